@@ -1,0 +1,1 @@
+"""Catenary: real-time EtherCAT for Python."""

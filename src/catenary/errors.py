@@ -1,0 +1,108 @@
+"""All errors of the package. Each says which device, what was asked, what came back, the likely
+cause and what to do next; the numbers are attributes.
+
+A caller's mistake is a ValueError or TypeError before anything is sent; these are a peer's, the
+network's or the machine's.
+"""
+
+from __future__ import annotations
+
+
+class CatenaryError(Exception):
+    """Base of all. `hint` is the next thing to do, without a full stop at its end."""
+
+    def __init__(self, message: str, *, hint: str = "") -> None:
+        super().__init__(message)
+        self.message = message
+        self.hint = hint
+
+    def __str__(self) -> str:
+        return f"{self.message}\n  hint: {self.hint}" if self.hint else self.message
+
+
+class DecodeError(CatenaryError):
+    """Bytes that are no value of the format: the only error a decoder raises."""
+
+
+class ConfigurationError(CatenaryError):
+    """A file or a wish that cannot be: names the file, field or object."""
+
+
+class LinkError(CatenaryError):
+    """A network interface that cannot be used: unknown, down, or not permitted."""
+
+
+class NoDeviceError(CatenaryError):
+    """Frames went out and no EtherCAT device answered."""
+
+
+class ResponseTimeout(CatenaryError):
+    """A device, or the whole segment, did not answer by a deadline."""
+
+
+class SegmentError(CatenaryError):
+    """The segment changed or contradicts itself: a device more, fewer, or answering twice."""
+
+
+class IdentityError(CatenaryError):
+    """A device is not the one expected."""
+
+    def __init__(self, message: str, *, position: int, expected: object, found: object, hint: str = "") -> None:
+        super().__init__(message, hint=hint)
+        self.position = position
+        self.expected = expected
+        self.found = found
+
+
+class EepromError(CatenaryError):
+    """The SII could not be read or written."""
+
+
+class MailboxError(CatenaryError):
+    """A device answered a mailbox service with a mailbox error, or against the protocol."""
+
+
+class SdoAbort(CatenaryError):
+    """A device refused an SDO service (ETG.1000.6 §5.6.2.7)."""
+
+    def __init__(
+        self, message: str, *, position: int, index: int, subindex: int, code: int, hint: str = ""
+    ) -> None:
+        super().__init__(message, hint=hint)
+        self.position = position
+        self.index = index
+        self.subindex = subindex
+        self.code = code
+
+
+class StateError(CatenaryError):
+    """A device refused an EtherCAT state or did not reach it in time."""
+
+    def __init__(
+        self, message: str, *, position: int, requested: int, actual: int, code: int, hint: str = ""
+    ) -> None:
+        super().__init__(message, hint=hint)
+        self.position = position
+        self.requested = requested
+        self.actual = actual
+        self.code = code
+
+
+class MappingError(CatenaryError):
+    """A wish for process data that a device cannot fulfil: names the object."""
+
+
+class LoopError(CatenaryError):
+    """The cyclic exchange could not go on. `log` holds the last cycles, oldest first."""
+
+    def __init__(self, message: str, *, log: object = None, hint: str = "") -> None:
+        super().__init__(message, hint=hint)
+        self.log = log
+
+
+class WorkingCounterError(LoopError):
+    """Devices stopped answering in the cyclic exchange: names the silent ones."""
+
+
+class DriveError(LoopError):
+    """A drive is in fault or cannot be enabled."""

@@ -1,0 +1,38 @@
+/* The image table: how a cycle exchanges its process images with whatever carries them:
+ * our frame engine on a link, or (later) libethercat.
+ *
+ * `emit` sends the output image, `collect` fills the input image. A sync unit is valid in this
+ * cycle when all of its datagrams came back with the expected working counter; the inputs of an
+ * invalid unit keep their last good values.
+ */
+#ifndef CATENARY_IMAGE_H
+#define CATENARY_IMAGE_H
+
+#include <stdint.h>
+
+#define CAT_IMAGE_CAPSULE "catenary.image"
+#define CAT_IMAGE_VERSION 1u
+
+typedef struct cat_image {
+    uint32_t version;                 /* CAT_IMAGE_VERSION */
+    uint32_t unit_count;
+    uint32_t output_size;             /* bytes */
+    uint32_t input_size;              /* bytes */
+    void *self;
+    uint8_t *outputs;                 /* output_size bytes, written by the cycle before emit */
+    const uint8_t *inputs;            /* input_size bytes, valid after collect */
+    const uint8_t *unit_valid;        /* unit_count flags, of the last collect */
+    const uint16_t *unit_counter;     /* unit_count sums of working counters, of the last collect */
+    const uint8_t *al_status;         /* one byte: OR of all AL states, bit 4: some device signals an error */
+    const int64_t *frame_stamp;       /* one value: when the last cyclic frame was seen [ns]; 0: none */
+
+    /* Sends the frames of this cycle. 0, or -errno of the first frame that could not go. */
+    int (*emit)(void *self);
+
+    /* Drains what has arrived and, until `deadline` [ns, link clock; 0: never waits], waits for
+     * the rest of the frames of the last emit. Number of its frames still missing (0: all back),
+     * or -errno. */
+    int (*collect)(void *self, int64_t deadline);
+} cat_image;
+
+#endif

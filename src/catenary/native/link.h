@@ -1,0 +1,44 @@
+/* The link table: how the compiled core, the compiled wrappers and the virtual segment
+ * hand Ethernet frames to one another without Python.
+ *
+ * A link carries whole Ethernet frames: destination MAC first, no preamble, no FCS.
+ * One thread uses a link at a time; nothing here allocates or raises.
+ * Python passes the table in a capsule named CAT_LINK_CAPSULE; whoever holds the table keeps
+ * the Python object that owns it alive.
+ */
+#ifndef CATENARY_LINK_H
+#define CATENARY_LINK_H
+
+#include <stdint.h>
+
+#define CAT_LINK_CAPSULE "catenary.link"
+#define CAT_LINK_VERSION 1u
+#define CAT_FRAME_MAX 1514u           /* header + 1500 bytes of payload, without FCS */
+#define CAT_FRAME_MIN 60u             /* shorter frames are padded before they are sent */
+
+/* flags */
+#define CAT_LINK_VIRTUAL_TIME 1u      /* `now` advances only in `wait_until`: run in the caller's thread */
+
+typedef struct cat_link {
+    uint32_t version;                 /* CAT_LINK_VERSION */
+    uint32_t flags;
+    void *self;
+
+    /* Sends one frame. 0, or -errno (-ENOBUFS: the device's queue is full, -ENETDOWN ...). */
+    int (*send)(void *self, const uint8_t *frame, uint32_t length);
+
+    /* Takes the oldest received frame without waiting: its length, with *frame pointing at bytes
+     * that stay valid until the next `receive` or `wait_until`; 0: none there; or -errno. */
+    int (*receive)(void *self, const uint8_t **frame);
+
+    /* The link's clock [ns]: CLOCK_MONOTONIC for a NIC, virtual time for a virtual segment. */
+    int64_t (*now)(void *self);
+
+    /* Waits until `deadline` [ns, absolute, the link's clock] and, where `wake_on_frame`, returns
+     * early once a frame can be received.
+     * 1: a frame is there (only with wake_on_frame); 0: the deadline has passed; or -errno
+     * (-EINTR: a signal came first; the caller decides). */
+    int (*wait_until)(void *self, int64_t deadline, int wake_on_frame);
+} cat_link;
+
+#endif

@@ -1,0 +1,157 @@
+"""CyclePlan: everything the compiled core needs to run a cycle, as a frozen value.
+
+Offsets count from the start of the process images: one image of outputs (MainDevice → SubDevices),
+one of inputs. Bits are numbered as on the wire: bit 0 of byte 0 first (little endian).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Literal
+
+Order = Literal["threaded", "inline", "law"]
+ReceiveMode = Literal["look", "wait", "spin"]
+
+
+class NumberKind(IntEnum):
+    """How the bits of a value are read."""
+
+    UNSIGNED = 0
+    SIGNED = 1
+    REAL = 2  # IEEE 754, 32 or 64 bits
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A value in a process image: where it sits and what one count of it means.
+
+    SI value = raw * scale + offset.
+    """
+
+    bit_offset: int
+    bit_length: int  # 1 to 64; REAL: 32 or 64
+    kind: NumberKind
+    scale: float = 1.0
+    offset: float = 0.0
+
+
+class Bank(IntEnum):
+    """Which array a column lives in."""
+
+    REAL = 0  # float64, SI units
+    INTEGER = 1  # int64, raw
+    BIT = 2  # uint8, 0 or 1
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A named value of any mapped object, outside the axes. Its place in its bank's array is its
+    rank among the columns of the same bank and direction, in the order of the plan."""
+
+    name: str
+    number: Number
+    bank: Bank
+    device: int  # position on the segment
+    sync_unit: int
+
+
+class DatagramKind(IntEnum):
+    PROCESS_DATA = 0
+    AL_STATUS = 1  # the BRD that rides in every cycle
+    CLOCK = 2  # distributed clocks
+
+
+@dataclass(frozen=True, slots=True)
+class Copy:
+    """Bytes that move between a frame and an image, `frame_offset` from the Ethernet header's start."""
+
+    frame_offset: int
+    image_offset: int
+    size: int
+
+
+@dataclass(frozen=True, slots=True)
+class DatagramPlan:
+    kind: DatagramKind
+    command: int
+    offset: int  # of its 10-byte header, from the start of the Ethernet frame
+    length: int  # of its data
+    expected_counter: int
+    sync_unit: int  # -1: belongs to none
+    outputs: tuple[Copy, ...] = ()  # image → frame, before sending
+    inputs: tuple[Copy, ...] = ()  # frame → image, after a valid return
+
+
+@dataclass(frozen=True, slots=True)
+class FramePlan:
+    """One frame of the cycle. `template` is the whole Ethernet frame with zeroed data; the core
+    patches the index of every datagram and the outputs."""
+
+    template: bytes
+    datagrams: tuple[DatagramPlan, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SyncUnit:
+    """The unit of validity: devices whose data is good or stale together."""
+
+    name: str
+    devices: tuple[int, ...]  # positions
+    optional: bool = False  # its loss does not make the cycle bad
+
+
+@dataclass(frozen=True, slots=True)
+class AxisLimits:
+    """What the core enforces whatever the application writes. None: no limit."""
+
+    position_min: float | None = None  # [rad]
+    position_max: float | None = None  # [rad]
+    velocity: float | None = None  # [rad/s], symmetric; in CSP it bounds the step per cycle
+    torque: float | None = None  # [N·m], symmetric
+
+
+@dataclass(frozen=True, slots=True)
+class AxisPlan:
+    """One CiA 402 axis: slot k of a device (objects + 0x800·k), with every quantity's place or None."""
+
+    name: str
+    device: int
+    slot: int
+    sync_unit: int
+    mode: int  # modes of operation 0x6060 at the start: 8 CSP, 9 CSV, 10 CST
+    controlword: Number
+    statusword: Number
+    mode_target: Number | None = None  # 0x6060
+    mode_actual: Number | None = None  # 0x6061
+    target_position: Number | None = None  # 0x607A
+    target_velocity: Number | None = None  # 0x60FF
+    target_torque: Number | None = None  # 0x6071
+    actual_position: Number | None = None  # 0x6064
+    actual_velocity: Number | None = None  # 0x606C
+    actual_torque: Number | None = None  # 0x6077
+    limits: AxisLimits = AxisLimits()
+    ramp_velocity: float = 100.0  # [rad/s²] at which CSV falls to zero when Python is late
+    ramp_torque: float = 1000.0  # [N·m/s] at which CST falls to zero when Python is late
+
+
+@dataclass(frozen=True, slots=True)
+class CyclePlan:
+    period_ns: int
+    order: Order
+    receive_mode: ReceiveMode
+    collect_deadline_ns: int  # threaded: how long after the wake-up the frames may come back
+    output_size: int
+    input_size: int
+    frames: tuple[FramePlan, ...]
+    sync_units: tuple[SyncUnit, ...]
+    device_count: int
+    axes: tuple[AxisPlan, ...] = ()
+    output_columns: tuple[Column, ...] = ()
+    input_columns: tuple[Column, ...] = ()
+    lost_limit: int = 3  # cycles in a row before WorkingCounterError
+    late_limit_position_ns: int = 50_000_000  # CSP; 0: off
+    late_limit_velocity_ns: int = 10_000_000  # CSV and CST; 0: off
+    stop_deadline_ns: int = 2_000_000_000  # quick stop to standstill, at most
+    cpu: int | None = None  # of the native thread
+    priority: int | None = 80  # SCHED_FIFO; None: leave the scheduling as it is

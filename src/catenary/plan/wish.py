@@ -1,0 +1,96 @@
+"""Wish: what an application asks of the devices, before it is known where the bytes will sit.
+
+`loop` and `drive` meet here: a Loop takes wishes and never asks what kind they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from catenary.plan.cycle import AxisPlan, Column, Number
+
+Reals = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+Words = npt.NDArray[np.uint16]
+Bytes = npt.NDArray[np.uint8]
+Modes = npt.NDArray[np.int8]
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectReference:
+    """An entry of the object dictionary, to be mapped into the process data."""
+
+    index: int
+    subindex: int
+    bit_length: int
+
+
+@dataclass(frozen=True, slots=True)
+class PdoWish:
+    """The objects one device must exchange every cycle. What is mapped already stays as it is;
+    the mapping is changed only where something wished for is missing."""
+
+    outputs: tuple[ObjectReference, ...] = ()  # MainDevice → device (RxPDO)
+    inputs: tuple[ObjectReference, ...] = ()  # device → MainDevice (TxPDO)
+    start_up: tuple[tuple[int, int, bytes], ...] = ()  # SDO downloads in PRE-OP: index, subindex, data
+
+
+class ImageLayout(Protocol):
+    """Where the mapped objects ended up."""
+
+    def output(self, device: int, index: int, subindex: int) -> Number | None: ...
+    def input(self, device: int, index: int, subindex: int) -> Number | None: ...
+    def sync_unit(self, device: int) -> int: ...
+
+
+@dataclass(frozen=True, slots=True)
+class WishTables:
+    """A wish as numbers."""
+
+    axes: tuple[AxisPlan, ...] = ()
+    output_columns: tuple[Column, ...] = ()
+    input_columns: tuple[Column, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Views:
+    """The part of the loop's private buffers that belongs to one wish: views, not copies.
+
+    n axes; columns by bank. `actual_*` change only in `next(loop)`; `target_*` are read there.
+    """
+
+    actual_position: Reals  # (n,) [rad]
+    actual_velocity: Reals  # (n,) [rad/s]
+    actual_torque: Reals  # (n,) [N·m]
+    statusword: Words  # (n,)
+    mode_actual: Modes  # (n,)
+    axis_state: Bytes  # (n,) CiA 402 state, wire.cia402.State
+    axis_flags: Bytes  # (n,) bit 0: set-points are followed; bit 1: limited in this cycle
+    target_position: Reals
+    target_velocity: Reals
+    target_torque: Reals
+    mode_target: Modes
+    goal: Bytes  # (n,) drive goal: 0 disabled, 1 enabled, 2 quick stop
+    controlword_bits: Words  # (n,) the mode's own control bits (4, 5, 6, 9, 11 to 15), or-ed in
+    input_reals: Reals
+    input_integers: Integers
+    input_bits: Bytes
+    output_reals: Reals
+    output_integers: Integers
+    output_bits: Bytes
+
+
+class Wish(Protocol):
+    def pdos(self, period_ns: int) -> Mapping[int, PdoWish]:
+        """The objects wished for, by device position."""
+
+    def tables(self, layout: ImageLayout) -> WishTables:
+        """The same as axes and columns, now that the layout is known."""
+
+    def bind(self, views: Views) -> None:
+        """Receives its views when the loop opens."""
