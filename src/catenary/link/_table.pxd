@@ -1,0 +1,28 @@
+from libc.stdint cimport int64_t, uint8_t, uint32_t
+
+cdef extern from "link.h" nogil:
+    const char *CAT_LINK_CAPSULE
+    const uint32_t CAT_LINK_VERSION
+    const uint32_t CAT_LINK_VIRTUAL_TIME
+    enum:
+        CAT_FRAME_MAX
+        CAT_FRAME_MIN
+    ctypedef struct cat_link:
+        uint32_t version
+        uint32_t flags
+        void *self
+        int (*send)(void *self, const uint8_t *frame, uint32_t length) noexcept nogil
+        int (*receive)(void *self, const uint8_t **frame) noexcept nogil
+        int64_t (*now)(void *self) noexcept nogil
+        int (*wait_until)(void *self, int64_t deadline, int wake_on_frame) noexcept nogil
+
+
+cdef class TableLink:
+    cdef cat_link table
+    cdef readonly str name
+    cdef int close_table(self) except -1
+    cdef void disconnect(self)
+    cdef failed(self, str verb, int number)
+
+
+cdef cat_link *table_of(object capsule) except NULL

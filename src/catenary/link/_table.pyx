@@ -1,0 +1,132 @@
+"""The Python methods of a link, over its C table (`native/link.h`).
+
+Compiled links derive from `TableLink`, fill its `table` and get the rest. Closing replaces the four
+calls of the table, so that whoever still holds it gets -EBADF instead of freed memory.
+"""
+
+from cpython.exc cimport PyErr_CheckSignals
+from cpython.pycapsule cimport (
+    PyCapsule_GetContext, PyCapsule_GetPointer, PyCapsule_New, PyCapsule_SetContext,
+)
+from cpython.ref cimport Py_DECREF, Py_INCREF, PyObject
+from libc.errno cimport EBADF, EINTR
+from libc.stdint cimport int64_t, uint8_t, uint32_t
+from libc.string cimport memset
+
+import os
+
+from catenary.errors import LinkError
+
+
+cdef cat_link *table_of(object capsule) except NULL:
+    """The checked table in a capsule; the caller keeps the capsule alive."""
+    cdef cat_link *table = <cat_link *> PyCapsule_GetPointer(capsule, CAT_LINK_CAPSULE)
+    if table.version != CAT_LINK_VERSION:
+        raise ValueError(f"link table of version {table.version}, expected {CAT_LINK_VERSION}")
+    return table
+
+
+cdef void release_owner(object capsule) noexcept:
+    cdef void *owner = PyCapsule_GetContext(capsule)
+    if owner != NULL:
+        Py_DECREF(<object> owner)
+
+
+cdef int closed_send(void *self, const uint8_t *frame, uint32_t length) noexcept nogil:
+    return -EBADF
+
+
+cdef int closed_receive(void *self, const uint8_t **frame) noexcept nogil:
+    return -EBADF
+
+
+cdef int64_t closed_now(void *self) noexcept nogil:
+    return 0
+
+
+cdef int closed_wait_until(void *self, int64_t deadline, int wake_on_frame) noexcept nogil:
+    return -EBADF
+
+
+cdef class TableLink:
+    """Owns one link table; a base for the compiled links of this package."""
+
+    def __cinit__(self):
+        memset(&self.table, 0, sizeof(cat_link))
+        self.table.version = CAT_LINK_VERSION
+        self.name = ""
+        self.disconnect()
+
+    cdef int close_table(self) except -1:
+        """Gives back what the table uses. Called once at most with a connected table."""
+        return 0
+
+    cdef void disconnect(self):
+        self.table.send = closed_send
+        self.table.receive = closed_receive
+        self.table.now = closed_now
+        self.table.wait_until = closed_wait_until
+
+    @property
+    def capsule(self):
+        """The table for compiled users; the capsule keeps this link alive, not open."""
+        capsule = PyCapsule_New(&self.table, CAT_LINK_CAPSULE, release_owner)
+        PyCapsule_SetContext(capsule, <void *> <PyObject *> self)
+        Py_INCREF(self)
+        return capsule
+
+    @property
+    def closed(self):
+        return self.table.send == closed_send
+
+    def open_link(self):
+        """An open link is its own source."""
+        return self
+
+    def send(self, bytes frame not None):
+        cdef int status = self.table.send(self.table.self, frame, <uint32_t> len(frame))
+        if status < 0:
+            raise self.failed("send", -status)
+
+    def receive(self):
+        cdef const uint8_t *frame = NULL
+        cdef int length = self.table.receive(self.table.self, &frame)
+        if length < 0:
+            raise self.failed("receive", -length)
+        return frame[:length] if length > 0 else None
+
+    def now(self):
+        return self.table.now(self.table.self)
+
+    def wait_until(self, int64_t deadline_ns, bint wake_on_frame):
+        cdef int status
+        while True:
+            with nogil:
+                status = self.table.wait_until(self.table.self, deadline_ns, wake_on_frame)
+            if status != -EINTR:
+                break
+            PyErr_CheckSignals()
+        if status < 0:
+            raise self.failed("wait", -status)
+        return status == 1
+
+    cdef failed(self, str verb, int number):
+        hint = "the link is closed" if number == EBADF else ""
+        return LinkError(f"{self.name}: cannot {verb}: {os.strerror(number)}", hint=hint)
+
+    def close(self):
+        if self.closed:
+            return
+        try:
+            self.close_table()
+        finally:
+            self.disconnect()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *exc_info):
+        self.close()
+
+    def __repr__(self):
+        return f"<{type(self).__name__} {self.name}{' (closed)' if self.closed else ''}>"
