@@ -44,6 +44,7 @@ class After(NamedTuple):
 
 Step: TypeAlias = list[Request] | After
 T = TypeVar("T")
+V = TypeVar("V", int, bytes)
 Procedure: TypeAlias = Generator[Step, list[Reply] | None, T]
 
 
@@ -58,14 +59,14 @@ def physical(station: int, address: int) -> int:
 
 
 def read(
-    command: Command, station: int, register: Register, *, repeatable: bool = True
+    command: Command, station: int, register: Register[V], *, repeatable: bool = True
 ) -> Request:
     """Reads one register; `station` is a station address, a negative position or 0 (broadcast)."""
     return Request(command, physical(station, register.address), bytes(register.size), repeatable)
 
 
 def write(
-    command: Command, station: int, register: Register, value: object, *, repeatable: bool = True
+    command: Command, station: int, register: Register[V], value: V, *, repeatable: bool = True
 ) -> Request:
     """Writes one register."""
     return Request(command, physical(station, register.address), register.pack(value), repeatable)

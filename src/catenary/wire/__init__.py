@@ -1,1 +1,1 @@
-"""(being built)"""
+"""Bytes ↔ frozen values, one file per chapter of the standard. Decoders raise `DecodeError` only."""

@@ -1,0 +1,144 @@
+"""EtherCAT datagrams, ETG.1000.4 §5.4: header, data, working counter."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from enum import IntEnum
+
+from catenary.errors import DecodeError
+
+
+class Command(IntEnum):
+    """What every controller on the way does with a datagram, ETG.1000.4 §5.4.1."""
+
+    NOP = 0
+    APRD = 1  # auto-increment: read, write, both
+    APWR = 2
+    APRW = 3
+    FPRD = 4  # configured station address
+    FPWR = 5
+    FPRW = 6
+    BRD = 7  # broadcast
+    BWR = 8
+    BRW = 9
+    LRD = 10  # logical address, through the FMMUs
+    LWR = 11
+    LRW = 12
+    ARMW = 13  # read by the one addressed, written by all others
+    FRMW = 14
+
+    @property
+    def reads(self) -> bool:
+        """Whether a device puts data into the datagram."""
+        return self in _READS
+
+    @property
+    def writes(self) -> bool:
+        """Whether a device takes data from the datagram."""
+        return self in _WRITES
+
+    @property
+    def is_logical(self) -> bool:
+        """Whether the address is a logical one."""
+        return self in (Command.LRD, Command.LWR, Command.LRW)
+
+
+_READS = frozenset(
+    (
+        *(Command.APRD, Command.APRW, Command.FPRD, Command.FPRW, Command.BRD, Command.BRW),
+        *(Command.LRD, Command.LRW, Command.ARMW, Command.FRMW),
+    )
+)
+_WRITES = frozenset(
+    (
+        *(Command.APWR, Command.APRW, Command.FPWR, Command.FPRW, Command.BWR, Command.BRW),
+        *(Command.LWR, Command.LRW, Command.ARMW, Command.FRMW),
+    )
+)
+
+HEADER_SIZE = 10
+WORKING_COUNTER_SIZE = 2
+OVERHEAD = HEADER_SIZE + WORKING_COUNTER_SIZE
+MAXIMUM_DATA_SIZE = 0x07FF  # by the 11-bit field; one Ethernet frame holds 1486 bytes
+
+_HEADER = struct.Struct("<BBIHH")
+_LENGTH_MASK = 0x07FF
+_RESERVED_MASK = 0x3800
+_CIRCULATING = 0x4000
+_MORE_FOLLOWS = 0x8000
+
+
+@dataclass(frozen=True, slots=True)
+class Datagram:
+    """One datagram. `address`: the 32 bits as on the wire, ADP | ADO << 16 or the logical address.
+
+    `circulating`: a controller has seen it pass twice (a broken ring). `interrupt`: the ECAT event
+    requests of all devices, or-ed together.
+    """
+
+    command: Command
+    address: int
+    data: bytes
+    index: int = 0
+    working_counter: int = 0
+    circulating: bool = False
+    interrupt: int = 0
+
+    @property
+    def adp(self) -> int:
+        """Position (two's complement, counted up by each device) or station address."""
+        return self.address & 0xFFFF
+
+    @property
+    def ado(self) -> int:
+        """Address in the memory of the device."""
+        return self.address >> 16
+
+    @property
+    def size(self) -> int:
+        """Its length on the wire in bytes."""
+        return OVERHEAD + len(self.data)
+
+    def encode(self, *, more_follows: bool = False) -> bytes:
+        """Its bytes. ValueError if a field does not fit."""
+        if len(self.data) > MAXIMUM_DATA_SIZE:
+            raise ValueError(f"datagram of {len(self.data)} bytes: at most {MAXIMUM_DATA_SIZE}")
+        length = len(self.data)
+        length |= _CIRCULATING if self.circulating else 0
+        length |= _MORE_FOLLOWS if more_follows else 0
+        try:
+            header = _HEADER.pack(self.command, self.index, self.address, length, self.interrupt)
+            return header + self.data + struct.pack("<H", self.working_counter)
+        except struct.error as error:
+            raise ValueError(f"{self.command.name} datagram: {error}") from None
+
+
+def decode_datagram(data: bytes, offset: int = 0) -> tuple[Datagram, bool]:
+    """The datagram at `offset`, and whether another follows it."""
+    if not 0 <= offset <= len(data) - OVERHEAD:
+        raise DecodeError(
+            f"datagram at byte {offset}: {max(len(data) - offset, 0)} bytes left, needs {OVERHEAD}"
+        )
+    command, index, address, length, interrupt = _HEADER.unpack_from(data, offset)
+    if command > Command.FRMW:
+        raise DecodeError(f"datagram at byte {offset}: unknown command {command}")
+    if length & _RESERVED_MASK:
+        raise DecodeError(f"datagram at byte {offset}: reserved bits set in 0x{length:04X}")
+    start = offset + HEADER_SIZE
+    end = start + (length & _LENGTH_MASK)
+    if end + WORKING_COUNTER_SIZE > len(data):
+        raise DecodeError(
+            f"datagram at byte {offset}: says {end - start} bytes of data, "
+            f"{max(len(data) - start - WORKING_COUNTER_SIZE, 0)} received"
+        )
+    datagram = Datagram(
+        Command(command),
+        address,
+        bytes(data[start:end]),
+        index,
+        int.from_bytes(data[end : end + WORKING_COUNTER_SIZE], "little"),
+        bool(length & _CIRCULATING),
+        interrupt,
+    )
+    return datagram, bool(length & _MORE_FOLLOWS)
