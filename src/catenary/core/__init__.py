@@ -1,1 +1,54 @@
-"""(being built)"""
+"""The compiled cyclic core: frames, axes, hand-over, cycle, thread. It knows bytes, arrays and the
+tables of a CyclePlan, read by attribute; it imports nothing of catenary."""
+
+from catenary.core._cia402 import (
+    GOAL_DISABLED,
+    GOAL_ENABLED,
+    GOAL_QUICK_STOP,
+    controlword_towards,
+    state_of,
+)
+from catenary.core._engine import (
+    AXIS_DROPPED,
+    AXIS_FALLBACK,
+    AXIS_FOLLOWED,
+    AXIS_LIMITED,
+    AXIS_REFUSED,
+    CYCLE_DROPPED,
+    CYCLE_LATE,
+    CYCLE_LAW_DONE,
+    CYCLE_LIMITED,
+    CYCLE_NONE,
+    CYCLE_OK,
+    CYCLE_REFUSED,
+    CYCLE_STOPPED,
+    CYCLE_UNCOMMITTED,
+    CYCLE_WORKING_COUNTER,
+    RECORD_FIELDS,
+    Engine,
+)
+
+__all__ = [
+    "AXIS_DROPPED",
+    "AXIS_FALLBACK",
+    "AXIS_FOLLOWED",
+    "AXIS_LIMITED",
+    "AXIS_REFUSED",
+    "CYCLE_DROPPED",
+    "CYCLE_LATE",
+    "CYCLE_LAW_DONE",
+    "CYCLE_LIMITED",
+    "CYCLE_NONE",
+    "CYCLE_OK",
+    "CYCLE_REFUSED",
+    "CYCLE_STOPPED",
+    "CYCLE_UNCOMMITTED",
+    "CYCLE_WORKING_COUNTER",
+    "GOAL_DISABLED",
+    "GOAL_ENABLED",
+    "GOAL_QUICK_STOP",
+    "RECORD_FIELDS",
+    "Engine",
+    "controlword_towards",
+    "state_of",
+]

@@ -17,6 +17,7 @@ from catenary.plan.cycle import AxisPlan, Column, Number
 Reals = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 Words = npt.NDArray[np.uint16]
+Serials = npt.NDArray[np.uint32]
 Bytes = npt.NDArray[np.uint8]
 Modes = npt.NDArray[np.int8]
 
@@ -70,12 +71,16 @@ class Views:
     statusword: Words  # (n,)
     mode_actual: Modes  # (n,)
     axis_state: Bytes  # (n,) CiA 402 state, wire.cia402.State
-    axis_flags: Bytes  # (n,) bit 0: set-points are followed; bit 1: limited in this cycle
+    # axis_flags (n,): bit 0: set-points are followed; 1: the last one was limited; 2: the goal
+    # dropped to disabled by itself; 3: the target was NaN or infinite and refused; 4: no fresh
+    # target: holding or ramping to zero; bits 6 and 7: the goal in force
+    axis_flags: Bytes
     target_position: Reals
     target_velocity: Reals
     target_torque: Reals
     mode_target: Modes
-    goal: Bytes  # (n,) drive goal: 0 disabled, 1 enabled, 2 quick stop
+    goal: Bytes  # (n,) drive goal: 0 disabled, 1 enabled, 2 quick stop; taken over when
+    request: Serials  # (n,) has changed: a goal that dropped comes back only by a new request
     controlword_bits: Words  # (n,) the mode's own control bits (4, 5, 6, 9, 11 to 15), or-ed in
     input_reals: Reals
     input_integers: Integers
