@@ -1,38 +1,42 @@
-# Two commands for a newcomer: `make demo` and `make test`. Both do all the set-up.
+# Two commands for a newcomer: `make demo` and `make test`. Both do all the set-up, once.
+#
+# PYTHON=/path/to/python3.12 takes another interpreter, and makes .venv anew for it.
+# TEST="-k axis" passes options to pytest.
 PYTHON ?= python3
 VENV := .venv
-SOURCES := $(shell find src -name '*.pyx' -o -name '*.pxd' -o -name '*.pxi' -o -name '*.h') CMakeLists.txt pyproject.toml
+TEST ?=
+SOURCES := CMakeLists.txt pyproject.toml \
+           $(shell find src -name '*.pyx' -o -name '*.pxd' -o -name '*.pxi' -o -name '*.h')
+CHECKED := src tests tools examples
+
+ifneq ($(origin PYTHON),file)
+  PREFIX := -c 'import sys; print(sys.base_prefix)'
+  ifneq ($(shell $(PYTHON) $(PREFIX)),$(shell $(VENV)/bin/python $(PREFIX) 2>/dev/null))
+    $(shell rm -rf $(VENV))
+  endif
+endif
 
 .PHONY: demo test lint build clean
 
-$(VENV)/bin/python:
-	$(PYTHON) -m venv --copies $(VENV)
+demo: $(VENV)/.built
+	@$(VENV)/bin/catenary demo
 
-$(VENV)/.requirements: $(VENV)/bin/python pyproject.toml
-	$(VENV)/bin/pip install -q "scikit-build-core>=0.11" "cython>=3.1" "cython-cmake>=0.2" ninja cmake
-	touch $@
+test: $(VENV)/.with-test
+	@$(VENV)/bin/python -m catenary.realtime.private_network -m pytest $(TEST)
 
-$(VENV)/.built: $(VENV)/.requirements $(SOURCES)
-	$(VENV)/bin/pip install -q --no-build-isolation -e '.[test]'
-	touch $@
+lint: $(VENV)/.with-lint
+	@$(VENV)/bin/ruff check $(wildcard $(CHECKED))
+	@$(VENV)/bin/ruff format --check $(wildcard $(CHECKED))
+	@$(VENV)/bin/mypy
+	@$(VENV)/bin/lint-imports
 
-$(VENV)/.lint: $(VENV)/.built
-	$(VENV)/bin/pip install -q -e '.[lint]' --no-build-isolation
-	touch $@
+build: $(VENV)/.with-test
 
-build: $(VENV)/.built
+$(VENV)/.built: $(SOURCES)
+	@tools/set_up $(VENV) $(PYTHON)
 
-test: build
-	$(VENV)/bin/python -m pytest
-
-demo: build
-	$(VENV)/bin/catenary demo
-
-lint: $(VENV)/.lint
-	$(VENV)/bin/ruff check src tests
-	$(VENV)/bin/ruff format --check src tests
-	$(VENV)/bin/mypy
-	$(VENV)/bin/lint-imports
+$(VENV)/.with-%: $(VENV)/.built pyproject.toml
+	@tools/install_extra $(VENV) $*
 
 clean:
-	rm -rf $(VENV) build
+	rm -rf $(VENV) build out

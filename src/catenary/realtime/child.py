@@ -1,0 +1,124 @@
+"""Children that end with us: a session of their own, a parent-death signal, an end by deadline.
+
+Their own session keeps a Ctrl-C in our terminal from them: we end them, after what needs them.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import os
+import runpy
+import select
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from types import TracebackType
+from typing import IO, Self
+
+PR_SET_PDEATHSIG = 1  # linux/prctl.h
+
+
+class Child:
+    """Owns one running child process. Its standard output is ours to read."""
+
+    def __init__(self, process: subprocess.Popen[bytes]) -> None:
+        self.process = process
+        self.unread = b""
+
+    @property
+    def pid(self) -> int:
+        return self.process.pid
+
+    @property
+    def running(self) -> bool:
+        return self.process.poll() is None
+
+    def read_line(self, seconds: float) -> str | None:
+        """The next line of its output; None: it ended, or wrote none within `seconds`."""
+        output = self.process.stdout
+        assert output is not None
+        deadline = time.monotonic() + seconds
+        while b"\n" not in self.unread:
+            if not wait_readable(output, deadline):
+                return None
+            read = os.read(output.fileno(), 4096)
+            if not read:
+                return None
+            self.unread += read
+        line, _, self.unread = self.unread.partition(b"\n")
+        return line.decode(errors="replace")
+
+    def end(self, seconds: float = 3.0) -> int:
+        """SIGTERM, and SIGKILL after `seconds`; its exit status."""
+        if self.running:
+            with contextlib.suppress(ProcessLookupError):
+                self.process.terminate()
+            try:
+                self.process.wait(seconds)
+            except subprocess.TimeoutExpired:
+                self.process.kill()
+        status = self.process.wait()
+        if self.process.stdout is not None:
+            self.process.stdout.close()
+        return status
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.end()
+
+
+def wait_readable(output: IO[bytes], deadline: float) -> bool:
+    left = max(deadline - time.monotonic(), 0.0)
+    return bool(select.select([output], [], [], left)[0])
+
+
+def start_python(arguments: Sequence[str]) -> Child:
+    """Starts this interpreter with `-m module ...` or `script.py ...` as a child."""
+    if not arguments or (arguments[0] == "-m" and len(arguments) < 2):
+        raise ValueError("arguments are `-m module ...` or `script.py ...`")
+    command = [sys.executable, "-m", "catenary.realtime.child", str(os.getpid()), *arguments]
+    return Child(subprocess.Popen(command, stdout=subprocess.PIPE, start_new_session=True))
+
+
+def start_program(command: Sequence[str]) -> Child:
+    """Starts any program as a child."""
+    if not command:
+        raise ValueError("no program named")
+    own = [sys.executable, "-m", "catenary.realtime.child", str(os.getpid()), "--exec", *command]
+    return Child(subprocess.Popen(own, stdout=subprocess.PIPE, start_new_session=True))
+
+
+def end_with_parent(parent: int) -> None:
+    """Has the kernel send us SIGTERM when `parent` ends.
+
+    Called in the child itself: a parent-death signal set before the start of an interpreter with
+    file capabilities (our advice to ordinary users) is cleared by that start, prctl(2).
+    """
+    if ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM) != 0 or os.getppid() != parent:
+        sys.exit("the parent process has ended")
+
+
+def main(arguments: Sequence[str]) -> None:
+    end_with_parent(int(arguments[0]))
+    if arguments[1] == "--exec":
+        os.execvp(arguments[2], list(arguments[2:]))
+    if arguments[1] == "-m":
+        sys.argv = list(arguments[2:])
+        runpy.run_module(arguments[2], run_name="__main__", alter_sys=True)
+    else:
+        sys.argv = list(arguments[1:])
+        runpy.run_path(arguments[1], run_name="__main__")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

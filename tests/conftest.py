@@ -1,0 +1,90 @@
+"""What tests stand on: shared data, and wires of our own.
+
+A test that uses `shared_data` or `veth` is skipped, with the reason, where there is none, and is
+marked `shared_data` or `wire`. `--require MARKER` turns those skips into failures and fails when
+no test so marked passed: what CI asks for.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Never
+
+import pytest
+
+from catenary.realtime import private_network
+
+ROOT = Path(__file__).resolve().parent.parent
+FIXTURE_OF = {"shared_data": "shared_data", "wire": "veth"}  # marker: fixture
+REQUIRED = pytest.StashKey[set[str]]()
+PASSED = pytest.StashKey[set[str]]()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--require",
+        action="append",
+        default=[],
+        choices=sorted(FIXTURE_OF),
+        metavar="MARKER",
+        help="fail unless tests with this marker ran (shared_data, wire)",
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.stash[REQUIRED] = set(config.getoption("--require"))
+    config.stash[PASSED] = set()
+
+
+def pytest_itemcollected(item: pytest.Item) -> None:
+    for marker, fixture in FIXTURE_OF.items():
+        if fixture in getattr(item, "fixturenames", ()):
+            item.add_marker(marker)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
+    report = yield
+    if report.when == "call" and report.passed:
+        item.config.stash[PASSED].update(mark.name for mark in item.iter_markers())
+    return report
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    missing = session.config.stash[REQUIRED] - session.config.stash[PASSED]
+    if missing and session.exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def pytest_terminal_summary(
+    terminalreporter: pytest.TerminalReporter, config: pytest.Config
+) -> None:
+    for marker in sorted(config.stash[REQUIRED] - config.stash[PASSED]):
+        terminalreporter.write_line(f"REQUIRED: no test marked {marker} passed", red=True)
+
+
+def lacking(config: pytest.Config, marker: str, reason: str) -> Never:
+    if marker in config.stash[REQUIRED]:
+        pytest.fail(reason, pytrace=False)
+    pytest.skip(reason)
+
+
+@pytest.fixture(scope="session")
+def shared_data(pytestconfig: pytest.Config) -> Path:
+    """The folder of captures, SII images and device descriptions, shared between projects."""
+    folder = Path(os.environ.get("CATENARY_SHARED") or ROOT.parent / "shared") / "data"
+    if not folder.is_dir():
+        lacking(pytestconfig, "shared_data", f"no shared data: {folder} is no folder")
+    return folder
+
+
+@pytest.fixture
+def veth(pytestconfig: pytest.Config) -> Iterator[tuple[str, str]]:
+    """The names of two connected network interfaces, nobody else's."""
+    state = private_network.state()
+    if isinstance(state, private_network.Refused):
+        lacking(pytestconfig, "wire", f"no wire: {state.reason}: run `make test`")
+    with private_network.veth_pair() as names:
+        yield names
