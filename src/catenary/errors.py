@@ -76,12 +76,22 @@ class SdoAbort(CatenaryError):
 
 
 class StateError(CatenaryError):
-    """A device refused an EtherCAT state or did not reach it in time."""
+    """A device refused an EtherCAT state, did not reach it in time, or left it. `log`: the last
+    cycles where that happened in a loop."""
 
     def __init__(
-        self, message: str, *, position: int, requested: int, actual: int, code: int, hint: str = ""
+        self,
+        message: str,
+        *,
+        position: int,
+        requested: int,
+        actual: int,
+        code: int,
+        log: object = None,
+        hint: str = "",
     ) -> None:
         super().__init__(message, hint=hint)
+        self.log = log
         self.position = position
         self.requested = requested
         self.actual = actual

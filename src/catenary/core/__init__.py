@@ -5,6 +5,7 @@ from catenary.core._cia402 import (
     GOAL_DISABLED,
     GOAL_ENABLED,
     GOAL_QUICK_STOP,
+    GOAL_RESET,
     controlword_towards,
     state_of,
 )
@@ -47,6 +48,7 @@ __all__ = [
     "GOAL_DISABLED",
     "GOAL_ENABLED",
     "GOAL_QUICK_STOP",
+    "GOAL_RESET",
     "RECORD_FIELDS",
     "Engine",
     "controlword_towards",

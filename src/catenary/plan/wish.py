@@ -79,7 +79,8 @@ class Views:
     target_velocity: Reals
     target_torque: Reals
     mode_target: Modes
-    goal: Bytes  # (n,) drive goal: 0 disabled, 1 enabled, 2 quick stop; taken over when
+    goal: Bytes  # (n,) drive goal: 0 disabled, 1 enabled, 2 quick stop, 3 disabled with a fault
+    # reset (so that a fault can be acknowledged without moving on); taken over when
     request: Serials  # (n,) has changed: a goal that dropped comes back only by a new request
     controlword_bits: Words  # (n,) the mode's own control bits (4, 5, 6, 9, 11 to 15), or-ed in
     input_reals: Reals
