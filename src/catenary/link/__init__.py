@@ -1,10 +1,13 @@
 """Cables: raw sockets, and recorders, replays and fault injectors round any link.
 
-with Interface("eth0").open_link() as link:
+with Recorder(Interface("eth0"), "run.pcapng") as link:
     link.send(frame)
 """
 
+from catenary.link._fault_injector import FaultInjector
+from catenary.link._recorder import Recorder
+from catenary.link.fault import Fault
 from catenary.link.interface import Interface
 from catenary.link.protocol import Link, LinkSource
 
-__all__ = ["Interface", "Link", "LinkSource"]
+__all__ = ["Fault", "FaultInjector", "Interface", "Link", "LinkSource", "Recorder"]

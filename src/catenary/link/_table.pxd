@@ -26,3 +26,10 @@ cdef class TableLink:
 
 
 cdef cat_link *table_of(object capsule) except NULL
+
+
+cdef class WrapperLink(TableLink):
+    cdef cat_link *inner
+    cdef readonly object link
+    cdef object inner_capsule
+    cdef int wrap(self, object link) except -1

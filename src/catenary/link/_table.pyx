@@ -16,6 +16,7 @@ from libc.string cimport memset
 import os
 
 from catenary.errors import LinkError
+from catenary.link.protocol import open_link
 
 
 cdef cat_link *table_of(object capsule) except NULL:
@@ -130,3 +131,21 @@ cdef class TableLink:
 
     def __repr__(self):
         return f"<{type(self).__name__} {self.name}{' (closed)' if self.closed else ''}>"
+
+
+cdef class WrapperLink(TableLink):
+    """Owns the link it is wrapped round: closing closes both. A base for recorders and the like."""
+
+    cdef int wrap(self, object link) except -1:
+        """Opens `link`, where it is a source, and takes its table, clock and flags."""
+        opened = open_link(link)
+        self.inner_capsule = opened.capsule
+        self.inner = table_of(self.inner_capsule)
+        self.link = opened
+        self.name = opened.name
+        self.table.flags = self.inner.flags
+        return 0
+
+    cdef int close_table(self) except -1:
+        self.link.close()
+        return 0

@@ -49,3 +49,8 @@ class LinkSource(Protocol):
     """Anything a MainDevice can be opened on: `Interface`, a virtual segment, an open link."""
 
     def open_link(self) -> Link: ...
+
+
+def open_link(source: Link | LinkSource) -> Link:
+    """The link of a source; an open link as it is."""
+    return source.open_link() if isinstance(source, LinkSource) else source

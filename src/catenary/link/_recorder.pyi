@@ -1,0 +1,13 @@
+import os
+
+from catenary.link._table import WrapperLink
+from catenary.link.protocol import Link, LinkSource
+
+class Recorder(WrapperLink):
+    def __init__(self, link: Link | LinkSource, path: str | os.PathLike[str]) -> None: ...
+    @property
+    def path(self) -> str: ...
+    @property
+    def recorded(self) -> int: ...
+    @property
+    def dropped(self) -> int: ...

@@ -1,0 +1,274 @@
+"""A recorder round a link: every frame, both ways, into a pcapng file.
+
+In the cycle a frame is copied into a ring of finished pcapng blocks (about 0.1 us); a thread of its
+own writes the ring to the file and never holds up the cycle: a full ring drops and counts.
+In virtual time there is no cycle to hold up: the caller writes when the ring is half full, and
+nothing is dropped.
+"""
+
+from libc.errno cimport EINTR, errno
+from libc.stdint cimport int64_t, uint8_t, uint16_t, uint32_t, uint64_t
+from libc.stdlib cimport free, malloc
+from libc.string cimport memcpy
+from posix.time cimport nanosleep, timespec
+from posix.unistd cimport write
+
+from catenary.link._table cimport CAT_LINK_VIRTUAL_TIME, WrapperLink, cat_link
+
+import os
+import time
+import warnings
+
+from catenary.link.pcapng_blocks import closing_block, opening_blocks
+
+cdef extern from "atomics.h" nogil:
+    uint32_t cat_load_acquire32(const uint32_t *p)
+    uint64_t cat_load_acquire64(const uint64_t *p)
+    uint64_t cat_load_relaxed64(const uint64_t *p)
+    void cat_store_release32(uint32_t *p, uint32_t v)
+    void cat_store_release64(uint64_t *p, uint64_t v)
+
+cdef extern from "<pthread.h>" nogil:
+    ctypedef unsigned long pthread_t
+    ctypedef struct pthread_attr_t:
+        pass
+    enum:
+        PTHREAD_EXPLICIT_SCHED
+    int pthread_attr_init(pthread_attr_t *attributes)
+    int pthread_attr_setinheritsched(pthread_attr_t *attributes, int inherit)
+    int pthread_attr_destroy(pthread_attr_t *attributes)
+    int pthread_create(
+        pthread_t *thread, const pthread_attr_t *attributes,
+        void *(*start)(void *) noexcept nogil, void *argument)
+    int pthread_join(pthread_t thread, void **result)
+
+cdef enum:
+    RING_BYTES = 4 * 1024 * 1024      # a power of two: 10 s of three drives at 1 kHz
+    WRITE_EVERY_NS = 10_000_000
+    INBOUND = 1                       # epb_flags, pcapng §4.3
+    OUTBOUND = 2
+
+ctypedef struct packet_head:          # Enhanced Packet Block, pcapng §4.3
+    uint32_t type
+    uint32_t total_length
+    uint32_t interface
+    uint32_t stamp_high
+    uint32_t stamp_low
+    uint32_t captured_length
+    uint32_t original_length
+
+ctypedef struct packet_tail:
+    uint16_t flags_code
+    uint16_t flags_length
+    uint32_t flags
+    uint32_t end_of_options
+    uint32_t total_length
+
+ctypedef struct recorder_state:
+    cat_link *inner
+    uint8_t *ring
+    uint64_t head                     # bytes ever put in; the cycle's
+    uint64_t tail                     # bytes ever written out; the writer's
+    uint64_t recorded                 # frames
+    uint64_t dropped                  # frames
+    int64_t stamp_offset              # link clock to the file's
+    uint32_t stop
+    uint32_t write_error              # errno; from then on everything is dropped
+    int fd
+    bint inline_writer
+
+
+cdef void put(recorder_state *recorder, uint64_t position, const void *data, size_t size) noexcept nogil:
+    cdef size_t at = <size_t> (position & (RING_BYTES - 1))
+    cdef size_t first = min(size, <size_t> RING_BYTES - at)
+    memcpy(recorder.ring + at, data, first)
+    memcpy(recorder.ring, <const uint8_t *> data + first, size - first)
+
+
+cdef void record(
+    recorder_state *recorder, const uint8_t *frame, uint32_t length, uint32_t direction
+) noexcept nogil:
+    cdef uint64_t stamp = <uint64_t> (recorder.inner.now(recorder.inner.self) + recorder.stamp_offset)
+    cdef uint32_t padded = (length + 3) & ~<uint32_t> 3
+    cdef uint32_t total = <uint32_t> sizeof(packet_head) + padded + <uint32_t> sizeof(packet_tail)
+    cdef uint64_t head = recorder.head
+    cdef uint64_t used = head - cat_load_acquire64(&recorder.tail)
+    cdef packet_head before
+    cdef packet_tail after
+    if used + total > RING_BYTES or cat_load_acquire32(&recorder.write_error) != 0:
+        cat_store_release64(&recorder.dropped, recorder.dropped + 1)
+        return
+    before.type = 6
+    before.total_length = total
+    before.interface = 0
+    before.stamp_high = <uint32_t> (stamp >> 32)
+    before.stamp_low = <uint32_t> stamp
+    before.captured_length = length
+    before.original_length = length
+    after.flags_code = 2
+    after.flags_length = 4
+    after.flags = direction
+    after.end_of_options = 0
+    after.total_length = total
+    put(recorder, head, &before, sizeof(before))
+    put(recorder, head + sizeof(before), frame, length)
+    put(recorder, head + sizeof(before) + length, &after.end_of_options, padded - length)  # zeros
+    put(recorder, head + sizeof(before) + padded, &after, sizeof(after))
+    cat_store_release64(&recorder.head, head + total)
+    cat_store_release64(&recorder.recorded, recorder.recorded + 1)
+    if recorder.inline_writer and used + total > RING_BYTES // 2:
+        drain(recorder)
+
+
+cdef void drain(recorder_state *recorder) noexcept nogil:
+    """Writes out what the ring holds."""
+    cdef uint64_t head = cat_load_acquire64(&recorder.head)
+    cdef size_t at, size
+    cdef ssize_t written
+    while recorder.tail != head and recorder.write_error == 0:
+        at = <size_t> (recorder.tail & (RING_BYTES - 1))
+        size = min(<size_t> (head - recorder.tail), <size_t> RING_BYTES - at)
+        written = write(recorder.fd, recorder.ring + at, size)
+        if written >= 0:
+            cat_store_release64(&recorder.tail, recorder.tail + <uint64_t> written)
+        elif errno != EINTR:
+            cat_store_release32(&recorder.write_error, <uint32_t> errno)
+
+
+cdef void *run_writer(void *argument) noexcept nogil:
+    cdef recorder_state *recorder = <recorder_state *> argument
+    cdef timespec pause
+    pause.tv_sec = 0
+    pause.tv_nsec = WRITE_EVERY_NS
+    while cat_load_acquire32(&recorder.stop) == 0:
+        drain(recorder)
+        nanosleep(&pause, NULL)
+    return NULL
+
+
+cdef int recorder_send(void *self, const uint8_t *frame, uint32_t length) noexcept nogil:
+    cdef recorder_state *recorder = <recorder_state *> self
+    cdef int status = recorder.inner.send(recorder.inner.self, frame, length)
+    if status == 0:
+        record(recorder, frame, length, OUTBOUND)
+    return status
+
+
+cdef int recorder_receive(void *self, const uint8_t **frame) noexcept nogil:
+    cdef recorder_state *recorder = <recorder_state *> self
+    cdef int length = recorder.inner.receive(recorder.inner.self, frame)
+    if length > 0:
+        record(recorder, frame[0], <uint32_t> length, INBOUND)
+    return length
+
+
+cdef int64_t recorder_now(void *self) noexcept nogil:
+    cdef recorder_state *recorder = <recorder_state *> self
+    return recorder.inner.now(recorder.inner.self)
+
+
+cdef int recorder_wait_until(void *self, int64_t deadline, int wake_on_frame) noexcept nogil:
+    cdef recorder_state *recorder = <recorder_state *> self
+    return recorder.inner.wait_until(recorder.inner.self, deadline, wake_on_frame)
+
+
+cdef class Recorder(WrapperLink):
+    """Owns a pcapng file being written with all frames of `link`, stamped in [ns].
+
+    Stamps are the time of day; of a link in virtual time, that time. A frame is recorded after it
+    was sent, so an answer is never before its question by more than the call. `dropped` counts
+    frames the file lacks; closing warns of them.
+    """
+    cdef recorder_state recorder
+    cdef pthread_t writer
+    cdef bint writing
+    cdef readonly str path
+
+    def __init__(self, link, path):
+        self.recorder.ring = <uint8_t *> malloc(RING_BYTES)
+        if self.recorder.ring == NULL:
+            raise MemoryError(f"{RING_BYTES} bytes for the recorder's ring")
+        self.path = os.fspath(path)
+        self.recorder.fd = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
+        try:
+            self.wrap(link)
+            os.write(self.recorder.fd, opening_blocks(self.name))
+            self.start()
+        except BaseException:
+            os.close(self.recorder.fd)
+            if self.link is not None:
+                self.link.close()
+            raise
+        self.table.self = &self.recorder
+        self.table.send = recorder_send
+        self.table.receive = recorder_receive
+        self.table.now = recorder_now
+        self.table.wait_until = recorder_wait_until
+
+    cdef int start(self) except -1:
+        self.recorder.inner = self.inner
+        self.recorder.inline_writer = (self.inner.flags & CAT_LINK_VIRTUAL_TIME) != 0
+        if not self.recorder.inline_writer:
+            self.recorder.stamp_offset = time.time_ns() - self.inner.now(self.inner.self)
+            self.start_writer()
+        return 0
+
+    cdef int start_writer(self) except -1:
+        """A thread that is never real-time, whatever the thread that opens the recorder is."""
+        cdef pthread_attr_t attributes
+        pthread_attr_init(&attributes)
+        pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED)
+        cdef int status = pthread_create(&self.writer, &attributes, run_writer, &self.recorder)
+        pthread_attr_destroy(&attributes)
+        if status != 0:
+            raise OSError(status, f"no thread for the recorder: {os.strerror(status)}")
+        self.writing = True
+        return 0
+
+    @property
+    def recorded(self):
+        """Frames in the file, or on their way there."""
+        return cat_load_relaxed64(&self.recorder.recorded)
+
+    @property
+    def dropped(self):
+        """Frames the file lacks: the disk was too slow, or full."""
+        return cat_load_relaxed64(&self.recorder.dropped)
+
+    cdef int stop_writer(self) except -1:
+        if self.writing:
+            cat_store_release32(&self.recorder.stop, 1)
+            with nogil:
+                pthread_join(self.writer, NULL)
+            self.writing = False
+        return 0
+
+    cdef int close_table(self) except -1:
+        try:
+            self.stop_writer()
+            self.finish_file()
+        finally:
+            WrapperLink.close_table(self)
+        return 0
+
+    cdef int finish_file(self) except -1:
+        drain(&self.recorder)
+        number = self.recorder.write_error
+        if number == 0:
+            stamp = self.inner.now(self.inner.self) + self.recorder.stamp_offset
+            os.write(self.recorder.fd, closing_block(stamp, self.recorded, self.dropped))
+        os.close(self.recorder.fd)
+        if number:
+            self.warn(f"is incomplete: {os.strerror(number)}")
+        elif self.dropped:
+            self.warn(f"lacks {self.dropped} frames: the disk was too slow")
+        return 0
+
+    cdef warn(self, str what):
+        warnings.warn(f"{self.path} {what}", RuntimeWarning, stacklevel=2)
+
+    def __dealloc__(self):
+        if self.writing:
+            cat_store_release32(&self.recorder.stop, 1)
+            pthread_join(self.writer, NULL)
+        free(self.recorder.ring)
