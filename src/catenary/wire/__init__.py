@@ -1,1 +1,1 @@
-"""Bytes ↔ frozen values, one file per chapter of the standard. Decoders raise `DecodeError` only."""
+"""Bytes ↔ frozen values, one file per chapter of the standard. Decoders raise `DecodeError`."""

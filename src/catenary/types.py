@@ -1,0 +1,252 @@
+"""EtherCAT's base data types with their CoE index numbers, ETG.1000.6 §5.6.7.3 and ETG.1020 (bit
+types). Values travel little endian.
+
+    UINT.encode(5)              # b"\\x05\\x00"
+    UINT.decode(b"\\x05\\x00")    # 5, an int also for the type checker
+    by_name("UNSIGNED16")       # UINT
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+import struct
+from dataclasses import dataclass
+from typing import Generic, TypeAlias, TypeVar, cast
+
+from catenary.errors import DecodeError
+
+T = TypeVar("T")
+Value: TypeAlias = bool | int | float | str | bytes
+
+
+# No slots: `DataType[int]` as a base of a frozen class with slots fails in Python 3.11.
+@dataclass(frozen=True)
+class DataType(Generic[T]):
+    """A data type. `bit_length` 0: any number of bytes."""
+
+    name: str
+    index: int  # of its DEFTYPE object in the dictionary
+    bit_length: int
+    aliases: tuple[str, ...] = ()
+
+    @property
+    def size(self) -> int:
+        """Its length in bytes when it travels alone; 0: any."""
+        return (self.bit_length + 7) // 8
+
+    def encode(self, value: T) -> bytes:
+        """Its bytes. TypeError for another kind of value, ValueError for one out of range."""
+        raise NotImplementedError
+
+    def decode(self, data: bytes) -> T:
+        """Its value. DecodeError if the bytes are none of this type."""
+        raise NotImplementedError
+
+    def parse(self, text: str) -> T:
+        """A value as a person writes it. ValueError if it is none."""
+        raise NotImplementedError
+
+    def __str__(self) -> str:
+        return self.name
+
+    def _check_size(self, data: bytes) -> None:
+        if self.size and len(data) != self.size:
+            raise DecodeError(f"{self.name}: needs {self.size} bytes, received {len(data)}")
+
+
+class Boolean(DataType[bool]):
+    """One bit; a byte when it travels alone, where anything but zero is true."""
+
+    def encode(self, value: bool) -> bytes:
+        return b"\x01" if value else b"\x00"
+
+    def decode(self, data: bytes) -> bool:
+        self._check_size(data)
+        return data != b"\x00"
+
+    def parse(self, text: str) -> bool:
+        try:
+            return {"0": False, "false": False, "1": True, "true": True}[text.strip().lower()]
+        except KeyError:
+            raise ValueError(f"{self.name}: {text!r} is none of 0, 1, false, true") from None
+
+
+@dataclass(frozen=True)
+class Integer(DataType[int]):
+    """A whole number of 1 to 64 bits."""
+
+    signed: bool = False
+
+    @property
+    def minimum(self) -> int:
+        """The smallest value."""
+        return -(1 << self.bit_length - 1) if self.signed else 0
+
+    @property
+    def maximum(self) -> int:
+        """The largest value."""
+        return (1 << self.bit_length - (1 if self.signed else 0)) - 1
+
+    def encode(self, value: int) -> bytes:
+        number = operator.index(value)
+        self._check_range(number, ValueError)
+        return number.to_bytes(self.size, "little", signed=self.signed)
+
+    def decode(self, data: bytes) -> int:
+        self._check_size(data)
+        number = int.from_bytes(data, "little", signed=self.signed)
+        self._check_range(number, DecodeError)
+        return number
+
+    def parse(self, text: str) -> int:
+        try:
+            number = int(text.strip(), 0)
+        except ValueError:
+            raise ValueError(f"{self.name}: {text!r} is no whole number (12, -3, 0x1F)") from None
+        self._check_range(number, ValueError)
+        return number
+
+    def _check_range(self, number: int, error: type[ValueError] | type[DecodeError]) -> None:
+        if not self.minimum <= number <= self.maximum:
+            raise error(f"{self.name}: {number} is not in {self.minimum} to {self.maximum}")
+
+
+class Real(DataType[float]):
+    """IEEE 754, 32 or 64 bits."""
+
+    def encode(self, value: float) -> bytes:
+        try:
+            return struct.pack(self._format, value)
+        except OverflowError:
+            raise ValueError(f"{self.name}: {value} is beyond ±3.4028235e38") from None
+        except struct.error:
+            raise TypeError(f"{self.name}: {value!r} is no number") from None
+
+    def decode(self, data: bytes) -> float:
+        self._check_size(data)
+        return cast(float, struct.unpack(self._format, data)[0])
+
+    def parse(self, text: str) -> float:
+        try:
+            number = float(text)
+        except ValueError:
+            raise ValueError(f"{self.name}: {text!r} is no number") from None
+        if not math.isfinite(number):
+            raise ValueError(f"{self.name}: {text!r} is not finite")
+        self.encode(number)
+        return number
+
+    @property
+    def _format(self) -> str:
+        return "<f" if self.bit_length == 32 else "<d"
+
+
+@dataclass(frozen=True)
+class Text(DataType[str]):
+    """Characters of a fixed width. Devices pad with NUL: what follows the first one is dropped."""
+
+    encoding: str = "latin-1"
+
+    def encode(self, value: str) -> bytes:
+        if "\x00" in value:
+            raise ValueError(f"{self.name}: {value!r} holds a NUL character")
+        try:
+            return value.encode(self.encoding)
+        except UnicodeEncodeError as error:
+            raise ValueError(f"{self.name}: {value!r} cannot be written: {error.reason}") from None
+
+    def decode(self, data: bytes) -> str:
+        try:
+            return data.decode(self.encoding).split("\x00", 1)[0]
+        except UnicodeDecodeError as error:
+            raise DecodeError(f"{self.name}: {error.reason} at byte {error.start}") from None
+
+    def parse(self, text: str) -> str:
+        self.encode(text)
+        return text
+
+
+class Octets(DataType[bytes]):
+    """Bytes without a meaning, of a fixed length or any."""
+
+    def encode(self, value: bytes) -> bytes:
+        if self.size and len(value) != self.size:
+            raise ValueError(f"{self.name}: needs exactly {self.size} bytes, got {len(value)}")
+        return bytes(value)
+
+    def decode(self, data: bytes) -> bytes:
+        self._check_size(data)
+        return bytes(data)
+
+    def parse(self, text: str) -> bytes:
+        try:
+            return self.encode(bytes.fromhex(text.removeprefix("0x")))
+        except ValueError as error:
+            raise ValueError(f"{self.name}: {text!r}: {error}") from None
+
+
+BOOL = Boolean("BOOL", 0x0001, 1, ("BOOLEAN", "BIT"))
+SINT = Integer("SINT", 0x0002, 8, ("INTEGER8", "INT8"), signed=True)
+INT = Integer("INT", 0x0003, 16, ("INTEGER16", "INT16"), signed=True)
+DINT = Integer("DINT", 0x0004, 32, ("INTEGER32", "INT32"), signed=True)
+USINT = Integer("USINT", 0x0005, 8, ("UNSIGNED8", "UINT8"))
+UINT = Integer("UINT", 0x0006, 16, ("UNSIGNED16", "UINT16"))
+UDINT = Integer("UDINT", 0x0007, 32, ("UNSIGNED32", "UINT32"))
+REAL = Real("REAL", 0x0008, 32, ("REAL32", "FLOAT"))
+VISIBLE_STRING = Text("VISIBLE_STRING", 0x0009, 0, ("STRING",))
+OCTET_STRING = Octets("OCTET_STRING", 0x000A, 0, ("BYTES",))
+UNICODE_STRING = Text("UNICODE_STRING", 0x000B, 0, ("WSTRING",), encoding="utf-16-le")
+DOMAIN = Octets("DOMAIN", 0x000F, 0)
+INT24 = Integer("INT24", 0x0010, 24, ("INTEGER24",), signed=True)
+LREAL = Real("LREAL", 0x0011, 64, ("REAL64", "DOUBLE"))
+INT40 = Integer("INT40", 0x0012, 40, ("INTEGER40",), signed=True)
+INT48 = Integer("INT48", 0x0013, 48, ("INTEGER48",), signed=True)
+INT56 = Integer("INT56", 0x0014, 56, ("INTEGER56",), signed=True)
+LINT = Integer("LINT", 0x0015, 64, ("INTEGER64", "INT64"), signed=True)
+UINT24 = Integer("UINT24", 0x0016, 24, ("UNSIGNED24",))
+UINT40 = Integer("UINT40", 0x0018, 40, ("UNSIGNED40",))
+UINT48 = Integer("UINT48", 0x0019, 48, ("UNSIGNED48",))
+UINT56 = Integer("UINT56", 0x001A, 56, ("UNSIGNED56",))
+ULINT = Integer("ULINT", 0x001B, 64, ("UNSIGNED64", "UINT64"))
+GUID = Octets("GUID", 0x001D, 128)
+BYTE = Integer("BYTE", 0x001E, 8)
+WORD = Integer("WORD", 0x001F, 16)
+DWORD = Integer("DWORD", 0x0020, 32)
+BITARR8 = Integer("BITARR8", 0x002D, 8)
+BITARR16 = Integer("BITARR16", 0x002E, 16)
+BITARR32 = Integer("BITARR32", 0x002F, 32)
+BIT1 = Integer("BIT1", 0x0030, 1)
+BIT2 = Integer("BIT2", 0x0031, 2)
+BIT3 = Integer("BIT3", 0x0032, 3)
+BIT4 = Integer("BIT4", 0x0033, 4)
+BIT5 = Integer("BIT5", 0x0034, 5)
+BIT6 = Integer("BIT6", 0x0035, 6)
+BIT7 = Integer("BIT7", 0x0036, 7)
+BIT8 = Integer("BIT8", 0x0037, 8)
+
+ALL = (
+    *(BOOL, SINT, INT, DINT, USINT, UINT, UDINT, REAL, VISIBLE_STRING, OCTET_STRING),
+    *(UNICODE_STRING, DOMAIN, INT24, LREAL, INT40, INT48, INT56, LINT, UINT24, UINT40, UINT48),
+    *(UINT56, ULINT, GUID, BYTE, WORD, DWORD, BITARR8, BITARR16, BITARR32),
+    *(BIT1, BIT2, BIT3, BIT4, BIT5, BIT6, BIT7, BIT8),
+)
+_BY_INDEX = {entry.index: entry for entry in ALL}
+_BY_NAME = {name: entry for entry in ALL for name in (entry.name, *entry.aliases)}
+
+
+def by_name(name: str) -> DataType[Value]:
+    """The type called so, in capitals or not, in PLC or CANopen words. ValueError if unknown."""
+    found = _BY_NAME.get(name.strip().upper())
+    if found is None:
+        known = ", ".join(entry.name for entry in ALL)
+        raise ValueError(f"unknown data type {name!r}; known are {known}")
+    return cast(DataType[Value], found)
+
+
+def by_index(index: int) -> DataType[Value]:
+    """The type with this CoE index. ValueError if unknown (a structure, or a vendor's own)."""
+    found = _BY_INDEX.get(index)
+    if found is None:
+        raise ValueError(f"no base data type has the index 0x{index:04X}")
+    return cast(DataType[Value], found)

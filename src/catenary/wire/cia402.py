@@ -1,0 +1,214 @@
+"""CiA 402 drives: states, words and modes, IEC 61800-7-201 / CiA 402-2.
+
+Objects of axis k of a device sit at the index given here + k * SLOT_OFFSET.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum, IntFlag
+
+
+class State(IntEnum):
+    """The states of the drive's state machine, in the standard's order."""
+
+    NOT_READY_TO_SWITCH_ON = 0
+    SWITCH_ON_DISABLED = 1
+    READY_TO_SWITCH_ON = 2
+    SWITCHED_ON = 3
+    OPERATION_ENABLED = 4
+    QUICK_STOP_ACTIVE = 5
+    FAULT_REACTION_ACTIVE = 6
+    FAULT = 7
+
+
+STATE_CODING = {
+    # state: (mask, value) of the statusword, CiA 402-2 table 30
+    State.NOT_READY_TO_SWITCH_ON: (0x004F, 0x0000),
+    State.SWITCH_ON_DISABLED: (0x004F, 0x0040),
+    State.READY_TO_SWITCH_ON: (0x006F, 0x0021),
+    State.SWITCHED_ON: (0x006F, 0x0023),
+    State.OPERATION_ENABLED: (0x006F, 0x0027),
+    State.QUICK_STOP_ACTIVE: (0x006F, 0x0007),
+    State.FAULT_REACTION_ACTIVE: (0x004F, 0x000F),
+    State.FAULT: (0x004F, 0x0008),
+}
+
+
+def state_of(statusword: int) -> State | None:
+    """The state a statusword codes; None if its bits code none."""
+    for state, (mask, value) in STATE_CODING.items():
+        if statusword & mask == value:
+            return state
+    return None
+
+
+class Status(IntFlag):
+    """Bits of the statusword 0x6041."""
+
+    READY_TO_SWITCH_ON = 1 << 0
+    SWITCHED_ON = 1 << 1
+    OPERATION_ENABLED = 1 << 2
+    FAULT = 1 << 3
+    VOLTAGE_ENABLED = 1 << 4
+    QUICK_STOP = 1 << 5  # 0: a quick stop is active
+    SWITCH_ON_DISABLED = 1 << 6
+    WARNING = 1 << 7
+    MANUFACTURER_8 = 1 << 8
+    REMOTE = 1 << 9  # the controlword is obeyed
+    TARGET_REACHED = 1 << 10
+    INTERNAL_LIMIT_ACTIVE = 1 << 11
+    MODE_12 = 1 << 12  # CSP, CSV, CST: the drive follows the set-points
+    MODE_13 = 1 << 13  # CSP: following error
+    MANUFACTURER_14 = 1 << 14
+    MANUFACTURER_15 = 1 << 15
+
+
+FOLLOWS_COMMAND = Status.MODE_12
+FOLLOWING_ERROR = Status.MODE_13
+
+
+class Control(IntFlag):
+    """Bits of the controlword 0x6040."""
+
+    SWITCH_ON = 1 << 0
+    ENABLE_VOLTAGE = 1 << 1
+    QUICK_STOP = 1 << 2  # 0: stop quickly
+    ENABLE_OPERATION = 1 << 3
+    MODE_4 = 1 << 4  # PP: new set-point; HM: start homing
+    MODE_5 = 1 << 5
+    MODE_6 = 1 << 6
+    FAULT_RESET = 1 << 7  # at its rising edge
+    HALT = 1 << 8
+    MODE_9 = 1 << 9
+    RESERVED_10 = 1 << 10
+    MANUFACTURER_11 = 1 << 11
+    MANUFACTURER_12 = 1 << 12
+    MANUFACTURER_13 = 1 << 13
+    MANUFACTURER_14 = 1 << 14
+    MANUFACTURER_15 = 1 << 15
+
+
+MODE_CONTROL_BITS = 0xFA70  # bits 4, 5, 6, 9, 11 to 15: free of the state machine and halt
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A device control command: the bits of the controlword it means, CiA 402-2 table 28."""
+
+    name: str
+    mask: int
+    value: int
+
+    def matches(self, controlword: int) -> bool:
+        """Whether a controlword is this command."""
+        return controlword & self.mask == self.value
+
+    def apply(self, controlword: int) -> int:
+        """The controlword with this command and its other bits kept."""
+        return controlword & ~self.mask & 0xFFFF | self.value
+
+
+SHUTDOWN = Command("shutdown", 0x0087, 0x0006)
+SWITCH_ON = Command("switch on", 0x008F, 0x0007)
+ENABLE_OPERATION = Command("enable operation", 0x008F, 0x000F)
+DISABLE_OPERATION = Command("disable operation", 0x008F, 0x0007)  # the same bits as switch on
+DISABLE_VOLTAGE = Command("disable voltage", 0x0082, 0x0000)
+QUICK_STOP = Command("quick stop", 0x0086, 0x0002)
+FAULT_RESET = Command("fault reset", 0x0080, 0x0080)  # a rising edge of bit 7
+
+COMMANDS = (
+    *(SHUTDOWN, SWITCH_ON, ENABLE_OPERATION, DISABLE_OPERATION),
+    *(DISABLE_VOLTAGE, QUICK_STOP, FAULT_RESET),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Transition:
+    """One arrow of the state machine. No command: the drive moves by itself."""
+
+    number: int
+    source: State | None  # None: switched off (0) or any state (13)
+    target: State
+    commands: tuple[Command, ...] = ()
+
+
+TRANSITIONS = (
+    Transition(0, None, State.NOT_READY_TO_SWITCH_ON),
+    Transition(1, State.NOT_READY_TO_SWITCH_ON, State.SWITCH_ON_DISABLED),
+    Transition(2, State.SWITCH_ON_DISABLED, State.READY_TO_SWITCH_ON, (SHUTDOWN,)),
+    Transition(3, State.READY_TO_SWITCH_ON, State.SWITCHED_ON, (SWITCH_ON,)),
+    Transition(4, State.SWITCHED_ON, State.OPERATION_ENABLED, (ENABLE_OPERATION,)),
+    Transition(5, State.OPERATION_ENABLED, State.SWITCHED_ON, (DISABLE_OPERATION,)),
+    Transition(6, State.SWITCHED_ON, State.READY_TO_SWITCH_ON, (SHUTDOWN,)),
+    Transition(
+        7, State.READY_TO_SWITCH_ON, State.SWITCH_ON_DISABLED, (DISABLE_VOLTAGE, QUICK_STOP)
+    ),
+    Transition(8, State.OPERATION_ENABLED, State.READY_TO_SWITCH_ON, (SHUTDOWN,)),
+    Transition(9, State.OPERATION_ENABLED, State.SWITCH_ON_DISABLED, (DISABLE_VOLTAGE,)),
+    Transition(10, State.SWITCHED_ON, State.SWITCH_ON_DISABLED, (DISABLE_VOLTAGE, QUICK_STOP)),
+    Transition(11, State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, (QUICK_STOP,)),
+    # 12 also happens by itself, when the drive stands and 0x605A is 1 to 4
+    Transition(12, State.QUICK_STOP_ACTIVE, State.SWITCH_ON_DISABLED, (DISABLE_VOLTAGE,)),
+    Transition(13, None, State.FAULT_REACTION_ACTIVE),
+    Transition(14, State.FAULT_REACTION_ACTIVE, State.FAULT),
+    Transition(15, State.FAULT, State.SWITCH_ON_DISABLED, (FAULT_RESET,)),
+    # 16 only where 0x605A is 5 to 8
+    Transition(16, State.QUICK_STOP_ACTIVE, State.OPERATION_ENABLED, (ENABLE_OPERATION,)),
+)
+
+
+class Mode(IntEnum):
+    """Modes of operation, objects 0x6060 and 0x6061."""
+
+    NONE = 0
+    PP = 1  # profile position
+    VL = 2  # velocity (frequency converter)
+    PV = 3  # profile velocity
+    TQ = 4  # profile torque
+    HM = 6  # homing
+    IP = 7  # interpolated position
+    CSP = 8  # cyclic synchronous position
+    CSV = 9  # cyclic synchronous velocity
+    CST = 10  # cyclic synchronous torque
+    CSTCA = 11  # cyclic synchronous torque with commutation angle
+
+    @property
+    def supported_bit(self) -> int:
+        """Its bit in the supported drive modes, object 0x6502; 0 for no mode."""
+        return 1 << self - 1 if self else 0
+
+
+class Object(IntEnum):
+    """Objects of the profile, axis 0."""
+
+    ERROR_CODE = 0x603F
+    CONTROLWORD = 0x6040
+    STATUSWORD = 0x6041
+    QUICK_STOP_OPTION = 0x605A
+    MODE_OF_OPERATION = 0x6060
+    MODE_OF_OPERATION_DISPLAY = 0x6061
+    POSITION_ACTUAL = 0x6064
+    FOLLOWING_ERROR_WINDOW = 0x6065
+    VELOCITY_ACTUAL = 0x606C
+    TARGET_TORQUE = 0x6071
+    MOTOR_RATED_TORQUE = 0x6076  # [mN·m]; torques are in thousandths of it
+    TORQUE_ACTUAL = 0x6077
+    TARGET_POSITION = 0x607A
+    SOFTWARE_POSITION_LIMIT = 0x607D
+    QUICK_STOP_DECELERATION = 0x6085
+    POSITION_ENCODER_RESOLUTION = 0x608F
+    GEAR_RATIO = 0x6091
+    POSITION_OFFSET = 0x60B0
+    VELOCITY_OFFSET = 0x60B1
+    TORQUE_OFFSET = 0x60B2
+    INTERPOLATION_TIME_PERIOD = 0x60C2
+    FOLLOWING_ERROR_ACTUAL = 0x60F4
+    DIGITAL_INPUTS = 0x60FD
+    DIGITAL_OUTPUTS = 0x60FE
+    TARGET_VELOCITY = 0x60FF
+    SUPPORTED_DRIVE_MODES = 0x6502
+
+
+SLOT_OFFSET = 0x800  # between the objects of one axis and the next
+PROFILE = 402  # low word of the device type, object 0x1000

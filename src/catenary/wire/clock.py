@@ -1,0 +1,94 @@
+"""Distributed clocks, registers 0x0900 to 0x09FF, ETG.1000.4 §6.8: receive times, the time loop and
+the SYNC unit's switches."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from enum import IntFlag
+
+from catenary.errors import DecodeError
+
+SIZE = 56  # 0x0900 to 0x0937
+_BLOCK = struct.Struct("<4IQQQIIHhBBBx")
+_SIGN = 1 << 31
+
+
+class CyclicUnit(IntFlag):
+    """Who controls SYNC and LATCH (0x0980). A bit clear: EtherCAT does."""
+
+    SYNC_BY_PDI = 0x01
+    LATCH0_BY_PDI = 0x10
+    LATCH1_BY_PDI = 0x20
+
+
+class Activation(IntFlag):
+    """The SYNC activation register (0x0981)."""
+
+    CYCLIC_OPERATION = 0x01
+    SYNC0 = 0x02
+    SYNC1 = 0x04
+    AUTO_ACTIVATION = 0x08
+    EXTEND_START_TIME = 0x10
+    CHECK_START_TIME = 0x20
+    NEAR_FUTURE_ONE_SECOND = 0x40
+    DEBUG_PULSE = 0x80
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """The time loop of one device. All times in ns."""
+
+    receive_times_ns: tuple[int, int, int, int]  # per port, local
+    system_time_ns: int
+    receive_time_processing_unit_ns: int
+    offset_ns: int  # modulo 2**64
+    delay_ns: int
+    difference_ns: int  # of the local copy of the system time minus the received one
+    speed_counter_start: int
+    speed_counter_difference: int
+    difference_filter: int
+    speed_counter_filter: int
+    latch_mode: int = 0
+
+    def encode(self) -> bytes:
+        """Its block. ValueError if a field does not fit."""
+        try:
+            return _BLOCK.pack(
+                *self.receive_times_ns,
+                *(self.system_time_ns, self.receive_time_processing_unit_ns, self.offset_ns),
+                *(self.delay_ns, encode_difference(self.difference_ns)),
+                *(self.speed_counter_start, self.speed_counter_difference),
+                *(self.difference_filter, self.speed_counter_filter, self.latch_mode),
+            )
+        except struct.error as error:
+            raise ValueError(f"distributed clock: {error}") from None
+
+
+def decode_clock(data: bytes) -> Clock:
+    """The time loop in the 56 bytes from 0x0900."""
+    if len(data) != SIZE:
+        raise DecodeError(f"distributed clock: needs {SIZE} bytes, received {len(data)}")
+    time_0, time_1, time_2, time_3, *rest = _BLOCK.unpack(data)
+    system_time, processing_unit, offset, delay, difference, *filters = rest
+    return Clock(
+        (time_0, time_1, time_2, time_3),
+        *(system_time, processing_unit, offset, delay, decode_difference(difference)),
+        *filters,
+    )
+
+
+def decode_difference(raw: int) -> int:
+    """The system time difference [ns] in register 0x092C, which is sign-magnitude: bit 31 set means
+    that the local copy is behind. Negative zero is zero."""
+    if not 0 <= raw <= 0xFFFF_FFFF:
+        raise DecodeError(f"system time difference: {raw} has more than 32 bits")
+    magnitude = raw & ~_SIGN
+    return -magnitude if raw & _SIGN else magnitude
+
+
+def encode_difference(difference_ns: int) -> int:
+    """The raw value of register 0x092C. ValueError beyond ±(2**31 - 1) ns."""
+    if abs(difference_ns) >= _SIGN:
+        raise ValueError(f"system time difference: {difference_ns} ns is beyond ±{_SIGN - 1}")
+    return -difference_ns | _SIGN if difference_ns < 0 else difference_ns

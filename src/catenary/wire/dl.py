@@ -1,0 +1,100 @@
+"""DL control and DL status: forwarding, loops and links of the ports, ETG.1000.4 §6.2."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+from catenary.errors import DecodeError
+
+PORTS = range(4)
+
+
+class Loop(IntEnum):
+    """What a port does with frames when its link comes and goes."""
+
+    AUTO = 0  # open while there is a link
+    AUTO_CLOSE = 1  # closes without a link, opens by a write only
+    OPEN = 2
+    CLOSED = 3
+
+
+_AUTO = (Loop.AUTO, Loop.AUTO, Loop.AUTO, Loop.AUTO)
+
+
+@dataclass(frozen=True, slots=True)
+class DlControl:
+    """DL control (0x0100)."""
+
+    destroy_alien_frames: bool = True  # frames that are not EtherCAT; False: forwarded
+    temporary: bool = False  # the settings hold for about a second
+    loops: tuple[Loop, Loop, Loop, Loop] = _AUTO
+    receive_fifo: int = 7  # 0 to 7: less delay with less
+    low_jitter: bool = False
+    alias_enabled: bool = False  # the station alias answers to FPxx commands
+
+    @property
+    def word(self) -> int:
+        """The register's value. ValueError if the FIFO's size does not fit."""
+        if not 0 <= self.receive_fifo <= 7:
+            raise ValueError(f"DL control: receive FIFO is 0 to 7, got {self.receive_fifo}")
+        word = self.destroy_alien_frames | self.temporary << 1
+        for port in PORTS:
+            word |= self.loops[port] << 8 + 2 * port
+        return word | self.receive_fifo << 16 | self.low_jitter << 19 | self.alias_enabled << 24
+
+    @classmethod
+    def from_word(cls, word: int) -> DlControl:
+        """The reverse of `word`; reserved bits are ignored."""
+        loop_0, loop_1, loop_2, loop_3 = (Loop(word >> 8 + 2 * port & 3) for port in PORTS)
+        return cls(
+            bool(word & 1),
+            bool(word & 2),
+            (loop_0, loop_1, loop_2, loop_3),
+            word >> 16 & 7,
+            bool(word & 1 << 19),
+            bool(word & 1 << 24),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Port:
+    """What DL status says of one port."""
+
+    link: bool = False  # the PHY has a signal
+    loop_closed: bool = True  # frames turn round here
+    communication: bool = False  # a stable connection
+
+
+_CLOSED = Port()
+
+
+@dataclass(frozen=True, slots=True)
+class DlStatus:
+    """DL status (0x0110)."""
+
+    pdi_operational: bool  # the EEPROM is loaded, the device's processor can be reached
+    pdi_watchdog: bool  # triggered in time
+    enhanced_link_detection: bool = False
+    ports: tuple[Port, Port, Port, Port] = (_CLOSED, _CLOSED, _CLOSED, _CLOSED)
+
+    @property
+    def word(self) -> int:
+        """The register's value."""
+        word = self.pdi_operational | self.pdi_watchdog << 1 | self.enhanced_link_detection << 2
+        for i, port in enumerate(self.ports):
+            word |= port.link << 4 + i
+            word |= port.loop_closed << 8 + 2 * i | port.communication << 9 + 2 * i
+        return word
+
+    @classmethod
+    def from_word(cls, word: int) -> DlStatus:
+        """The reverse of `word`; bit 3 is reserved."""
+        port_0, port_1, port_2, port_3 = (_port(word, i) for i in PORTS)
+        return cls(bool(word & 1), bool(word & 2), bool(word & 4), (port_0, port_1, port_2, port_3))
+
+
+def _port(word: int, i: int) -> Port:
+    if not 0 <= word <= 0xFFFF:
+        raise DecodeError(f"DL status: {word} has more than 16 bits")
+    return Port(bool(word & 1 << 4 + i), bool(word & 1 << 8 + 2 * i), bool(word & 1 << 9 + 2 * i))

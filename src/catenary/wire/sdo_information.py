@@ -1,0 +1,235 @@
+"""SDO information, ETG.1000.6 §5.6.3: what objects a device has.
+
+A reply may come in fragments. `SdoInformation` is one message; its data, joined over the fragments,
+is then decoded: `decode_object_list`, `decode_object_description`, `decode_entry_description`.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from enum import IntEnum, IntFlag
+
+from catenary.errors import DecodeError
+
+_HEADER = struct.Struct("<HBBH")  # CoE header, opcode and incomplete, reserved, fragments left
+_SERVICE = 8
+_INCOMPLETE = 0x80
+_OBJECT = struct.Struct("<HHBB")
+_ENTRY = struct.Struct("<HBBHHH")
+
+
+class Opcode(IntEnum):
+    """What a message of SDO information is."""
+
+    LIST_REQUEST = 1
+    LIST_RESPONSE = 2
+    OBJECT_REQUEST = 3
+    OBJECT_RESPONSE = 4
+    ENTRY_REQUEST = 5
+    ENTRY_RESPONSE = 6
+    ERROR = 7
+
+
+class ListType(IntEnum):
+    """Which objects are asked for."""
+
+    LENGTHS = 0  # how many of each kind
+    ALL = 1
+    RXPDO_MAPPABLE = 2
+    TXPDO_MAPPABLE = 3
+    BACKUP = 4
+    SETTINGS = 5
+
+
+class ObjectCode(IntEnum):
+    """The shape of an object."""
+
+    DOMAIN = 2
+    DEFTYPE = 5
+    DEFSTRUCT = 6
+    VAR = 7
+    ARRAY = 8
+    RECORD = 9
+
+
+class ValueInfo(IntFlag):
+    """What else an entry description shall hold."""
+
+    NONE = 0
+    ACCESS_RIGHTS = 0x01
+    CATEGORY = 0x02
+    MAPPABLE = 0x04
+    UNIT = 0x08
+    DEFAULT = 0x10
+    MINIMUM = 0x20
+    MAXIMUM = 0x40
+
+
+class Access(IntFlag):
+    """The object access word of an entry."""
+
+    READ_PRE_OP = 0x0001
+    READ_SAFE_OP = 0x0002
+    READ_OP = 0x0004
+    WRITE_PRE_OP = 0x0008
+    WRITE_SAFE_OP = 0x0010
+    WRITE_OP = 0x0020
+    RXPDO_MAPPABLE = 0x0040
+    TXPDO_MAPPABLE = 0x0080
+    BACKUP = 0x0100
+    SETTING = 0x0200
+
+
+@dataclass(frozen=True, slots=True)
+class SdoInformation:
+    """One message, perhaps a fragment of a reply. Bit 7 of the opcode: more fragments follow."""
+
+    opcode: Opcode
+    data: bytes
+    fragments_left: int = 0
+    incomplete: bool = False
+
+    def encode(self) -> bytes:
+        """Its bytes. ValueError if a field does not fit."""
+        opcode = self.opcode | (_INCOMPLETE if self.incomplete else 0)
+        try:
+            return _HEADER.pack(_SERVICE << 12, opcode, 0, self.fragments_left) + self.data
+        except struct.error as error:
+            raise ValueError(f"SDO information: {error}") from None
+
+
+def decode_sdo_information(data: bytes) -> SdoInformation:
+    """The message in a mailbox's data, CoE header included."""
+    if len(data) < _HEADER.size:
+        raise DecodeError(f"SDO information: needs {_HEADER.size} bytes, received {len(data)}")
+    header, opcode, _, fragments_left = _HEADER.unpack_from(data)
+    if header >> 12 != _SERVICE:
+        raise DecodeError(f"SDO information: CoE service {header >> 12}, needs {_SERVICE}")
+    try:
+        kind = Opcode(opcode & ~_INCOMPLETE)
+    except ValueError:
+        raise DecodeError(f"SDO information: unknown opcode {opcode & ~_INCOMPLETE}") from None
+    payload = bytes(data[_HEADER.size :])
+    return SdoInformation(kind, payload, fragments_left, bool(opcode & _INCOMPLETE))
+
+
+def list_request(kind: ListType) -> SdoInformation:
+    """Asks for the indices of the objects of a kind."""
+    return SdoInformation(Opcode.LIST_REQUEST, struct.pack("<H", kind))
+
+
+def object_request(index: int) -> SdoInformation:
+    """Asks what an object is."""
+    return SdoInformation(Opcode.OBJECT_REQUEST, struct.pack("<H", index))
+
+
+def entry_request(index: int, subindex: int, info: ValueInfo = ValueInfo.NONE) -> SdoInformation:
+    """Asks what an entry is."""
+    return SdoInformation(Opcode.ENTRY_REQUEST, struct.pack("<HBB", index, subindex, info))
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectList:
+    """The objects of a kind. For LENGTHS: how many of each other kind."""
+
+    kind: ListType
+    indices: tuple[int, ...]
+
+    def encode(self) -> bytes:
+        """Its bytes. ValueError if an index does not fit."""
+        try:
+            return struct.pack(f"<{1 + len(self.indices)}H", self.kind, *self.indices)
+        except struct.error as error:
+            raise ValueError(f"object list: {error}") from None
+
+
+def decode_object_list(data: bytes) -> ObjectList:
+    """The list in the joined data of LIST_RESPONSEs."""
+    if len(data) < 2 or len(data) % 2:
+        raise DecodeError(f"object list: {len(data)} bytes, needs an even number from 2")
+    kind, *indices = struct.unpack(f"<{len(data) // 2}H", data)
+    try:
+        return ObjectList(ListType(kind), tuple(indices))
+    except ValueError:
+        raise DecodeError(f"object list: unknown kind {kind}") from None
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectDescription:
+    """An object: its type (see `types.by_index`), its shape and its name."""
+
+    index: int
+    data_type: int
+    maximum_subindex: int
+    object_code: int  # an ObjectCode, or what the device says
+    name: str = ""
+
+    def encode(self) -> bytes:
+        """Its bytes. ValueError if a field does not fit."""
+        try:
+            head = _OBJECT.pack(self.index, self.data_type, self.maximum_subindex, self.object_code)
+            return head + self.name.encode("latin-1")
+        except (struct.error, UnicodeEncodeError) as error:
+            raise ValueError(f"object description: {error}") from None
+
+
+def decode_object_description(data: bytes) -> ObjectDescription:
+    """The description in the data of an OBJECT_RESPONSE."""
+    if len(data) < _OBJECT.size:
+        raise DecodeError(f"object description: needs {_OBJECT.size} bytes, received {len(data)}")
+    name = bytes(data[_OBJECT.size :]).decode("latin-1")
+    index, data_type, maximum_subindex, object_code = _OBJECT.unpack_from(data)
+    return ObjectDescription(index, data_type, maximum_subindex, object_code, name)
+
+
+@dataclass(frozen=True, slots=True)
+class EntryDescription:
+    """An entry of an object. `rest`: what was asked for with `info`, then the name."""
+
+    index: int
+    subindex: int
+    info: ValueInfo
+    data_type: int
+    bit_length: int
+    access: Access
+    rest: bytes = b""
+
+    def encode(self) -> bytes:
+        """Its bytes. ValueError if a field does not fit."""
+        try:
+            head = _ENTRY.pack(
+                *(self.index, self.subindex, self.info),
+                *(self.data_type, self.bit_length, self.access),
+            )
+        except struct.error as error:
+            raise ValueError(f"entry description: {error}") from None
+        return head + self.rest
+
+    @property
+    def name(self) -> str:
+        """Its name: what is left of `rest` behind the values asked for."""
+        size = (self.bit_length + 7) // 8
+        values = (ValueInfo.DEFAULT, ValueInfo.MINIMUM, ValueInfo.MAXIMUM)
+        skipped = (4 if self.info & ValueInfo.UNIT else 0) + size * sum(
+            bool(self.info & value) for value in values
+        )
+        return self.rest[skipped:].decode("latin-1")
+
+
+def decode_entry_description(data: bytes) -> EntryDescription:
+    """The description in the data of an ENTRY_RESPONSE."""
+    if len(data) < _ENTRY.size:
+        raise DecodeError(f"entry description: needs {_ENTRY.size} bytes, received {len(data)}")
+    index, subindex, info, data_type, bit_length, access = _ENTRY.unpack_from(data)
+    return EntryDescription(
+        *(index, subindex, ValueInfo(info), data_type, bit_length, Access(access)),
+        bytes(data[_ENTRY.size :]),
+    )
+
+
+def decode_error(data: bytes) -> int:
+    """The abort code in the data of an ERROR."""
+    if len(data) < 4:
+        raise DecodeError(f"SDO information error: needs 4 bytes, received {len(data)}")
+    return int.from_bytes(data[:4], "little")

@@ -1,0 +1,303 @@
+"""SII, the EEPROM of a SubDevice, ETG.1000.6 §5.4 and ETG.2010: header and categories.
+
+`decode_sii` gives the whole image as a frozen value that encodes back byte for byte. Reading word
+by word from a device, `decode_header` and `decode_category_header` tell how far to go. What the
+categories hold is in sii_categories.py.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum, IntFlag
+from typing import TypeVar
+
+from catenary.errors import DecodeError
+from catenary.wire.sii_categories import (
+    ClockMode,
+    General,
+    Pdo,
+    SyncManagerEntry,
+    decode_clock_modes,
+    decode_general,
+    decode_pdos,
+    decode_strings,
+    decode_sync_managers,
+)
+
+T = TypeVar("T")
+
+HEADER_SIZE = 128
+CATEGORY_HEADER_SIZE = 4
+MAXIMUM_SIZE = (
+    0x20000  # 64 k words: all that the header's size field can say, and more than is sold
+)
+MAXIMUM_CATEGORIES = 512
+END_OF_CATEGORIES = 0xFFFF
+
+# Addresses in words, for single reads and writes
+STATION_ALIAS_WORD = 0x0004
+CHECKSUM_WORD = 0x0007
+IDENTITY_WORD = 0x0008
+MAILBOX_WORD = 0x0018
+CATEGORIES_WORD = 0x0040
+
+_HEADER = struct.Struct("<5H4sH4I8s8HH66sHH")
+_CATEGORY = struct.Struct("<HH")
+_CHECKSUM_SIZE = 14  # bytes that the checksum covers
+_CHECKSUM_DISABLED = 0x88A4  # controllers accept it in place of a checksum, for debugging
+
+
+class CategoryType(IntEnum):
+    """The kinds of categories that have a meaning for a MainDevice."""
+
+    NOP = 0
+    STRINGS = 10
+    DATA_TYPES = 20
+    GENERAL = 30
+    FMMU = 40
+    SYNC_MANAGER = 41
+    FMMU_EXTENDED = 42
+    SYNC_UNIT = 43
+    TXPDO = 50
+    RXPDO = 51
+    DISTRIBUTED_CLOCKS = 60
+
+
+class MailboxProtocol(IntFlag):
+    """The protocols a device speaks (word 0x001C)."""
+
+    AOE = 0x0001
+    EOE = 0x0002
+    COE = 0x0004
+    FOE = 0x0008
+    SOE = 0x0010
+    VOE = 0x0020
+
+
+@dataclass(frozen=True, slots=True)
+class MailboxArea:
+    """Where one direction of a mailbox lies. Size 0: there is none."""
+
+    offset: int = 0
+    size: int = 0
+
+
+_NO_PROTOCOL = MailboxProtocol(0)
+_NO_AREA = MailboxArea()
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """The first 64 words. `receive`: MainDevice → device, `send`: device → MainDevice."""
+
+    vendor: int
+    product: int
+    revision: int
+    serial: int = 0
+    pdi_control: int = 0
+    pdi_configuration: int = 0
+    sync_pulse_length: int = 0  # [10 ns]
+    pdi_configuration_2: int = 0
+    station_alias: int = 0
+    checksum: int | None = None  # None: computed by encode
+    bootstrap_receive: MailboxArea = _NO_AREA
+    bootstrap_send: MailboxArea = _NO_AREA
+    standard_receive: MailboxArea = _NO_AREA
+    standard_send: MailboxArea = _NO_AREA
+    mailbox_protocols: MailboxProtocol = _NO_PROTOCOL
+    size_kbit: int = 16
+    version: int = 1
+    reserved: bytes = bytes(78)  # words 0x05-0x06, 0x10-0x13, 0x1D-0x3D, verbatim
+
+    def encode(self) -> bytes:
+        """Its 128 bytes. ValueError if a field does not fit."""
+        areas = (
+            *(self.bootstrap_receive, self.bootstrap_send),
+            *(self.standard_receive, self.standard_send),
+        )
+        if len(self.reserved) != 78:
+            raise ValueError(f"SII header: 78 bytes are reserved, got {len(self.reserved)}")
+        numbers = [number for area in areas for number in (area.offset, area.size)]
+        try:
+            image = _HEADER.pack(
+                *(self.pdi_control, self.pdi_configuration, self.sync_pulse_length),
+                *(self.pdi_configuration_2, self.station_alias, self.reserved[0:4], 0),
+                *(self.vendor, self.product, self.revision, self.serial, self.reserved[4:12]),
+                *(*numbers, self.mailbox_protocols, self.reserved[12:78]),
+                *(self.size_kbit - 1, self.version),
+            )
+            checksum = checksum_of(image) if self.checksum is None else self.checksum
+            return image[:_CHECKSUM_SIZE] + struct.pack("<H", checksum) + image[16:]
+        except struct.error as error:
+            raise ValueError(f"SII header: {error}") from None
+
+
+def decode_header(data: bytes) -> Header:
+    """The header in the first 128 bytes. DecodeError also where the checksum is wrong: then the
+    controller has not loaded its configuration either."""
+    if len(data) < HEADER_SIZE:
+        raise DecodeError(f"SII: {len(data)} bytes, the header needs {HEADER_SIZE}")
+    (pdi_control, pdi_configuration, pulse_length, pdi_configuration_2, alias, *rest) = (
+        _HEADER.unpack_from(data)
+    )
+    (reserved_1, checksum, vendor, product, revision, serial, reserved_2, *rest) = rest
+    (offset_0, size_0, offset_1, size_1, offset_2, size_2, offset_3, size_3, *rest) = rest
+    protocols, reserved_3, size_word, version = rest
+    _verify(checksum, checksum_of(data))
+    return Header(
+        *(vendor, product, revision, serial),
+        *(pdi_control, pdi_configuration, pulse_length, pdi_configuration_2, alias, checksum),
+        bootstrap_receive=MailboxArea(offset_0, size_0),
+        bootstrap_send=MailboxArea(offset_1, size_1),
+        standard_receive=MailboxArea(offset_2, size_2),
+        standard_send=MailboxArea(offset_3, size_3),
+        mailbox_protocols=MailboxProtocol(protocols),
+        size_kbit=size_word + 1,
+        version=version,
+        reserved=reserved_1 + reserved_2 + reserved_3,
+    )
+
+
+def _verify(checksum: int, expected: int) -> None:
+    if checksum & 0xFF != expected and checksum != _CHECKSUM_DISABLED:
+        raise DecodeError(
+            f"SII: checksum 0x{checksum:04X}, expected 0x{expected:04X}",
+            hint="the EEPROM is empty or was written in part: write the vendor's image again",
+        )
+
+
+def checksum_of(data: bytes) -> int:
+    """CRC-8 of the first 14 bytes: polynomial x^8 + x^2 + x + 1, start value 0xFF."""
+    crc = 0xFF
+    for byte in data[:_CHECKSUM_SIZE]:
+        crc ^= byte
+        for _ in range(8):
+            crc = (crc << 1 ^ 0x07) & 0xFF if crc & 0x80 else crc << 1
+    return crc
+
+
+@dataclass(frozen=True, slots=True)
+class Category:
+    """One category, as bytes. Bit 15 of the type: the vendor's own."""
+
+    type: int
+    data: bytes
+
+    def encode(self) -> bytes:
+        """Its bytes with header. ValueError if it does not fit or has an odd length."""
+        if len(self.data) % 2:
+            raise ValueError(f"SII category {self.type}: {len(self.data)} bytes are no whole words")
+        try:
+            return _CATEGORY.pack(self.type, len(self.data) // 2) + self.data
+        except struct.error as error:
+            raise ValueError(f"SII category {self.type}: {error}") from None
+
+
+def decode_category_header(data: bytes) -> tuple[int, int]:
+    """Type and length in bytes of the category that begins here. The end mark has no length."""
+    if data[:2] == b"\xff\xff":
+        return END_OF_CATEGORIES, 0
+    if len(data) < CATEGORY_HEADER_SIZE:
+        raise DecodeError(f"SII: a category's header needs 4 bytes, {len(data)} left")
+    kind, words = _CATEGORY.unpack_from(data)
+    return kind, 2 * words
+
+
+@dataclass(frozen=True, slots=True)
+class Sii:
+    """A whole image: header, categories as found, and decoded those that have a meaning."""
+
+    header: Header
+    categories: tuple[Category, ...] = ()
+    trailing: bytes = b"\xff\xff"  # from the end mark on, verbatim
+
+    def encode(self, size: int | None = None) -> bytes:
+        """Its bytes, filled up with 0xFF to `size`. ValueError if it does not fit."""
+        body = b"".join(category.encode() for category in self.categories)
+        image = self.header.encode() + body + self.trailing
+        if size is not None and len(image) > size:
+            raise ValueError(f"SII: {len(image)} bytes, the EEPROM has {size}")
+        return image.ljust(size or 0, b"\xff")
+
+    @property
+    def strings(self) -> tuple[str, ...]:
+        """Texts, in order; others name them by number, from 1. See `string`."""
+        return self._join(CategoryType.STRINGS, decode_strings)
+
+    def string(self, number: int) -> str:
+        """The text with a number; empty for 0 and for one that is not there."""
+        strings = self.strings
+        return strings[number - 1] if 0 < number <= len(strings) else ""
+
+    @property
+    def general(self) -> General | None:
+        """Names, mailbox details, current."""
+        found = (each.data for each in self.categories if each.type == CategoryType.GENERAL)
+        data = next(found, None)
+        return None if data is None else decode_general(data)
+
+    @property
+    def fmmus(self) -> tuple[int, ...]:
+        """What each FMMU is meant for, a `FmmuUse` or a vendor's number."""
+        return self._join(CategoryType.FMMU, tuple)
+
+    @property
+    def sync_managers(self) -> tuple[SyncManagerEntry, ...]:
+        """The SyncManagers, by number."""
+        return self._join(CategoryType.SYNC_MANAGER, decode_sync_managers)
+
+    @property
+    def transmit_pdos(self) -> tuple[Pdo, ...]:
+        """What the device can send: inputs of the MainDevice."""
+        return self._join(CategoryType.TXPDO, decode_pdos)
+
+    @property
+    def receive_pdos(self) -> tuple[Pdo, ...]:
+        """What the device can receive: outputs of the MainDevice."""
+        return self._join(CategoryType.RXPDO, decode_pdos)
+
+    @property
+    def clock_modes(self) -> tuple[ClockMode, ...]:
+        """Ways to use distributed clocks; the first is the default."""
+        return self._join(CategoryType.DISTRIBUTED_CLOCKS, decode_clock_modes)
+
+    def _join(self, kind: CategoryType, decode: Callable[[bytes], tuple[T, ...]]) -> tuple[T, ...]:
+        # Vendors split one category into several (pollen: a TXPDO category for each PDO).
+        return tuple(
+            item for each in self.categories if each.type == kind for item in decode(each.data)
+        )
+
+
+def decode_sii(image: bytes) -> Sii:
+    """The image of an EEPROM, or DecodeError with the reason. Every category with a meaning is
+    decoded once here, so that the properties of the result do not raise."""
+    if len(image) > MAXIMUM_SIZE:
+        raise DecodeError(f"SII: {len(image)} bytes, at most {MAXIMUM_SIZE}")
+    header = decode_header(image)
+    found, end = _split(image)
+    sii = Sii(header, found, bytes(image[end:]))
+    _ = (sii.strings, sii.general, sii.sync_managers)
+    _ = (sii.transmit_pdos, sii.receive_pdos, sii.clock_modes)
+    return sii
+
+
+def _split(image: bytes) -> tuple[tuple[Category, ...], int]:
+    found: list[Category] = []
+    offset = HEADER_SIZE
+    while offset < len(image):  # an image without an end mark ends with its bytes
+        kind, size = decode_category_header(image[offset : offset + CATEGORY_HEADER_SIZE])
+        if kind == END_OF_CATEGORIES:
+            break
+        start = offset + CATEGORY_HEADER_SIZE
+        if start + size > len(image):
+            left = len(image) - start
+            raise DecodeError(
+                f"SII: category {kind} at byte {offset} says {size} bytes, {left} left"
+            )
+        found.append(Category(kind, bytes(image[start : start + size])))
+        if len(found) > MAXIMUM_CATEGORIES:
+            raise DecodeError(f"SII: more than {MAXIMUM_CATEGORIES} categories and no end mark")
+        offset = start + size
+    return tuple(found), offset

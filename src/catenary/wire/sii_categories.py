@@ -1,0 +1,304 @@
+"""What the categories of the SII hold, ETG.1000.6 §5.4 tables 18 to 27 and ETG.2010.
+
+Each has `encode_...` and `decode_...`. Categories are filled up to whole words; the number of a
+string counts from 1, 0 means none. What is left at a category's end and shorter than one of its
+records is filling.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import IntEnum, IntFlag
+from typing import Any
+
+from catenary.errors import DecodeError
+
+_GENERAL = struct.Struct("<4BB5BBBhBBHH12s")
+_SYNC_MANAGER = struct.Struct("<HHBBBB")
+_PDO = struct.Struct("<HBBBBH")
+_PDO_ENTRY = struct.Struct("<HBBBBH")
+_CLOCK_MODE = struct.Struct("<IiihHhBB4s")
+
+
+class CoeDetails(IntFlag):
+    """What CoE of the device can, general category byte 5."""
+
+    SDO = 0x01
+    SDO_INFORMATION = 0x02
+    PDO_ASSIGN = 0x04
+    PDO_CONFIGURATION = 0x08
+    UPLOAD_AT_START = 0x10
+    COMPLETE_ACCESS = 0x20
+
+
+class FmmuUse(IntEnum):
+    """What an FMMU is meant for."""
+
+    UNUSED = 0
+    OUTPUTS = 1
+    INPUTS = 2
+    MAILBOX_STATE = 3
+    NONE = 0xFF
+
+
+class SyncManagerUse(IntEnum):
+    """What a SyncManager is meant for."""
+
+    UNUSED = 0
+    MAILBOX_OUT = 1
+    MAILBOX_IN = 2
+    OUTPUTS = 3
+    INPUTS = 4
+
+
+class SyncManagerEnable(IntFlag):
+    """The enable byte of a SyncManager's entry."""
+
+    ENABLED = 0x01
+    FIXED_CONTENT = 0x02
+    VIRTUAL = 0x04
+    OP_ONLY = 0x08
+
+
+_NO_DETAILS = CoeDetails(0)
+
+
+@dataclass(frozen=True, slots=True)
+class General:
+    """General category: names by string number, mailbox details, current on the E-bus."""
+
+    group: int = 0
+    image: int = 0
+    order: int = 0
+    name: int = 0
+    coe: CoeDetails = _NO_DETAILS
+    foe: int = 0
+    eoe: int = 0
+    soe_channels: int = 0
+    ds402_channels: int = 0
+    sysman_class: int = 0
+    flags: int = 0
+    current_ma: int = 0  # drawn from the E-bus; negative: fed into it [mA]
+    physical_ports: int = 0  # four bits a port: 1 MII, 3 E-bus
+    identification_address: int = 0  # where the device shows its identification
+    reserved: bytes = bytes(15)  # bytes 4, 14, 15 and the last 12, verbatim
+
+    def encode(self) -> bytes:
+        """Its 32 bytes. ValueError if a field does not fit."""
+        reserved = self.reserved
+        try:
+            return _GENERAL.pack(
+                *(self.group, self.image, self.order, self.name, reserved[0]),
+                *(self.coe, self.foe, self.eoe, self.soe_channels, self.ds402_channels),
+                *(self.sysman_class, self.flags, self.current_ma, reserved[1], reserved[2]),
+                *(self.physical_ports, self.identification_address, reserved[3:15]),
+            )
+        except (struct.error, IndexError) as error:
+            raise ValueError(f"SII general category: {error}") from None
+
+
+def decode_general(data: bytes) -> General:
+    """The general category. A shorter one, of an early edition, is filled up with zeros."""
+    if len(data) < 16:
+        raise DecodeError(f"SII general category: needs at least 16 bytes, received {len(data)}")
+    fields = _GENERAL.unpack(data[: _GENERAL.size].ljust(_GENERAL.size, b"\x00"))
+    (group, image, order, name, pad, coe, foe, eoe, soe, ds402, sysman, flags) = fields[:12]
+    current, pad_14, pad_15, ports, identification, last = fields[12:]
+    return General(
+        *(group, image, order, name, CoeDetails(coe), foe, eoe, soe, ds402, sysman, flags),
+        *(current, ports, identification, bytes((pad, pad_14, pad_15)) + last),
+    )
+
+
+def encode_strings(strings: Sequence[str]) -> bytes:
+    """The strings category. ValueError for more than 255 strings or a string of more than 255."""
+    if len(strings) > 255:
+        raise ValueError(f"SII strings: {len(strings)}, at most 255")
+    parts = [bytes((len(strings),))]
+    for text in strings:
+        try:
+            raw = text.encode("latin-1")
+            parts.append(bytes((len(raw),)) + raw)
+        except ValueError as error:
+            raise ValueError(f"SII string {text!r}: {error}") from None
+    return _even(b"".join(parts))
+
+
+def decode_strings(data: bytes) -> tuple[str, ...]:
+    """The texts of the strings category; characters beyond ASCII are read as Latin-1."""
+    strings: list[str] = []
+    offset = 1
+    for _ in range(data[0] if data else 0):
+        length = data[offset] if offset < len(data) else len(data)
+        if offset + 1 + length > len(data):
+            raise DecodeError(
+                f"SII strings: {data[0]} strings, string {len(strings) + 1} at byte {offset} does "
+                f"not fit into {len(data)} bytes"
+            )
+        strings.append(data[offset + 1 : offset + 1 + length].decode("latin-1"))
+        offset += 1 + length
+    return tuple(strings)
+
+
+def encode_fmmus(uses: Sequence[int]) -> bytes:
+    """The FMMU category."""
+    data = bytes(uses)
+    return data + (b"\xff" if len(data) % 2 else b"")
+
+
+@dataclass(frozen=True, slots=True)
+class SyncManagerEntry:
+    """How a SyncManager is to be set: see sync_manager.Control for the control byte."""
+
+    address: int
+    length: int
+    control: int
+    status: int = 0
+    enable: SyncManagerEnable = SyncManagerEnable.ENABLED
+    use: int = SyncManagerUse.UNUSED  # a SyncManagerUse, or what the device says
+
+    def encode(self) -> bytes:
+        """Its 8 bytes. ValueError if a field does not fit."""
+        try:
+            return _SYNC_MANAGER.pack(
+                *(self.address, self.length, self.control, self.status, self.enable, self.use)
+            )
+        except struct.error as error:
+            raise ValueError(f"SII SyncManager: {error}") from None
+
+
+def encode_sync_managers(entries: Sequence[SyncManagerEntry]) -> bytes:
+    """The SyncManager category."""
+    return b"".join(entry.encode() for entry in entries)
+
+
+def decode_sync_managers(data: bytes) -> tuple[SyncManagerEntry, ...]:
+    """The SyncManager category."""
+    return tuple(
+        SyncManagerEntry(address, length, control, status, SyncManagerEnable(enable), use)
+        for address, length, control, status, enable, use in _records(_SYNC_MANAGER, data)
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class PdoEntry:
+    """One object in a PDO. Index 0: a gap."""
+
+    index: int
+    subindex: int
+    bit_length: int
+    data_type: int = 0  # see types.by_index
+    name: int = 0
+    flags: int = 0
+
+    def encode(self) -> bytes:
+        """Its 8 bytes. ValueError if a field does not fit."""
+        try:
+            return _PDO_ENTRY.pack(
+                *(self.index, self.subindex, self.name),
+                *(self.data_type, self.bit_length, self.flags),
+            )
+        except struct.error as error:
+            raise ValueError(f"SII PDO entry: {error}") from None
+
+
+@dataclass(frozen=True, slots=True)
+class Pdo:
+    """A PDO and its entries."""
+
+    index: int
+    entries: tuple[PdoEntry, ...] = ()
+    sync_manager: int = 0xFF  # 0xFF: not assigned
+    synchronization: int = 0
+    name: int = 0
+    flags: int = 0
+
+    @property
+    def bit_length(self) -> int:
+        """The sum over its entries."""
+        return sum(entry.bit_length for entry in self.entries)
+
+    def encode(self) -> bytes:
+        """Its bytes. ValueError if a field does not fit."""
+        try:
+            head = _PDO.pack(
+                *(self.index, len(self.entries), self.sync_manager),
+                *(self.synchronization, self.name, self.flags),
+            )
+        except struct.error as error:
+            raise ValueError(f"SII PDO: {error}") from None
+        return head + b"".join(entry.encode() for entry in self.entries)
+
+
+def encode_pdos(pdos: Sequence[Pdo]) -> bytes:
+    """A TXPDO or RXPDO category."""
+    return b"".join(pdo.encode() for pdo in pdos)
+
+
+def decode_pdos(data: bytes) -> tuple[Pdo, ...]:
+    """The PDOs of a TXPDO or RXPDO category."""
+    pdos: list[Pdo] = []
+    offset = 0
+    while offset + _PDO.size <= len(data):
+        index, count, sync_manager, synchronization, name, flags = _PDO.unpack_from(data, offset)
+        offset += _PDO.size
+        end = offset + count * _PDO_ENTRY.size
+        if end > len(data):
+            raise DecodeError(
+                f"SII PDO 0x{index:04X}: {count} entries do not fit into its category"
+            )
+        entries = tuple(
+            PdoEntry(entry, subindex, bits, data_type, text, bits_flags)
+            for entry, subindex, text, data_type, bits, bits_flags in _PDO_ENTRY.iter_unpack(
+                data[offset:end]
+            )
+        )
+        pdos.append(Pdo(index, entries, sync_manager, synchronization, name, flags))
+        offset = end
+    return tuple(pdos)
+
+
+@dataclass(frozen=True, slots=True)
+class ClockMode:
+    """One way to use distributed clocks (category 60). Cycle time 0: that of the loop."""
+
+    cycle_time_ns: int = 0
+    shift_time_ns: int = 0
+    shift_time_1_ns: int = 0
+    sync1_factor: int = 0
+    assign_activate: int = 0  # registers 0x0980 (low byte) and 0x0981
+    sync0_factor: int = 0
+    name: int = 0
+    description: int = 0
+    reserved: bytes = bytes(4)
+
+    def encode(self) -> bytes:
+        """Its 24 bytes. ValueError if a field does not fit."""
+        try:
+            return _CLOCK_MODE.pack(
+                *(self.cycle_time_ns, self.shift_time_ns, self.shift_time_1_ns),
+                *(self.sync1_factor, self.assign_activate, self.sync0_factor),
+                *(self.name, self.description, self.reserved),
+            )
+        except struct.error as error:
+            raise ValueError(f"SII distributed clocks: {error}") from None
+
+
+def encode_clock_modes(modes: Sequence[ClockMode]) -> bytes:
+    """The distributed clocks category."""
+    return b"".join(mode.encode() for mode in modes)
+
+
+def decode_clock_modes(data: bytes) -> tuple[ClockMode, ...]:
+    """The distributed clocks category."""
+    return tuple(ClockMode(*fields) for fields in _records(_CLOCK_MODE, data))
+
+
+def _records(record: struct.Struct, data: bytes) -> Iterator[tuple[Any, ...]]:
+    return record.iter_unpack(data[: len(data) // record.size * record.size])
+
+
+def _even(data: bytes) -> bytes:
+    return data + b"\x00" if len(data) % 2 else data

@@ -1,0 +1,77 @@
+"""Reading and writing the SII EEPROM, registers 0x0500 to 0x050F, ETG.1000.4 §6.4."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+from catenary.errors import DecodeError
+
+CONFIGURATION_TO_PDI = 0x01  # of 0x0500: the device's processor owns the EEPROM
+CONFIGURATION_FORCE = 0x02  # of 0x0500: take it back whatever the processor does
+PDI_ACCESS_ACTIVE = 0x01  # of 0x0501
+
+
+class Command(IntEnum):
+    """Bits 8 to 10 of control/status."""
+
+    IDLE = 0  # written: clears error bits
+    READ = 1
+    WRITE = 2
+    RELOAD = 4
+
+
+@dataclass(frozen=True, slots=True)
+class ControlStatus:
+    """SII control/status (0x0502). Everything but `write_enable` and `command` is read only."""
+
+    command: Command = Command.IDLE
+    write_enable: bool = False  # valid for the datagram that also writes the command
+    emulation: bool = False  # the device's processor plays the EEPROM
+    eight_bytes: bool = False  # a read gives 8 bytes, else 4
+    two_byte_address: bool = False  # EEPROMs above 16 kbit
+    checksum_error: bool = False
+    not_loaded: bool = False
+    command_error: bool = False  # missing acknowledge, or an invalid command
+    write_enable_error: bool = False
+    busy: bool = False
+
+    @property
+    def read_size(self) -> int:
+        """How many bytes one read command brings."""
+        return 8 if self.eight_bytes else 4
+
+    @property
+    def failed(self) -> bool:
+        """Whether the last command failed; writing IDLE clears it."""
+        return self.command_error or self.write_enable_error
+
+    @property
+    def word(self) -> int:
+        """The register's value."""
+        return (
+            self.write_enable
+            | self.emulation << 5
+            | self.eight_bytes << 6
+            | self.two_byte_address << 7
+            | self.command << 8
+            | self.checksum_error << 11
+            | self.not_loaded << 12
+            | self.command_error << 13
+            | self.write_enable_error << 14
+            | self.busy << 15
+        )
+
+    @classmethod
+    def from_word(cls, word: int) -> ControlStatus:
+        """The reverse of `word`. DecodeError for a command that does not exist."""
+        try:
+            command = Command(word >> 8 & 7)
+        except ValueError:
+            raise DecodeError(
+                f"SII control/status 0x{word:04X}: no command {word >> 8 & 7}"
+            ) from None
+        return cls(
+            command,
+            *(bool(word >> bit & 1) for bit in (0, 5, 6, 7, 11, 12, 13, 14, 15)),
+        )

@@ -1,0 +1,132 @@
+"""SyncManager blocks, registers 0x0800 + 8·k, ETG.1000.4 §6.7 and ESC data sheet."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from enum import IntEnum, IntFlag
+
+from catenary.errors import DecodeError
+
+SIZE = 8
+_BLOCK = struct.Struct("<HHBBBB")
+
+
+class Buffering(IntEnum):
+    """How a SyncManager hands memory over."""
+
+    THREE_BUFFERS = 0  # process data: the newest, never waiting
+    MAILBOX = 2  # one buffer: handshake, nothing is lost
+
+
+class Direction(IntEnum):
+    """Who writes, seen from the MainDevice."""
+
+    READ = 0  # the device writes, EtherCAT reads
+    WRITE = 1
+
+
+class Status(IntFlag):
+    """The status byte (offset 5). Bits 4 and 5: the buffer written last, in three-buffer mode."""
+
+    INTERRUPT_WRITE = 0x01
+    INTERRUPT_READ = 0x02
+    MAILBOX_FULL = 0x08
+    BUFFER_1 = 0x10
+    BUFFER_2 = 0x20
+    READ_BUFFER_OPEN = 0x40
+    WRITE_BUFFER_OPEN = 0x80
+
+
+class Activation(IntFlag):
+    """The activation byte (offset 6)."""
+
+    ENABLE = 0x01
+    REPEAT_REQUEST = 0x02
+    LATCH_EVENT_ECAT = 0x40
+    LATCH_EVENT_PDI = 0x80
+
+
+class PdiControl(IntFlag):
+    """The PDI's byte (offset 7); the MainDevice only reads it."""
+
+    DEACTIVATED = 0x01
+    REPEAT_ACKNOWLEDGE = 0x02
+
+
+@dataclass(frozen=True, slots=True)
+class Control:
+    """The control byte (offset 4), also in the SII. Bits 0 to 3: mode; 4 to 6: side effects."""
+
+    buffering: Buffering
+    direction: Direction
+    interrupt_ecat: bool = False
+    interrupt_pdi: bool = False
+    watchdog: bool = False  # a write triggers the process data watchdog
+
+    @property
+    def byte(self) -> int:
+        """The register's value."""
+        return (
+            self.buffering
+            | self.direction << 2
+            | self.interrupt_ecat << 4
+            | self.interrupt_pdi << 5
+            | self.watchdog << 6
+        )
+
+    @classmethod
+    def from_byte(cls, byte: int) -> Control:
+        """The reverse of `byte`. DecodeError for a mode that does not exist. Bit 7 is ignored."""
+        try:
+            buffering, direction = Buffering(byte & 0x03), Direction(byte >> 2 & 0x03)
+        except ValueError as error:
+            raise DecodeError(f"SyncManager control 0x{byte:02X}: {error}") from None
+        return cls(buffering, direction, bool(byte & 0x10), bool(byte & 0x20), bool(byte & 0x40))
+
+
+MAILBOX_OUT = Control(Buffering.MAILBOX, Direction.WRITE, interrupt_pdi=True)  # 0x26
+MAILBOX_IN = Control(Buffering.MAILBOX, Direction.READ, interrupt_pdi=True)  # 0x22
+OUTPUTS = Control(Buffering.THREE_BUFFERS, Direction.WRITE, interrupt_pdi=True, watchdog=True)  # 64
+INPUTS = Control(Buffering.THREE_BUFFERS, Direction.READ, interrupt_pdi=True)  # 0x20
+
+
+_IDLE = Status(0)
+_UNTOUCHED = PdiControl(0)
+
+
+@dataclass(frozen=True, slots=True)
+class SyncManager:
+    """One SyncManager: the memory it guards, and how."""
+
+    address: int
+    length: int
+    control: Control
+    status: Status = _IDLE
+    activation: Activation = Activation.ENABLE
+    pdi_control: PdiControl = _UNTOUCHED
+
+    def encode(self) -> bytes:
+        """Its block. ValueError if a field does not fit."""
+        try:
+            return _BLOCK.pack(
+                *(self.address, self.length, self.control.byte),
+                *(self.status, self.activation, self.pdi_control),
+            )
+        except struct.error as error:
+            raise ValueError(f"SyncManager: {error}") from None
+
+
+def decode_sync_manager(data: bytes) -> SyncManager:
+    """The SyncManager in a block of 8 bytes."""
+    if len(data) != SIZE:
+        raise DecodeError(f"SyncManager: needs {SIZE} bytes, received {len(data)}")
+    address, length, control, status, activation, pdi_control = _BLOCK.unpack(data)
+    return SyncManager(
+        address,
+        length,
+        Control.from_byte(control),
+        Status(status),
+        Activation(activation),
+        PdiControl(pdi_control),
+    )
