@@ -32,12 +32,17 @@ _VLAN_ETHERTYPES = (0x8100, 0x88A8)
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One frame. `padding` is what follows the last datagram: encode restores every byte."""
+    """One frame. `padding` is what follows the last datagram: encode restores every byte.
+
+    `counted_padding`: how much of it the length in the EtherCAT header counts. None is the rule;
+    TwinCAT counts an even number of bytes, others count Ethernet's minimum.
+    """
 
     datagrams: tuple[Datagram, ...]
     source: bytes = DEFAULT_SOURCE
     destination: bytes = BROADCAST
     padding: bytes = b""
+    counted_padding: int = 0
 
     @property
     def has_passed_controller(self) -> bool:
@@ -57,11 +62,14 @@ class Frame:
         payload = b"".join(
             datagram.encode(more_follows=i < last) for i, datagram in enumerate(self.datagrams)
         )
-        if len(payload) > MAXIMUM_PAYLOAD:
+        if len(payload) + len(self.padding) > MAXIMUM_PAYLOAD:
             raise ValueError(
                 f"datagrams of {len(payload)} bytes: at most {MAXIMUM_PAYLOAD} a frame"
             )
-        header = struct.pack("<H", len(payload) | _TYPE_COMMAND << 12)
+        if not 0 <= self.counted_padding <= len(self.padding):
+            raise ValueError(f"{self.counted_padding} bytes of padding counted, not all are there")
+        length = len(payload) + self.counted_padding
+        header = struct.pack("<H", length | _TYPE_COMMAND << 12)
         ethertype = struct.pack(">H", ETHERTYPE)
         return self.destination + self.source + ethertype + header + payload + self.padding
 
@@ -83,8 +91,14 @@ def decode_frame(data: bytes) -> Frame:
         raise DecodeError(
             f"EtherCAT header says {length} bytes, {len(data) - HEADER_SIZE} received"
         )
-    datagrams = _decode_datagrams(bytes(data[:end]))
-    return Frame(datagrams, bytes(data[6:12]), bytes(data[0:6]), bytes(data[end:]))
+    datagrams, rest = _decode_datagrams(bytes(data[:end]))
+    return Frame(
+        datagrams,
+        bytes(data[6:12]),
+        bytes(data[0:6]),
+        bytes(data[rest:]),
+        counted_padding=end - rest,
+    )
 
 
 def is_alien(data: bytes) -> bool:
@@ -116,16 +130,12 @@ def _why_alien(data: bytes) -> str | None:
     return None
 
 
-def _decode_datagrams(data: bytes) -> tuple[Datagram, ...]:
+def _decode_datagrams(data: bytes) -> tuple[tuple[Datagram, ...], int]:
+    """The datagrams, and where the last one ends."""
     datagrams: list[Datagram] = []
     offset, more_follows = HEADER_SIZE, True
     while more_follows:
         datagram, more_follows = decode_datagram(data, offset)
         datagrams.append(datagram)
         offset += datagram.size
-    if offset != len(data):
-        raise DecodeError(
-            f"EtherCAT header says {len(data) - HEADER_SIZE} bytes, "
-            f"the datagrams have {offset - HEADER_SIZE}"
-        )
-    return tuple(datagrams)
+    return tuple(datagrams), offset

@@ -1,0 +1,223 @@
+"""Captures of Ethernet frames in pcapng (draft-ietf-opsawg-pcapng): reading of what any tool wrote,
+in both byte orders; writing with one interface and times in ns.
+
+    capture = encode_header("eth0") + b"".join(encode_packet(packet) for packet in packets)
+    decode_capture(capture).packets == tuple(packets)
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from catenary.errors import DecodeError
+
+ETHERNET = 1  # LINKTYPE_ETHERNET
+
+_SECTION = 0x0A0D0D0A  # reads the same in both byte orders
+_MAGIC = 0x1A2B3C4D
+_INTERFACE = 1
+_SIMPLE_PACKET = 3
+_ENHANCED_PACKET = 6
+_MINIMUM_BLOCK = 12
+
+_OPTION_END = 0
+_OPTION_COMMENT = 1
+_OPTION_NAME = 2
+_OPTION_RESOLUTION = 9
+_OPTION_TIME_OFFSET = 14
+_MICROSECONDS = 6  # the resolution where none is given
+_NANOSECONDS = 9
+
+
+@dataclass(frozen=True, slots=True)
+class Interface:
+    """Where packets were captured. Bit 7 of `resolution`: a power of 2, else of 10."""
+
+    name: str = ""
+    link_type: int = ETHERNET
+    resolution: int = _NANOSECONDS
+    time_offset: int = 0  # [s]
+
+
+@dataclass(frozen=True, slots=True)
+class Packet:
+    """One captured frame."""
+
+    time_ns: int  # since 1970, or whatever the writer counts from
+    data: bytes
+    comment: str = ""
+    interface: int = 0  # its number in Capture.interfaces
+    original_length: int | None = None  # None: nothing was cut off
+
+
+@dataclass(frozen=True, slots=True)
+class Capture:
+    """A whole file. Blocks of other kinds (names, statistics) are left out."""
+
+    interfaces: tuple[Interface, ...]
+    packets: tuple[Packet, ...]
+
+
+def encode_header(interface_name: str = "") -> bytes:
+    """The beginning of a file: the section and its one interface, with times in ns."""
+    section = struct.pack("<IHHq", _MAGIC, 1, 0, -1)
+    options = _option(_OPTION_NAME, interface_name.encode()) if interface_name else b""
+    options += _option(_OPTION_RESOLUTION, bytes((_NANOSECONDS,))) + _option(_OPTION_END, b"")
+    interface = struct.pack("<HHI", ETHERNET, 0, 0) + options
+    return _block(_SECTION, section) + _block(_INTERFACE, interface)
+
+
+def encode_packet(packet: Packet) -> bytes:
+    """A packet of the one interface. ValueError if a field does not fit."""
+    original = len(packet.data) if packet.original_length is None else packet.original_length
+    if not 0 <= packet.time_ns < 1 << 64:
+        raise ValueError(f"pcapng: time {packet.time_ns} ns is not in 0 to 2**64 - 1")
+    if packet.interface or not len(packet.data) <= original < 1 << 32:
+        raise ValueError(f"pcapng: interface {packet.interface}, original length {original}")
+    high, low = packet.time_ns >> 32, packet.time_ns & 0xFFFF_FFFF
+    body = struct.pack("<IIIII", 0, high, low, len(packet.data), original) + _pad(packet.data)
+    if packet.comment:
+        body += _option(_OPTION_COMMENT, packet.comment.encode()) + _option(_OPTION_END, b"")
+    return _block(_ENHANCED_PACKET, body)
+
+
+def decode_capture(data: bytes) -> Capture:
+    """The capture in a file's bytes. A last block that was cut off is an error too."""
+    state = _State()
+    for block in _blocks(data):
+        if block.kind == _SECTION:
+            state.first_interface = len(state.interfaces)
+        elif block.kind == _INTERFACE:
+            state.interfaces.append(_decode_interface(block))
+        elif block.kind == _ENHANCED_PACKET:
+            state.packets.append(_decode_enhanced(block, state))
+        elif block.kind == _SIMPLE_PACKET:
+            state.packets.append(_decode_simple(block, state))
+    return Capture(tuple(state.interfaces), tuple(state.packets))
+
+
+@dataclass(slots=True)
+class _State:
+    """Owns what was found so far."""
+
+    interfaces: list[Interface] = field(default_factory=list)
+    packets: list[Packet] = field(default_factory=list)
+    first_interface: int = 0  # of the section; its packets count from there
+
+    def interface(self, number: int) -> int:
+        found = self.first_interface + number
+        if found >= len(self.interfaces):
+            raise DecodeError(f"pcapng: a packet of interface {number}, which was not described")
+        return found
+
+
+class _Block(NamedTuple):
+    kind: int
+    order: str  # "<" or ">"
+    body: bytes
+
+    def unpack(self, layout: str) -> tuple[int, ...]:
+        """The fields at its start."""
+        size = struct.calcsize(self.order + layout)
+        if size > len(self.body):
+            raise DecodeError(f"pcapng: block {self.kind} has {len(self.body)} bytes, needs {size}")
+        return struct.unpack_from(self.order + layout, self.body)
+
+
+def _blocks(data: bytes) -> Iterator[_Block]:
+    offset, order = 0, ""
+    while offset < len(data):
+        if offset + _MINIMUM_BLOCK > len(data):
+            raise DecodeError(f"pcapng: {len(data) - offset} bytes left at {offset}, no block fits")
+        if data[offset : offset + 4] == b"\x0a\x0d\x0d\x0a":
+            order = _byte_order(data[offset + 8 : offset + 12])
+        if not order:
+            raise DecodeError("pcapng: does not begin with a section header")
+        kind, length = struct.unpack_from(order + "II", data, offset)
+        end = offset + length
+        if length < _MINIMUM_BLOCK or length % 4 or end > len(data):
+            raise DecodeError(f"pcapng: block at byte {offset} says {length} bytes")
+        if struct.unpack_from(order + "I", data, end - 4)[0] != length:
+            raise DecodeError(f"pcapng: block at byte {offset} ends with another length")
+        yield _Block(kind, order, bytes(data[offset + 8 : end - 4]))
+        offset = end
+
+
+def _byte_order(magic: bytes) -> str:
+    for order in ("<", ">"):
+        if magic == struct.pack(order + "I", _MAGIC):
+            return order
+    raise DecodeError(f"pcapng: byte-order magic is {magic.hex()}")
+
+
+def _decode_interface(block: _Block) -> Interface:
+    link_type, _, _ = block.unpack("HHI")
+    options = _decode_options(block, 8)
+    name = options.get(_OPTION_NAME, b"").decode("utf-8", "replace")
+    resolution = options.get(_OPTION_RESOLUTION, bytes((_MICROSECONDS,)))
+    time_offset = options.get(_OPTION_TIME_OFFSET, bytes(8))
+    if len(resolution) != 1 or len(time_offset) != 8:
+        raise DecodeError("pcapng: resolution or time offset of an interface has a wrong length")
+    return Interface(
+        name, link_type, resolution[0], struct.unpack(block.order + "q", time_offset)[0]
+    )
+
+
+def _decode_enhanced(block: _Block, state: _State) -> Packet:
+    number, high, low, captured, original = block.unpack("IIIII")
+    interface = state.interface(number)
+    end = 20 + captured
+    if end > len(block.body):
+        raise DecodeError(
+            f"pcapng: a packet says {captured} bytes, {len(block.body) - 20} received"
+        )
+    options = _decode_options(block, end + -end % 4)
+    comment = options.get(_OPTION_COMMENT, b"").decode("utf-8", "replace")
+    time_ns = _time_ns(high << 32 | low, state.interfaces[interface])
+    cut = original if original != captured else None
+    return Packet(time_ns, block.body[20:end], comment, interface, cut)
+
+
+def _decode_simple(block: _Block, state: _State) -> Packet:
+    (original,) = block.unpack("I")
+    data = block.body[4 : 4 + original]
+    cut = original if original != len(data) else None
+    return Packet(0, data, "", state.interface(0), cut)
+
+
+def _time_ns(ticks: int, interface: Interface) -> int:
+    power = interface.resolution & 0x7F
+    divisor = 1 << power if interface.resolution & 0x80 else 10**power
+    return ticks * 1_000_000_000 // divisor + interface.time_offset * 1_000_000_000
+
+
+def _decode_options(block: _Block, offset: int) -> dict[int, bytes]:
+    options: dict[int, bytes] = {}
+    while offset + 4 <= len(block.body):
+        code, length = struct.unpack_from(block.order + "HH", block.body, offset)
+        if code == _OPTION_END:
+            break
+        start = offset + 4
+        if start + length > len(block.body):
+            raise DecodeError(f"pcapng: option {code} says {length} bytes, beyond its block")
+        options.setdefault(code, block.body[start : start + length])
+        offset = start + length + -length % 4
+    return options
+
+
+def _block(kind: int, body: bytes) -> bytes:
+    length = len(body) + _MINIMUM_BLOCK
+    return struct.pack("<II", kind, length) + body + struct.pack("<I", length)
+
+
+def _option(code: int, value: bytes) -> bytes:
+    if len(value) > 0xFFFF:
+        raise ValueError(f"pcapng: an option has at most 65535 bytes, got {len(value)}")
+    return struct.pack("<HH", code, len(value)) + _pad(value)
+
+
+def _pad(data: bytes) -> bytes:
+    return data + bytes(-len(data) % 4)
