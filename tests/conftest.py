@@ -1,13 +1,14 @@
-"""What tests stand on: shared data, and wires of our own.
+"""What tests stand on: shared data, wires of our own, tshark.
 
-A test that uses `shared_data` or `veth` is skipped, with the reason, where there is none, and is
-marked `shared_data` or `wire`. `--require MARKER` turns those skips into failures and fails when
-no test so marked passed: what CI asks for.
+A test that uses `shared_data`, `veth` or `tshark` is skipped, with the reason, where there is none,
+and is marked `shared_data`, `wire` or `tshark`. `--require MARKER` turns those skips into failures,
+and fails when no test so marked passed: what CI asks for.
 """
 
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Never
@@ -17,7 +18,7 @@ import pytest
 from catenary.realtime import private_network
 
 ROOT = Path(__file__).resolve().parent.parent
-FIXTURE_OF = {"shared_data": "shared_data", "wire": "veth"}  # marker: fixture
+FIXTURE_OF = {"shared_data": "shared_data", "wire": "veth", "tshark": "tshark"}  # marker: fixture
 REQUIRED = pytest.StashKey[set[str]]()
 PASSED = pytest.StashKey[set[str]]()
 
@@ -29,7 +30,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         default=[],
         choices=sorted(FIXTURE_OF),
         metavar="MARKER",
-        help="fail unless tests with this marker ran (shared_data, wire)",
+        help="fail unless tests with this marker ran (shared_data, wire, tshark)",
     )
 
 
@@ -78,6 +79,15 @@ def shared_data(pytestconfig: pytest.Config) -> Path:
     if not folder.is_dir():
         lacking(pytestconfig, "shared_data", f"no shared data: {folder} is no folder")
     return folder
+
+
+@pytest.fixture(scope="session")
+def tshark(pytestconfig: pytest.Config) -> str:
+    """The foreign dissector's command."""
+    command = shutil.which("tshark")
+    if command is None:
+        lacking(pytestconfig, "tshark", "tshark is not installed (package tshark)")
+    return command
 
 
 @pytest.fixture

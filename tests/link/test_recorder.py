@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import resource
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -14,16 +13,14 @@ from catenary.link import Interface, Recorder
 from tests.link.python_link import PythonLink, frame
 
 
-def dissect(path: Path, *fields: str) -> list[list[str]]:
-    if shutil.which("tshark") is None:
-        pytest.skip("tshark is not installed")
+def dissect(tshark: str, path: Path, *fields: str) -> list[list[str]]:
     options = [part for field in fields for part in ("-e", field)]
-    command = ["tshark", "-r", str(path), "-T", "fields", *options]
+    command = [tshark, "-r", str(path), "-T", "fields", *options]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     return [line.split("\t") for line in done.stdout.splitlines()]
 
 
-def test_records_both_directions_with_stamps_in_virtual_time(tmp_path):
+def test_records_both_directions_with_stamps_in_virtual_time(tshark, tmp_path):
     path = tmp_path / "run.pcapng"
     with Recorder(PythonLink(latency_ns=1234), path) as link:
         for number in range(3):
@@ -33,7 +30,12 @@ def test_records_both_directions_with_stamps_in_virtual_time(tmp_path):
             assert link.receive() == frame(bytes([number]) * 40, index=number)
         assert link.recorded == 6
     rows = dissect(
-        path, "frame.time_epoch", "frame.packet_flags_direction", "ecat.idx", "_ws.malformed"
+        tshark,
+        path,
+        "frame.time_epoch",
+        "frame.packet_flags_direction",
+        "ecat.idx",
+        "_ws.malformed",
     )
     assert [row[0][:11] for row in rows[1::2]] == [f"{n}.000001234" for n in range(3)]
     assert [int(row[1], 0) for row in rows] == [2, 1] * 3
@@ -41,15 +43,13 @@ def test_records_both_directions_with_stamps_in_virtual_time(tmp_path):
     assert {row[3] for row in rows} == {""}
 
 
-def test_keeps_every_byte_of_frames_of_any_length(tmp_path):
+def test_keeps_every_byte_of_frames_of_any_length(tshark, tmp_path):
     path = tmp_path / "run.pcapng"
     frames = [frame(bytes(range(size)) * 5) for size in range(8, 30)]
     with Recorder(PythonLink(), path) as link:
         for sent in frames:
             link.send(sent)
-    if shutil.which("tshark") is None:
-        pytest.skip("tshark is not installed")
-    command = ["tshark", "-r", str(path), "-T", "json", "-x", "--no-duplicate-keys"]
+    command = [tshark, "-r", str(path), "-T", "json", "-x", "--no-duplicate-keys"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     recorded = [packet["_source"]["layers"]["frame_raw"][0] for packet in json.loads(done.stdout)]
     assert recorded == [sent.hex() for sent in frames]
@@ -93,7 +93,7 @@ def test_a_disk_that_fills_up_is_said_at_the_end(tmp_path, files_of_4096_bytes, 
     assert inner.closed
 
 
-def test_stamps_a_real_link_with_the_time_of_day(veth, tmp_path):
+def test_stamps_a_real_link_with_the_time_of_day(veth, tshark, tmp_path):
     path = tmp_path / "run.pcapng"
     with (
         Interface(veth[1]).open_link() as segment,
@@ -107,7 +107,7 @@ def test_stamps_a_real_link_with_the_time_of_day(veth, tmp_path):
             assert link.wait_until(link.now() + 10**9, True)
             link.receive()
         assert link.name == veth[0]
-    rows = dissect(path, "frame.time_epoch", "ecat.idx")
+    rows = dissect(tshark, path, "frame.time_epoch", "ecat.idx")
     assert [int(row[1], 0) for row in rows] == [n for n in range(100) for _ in range(2)]
     stamps = [float(row[0]) for row in rows]
     assert stamps == sorted(stamps)

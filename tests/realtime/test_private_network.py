@@ -1,0 +1,97 @@
+"""Private networks: programs run inside them, and are told where there is none."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+
+import pytest
+
+from catenary.realtime import private_network
+from catenary.realtime.private_network import INSIDE, VARIABLE, Private, Refused
+
+REPORT = """
+import socket
+from catenary.realtime import private_network
+print(private_network.enter())
+print(*(name for _, name in socket.if_nameindex()))
+"""
+
+
+def run_python(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    surroundings = {name: value for name, value in os.environ.items() if name != VARIABLE}
+    return subprocess.run(
+        [sys.executable, *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=surroundings | environment,
+    )
+
+
+def test_importing_it_imports_no_numpy():
+    modules = "private_network, scheduling, child"
+    code = f"import sys; from catenary.realtime import {modules}; print('numpy' in sys.modules)"
+    assert run_python("-c", code).stdout == "False\n"
+
+
+def test_a_program_enters_and_is_alone(veth):
+    done = run_python("-c", REPORT)
+    assert done.stdout == "Private()\nlo\n", done.stderr
+
+
+def test_a_program_run_by_another_stays_in_its_network(veth):
+    done = run_python("-c", REPORT, **{VARIABLE: INSIDE})
+    assert done.stdout.splitlines()[0] == "Private()"
+    assert veth[0] in done.stdout
+
+
+def test_modules_run_inside_from_the_shell(veth):
+    done = run_python("-m", private_network.MODULE, "-c", REPORT)
+    assert done.stdout == "Private()\nlo\n", done.stderr
+
+
+def test_where_it_is_refused_the_program_runs_on_and_knows_the_reason(tmp_path):
+    done = run_python("-c", REPORT, PATH=str(tmp_path))
+    assert done.stdout.startswith("Refused(reason='`unshare` is not installed"), done.stderr
+
+
+def test_a_machine_that_lets_unshare_pass_and_refuses_the_rest_is_found_out(tmp_path):
+    unshare = tmp_path / "unshare"
+    unshare.write_text('#!/bin/sh\nwhile [ "${1#--}" != "$1" ]; do shift; done\nexec "$@"\n')
+    ip = tmp_path / "ip"
+    ip.write_text("#!/bin/sh\necho 'RTNETLINK answers: Operation not permitted' >&2\nexit 2\n")
+    unshare.chmod(0o755)
+    ip.chmod(0o755)
+    done = run_python("-c", REPORT, PATH=f"{tmp_path}:/usr/bin:/bin")
+    assert "Refused(" in done.stdout
+    assert "Operation not permitted" in done.stdout
+
+
+def test_children_of_a_refused_program_are_not_asked_again(monkeypatch):
+    monkeypatch.setenv(VARIABLE, "no such luck")
+    assert private_network.enter() == Refused("no such luck")
+
+
+def test_says_where_it_is(monkeypatch):
+    monkeypatch.setenv(VARIABLE, INSIDE)
+    assert private_network.state() == Private()
+    monkeypatch.delenv(VARIABLE)
+    assert private_network.state() == Refused("not started in a private network namespace")
+
+
+def test_pairs_carry_no_ipv6_and_go_away(veth):
+    names = {name for _, name in socket.if_nameindex()}
+    assert set(veth) <= names
+    shown = subprocess.run(["ip", "-6", "address"], capture_output=True, text=True, check=True)
+    assert veth[0] not in shown.stdout
+    with private_network.veth_pair() as others:
+        assert not set(others) & names
+    assert {name for _, name in socket.if_nameindex()} == names
+
+
+def test_an_error_of_ip_is_raised_with_its_words():
+    with pytest.raises(OSError, match=r"ip link delete none0: .*none0"):
+        private_network.run_ip("link", "delete", "none0")
