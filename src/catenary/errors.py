@@ -47,7 +47,9 @@ class SegmentError(CatenaryError):
 class IdentityError(CatenaryError):
     """A device is not the one expected."""
 
-    def __init__(self, message: str, *, position: int, expected: object, found: object, hint: str = "") -> None:
+    def __init__(
+        self, message: str, *, position: int, expected: object, found: object, hint: str = ""
+    ) -> None:
         super().__init__(message, hint=hint)
         self.position = position
         self.expected = expected

@@ -6,8 +6,9 @@ with Recorder(Interface("eth0"), "run.pcapng") as link:
 
 from catenary.link._fault_injector import FaultInjector
 from catenary.link._recorder import Recorder
+from catenary.link._replay import Replay
 from catenary.link.fault import Fault
 from catenary.link.interface import Interface
 from catenary.link.protocol import Link, LinkSource
 
-__all__ = ["Fault", "FaultInjector", "Interface", "Link", "LinkSource", "Recorder"]
+__all__ = ["Fault", "FaultInjector", "Interface", "Link", "LinkSource", "Recorder", "Replay"]

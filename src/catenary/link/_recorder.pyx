@@ -19,7 +19,7 @@ import os
 import time
 import warnings
 
-from catenary.link.pcapng_blocks import closing_block, opening_blocks
+from catenary.wire.pcapng import encode_header, encode_statistics
 
 cdef extern from "atomics.h" nogil:
     uint32_t cat_load_acquire32(const uint32_t *p)
@@ -192,7 +192,7 @@ cdef class Recorder(WrapperLink):
         self.recorder.fd = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
         try:
             self.wrap(link)
-            os.write(self.recorder.fd, opening_blocks(self.name))
+            os.write(self.recorder.fd, encode_header(self.name))
             self.start()
         except BaseException:
             os.close(self.recorder.fd)
@@ -256,7 +256,9 @@ cdef class Recorder(WrapperLink):
         number = self.recorder.write_error
         if number == 0:
             stamp = self.inner.now(self.inner.self) + self.recorder.stamp_offset
-            os.write(self.recorder.fd, closing_block(stamp, self.recorded, self.dropped))
+            received = self.recorded + self.dropped
+            end = encode_statistics(stamp, received=received, dropped=self.dropped)
+            os.write(self.recorder.fd, end)
         os.close(self.recorder.fd)
         if number:
             self.warn(f"is incomplete: {os.strerror(number)}")

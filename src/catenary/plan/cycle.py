@@ -64,7 +64,7 @@ class DatagramKind(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Copy:
-    """Bytes that move between a frame and an image, `frame_offset` from the Ethernet header's start."""
+    """Bytes that move between a frame and an image; `frame_offset` is from the frame's start."""
 
     frame_offset: int
     image_offset: int
@@ -113,7 +113,7 @@ class AxisLimits:
 
 @dataclass(frozen=True, slots=True)
 class AxisPlan:
-    """One CiA 402 axis: slot k of a device (objects + 0x800·k), with every quantity's place or None."""
+    """One CiA 402 axis: slot k of a device (objects + 0x800·k), each quantity's place or None."""
 
     name: str
     device: int

@@ -38,7 +38,9 @@ class PdoWish:
 
     outputs: tuple[ObjectReference, ...] = ()  # MainDevice → device (RxPDO)
     inputs: tuple[ObjectReference, ...] = ()  # device → MainDevice (TxPDO)
-    start_up: tuple[tuple[int, int, bytes], ...] = ()  # SDO downloads in PRE-OP: index, subindex, data
+    start_up: tuple[
+        tuple[int, int, bytes], ...
+    ] = ()  # SDO downloads in PRE-OP: index, subindex, data
 
 
 class ImageLayout(Protocol):

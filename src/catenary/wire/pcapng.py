@@ -10,6 +10,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from enum import IntEnum
 from typing import NamedTuple
 
 from catenary.errors import DecodeError
@@ -20,12 +21,16 @@ _SECTION = 0x0A0D0D0A  # reads the same in both byte orders
 _MAGIC = 0x1A2B3C4D
 _INTERFACE = 1
 _SIMPLE_PACKET = 3
+_STATISTICS = 5
 _ENHANCED_PACKET = 6
 _MINIMUM_BLOCK = 12
 
 _OPTION_END = 0
 _OPTION_COMMENT = 1
 _OPTION_NAME = 2
+_OPTION_FLAGS = 2  # of a packet
+_OPTION_RECEIVED = 4  # of statistics
+_OPTION_DROPPED = 5
 _OPTION_RESOLUTION = 9
 _OPTION_TIME_OFFSET = 14
 _MICROSECONDS = 6  # the resolution where none is given
@@ -42,6 +47,14 @@ class Interface:
     time_offset: int = 0  # [s]
 
 
+class Direction(IntEnum):
+    """Which way a packet went, as bits 0 and 1 of epb_flags say."""
+
+    UNKNOWN = 0
+    INBOUND = 1
+    OUTBOUND = 2
+
+
 @dataclass(frozen=True, slots=True)
 class Packet:
     """One captured frame."""
@@ -51,6 +64,7 @@ class Packet:
     comment: str = ""
     interface: int = 0  # its number in Capture.interfaces
     original_length: int | None = None  # None: nothing was cut off
+    direction: Direction = Direction.UNKNOWN
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +94,20 @@ def encode_packet(packet: Packet) -> bytes:
     high, low = packet.time_ns >> 32, packet.time_ns & 0xFFFF_FFFF
     body = struct.pack("<IIIII", 0, high, low, len(packet.data), original) + _pad(packet.data)
     if packet.comment:
-        body += _option(_OPTION_COMMENT, packet.comment.encode()) + _option(_OPTION_END, b"")
+        body += _option(_OPTION_COMMENT, packet.comment.encode())
+    if packet.direction:
+        body += _option(_OPTION_FLAGS, struct.pack("<I", packet.direction))
+    if packet.comment or packet.direction:
+        body += _option(_OPTION_END, b"")
     return _block(_ENHANCED_PACKET, body)
+
+
+def encode_statistics(time_ns: int, *, received: int, dropped: int) -> bytes:
+    """The end of a file: how many packets came, and how many of them the file lacks."""
+    body = struct.pack("<III", 0, time_ns >> 32, time_ns & 0xFFFF_FFFF)
+    body += _option(_OPTION_RECEIVED, struct.pack("<Q", received))
+    body += _option(_OPTION_DROPPED, struct.pack("<Q", dropped)) + _option(_OPTION_END, b"")
+    return _block(_STATISTICS, body)
 
 
 def decode_capture(data: bytes) -> Capture:
@@ -178,7 +204,15 @@ def _decode_enhanced(block: _Block, state: _State) -> Packet:
     comment = options.get(_OPTION_COMMENT, b"").decode("utf-8", "replace")
     time_ns = _time_ns(high << 32 | low, state.interfaces[interface])
     cut = original if original != captured else None
-    return Packet(time_ns, block.body[20:end], comment, interface, cut)
+    direction = _direction(block, options.get(_OPTION_FLAGS, bytes(4)))
+    return Packet(time_ns, block.body[20:end], comment, interface, cut, direction)
+
+
+def _direction(block: _Block, flags: bytes) -> Direction:
+    if len(flags) != 4:
+        raise DecodeError(f"pcapng: flags of a packet are {len(flags)} bytes, not 4")
+    bits = struct.unpack(block.order + "I", flags)[0] & 3
+    return Direction(bits) if bits < 3 else Direction.UNKNOWN
 
 
 def _decode_simple(block: _Block, state: _State) -> Packet:

@@ -1,0 +1,125 @@
+"""Replays: recorded segments that answer again."""
+
+from __future__ import annotations
+
+import pytest
+
+from catenary.errors import DecodeError, LinkError
+from catenary.link import Recorder, Replay
+from catenary.link.exchanges import pair, read_exchanges
+from catenary.wire.pcapng import Direction, Packet, decode_capture
+from tests.link.python_link import PythonLink, frame
+
+QUESTION = frame(bytes(4))
+
+
+def answered(link: Replay, sent: bytes) -> bytes | None:
+    link.send(sent)
+    return link.receive() if link.wait_until(link.now() + 1_000_000_000, True) else None
+
+
+def test_answers_with_the_index_of_the_question():
+    link = Replay([(frame(b"ask", index=7), frame(b"say", index=7))])
+    assert answered(link, frame(b"ask", index=200)) == frame(b"say", index=200)
+    assert (link.answered, link.unmatched, link.first_unmatched) == (1, 0, None)
+
+
+def test_answers_of_one_question_come_in_order_and_the_last_again():
+    says = [frame(bytes([n]) * 4) for n in range(3)]
+    link = Replay([(QUESTION, said) for said in says])
+    assert [answered(link, QUESTION) for _ in range(5)] == [*says, says[2], says[2]]
+
+
+def test_what_was_never_asked_stays_unanswered_and_is_shown():
+    link = Replay([(QUESTION, QUESTION)])
+    assert answered(link, frame(b"else")) is None
+    assert answered(link, frame(b"more")) is None
+    assert (link.answered, link.unmatched) == (0, 2)
+    assert link.first_unmatched == frame(b"else")
+
+
+@pytest.mark.parametrize("cut", range(16, 28))
+def test_frames_cut_short_stay_unanswered(cut):
+    link = Replay([(QUESTION, QUESTION)])
+    assert answered(link, QUESTION[:cut]) is None
+
+
+def test_time_passes_in_waiting_alone():
+    link = Replay([(QUESTION, QUESTION)])
+    assert link.wait_until(5_000, False) is False
+    assert link.now() == 5_000
+    link.send(QUESTION)
+    assert link.wait_until(9_000, True) is True
+    assert link.now() == 5_000
+
+
+def test_more_answers_under_way_than_there_is_room_for_are_refused():
+    link = Replay([(QUESTION, QUESTION)])
+    for _ in range(64):
+        link.send(QUESTION)
+    with pytest.raises(LinkError, match="cannot send"):
+        link.send(QUESTION)
+
+
+def test_a_recording_replays_with_its_latencies(tmp_path):
+    path = tmp_path / "run.pcapng"
+    frames = [frame(bytes([n]) * 20, index=n) for n in range(10)]
+    with Recorder(PythonLink(latency_ns=1234), path) as link:
+        for sent in frames:
+            link.send(sent)
+            assert link.wait_until(link.now() + 10_000, True)
+            assert link.receive() == sent
+    with Replay(path) as replay:
+        assert [answered(replay, sent) for sent in frames] == frames
+        assert replay.now() == 10 * 1234
+        assert replay.name == f"replay of {path}"
+
+
+def test_pairs_by_direction_even_where_no_controller_touched_the_frame():
+    packets = [
+        Packet(100, QUESTION, direction=Direction.OUTBOUND),
+        Packet(350, QUESTION, direction=Direction.INBOUND),
+        Packet(900, QUESTION, direction=Direction.INBOUND),
+    ]
+    assert pair(packets) == [(QUESTION, QUESTION, 250)]
+
+
+def test_pairs_by_the_source_address_where_the_file_names_no_direction():
+    sent = QUESTION[:6] + b"\x00" + QUESTION[7:]
+    assert pair([Packet(1, sent), Packet(2, b"alien"), Packet(3, QUESTION)]) == [
+        (sent, QUESTION, 2)
+    ]
+
+
+def test_a_file_that_is_no_capture_is_a_decode_error(tmp_path):
+    path = tmp_path / "notes.txt"
+    path.write_text("no capture at all")
+    with pytest.raises(DecodeError, match="pcapng"):
+        Replay(path)
+
+
+def test_nothing_recorded_is_an_error():
+    with pytest.raises(ValueError, match="no frame that came back"):
+        Replay([])
+
+
+def test_captures_of_real_segments_answer_as_they_did(shared_data):
+    replayed = 0
+    for path in sorted((shared_data / "pcap").glob("*.pcapng")):
+        exchanges = read_exchanges(path)
+        if not exchanges:
+            continue  # a scan of an empty cable
+        link = Replay(path)
+        assert [answered(link, e.sent) for e in exchanges] == [e.answer for e in exchanges]
+        assert link.unmatched == 0
+        replayed += 1
+    assert replayed
+
+
+def test_a_recording_keeps_the_direction(tmp_path):
+    path = tmp_path / "run.pcapng"
+    with Recorder(PythonLink(latency_ns=0), path) as link:
+        link.send(QUESTION)
+        link.receive()
+    directions = [packet.direction for packet in decode_capture(path.read_bytes()).packets]
+    assert directions == [Direction.OUTBOUND, Direction.INBOUND]
