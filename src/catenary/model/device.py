@@ -1,0 +1,253 @@
+"""What a SubDevice is, as values: identity, memory, mailbox, SyncManagers, PDOs.
+
+Made from its registers (ETG.1000.4 §6.1), its SII (ETG.1000.6 §5.4, ETG.2010) and, where it has
+one, its object dictionary (ETG.1000.6 §5.6.7.4). Nothing here asks the network.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import IntEnum, IntFlag
+from typing import NamedTuple
+
+
+class Identity(NamedTuple):
+    """The four numbers of 0x1018, which the SII repeats."""
+
+    vendor: int
+    product: int
+    revision: int
+    serial: int
+
+    def __str__(self) -> str:
+        return (
+            f"vendor 0x{self.vendor:08X} product 0x{self.product:08X} "
+            f"revision 0x{self.revision:08X} serial {self.serial}"
+        )
+
+    def same_kind(self, other: Identity) -> bool:
+        """Whether both are the same product, whatever their revision and serial number."""
+        return (self.vendor, self.product) == (other.vendor, other.product)
+
+
+class Direction(IntEnum):
+    """Seen from the MainDevice; the number is the object that assigns its PDOs minus 0x1C10."""
+
+    OUTPUT = 2  # RxPDOs, 0x1C12
+    INPUT = 3  # TxPDOs, 0x1C13
+
+
+class SyncManagerKind(IntEnum):
+    """ETG.1000.6 §5.6.7.4, object 0x1C00; the same numbers in the SII."""
+
+    UNUSED = 0
+    MAILBOX_OUT = 1
+    MAILBOX_IN = 2
+    OUTPUTS = 3
+    INPUTS = 4
+
+
+class MailboxProtocol(IntFlag):
+    """ETG.1000.6 §5.4, SII word 0x1C."""
+
+    AOE = 0x01
+    EOE = 0x02
+    COE = 0x04
+    FOE = 0x08
+    SOE = 0x10
+    VOE = 0x20
+
+
+@dataclass(frozen=True, slots=True)
+class Mailbox:
+    """The standard mailbox. "Receive" is the SubDevice's view: what the MainDevice writes."""
+
+    receive_offset: int
+    receive_size: int
+    send_offset: int
+    send_size: int
+    protocols: MailboxProtocol
+    complete_access: bool = False  # SDO complete access
+    sdo_information: bool = False
+    pdo_assign: bool = False  # 0x1C1x may be written
+    pdo_configuration: bool = False  # 0x16xx and 0x1Axx may be written
+
+    @property
+    def coe(self) -> bool:
+        return MailboxProtocol.COE in self.protocols
+
+
+@dataclass(frozen=True, slots=True)
+class SyncManager:
+    """One channel as its device wants it (SII category 41)."""
+
+    index: int
+    kind: SyncManagerKind
+    start: int  # physical address
+    length: int  # bytes; of process data: the default mapping's
+    control: int  # register 0x0804 + 8·index
+    enabled: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One object inside a PDO. Index 0 is a gap."""
+
+    index: int
+    subindex: int
+    bit_length: int
+    name: str = ""
+    data_type: int = 0  # ETG.1000.6 table 64, 0: unknown
+
+    def __str__(self) -> str:
+        place = f"0x{self.index:04X}:{self.subindex:02X} ({self.bit_length} bits)"
+        return f"{place} {self.name}".rstrip()
+
+
+@dataclass(frozen=True, slots=True)
+class Pdo:
+    """A process data object: entries that travel together."""
+
+    index: int
+    entries: tuple[Entry, ...]
+    sync_manager: int | None  # assigned to by default; None: not
+    fixed: bool = False  # its entries cannot be changed
+    mandatory: bool = False
+    name: str = ""
+
+    @property
+    def bit_length(self) -> int:
+        return sum(entry.bit_length for entry in self.entries)
+
+
+@dataclass(frozen=True, slots=True)
+class Assignment:
+    """The PDOs that one SyncManager carries, in their order."""
+
+    sync_manager: int
+    pdos: tuple[Pdo, ...]
+
+    @property
+    def bit_length(self) -> int:
+        return sum(pdo.bit_length for pdo in self.pdos)
+
+    @property
+    def byte_length(self) -> int:
+        return (self.bit_length + 7) // 8
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectInformation:
+    """What the dictionary says of one entry (SDO information, ETG.1000.6 §5.6.3.6)."""
+
+    index: int
+    subindex: int
+    bit_length: int
+    data_type: int = 0
+    output_mappable: bool = True  # as RxPDO
+    input_mappable: bool = True  # as TxPDO
+    name: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Controller:
+    """The EtherCAT SubDevice controller, from the registers 0x0000 to 0x0009."""
+
+    type: int
+    revision: int
+    build: int
+    fmmu_count: int
+    sync_manager_count: int
+    ram_size: int  # bytes
+    port_kinds: tuple[int, int, int, int]  # 0 absent, 1 not configured, 2 EBUS, 3 MII
+    features: int  # register 0x0008
+
+    @property
+    def bitwise_fmmu(self) -> bool:
+        return not self.features & 0x0001
+
+    @property
+    def distributed_clock(self) -> bool:
+        return bool(self.features & 0x0004)
+
+    @property
+    def distributed_clock_64_bit(self) -> bool:
+        return bool(self.features & 0x0008)
+
+    @property
+    def logical_read_write(self) -> bool:
+        """LRW is understood (the bit says "not supported")."""
+        return not self.features & 0x0200
+
+    @property
+    def fixed_configuration(self) -> bool:
+        """FMMUs and SyncManagers are wired: what is written to them does not matter."""
+        return bool(self.features & 0x0800)
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceDescription:
+    """One SubDevice at one place of the segment."""
+
+    position: int
+    station_address: int
+    alias: int
+    identity: Identity
+    name: str
+    controller: Controller
+    mailbox: Mailbox | None
+    sync_managers: tuple[SyncManager, ...]
+    outputs: tuple[Assignment, ...]  # what is assigned now, by SyncManager
+    inputs: tuple[Assignment, ...]
+    output_pdos: tuple[Pdo, ...]  # all that the device has, assigned or not
+    input_pdos: tuple[Pdo, ...]
+    open_ports: tuple[bool, bool, bool, bool] = (True, False, False, False)
+    parent: int | None = None  # position of the device before it in the tree
+    parent_port: int | None = None
+    group: str = ""
+    order: str = ""
+    device_type: int | None = None  # object 0x1000
+    slots: tuple[int, ...] = ()  # CiA 402 axes: objects + 0x800·slot
+    objects: tuple[ObjectInformation, ...] = ()  # what has been asked of the dictionary
+    mapping_source: str = "SII"  # or "CoE"
+    notes: tuple[str, ...] = ()  # what is odd about its SII
+
+    @property
+    def profile(self) -> int | None:
+        """Device profile number: 402 for drives, 5001 for modular devices."""
+        return None if self.device_type is None else self.device_type & 0xFFFF
+
+    @property
+    def is_drive(self) -> bool:
+        return bool(self.slots)
+
+    @property
+    def coe(self) -> bool:
+        return self.mailbox is not None and self.mailbox.coe
+
+    def assignments(self, direction: Direction) -> tuple[Assignment, ...]:
+        return self.outputs if direction is Direction.OUTPUT else self.inputs
+
+    def pdos(self, direction: Direction) -> tuple[Pdo, ...]:
+        return self.output_pdos if direction is Direction.OUTPUT else self.input_pdos
+
+    def known_object(self, index: int, subindex: int) -> ObjectInformation | None:
+        for known in self.objects:
+            if (known.index, known.subindex) == (index, subindex):
+                return known
+        return None
+
+    def __str__(self) -> str:
+        return f"device {self.position} ({self.name})"
+
+
+def mapped_entries(assignments: Iterable[Assignment]) -> tuple[Entry, ...]:
+    """All entries of the assignments, gaps left out."""
+    return tuple(
+        entry
+        for assignment in assignments
+        for pdo in assignment.pdos
+        for entry in pdo.entries
+        if entry.index
+    )

@@ -1,0 +1,133 @@
+"""Units → the frames of a cycle, with templates and expected counters. ETG.1000.4 §5.4.
+
+A device adds to a logical datagram's working counter: LRD 1, LWR 1, LRW 1 for a read and 2 for
+a write (ETG.1000.4 table 14), once per datagram however many FMMUs it has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from catenary.plan.cycle import Copy, DatagramKind, DatagramPlan, FramePlan
+from catenary.plan.layout import UnitLayout
+from catenary.wire.datagram import HEADER_SIZE as DATAGRAM_HEADER
+from catenary.wire.datagram import OVERHEAD, Command, Datagram
+from catenary.wire.frame import HEADER_SIZE, MAXIMUM_PAYLOAD, encode_frame
+from catenary.wire.register import AL_STATUS
+
+
+@dataclass(frozen=True, slots=True)
+class _Piece:
+    """A datagram before it has a place in a frame. Offsets count from its data."""
+
+    kind: DatagramKind
+    command: Command
+    address: int
+    length: int
+    expected_counter: int
+    sync_unit: int
+    outputs: tuple[Copy, ...] = ()
+    inputs: tuple[Copy, ...] = ()
+
+    @property
+    def size(self) -> int:
+        return OVERHEAD + self.length
+
+
+def make_frames(units: Sequence[UnitLayout], device_count: int) -> tuple[FramePlan, ...]:
+    """The frames of one cycle, in the order they are sent. Frame 0 begins with the BRD of AL
+    status, which every device answers."""
+    pieces = [_al_status(device_count)]
+    for number, unit in enumerate(units):
+        pieces.extend(_of_unit(unit, number))
+    return tuple(_frame(batch) for batch in _batches(pieces))
+
+
+def _al_status(device_count: int) -> _Piece:
+    address = AL_STATUS.address << 16
+    return _Piece(
+        DatagramKind.AL_STATUS, Command.BRD, address, AL_STATUS.size, device_count, sync_unit=-1
+    )
+
+
+def _of_unit(unit: UnitLayout, number: int) -> list[_Piece]:
+    out_size, in_size = unit.output_size, unit.input_size
+    if unit.logical_read_write and out_size and in_size:
+        return [
+            _Piece(
+                DatagramKind.PROCESS_DATA,
+                Command.LRW,
+                unit.logical_start,
+                out_size + in_size,
+                2 * unit.output_devices + unit.input_devices,
+                number,
+                outputs=(Copy(0, unit.output_offset, out_size),),
+                inputs=(Copy(out_size, unit.input_offset, in_size),),
+            )
+        ]
+    pieces = []
+    if out_size:
+        outputs = (Copy(0, unit.output_offset, out_size),)
+        pieces.append(
+            _Piece(
+                DatagramKind.PROCESS_DATA,
+                Command.LWR,
+                unit.logical_start,
+                out_size,
+                unit.output_devices,
+                number,
+                outputs=outputs,
+            )
+        )
+    if in_size:
+        inputs = (Copy(0, unit.input_offset, in_size),)
+        pieces.append(
+            _Piece(
+                DatagramKind.PROCESS_DATA,
+                Command.LRD,
+                unit.logical_start + out_size,
+                in_size,
+                unit.input_devices,
+                number,
+                inputs=inputs,
+            )
+        )
+    return pieces
+
+
+def _batches(pieces: Sequence[_Piece]) -> list[list[_Piece]]:
+    """Pieces by frame: each goes into the first frame with room."""
+    batches: list[list[_Piece]] = []
+    for piece in pieces:
+        for batch in batches:
+            if sum(other.size for other in batch) + piece.size <= MAXIMUM_PAYLOAD:
+                batch.append(piece)
+                break
+        else:
+            batches.append([piece])
+    return batches
+
+
+def _frame(batch: Sequence[_Piece]) -> FramePlan:
+    plans = []
+    offset = HEADER_SIZE
+    for piece in batch:
+        plans.append(_placed(piece, offset))
+        offset += piece.size
+    datagrams = [Datagram(piece.command, piece.address, bytes(piece.length)) for piece in batch]
+    return FramePlan(encode_frame(datagrams), tuple(plans))
+
+
+def _placed(piece: _Piece, offset: int) -> DatagramPlan:
+    data = offset + DATAGRAM_HEADER
+    return DatagramPlan(
+        kind=piece.kind,
+        command=int(piece.command),
+        offset=offset,
+        length=piece.length,
+        expected_counter=piece.expected_counter,
+        sync_unit=piece.sync_unit,
+        outputs=tuple(Copy(data + c.frame_offset, c.image_offset, c.size) for c in piece.outputs),
+        inputs=tuple(Copy(data + c.frame_offset, c.image_offset, c.size) for c in piece.inputs),
+    )

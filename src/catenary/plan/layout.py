@@ -1,0 +1,327 @@
+"""Where the process data sits: images, logical addresses, FMMUs, sync units. ETG.1000.4 §6.6.
+
+- A unit is what one datagram carries (LRW; or LRD and LWR where a device has no LRW). A device
+  never straddles units; an optional device is a unit of its own, so its loss spoils no other.
+- Inside a unit: the outputs of its devices, then their inputs, both by position.
+- Every device starts at a byte of its own and fills whole bytes, also a terminal of four bits.
+  Sharing bytes by bit-wise FMMUs would save some bytes, but writes would need the neighbour's
+  bits, the ESC must have bit-wise FMMUs, and SOEM#958-like mismatches follow. IgH does likewise.
+- SyncManagers whose memory is adjacent share an FMMU: terminals have few of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+from catenary.errors import ConfigurationError, MappingError
+from catenary.model.device import Assignment, DeviceDescription, Direction, SyncManagerKind
+from catenary.plan.cycle import Number, NumberKind
+
+LOGICAL_BASE = 0x0001_0000
+LOGICAL_STRIDE = 0x0000_0800  # units start at multiples: no two share an FMMU's range
+UNIT_MAX = 1472  # bytes of a unit: a frame's 1486 less the 14 of the AL status datagram
+
+_SIGNED_TYPES = {0x0002, 0x0003, 0x0004, 0x0010, 0x0012, 0x0013, 0x0014, 0x0015}
+_REAL_TYPES = {0x0008, 0x0011}
+
+
+@dataclass(frozen=True, slots=True)
+class SyncManagerPlan:
+    """One SyncManager of process data as it will be written."""
+
+    index: int
+    direction: Direction
+    start: int
+    length: int  # bytes
+    control: int
+
+
+@dataclass(frozen=True, slots=True)
+class FmmuPlan:
+    """Whole bytes of the logical address space onto physical memory."""
+
+    index: int
+    direction: Direction
+    logical_start: int
+    physical_start: int
+    length: int
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceLayout:
+    """The place of one device's process data."""
+
+    position: int
+    sync_unit: int  # -1: has no process data
+    output_offset: int  # bytes, in the image of outputs
+    output_size: int
+    input_offset: int
+    input_size: int
+    sync_managers: tuple[SyncManagerPlan, ...] = ()
+    fmmus: tuple[FmmuPlan, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class UnitLayout:
+    """One datagram's worth of devices."""
+
+    name: str
+    devices: tuple[int, ...]
+    optional: bool
+    logical_read_write: bool
+    logical_start: int
+    output_offset: int  # in the image
+    output_size: int
+    input_offset: int
+    input_size: int
+    output_devices: int  # that count LWR or the 2 of LRW
+    input_devices: int
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceData:
+    """A device and the process data chosen for it."""
+
+    description: DeviceDescription
+    outputs: tuple[Assignment, ...]
+    inputs: tuple[Assignment, ...]
+
+    @property
+    def output_size(self) -> int:
+        return sum(assignment.byte_length for assignment in self.outputs)
+
+    @property
+    def input_size(self) -> int:
+        return sum(assignment.byte_length for assignment in self.inputs)
+
+    @property
+    def size(self) -> int:
+        return self.output_size + self.input_size
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """All places. Fulfils `plan.wish.ImageLayout`."""
+
+    units: tuple[UnitLayout, ...]
+    devices: tuple[DeviceLayout, ...]
+    output_size: int
+    input_size: int
+    numbers: Mapping[tuple[Direction, int, int, int], Number]
+
+    def output(self, device: int, index: int, subindex: int) -> Number | None:
+        return self.numbers.get((Direction.OUTPUT, device, index, subindex))
+
+    def input(self, device: int, index: int, subindex: int) -> Number | None:
+        return self.numbers.get((Direction.INPUT, device, index, subindex))
+
+    def sync_unit(self, device: int) -> int:
+        return self.devices[device].sync_unit
+
+
+def make_layout(devices: Sequence[DeviceData], *, optional: Collection[int] = ()) -> Layout:
+    """Lays out all devices, given in the order of their positions."""
+    units: list[UnitLayout] = []
+    places: dict[int, DeviceLayout] = {}
+    output_offset = input_offset = 0
+    logical_start = LOGICAL_BASE
+    for members in _grouped(devices, optional):
+        number = len(units)
+        unit = _unit(members, optional, logical_start, output_offset, input_offset)
+        units.append(unit)
+        places.update(_places(members, unit, number))
+        output_offset += unit.output_size
+        input_offset += unit.input_size
+        span = unit.output_size + unit.input_size
+        logical_start += -(-span // LOGICAL_STRIDE) * LOGICAL_STRIDE
+    ordered = tuple(
+        places.get(
+            data.description.position,
+            DeviceLayout(data.description.position, -1, 0, 0, 0, 0),
+        )
+        for data in devices
+    )
+    return Layout(
+        tuple(units), ordered, output_offset, input_offset, _numbers(devices, ordered)
+    )
+
+
+def _grouped(
+    devices: Sequence[DeviceData], optional: Collection[int]
+) -> list[list[DeviceData]]:
+    """Devices by unit, in the order of their first member."""
+    groups: list[list[DeviceData]] = []
+    room: dict[bool, int] = {}  # LRW or not → rank of the group that is being filled
+    for data in devices:
+        if data.size == 0:
+            continue
+        if data.size > UNIT_MAX:
+            raise MappingError(
+                f"{data.description}: {data.size} bytes of process data do not fit a datagram "
+                f"of {UNIT_MAX} bytes",
+                hint="map fewer objects",
+            )
+        if data.description.position in optional:
+            groups.append([data])
+            continue
+        kind = data.description.controller.logical_read_write
+        rank = room.get(kind)
+        if rank is not None and _fits(groups[rank], data):
+            groups[rank].append(data)
+        else:
+            room[kind] = len(groups)
+            groups.append([data])
+    return groups
+
+
+def _fits(group: Sequence[DeviceData], data: DeviceData) -> bool:
+    return sum(member.size for member in group) + data.size <= UNIT_MAX
+
+
+def _unit(
+    members: Sequence[DeviceData],
+    optional: Collection[int],
+    logical_start: int,
+    output_offset: int,
+    input_offset: int,
+) -> UnitLayout:
+    positions = tuple(data.description.position for data in members)
+    first, last = positions[0], positions[-1]
+    name = f"device {first}" if first == last else f"devices {first} to {last}"
+    return UnitLayout(
+        name=name,
+        devices=positions,
+        optional=first in optional,
+        logical_read_write=members[0].description.controller.logical_read_write,
+        logical_start=logical_start,
+        output_offset=output_offset,
+        output_size=sum(data.output_size for data in members),
+        input_offset=input_offset,
+        input_size=sum(data.input_size for data in members),
+        output_devices=sum(data.output_size > 0 for data in members),
+        input_devices=sum(data.input_size > 0 for data in members),
+    )
+
+
+def _places(
+    members: Sequence[DeviceData], unit: UnitLayout, number: int
+) -> dict[int, DeviceLayout]:
+    places: dict[int, DeviceLayout] = {}
+    output_offset = input_offset = 0  # inside the unit
+    for data in members:
+        managers = (
+            *_managers(data.description, data.outputs, Direction.OUTPUT),
+            *_managers(data.description, data.inputs, Direction.INPUT),
+        )
+        outputs_at = unit.logical_start + output_offset
+        inputs_at = unit.logical_start + unit.output_size + input_offset
+        places[data.description.position] = DeviceLayout(
+            position=data.description.position,
+            sync_unit=number,
+            output_offset=unit.output_offset + output_offset,
+            output_size=data.output_size,
+            input_offset=unit.input_offset + input_offset,
+            input_size=data.input_size,
+            sync_managers=managers,
+            fmmus=_fmmus(data.description, managers, outputs_at, inputs_at),
+        )
+        output_offset += data.output_size
+        input_offset += data.input_size
+    return places
+
+
+def _managers(
+    device: DeviceDescription, assignments: Sequence[Assignment], direction: Direction
+) -> tuple[SyncManagerPlan, ...]:
+    channels = {channel.index: channel for channel in device.sync_managers}
+    wanted = SyncManagerKind.OUTPUTS if direction is Direction.OUTPUT else SyncManagerKind.INPUTS
+    plans = []
+    for assignment in assignments:
+        if assignment.byte_length == 0:
+            continue
+        channel = channels.get(assignment.sync_manager)
+        if channel is None or channel.kind is not wanted:
+            raise ConfigurationError(
+                f"{device}: its PDOs name SyncManager {assignment.sync_manager} for "
+                f"{direction.name.lower()}s, which its SII does not have as such",
+                hint="its SII is wrong; ask the maker for a corrected image",
+            )
+        plans.append(
+            SyncManagerPlan(
+                assignment.sync_manager,
+                direction,
+                channel.start,
+                assignment.byte_length,
+                channel.control,
+            )
+        )
+    return tuple(plans)
+
+
+def _fmmus(
+    device: DeviceDescription,
+    managers: Sequence[SyncManagerPlan],
+    outputs_at: int,
+    inputs_at: int,
+) -> tuple[FmmuPlan, ...]:
+    """One per run of adjacent SyncManagers of a direction."""
+    plans: list[FmmuPlan] = []
+    next_logical = {Direction.OUTPUT: outputs_at, Direction.INPUT: inputs_at}
+    for manager in managers:
+        last = plans[-1] if plans else None
+        logical = next_logical[manager.direction]
+        next_logical[manager.direction] = logical + manager.length
+        if (
+            last is not None
+            and last.direction is manager.direction
+            and last.physical_start + last.length == manager.start
+        ):
+            plans[-1] = FmmuPlan(
+                last.index,
+                last.direction,
+                last.logical_start,
+                last.physical_start,
+                last.length + manager.length,
+            )
+            continue
+        plans.append(
+            FmmuPlan(len(plans), manager.direction, logical, manager.start, manager.length)
+        )
+    if len(plans) > device.controller.fmmu_count:
+        raise ConfigurationError(
+            f"{device}: its process data needs {len(plans)} FMMUs, its controller has "
+            f"{device.controller.fmmu_count}",
+            hint="map fewer SyncManagers",
+        )
+    return tuple(plans)
+
+
+def _numbers(
+    devices: Sequence[DeviceData], places: Sequence[DeviceLayout]
+) -> dict[tuple[Direction, int, int, int], Number]:
+    numbers: dict[tuple[Direction, int, int, int], Number] = {}
+    for data, place in zip(devices, places, strict=True):
+        sides = (
+            (Direction.OUTPUT, data.outputs, place.output_offset),
+            (Direction.INPUT, data.inputs, place.input_offset),
+        )
+        for direction, assignments, offset in sides:
+            for assignment in assignments:
+                bit = offset * 8
+                for pdo in assignment.pdos:
+                    for entry in pdo.entries:
+                        key = (direction, place.position, entry.index, entry.subindex)
+                        if entry.index:
+                            kind = number_kind(entry.data_type)
+                            numbers.setdefault(key, Number(bit, entry.bit_length, kind))
+                        bit += entry.bit_length
+                offset += assignment.byte_length
+    return numbers
+
+
+def number_kind(data_type: int) -> NumberKind:
+    """How an object of this data type is read (ETG.1000.6 table 64)."""
+    if data_type in _SIGNED_TYPES:
+        return NumberKind.SIGNED
+    return NumberKind.REAL if data_type in _REAL_TYPES else NumberKind.UNSIGNED
