@@ -1,9 +1,10 @@
 """What a conversation says to its runner: datagrams to exchange, or a time to let pass.
 
 A procedure is a generator: it yields a list of `Request`s and is resumed with the list of their
-`Reply`s, in the same order; or it yields `after(seconds)` and is resumed with None when the time
-has passed. It never sleeps, retries or touches a link: its runner does. Its `return` value is the
-result.
+`Reply`s, in the same order; or it yields `after(seconds)` and is resumed with an empty list when
+the time has passed. It never sleeps, retries or touches a link: its runner does. Its `return`
+value is the result. It knows the time from its replies alone (`Reply.time_ns`, the link's clock),
+which is how deadlines are kept without a clock.
 
     def read_al_status(station):
         [reply] = yield [read(Command.FPRD, station, AL_STATUS)]
@@ -35,7 +36,8 @@ class Request(NamedTuple):
 class Reply(NamedTuple):
     data: bytes
     working_counter: int
-    lost: bool = False
+    lost: bool = False  # no answer, or a repeatable request without one after all its repeats
+    time_ns: int = 0  # when it was back, or given up; the link's clock
 
 
 class After(NamedTuple):
@@ -45,7 +47,7 @@ class After(NamedTuple):
 Step: TypeAlias = list[Request] | After
 T = TypeVar("T")
 V = TypeVar("V", int, bytes)
-Procedure: TypeAlias = Generator[Step, list[Reply] | None, T]
+Procedure: TypeAlias = Generator[Step, list[Reply], T]
 
 
 def after(seconds: float) -> After:
@@ -58,11 +60,9 @@ def physical(station: int, address: int) -> int:
     return (station & 0xFFFF) | (address & 0xFFFF) << 16
 
 
-def read(
-    command: Command, station: int, register: Register[V], *, repeatable: bool = True
-) -> Request:
+def read(command: Command, station: int, register: Register[V]) -> Request:
     """Reads one register; `station` is a station address, a negative position or 0 (broadcast)."""
-    return Request(command, physical(station, register.address), bytes(register.size), repeatable)
+    return Request(command, physical(station, register.address), bytes(register.size), True)
 
 
 def write(
@@ -70,3 +70,13 @@ def write(
 ) -> Request:
     """Writes one register."""
     return Request(command, physical(station, register.address), register.pack(value), repeatable)
+
+
+def read_memory(station: int, address: int, size: int, *, repeatable: bool) -> Request:
+    """Reads a device's memory by its station address (FPRD)."""
+    return Request(Command.FPRD, physical(station, address), bytes(size), repeatable)
+
+
+def write_memory(station: int, address: int, data: bytes, *, repeatable: bool) -> Request:
+    """Writes a device's memory by its station address (FPWR)."""
+    return Request(Command.FPWR, physical(station, address), data, repeatable)

@@ -1,0 +1,164 @@
+"""Descriptions and wishes → a Plan: mapping, layout, frames, start-up lists. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+from catenary.errors import ConfigurationError
+from catenary.model.device import DeviceDescription, Direction
+from catenary.plan.cycle import CyclePlan, Order, ReceiveMode, SyncUnit
+from catenary.plan.frames import make_frames
+from catenary.plan.layout import DeviceData, Layout, make_layout
+from catenary.plan.mapping import Mapping, make_mapping
+from catenary.plan.report import report
+from catenary.plan.start_up import WATCHDOG_UNIT_NS, DevicePlan, make_device_plan
+from catenary.plan.wish import ObjectReference, PdoWish, Wish, WishTables
+
+WATCHDOG_PERIODS = 3  # the watchdog must outlive that many lost cycles
+WATCHDOG_COUNT_MAX = 0xFFFF
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What will run, for one network: `print(plan)` shows it; equal plans do the same.
+
+    `tables[k]` are the axes and columns of the k-th wish; in `cycle` they follow one another.
+    """
+
+    cycle: CyclePlan
+    devices: tuple[DevicePlan, ...]
+    layout: Layout
+    tables: tuple[WishTables, ...]
+
+    def __str__(self) -> str:
+        return report(self.cycle, self.devices, self.layout)
+
+
+def make_plan(
+    devices: Sequence[DeviceDescription],
+    wishes: Sequence[Wish] = (),
+    *,
+    period: float = 1e-3,
+    order: Order = "threaded",
+    receive_mode: ReceiveMode = "wait",
+    optional: Collection[int] = (),
+    watchdog: float | None = 0.1,
+    collect_share: float = 0.8,
+    lost_limit: int = 3,
+    late_limit_position: float = 0.050,
+    late_limit_velocity: float = 0.010,
+    stop_deadline: float = 2.0,
+    cpu: int | None = None,
+    priority: int | None = 80,
+) -> Plan:
+    """The plan that fulfils all wishes, or an error that names the object that cannot be.
+
+    `period` [s]; `watchdog` [s] of process data, None: off; `collect_share`: when threaded,
+    the part of the period in which frames may come back; `late_limit_*`, `stop_deadline` [s].
+    """
+    period_ns = round(period * 1e9)
+    watchdog_ns = _watchdog_ns(watchdog, period_ns)
+    if period_ns <= 0:
+        raise ValueError(f"period must be positive, not {period}")
+    asked = _asked(devices, wishes, period_ns)
+    mappings = [_mappings(device, asked.get(device.position, PdoWish())) for device in devices]
+    data = [
+        DeviceData(device, outputs.assignments, inputs.assignments)
+        for device, (outputs, inputs) in zip(devices, mappings, strict=True)
+    ]
+    layout = make_layout(data, optional=optional)
+    tables = tuple(wish.tables(layout) for wish in wishes)
+    cycle = CyclePlan(
+        period_ns=period_ns,
+        order=order,
+        receive_mode=receive_mode,
+        collect_deadline_ns=round(period_ns * collect_share),
+        output_size=layout.output_size,
+        input_size=layout.input_size,
+        frames=make_frames(layout.units, len(devices)),
+        sync_units=tuple(SyncUnit(u.name, u.devices, u.optional) for u in layout.units),
+        device_count=len(devices),
+        axes=tuple(axis for table in tables for axis in table.axes),
+        output_columns=tuple(c for table in tables for c in table.output_columns),
+        input_columns=tuple(c for table in tables for c in table.input_columns),
+        lost_limit=lost_limit,
+        late_limit_position_ns=round(late_limit_position * 1e9),
+        late_limit_velocity_ns=round(late_limit_velocity * 1e9),
+        stop_deadline_ns=round(stop_deadline * 1e9),
+        cpu=cpu,
+        priority=priority,
+    )
+    plans = tuple(
+        make_device_plan(
+            device,
+            outputs,
+            inputs,
+            place,
+            asked.get(device.position, PdoWish()).start_up,
+            watchdog_ns if place.output_size else 0,
+        )
+        for device, (outputs, inputs), place in zip(devices, mappings, layout.devices, strict=True)
+    )
+    return Plan(cycle, plans, layout, tables)
+
+
+def gather_wishes(wishes: Sequence[Wish], period_ns: int) -> dict[int, PdoWish]:
+    """What all wishes together ask of each device, by position."""
+    gathered: dict[int, PdoWish] = {}
+    for wish in wishes:
+        for position, pdos in wish.pdos(period_ns).items():
+            before = gathered.get(position, PdoWish())
+            gathered[position] = PdoWish(
+                _merged(before.outputs, pdos.outputs),
+                _merged(before.inputs, pdos.inputs),
+                before.start_up + tuple(d for d in pdos.start_up if d not in before.start_up),
+            )
+    return gathered
+
+
+def _asked(
+    devices: Sequence[DeviceDescription], wishes: Sequence[Wish], period_ns: int
+) -> dict[int, PdoWish]:
+    asked = gather_wishes(wishes, period_ns)
+    known = [device.position for device in devices]
+    if known != list(range(len(devices))):
+        raise ValueError(f"devices must be all of a segment in order, not positions {known}")
+    for position in asked:
+        if position not in range(len(devices)):
+            raise ConfigurationError(
+                f"a wish names device {position}; the segment has {len(devices)} devices",
+                hint="scan again, or correct the position",
+            )
+    return asked
+
+
+def _merged(
+    first: tuple[ObjectReference, ...], second: tuple[ObjectReference, ...]
+) -> tuple[ObjectReference, ...]:
+    return first + tuple(reference for reference in second if reference not in first)
+
+
+def _mappings(device: DeviceDescription, wish: PdoWish) -> tuple[Mapping, Mapping]:
+    return (
+        make_mapping(device, Direction.OUTPUT, wish.outputs),
+        make_mapping(device, Direction.INPUT, wish.inputs),
+    )
+
+
+def _watchdog_ns(watchdog: float | None, period_ns: int) -> int:
+    if watchdog is None:
+        return 0
+    count = round(watchdog * 1e9 / WATCHDOG_UNIT_NS)
+    if not 0 < count <= WATCHDOG_COUNT_MAX:
+        raise ValueError(
+            f"watchdog of {watchdog} s: from {WATCHDOG_UNIT_NS * 1e-9:.4f} to "
+            f"{WATCHDOG_UNIT_NS * WATCHDOG_COUNT_MAX * 1e-9:.4f} s, or None to switch it off"
+        )
+    watchdog_ns = count * WATCHDOG_UNIT_NS
+    if watchdog_ns < WATCHDOG_PERIODS * period_ns:
+        raise ValueError(
+            f"watchdog of {watchdog} s would expire after less than {WATCHDOG_PERIODS} periods "
+            f"of {period_ns * 1e-9} s"
+        )
+    return watchdog_ns

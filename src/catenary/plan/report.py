@@ -1,0 +1,87 @@
+"""A plan as a table to read: devices, SyncManagers, FMMUs, entries, frames, watchdogs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from catenary.model.device import Assignment, Direction
+from catenary.plan.cycle import CyclePlan, DatagramPlan
+from catenary.plan.layout import Layout
+from catenary.plan.start_up import DevicePlan
+from catenary.wire.datagram import Command
+
+_ARROW = {Direction.OUTPUT: "out", Direction.INPUT: "in "}
+
+
+def report(cycle: CyclePlan, devices: Sequence[DevicePlan], layout: Layout) -> str:
+    """The lines of `print(plan)`."""
+    return "\n".join([*_heading(cycle), *_devices(devices), *_frames(cycle), *_units(layout)])
+
+
+def _heading(cycle: CyclePlan) -> Iterator[str]:
+    yield (
+        f"Plan: {cycle.device_count} devices, period {cycle.period_ns / 1e6:g} ms, "
+        f"{cycle.order}, receive {cycle.receive_mode}, "
+        f"{cycle.output_size} bytes out, {cycle.input_size} bytes in, {len(cycle.axes)} axes"
+    )
+
+
+def _devices(devices: Sequence[DevicePlan]) -> Iterator[str]:
+    for device in devices:
+        place = device.layout
+        watchdog = f", watchdog {device.watchdog_ns / 1e6:g} ms" if device.watchdog_ns else ""
+        yield (
+            f"device {device.position:>3}  {device.name}  station 0x{device.station_address:04X}  "
+            f"{place.output_size} out, {place.input_size} in{watchdog}"
+        )
+        for manager in place.sync_managers:
+            yield (
+                f"    SyncManager {manager.index} {_ARROW[manager.direction]}  "
+                f"0x{manager.start:04X} + {manager.length}  control 0x{manager.control:02X}"
+            )
+        for fmmu in place.fmmus:
+            yield (
+                f"    FMMU {fmmu.index} {_ARROW[fmmu.direction]}  "
+                f"logical 0x{fmmu.logical_start:08X} + {fmmu.length}  "
+                f"→ 0x{fmmu.physical_start:04X}"
+            )
+        yield from _entries(Direction.OUTPUT, device.outputs, place.output_offset)
+        yield from _entries(Direction.INPUT, device.inputs, place.input_offset)
+        if device.downloads:
+            yield f"    {len(device.downloads)} SDO downloads before SAFE-OP"
+
+
+def _entries(
+    direction: Direction, assignments: Sequence[Assignment], offset: int
+) -> Iterator[str]:
+    for assignment in assignments:
+        bit = offset * 8
+        for pdo in assignment.pdos:
+            yield f"    PDO 0x{pdo.index:04X} {_ARROW[direction]}  {pdo.name}".rstrip()
+            for entry in pdo.entries:
+                what = str(entry) if entry.index else f"gap ({entry.bit_length} bits)"
+                yield f"        {bit // 8:>5}.{bit % 8}  {what}"
+                bit += entry.bit_length
+        offset += assignment.byte_length
+
+
+def _frames(cycle: CyclePlan) -> Iterator[str]:
+    for number, frame in enumerate(cycle.frames):
+        yield f"frame {number}: {len(frame.template)} bytes"
+        for datagram in frame.datagrams:
+            yield f"    {_datagram(datagram)}"
+
+
+def _datagram(datagram: DatagramPlan) -> str:
+    unit = "" if datagram.sync_unit < 0 else f"  sync unit {datagram.sync_unit}"
+    return (
+        f"{Command(datagram.command).name}  {datagram.length} bytes at {datagram.offset}  "
+        f"expected counter {datagram.expected_counter}{unit}  {datagram.kind.name}"
+    )
+
+
+def _units(layout: Layout) -> Iterator[str]:
+    for number, unit in enumerate(layout.units):
+        optional = ", optional" if unit.optional else ""
+        how = "LRW" if unit.logical_read_write else "LRD + LWR"
+        yield f"sync unit {number}: {unit.name}, {how}{optional}"

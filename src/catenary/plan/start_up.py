@@ -1,0 +1,104 @@
+"""What is written to one device between PRE-OP and SAFE-OP: SDOs, then registers.
+
+The order inside a changed mapping is the one of ETG.1020 §"PDO mapping": empty the assignment,
+empty and fill the mapping, fill the assignment. Only what differs is written.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from catenary.model.device import Assignment, DeviceDescription, Direction, Entry, Identity, Pdo
+from catenary.plan.layout import DeviceLayout
+from catenary.plan.mapping import Mapping
+
+WATCHDOG_DIVIDER = 2498  # (2498 + 2) · 40 ns = 100 µs, the controller's reset value
+WATCHDOG_UNIT_NS = (WATCHDOG_DIVIDER + 2) * 40
+ASSIGNMENT_BASE = 0x1C10  # + SyncManager
+
+
+@dataclass(frozen=True, slots=True)
+class Download:
+    """One SDO download. `entry`: what is being mapped by it, for the error that names it."""
+
+    index: int
+    subindex: int
+    data: bytes
+    entry: Entry | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class DevicePlan:
+    """All that one device is told, and what it is expected to be."""
+
+    position: int
+    name: str
+    station_address: int
+    identity: Identity
+    outputs: tuple[Assignment, ...]
+    inputs: tuple[Assignment, ...]
+    layout: DeviceLayout
+    downloads: tuple[Download, ...]
+    watchdog_ns: int  # of process data; 0: off
+
+    @property
+    def watchdog_count(self) -> int:
+        """Value of register 0x0420."""
+        return self.watchdog_ns // WATCHDOG_UNIT_NS
+
+    def assignments(self, direction: Direction) -> tuple[Assignment, ...]:
+        return self.outputs if direction is Direction.OUTPUT else self.inputs
+
+
+def make_device_plan(
+    device: DeviceDescription,
+    outputs: Mapping,
+    inputs: Mapping,
+    layout: DeviceLayout,
+    start_up: Sequence[tuple[int, int, bytes]],
+    watchdog_ns: int,
+) -> DevicePlan:
+    wished = tuple(Download(index, subindex, data) for index, subindex, data in start_up)
+    return DevicePlan(
+        position=device.position,
+        name=device.name,
+        station_address=device.station_address,
+        identity=device.identity,
+        outputs=outputs.assignments,
+        inputs=inputs.assignments,
+        layout=layout,
+        downloads=(*mapping_downloads(outputs), *mapping_downloads(inputs), *wished),
+        watchdog_ns=watchdog_ns,
+    )
+
+
+def mapping_downloads(mapping: Mapping) -> tuple[Download, ...]:
+    """The downloads that make a mapping so; none where it is the device's own."""
+    rewritten = {pdo.index for pdo in mapping.rewritten}
+    downloads: list[Download] = []
+    for assignment in mapping.assignments:
+        touched = assignment.sync_manager in mapping.reassigned or any(
+            pdo.index in rewritten for pdo in assignment.pdos
+        )
+        if not touched:
+            continue
+        index = ASSIGNMENT_BASE + assignment.sync_manager
+        downloads.append(Download(index, 0, b"\x00"))
+        for pdo in assignment.pdos:
+            if pdo.index in rewritten:
+                downloads.extend(_pdo_downloads(pdo))
+        for rank, pdo in enumerate(assignment.pdos, start=1):
+            downloads.append(Download(index, rank, struct.pack("<H", pdo.index)))
+        downloads.append(Download(index, 0, bytes([len(assignment.pdos)])))
+    return tuple(downloads)
+
+
+def _pdo_downloads(pdo: Pdo) -> list[Download]:
+    downloads = [Download(pdo.index, 0, b"\x00")]
+    for rank, entry in enumerate(pdo.entries, start=1):
+        word = entry.index << 16 | entry.subindex << 8 | entry.bit_length
+        downloads.append(Download(pdo.index, rank, struct.pack("<I", word), entry))
+    downloads.append(Download(pdo.index, 0, bytes([len(pdo.entries)])))
+    return downloads
