@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 from typing import NamedTuple
 
+from catenary.wire.features import Information
+
 
 class Identity(NamedTuple):
     """The four numbers of 0x1018, which the SII repeats."""
@@ -60,7 +62,7 @@ class MailboxProtocol(IntFlag):
 
 
 @dataclass(frozen=True, slots=True)
-class Mailbox:
+class MailboxLayout:
     """The standard mailbox. "Receive" is the SubDevice's view: what the MainDevice writes."""
 
     receive_offset: int
@@ -151,42 +153,6 @@ class ObjectInformation:
 
 
 @dataclass(frozen=True, slots=True)
-class Controller:
-    """The EtherCAT SubDevice controller, from the registers 0x0000 to 0x0009."""
-
-    type: int
-    revision: int
-    build: int
-    fmmu_count: int
-    sync_manager_count: int
-    ram_size: int  # bytes
-    port_kinds: tuple[int, int, int, int]  # 0 absent, 1 not configured, 2 EBUS, 3 MII
-    features: int  # register 0x0008
-
-    @property
-    def bitwise_fmmu(self) -> bool:
-        return not self.features & 0x0001
-
-    @property
-    def distributed_clock(self) -> bool:
-        return bool(self.features & 0x0004)
-
-    @property
-    def distributed_clock_64_bit(self) -> bool:
-        return bool(self.features & 0x0008)
-
-    @property
-    def logical_read_write(self) -> bool:
-        """LRW is understood (the bit says "not supported")."""
-        return not self.features & 0x0200
-
-    @property
-    def fixed_configuration(self) -> bool:
-        """FMMUs and SyncManagers are wired: what is written to them does not matter."""
-        return bool(self.features & 0x0800)
-
-
-@dataclass(frozen=True, slots=True)
 class DeviceDescription:
     """One SubDevice at one place of the segment."""
 
@@ -195,8 +161,8 @@ class DeviceDescription:
     alias: int
     identity: Identity
     name: str
-    controller: Controller
-    mailbox: Mailbox | None
+    controller: Information
+    mailbox: MailboxLayout | None
     sync_managers: tuple[SyncManager, ...]
     outputs: tuple[Assignment, ...]  # what is assigned now, by SyncManager
     inputs: tuple[Assignment, ...]

@@ -142,14 +142,10 @@ def make_layout(devices: Sequence[DeviceData], *, optional: Collection[int] = ()
         )
         for data in devices
     )
-    return Layout(
-        tuple(units), ordered, output_offset, input_offset, _numbers(devices, ordered)
-    )
+    return Layout(tuple(units), ordered, output_offset, input_offset, _numbers(devices, ordered))
 
 
-def _grouped(
-    devices: Sequence[DeviceData], optional: Collection[int]
-) -> list[list[DeviceData]]:
+def _grouped(devices: Sequence[DeviceData], optional: Collection[int]) -> list[list[DeviceData]]:
     """Devices by unit, in the order of their first member."""
     groups: list[list[DeviceData]] = []
     room: dict[bool, int] = {}  # LRW or not → rank of the group that is being filled
@@ -165,7 +161,7 @@ def _grouped(
         if data.description.position in optional:
             groups.append([data])
             continue
-        kind = data.description.controller.logical_read_write
+        kind = data.description.controller.supports_lrw
         rank = room.get(kind)
         if rank is not None and _fits(groups[rank], data):
             groups[rank].append(data)
@@ -193,7 +189,7 @@ def _unit(
         name=name,
         devices=positions,
         optional=first in optional,
-        logical_read_write=members[0].description.controller.logical_read_write,
+        logical_read_write=members[0].description.controller.supports_lrw,
         logical_start=logical_start,
         output_offset=output_offset,
         output_size=sum(data.output_size for data in members),

@@ -58,9 +58,9 @@ def make_plan(
     the part of the period in which frames may come back; `late_limit_*`, `stop_deadline` [s].
     """
     period_ns = round(period * 1e9)
-    watchdog_ns = _watchdog_ns(watchdog, period_ns)
     if period_ns <= 0:
         raise ValueError(f"period must be positive, not {period}")
+    watchdog_ns = _watchdog_ns(watchdog, period_ns)
     asked = _asked(devices, wishes, period_ns)
     mappings = [_mappings(device, asked.get(device.position, PdoWish())) for device in devices]
     data = [

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from catenary.errors import MappingError
 from catenary.model.device import (
@@ -21,7 +21,9 @@ from catenary.model.device import (
     SyncManagerKind,
     mapped_entries,
 )
-from catenary.plan.wish import ObjectReference
+
+if TYPE_CHECKING:  # wish.py needs NumPy, a scan does not
+    from catenary.plan.wish import ObjectReference
 
 ENTRIES_MAX = 254  # subindices of a mapping object, ETG.1000.6 table 75
 BITS_MAX = 1486 * 8  # a device's data must fit one datagram of one frame

@@ -51,9 +51,7 @@ def _devices(devices: Sequence[DevicePlan]) -> Iterator[str]:
             yield f"    {len(device.downloads)} SDO downloads before SAFE-OP"
 
 
-def _entries(
-    direction: Direction, assignments: Sequence[Assignment], offset: int
-) -> Iterator[str]:
+def _entries(direction: Direction, assignments: Sequence[Assignment], offset: int) -> Iterator[str]:
     for assignment in assignments:
         bit = offset * 8
         for pdo in assignment.pdos:

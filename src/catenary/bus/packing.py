@@ -1,0 +1,77 @@
+"""Requests of many procedures → few frames, and the frames back → replies.
+
+Requests keep their order, so what one procedure asks in a step happens in that order on the wire.
+All datagrams of a frame carry the frame's index, from the half that belongs to procedures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from catenary.procedure.exchange import Reply, Request
+from catenary.wire.datagram import OVERHEAD, Command, Datagram
+from catenary.wire.frame import MAXIMUM_DATA, MAXIMUM_PAYLOAD, Frame, encode_frame
+
+INDEX_FIRST, INDEX_LAST = 0x80, 0xFF  # 0x00 to 0x7F belong to the cycle
+_COUNTED_ADDRESS = frozenset(  # their ADP counts up on the way
+    (Command.APRD, Command.APWR, Command.APRW, Command.ARMW, Command.BRD, Command.BWR, Command.BRW)
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Parcel:
+    """One frame of procedures' requests."""
+
+    index: int
+    frame: bytes
+    requests: tuple[Request, ...]
+
+
+def indices() -> Iterator[int]:
+    """The indices of procedures' frames, round and round."""
+    while True:
+        yield from range(INDEX_FIRST, INDEX_LAST + 1)
+
+
+def batches(requests: Sequence[Request]) -> list[list[int]]:
+    """Ranks of the requests that share a frame, in order. ValueError if one fits no frame."""
+    found: list[list[int]] = []
+    room = 0
+    for rank, request in enumerate(requests):
+        if len(request.data) > MAXIMUM_DATA:
+            raise ValueError(
+                f"a datagram of {len(request.data)} bytes fits no frame: at most {MAXIMUM_DATA}"
+            )
+        size = OVERHEAD + len(request.data)
+        if size > room:
+            found.append([])
+            room = MAXIMUM_PAYLOAD
+        found[-1].append(rank)
+        room -= size
+    return found
+
+
+def make_parcel(requests: Sequence[Request], index: int) -> Parcel:
+    datagrams = [Datagram(r.command, r.address, r.data, index) for r in requests]
+    return Parcel(index, encode_frame(datagrams), tuple(requests))
+
+
+def replies_of(parcel: Parcel, frame: Frame, time_ns: int) -> list[Reply] | None:
+    """What the frame brought back; None if it is not this parcel."""
+    if len(frame.datagrams) != len(parcel.requests):
+        return None
+    for datagram, request in zip(frame.datagrams, parcel.requests, strict=True):
+        if not _belongs(datagram, request, parcel.index):
+            return None
+    return [Reply(d.data, d.working_counter, False, time_ns) for d in frame.datagrams]
+
+
+def _belongs(datagram: Datagram, request: Request, index: int) -> bool:
+    if datagram.index != index or datagram.command != request.command:
+        return False
+    if len(datagram.data) != len(request.data):
+        return False
+    if datagram.command in _COUNTED_ADDRESS:
+        return datagram.ado == request.address >> 16
+    return datagram.address == request.address

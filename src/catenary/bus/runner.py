@@ -1,0 +1,182 @@
+"""Runs procedures over a link, before and after the loop: all at once, in shared frames.
+
+In rounds: everything that procedures ask for now goes out in as few frames as it takes; when all
+of them are back or given up, the procedures go on. A lost datagram is sent again only if its
+procedure said that this is harmless. Every wait has a deadline on the link's clock.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
+
+from catenary.bus.packing import Parcel, batches, indices, make_parcel, replies_of
+from catenary.bus.task import Task
+from catenary.errors import DecodeError
+from catenary.link import Link
+from catenary.procedure.exchange import Procedure, Reply, Request
+from catenary.wire.frame import decode_frame, is_alien
+
+T = TypeVar("T")
+
+FRAME_TIMEOUT = 0.05  # [s]; a frame takes microseconds, a busy machine's scheduler much longer
+ATTEMPTS = 4  # of a repeatable request
+WINDOW = 16  # frames under way at once: less than any receive ring holds
+
+
+class Runner(Protocol):
+    """Runs procedures to their end. `lane`: those of one lane never run at the same time."""
+
+    def run(self, procedure: Procedure[T], *, lane: int | None = None) -> T: ...
+
+
+@dataclass(slots=True)
+class FrameCounts:
+    """Owns the counts of one runner's frames."""
+
+    sent: int = 0
+    datagrams: int = 0
+    lost: int = 0
+    stale: int = 0  # EtherCAT, but no answer to anything under way
+    alien: int = 0  # other traffic
+    malformed: int = 0
+
+
+class BlockingRunner:
+    """Owns the link while a procedure runs; blocks its caller until the end."""
+
+    def __init__(
+        self, link: Link, *, frame_timeout: float = FRAME_TIMEOUT, attempts: int = ATTEMPTS
+    ) -> None:
+        self.counts = FrameCounts()
+        self._link = link
+        self._timeout_ns = round(frame_timeout * 1e9)
+        self._attempts = attempts
+        self._indices = indices()
+        self._lock = threading.Lock()
+
+    def run(self, procedure: Procedure[T], *, lane: int | None = None) -> T:
+        return self.run_all([procedure])[0]
+
+    def run_all(self, procedures: Sequence[Procedure[T]]) -> list[T]:
+        """Runs all at once. When some fail, the others are finished first; then the first error
+        is raised, with the rest as its notes."""
+        with self._lock:
+            tasks = [Task(procedure) for procedure in procedures]
+            try:
+                self._run(tasks)
+            finally:
+                for task in tasks:
+                    task.cancel()
+        errors = [task.error for task in tasks if task.error is not None]
+        for other in errors[1:]:
+            errors[0].add_note(f"also: {other}")
+        if errors:
+            raise errors[0]
+        return [task.result() for task in tasks]
+
+    def flush(self) -> None:
+        """Throws away what has been received before."""
+        while self._link.receive() is not None:
+            self.counts.stale += 1
+
+    def _run(self, tasks: Sequence[Task[Any]]) -> None:
+        now = self._link.now()
+        for task in tasks:
+            task.start(now)
+        while running := [task for task in tasks if not task.done]:
+            ready = [task for task in running if task.requests]
+            if not ready:
+                self._sleep_until(min(task.wake_ns or 0 for task in running))
+            else:
+                self._round(ready)
+            self._wake(running)
+
+    def _sleep_until(self, deadline_ns: int) -> None:
+        while self._link.now() < deadline_ns:
+            self._link.wait_until(deadline_ns, False)
+
+    def _wake(self, tasks: Sequence[Task[Any]]) -> None:
+        now = self._link.now()
+        for task in tasks:
+            if not task.done and task.wake_ns is not None and task.wake_ns <= now:
+                task.resume([], now)
+
+    def _round(self, ready: Sequence[Task[Any]]) -> None:
+        requests = [request for task in ready for request in task.requests]
+        replies = self._exchange(requests)
+        now = self._link.now()
+        start = 0
+        for task in ready:
+            end = start + len(task.requests)
+            task.resume(replies[start:end], now)
+            start = end
+
+    def _exchange(self, requests: Sequence[Request]) -> list[Reply]:
+        """All replies; lost ones are repeated where that is harmless."""
+        replies: dict[int, Reply] = {}
+        ranks = list(range(len(requests)))
+        for _ in range(self._attempts):
+            replies.update(self._send_once(requests, ranks))
+            ranks = [r for r in ranks if replies[r].lost and requests[r].repeatable]
+            if not ranks:
+                break
+        return [replies[rank] for rank in range(len(requests))]
+
+    def _send_once(self, requests: Sequence[Request], ranks: Sequence[int]) -> dict[int, Reply]:
+        replies: dict[int, Reply] = {}
+        groups = [[ranks[i] for i in batch] for batch in batches([requests[r] for r in ranks])]
+        for first in range(0, len(groups), WINDOW):
+            under_way: dict[int, tuple[Parcel, list[int]]] = {}
+            for group in groups[first : first + WINDOW]:
+                parcel = make_parcel([requests[r] for r in group], next(self._indices))
+                under_way[parcel.index] = (parcel, group)
+                self._link.send(parcel.frame)
+                self.counts.sent += 1
+                self.counts.datagrams += len(group)
+            self._collect(under_way, replies)
+        return replies
+
+    def _collect(
+        self, under_way: dict[int, tuple[Parcel, list[int]]], replies: dict[int, Reply]
+    ) -> None:
+        """Takes the frames of one window back, until a deadline."""
+        deadline = self._link.now() + self._timeout_ns
+        while under_way and self._link.now() < deadline:  # also under a flood of alien frames
+            raw = self._link.receive()
+            if raw is not None:
+                self._take(raw, under_way, replies)
+            else:
+                self._link.wait_until(deadline, True)
+        now = self._link.now()
+        for parcel, group in under_way.values():
+            self.counts.lost += 1
+            for rank, request in zip(group, parcel.requests, strict=True):
+                replies[rank] = Reply(request.data, 0, True, now)
+
+    def _take(
+        self,
+        raw: bytes,
+        under_way: dict[int, tuple[Parcel, list[int]]],
+        replies: dict[int, Reply],
+    ) -> None:
+        try:
+            frame = decode_frame(raw)
+        except DecodeError:
+            self._count_stray(raw)
+            return
+        parcel, group = under_way.get(frame.datagrams[0].index, (None, []))
+        found = replies_of(parcel, frame, self._link.now()) if parcel else None
+        if parcel is None or found is None:
+            self.counts.stale += 1
+            return
+        del under_way[parcel.index]
+        replies.update(zip(group, found, strict=True))
+
+    def _count_stray(self, raw: bytes) -> None:
+        if is_alien(raw):
+            self.counts.alien += 1
+        else:
+            self.counts.malformed += 1

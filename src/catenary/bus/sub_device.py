@@ -1,0 +1,144 @@
+"""SubDevice: the handle of one device, valid across scans while its identity agrees."""
+
+from __future__ import annotations
+
+from typing import Protocol, TypeVar, overload
+
+from catenary.errors import MailboxError
+from catenary.model.device import DeviceDescription, Identity
+from catenary.procedure.al_state import DeviceState, read_state
+from catenary.procedure.exchange import Procedure
+from catenary.procedure.mailbox import MailboxChannel
+from catenary.procedure.sdo import download, upload
+from catenary.procedure.station import Station
+from catenary.types import DataType
+from catenary.wire.al import State
+from catenary.wire.coe import Emergency
+
+T = TypeVar("T")
+
+
+class Conversation(Protocol):
+    """Whoever can run a procedure now: the MainDevice, through whichever runner it has."""
+
+    def converse(self, procedure: Procedure[T], *, lane: int) -> T: ...
+
+
+class SubDevice:
+    """Owns what is known of one device. Attributes never cause traffic; calls with a verb do."""
+
+    def __init__(self, main: Conversation, description: DeviceDescription) -> None:
+        self._main = main
+        self.description = description
+        self.state: State | None = None  # last known; None: unknown
+        self.channel = _channel(description)
+        self.sdo = Sdo(main, self)
+
+    @property
+    def position(self) -> int:
+        return self.description.position
+
+    @property
+    def name(self) -> str:
+        return self.description.name
+
+    @property
+    def identity(self) -> Identity:
+        return self.description.identity
+
+    @property
+    def alias(self) -> int:
+        """Station alias, 0: none."""
+        return self.description.alias
+
+    @property
+    def is_drive(self) -> bool:
+        """Whether it has CiA 402 axes."""
+        return self.description.is_drive
+
+    @property
+    def slots(self) -> tuple[int, ...]:
+        """Its CiA 402 axes: the objects of slot k lie 0x800·k above those of slot 0."""
+        return self.description.slots
+
+    @property
+    def emergencies(self) -> tuple[Emergency, ...]:
+        """The last emergencies it sent, whoever read them; oldest first."""
+        return tuple(self.channel.emergencies) if self.channel is not None else ()
+
+    @property
+    def station(self) -> Station:
+        return Station(self.position, self.description.station_address, self.name)
+
+    def read_state(self) -> DeviceState:
+        """Asks for its EtherCAT state."""
+        found = self._main.converse(
+            read_state(self.station), lane=self.description.station_address
+        )
+        self.state = found.state
+        return found
+
+    def update(self, description: DeviceDescription) -> None:
+        """After a scan: the same device, described anew."""
+        self.description = description
+        self.channel = _channel(description)
+
+    def __repr__(self) -> str:
+        return f"<SubDevice {self.position} {self.name!r} {self.state or 'state unknown'}>"
+
+
+class Sdo:
+    """The object dictionary of one device: `sub.sdo.read(0x1018, 1, type=UDINT)`."""
+
+    def __init__(self, main: Conversation, sub: SubDevice) -> None:
+        self._main = main
+        self._sub = sub
+
+    @overload
+    def read(self, index: int, subindex: int = 0) -> bytes: ...
+    @overload
+    def read(self, index: int, subindex: int = 0, *, type: DataType[T]) -> T: ...
+    def read(
+        self, index: int, subindex: int = 0, *, type: DataType[T] | None = None
+    ) -> T | bytes:
+        """Reads an object: bytes, or with a `type` its value. SdoAbort if the device refuses."""
+        channel = self._usable(index, subindex)
+        lane = self._sub.description.station_address
+        data = self._main.converse(upload(channel, index, subindex), lane=lane)
+        return data if type is None else type.decode(data)
+
+    @overload
+    def write(self, index: int, subindex: int, value: bytes) -> None: ...
+    @overload
+    def write(self, index: int, subindex: int, value: T, *, type: DataType[T]) -> None: ...
+    def write(
+        self, index: int, subindex: int, value: object, *, type: DataType[T] | None = None
+    ) -> None:
+        """Writes an object: bytes, or with a `type` a value. SdoAbort if the device refuses."""
+        channel = self._usable(index, subindex)
+        data = value if type is None else type.encode(value)  # type: ignore[arg-type]
+        if not isinstance(data, bytes):
+            raise TypeError(f"give a type for {value!r}, or bytes: type=catenary.types.UDINT")
+        lane = self._sub.description.station_address
+        self._main.converse(download(channel, index, subindex, data), lane=lane)
+
+    def _usable(self, index: int, subindex: int) -> MailboxChannel:
+        if not 0 <= index <= 0xFFFF or not 0 <= subindex <= 0xFF:
+            raise ValueError(
+                f"object 0x{index:X}:{subindex:X}: an index has 16 bits, a subindex 8"
+            )
+        channel = self._sub.channel
+        if channel is None or not channel.layout.coe:
+            what = "has no mailbox" if channel is None else "does not speak CoE"
+            raise MailboxError(
+                f"{self._sub.station} {what}: object 0x{index:04X}:{subindex:02X} is out of reach",
+                hint="couplers and simple terminals have no object dictionary",
+            )
+        return channel
+
+
+def _channel(description: DeviceDescription) -> MailboxChannel | None:
+    if description.mailbox is None:
+        return None
+    station = Station(description.position, description.station_address, description.name)
+    return MailboxChannel(station, description.mailbox)

@@ -1,0 +1,113 @@
+"""Changing the state of a device, ETG.1000.6 §5.3 and §6.4; times by ETG.1020 table "Timeouts"."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from catenary.errors import DecodeError, StateError
+from catenary.procedure.exchange import Procedure, after, read_memory, write
+from catenary.procedure.station import Deadline, Pace, Station, answered
+from catenary.wire.al import AlControl, AlStatus, State, status_code
+from catenary.wire.datagram import Command
+from catenary.wire.register import AL_CONTROL, AL_STATUS, AL_STATUS_CODE
+
+# By the state asked for [s]; the ESI's defaults (ETG.2000, StateMachine/Timeout).
+TIMEOUTS = {
+    State.INIT: 5.0,  # back to INIT
+    State.PRE_OP: 3.0,
+    State.BOOT: 3.0,
+    State.SAFE_OP: 10.0,
+    State.OP: 10.0,
+}
+
+_STATUS_START = AL_STATUS.address
+_STATUS_SIZE = AL_STATUS_CODE.address + AL_STATUS_CODE.size - AL_STATUS.address
+
+
+class DeviceState(NamedTuple):
+    """AL status and its code, read together."""
+
+    state: State | None  # None: a value the standard does not have
+    error: bool
+    code: int
+    word: int
+
+    @property
+    def name(self) -> str:
+        return str(self.state) if self.state is not None else f"state {self.word & 0xF}"
+
+
+def read_state(station: Station) -> Procedure[DeviceState]:
+    """The state the device is in now."""
+    [reply] = yield [read_memory(station.address, _STATUS_START, _STATUS_SIZE, repeatable=True)]
+    return _decoded(answered(reply, station, "AL status"))
+
+
+def request_state(
+    station: Station, target: State, *, timeout: float | None = None
+) -> Procedure[DeviceState]:
+    """Asks for a state and waits until the device is there. A pending error is acknowledged
+    first. StateError with the device's own code if it refuses or takes too long."""
+    before = yield from read_state(station)
+    if before.error:
+        yield from acknowledge(station, before)
+    elif before.state is target:
+        return before
+    word = AlControl(target).word
+    [reply] = yield [write(Command.FPWR, station.address, AL_CONTROL, word)]
+    answered(reply, station, f"request for {target}")
+    return (yield from _await_state(station, target, timeout or TIMEOUTS[target]))
+
+
+def acknowledge(station: Station, pending: DeviceState) -> Procedure[DeviceState]:
+    """Acknowledges an AL error by asking for the state the device is in already."""
+    state = pending.state or State.INIT
+    word = AlControl(state, acknowledge=True).word
+    [reply] = yield [write(Command.FPWR, station.address, AL_CONTROL, word)]
+    answered(reply, station, "acknowledgement of an AL error")
+    deadline, pace = Deadline(TIMEOUTS[State.INIT]), Pace()
+    while True:
+        [reply] = yield [read_memory(station.address, _STATUS_START, _STATUS_SIZE, repeatable=True)]
+        now = _decoded(answered(reply, station, "AL status"))
+        if not now.error:
+            return now
+        if deadline.passed(reply):
+            raise _refused(station, state, now, "does not take the acknowledgement of its error")
+        yield after(pace.pause())
+
+
+def _await_state(station: Station, target: State, timeout: float) -> Procedure[DeviceState]:
+    deadline, pace = Deadline(timeout), Pace()
+    while True:
+        [reply] = yield [read_memory(station.address, _STATUS_START, _STATUS_SIZE, repeatable=True)]
+        now = _decoded(answered(reply, station, "AL status"))
+        if now.error:
+            raise _refused(station, target, now, "refused")
+        if now.state is target:
+            return now
+        if deadline.passed(reply):
+            raise _refused(station, target, now, f"did not reach within {timeout:g} s")
+        yield after(pace.pause())
+
+
+def _decoded(data: bytes) -> DeviceState:
+    word = AL_STATUS.unpack(data[: AL_STATUS.size])
+    code = AL_STATUS_CODE.unpack(data[-AL_STATUS_CODE.size :])
+    try:
+        status = AlStatus.from_word(word)
+    except DecodeError:
+        return DeviceState(None, bool(word & 0x10), code, word)
+    return DeviceState(status.state, status.error, code, word)
+
+
+def _refused(station: Station, target: State, now: DeviceState, what: str) -> StateError:
+    known = status_code(now.code)
+    reason = f", AL status code 0x{now.code:04X}: {known.text}" if now.code else ""
+    return StateError(
+        f"{station} {what} {target}: it is in {now.name}{' with an error' * now.error}{reason}",
+        position=station.position,
+        requested=int(target),
+        actual=now.word & 0x0F,
+        code=now.code,
+        hint=known.cause or "read its AL status again; its manual lists what it needs",
+    )

@@ -1,0 +1,101 @@
+"""Writing SyncManagers, FMMUs and the watchdog, ETG.1000.4 §6.3, §6.6, §6.7.
+
+The mailbox's SyncManagers are written in INIT, those of the process data in PRE-OP.
+"""
+
+from __future__ import annotations
+
+from catenary.errors import ConfigurationError, DecodeError
+from catenary.model.device import DeviceDescription, Direction
+from catenary.plan.layout import FmmuPlan, SyncManagerPlan
+from catenary.plan.start_up import WATCHDOG_DIVIDER, DevicePlan
+from catenary.procedure.exchange import Procedure, Request, write
+from catenary.procedure.mailbox import IN, OUT, MailboxChannel
+from catenary.procedure.station import Station, answered
+from catenary.wire import fmmu, register
+from catenary.wire.datagram import Command
+from catenary.wire.sync_manager import (
+    MAILBOX_IN,
+    MAILBOX_OUT,
+    Activation,
+    Control,
+    SyncManager,
+)
+
+
+def configure_mailbox(channel: MailboxChannel) -> Procedure[None]:
+    """SyncManagers 0 and 1, and the counters from the beginning. In INIT."""
+    layout, station = channel.layout, channel.station
+    out = SyncManager(layout.receive_offset, layout.receive_size, MAILBOX_OUT)
+    back = SyncManager(layout.send_offset, layout.send_size, MAILBOX_IN)
+    yield from _write_all(
+        station,
+        [_sync_manager(station, OUT, out), _sync_manager(station, IN, back)],
+        "mailbox SyncManagers",
+    )
+    channel.reset()
+
+
+def configure_process_data(
+    station: Station, device: DeviceDescription, plan: DevicePlan
+) -> Procedure[None]:
+    """SyncManagers and FMMUs of the process data and the watchdog. In PRE-OP. What an earlier
+    plan may have left is switched off."""
+    used = {manager.index for manager in plan.layout.sync_managers}
+    requests = [_planned_manager(station, manager) for manager in plan.layout.sync_managers]
+    for manager in device.sync_managers:
+        if manager.index not in used and not _is_mailbox(device, manager.index):
+            requests.append(_switched_off(station, manager.index))
+    requests += [_planned_fmmu(station, planned) for planned in plan.layout.fmmus]
+    for number in range(len(plan.layout.fmmus), device.controller.fmmu_count):
+        block = register.fmmu(number)
+        requests.append(write(Command.FPWR, station.address, block, bytes(block.size)))
+    if plan.layout.output_size:
+        divider, time = register.WATCHDOG_DIVIDER, register.WATCHDOG_TIME_PROCESS_DATA
+        requests.append(write(Command.FPWR, station.address, divider, WATCHDOG_DIVIDER))
+        requests.append(write(Command.FPWR, station.address, time, plan.watchdog_count))
+    yield from _write_all(station, requests, "SyncManagers and FMMUs")
+
+
+def _is_mailbox(device: DeviceDescription, index: int) -> bool:
+    return device.mailbox is not None and index in (OUT, IN)
+
+
+def _planned_manager(station: Station, plan: SyncManagerPlan) -> Request:
+    try:
+        control = Control.from_byte(plan.control)
+    except DecodeError as error:
+        raise ConfigurationError(
+            f"{station}: its SII gives SyncManager {plan.index} a control byte that cannot be: "
+            f"{error}",
+            hint="its SII is wrong; ask the maker for a corrected image",
+        ) from error
+    return _sync_manager(station, plan.index, SyncManager(plan.start, plan.length, control))
+
+
+def _sync_manager(station: Station, index: int, block: SyncManager) -> Request:
+    return write(Command.FPWR, station.address, register.sync_manager(index), block.encode())
+
+
+def _switched_off(station: Station, index: int) -> Request:
+    activation = register.sync_manager_activation(index)
+    return write(Command.FPWR, station.address, activation, int(Activation(0)))
+
+
+def _planned_fmmu(station: Station, plan: FmmuPlan) -> Request:
+    block = fmmu.bits(
+        plan.logical_start * 8,
+        plan.physical_start * 8,
+        plan.length * 8,
+        reads=plan.direction is Direction.INPUT,
+        writes=plan.direction is Direction.OUTPUT,
+    )
+    return write(Command.FPWR, station.address, register.fmmu(plan.index), block.encode())
+
+
+def _write_all(station: Station, requests: list[Request], what: str) -> Procedure[None]:
+    if not requests:
+        return
+    replies = yield requests
+    for reply in replies:
+        answered(reply, station, what)

@@ -1,0 +1,272 @@
+"""The mailbox of one SubDevice, ETG.1000.4 §5.6 and §6.7, ETG.1000.6 §5.1.
+
+One message is outstanding at a time. What the network loses is recovered by the standard's own
+means, never by blindly sending the datagram again, which jams mailboxes (SOEM#684):
+
+- A lost read: toggle the repeat request of SyncManager 1, wait for the acknowledge, read again.
+- A lost write: nobody knows whether it arrived. An answer within a grace says that it did; else
+  the message is written again with the same counter, by which the device tells the repetition.
+
+The counter of what the device sends only tells duplicates; devices may start it anywhere and may
+leave it 0 (ethercrab#236).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from catenary.errors import DecodeError, MailboxError, ResponseTimeout
+from catenary.model.device import MailboxLayout
+from catenary.procedure.exchange import (
+    Procedure,
+    Reply,
+    after,
+    read,
+    read_memory,
+    write,
+    write_memory,
+)
+from catenary.procedure.station import Deadline, Pace, Station, answered
+from catenary.wire import coe
+from catenary.wire.datagram import Command
+from catenary.wire.mailbox import Mailbox, Type, decode_error, decode_mailbox, next_counter
+from catenary.wire.register import (
+    sync_manager_activation,
+    sync_manager_pdi_control,
+    sync_manager_status,
+)
+from catenary.wire.sync_manager import Activation, PdiControl, Status
+
+T = TypeVar("T")
+
+OUT, IN = 0, 1  # SyncManagers of the mailbox, by the standard
+WRITE_TIMEOUT = 1.0  # [s] until the device has emptied its mailbox
+READ_TIMEOUT = 2.0  # [s] until it answers; AKDs take their time over 0x1010
+REPEAT_TIMEOUT = 0.2  # [s] until it acknowledges a repeat request
+GRACE = 0.1  # [s] for an answer to a message whose frame was lost
+RECOVERIES = 5  # of one message, then the cable is to blame
+EMERGENCIES_KEPT = 64
+
+
+@dataclass(slots=True)
+class MailboxChannel:
+    """Owns the state of one SubDevice's mailbox: counters, repeat toggle, emergencies."""
+
+    station: Station
+    layout: MailboxLayout
+    counter: int = 0  # of what was written last
+    received_counter: int = 0  # of what was read last
+    repeat_requested: bool = False  # state of the toggle bit
+    emergencies: deque[coe.Emergency] = field(
+        default_factory=lambda: deque(maxlen=EMERGENCIES_KEPT)
+    )
+    dropped: int = 0  # messages nobody waited for, duplicates
+
+    def reset(self) -> None:
+        """After the SyncManagers were configured anew."""
+        self.counter = self.received_counter = 0
+        self.repeat_requested = False
+
+
+def converse(
+    channel: MailboxChannel,
+    kind: Type,
+    data: bytes,
+    accept: Callable[[Mailbox], T | None],
+    *,
+    timeout: float = READ_TIMEOUT,
+) -> Procedure[T]:
+    """Sends one message and returns what `accept` makes of the answer. `accept` returns None for
+    a message that is none (an emergency it has put aside, a late answer to something else)."""
+    channel.counter = next_counter(channel.counter)
+    message = Mailbox(kind, data, channel.counter).encode(channel.layout.receive_size)
+    for _ in range(RECOVERIES):
+        sent = yield from _post(channel, message)
+        patience = timeout if sent else GRACE
+        deadline = Deadline(patience)
+        while True:
+            received = yield from _fetch(channel, deadline)
+            if received is None:
+                break
+            answer = _sorted(channel, received, accept)
+            if answer is not None:
+                return answer
+        if sent:
+            raise ResponseTimeout(
+                f"{channel.station}: no answer to a {kind.name} message within {timeout:g} s",
+                hint="the device's application may hang: read its state; power-cycle it",
+            )
+    raise ResponseTimeout(
+        f"{channel.station}: {RECOVERIES} frames with the same mailbox message were lost",
+        hint="look at the cable: the error counters at 0x0300 tell which",
+    )
+
+
+def tell(channel: MailboxChannel, kind: Type, data: bytes) -> Procedure[bool]:
+    """Sends one message that has no answer. False: its frame was lost, it may have arrived."""
+    channel.counter = next_counter(channel.counter)
+    return (
+        yield from _post(
+            channel, Mailbox(kind, data, channel.counter).encode(channel.layout.receive_size)
+        )
+    )
+
+
+def drain(channel: MailboxChannel, accept: Callable[[Mailbox], T | None]) -> Procedure[list[T]]:
+    """Reads what lies in the mailbox without asking for anything: late answers, emergencies."""
+    found: list[T] = []
+    while (yield from _is_full(channel, IN))[0]:
+        received = yield from _take(channel)
+        answer = _sorted(channel, received, accept) if received is not None else None
+        if answer is not None:
+            found.append(answer)
+    return found
+
+
+def _post(channel: MailboxChannel, message: bytes) -> Procedure[bool]:
+    """Writes the message once the mailbox is empty. False: its frame was lost."""
+    deadline, pace = Deadline(WRITE_TIMEOUT), Pace()
+    while True:
+        request = write_memory(
+            channel.station.address, channel.layout.receive_offset, message, repeatable=False
+        )
+        [reply] = yield [request]
+        if reply.lost:
+            return False
+        if reply.working_counter:
+            answered(reply, channel.station, "mailbox write")
+            return True
+        full, status = yield from _is_full(channel, OUT)
+        if deadline.passed(status):
+            raise _stuck(channel, full)
+        yield after(pace.pause())
+
+
+def _stuck(channel: MailboxChannel, full: bool) -> MailboxError:
+    if full:
+        return MailboxError(
+            f"{channel.station} has not read its mailbox for {WRITE_TIMEOUT:g} s",
+            hint="its application hangs, or waits for its own mailbox to be read: power-cycle it",
+        )
+    return MailboxError(
+        f"{channel.station} does not take mailbox messages at "
+        f"0x{channel.layout.receive_offset:04X} (working counter 0)",
+        hint="its SyncManager 0 is off: bring it to PRE-OP again",
+    )
+
+
+def _fetch(channel: MailboxChannel, deadline: Deadline) -> Procedure[Mailbox | None]:
+    """The next message the device sends; None when the deadline has passed."""
+    pace = Pace()
+    while True:
+        full, status = yield from _is_full(channel, IN)
+        if full:
+            received = yield from _take(channel)
+            if received is not None:
+                return received
+        if deadline.passed(status):
+            return None
+        yield after(pace.pause())
+
+
+def _is_full(channel: MailboxChannel, number: int) -> Procedure[tuple[bool, Reply]]:
+    register = sync_manager_status(number)
+    [reply] = yield [read(Command.FPRD, channel.station.address, register)]
+    status = Status(register.unpack(answered(reply, channel.station, "mailbox status")))
+    return Status.MAILBOX_FULL in status, reply
+
+
+def _take(channel: MailboxChannel) -> Procedure[Mailbox | None]:
+    """Reads the full mailbox; None for a duplicate of what was read before, or for nothing."""
+    layout = channel.layout
+    for _ in range(RECOVERIES):
+        [reply] = yield [
+            read_memory(
+                channel.station.address, layout.send_offset, layout.send_size, repeatable=False
+            )
+        ]
+        if not reply.lost:
+            return _decoded(channel, reply.data) if reply.working_counter else None
+        if not (yield from _ask_again(channel)):
+            return None
+    raise ResponseTimeout(
+        f"{channel.station}: {RECOVERIES} frames that read its mailbox were lost",
+        hint="look at the cable: the error counters at 0x0300 tell which",
+    )
+
+
+def _decoded(channel: MailboxChannel, data: bytes) -> Mailbox | None:
+    try:
+        message = decode_mailbox(data)
+    except DecodeError as error:
+        raise MailboxError(
+            f"{channel.station}: a mailbox message that is none: {error}",
+            hint="its firmware is at fault; a capture of the bring-up shows the bytes",
+        ) from error
+    if message.counter and message.counter == channel.received_counter:
+        channel.dropped += 1
+        return None
+    channel.received_counter = message.counter
+    return message
+
+
+def _ask_again(channel: MailboxChannel) -> Procedure[bool]:
+    """Repeat request and acknowledge of SyncManager 1, ETG.1000.4 §6.7.2: the device puts its
+    last message into the buffer once more. Whether there is one now."""
+    channel.repeat_requested = not channel.repeat_requested
+    activation = Activation.ENABLE
+    if channel.repeat_requested:
+        activation |= Activation.REPEAT_REQUEST
+    register, answer = sync_manager_activation(IN), sync_manager_pdi_control(IN)
+    station = channel.station
+    [reply] = yield [write(Command.FPWR, station.address, register, int(activation))]
+    answered(reply, station, "mailbox repeat request")
+    deadline, pace = Deadline(REPEAT_TIMEOUT), Pace()
+    while True:
+        [reply] = yield [read(Command.FPRD, station.address, answer)]
+        value = PdiControl(answer.unpack(answered(reply, station, "mailbox repeat acknowledge")))
+        acknowledged = (PdiControl.REPEAT_ACKNOWLEDGE in value) == channel.repeat_requested
+        if acknowledged and (yield from _is_full(channel, IN))[0]:
+            return True
+        if deadline.passed(reply):
+            break
+        yield after(pace.pause())
+    if acknowledged:
+        return False
+    raise MailboxError(
+        f"{station} does not acknowledge the repeat request of its mailbox",
+        hint="its stack lacks the recovery of ETG.1000.4 §6.7.2: bring it to INIT and back",
+    )
+
+
+def _sorted(
+    channel: MailboxChannel, message: Mailbox, accept: Callable[[Mailbox], T | None]
+) -> T | None:
+    if message.type is Type.ERROR:
+        reply = decode_error(message.data)
+        raise MailboxError(
+            f"{channel.station} answers with mailbox error 0x{reply.code:04X}: {reply.text}",
+            hint="the device does not offer this mailbox service",
+        )
+    emergency = _emergency(message)
+    if emergency is not None:
+        channel.emergencies.append(emergency)
+        return None
+    answer = accept(message)
+    if answer is None:
+        channel.dropped += 1
+    return answer
+
+
+def _emergency(message: Mailbox) -> coe.Emergency | None:
+    header = int.from_bytes(message.data[: coe.HEADER_SIZE], "little")
+    if message.type is not Type.COE or header >> 12 != coe.Service.EMERGENCY:
+        return None
+    try:
+        decoded = coe.decode_coe(message.data)
+    except DecodeError:
+        return None  # cut short: dropped and counted like anything nobody can use
+    return decoded if isinstance(decoded, coe.Emergency) else None

@@ -1,0 +1,164 @@
+"""PDO assignment and mapping in the object dictionary, ETG.1000.6 §5.6.7.4: read, written where a
+plan differs, read again to verify."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from catenary.errors import MappingError, SdoAbort
+from catenary.model.device import (
+    Assignment,
+    DeviceDescription,
+    Direction,
+    Entry,
+    Pdo,
+    SyncManagerKind,
+)
+from catenary.plan.start_up import ASSIGNMENT_BASE, DevicePlan
+from catenary.procedure.exchange import Procedure
+from catenary.procedure.mailbox import MailboxChannel
+from catenary.procedure.sdo import download, upload
+
+NOT_THERE = frozenset((0x0602_0000, 0x0609_0011))  # no such object, no such subindex
+
+
+def read_mapping(
+    channel: MailboxChannel, device: DeviceDescription
+) -> Procedure[DeviceDescription]:
+    """The description with what is mapped now. Devices without 0x1C1x keep what their SII says."""
+    outputs = yield from _read_direction(channel, device, Direction.OUTPUT)
+    inputs = yield from _read_direction(channel, device, Direction.INPUT)
+    return replace(
+        device,
+        outputs=device.outputs if outputs is None else outputs,
+        inputs=device.inputs if inputs is None else inputs,
+        output_pdos=_joined(device.output_pdos, outputs),
+        input_pdos=_joined(device.input_pdos, inputs),
+        mapping_source="SII" if outputs is None and inputs is None else "CoE",
+    )
+
+
+def write_downloads(channel: MailboxChannel, plan: DevicePlan) -> Procedure[None]:
+    """The plan's SDO downloads in their order. A refused mapping names its object."""
+    for step in plan.downloads:
+        try:
+            yield from download(channel, step.index, step.subindex, step.data)
+        except SdoAbort as abort:
+            if step.entry is None:
+                raise
+            raise MappingError(
+                f"{channel.station}: object {step.entry} cannot be mapped into PDO "
+                f"0x{step.index:04X}: {abort.message}",
+                hint=abort.hint,
+            ) from abort
+
+
+def verify_mapping(
+    channel: MailboxChannel, device: DeviceDescription, plan: DevicePlan
+) -> Procedure[None]:
+    """Reads the mapping again after it was written; MappingError where the device took something
+    else."""
+    for direction in Direction:
+        found = yield from _read_direction(channel, device, direction)
+        wanted = _shape(plan.assignments(direction))
+        if found is None or _shape(found) == wanted:
+            continue
+        raise MappingError(
+            f"{channel.station}: took a mapping of {direction.name.lower()}s that is not the one "
+            f"written: {_text(_shape(found))} instead of {_text(wanted)}",
+            hint="its firmware corrects mappings; map what it accepts",
+        )
+
+
+_Shape = tuple[tuple[int, int, int], ...]
+
+
+def _shape(assignments: tuple[Assignment, ...]) -> _Shape:
+    return tuple(
+        (entry.index, entry.subindex, entry.bit_length)
+        for assignment in assignments
+        for pdo in assignment.pdos
+        for entry in pdo.entries
+    )
+
+
+def _text(shape: _Shape) -> str:
+    return ", ".join(f"0x{index:04X}:{sub:02X}/{bits}" for index, sub, bits in shape) or "nothing"
+
+
+def _read_direction(
+    channel: MailboxChannel, device: DeviceDescription, direction: Direction
+) -> Procedure[tuple[Assignment, ...] | None]:
+    """None: the dictionary has no assignment for this direction."""
+    kind = SyncManagerKind.OUTPUTS if direction is Direction.OUTPUT else SyncManagerKind.INPUTS
+    known = {pdo.index: pdo for pdo in device.pdos(direction)}
+    assignments = []
+    for manager in device.sync_managers:
+        if manager.kind is not kind:
+            continue
+        indices = yield from _read_list(channel, ASSIGNMENT_BASE + manager.index)
+        if indices is None:
+            continue
+        pdos = []
+        for data in indices:
+            index = int.from_bytes(data[:2], "little")
+            if index:  # 0: a place kept free
+                pdos.append((yield from _read_pdo(channel, index, known.get(index), manager.index)))
+        assignments.append(Assignment(manager.index, tuple(pdos)))
+    return tuple(assignments) if assignments else None
+
+
+def _read_pdo(
+    channel: MailboxChannel, index: int, known: Pdo | None, sync_manager: int
+) -> Procedure[Pdo]:
+    words = yield from _read_list(channel, index)
+    if words is None:
+        if known is None:
+            raise MappingError(
+                f"{channel.station}: assigns PDO 0x{index:04X}, which neither its dictionary nor "
+                "its SII has",
+                hint="write 0x1C12 and 0x1C13 anew, or restore its defaults (0x1011)",
+            )
+        return replace(known, sync_manager=sync_manager)
+    names = {(e.index, e.subindex): e for e in known.entries} if known else {}
+    entries = tuple(_entry(data, names) for data in words)
+    if known is None:
+        return Pdo(index, entries, sync_manager)
+    return replace(known, entries=entries, sync_manager=sync_manager)
+
+
+def _entry(data: bytes, names: dict[tuple[int, int], Entry]) -> Entry:
+    word = int.from_bytes(data[:4], "little")
+    index, subindex, bits = word >> 16, word >> 8 & 0xFF, word & 0xFF
+    named = names.get((index, subindex))
+    if named is None:
+        return Entry(index, subindex, bits)
+    return replace(named, bit_length=bits)
+
+
+def _read_list(channel: MailboxChannel, index: int) -> Procedure[list[bytes] | None]:
+    """Subindices 1 to n of a list object; None where the device does not have it."""
+    try:
+        count = (yield from upload(channel, index, 0))[:1]
+        items = []
+        for subindex in range(1, int.from_bytes(count, "little") + 1):
+            items.append((yield from upload(channel, index, subindex)))
+    except SdoAbort as abort:
+        if abort.code in NOT_THERE:
+            return None
+        raise
+    return items
+
+
+def _joined(
+    offered: tuple[Pdo, ...], assignments: tuple[Assignment, ...] | None
+) -> tuple[Pdo, ...]:
+    """All PDOs of a device: those of the SII, corrected and completed by what was read."""
+    if assignments is None:
+        return offered
+    read = {pdo.index: pdo for assignment in assignments for pdo in assignment.pdos}
+    kept = tuple(
+        read.pop(pdo.index) if pdo.index in read else replace(pdo, sync_manager=None)
+        for pdo in offered
+    )
+    return kept + tuple(read.values())

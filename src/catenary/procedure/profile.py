@@ -1,0 +1,118 @@
+"""What kind of device it is: object 0x1000, and where its CiA 402 axes are.
+
+ETG.6010 §"Multi-axis": axis k's objects lie 0x800·k above the first one's. Modular devices
+(profile 5001, ETG.5001) list the profile of every slot in 0xF010.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from catenary.errors import SdoAbort
+from catenary.model.device import DeviceDescription, ObjectInformation
+from catenary.procedure.exchange import Procedure
+from catenary.procedure.mailbox import MailboxChannel, converse
+from catenary.procedure.sdo import upload
+from catenary.wire.coe import decode_coe
+from catenary.wire.mailbox import Mailbox, Type
+from catenary.wire.sdo_information import (
+    Access,
+    Opcode,
+    SdoInformation,
+    decode_entry_description,
+    entry_request,
+)
+
+DEVICE_TYPE = 0x1000
+STATUSWORD = 0x6041
+MODULE_PROFILES = 0xF010
+PROFILE_DRIVE = 402
+PROFILE_MODULAR = 5001
+SLOT_STRIDE = 0x800
+SLOTS_MAX = 16  # 0x6000 to 0xDFFF
+
+
+def read_profile(
+    channel: MailboxChannel, device: DeviceDescription
+) -> Procedure[DeviceDescription]:
+    """The description with device type and drive slots."""
+    data = yield from _upload_if_there(channel, DEVICE_TYPE, 0)
+    if data is None:
+        return device
+    device_type = int.from_bytes(data[:4], "little")
+    profile = device_type & 0xFFFF
+    slots: tuple[int, ...] = ()
+    if profile == PROFILE_DRIVE:
+        slots = yield from _count_axes(channel)
+    elif profile == PROFILE_MODULAR:
+        slots = yield from _listed_axes(channel)
+    return replace(device, device_type=device_type, slots=slots)
+
+
+def read_object(
+    channel: MailboxChannel, device: DeviceDescription, index: int, subindex: int
+) -> Procedure[ObjectInformation]:
+    """What the dictionary says of an entry. Bit length 0: it does not exist. Where the device has
+    no SDO information, its length is found by reading it, and mapping it is left to the device."""
+    mailbox = device.mailbox
+    if mailbox is not None and mailbox.sdo_information:
+        found = yield from _describe(channel, index, subindex)
+        if found is not None:
+            return found
+    data = yield from _upload_if_there(channel, index, subindex)
+    return ObjectInformation(index, subindex, 0 if data is None else 8 * len(data))
+
+
+def _describe(
+    channel: MailboxChannel, index: int, subindex: int
+) -> Procedure[ObjectInformation | None]:
+    """By SDO information; None where the device answers with an error."""
+
+    def accept(mailbox: Mailbox) -> SdoInformation | None:
+        if mailbox.type is not Type.COE:
+            return None
+        message = decode_coe(mailbox.data)
+        return message if isinstance(message, SdoInformation) else None
+
+    request = entry_request(index, subindex)
+    answer = yield from converse(channel, Type.COE, request.encode(), accept)
+    if answer.opcode is not Opcode.ENTRY_RESPONSE:
+        return None
+    entry = decode_entry_description(answer.data)
+    return ObjectInformation(
+        index,
+        subindex,
+        entry.bit_length,
+        entry.data_type,
+        Access.RXPDO_MAPPABLE in entry.access,
+        Access.TXPDO_MAPPABLE in entry.access,
+        entry.name,
+    )
+
+
+def _count_axes(channel: MailboxChannel) -> Procedure[tuple[int, ...]]:
+    slots = [0]
+    for slot in range(1, SLOTS_MAX):
+        there = yield from _upload_if_there(channel, STATUSWORD + SLOT_STRIDE * slot, 0)
+        if there is None:
+            break
+        slots.append(slot)
+    return tuple(slots)
+
+
+def _listed_axes(channel: MailboxChannel) -> Procedure[tuple[int, ...]]:
+    count = yield from _upload_if_there(channel, MODULE_PROFILES, 0)
+    slots = []
+    for slot in range(min(int.from_bytes((count or b"")[:1], "little"), SLOTS_MAX)):
+        data = yield from _upload_if_there(channel, MODULE_PROFILES, slot + 1)
+        if data is not None and int.from_bytes(data[:2], "little") == PROFILE_DRIVE:
+            slots.append(slot)
+    return tuple(slots)
+
+
+def _upload_if_there(channel: MailboxChannel, index: int, subindex: int) -> Procedure[bytes | None]:
+    """None where the device refuses: whatever the reason, the object is of no use."""
+    try:
+        return (yield from upload(channel, index, subindex))
+    except SdoAbort:
+        return None

@@ -1,0 +1,160 @@
+"""SDO services, ETG.1000.6 §5.6.2: upload and download, each expedited, normal and segmented."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from catenary.errors import DecodeError, MailboxError, SdoAbort
+from catenary.procedure.exchange import Procedure
+from catenary.procedure.mailbox import MailboxChannel, converse, tell
+from catenary.wire.abort import abort_code
+from catenary.wire.coe import (
+    EXPEDITED_MAXIMUM,
+    SDO_SIZE,
+    Abort,
+    DownloadRequest,
+    DownloadResponse,
+    DownloadSegment,
+    DownloadSegmentResponse,
+    Message,
+    UploadRequest,
+    UploadResponse,
+    UploadSegment,
+    UploadSegmentRequest,
+    decode_coe,
+)
+from catenary.wire.mailbox import HEADER_SIZE, Mailbox, Type
+
+T = TypeVar("T")
+
+SEGMENT_OVERHEAD = HEADER_SIZE + 3  # mailbox header, CoE header, command
+INITIATE_OVERHEAD = HEADER_SIZE + SDO_SIZE
+ABORT_PROTOCOL = 0x0504_0001  # command specifier not valid or unknown
+ABORT_TOGGLE = 0x0503_0000
+ABORT_LENGTH = 0x0607_0012  # data type does not match, length too high
+
+
+def upload(
+    channel: MailboxChannel, index: int, subindex: int, *, complete_access: bool = False
+) -> Procedure[bytes]:
+    """Reads one object. SdoAbort if the device refuses."""
+    first = yield from _ask(
+        channel,
+        UploadRequest(index, subindex, complete_access),
+        UploadResponse,
+        (index, subindex),
+        lambda message: (message.index, message.subindex) == (index, subindex),
+    )
+    if first.expedited or len(first.data) >= first.size:
+        return first.data
+    data = bytearray(first.data)
+    toggle, last = False, False
+    while not last:
+        segment = yield from _ask(
+            channel, UploadSegmentRequest(toggle), UploadSegment, (index, subindex)
+        )
+        if segment.toggle != toggle:
+            raise (yield from _break_off(channel, index, subindex, ABORT_TOGGLE))
+        if not (segment.data or segment.last) or len(data) + len(segment.data) > first.size:
+            raise (yield from _break_off(channel, index, subindex, ABORT_LENGTH))
+        data += segment.data
+        toggle, last = not toggle, segment.last
+    return bytes(data)
+
+
+def download(
+    channel: MailboxChannel,
+    index: int,
+    subindex: int,
+    data: bytes,
+    *,
+    complete_access: bool = False,
+) -> Procedure[None]:
+    """Writes one object. SdoAbort if the device refuses."""
+    room = channel.layout.receive_size - INITIATE_OVERHEAD
+    expedited = 0 < len(data) <= EXPEDITED_MAXIMUM and not complete_access
+    sent = len(data) if expedited else min(len(data), room)
+    yield from _ask(
+        channel,
+        DownloadRequest(index, subindex, data[:sent], len(data), expedited, complete_access),
+        DownloadResponse,
+        (index, subindex),
+        lambda message: (message.index, message.subindex) == (index, subindex),
+    )
+    toggle = False
+    room = channel.layout.receive_size - SEGMENT_OVERHEAD
+    while sent < len(data):
+        part = data[sent : sent + room]
+        sent += len(part)
+        answer = yield from _ask(
+            channel,
+            DownloadSegment(toggle, sent == len(data), part),
+            DownloadSegmentResponse,
+            (index, subindex),
+        )
+        if answer.toggle != toggle:
+            raise (yield from _break_off(channel, index, subindex, ABORT_TOGGLE))
+        toggle = not toggle
+
+
+def _ask(
+    channel: MailboxChannel,
+    request: UploadRequest | UploadSegmentRequest | DownloadRequest | DownloadSegment,
+    expected: type[T],
+    place: tuple[int, int],
+    matches: Callable[[T], bool] = lambda _: True,
+) -> Procedure[T]:
+    """Sends one SDO request and returns its answer; an abort is raised."""
+
+    def accept(mailbox: Mailbox) -> T | Abort | None:
+        message = _decoded(channel, mailbox)
+        if isinstance(message, Abort):
+            # Aborts of segments name no object with some devices.
+            return message if (message.index, message.subindex) in (place, (0, 0)) else None
+        return message if isinstance(message, expected) and matches(message) else None
+
+    talk: Procedure[T | Abort] = converse(channel, Type.COE, request.encode(), accept)
+    answer = yield from talk
+    if isinstance(answer, Abort):
+        raise refused(channel, *place, answer.code)
+    return answer
+
+
+def _decoded(channel: MailboxChannel, mailbox: Mailbox) -> Message | None:
+    if mailbox.type is not Type.COE:
+        return None
+    try:
+        return decode_coe(mailbox.data)
+    except DecodeError as error:
+        raise MailboxError(
+            f"{channel.station}: a CoE message that is none: {error}",
+            hint="its firmware is at fault; a capture of the bring-up shows the bytes",
+        ) from error
+
+
+def _break_off(
+    channel: MailboxChannel, index: int, subindex: int, code: int
+) -> Procedure[MailboxError]:
+    """Tells the device that the transfer ends here; the error for the caller to raise. An abort
+    is not answered, so only a lost frame could keep it from the device."""
+    yield from tell(channel, Type.COE, Abort(index, subindex, code).encode())
+    return MailboxError(
+        f"{channel.station}: SDO 0x{index:04X}:{subindex:02X}: a segment against the protocol "
+        f"({abort_code(code).text})",
+        hint="its firmware is at fault, or two masters talk to it",
+    )
+
+
+def refused(channel: MailboxChannel, index: int, subindex: int, code: int) -> SdoAbort:
+    """The error for an abort code."""
+    known = abort_code(code)
+    return SdoAbort(
+        f"{channel.station}: SDO 0x{index:04X}:{subindex:02X} refused with "
+        f"0x{code:08X}: {known.text}",
+        position=channel.station.position,
+        index=index,
+        subindex=subindex,
+        code=code,
+        hint=known.hint or "the manual of the device lists its objects",
+    )

@@ -1,0 +1,67 @@
+"""Whom a conversation is with, and what an answer of theirs must look like."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from catenary.errors import ResponseTimeout, SegmentError
+from catenary.procedure.exchange import Reply
+
+
+class Station(NamedTuple):
+    """One device as errors name it. `address`: its configured station address."""
+
+    position: int
+    address: int
+    name: str = ""
+
+    def __str__(self) -> str:
+        return f"device {self.position} ({self.name})" if self.name else f"device {self.position}"
+
+
+def answered(reply: Reply, station: Station, what: str) -> bytes:
+    """The data of a reply that this one device, and no other, must have given."""
+    if reply.lost:
+        raise ResponseTimeout(
+            f"{station}: {what}: the frame did not come back",
+            hint="check cable and power of the first device; look for other traffic on this port",
+        )
+    if reply.working_counter == 0:
+        raise ResponseTimeout(
+            f"{station}: {what}: no answer from station 0x{station.address:04X} "
+            "(working counter 0)",
+            hint="the device was switched off, reset or unplugged: scan again",
+        )
+    if reply.working_counter > 1:
+        raise SegmentError(
+            f"{station}: {what}: {reply.working_counter} devices answer to station "
+            f"0x{station.address:04X}",
+            hint="a device joined with an old station address: scan again",
+        )
+    return reply.data
+
+
+class Deadline:
+    """Counts one span of time on the stamps of replies [s]; it starts with the first one seen."""
+
+    def __init__(self, seconds: float) -> None:
+        self.seconds = seconds
+        self._start_ns: int | None = None
+
+    def passed(self, reply: Reply) -> bool:
+        if self._start_ns is None:
+            self._start_ns = reply.time_ns
+        return reply.time_ns - self._start_ns > self.seconds * 1e9
+
+
+class Pace:
+    """The growing pause between two polls [s]: quick at first, then easy on the cable."""
+
+    def __init__(self, first: float = 100e-6, longest: float = 5e-3) -> None:
+        self._next = first
+        self._longest = longest
+
+    def pause(self) -> float:
+        pause = self._next
+        self._next = min(2 * pause, self._longest)
+        return pause

@@ -1,0 +1,122 @@
+"""Counting devices and giving them addresses, ETG.1000.4 §6.1.2 and ETG.1020 §"Start-up"."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from catenary.errors import NoDeviceError, SegmentError
+from catenary.procedure.exchange import Procedure, Request, physical, read, write
+from catenary.procedure.station import Station, answered
+from catenary.wire.al import AlControl, State
+from catenary.wire.datagram import Command
+from catenary.wire.register import (
+    ACTIVATION,
+    AL_CONTROL,
+    AL_STATUS,
+    DL_STATUS,
+    INFORMATION,
+    SII_CONFIGURATION,
+    STATION_ADDRESS,
+    STATION_ALIAS,
+)
+
+STATION_BASE = 0x1001  # of position 0; 0 would answer nothing, small numbers are likely aliases
+_FMMU_BLOCK = (0x0600, 256)  # all 16 FMMUs
+_SYNC_MANAGER_BLOCK = (0x0800, 128)  # all 16 SyncManagers
+
+
+@dataclass(frozen=True, slots=True)
+class StationRegisters:
+    """What the registers of one device say before anything is asked of its EEPROM."""
+
+    position: int
+    station_address: int
+    alias: int
+    dl_status: int
+    information: bytes  # 0x0000 to 0x0009
+
+
+def count() -> Procedure[int]:
+    """How many devices process a broadcast. NoDeviceError if none does."""
+    [reply] = yield [read(Command.BRD, 0, AL_STATUS)]
+    if reply.lost:
+        raise NoDeviceError(
+            "no device: no frame comes back",
+            hint="check the cable and the power of the first device; is this the right port?",
+        )
+    if reply.working_counter == 0:
+        raise NoDeviceError(
+            "no device: frames come back unprocessed (working counter 0)",
+            hint="`lo`, a bridge or a switch echoes frames; take the port the segment is wired to",
+        )
+    return reply.working_counter
+
+
+def reset(device_count: int) -> Procedure[None]:
+    """All devices to INIT with errors acknowledged; FMMUs, SyncManagers, SYNC signals cleared;
+    their EEPROM taken from the process data interface."""
+    init = AlControl(State.INIT, acknowledge=True).word
+    requests = [
+        write(Command.BWR, 0, AL_CONTROL, init),
+        _clear(*_FMMU_BLOCK),
+        _clear(*_SYNC_MANAGER_BLOCK),
+        write(Command.BWR, 0, ACTIVATION, 0),
+        write(Command.BWR, 0, SII_CONFIGURATION, 2),  # force: the EEPROM back from the PDI
+        write(Command.BWR, 0, SII_CONFIGURATION, 0),
+    ]
+    replies = yield requests
+    if replies[0].working_counter != device_count:
+        raise SegmentError(
+            f"{device_count} devices were counted, {replies[0].working_counter} took INIT",
+            hint="devices come and go: look for a loose contact, then scan again",
+        )
+
+
+def assign(device_count: int) -> Procedure[tuple[StationRegisters, ...]]:
+    """Gives every device its station address, then reads its registers by it."""
+    addresses = [STATION_BASE + position for position in range(device_count)]
+    replies = yield [
+        write(Command.APWR, -position, STATION_ADDRESS, address)
+        for position, address in enumerate(addresses)
+    ]
+    for position, reply in enumerate(replies):
+        answered(reply, Station(position, addresses[position]), "station address")
+    per_device = 3
+    replies = yield [request for address in addresses for request in _questions(address)]
+    registers = []
+    for position, address in enumerate(addresses):
+        station = Station(position, address)
+        mine = replies[position * per_device : (position + 1) * per_device]
+        information, alias, dl_status = (answered(r, station, "registers") for r in mine)
+        registers.append(
+            StationRegisters(
+                position,
+                address,
+                STATION_ALIAS.unpack(alias),
+                DL_STATUS.unpack(dl_status),
+                information,
+            )
+        )
+    return tuple(registers)
+
+
+def duplicate_aliases(registers: Sequence[StationRegisters]) -> dict[int, tuple[int, ...]]:
+    """Aliases that several devices have, with their positions. Alias 0 is none."""
+    positions: dict[int, list[int]] = {}
+    for device in registers:
+        if device.alias:
+            positions.setdefault(device.alias, []).append(device.position)
+    return {alias: tuple(where) for alias, where in positions.items() if len(where) > 1}
+
+
+def _questions(address: int) -> list[Request]:
+    return [
+        read(Command.FPRD, address, INFORMATION),
+        read(Command.FPRD, address, STATION_ALIAS),
+        read(Command.FPRD, address, DL_STATUS),
+    ]
+
+
+def _clear(start: int, size: int) -> Request:
+    return Request(Command.BWR, physical(0, start), bytes(size), True)
