@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol, TypeVar, overload
+from typing import TYPE_CHECKING, TypeVar, overload
 
 from catenary.errors import MailboxError
 from catenary.model.device import DeviceDescription, Identity
@@ -15,24 +15,23 @@ from catenary.types import DataType
 from catenary.wire.al import State
 from catenary.wire.coe import Emergency
 
+if TYPE_CHECKING:
+    from catenary.bus.main_device import MainDevice
+
 T = TypeVar("T")
-
-
-class Conversation(Protocol):
-    """Whoever can run a procedure now: the MainDevice, through whichever runner it has."""
-
-    def converse(self, procedure: Procedure[T], *, lane: int) -> T: ...
 
 
 class SubDevice:
     """Owns what is known of one device. Attributes never cause traffic; calls with a verb do."""
 
-    def __init__(self, main: Conversation, description: DeviceDescription) -> None:
-        self._main = main
+    def __init__(
+        self, main: MainDevice, description: DeviceDescription, channel: MailboxChannel | None
+    ) -> None:
+        self.main = main
         self.description = description
+        self.channel = channel  # None: it has no mailbox
         self.state: State | None = None  # last known; None: unknown
-        self.channel = _channel(description)
-        self.sdo = Sdo(main, self)
+        self.sdo = Sdo(self)
 
     @property
     def position(self) -> int:
@@ -72,16 +71,13 @@ class SubDevice:
 
     def read_state(self) -> DeviceState:
         """Asks for its EtherCAT state."""
-        found = self._main.converse(
-            read_state(self.station), lane=self.description.station_address
-        )
+        found = self.converse(read_state(self.station))
         self.state = found.state
         return found
 
-    def update(self, description: DeviceDescription) -> None:
-        """After a scan: the same device, described anew."""
-        self.description = description
-        self.channel = _channel(description)
+    def converse(self, procedure: Procedure[T]) -> T:
+        """Runs a conversation with this device; one at a time."""
+        return self.main.converse(procedure, lane=self.description.station_address)
 
     def __repr__(self) -> str:
         return f"<SubDevice {self.position} {self.name!r} {self.state or 'state unknown'}>"
@@ -90,21 +86,17 @@ class SubDevice:
 class Sdo:
     """The object dictionary of one device: `sub.sdo.read(0x1018, 1, type=UDINT)`."""
 
-    def __init__(self, main: Conversation, sub: SubDevice) -> None:
-        self._main = main
+    def __init__(self, sub: SubDevice) -> None:
         self._sub = sub
 
     @overload
     def read(self, index: int, subindex: int = 0) -> bytes: ...
     @overload
     def read(self, index: int, subindex: int = 0, *, type: DataType[T]) -> T: ...
-    def read(
-        self, index: int, subindex: int = 0, *, type: DataType[T] | None = None
-    ) -> T | bytes:
+    def read(self, index: int, subindex: int = 0, *, type: DataType[T] | None = None) -> T | bytes:
         """Reads an object: bytes, or with a `type` its value. SdoAbort if the device refuses."""
         channel = self._usable(index, subindex)
-        lane = self._sub.description.station_address
-        data = self._main.converse(upload(channel, index, subindex), lane=lane)
+        data = self._sub.converse(upload(channel, index, subindex))
         return data if type is None else type.decode(data)
 
     @overload
@@ -119,14 +111,11 @@ class Sdo:
         data = value if type is None else type.encode(value)  # type: ignore[arg-type]
         if not isinstance(data, bytes):
             raise TypeError(f"give a type for {value!r}, or bytes: type=catenary.types.UDINT")
-        lane = self._sub.description.station_address
-        self._main.converse(download(channel, index, subindex, data), lane=lane)
+        self._sub.converse(download(channel, index, subindex, data))
 
     def _usable(self, index: int, subindex: int) -> MailboxChannel:
         if not 0 <= index <= 0xFFFF or not 0 <= subindex <= 0xFF:
-            raise ValueError(
-                f"object 0x{index:X}:{subindex:X}: an index has 16 bits, a subindex 8"
-            )
+            raise ValueError(f"object 0x{index:X}:{subindex:X}: an index has 16 bits, a subindex 8")
         channel = self._sub.channel
         if channel is None or not channel.layout.coe:
             what = "has no mailbox" if channel is None else "does not speak CoE"
@@ -135,10 +124,3 @@ class Sdo:
                 hint="couplers and simple terminals have no object dictionary",
             )
         return channel
-
-
-def _channel(description: DeviceDescription) -> MailboxChannel | None:
-    if description.mailbox is None:
-        return None
-    station = Station(description.position, description.station_address, description.name)
-    return MailboxChannel(station, description.mailbox)

@@ -16,12 +16,14 @@ class Task(Generic[T]):
         self._procedure = procedure
         self.requests: list[Request] = []  # of this step; empty: none to send
         self.wake_ns: int | None = None  # sleeping until then
+        self.started = False
         self.done = False
         self.error: BaseException | None = None
         self._result: T | None = None
 
     def start(self, now_ns: int) -> None:
         """Runs to the first step."""
+        self.started = True
         self._advance(None, now_ns)
 
     def resume(self, replies: list[Reply], now_ns: int) -> None:
@@ -53,5 +55,4 @@ class Task(Generic[T]):
                 self.wake_ns = now_ns + round(step.seconds * 1e9)
             else:
                 self.requests = step
-                if not step:  # nothing to send: due at once
-                    self.wake_ns = now_ns
+                self.wake_ns = None if step else now_ns  # nothing to send: due at once

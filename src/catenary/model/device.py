@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from enum import IntEnum, IntFlag
+from enum import IntEnum
 from typing import NamedTuple
 
 from catenary.wire.features import Information
+from catenary.wire.sii import MailboxProtocol
+from catenary.wire.sii_categories import SyncManagerUse
 
 
 class Identity(NamedTuple):
@@ -34,31 +36,19 @@ class Identity(NamedTuple):
 
 
 class Direction(IntEnum):
-    """Seen from the MainDevice; the number is the object that assigns its PDOs minus 0x1C10."""
+    """Seen from the MainDevice."""
 
-    OUTPUT = 2  # RxPDOs, 0x1C12
-    INPUT = 3  # TxPDOs, 0x1C13
+    OUTPUT = 0  # RxPDOs
+    INPUT = 1  # TxPDOs
 
+    @property
+    def use(self) -> SyncManagerUse:
+        """Of the SyncManagers that carry it."""
+        return SyncManagerUse.OUTPUTS if self is Direction.OUTPUT else SyncManagerUse.INPUTS
 
-class SyncManagerKind(IntEnum):
-    """ETG.1000.6 §5.6.7.4, object 0x1C00; the same numbers in the SII."""
-
-    UNUSED = 0
-    MAILBOX_OUT = 1
-    MAILBOX_IN = 2
-    OUTPUTS = 3
-    INPUTS = 4
-
-
-class MailboxProtocol(IntFlag):
-    """ETG.1000.6 §5.4, SII word 0x1C."""
-
-    AOE = 0x01
-    EOE = 0x02
-    COE = 0x04
-    FOE = 0x08
-    SOE = 0x10
-    VOE = 0x20
+    @property
+    def noun(self) -> str:
+        return "outputs" if self is Direction.OUTPUT else "inputs"
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +75,7 @@ class SyncManager:
     """One channel as its device wants it (SII category 41)."""
 
     index: int
-    kind: SyncManagerKind
+    use: SyncManagerUse
     start: int  # physical address
     length: int  # bytes; of process data: the default mapping's
     control: int  # register 0x0804 + 8·index

@@ -1,1 +1,43 @@
-"""(being built)"""
+"""Pure arithmetic: descriptions and wishes → the tables a cycle runs by.
+
+Names load when they are used: a scan needs parts of the plan, but not NumPy.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from catenary.plan.cycle import CyclePlan, Number, NumberKind
+    from catenary.plan.make import Plan, make_plan
+    from catenary.plan.wish import ImageLayout, ObjectReference, PdoWish, Views, Wish, WishTables
+
+__all__ = [
+    "CyclePlan",
+    "ImageLayout",
+    "Number",
+    "NumberKind",
+    "ObjectReference",
+    "PdoWish",
+    "Plan",
+    "Views",
+    "Wish",
+    "WishTables",
+    "make_plan",
+]
+
+_HOMES = {
+    **dict.fromkeys(("CyclePlan", "Number", "NumberKind"), "catenary.plan.cycle"),
+    **dict.fromkeys(("Plan", "make_plan"), "catenary.plan.make"),
+    **dict.fromkeys(
+        ("ImageLayout", "ObjectReference", "PdoWish", "Views", "Wish", "WishTables"),
+        "catenary.plan.wish",
+    ),
+}
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)

@@ -15,7 +15,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from catenary.errors import ConfigurationError, MappingError
-from catenary.model.device import Assignment, DeviceDescription, Direction, SyncManagerKind
+from catenary.model.device import Assignment, DeviceDescription, Direction
 from catenary.plan.cycle import Number, NumberKind
 
 LOGICAL_BASE = 0x0001_0000
@@ -231,16 +231,15 @@ def _managers(
     device: DeviceDescription, assignments: Sequence[Assignment], direction: Direction
 ) -> tuple[SyncManagerPlan, ...]:
     channels = {channel.index: channel for channel in device.sync_managers}
-    wanted = SyncManagerKind.OUTPUTS if direction is Direction.OUTPUT else SyncManagerKind.INPUTS
     plans = []
     for assignment in assignments:
         if assignment.byte_length == 0:
             continue
         channel = channels.get(assignment.sync_manager)
-        if channel is None or channel.kind is not wanted:
+        if channel is None or channel.use is not direction.use:
             raise ConfigurationError(
                 f"{device}: its PDOs name SyncManager {assignment.sync_manager} for "
-                f"{direction.name.lower()}s, which its SII does not have as such",
+                f"{direction.noun}, which its SII does not have as such",
                 hint="its SII is wrong; ask the maker for a corrected image",
             )
         plans.append(

@@ -18,7 +18,6 @@ from catenary.model.device import (
     Direction,
     Entry,
     Pdo,
-    SyncManagerKind,
     mapped_entries,
 )
 
@@ -85,7 +84,7 @@ def _assign_offered(
     device: DeviceDescription, direction: Direction, missing: Sequence[ObjectReference]
 ) -> Mapping | None:
     """Adds PDOs that the device offers with just such entries. None: they do not carry all."""
-    if device.mailbox is None or not device.mailbox.pdo_assign:
+    if not device.coe:
         return None
     assigned = {pdo.index for a in device.assignments(direction) for pdo in a.pdos}
     added: list[Pdo] = []
@@ -113,7 +112,7 @@ def _rewrite(
     wished: Sequence[ObjectReference],
 ) -> Mapping:
     """Appends the missing entries to a PDO that may be changed, or makes it carry them alone."""
-    if device.mailbox is None or not device.mailbox.coe:
+    if not device.coe:
         _refuse(
             device,
             direction,
@@ -211,7 +210,7 @@ def _checked(device: DeviceDescription, direction: Direction, mapping: Mapping) 
     for assignment in mapping.assignments:
         if assignment.bit_length > BITS_MAX:
             raise MappingError(
-                f"{device}: {assignment.byte_length} bytes of {_noun(direction)} in SyncManager "
+                f"{device}: {assignment.byte_length} bytes of {direction.noun} in SyncManager "
                 f"{assignment.sync_manager} do not fit a datagram of {BITS_MAX // 8} bytes",
                 hint="wish for fewer objects",
             )
@@ -222,12 +221,11 @@ def _process_data_channel(device: DeviceDescription, direction: Direction) -> in
     """The SyncManager that process data of a direction goes through."""
     for assignment in device.assignments(direction):
         return assignment.sync_manager
-    kind = SyncManagerKind.OUTPUTS if direction is Direction.OUTPUT else SyncManagerKind.INPUTS
     for channel in device.sync_managers:
-        if channel.kind is kind:
+        if channel.use is direction.use:
             return channel.index
     raise MappingError(
-        f"{device} has no SyncManager for {_noun(direction)}",
+        f"{device} has no SyncManager for {direction.noun}",
         hint="do not wish for process data of this direction from this device",
     )
 
@@ -254,10 +252,6 @@ def _in_order(assignments: Sequence[Assignment]) -> tuple[Assignment, ...]:
     return tuple(sorted(assignments, key=lambda assignment: assignment.sync_manager))
 
 
-def _noun(direction: Direction) -> str:
-    return "outputs" if direction is Direction.OUTPUT else "inputs"
-
-
 def _possible(device: DeviceDescription, direction: Direction) -> str:
     objects = sorted(
         {
@@ -268,9 +262,9 @@ def _possible(device: DeviceDescription, direction: Direction) -> str:
         }
     )
     if not objects:
-        return f"the device has no mappable {_noun(direction)}"
+        return f"the device has no mappable {direction.noun}"
     shown = ", ".join(objects[:12]) + (" ..." if len(objects) > 12 else "")
-    return f"its PDOs for {_noun(direction)} offer {shown}"
+    return f"its PDOs for {direction.noun} offer {shown}"
 
 
 def _refuse(
@@ -282,6 +276,6 @@ def _refuse(
 ) -> NoReturn:
     raise MappingError(
         f"{device}: object 0x{reference.index:04X}:{reference.subindex:02X} "
-        f"({reference.bit_length} bits), wished for as one of its {_noun(direction)}, {reason}",
+        f"({reference.bit_length} bits), wished for as one of its {direction.noun}, {reason}",
         hint=hint,
     )

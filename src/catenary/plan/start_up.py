@@ -41,6 +41,7 @@ class DevicePlan:
     inputs: tuple[Assignment, ...]
     layout: DeviceLayout
     downloads: tuple[Download, ...]
+    mapping_changed: bool  # the downloads begin with a new mapping
     watchdog_ns: int  # of process data; 0: off
 
     @property
@@ -70,6 +71,7 @@ def make_device_plan(
         inputs=inputs.assignments,
         layout=layout,
         downloads=(*mapping_downloads(outputs), *mapping_downloads(inputs), *wished),
+        mapping_changed=outputs.changed or inputs.changed,
         watchdog_ns=watchdog_ns,
     )
 

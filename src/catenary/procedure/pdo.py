@@ -12,7 +12,6 @@ from catenary.model.device import (
     Direction,
     Entry,
     Pdo,
-    SyncManagerKind,
 )
 from catenary.plan.start_up import ASSIGNMENT_BASE, DevicePlan
 from catenary.procedure.exchange import Procedure
@@ -64,7 +63,7 @@ def verify_mapping(
         if found is None or _shape(found) == wanted:
             continue
         raise MappingError(
-            f"{channel.station}: took a mapping of {direction.name.lower()}s that is not the one "
+            f"{channel.station}: took a mapping of {direction.noun} that is not the one "
             f"written: {_text(_shape(found))} instead of {_text(wanted)}",
             hint="its firmware corrects mappings; map what it accepts",
         )
@@ -90,11 +89,10 @@ def _read_direction(
     channel: MailboxChannel, device: DeviceDescription, direction: Direction
 ) -> Procedure[tuple[Assignment, ...] | None]:
     """None: the dictionary has no assignment for this direction."""
-    kind = SyncManagerKind.OUTPUTS if direction is Direction.OUTPUT else SyncManagerKind.INPUTS
     known = {pdo.index: pdo for pdo in device.pdos(direction)}
     assignments = []
     for manager in device.sync_managers:
-        if manager.kind is not kind:
+        if manager.use is not direction.use:
             continue
         indices = yield from _read_list(channel, ASSIGNMENT_BASE + manager.index)
         if indices is None:

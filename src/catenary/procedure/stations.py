@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from catenary.errors import NoDeviceError, SegmentError
-from catenary.procedure.exchange import Procedure, Request, physical, read, write
-from catenary.procedure.station import Station, answered
+from catenary.errors import NoDeviceError, SegmentError, StateError
+from catenary.procedure.al_state import read_state
+from catenary.procedure.exchange import Procedure, Request, after, physical, read, write
+from catenary.procedure.station import Deadline, Pace, Station, answered
 from catenary.wire.al import AlControl, State
 from catenary.wire.datagram import Command
 from catenary.wire.register import (
@@ -20,7 +21,9 @@ from catenary.wire.register import (
     STATION_ADDRESS,
     STATION_ALIAS,
 )
+from catenary.wire.sii_interface import CONFIGURATION_FORCE
 
+RESET_TIMEOUT = 2.0  # [s]; who is not in INIT then is asked by name
 STATION_BASE = 0x1001  # of position 0; 0 would answer nothing, small numbers are likely aliases
 _FMMU_BLOCK = (0x0600, 256)  # all 16 FMMUs
 _SYNC_MANAGER_BLOCK = (0x0800, 128)  # all 16 SyncManagers
@@ -56,21 +59,56 @@ def count() -> Procedure[int]:
 def reset(device_count: int) -> Procedure[None]:
     """All devices to INIT with errors acknowledged; FMMUs, SyncManagers, SYNC signals cleared;
     their EEPROM taken from the process data interface."""
-    init = AlControl(State.INIT, acknowledge=True).word
-    requests = [
-        write(Command.BWR, 0, AL_CONTROL, init),
+    yield from _all_to(State.INIT, device_count, RESET_TIMEOUT)
+    replies = yield [
         _clear(*_FMMU_BLOCK),
         _clear(*_SYNC_MANAGER_BLOCK),
         write(Command.BWR, 0, ACTIVATION, 0),
-        write(Command.BWR, 0, SII_CONFIGURATION, 2),  # force: the EEPROM back from the PDI
+        write(Command.BWR, 0, SII_CONFIGURATION, CONFIGURATION_FORCE),
         write(Command.BWR, 0, SII_CONFIGURATION, 0),
     ]
-    replies = yield requests
-    if replies[0].working_counter != device_count:
-        raise SegmentError(
-            f"{device_count} devices were counted, {replies[0].working_counter} took INIT",
-            hint="devices come and go: look for a loose contact, then scan again",
-        )
+    if replies[-1].working_counter != device_count:
+        raise _came_and_went(device_count, replies[-1].working_counter)
+
+
+def bring_all_down(stations: Sequence[Station], state: State, timeout: float) -> Procedure[None]:
+    """All devices to a lower state by broadcast, whatever each of them is in. StateError names
+    the first that stays up."""
+    if (yield from _all_to(state, len(stations), timeout)):
+        return
+    for station in stations:
+        now = yield from read_state(station)
+        if now.state is None or now.state > state:
+            raise StateError(
+                f"{station} stays in {now.name}; {state} was asked for",
+                position=station.position,
+                requested=int(state),
+                actual=now.word & 0x0F,
+                code=now.code,
+                hint="its outputs may be on: switch off its power",
+            )
+
+
+def _all_to(state: State, device_count: int, timeout: float) -> Procedure[bool]:
+    """Asks all at once, errors acknowledged, and waits. Whether all are there."""
+    [reply] = yield [write(Command.BWR, 0, AL_CONTROL, AlControl(state, acknowledge=True).word)]
+    if device_count and reply.working_counter != device_count:
+        raise _came_and_went(device_count, reply.working_counter)
+    deadline, pace = Deadline(timeout), Pace()
+    while True:
+        [reply] = yield [read(Command.BRD, 0, AL_STATUS)]
+        if AL_STATUS.unpack(reply.data) & 0x1F == state:
+            return True
+        if reply.lost or deadline.passed(reply):
+            return False
+        yield after(pace.pause())
+
+
+def _came_and_went(expected: int, found: int) -> SegmentError:
+    return SegmentError(
+        f"{expected} devices were counted, {found} took a broadcast",
+        hint="devices come and go: look for a loose contact, then scan again",
+    )
 
 
 def assign(device_count: int) -> Procedure[tuple[StationRegisters, ...]]:

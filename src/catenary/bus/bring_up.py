@@ -1,0 +1,90 @@
+"""From PRE-OP to SAFE-OP: mappings read for a plan, a plan written to its devices."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from catenary.bus.runner import BlockingRunner
+from catenary.bus.segment_scan import check_identity
+from catenary.bus.sub_device import SubDevice
+from catenary.errors import ConfigurationError, SegmentError
+from catenary.model.device import DeviceDescription, Direction, mapped_entries
+from catenary.plan.make import Plan, gather_wishes
+from catenary.plan.start_up import DevicePlan
+from catenary.plan.wish import ObjectReference, PdoWish, Wish
+from catenary.procedure.al_state import request_state
+from catenary.procedure.configure import configure_process_data
+from catenary.procedure.exchange import Procedure
+from catenary.procedure.mailbox import MailboxChannel
+from catenary.procedure.pdo import read_mapping, verify_mapping, write_downloads
+from catenary.procedure.profile import read_object
+from catenary.wire.al import State
+
+
+def describe_mappings(
+    runner: BlockingRunner, subs: Sequence[SubDevice], wishes: Sequence[Wish], period_ns: int
+) -> None:
+    """Renews the descriptions of all devices with CoE: what is mapped now, and what the
+    dictionary says of the objects wished for that are not."""
+    asked = gather_wishes(wishes, period_ns)
+    with_coe = [sub for sub in subs if sub.description.coe]
+    found = runner.run_all([_describe(sub, asked.get(sub.position, PdoWish())) for sub in with_coe])
+    for sub, description in zip(with_coe, found, strict=True):
+        sub.description = description
+
+
+def bring_to_safe_op(runner: BlockingRunner, subs: Sequence[SubDevice], plan: Plan) -> None:
+    """Writes every device's part of the plan, then asks for SAFE-OP; all at once."""
+    if len(subs) != len(plan.devices):
+        raise SegmentError(
+            f"the plan is for {len(plan.devices)} devices, the segment has {len(subs)}",
+            hint="scan and plan again",
+        )
+    for sub, device in zip(subs, plan.devices, strict=True):
+        check_identity(sub.description, device.identity)
+    runner.run_all([_prepare(sub, device) for sub, device in zip(subs, plan.devices, strict=True)])
+    for sub in subs:
+        sub.state = State.SAFE_OP
+
+
+def _describe(sub: SubDevice, wish: PdoWish) -> Procedure[DeviceDescription]:
+    channel = _channel(sub)
+    device = yield from read_mapping(channel, sub.description)
+    known = {(found.index, found.subindex) for found in device.objects}
+    for direction, references in ((Direction.OUTPUT, wish.outputs), (Direction.INPUT, wish.inputs)):
+        for reference in _unmapped(device, direction, references):
+            if (reference.index, reference.subindex) in known:
+                continue
+            known.add((reference.index, reference.subindex))
+            found = yield from read_object(channel, device, reference.index, reference.subindex)
+            device = replace(device, objects=(*device.objects, found))
+    return device
+
+
+def _unmapped(
+    device: DeviceDescription, direction: Direction, references: Sequence[ObjectReference]
+) -> list[ObjectReference]:
+    mapped = {(e.index, e.subindex) for e in mapped_entries(device.assignments(direction))}
+    return [each for each in references if (each.index, each.subindex) not in mapped]
+
+
+def _prepare(sub: SubDevice, plan: DevicePlan) -> Procedure[None]:
+    device = sub.description
+    yield from request_state(sub.station, State.PRE_OP)
+    if plan.downloads:
+        channel = _channel(sub)
+        yield from write_downloads(channel, plan)
+        if plan.mapping_changed:
+            yield from verify_mapping(channel, device, plan)
+    yield from configure_process_data(sub.station, device, plan)
+    yield from request_state(sub.station, State.SAFE_OP)
+
+
+def _channel(sub: SubDevice) -> MailboxChannel:
+    if sub.channel is None:
+        raise ConfigurationError(
+            f"{sub.station} has no mailbox for its start-up list",
+            hint="do not wish for SDO downloads to this device",
+        )
+    return sub.channel

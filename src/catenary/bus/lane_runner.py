@@ -1,0 +1,228 @@
+"""Runs procedures beside a running cycle, through the acyclic lane of the core.
+
+`step` moves everything on by at most one exchange; whoever runs the loop calls it, at most once a
+cycle: a service thread, or in virtual time the loop itself. Other threads submit and wait.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Any, Protocol, TypeVar
+
+from catenary.bus.packing import Parcel, batches, indices, make_parcel, replies_of
+from catenary.bus.runner import ATTEMPTS, FRAME_TIMEOUT, FrameCounts
+from catenary.bus.task import Task
+from catenary.errors import DecodeError, LoopError
+from catenary.procedure.exchange import Procedure, Reply, Request
+from catenary.wire.frame import decode_frame
+
+T = TypeVar("T")
+
+FRAMES_PER_STEP = 4  # what a cycle carries besides its own frames
+
+
+class Lane(Protocol):
+    """The lane's end in Python: `core.Engine` has it."""
+
+    def lane_push(self, frame: bytes) -> bool: ...
+    def lane_pop(self) -> bytes | None: ...
+    def now(self) -> int: ...
+
+
+@dataclass(slots=True, eq=False)
+class _Turn:
+    """Owns the replies of one step of a task until they are complete."""
+
+    task: Task[Any]
+    replies: list[Reply | None]
+
+
+@dataclass(slots=True)
+class _Item:
+    """One request on its way."""
+
+    turn: _Turn
+    rank: int
+    request: Request
+    attempts: int = 0
+
+
+@dataclass(slots=True)
+class _UnderWay:
+    parcel: Parcel
+    items: list[_Item]
+    deadline_ns: int
+
+
+@dataclass(slots=True, eq=False)
+class _Waiting:
+    task: Task[Any]
+    lane: int | None
+    finished: threading.Event = field(default_factory=threading.Event)
+
+
+class LaneRunner:
+    """Owns the procedures beside one cycle. One thread steps; `submit` and `run` are for any."""
+
+    def __init__(
+        self, lane: Lane, *, frame_timeout: float = FRAME_TIMEOUT, attempts: int = ATTEMPTS
+    ) -> None:
+        self.counts = FrameCounts()
+        self._lane = lane
+        self._timeout_ns = round(frame_timeout * 1e9)
+        self._attempts = attempts
+        self._indices = indices()
+        self._lock = threading.Lock()  # of the two below
+        self._submitted: deque[_Waiting] = deque()
+        self._closed = False
+        self._owner = threading.get_ident()
+        self._active: list[_Waiting] = []
+        self._outbox: deque[_Item] = deque()
+        self._under_way: dict[int, _UnderWay] = {}
+
+    def submit(self, procedure: Procedure[T], *, lane: int | None = None) -> Task[T]:
+        """Lets a procedure begin at the next step; `task.done` and `task.result()` tell the rest.
+        Procedures of the same `lane` run one after another."""
+        task = Task(procedure)
+        self._submit(_Waiting(task, lane))
+        return task
+
+    def run(self, procedure: Procedure[T], *, lane: int | None = None) -> T:
+        """Waits for the result, in another thread than the loop's. RuntimeError in the loop's
+        own: it would wait for itself."""
+        if threading.get_ident() == self._owner:
+            procedure.close()
+            raise RuntimeError(
+                "a blocking call inside the loop's own thread would stop the loop: "
+                "make it from another thread, or before the loop"
+            )
+        waiting = _Waiting(Task(procedure), lane)
+        self._submit(waiting)
+        waiting.finished.wait()  # the procedure's own deadlines, or close(), end this
+        result: T = waiting.task.result()
+        return result
+
+    def step(self) -> None:
+        """One exchange of everything that is under way."""
+        now = self._lane.now()
+        self._receive(now)
+        self._expire(now)
+        self._begin(now)
+        self._wake(now)
+        self._finish()
+        self._send(now)
+
+    def close(self) -> None:
+        """Ends all procedures where they stand; their callers get LoopError."""
+        with self._lock:
+            self._closed = True
+            left = [*self._active, *self._submitted]
+            self._submitted.clear()
+        self._active.clear()
+        for waiting in left:
+            if not waiting.task.done:
+                waiting.task.cancel()
+                waiting.task.error = _ended()
+            waiting.finished.set()
+
+    def _submit(self, waiting: _Waiting) -> None:
+        with self._lock:
+            if self._closed:
+                raise _ended()
+            self._submitted.append(waiting)
+
+    def _receive(self, now: int) -> None:
+        while (raw := self._lane.lane_pop()) is not None:
+            try:
+                frame = decode_frame(raw)
+            except DecodeError:
+                self.counts.malformed += 1
+                continue
+            found = self._under_way.get(frame.datagrams[0].index)
+            replies = replies_of(found.parcel, frame, now) if found else None
+            if found is None or replies is None:
+                self.counts.stale += 1
+                continue
+            del self._under_way[found.parcel.index]
+            for item, reply in zip(found.items, replies, strict=True):
+                self._deliver(item, reply, now)
+
+    def _expire(self, now: int) -> None:
+        late = [index for index, sent in self._under_way.items() if sent.deadline_ns <= now]
+        for index in late:
+            self.counts.lost += 1
+            for item in self._under_way.pop(index).items:
+                if item.request.repeatable and item.attempts < self._attempts:
+                    self._outbox.append(item)
+                else:
+                    self._deliver(item, Reply(item.request.data, 0, True, now), now)
+
+    def _deliver(self, item: _Item, reply: Reply, now: int) -> None:
+        turn = item.turn
+        turn.replies[item.rank] = reply
+        complete = [reply for reply in turn.replies if reply is not None]
+        if len(complete) == len(turn.replies) and not turn.task.done:
+            turn.task.resume(complete, now)
+            self._enqueue(turn.task)
+
+    def _begin(self, now: int) -> None:
+        busy = {waiting.lane for waiting in self._active if waiting.lane is not None}
+        with self._lock:
+            queue, self._submitted = self._submitted, deque()
+            for waiting in queue:
+                if waiting.lane in busy:
+                    self._submitted.append(waiting)
+                    continue
+                if waiting.lane is not None:
+                    busy.add(waiting.lane)
+                self._active.append(waiting)
+        for waiting in self._active:
+            if not waiting.task.started:
+                waiting.task.start(now)
+                self._enqueue(waiting.task)
+
+    def _wake(self, now: int) -> None:
+        for waiting in self._active:
+            task = waiting.task
+            if not task.done and task.wake_ns is not None and task.wake_ns <= now:
+                task.resume([], now)
+                self._enqueue(task)
+
+    def _enqueue(self, task: Task[Any]) -> None:
+        if task.done or not task.requests:
+            return
+        turn = _Turn(task, [None] * len(task.requests))
+        self._outbox.extend(
+            _Item(turn, rank, request) for rank, request in enumerate(task.requests)
+        )
+
+    def _finish(self) -> None:
+        for waiting in self._active:
+            if waiting.task.done:
+                waiting.finished.set()
+        self._active = [waiting for waiting in self._active if not waiting.task.done]
+
+    def _send(self, now: int) -> None:
+        items = list(self._outbox)
+        sent = 0
+        for batch in batches([item.request for item in items])[:FRAMES_PER_STEP]:
+            group = [items[rank] for rank in batch]
+            parcel = make_parcel([item.request for item in group], next(self._indices))
+            if not self._lane.lane_push(parcel.frame):
+                break
+            for item in group:
+                item.attempts += 1
+            self._under_way[parcel.index] = _UnderWay(parcel, group, now + self._timeout_ns)
+            self.counts.sent += 1
+            self.counts.datagrams += len(group)
+            sent += len(group)
+        for _ in range(sent):
+            self._outbox.popleft()
+
+
+def _ended() -> LoopError:
+    return LoopError(
+        "the loop has ended before the device answered", hint="ask again, outside the loop"
+    )

@@ -1,0 +1,242 @@
+"""MainDevice: owns the link to one segment and the handles of its devices."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Collection, Iterator, Sequence
+from typing import TYPE_CHECKING, Self, TypeVar, overload
+
+from catenary.bus.runner import BlockingRunner, FrameCounts, Runner
+from catenary.bus.segment_scan import Found, bring_to_pre_op, check_identity, with_places
+from catenary.bus.sub_device import SubDevice
+from catenary.errors import CatenaryError, SegmentError
+from catenary.link import Link, LinkSource
+from catenary.model.device import Identity
+from catenary.procedure.exchange import Procedure
+from catenary.procedure.stations import assign, bring_all_down, count, duplicate_aliases, reset
+from catenary.wire.al import State
+
+if TYPE_CHECKING:  # plan needs NumPy, a scan does not
+    from catenary.plan.cycle import Order, ReceiveMode
+    from catenary.plan.make import Plan
+    from catenary.plan.wish import Wish
+
+T = TypeVar("T")
+
+LEAVE_TIMEOUT = 0.5  # [s] for each state on the way down: nobody waits long for a broken segment
+
+
+class SubDevices(Sequence[SubDevice]):
+    """The devices of a segment, by position."""
+
+    def __init__(self, subs: Sequence[SubDevice] = ()) -> None:
+        self._subs = tuple(subs)
+
+    @property
+    def drives(self) -> tuple[SubDevice, ...]:
+        """Those with CiA 402 axes."""
+        return tuple(sub for sub in self._subs if sub.is_drive)
+
+    @overload
+    def __getitem__(self, position: int) -> SubDevice: ...
+    @overload
+    def __getitem__(self, position: slice) -> tuple[SubDevice, ...]: ...
+    def __getitem__(self, position: int | slice) -> SubDevice | tuple[SubDevice, ...]:
+        return self._subs[position]
+
+    def __len__(self) -> int:
+        return len(self._subs)
+
+    def __iter__(self) -> Iterator[SubDevice]:
+        return iter(self._subs)
+
+    def __repr__(self) -> str:
+        return f"<{len(self._subs)} SubDevices: {', '.join(sub.name for sub in self._subs)}>"
+
+
+class MainDevice:
+    """Owns the link to one segment.
+
+        with MainDevice(Interface("eth0")) as main:
+            for sub in main.scan():
+                print(sub.position, sub.name, sub.identity)
+
+    Leaving the block brings all devices to INIT, whatever happened in it.
+    """
+
+    def __init__(self, source: LinkSource) -> None:
+        self.subs = SubDevices()
+        self.notes: tuple[str, ...] = ()  # what the last scan found odd
+        self._source = source
+        self._link: Link | None = None
+        self._blocking: BlockingRunner | None = None
+        self._attached: Runner | None = None
+
+    @property
+    def link(self) -> Link:
+        """The open link."""
+        if self._link is None:
+            raise RuntimeError("the MainDevice is not open: use it in a with block")
+        return self._link
+
+    @property
+    def is_open(self) -> bool:
+        return self._link is not None
+
+    @property
+    def counts(self) -> FrameCounts:
+        """Frames sent and lost outside the loop."""
+        return self._runner.counts
+
+    def open(self) -> None:
+        """Opens the link. LinkError if it cannot be used. Nothing is sent."""
+        if self._link is None:
+            self._link = self._source.open_link()
+            self._blocking = BlockingRunner(self._link)
+
+    def close(self) -> None:
+        """Brings all devices to INIT, best effort, and closes the link."""
+        if self._link is None:
+            return
+        try:
+            with contextlib.suppress(CatenaryError):  # the segment may be gone: that is why we go
+                self._bring_down(State.INIT)
+        finally:
+            link, self._link, self._blocking, self._attached = self._link, None, None, None
+            link.close()
+
+    def scan(
+        self, *, expected: Sequence[Identity | tuple[int, int] | None] | None = None
+    ) -> SubDevices:
+        """Finds all devices and brings them to PRE-OP. The handles of devices that are still
+        there stay the same objects.
+
+        `expected`: by position, an identity or (vendor, product); None: whatever it is.
+        """
+        runner = self._runner
+        runner.flush()
+        device_count = runner.run(count())
+        runner.run(reset(device_count))
+        registers = runner.run(assign(device_count))
+        found = runner.run_all([bring_to_pre_op(each) for each in registers])
+        descriptions = with_places([each.description for each in found])
+        self.subs = SubDevices(
+            [
+                self._handle(each._replace(description=description))
+                for each, description in zip(found, descriptions, strict=True)
+            ]
+        )
+        self.notes = tuple(
+            f"devices {positions} have the same alias {alias}"
+            for alias, positions in duplicate_aliases(registers).items()
+        )
+        if expected is not None:
+            self._check_expected(expected)
+        return self.subs
+
+    def plan(
+        self,
+        *wishes: Wish,
+        period: float = 1e-3,
+        order: Order = "threaded",
+        receive_mode: ReceiveMode = "wait",
+        optional: Collection[int] = (),
+        watchdog: float | None = 0.1,
+    ) -> Plan:
+        """The plan that fulfils the wishes, from what the devices have mapped now. In PRE-OP;
+        nothing is written. MappingError names an object that cannot be.
+
+        For more to choose: `read_mappings`, then `catenary.plan.make_plan`.
+        """
+        from catenary.plan.make import make_plan
+
+        self.read_mappings(*wishes, period=period)
+        return make_plan(
+            [sub.description for sub in self.subs],
+            wishes,
+            period=period,
+            order=order,
+            receive_mode=receive_mode,
+            optional=optional,
+            watchdog=watchdog,
+        )
+
+    def read_mappings(self, *wishes: Wish, period: float = 1e-3) -> None:
+        """Brings the descriptions up to date: what is mapped, and what the dictionaries say of
+        objects wished for that are not."""
+        from catenary.bus.bring_up import describe_mappings
+
+        describe_mappings(self._runner, self.subs, wishes, round(period * 1e9))
+
+    def configure(self, plan: Plan) -> None:
+        """Tells every device its part of the plan and brings all to SAFE-OP."""
+        from catenary.bus.bring_up import bring_to_safe_op
+
+        bring_to_safe_op(self._runner, self.subs, plan)
+
+    def leave(self, *, timeout: float = LEAVE_TIMEOUT) -> None:
+        """Brings all devices to SAFE-OP, then PRE-OP. StateError names one that stays up."""
+        self._bring_down(State.SAFE_OP, timeout)
+        self._bring_down(State.PRE_OP, timeout)
+
+    def converse(self, procedure: Procedure[T], *, lane: int | None = None) -> T:
+        """Runs a procedure, alone or beside the running loop. Those of one lane take turns."""
+        runner: Runner = self._attached or self._runner
+        return runner.run(procedure, lane=lane)
+
+    @contextlib.contextmanager
+    def attached(self, runner: Runner) -> Iterator[None]:
+        """While a loop runs: conversations go through its runner, scans are refused."""
+        if self._attached is not None:
+            raise RuntimeError("a loop runs on this MainDevice already")
+        self._attached = runner
+        try:
+            yield
+        finally:
+            self._attached = None
+
+    @property
+    def _runner(self) -> BlockingRunner:
+        if self._blocking is None:
+            raise RuntimeError("the MainDevice is not open: use it in a with block")
+        if self._attached is not None:
+            raise RuntimeError("not possible while a loop runs on this MainDevice")
+        return self._blocking
+
+    def _handle(self, found: Found) -> SubDevice:
+        """The handle there was at this place, if it is the same device; else a new one."""
+        position = found.description.position
+        known = self.subs[position] if position < len(self.subs) else None
+        if known is None or known.identity != found.description.identity:
+            known = SubDevice(self, found.description, found.channel)
+        known.description, known.channel = found.description, found.channel
+        known.state = State.PRE_OP
+        return known
+
+    def _check_expected(self, expected: Sequence[Identity | tuple[int, int] | None]) -> None:
+        if len(expected) != len(self.subs):
+            raise SegmentError(
+                f"{len(expected)} devices expected, {len(self.subs)} found",
+                hint="look for a device without power or a loose cable",
+            )
+        for sub, wanted in zip(self.subs, expected, strict=True):
+            if wanted is not None:
+                check_identity(sub.description, Identity(*(*wanted, 0, 0)[:4]))
+
+    def _bring_down(self, state: State, timeout: float = LEAVE_TIMEOUT) -> None:
+        self._attached = None
+        stations = [sub.station for sub in self.subs]
+        self._runner.run(bring_all_down(stations, state, timeout))
+        for sub in self.subs:
+            sub.state = state
+
+    def __enter__(self) -> Self:
+        self.open()
+        return self
+
+    def __exit__(self, *exc_info: object) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        name = self._link.name if self._link is not None else "closed"
+        return f"<MainDevice {name}, {len(self.subs)} SubDevices>"

@@ -1,0 +1,82 @@
+"""What is asked of one device on its way from power-up to PRE-OP, as one procedure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from catenary.errors import IdentityError
+from catenary.model.describe import describe
+from catenary.model.device import DeviceDescription, Identity
+from catenary.model.topology import tree
+from catenary.procedure.al_state import request_state
+from catenary.procedure.configure import configure_mailbox
+from catenary.procedure.exchange import Procedure
+from catenary.procedure.mailbox import MailboxChannel
+from catenary.procedure.pdo import read_mapping
+from catenary.procedure.profile import read_profile
+from catenary.procedure.sii import read_image
+from catenary.procedure.station import Station
+from catenary.procedure.stations import StationRegisters
+from catenary.wire.al import State
+
+
+class Found(NamedTuple):
+    """One device in PRE-OP, with the mailbox that brought it there."""
+
+    description: DeviceDescription
+    channel: MailboxChannel | None
+
+
+def bring_to_pre_op(registers: StationRegisters) -> Procedure[Found]:
+    """Reads the SII, opens the mailbox, asks for PRE-OP and reads the profile."""
+    device = yield from identify(registers)
+    station = Station(device.position, device.station_address, device.name)
+    if device.mailbox is None:
+        yield from request_state(station, State.PRE_OP)
+        return Found(device, None)
+    channel = MailboxChannel(station, device.mailbox)
+    yield from configure_mailbox(channel)
+    yield from request_state(station, State.PRE_OP)
+    if device.coe:
+        device = yield from read_profile(channel, device)
+    if device.coe and not (device.outputs or device.inputs):
+        device = yield from read_mapping(channel, device)  # an SII without PDOs
+    return Found(device, channel)
+
+
+def identify(registers: StationRegisters) -> Procedure[DeviceDescription]:
+    """What registers and SII say."""
+    station = Station(registers.position, registers.station_address)
+    image = yield from read_image(station)
+    return describe(
+        registers.position,
+        station_address=registers.station_address,
+        alias=registers.alias,
+        dl_status=registers.dl_status,
+        information=registers.information,
+        image=image,
+    )
+
+
+def with_places(devices: Sequence[DeviceDescription]) -> tuple[DeviceDescription, ...]:
+    """The devices with their parents."""
+    places = tree([device.open_ports for device in devices])
+    return tuple(
+        replace(device, parent=place.parent, parent_port=place.parent_port)
+        for device, place in zip(devices, places, strict=True)
+    )
+
+
+def check_identity(device: DeviceDescription, expected: Identity) -> None:
+    """IdentityError unless it is the same product. Revision and serial number may differ."""
+    if device.identity.same_kind(expected):
+        return
+    raise IdentityError(
+        f"{device}: expected {expected}, found {device.identity}",
+        position=device.position,
+        expected=expected,
+        found=device.identity,
+        hint="check the order of the devices on the cable, or correct what is expected",
+    )

@@ -1,0 +1,207 @@
+"""Registers and SII image → DeviceDescription, ETG.1000.6 §5.4.
+
+Real images are odd: no FMMU category, no end mark, vendor 0, PDOs that name a SyncManager the image
+does not have, an EEPROM nobody wrote. None of this ends a scan: what cannot be used is left out and
+noted in the description.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import replace
+
+from catenary.errors import DecodeError
+from catenary.model.device import (
+    Assignment,
+    DeviceDescription,
+    Entry,
+    Identity,
+    MailboxLayout,
+    Pdo,
+    SyncManager,
+)
+from catenary.model.topology import open_ports
+from catenary.wire import sii_categories
+from catenary.wire.features import decode_information
+from catenary.wire.sii import CHECKSUM_WORD, MailboxProtocol, Sii, decode_sii
+from catenary.wire.sii_categories import CoeDetails, SyncManagerEnable, SyncManagerUse
+from catenary.wire.sync_manager import Buffering, Control
+from catenary.wire.sync_manager import Direction as Flow
+
+NOT_ASSIGNED = 0xFF
+_MANDATORY, _FIXED_CONTENT = 0x0001, 0x0010  # PDO flags, ETG.2010 table 14
+_CHECKSUM_DISABLED = struct.pack("<H", 0x88A4)
+_UNPROGRAMMED = (bytes(4), b"\xff\xff\xff\xff")
+
+_KINDS = {
+    (Buffering.MAILBOX, Flow.WRITE): SyncManagerUse.MAILBOX_OUT,
+    (Buffering.MAILBOX, Flow.READ): SyncManagerUse.MAILBOX_IN,
+    (Buffering.THREE_BUFFERS, Flow.WRITE): SyncManagerUse.OUTPUTS,
+    (Buffering.THREE_BUFFERS, Flow.READ): SyncManagerUse.INPUTS,
+}
+
+
+def describe(
+    position: int,
+    *,
+    station_address: int,
+    alias: int,
+    dl_status: int,
+    information: bytes,
+    image: bytes,
+) -> DeviceDescription:
+    """The description of one device. DecodeError only for `information` of the wrong size."""
+    bare = DeviceDescription(
+        position=position,
+        station_address=station_address,
+        alias=alias,
+        identity=Identity(0, 0, 0, 0),
+        name="unknown",
+        controller=decode_information(information),
+        mailbox=None,
+        sync_managers=(),
+        outputs=(),
+        inputs=(),
+        output_pdos=(),
+        input_pdos=(),
+        open_ports=open_ports(dl_status),
+    )
+    notes: list[str] = []
+    sii = _decoded(image, notes)
+    if sii is None:
+        return replace(bare, notes=tuple(notes))
+    return replace(_filled(bare, sii, notes), notes=tuple(notes))
+
+
+def _decoded(image: bytes, notes: list[str]) -> Sii | None:
+    try:
+        return decode_sii(image)
+    except DecodeError as error:
+        notes.append(str(error.message))
+    product = image[20:24]
+    if product in _UNPROGRAMMED:
+        return None
+    # Cards that were programmed by hand work with a wrong checksum; their content may be good.
+    start = 2 * CHECKSUM_WORD
+    try:
+        return decode_sii(image[:start] + _CHECKSUM_DISABLED + image[start + 2 :])
+    except DecodeError:
+        return None
+
+
+def _filled(bare: DeviceDescription, sii: Sii, notes: list[str]) -> DeviceDescription:
+    header = sii.header
+    managers = _sync_managers(sii)
+    outputs = _pdos(sii, sii.receive_pdos, managers, SyncManagerUse.OUTPUTS, notes)
+    inputs = _pdos(sii, sii.transmit_pdos, managers, SyncManagerUse.INPUTS, notes)
+    general = sii.general
+    group = sii.string(general.group) if general else ""
+    order = _tidy(sii.string(general.order)) if general else ""
+    name = _tidy(sii.string(general.name)) if general else ""
+    nameless = f"0x{header.vendor:08X}:0x{header.product:08X}"
+    return replace(
+        bare,
+        identity=Identity(header.vendor, header.product, header.revision, header.serial),
+        name=order or name or nameless,
+        mailbox=_mailbox(sii),
+        sync_managers=managers,
+        outputs=assignments(outputs),
+        inputs=assignments(inputs),
+        output_pdos=outputs,
+        input_pdos=inputs,
+        group=_tidy(group),
+        order=order,
+    )
+
+
+def assignments(pdos: tuple[Pdo, ...]) -> tuple[Assignment, ...]:
+    """PDOs by the SyncManager they belong to by default."""
+    channels = sorted({pdo.sync_manager for pdo in pdos if pdo.sync_manager is not None})
+    return tuple(
+        Assignment(channel, tuple(pdo for pdo in pdos if pdo.sync_manager == channel))
+        for channel in channels
+    )
+
+
+def _mailbox(sii: Sii) -> MailboxLayout | None:
+    receive, send = sii.header.standard_receive, sii.header.standard_send
+    if not (receive.size and send.size):
+        return None
+    coe = sii.general.coe if sii.general else CoeDetails(0)
+    protocols = MailboxProtocol(sii.header.mailbox_protocols & 0x3F)
+    return MailboxLayout(
+        receive.offset,
+        receive.size,
+        send.offset,
+        send.size,
+        protocols,
+        complete_access=CoeDetails.COMPLETE_ACCESS in coe,
+        sdo_information=CoeDetails.SDO_INFORMATION in coe,
+        pdo_assign=CoeDetails.PDO_ASSIGN in coe,
+        pdo_configuration=CoeDetails.PDO_CONFIGURATION in coe,
+    )
+
+
+def _sync_managers(sii: Sii) -> tuple[SyncManager, ...]:
+    return tuple(
+        SyncManager(
+            index,
+            _kind(entry),
+            entry.address,
+            entry.length,
+            entry.control,
+            SyncManagerEnable.ENABLED in entry.enable,
+        )
+        for index, entry in enumerate(sii.sync_managers)
+    )
+
+
+def _kind(entry: sii_categories.SyncManagerEntry) -> SyncManagerUse:
+    """What the image says; early images leave it 0, then the control byte tells (as in SOEM)."""
+    if entry.use in (1, 2, 3, 4):
+        return SyncManagerUse(entry.use)
+    if not entry.address:
+        return SyncManagerUse.UNUSED
+    try:
+        control = Control.from_byte(entry.control)
+    except DecodeError:
+        return SyncManagerUse.UNUSED
+    return _KINDS[control.buffering, control.direction]
+
+
+def _pdos(
+    sii: Sii,
+    pdos: tuple[sii_categories.Pdo, ...],
+    managers: tuple[SyncManager, ...],
+    kind: SyncManagerUse,
+    notes: list[str],
+) -> tuple[Pdo, ...]:
+    usable = {manager.index for manager in managers if manager.use is kind}
+    found = []
+    for pdo in pdos:
+        channel = None if pdo.sync_manager == NOT_ASSIGNED else pdo.sync_manager
+        if channel is not None and channel not in usable:
+            notes.append(
+                f"PDO 0x{pdo.index:04X} names SyncManager {channel}, which is none for "
+                f"{kind.name.lower()}"
+            )
+            channel = None
+        entries = tuple(
+            Entry(e.index, e.subindex, e.bit_length, _tidy(sii.string(e.name)), e.data_type)
+            for e in pdo.entries
+        )
+        found.append(
+            Pdo(
+                pdo.index,
+                entries,
+                channel,
+                fixed=bool(pdo.flags & _FIXED_CONTENT),
+                mandatory=bool(pdo.flags & _MANDATORY),
+                name=_tidy(sii.string(pdo.name)),
+            )
+        )
+    return tuple(found)
+
+
+def _tidy(text: str) -> str:
+    return "".join(c for c in text if c.isprintable()).strip()
