@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
-from catenary.errors import DecodeError
-
 PORTS = range(4)
 
 
@@ -95,6 +93,4 @@ class DlStatus:
 
 
 def _port(word: int, i: int) -> Port:
-    if not 0 <= word <= 0xFFFF:
-        raise DecodeError(f"DL status: {word} has more than 16 bits")
     return Port(bool(word & 1 << 4 + i), bool(word & 1 << 8 + 2 * i), bool(word & 1 << 9 + 2 * i))

@@ -1,0 +1,320 @@
+"""Fuzz targets for every codec of `catenary.wire` and `catenary.types`.
+
+    python tests/fuzz/fuzz_wire.py [--seconds N] [--seed S] [--target NAME]
+
+Any bytes give a value or DecodeError; a value encodes, and its encoding is stable. With atheris
+installed and one --target, coverage guides the search; else mutations of golden bytes do.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import random
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from catenary import types
+from catenary.errors import DecodeError
+from catenary.wire import (
+    al,
+    clock,
+    coe,
+    datagram,
+    dl,
+    features,
+    fmmu,
+    frame,
+    mailbox,
+    pcapng,
+    register,
+    sdo_information,
+    sii,
+    sii_categories,
+    sii_interface,
+    sync_manager,
+)
+
+
+@dataclass(frozen=True)
+class Target:
+    """One decoder. `encode` turns its value back into bytes; None: there is no such encoder."""
+
+    name: str
+    decode: Callable[[bytes], Any]
+    encode: Callable[[Any], bytes] | None
+    corpus: tuple[bytes, ...]
+    exact: bool = False  # encode restores every byte
+
+
+def check(target: Target, data: bytes) -> None:
+    """Raises AssertionError, or whatever a broken decoder raises."""
+    try:
+        value = target.decode(data)
+    except DecodeError:
+        return
+    if target.encode is None:
+        return
+    first = target.encode(value)
+    if target.exact:
+        assert first == data, f"{target.name}: {data.hex()} became {first.hex()}"
+    again = target.encode(target.decode(first))
+    assert again == first, f"{target.name}: {first.hex()} became {again.hex()}"
+
+
+def _method(value: Any) -> bytes:
+    encoded = value.encode()
+    assert isinstance(encoded, bytes)
+    return encoded
+
+
+def _first(data: bytes) -> datagram.Datagram:
+    return datagram.decode_datagram(data)[0]
+
+
+def _word(name: str, decode: Callable[[int], Any], size: int, *values: int) -> Target:
+    """A register's word: an int of `size` bytes."""
+
+    def from_bytes(data: bytes) -> Any:
+        return decode(int.from_bytes(data[:size], "little"))
+
+    def to_bytes(value: Any) -> bytes:
+        word = getattr(value, "word", getattr(value, "byte", None))
+        assert isinstance(word, int)
+        return word.to_bytes(size, "little")
+
+    corpus = tuple(value.to_bytes(size, "little") for value in values)
+    return Target(name, from_bytes, to_bytes, corpus)
+
+
+def _type(entry: types.DataType[Any]) -> Target:
+    corpus = (bytes(entry.size or 6), b"\x01" * (entry.size or 6), b"\xff" * entry.size)
+    return Target(f"types.{entry.name}", entry.decode, entry.encode, corpus)
+
+
+# ethercrab's tests/replay-ek1100-el2828-el2889.pcapng, frame 2296: two datagrams
+FRAME = bytes.fromhex(
+    "ffffffffffff10101010101088a41c10047c001030010280000000000000047d021030010200000000000000"
+)
+# ethercrab's dumps/twincat-scan-boxes.pcapng, frame 0: the header counts one byte too many
+TWINCAT_FRAME = bytes.fromhex("0101050100007285c28dd3c488a40e100840020001010100040000020000").ljust(
+    60, b"\x00"
+)
+STRINGS = sii_categories.encode_strings(("Servo", "drive", "in"))
+GENERAL = sii_categories.General(name=1, order=2, coe=sii_categories.CoeDetails.SDO).encode()
+SYNC_MANAGERS = bytes.fromhex("001000022600010100120002220001020016000024000103001a000020000104")
+PDO = bytes.fromhex("0016010000051100007001060101000001160100000711001070010601010000")
+CLOCK_MODES = bytes.fromhex("000000000000000000000000000000070000000000000000")
+SII = sii.Sii(
+    sii.Header(vendor=2, product=0x044C2C52, revision=0x00120000),
+    (
+        sii.Category(sii.CategoryType.STRINGS, STRINGS),
+        sii.Category(sii.CategoryType.GENERAL, GENERAL),
+        sii.Category(sii.CategoryType.FMMU, b"\x01\x02\x03\xff"),
+        sii.Category(sii.CategoryType.SYNC_MANAGER, SYNC_MANAGERS),
+        sii.Category(sii.CategoryType.TXPDO, PDO),
+        sii.Category(sii.CategoryType.DISTRIBUTED_CLOCKS, CLOCK_MODES),
+    ),
+).encode()
+SDO_DOWNLOAD = bytes.fromhex("00202f121c0000000000")
+COE = (
+    SDO_DOWNLOAD,
+    bytes.fromhex("003060121c0000000000"),
+    bytes.fromhex("00304108100006000000454b31393134"),
+    coe.UploadRequest(0x1018, 1).encode(),
+    coe.UploadSegment(True, False, b"abcdefghijk").encode(),
+    coe.DownloadSegment(False, True, b"abc").encode(),
+    coe.UploadSegmentRequest(True).encode(),
+    coe.DownloadSegmentResponse(True).encode(),
+    coe.Abort(0x1000, 0, 0x06020000).encode(),
+    coe.Emergency(0x8611, 0x21, b"12345").encode(),
+    sdo_information.list_request(sdo_information.ListType.ALL).encode(),
+)
+CAPTURE = pcapng.encode_header("eth0") + pcapng.encode_packet(pcapng.Packet(5, FRAME, "hello"))
+
+TARGETS = (
+    *(_type(entry) for entry in types.ALL),
+    Target("datagram.decode_datagram", _first, _method, (FRAME[16:30], FRAME[30:])),
+    Target("frame.decode_frame", frame.decode_frame, _method, (FRAME, TWINCAT_FRAME), exact=True),
+    Target("frame.is_alien", frame.is_alien, None, (FRAME, TWINCAT_FRAME)),
+    Target("frame.is_own", lambda data: frame.is_own(data, FRAME[6:12]), None, (FRAME,)),
+    Target("register.Register.unpack", register.AL_STATUS.unpack, None, (b"\x08\x00",)),
+    _word("al.AlControl.from_word", al.AlControl.from_word, 2, 0x11, 0x08),
+    _word("al.AlStatus.from_word", al.AlStatus.from_word, 2, 0x08, 0x14),
+    _word("dl.DlControl.from_word", dl.DlControl.from_word, 4, 0x01070001),
+    _word("dl.DlStatus.from_word", dl.DlStatus.from_word, 2, 0x5A31),
+    _word("sync_manager.Control.from_byte", sync_manager.Control.from_byte, 1, 0x26, 0x64),
+    _word(
+        "sii_interface.ControlStatus.from_word", sii_interface.ControlStatus.from_word, 2, 0x8160
+    ),
+    Target(
+        "sync_manager.decode_sync_manager",
+        sync_manager.decode_sync_manager,
+        _method,
+        (bytes.fromhex("000f010044000100"),),
+    ),
+    Target(
+        "fmmu.decode_fmmu",
+        fmmu.decode_fmmu,
+        _method,
+        (bytes.fromhex("0000000001000007000f000201000000"),),
+    ),
+    Target("features.decode_information", features.decode_information, _method, (b"\x11" * 10,)),
+    Target("clock.decode_clock", clock.decode_clock, _method, (bytes(range(56)),)),
+    Target(
+        "clock.decode_difference",
+        lambda data: clock.decode_difference(int.from_bytes(data[:4], "little")),
+        lambda value: clock.encode_difference(value).to_bytes(4, "little"),
+        (b"\x01\x00\x00\x80",),
+    ),
+    Target("sii.decode_sii", sii.decode_sii, _method, (SII,), exact=True),
+    Target("sii.decode_header", sii.decode_header, _method, (SII[:128],)),
+    Target("sii.decode_category_header", sii.decode_category_header, None, (SII[128:132],)),
+    Target(
+        "sii_categories.decode_strings",
+        sii_categories.decode_strings,
+        sii_categories.encode_strings,
+        (STRINGS,),
+    ),
+    Target("sii_categories.decode_general", sii_categories.decode_general, _method, (GENERAL,)),
+    Target(
+        "sii_categories.decode_sync_managers",
+        sii_categories.decode_sync_managers,
+        sii_categories.encode_sync_managers,
+        (SYNC_MANAGERS,),
+    ),
+    Target(
+        "sii_categories.decode_pdos",
+        sii_categories.decode_pdos,
+        sii_categories.encode_pdos,
+        (PDO,),
+    ),
+    Target(
+        "sii_categories.decode_clock_modes",
+        sii_categories.decode_clock_modes,
+        sii_categories.encode_clock_modes,
+        (CLOCK_MODES,),
+    ),
+    Target(
+        "mailbox.decode_mailbox",
+        mailbox.decode_mailbox,
+        _method,
+        (mailbox.Mailbox(mailbox.Type.COE, SDO_DOWNLOAD, 1).encode(128),),
+    ),
+    Target("mailbox.decode_error", mailbox.decode_error, _method, (b"\x01\x00\x04\x00",)),
+    Target("coe.decode_coe", coe.decode_coe, _method, COE),
+    Target(
+        "sdo_information.decode_sdo_information",
+        sdo_information.decode_sdo_information,
+        _method,
+        (bytes.fromhex("008001000000") + b"\x01\x00",),
+    ),
+    Target(
+        "sdo_information.decode_object_list",
+        sdo_information.decode_object_list,
+        _method,
+        (bytes.fromhex("010000100810"),),
+    ),
+    Target(
+        "sdo_information.decode_object_description",
+        sdo_information.decode_object_description,
+        _method,
+        (bytes.fromhex("001007000007") + b"Device type",),
+    ),
+    Target(
+        "sdo_information.decode_entry_description",
+        sdo_information.decode_entry_description,
+        _method,
+        (bytes.fromhex("00100000070020000700") + b"Device type",),
+    ),
+    Target("sdo_information.decode_error", sdo_information.decode_error, None, (bytes(4),)),
+    Target("pcapng.decode_capture", pcapng.decode_capture, None, (CAPTURE,)),
+)
+
+_TELLING = (0x00, 0x01, 0x07, 0x0F, 0x7F, 0x80, 0xFE, 0xFF)
+_MAXIMUM_SIZE = 4096
+
+
+def mutations(corpus: tuple[bytes, ...], random_source: random.Random) -> Iterator[bytes]:
+    """Bytes near the corpus, without end."""
+    while True:
+        data = bytearray(random_source.choice((*corpus, b"")))
+        for _ in range(random_source.randint(1, 8)):
+            _mutate(data, random_source)
+        yield bytes(data[:_MAXIMUM_SIZE])
+
+
+def _mutate(data: bytearray, random_source: random.Random) -> None:
+    place = random_source.randint(0, len(data))
+    choice = random_source.randrange(6)
+    if choice == 0:
+        data[place:place] = random_source.randbytes(random_source.randint(1, 16))
+    elif choice == 1:
+        del data[place : place + random_source.randint(1, 16)]
+    elif choice == 2:
+        data[place:place] = data[place : place + random_source.randint(1, 64)]
+    elif place < len(data):
+        telling = random_source.choice(_TELLING)
+        data[place] = (telling, data[place] ^ 1 << random_source.randrange(8), place & 0xFF)[
+            choice - 3
+        ]
+
+
+def fuzz(
+    targets: tuple[Target, ...], seed: int, *, rounds: int, seconds: float | None = None
+) -> int:
+    """`rounds` inputs for each target; with `seconds`, again until they are over. Returns the
+    number of inputs tried."""
+    end = None if seconds is None else time.monotonic() + seconds
+    tried = 0
+    sources = [
+        mutations(target.corpus, random.Random(f"{seed} {target.name}")) for target in targets
+    ]
+    while True:
+        for target, source in zip(targets, sources, strict=True):
+            for _ in range(rounds):
+                _check_reporting(target, next(source))
+            tried += rounds
+        if end is None or time.monotonic() >= end:
+            return tried
+
+
+def _check_reporting(target: Target, data: bytes) -> None:
+    try:
+        check(target, data)
+    except Exception as error:
+        error.add_note(f"fuzz target {target.name}, input {data.hex()}")
+        raise
+
+
+def _fuzz_with_atheris(target: Target, seconds: float, seed: int) -> None:
+    import atheris  # type: ignore[import-not-found]
+
+    limits = [f"-max_total_time={int(seconds)}", f"-seed={seed}", f"-max_len={_MAXIMUM_SIZE}"]
+    atheris.instrument_all()
+    atheris.Setup([sys.argv[0], *limits], lambda data: _check_reporting(target, data))
+    atheris.Fuzz()
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--target", choices=[target.name for target in TARGETS])
+    arguments = parser.parse_args()
+    chosen = tuple(each for each in TARGETS if arguments.target in (None, each.name))
+    if arguments.target and importlib.util.find_spec("atheris"):
+        _fuzz_with_atheris(chosen[0], arguments.seconds, arguments.seed)
+        return 0
+    tried = fuzz(chosen, arguments.seed, rounds=200, seconds=arguments.seconds)
+    print(f"{tried} inputs on {len(chosen)} targets, seed {arguments.seed}: no finding")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
