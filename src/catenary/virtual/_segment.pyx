@@ -1,0 +1,567 @@
+"""The compiled segment: controllers, clock and link table for frames; accessors for the
+application's side. The frame path is in the headers, one for each mechanism; nothing of it runs
+under the GIL.
+"""
+
+from cpython.bytes cimport PyBytes_FromStringAndSize
+from cpython.pycapsule cimport PyCapsule_New
+from libc.stdint cimport int64_t, uint8_t, uint16_t, uint32_t, uint64_t
+from libc.string cimport memcpy
+
+cdef extern from "link.h":
+    const char *CAT_LINK_CAPSULE
+    uint32_t CAT_LINK_VERSION, CAT_LINK_VIRTUAL_TIME, CAT_FRAME_MAX
+    ctypedef struct cat_link:
+        uint32_t version, flags
+        void *self
+        int (*send)(void *, const uint8_t *, uint32_t) noexcept nogil
+        int (*receive)(void *, const uint8_t **) noexcept nogil
+        int64_t (*now)(void *) noexcept nogil
+        int (*wait_until)(void *, int64_t, int) noexcept nogil
+
+cdef extern from "packet_loop.h" nogil:
+    int packet_loop(cat_segment *s, int fd, int stop_fd)
+
+cdef extern from "segment_memory.h" nogil:
+    int MAX_AXES, MAX_MAPPED, AXIS_SLOTS, MODEL_SERVO, MODEL_SLOTS
+    int64_t NEVER
+    ctypedef struct sync_manager:
+        uint16_t start, length
+        uint8_t enabled, blocked, mailbox, ecat_writes, watchdog, full, latest, written
+    ctypedef struct mapped:
+        uint32_t bit
+        uint16_t slot
+        uint8_t bits, is_signed
+    ctypedef struct mapping:
+        mapped *entries
+        int count, sm
+    ctypedef struct sii_access:
+        uint8_t *image
+        uint32_t words
+        int64_t read_time, write_time
+    ctypedef struct dc_clock:
+        double rate
+        uint32_t hop
+    ctypedef struct servo_axis:
+        double inertia, viscous, coulomb, load, rated_torque, velocity_limit
+        double counts_per_radian, velocity_per_radian, position_gain, velocity_gain, integral_gain
+        double position, velocity, torque, boot
+        int state
+        uint16_t injected
+        uint8_t sto
+    ctypedef struct controller:
+        uint8_t *memory
+        uint32_t memory_size, events
+        uint8_t emulation, al_unread, frozen, outputs_valid, outputs_seen
+        uint16_t identification, emergency
+        sync_manager *sm
+        int sm_count
+        sii_access sii
+        dc_clock clock
+        int64_t step_period, step_due
+        mapping outputs, inputs
+        int64_t *slots
+        int slot_count, axis_count
+        servo_axis *axes
+    ctypedef struct frame_counters:
+        uint64_t frames, malformed, foreign, lost, datagrams
+    ctypedef struct cat_segment:
+        controller *controllers
+        int count, reachable, pending, event_fd, is_virtual, connected
+        int64_t now, next_due, service_due
+        frame_counters counters
+        uint32_t head, tail
+        int (*service)(void *) noexcept
+        void *owner
+    cat_segment *segment_make(int count, int is_virtual)
+    void segment_free(cat_segment *)
+    int controller_make(controller *, uint32_t ram, uint32_t sii_words, int slots, int axes)
+    void controller_power_on(controller *, int fmmus, int sms, int has_dc, int no_lrw)
+    void segment_connect(cat_segment *, int connected, int reachable)
+    void segment_advance(cat_segment *, int64_t until)
+    void sii_load(controller *)
+    void al_show(controller *, uint16_t status, uint16_t code)
+    void sm_configured(controller *, int n)
+    uint8_t *sm_registers(controller *, int n)
+    uint8_t *sm_buffer(controller *, sync_manager *, uint8_t)
+    int sm_pdi_read(controller *, int n, uint8_t *data, uint32_t room)
+    int sm_pdi_write(controller *, int n, const uint8_t *data, uint32_t size)
+    void inputs_put(controller *)
+    void lock(cat_segment *)
+    void unlock(cat_segment *)
+    int64_t monotonic_now()
+    int64_t register_number(const controller *, uint32_t address, int size)
+    int frame_through(cat_segment *, uint8_t *frame, uint32_t length)
+    int line_send(void *, const uint8_t *, uint32_t)
+    int line_receive(void *, const uint8_t **)
+    int64_t line_now(void *)
+    int line_wait_until(void *, int64_t, int)
+    enum:
+        REG_AL_CONTROL, REG_RX_ERRORS, REG_LOST_LINKS, SM_PDI_DEACTIVATE, SM_PDI_REPEAT_ACK
+        SM_ACTIVATE_REPEAT, ETHERNET_HEADER
+
+cdef extern from "segment_memory.h":
+    cpdef enum:
+        SLOT_CONTROLWORD, SLOT_STATUSWORD, SLOT_MODE
+        SLOT_MODE_DISPLAY, SLOT_TARGET_POSITION, SLOT_TARGET_VELOCITY
+        SLOT_TARGET_TORQUE, SLOT_POSITION_OFFSET, SLOT_VELOCITY_OFFSET
+        SLOT_TORQUE_OFFSET, SLOT_POSITION_DEMAND, SLOT_POSITION
+        SLOT_VELOCITY, SLOT_TORQUE_DEMAND, SLOT_TORQUE
+        SLOT_FOLLOWING_ERROR, SLOT_ERROR_CODE, SLOT_DIGITAL_INPUTS
+        SLOT_DIGITAL_OUTPUTS, SLOT_QUICK_STOP_OPTION, SLOT_SHUTDOWN_OPTION
+        SLOT_DISABLE_OPTION, SLOT_FAULT_OPTION, SLOT_FOLLOWING_WINDOW
+        SLOT_FOLLOWING_TIME, SLOT_LIMIT_MIN, SLOT_LIMIT_MAX
+        SLOT_MAX_TORQUE, SLOT_MAX_SPEED, SLOT_QUICK_STOP_DECELERATION
+        SLOT_DECELERATION, SLOT_INTERPOLATION_PERIOD, SLOT_INTERPOLATION_EXPONENT
+        SLOT_VELOCITY_DEMAND, SLOT_POLARITY
+    cpdef enum:
+        EVENT_AL_CONTROL, EVENT_MAILBOX_WRITTEN, EVENT_MAILBOX_READ
+        EVENT_REPEAT_REQUEST, EVENT_WATCHDOG, EVENT_OUTPUTS
+        EVENT_EMERGENCY
+
+FOREVER = NEVER
+SLOTS_PER_AXIS = AXIS_SLOTS
+AXES_MAX = MAX_AXES
+MAPPED_MAX = MAX_MAPPED
+
+
+cdef int _serve_application(void *owner) noexcept with gil:
+    return (<Core>owner)._run_service()
+
+
+cdef class Core:
+    """Owns the controllers' memory. `position` counts devices from the MainDevice, from 0."""
+
+    cdef cat_segment *_segment
+    cdef object _service
+    cdef readonly object failure
+    cdef readonly int count
+
+    def __cinit__(self, int count, bint is_virtual):
+        if not 0 <= count <= 65535:
+            raise ValueError(f"a segment has 0 to 65535 devices, not {count}")
+        self._segment = segment_make(count, is_virtual)
+        if self._segment == NULL:
+            raise MemoryError("no memory for the segment")
+        self.count = count
+        self._segment.owner = <void *>self
+        self._segment.service = _serve_application
+
+    def __dealloc__(self):
+        segment_free(self._segment)
+
+    cdef controller *_at(self, int position) except NULL:
+        if not 0 <= position < self.count:
+            raise IndexError(f"no device at position {position}")
+        return &self._segment.controllers[position]
+
+    cdef sync_manager *_sync_manager_at(self, int position, int n) except NULL:
+        cdef controller *c = self._at(position)
+        if not 0 <= n < c.sm_count:
+            raise IndexError(f"no SyncManager {n} at position {position}")
+        return &c.sm[n]
+
+    # -- making ---------------------------------------------------------------------------------
+
+    def make_controller(self, int position, *, int ram, bytes sii, int slots, int axes, int fmmus,
+                        int sync_managers, bint clock, bint lrw, int identification):
+        cdef controller *c = self._at(position)
+        if c.memory != NULL:
+            raise ValueError(f"the controller at position {position} is made already")
+        if not (0 < ram <= 61440 and 0 <= axes <= 8 and 0 <= slots <= 65535 and len(sii) % 2 == 0
+                and 0 < fmmus <= 8 and 0 < sync_managers <= 8 and slots >= axes * AXIS_SLOTS):
+            raise ValueError(f"impossible controller at position {position}")
+        if not controller_make(c, ram, len(sii) // 2, slots, axes):
+            raise MemoryError(f"no memory for the controller at position {position}")
+        controller_power_on(c, fmmus, sync_managers, clock, not lrw)
+        c.identification = identification
+        memcpy(c.sii.image, <const char *>sii, len(sii))
+        sii_load(c)
+
+    def start(self):
+        """All controllers are made: links up."""
+        cdef int k
+        for k in range(self.count):
+            if self._segment.controllers[k].memory == NULL:
+                raise ValueError(f"no controller at position {k}")
+        segment_connect(self._segment, True, self.count)
+
+    def connect(self, bint connected, int reachable):
+        lock(self._segment)
+        segment_connect(self._segment, connected, reachable)
+        unlock(self._segment)
+
+    # -- time and service -----------------------------------------------------------------------
+
+    @property
+    def now(self) -> int:
+        return line_now(self._segment)
+
+    @property
+    def is_virtual(self) -> bool:
+        return bool(self._segment.is_virtual)
+
+    def use_service(self, service):
+        """`service()` runs the application side and returns when it is due again [ns]."""
+        self._service = service
+
+    def wake_at(self, int64_t when):
+        if when < self._segment.service_due:
+            self._segment.service_due = when
+
+    def wake_by(self, int event_fd):
+        self._segment.event_fd = event_fd
+
+    cdef int _run_service(self) noexcept:
+        try:
+            self._segment.service_due = FOREVER
+            self._segment.service_due = self._service()
+            return 0
+        except BaseException as failure:
+            self.failure = failure
+            return -5
+
+    def raise_failure(self):
+        """An exception in the application side, where the caller can see it."""
+        failure, self.failure = self.failure, None
+        if failure is not None:
+            raise failure
+
+    def advance(self):
+        """Real time: compiled work up to now."""
+        if not self._segment.is_virtual:
+            with nogil:
+                lock(self._segment)
+                segment_advance(self._segment, monotonic_now())
+                unlock(self._segment)
+
+    def take_events(self):
+        """[(position, events)], cleared by being taken."""
+        cdef int k
+        taken = []
+        lock(self._segment)
+        if self._segment.pending:
+            self._segment.pending = 0
+            for k in range(self.count):
+                if self._segment.controllers[k].events:
+                    taken.append((k, self._segment.controllers[k].events))
+                    self._segment.controllers[k].events = 0
+        unlock(self._segment)
+        return taken
+
+    # -- the PDI side ---------------------------------------------------------------------------
+
+    def peek(self, int position, int address, int size):
+        """Bytes of the controller's memory, without any effect."""
+        cdef controller *c = self._at(position)
+        if address < 0 or size < 0 or address + size > <int64_t>c.memory_size:
+            raise ValueError(f"no memory at 0x{address:04X}, {size} bytes")
+        return PyBytes_FromStringAndSize(<char *>c.memory + address, size)
+
+    def poke(self, int position, int address, bytes data):
+        """Memory as it is, past all rules: for error counters and injected faults."""
+        cdef controller *c = self._at(position)
+        if address < 0 or address + len(data) > <int64_t>c.memory_size:
+            raise ValueError(f"no memory at 0x{address:04X}, {len(data)} bytes")
+        lock(self._segment)
+        memcpy(c.memory + address, <const char *>data, len(data))
+        unlock(self._segment)
+
+    def fetch_al_control(self, int position):
+        """What the MainDevice asks for; fetching opens the register for the next request."""
+        cdef controller *c = self._at(position)
+        lock(self._segment)
+        c.al_unread = 0
+        value = register_number(c, REG_AL_CONTROL, 2)
+        unlock(self._segment)
+        return value
+
+    def show_al_status(self, int position, int status, int code):
+        cdef controller *c = self._at(position)
+        lock(self._segment)
+        al_show(c, status, code)
+        unlock(self._segment)
+
+    def sync_manager(self, int position, int n):
+        """(start, length, control, enabled, full)"""
+        cdef sync_manager *sm = self._sync_manager_at(position, n)
+        cdef controller *c = self._at(position)
+        return sm.start, sm.length, sm_registers(c, n)[4], bool(sm.enabled), bool(sm.full)
+
+    def block_sync_manager(self, int position, int n, bint blocked):
+        """The PDI's own switch: a blocked SyncManager lets nobody pass."""
+        cdef controller *c = self._at(position)
+        cdef uint8_t *r
+        self._sync_manager_at(position, n)
+        lock(self._segment)
+        r = sm_registers(c, n)
+        r[7] = (r[7] & ~SM_PDI_DEACTIVATE) | (SM_PDI_DEACTIVATE if blocked else 0)
+        sm_configured(c, n)
+        unlock(self._segment)
+
+    def acknowledge_repeat(self, int position, int n):
+        cdef controller *c = self._at(position)
+        cdef uint8_t *r
+        self._sync_manager_at(position, n)
+        lock(self._segment)
+        r = sm_registers(c, n)
+        r[7] = (r[7] & ~SM_PDI_REPEAT_ACK) | (r[6] & SM_ACTIVATE_REPEAT)
+        unlock(self._segment)
+
+    def repeat_requested(self, int position, int n):
+        cdef controller *c = self._at(position)
+        self._sync_manager_at(position, n)
+        return bool((sm_registers(c, n)[6] ^ sm_registers(c, n)[7]) & SM_ACTIVATE_REPEAT)
+
+    def read_buffer(self, int position, int n):
+        """A complete buffer the MainDevice wrote (a mailbox is emptied by it), or None."""
+        cdef uint8_t buffer[4096]
+        cdef controller *c = self._at(position)
+        cdef int size
+        self._sync_manager_at(position, n)
+        lock(self._segment)
+        size = sm_pdi_read(c, n, buffer, 4096)
+        unlock(self._segment)
+        return None if size < 0 else PyBytes_FromStringAndSize(<char *>buffer, size)
+
+    def write_buffer(self, int position, int n, bytes data):
+        """False: the mailbox is full, or the SyncManager does not let it pass."""
+        cdef controller *c = self._at(position)
+        cdef int size
+        self._sync_manager_at(position, n)
+        lock(self._segment)
+        size = sm_pdi_write(c, n, <const uint8_t *><const char *>data, len(data))
+        unlock(self._segment)
+        return size >= 0
+
+    def take_back(self, int position, int n):
+        """What still lies in a mailbox for the MainDevice is taken out again, or None."""
+        cdef controller *c = self._at(position)
+        cdef sync_manager *sm = self._sync_manager_at(position, n)
+        data = None
+        lock(self._segment)
+        if sm.enabled and sm.mailbox and sm.full:
+            data = PyBytes_FromStringAndSize(<char *>c.memory + sm.start, sm.length)
+            sm.full = 0
+            sm_registers(c, n)[5] &= 0xF6
+        unlock(self._segment)
+        return data
+
+    def outputs_valid(self, int position):
+        return bool(self._at(position).outputs_valid)
+
+    def enable_outputs(self, int position, bint valid):
+        self._at(position).outputs_valid = valid
+
+    def expect_outputs(self, int position):
+        """EVENT_OUTPUTS comes with the next complete process data."""
+        self._at(position).outputs_seen = 0
+
+    def outputs_seen(self, int position):
+        return bool(self._at(position).outputs_seen)
+
+    def output_image(self, int position, int n):
+        """The last complete outputs, without taking them; empty where there are none."""
+        cdef controller *c = self._at(position)
+        cdef sync_manager *sm = self._sync_manager_at(position, n)
+        if not (sm.enabled and sm.written) or sm.mailbox:
+            return b""
+        return PyBytes_FromStringAndSize(<char *>sm_buffer(c, sm, sm.latest), sm.length)
+
+    # -- process data and models ----------------------------------------------------------------
+
+    def map_process_data(self, int position, bint outputs, int n, list entries):
+        """`entries`: (bit, bits, slot, is_signed); n -1: nothing is mapped."""
+        cdef controller *c = self._at(position)
+        cdef mapping *m = &c.outputs if outputs else &c.inputs
+        cdef int k = 0
+        if len(entries) > MAX_MAPPED or not -1 <= n < c.sm_count:
+            raise ValueError("impossible process data")
+        for bit, bits, slot, is_signed in entries:
+            if not (0 < bits <= 64 and 0 <= slot < c.slot_count and 0 <= bit <= 65536):
+                raise ValueError("impossible process data")
+        lock(self._segment)
+        m.sm = n
+        m.count = len(entries)
+        for bit, bits, slot, is_signed in entries:
+            m.entries[k].bit = bit
+            m.entries[k].bits = bits
+            m.entries[k].slot = slot
+            m.entries[k].is_signed = is_signed
+            k += 1
+        unlock(self._segment)
+
+    def refresh_inputs(self, int position):
+        lock(self._segment)
+        inputs_put(self._at(position))
+        unlock(self._segment)
+
+    def run_model(self, int position, int64_t period_ns):
+        """Steps the device's model from now on, every `period_ns`."""
+        cdef controller *c = self._at(position)
+        if period_ns < 1000:
+            raise ValueError(f"a device cycle of {period_ns} ns is shorter than 1 us")
+        c.step_period = period_ns
+        c.step_due = self._segment.now + period_ns
+        if c.step_due < self._segment.next_due:
+            self._segment.next_due = c.step_due
+
+    def slot(self, int position, int number):
+        cdef controller *c = self._at(position)
+        if not 0 <= number < c.slot_count:
+            raise IndexError(f"no slot {number}")
+        return c.slots[number]
+
+    def put_slot(self, int position, int number, int64_t value):
+        cdef controller *c = self._at(position)
+        if not 0 <= number < c.slot_count:
+            raise IndexError(f"no slot {number}")
+        c.slots[number] = value
+
+    cdef servo_axis *_axis(self, int position, int axis) except NULL:
+        cdef controller *c = self._at(position)
+        if not 0 <= axis < c.axis_count:
+            raise IndexError(f"the device at position {position} has no axis {axis}")
+        return &c.axes[axis]
+
+    def make_axis(self, int position, int axis, *, double inertia, double viscous, double coulomb,
+                  double rated_torque, double velocity_limit, double counts_per_radian,
+                  double velocity_per_radian, double position_gain, double velocity_gain,
+                  double integral_gain, double boot):
+        cdef servo_axis *a = self._axis(position, axis)
+        a.inertia, a.viscous, a.coulomb = inertia, viscous, coulomb
+        a.rated_torque, a.velocity_limit = rated_torque, velocity_limit
+        a.counts_per_radian, a.velocity_per_radian = counts_per_radian, velocity_per_radian
+        a.position_gain, a.velocity_gain = position_gain, velocity_gain
+        a.integral_gain, a.boot = integral_gain, boot
+
+    def axis(self, int position, int axis):
+        """(position [rad], velocity [rad/s], torque [N m], state)"""
+        cdef servo_axis *a = self._axis(position, axis)
+        return a.position, a.velocity, a.torque, a.state
+
+    def move_axis(self, int position, int axis, double to):
+        self._axis(position, axis).position = to
+
+    def load_axis(self, int position, int axis, double load):
+        self._axis(position, axis).load = load
+
+    def inject_axis(self, int position, int axis, int code):
+        self._axis(position, axis).injected = code
+
+    def stop_torque(self, int position, int axis, bint active):
+        self._axis(position, axis).sto = active
+
+    def emergency(self, int position):
+        return self._at(position).emergency
+
+    def freeze(self, int position, bint frozen):
+        self._at(position).frozen = frozen
+
+    def tune_clock(self, int position, double rate, int hop_ns):
+        cdef controller *c = self._at(position)
+        c.clock.rate = rate
+        c.clock.hop = hop_ns
+
+    def time_sii(self, int position, int64_t read_ns, int64_t write_ns, bint read_eight):
+        cdef controller *c = self._at(position)
+        c.sii.read_time, c.sii.write_time = read_ns, write_ns
+        c.memory[0x0502] = (c.memory[0x0502] & 0xBF) | (0x40 if read_eight else 0)
+
+    def sii_image(self, int position):
+        cdef controller *c = self._at(position)
+        return PyBytes_FromStringAndSize(<char *>c.sii.image, 2 * c.sii.words)
+
+    # -- frames ---------------------------------------------------------------------------------
+
+    @property
+    def counters(self):
+        cdef frame_counters f = self._segment.counters
+        return f.frames, f.datagrams, f.malformed, f.foreign, f.lost
+
+    def pass_frame(self, bytes frame):
+        """One frame through the line at once, as it comes back; None: it does not."""
+        cdef uint8_t buffer[2048]
+        cdef int back
+        cdef int size = len(frame)
+        if size > <int>CAT_FRAME_MAX:
+            raise ValueError(f"a frame has at most {CAT_FRAME_MAX} bytes")
+        memcpy(buffer, <const char *>frame, size)
+        lock(self._segment)
+        back = frame_through(self._segment, buffer, size)
+        unlock(self._segment)
+        return PyBytes_FromStringAndSize(<char *>buffer, size) if back else None
+
+    def answer_packets(self, int fd, int stop_fd):
+        """The packet loop on an AF_PACKET socket, until `stop_fd` can be read. 0 or -errno."""
+        cdef int result
+        with nogil:
+            result = packet_loop(self._segment, fd, stop_fd)
+        return result
+
+
+cdef class SegmentLink:
+    """Owns a link table into the segment's line. Keep it as long as its capsule is used."""
+
+    cdef cat_link _table
+    cdef Core _core
+    cdef object _ended
+    cdef readonly object capsule
+    cdef readonly str name
+    cdef bint _open
+
+    def __init__(self, Core core, str name, ended):
+        self._core = core
+        self._ended = ended
+        self._open = True
+        self.name = name
+        self._table.version = CAT_LINK_VERSION
+        self._table.flags = CAT_LINK_VIRTUAL_TIME if core._segment.is_virtual else 0
+        self._table.self = <void *>core._segment
+        self._table.send = line_send
+        self._table.receive = line_receive
+        self._table.now = line_now
+        self._table.wait_until = line_wait_until
+        self.capsule = PyCapsule_New(&self._table, CAT_LINK_CAPSULE, NULL)
+
+    def _check(self, int result):
+        if result < 0:
+            self._core.raise_failure()
+            raise OSError(-result, "the virtual segment's line refused")
+        return result
+
+    def send(self, bytes frame not None):
+        cdef const uint8_t *data = <const uint8_t *><const char *>frame
+        cdef uint32_t size = len(frame)
+        cdef int result
+        with nogil:
+            result = line_send(self._core._segment, data, size)
+        self._check(result)
+
+    def receive(self):
+        cdef const uint8_t *data = NULL
+        cdef int size = line_receive(self._core._segment, &data)
+        return PyBytes_FromStringAndSize(<const char *>data, size) if self._check(size) else None
+
+    def now(self):
+        return line_now(self._core._segment)
+
+    def wait_until(self, int64_t deadline_ns, bint wake_on_frame):
+        cdef int result
+        with nogil:
+            result = line_wait_until(self._core._segment, deadline_ns, wake_on_frame)
+        if result == -4:
+            return False                   # a signal came first: Python handles it on return
+        return bool(self._check(result))
+
+    def close(self):
+        if self._open:
+            self._open = False
+            self._core._segment.head = self._core._segment.tail
+            self._ended()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *exception):
+        self.close()

@@ -1,0 +1,1 @@
+"""CANopen over EtherCAT, the device's side: dictionary, SDO server, information, PDO objects."""

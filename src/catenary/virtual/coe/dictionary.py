@@ -1,0 +1,205 @@
+"""A device's object dictionary, ETG.1000.6 §5.6.7, with the access rules of its entries."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+VARIABLE, ARRAY, RECORD = 7, 8, 9
+
+# data types, ETG.1020: number → (bits, struct format)
+FORMATS = {
+    0x0001: (1, "<B"),
+    0x0002: (8, "<b"),
+    0x0003: (16, "<h"),
+    0x0004: (32, "<i"),
+    0x0005: (8, "<B"),
+    0x0006: (16, "<H"),
+    0x0007: (32, "<I"),
+    0x0008: (32, "<f"),
+    0x0015: (64, "<q"),
+    0x001B: (64, "<Q"),
+}
+BOOLEAN, INTEGER8, INTEGER16, INTEGER32 = 1, 2, 3, 4
+UNSIGNED8, UNSIGNED16, UNSIGNED32, REAL32 = 5, 6, 7, 8
+VISIBLE_STRING, OCTET_STRING = 9, 10
+SIGNED = {INTEGER8, INTEGER16, INTEGER32, 0x0015}
+
+READ_ANY, WRITE_ANY, WRITE_PRE_OP = 0x07, 0x38, 0x08
+MAP_RX, MAP_TX = 0x40, 0x80
+
+TOGGLE = 0x05030000
+UNKNOWN_COMMAND = 0x05040001
+WRITE_ONLY, READ_ONLY = 0x06010001, 0x06010002
+SUBINDEX_0_FIRST = 0x06010003
+NO_COMPLETE_ACCESS = 0x06010004
+NO_OBJECT = 0x06020000
+CANNOT_BE_MAPPED, MAPPING_TOO_LONG = 0x06040041, 0x06040042
+WRONG_LENGTH, TOO_LONG, TOO_SHORT = 0x06070010, 0x06070012, 0x06070013
+NO_SUBINDEX = 0x06090011
+OUT_OF_RANGE = 0x06090030
+WRONG_STATE = 0x08000022
+
+
+class Abort(Exception):
+    """An SDO abort the device answers with."""
+
+    def __init__(self, code: int) -> None:
+        super().__init__(f"SDO abort 0x{code:08X}")
+        self.code = code
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One subindex. `read` gives its bytes, `write` takes them or raises Abort."""
+
+    name: str
+    data_type: int
+    bits: int
+    access: int
+    read: Callable[[], bytes]
+    write: Callable[[bytes], None] | None = None
+    slot: int = -1  # where its value sits for process data, -1: nowhere
+
+
+@dataclass(slots=True)
+class Object:
+    index: int
+    name: str
+    code: int
+    data_type: int
+    entries: dict[int, Entry] = field(default_factory=dict)
+
+    @property
+    def highest(self) -> int:
+        return max(self.entries)
+
+
+def constant(name: str, data_type: int, value: bytes, access: int = READ_ANY) -> Entry:
+    return Entry(name, data_type, 8 * len(value), access, lambda: value)
+
+
+def number(name: str, data_type: int, value: int, access: int = READ_ANY) -> Entry:
+    bits, form = FORMATS[data_type]
+    packed = struct.pack(form, value)
+    return Entry(name, data_type, bits, access, lambda: packed)
+
+
+def text(name: str, value: str) -> Entry:
+    return constant(name, VISIBLE_STRING, value.encode("latin-1", "replace"))
+
+
+class Variable:
+    """Owns the bytes of one writable entry."""
+
+    def __init__(self, value: bytes, *, variable_length: bool = False) -> None:
+        self.value = value
+        self._limit = len(value)
+        self._variable_length = variable_length
+
+    def read(self) -> bytes:
+        return self.value
+
+    def write(self, data: bytes) -> None:
+        if len(data) > self._limit:
+            raise Abort(TOO_LONG)
+        if len(data) < self._limit and not self._variable_length:
+            raise Abort(TOO_SHORT)
+        self.value = data
+
+
+def stored(name: str, data_type: int, value: bytes, *, variable_length: bool = False) -> Entry:
+    """An entry that keeps what is written into it."""
+    variable = Variable(value, variable_length=variable_length)
+    access = READ_ANY | WRITE_ANY
+    return Entry(name, data_type, 8 * len(value), access, variable.read, variable.write)
+
+
+class Dictionary:
+    """Owns a device's objects. `state` tells the AL state access rights depend on."""
+
+    def __init__(self, state: Callable[[], int]) -> None:
+        self._state = state
+        self.objects: dict[int, Object] = {}
+
+    def add(self, index: int, name: str, entries: dict[int, Entry], *, code: int = RECORD) -> None:
+        data_type = entries[0].data_type if code == VARIABLE else entries[max(entries)].data_type
+        self.objects[index] = Object(index, name, code, data_type, entries)
+
+    def add_variable(self, index: int, entry: Entry) -> None:
+        self.add(index, entry.name, {0: entry}, code=VARIABLE)
+
+    def add_record(self, index: int, name: str, entries: list[Entry], *, code: int = RECORD) -> None:
+        """Entries from subindex 1 on; subindex 0 counts them."""
+        counted = {0: number("Number of entries", UNSIGNED8, len(entries))}
+        self.add(index, name, counted | dict(enumerate(entries, 1)), code=code)
+
+    def entry(self, index: int, subindex: int) -> Entry:
+        if index not in self.objects:
+            raise Abort(NO_OBJECT)
+        if subindex not in self.objects[index].entries:
+            raise Abort(NO_SUBINDEX)
+        return self.objects[index].entries[subindex]
+
+    def _state_bit(self) -> int:
+        return {2: 1, 4: 2, 8: 4}.get(self._state(), 0)
+
+    def read(self, index: int, subindex: int) -> bytes:
+        entry = self.entry(index, subindex)
+        if not entry.access & READ_ANY:
+            raise Abort(WRITE_ONLY)
+        return entry.read()
+
+    def write(self, index: int, subindex: int, data: bytes) -> None:
+        entry = self.entry(index, subindex)
+        if entry.write is None or not entry.access & WRITE_ANY:
+            raise Abort(READ_ONLY)
+        if not entry.access & self._state_bit() << 3:
+            raise Abort(WRONG_STATE)
+        if entry.data_type in FORMATS and len(data) * 8 != max(entry.bits, 8):
+            raise Abort(TOO_LONG if len(data) * 8 > entry.bits else TOO_SHORT)
+        entry.write(data)
+
+    def read_complete(self, index: int, first: int) -> bytes:
+        """All subindices from `first` (0 or 1) on; subindex 0 takes 16 bits."""
+        if index not in self.objects:
+            raise Abort(NO_OBJECT)
+        entries = self.objects[index].entries
+        if self.objects[index].code == VARIABLE:
+            raise Abort(NO_COMPLETE_ACCESS)
+        value, bit = 0, 0
+        for subindex in sorted(entries):
+            if subindex < first:
+                continue
+            entry = entries[subindex]
+            raw = entry.read() if entry.access & READ_ANY else bytes((entry.bits + 7) // 8)
+            value |= int.from_bytes(raw, "little") << bit
+            bit += 16 if subindex == 0 else entry.bits
+        return value.to_bytes((bit + 7) // 8, "little")
+
+    def write_complete(self, index: int, first: int, data: bytes) -> None:
+        """Subindex 0 is cleared first and written last, as PDO objects need it."""
+        if index not in self.objects:
+            raise Abort(NO_OBJECT)
+        entries = self.objects[index].entries
+        if self.objects[index].code == VARIABLE or any(e.bits % 8 for e in entries.values()):
+            raise Abort(NO_COMPLETE_ACCESS)
+        count = data[:1] if first == 0 else b""
+        at = 2 if first == 0 else 0
+        writable_count = entries[0].write is not None
+        if writable_count:
+            self.write(index, 0, b"\0")
+        written = 0
+        for subindex in sorted(entries)[1:]:
+            size = entries[subindex].bits // 8
+            if at + size > len(data):
+                break
+            if entries[subindex].write is not None:
+                self.write(index, subindex, data[at : at + size])
+            at += size
+            written += 1
+        if at < len(data):
+            raise Abort(TOO_LONG)
+        if writable_count:
+            self.write(index, 0, count or bytes([written]))

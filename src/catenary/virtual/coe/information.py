@@ -1,0 +1,84 @@
+"""SDO information services, ETG.1000.6 §5.6.3: the list of objects, object and entry descriptions."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable
+
+from catenary.virtual.coe.dictionary import (
+    MAP_RX,
+    MAP_TX,
+    NO_OBJECT,
+    NO_SUBINDEX,
+    UNKNOWN_COMMAND,
+    Dictionary,
+)
+
+SDO_INFORMATION = 8
+LIST_REQUEST, LIST, OBJECT_REQUEST, OBJECT, ENTRY_REQUEST, ENTRY, ERROR = range(1, 8)
+INCOMPLETE = 0x80
+HEADER = 2 + 4
+
+
+def _message(opcode: int, payload: bytes, left: int = 0) -> bytes:
+    flags = opcode | (INCOMPLETE if left else 0)
+    return struct.pack("<HBxH", SDO_INFORMATION << 12, flags, left) + payload
+
+
+class InformationServer:
+    """Owns nothing but the way to the dictionary it describes."""
+
+    def __init__(self, dictionary: Dictionary, *, size: int) -> None:
+        self._dictionary = dictionary
+        self._room = (size - HEADER) & ~1
+
+    def serve(self, payload: bytes) -> Iterable[bytes]:
+        opcode = payload[0] & 0x7F if payload else 0
+        body = payload[4:]
+        if opcode == LIST_REQUEST and len(body) >= 2:
+            return self._lists(struct.unpack_from("<H", body)[0])
+        if opcode == OBJECT_REQUEST and len(body) >= 2:
+            return [self._object(struct.unpack_from("<H", body)[0])]
+        if opcode == ENTRY_REQUEST and len(body) >= 4:
+            return [self._entry(*struct.unpack_from("<HBB", body))]
+        return [_message(ERROR, struct.pack("<I", UNKNOWN_COMMAND))]
+
+    def _indices(self, kind: int) -> list[int]:
+        objects = self._dictionary.objects.values()
+        if kind in (2, 3):
+            flag = MAP_RX if kind == 2 else MAP_TX
+            objects = [o for o in objects if any(e.access & flag for e in o.entries.values())]
+        elif kind in (4, 5):
+            objects = []
+        return sorted(o.index for o in objects)
+
+    def _lists(self, kind: int) -> list[bytes]:
+        if kind == 0:
+            content = struct.pack("<5H", *(len(self._indices(k)) for k in range(1, 6)))
+        elif kind > 5:
+            return [_message(ERROR, struct.pack("<I", UNKNOWN_COMMAND))]
+        else:
+            indices = self._indices(kind)
+            content = struct.pack(f"<{len(indices)}H", *indices)
+        content = struct.pack("<H", kind) + content
+        parts = [content[k : k + self._room] for k in range(0, len(content), self._room)]
+        return [_message(LIST, part, len(parts) - 1 - k) for k, part in enumerate(parts)]
+
+    def _object(self, index: int) -> bytes:
+        found = self._dictionary.objects.get(index)
+        if found is None:
+            return _message(ERROR, struct.pack("<I", NO_OBJECT))
+        highest = 0 if found.code == 7 else found.highest
+        head = struct.pack("<HHBB", index, found.data_type, highest, found.code)
+        return _message(OBJECT, head + found.name.encode("latin-1", "replace"))
+
+    def _entry(self, index: int, subindex: int, information: int) -> bytes:
+        found = self._dictionary.objects.get(index)
+        if found is None or subindex not in found.entries:
+            code = NO_OBJECT if found is None else NO_SUBINDEX
+            return _message(ERROR, struct.pack("<I", code))
+        entry = found.entries[subindex]
+        head = struct.pack(
+            "<HBBHHH", index, subindex, information & 0, entry.data_type, entry.bits, entry.access
+        )
+        return _message(ENTRY, head + entry.name.encode("latin-1", "replace"))

@@ -1,0 +1,175 @@
+"""PDO assignment (0x1C12, 0x1C13) and mapping (0x1600.., 0x1A00..), ETG.1000.6 §5.6.7.4.
+
+Both are written in PRE-OP only, with subindex 0 cleared first and set last; what results must fit.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from catenary.virtual.coe.dictionary import (
+    ARRAY,
+    CANNOT_BE_MAPPED,
+    MAP_RX,
+    MAP_TX,
+    MAPPING_TOO_LONG,
+    OUT_OF_RANGE,
+    READ_ANY,
+    RECORD,
+    SUBINDEX_0_FIRST,
+    UNSIGNED8,
+    UNSIGNED16,
+    UNSIGNED32,
+    WRITE_PRE_OP,
+    Abort,
+    Dictionary,
+    Entry,
+)
+from catenary.virtual.description import Pdo
+
+RX_ASSIGNMENT, TX_ASSIGNMENT = 0x1C12, 0x1C13
+ENTRIES_MAX, PDOS_MAX = 32, 16
+
+
+class _Table:
+    """Owns the numbers of one assignment or mapping: a count and its places."""
+
+    def __init__(self, form: str, values: Sequence[int], places: int) -> None:
+        self._form = form
+        self.places = list(values) + [0] * (places - len(values))
+        self.count = len(values)
+
+    @property
+    def values(self) -> list[int]:
+        return self.places[: self.count]
+
+    def read(self, place: int) -> bytes:
+        return struct.pack(self._form, self.places[place])
+
+    def unpack(self, data: bytes) -> int:
+        return int(struct.unpack(self._form, data)[0])
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """One mapped object in a SyncManager's buffer."""
+
+    bit: int
+    bits: int
+    index: int
+    subindex: int
+
+
+class PdoObjects:
+    """Owns which objects are in the process data of a device, and where."""
+
+    def __init__(self, dictionary: Dictionary, rx: Sequence[Pdo], tx: Sequence[Pdo], limit: int) -> None:
+        self._dictionary = dictionary
+        self._limit_bits = 8 * limit
+        self._mappings: dict[int, _Table] = {}
+        self._assigned = {
+            RX_ASSIGNMENT: self._add_direction(RX_ASSIGNMENT, "RxPDO assign", rx, MAP_RX),
+            TX_ASSIGNMENT: self._add_direction(TX_ASSIGNMENT, "TxPDO assign", tx, MAP_TX),
+        }
+
+    def _add_direction(self, index: int, name: str, pdos: Sequence[Pdo], flag: int) -> _Table:
+        for pdo in pdos:
+            packed = [e.index << 16 | e.subindex << 8 | e.bits for e in pdo.entries]
+            table = self._mappings[pdo.index] = _Table("<I", packed, ENTRIES_MAX)
+            self._add(pdo.index, pdo.name, table, UNSIGNED32, flag)
+        assigned = [pdo.index for pdo in pdos if pdo.sync_manager != 0xFF]
+        table = _Table("<H", assigned, PDOS_MAX)
+        allowed = [pdo.index for pdo in pdos]
+        self._add(index, name, table, UNSIGNED16, flag, allowed)
+        return table
+
+    def _add(
+        self,
+        index: int,
+        name: str,
+        table: _Table,
+        data_type: int,
+        flag: int,
+        allowed: list[int] | None = None,
+    ) -> None:
+        access = READ_ANY | WRITE_PRE_OP
+        bits = 16 if data_type == UNSIGNED16 else 32
+
+        def write_count(data: bytes) -> None:
+            count = data[0]
+            if count > len(table.places):
+                raise Abort(MAPPING_TOO_LONG if allowed is None else OUT_OF_RANGE)
+            before, table.count = table.count, count
+            try:
+                self._check(table, flag, allowed)
+            except Abort:
+                table.count = before
+                raise
+
+        def write_place(place: int, data: bytes) -> None:
+            if table.count:
+                raise Abort(SUBINDEX_0_FIRST)
+            value = table.unpack(data)
+            if allowed is None:
+                self._check_entry(value, flag)
+            elif value not in allowed and value != 0:
+                raise Abort(CANNOT_BE_MAPPED)
+            table.places[place] = value
+
+        def entry(place: int) -> Entry:
+            return Entry(
+                f"Subindex {place + 1:03d}",
+                data_type,
+                bits,
+                access,
+                lambda: table.read(place),
+                lambda data: write_place(place, data),
+            )
+
+        entries = {
+            0: Entry("Subindex 000", UNSIGNED8, 8, access, lambda: bytes([table.count]), write_count)
+        }
+        entries |= {place + 1: entry(place) for place in range(len(table.places))}
+        self._dictionary.add(index, name, entries, code=RECORD if allowed is None else ARRAY)
+
+    def _check_entry(self, value: int, flag: int) -> None:
+        index, subindex, bits = value >> 16, value >> 8 & 0xFF, value & 0xFF
+        if index == 0:  # a gap
+            return
+        try:
+            entry = self._dictionary.entry(index, subindex)
+        except Abort:
+            raise Abort(CANNOT_BE_MAPPED) from None
+        if not entry.access & flag or entry.bits != bits:
+            raise Abort(CANNOT_BE_MAPPED)
+
+    def _check(self, table: _Table, flag: int, allowed: list[int] | None) -> None:
+        if allowed is not None:
+            if any(pdo not in allowed for pdo in table.values):
+                raise Abort(CANNOT_BE_MAPPED)
+            bits = sum(value & 0xFF for pdo in table.values for value in self._mappings[pdo].values)
+        else:
+            for value in table.values:
+                self._check_entry(value, flag)
+            bits = sum(value & 0xFF for value in table.values)
+        if bits > self._limit_bits:
+            raise Abort(MAPPING_TOO_LONG)
+
+    def placed(self, assignment: int) -> list[Placed]:
+        """The objects of one direction in the order of the buffer, gaps left out."""
+        placed: list[Placed] = []
+        bit = 0
+        for pdo in self._assigned[assignment].values:
+            for value in self._mappings[pdo].values:
+                if value >> 16:
+                    placed.append(Placed(bit, value & 0xFF, value >> 16, value >> 8 & 0xFF))
+                bit += value & 0xFF
+        return placed
+
+    def size(self, assignment: int) -> int:
+        """Bytes of one direction's buffer."""
+        pdos = self._assigned[assignment].values
+        bits = sum(value & 0xFF for pdo in pdos for value in self._mappings[pdo].values)
+        return (bits + 7) // 8

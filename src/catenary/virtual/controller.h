@@ -1,0 +1,192 @@
+/* One virtual EtherCAT SubDevice controller and the segment it stands in: memory, what is cached
+ * of it for the frame path, and the events that wake the application.
+ *
+ * Two sides touch a controller: frames (the EtherCAT side, `noexcept`, answers from memory alone)
+ * and the application (the PDI side). Whoever touches one holds the segment's mutex; nothing here
+ * allocates, waits or calls Python. */
+#ifndef CATENARY_VIRTUAL_CONTROLLER_H
+#define CATENARY_VIRTUAL_CONTROLLER_H
+
+#include <pthread.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "link.h"
+#include "registers.h"
+
+#define MAX_SM 8
+#define MAX_FMMU 8
+#define MAX_AXES 8
+#define MAX_MAPPED 256
+#define NEVER INT64_MAX
+
+/* events for the application, kept until it fetches them */
+enum controller_event {
+    EVENT_AL_CONTROL = 1,
+    EVENT_MAILBOX_WRITTEN = 2,       /* SM0 was filled by the MainDevice */
+    EVENT_MAILBOX_READ = 4,          /* SM1 was emptied by the MainDevice */
+    EVENT_REPEAT_REQUEST = 8,
+    EVENT_WATCHDOG = 16,             /* the process data watchdog expired */
+    EVENT_OUTPUTS = 32,              /* the first process data since the SyncManager was enabled */
+    EVENT_EMERGENCY = 64             /* a device model has a new error code */
+};
+
+/* A SyncManager as the frame path sees it; its registers stay the truth. */
+typedef struct {
+    uint16_t start, length;
+    uint8_t enabled;                 /* activated by the MainDevice */
+    uint8_t blocked;                 /* deactivated by the PDI: nobody passes */
+    uint8_t mailbox, ecat_writes, watchdog;
+    uint8_t full;                    /* mailbox */
+    uint8_t open;                    /* EtherCAT side is between its first and last byte */
+    uint8_t latest, using;           /* three buffers: last complete one; the one EtherCAT holds */
+    uint8_t written;                 /* buffers: something complete is there */
+    uint32_t writes;                 /* complete writes from the producer */
+} sync_manager;
+
+typedef struct {
+    uint64_t first, end;             /* logical bits [first, end) */
+    uint64_t physical;               /* bit */
+    uint8_t active, reads, writes, bytewise;
+} fmmu;
+
+typedef struct {
+    uint8_t *image;                  /* the EEPROM's content */
+    uint32_t words;
+    uint16_t pending;                /* command under way, 0: none */
+    uint32_t address;
+    uint16_t word;                   /* to be written */
+    int64_t due;
+    int64_t read_time, write_time;   /* [ns] */
+    int loaded;                      /* the first load after power-on has taken the alias */
+} sii_access;
+
+typedef struct {
+    int64_t anchor, local;           /* at segment time `anchor` the local time was `local` [ns] */
+    double rate;                     /* nominal, with the oscillator's error */
+    double correction;               /* of the control loop */
+    double mean;                     /* filtered difference [ns] */
+    uint32_t hop;                    /* cable and forwarding, one way, to the next device [ns] */
+} dc_clock;
+
+/* One object of a device in its process data: bits of a SyncManager buffer <-> a slot. */
+typedef struct {
+    uint32_t bit;
+    uint16_t slot;
+    uint8_t bits;
+    uint8_t is_signed;
+} mapped;
+
+typedef struct {
+    mapped entries[MAX_MAPPED];
+    int count;
+    int sm;                          /* -1: none */
+} mapping;
+
+struct servo_axis;
+struct cat_segment;
+
+enum { MODEL_NONE = 0, MODEL_SLOTS = 1, MODEL_SERVO = 2 };
+
+typedef struct controller {
+    struct cat_segment *segment;
+    uint8_t *memory;
+    uint32_t memory_size;
+    int position;
+    uint32_t events;
+    uint8_t emulation;               /* AL status follows AL control; no microcontroller */
+    uint8_t has_dc, no_lrw;
+    uint8_t al_unread;               /* the PDI has not yet fetched AL control */
+    uint8_t frozen;                  /* injected: the application stands still */
+    uint8_t outputs_valid;           /* the application takes the outputs: OP and fed */
+    uint8_t outputs_seen;            /* EVENT_OUTPUTS was raised since the last arming */
+    uint8_t linked;                  /* the segment's line reaches this device */
+    uint16_t identification;         /* explicit device ID, 0: none */
+    sync_manager sm[MAX_SM];
+    int sm_count, sm_top;
+    fmmu fmmus[MAX_FMMU];
+    int fmmu_count, fmmu_active;
+    uint64_t logical_first, logical_end;  /* hull of the active FMMUs, bits */
+    sii_access sii;
+    dc_clock clock;
+    int64_t watchdog_due, pdi_watchdog_due;
+    uint8_t watchdog_armed;
+    /* model */
+    int model;
+    int64_t step_period, step_due;   /* [ns] */
+    mapping outputs, inputs;
+    int64_t *slots;
+    int slot_count;
+    struct servo_axis *axes;
+    int axis_count;
+    uint16_t emergency;              /* last new error code for the application */
+} controller;
+
+typedef struct {
+    int64_t arrival;
+    uint32_t length;
+    uint8_t bytes[CAT_FRAME_MAX + 2];
+} queued_frame;
+
+#define QUEUE_SIZE 256u               /* a power of two */
+
+typedef struct {
+    uint64_t frames, malformed, foreign, lost, datagrams;
+} frame_counters;
+
+typedef struct cat_segment {
+    pthread_mutex_t mutex;
+    controller *controllers;
+    int count, reachable;
+    uint16_t *stations;              /* contiguous, for the search of FPxx */
+    uint8_t write_mask[REG_END];
+    int64_t now, power_on;
+    int64_t passage;                 /* when the frame in work reaches the first device */
+    int64_t busy_until;              /* the wire towards the segment is occupied */
+    int64_t next_due;                /* of compiled work */
+    int64_t service_due;             /* of the application, Python */
+    int pending;                     /* some controller has events */
+    int event_fd;                    /* wakes the service thread, -1: none */
+    int is_virtual;
+    int connected;                   /* the cable between MainDevice and first device */
+    uint8_t scratch[2048], incoming[2048];
+    frame_counters counters;
+    queued_frame *queue;
+    uint32_t head, tail;             /* take at head, put at tail */
+    uint8_t taken[CAT_FRAME_MAX + 2];
+    int (*service)(void *owner);      /* virtual time: the application side, takes the GIL; 0 or -errno */
+    void *owner;
+} cat_segment;
+
+static inline uint16_t load16(const uint8_t *p) { return (uint16_t)(p[0] | p[1] << 8); }
+static inline uint32_t load32(const uint8_t *p) {
+    return (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
+}
+static inline uint64_t load64(const uint8_t *p) {
+    return (uint64_t)load32(p) | (uint64_t)load32(p + 4) << 32;
+}
+static inline void store16(uint8_t *p, uint16_t v) { p[0] = (uint8_t)v; p[1] = (uint8_t)(v >> 8); }
+static inline void store32(uint8_t *p, uint32_t v) { store16(p, (uint16_t)v); store16(p + 2, (uint16_t)(v >> 16)); }
+static inline void store64(uint8_t *p, uint64_t v) { store32(p, (uint32_t)v); store32(p + 4, (uint32_t)(v >> 32)); }
+
+static inline uint32_t min32(uint32_t a, uint32_t b) { return a < b ? a : b; }
+
+static void wake_service(cat_segment *s);
+
+static inline void raise_event(controller *c, uint32_t event) {
+    c->events |= event;
+    if (!c->segment->pending) {
+        c->segment->pending = 1;
+        wake_service(c->segment);
+    }
+}
+
+/* Something of this controller is due at `when`: the segment looks no later than that. */
+static inline void due_at(controller *c, int64_t when) {
+    if (when < c->segment->next_due)
+        c->segment->next_due = when;
+}
+
+#endif

@@ -1,0 +1,10 @@
+"""The kinds of virtual devices, one file each."""
+
+from catenary.virtual.devices.analog_inputs import AnalogInputs
+from catenary.virtual.devices.coupler import Coupler
+from catenary.virtual.devices.device import Device
+from catenary.virtual.devices.digital_inputs import DigitalInputs
+from catenary.virtual.devices.digital_outputs import DigitalOutputs
+from catenary.virtual.devices.servo import Servo
+
+__all__ = ["AnalogInputs", "Coupler", "Device", "DigitalInputs", "DigitalOutputs", "Servo"]

@@ -1,0 +1,127 @@
+"""Analogue inputs with CoE: 0x60n0:11 the value, status bits before it, as such terminals have."""
+
+from __future__ import annotations
+
+from catenary.virtual.coe.dictionary import (
+    BOOLEAN,
+    INTEGER16,
+    MAP_TX,
+    READ_ANY,
+    UNSIGNED8,
+    Entry,
+    number,
+    stored,
+)
+from catenary.virtual.description import Description, MappedEntry, Pdo
+from catenary.virtual.devices.application import Application, mailbox_of, sync_managers_of
+from catenary.virtual.devices.applied import AppliedDevice
+from catenary.virtual.scheduler import Scheduler
+
+SLOTS = 4  # of one channel: underrange, overrange, error, value
+UNDERRANGE, OVERRANGE, ERROR, VALUE = range(SLOTS)
+FULL_SCALE = 0x7FFF
+CONVERSION_NS = 500_000
+
+
+class AnalogInputs(AppliedDevice):
+    """Owns a terminal of 1 to 8 analogue inputs of ±10 V, 16 bits."""
+
+    kind = "analog_inputs"
+
+    def __init__(
+        self,
+        *,
+        channels: int = 2,
+        name: str = "",
+        alias: int = 0,
+        serial: int = 0,
+        lrw: bool = True,
+        mailbox_bytes: int = 128,
+        mailbox_delay: float = 300e-6,
+    ) -> None:
+        if not 1 <= channels <= 8:
+            raise ValueError(f"analogue inputs have 1 to 8 channels, not {channels}")
+        super().__init__(
+            name=name or f"Catenary virtual {channels}-channel analogue input",
+            alias=alias,
+            serial=serial,
+            lrw=lrw,
+            mailbox_bytes=mailbox_bytes,
+            mailbox_delay=mailbox_delay,
+        )
+        self.channels = channels
+
+    def _pdo(self, channel: int) -> Pdo:
+        index = 0x6000 + 0x10 * channel
+        entries = (
+            MappedEntry(index, 0x01, 1, "Underrange", BOOLEAN),
+            MappedEntry(index, 0x02, 1, "Overrange", BOOLEAN),
+            MappedEntry(0, 0, 4, "", 0),
+            MappedEntry(index, 0x07, 1, "Error", BOOLEAN),
+            MappedEntry(0, 0, 9, "", 0),
+            MappedEntry(index, 0x11, 16, "Value", INTEGER16),
+        )
+        return Pdo(0x1A00 + channel, f"AI channel {channel + 1}", entries, 3)
+
+    def description(self) -> Description:
+        pdos = tuple(self._pdo(k) for k in range(self.channels))
+        return Description(
+            name=self.name,
+            order=f"CVA{self.channels:03d}",
+            group="Analogue inputs",
+            product_code=0x0004_0000 + self.channels,
+            revision=0x0001_0000,
+            serial=self.serial,
+            alias=self.alias,
+            emulation=False,
+            pdi_type=0x05,
+            mailbox=mailbox_of(self.mailbox_bytes),
+            sync_managers=sync_managers_of(self.mailbox_bytes, (), pdos),
+            fmmus=(1, 2, 3),
+            rx_pdos=(),
+            tx_pdos=pdos,
+            clock=True,
+            slots=SLOTS * self.channels,
+            current_milliampere=130,
+        )
+
+    def started(self, scheduler: Scheduler) -> None:
+        super().started(scheduler)
+        self.core.run_model(self.position, CONVERSION_NS)
+
+    def add_objects(self, application: Application) -> None:
+        readable = READ_ANY | MAP_TX
+        for k in range(self.channels):
+            at = SLOTS * k
+            entries: dict[int, Entry] = {
+                0x00: number("Number of entries", UNSIGNED8, 0x11),
+                0x01: application.slot_entry("Underrange", BOOLEAN, 1, at + UNDERRANGE, readable),
+                0x02: application.slot_entry("Overrange", BOOLEAN, 1, at + OVERRANGE, readable),
+                0x07: application.slot_entry("Error", BOOLEAN, 1, at + ERROR, readable),
+                0x11: application.slot_entry("Value", INTEGER16, 16, at + VALUE, readable),
+            }
+            application.dictionary.add(0x6000 + 0x10 * k, f"AI inputs channel {k + 1}", entries)
+            filter_setting = stored("Filter", UNSIGNED8, b"\0")
+            application.dictionary.add_record(
+                0x8000 + 0x10 * k, f"AI settings channel {k + 1}", [filter_setting]
+            )
+
+    def apply_volts(self, channel: int, volts: float) -> None:
+        """What lies at the terminals of one channel [V], ±10 full scale."""
+        if not 0 <= channel < self.channels:
+            raise IndexError(f"no channel {channel}")
+        raw = round(volts / 10 * FULL_SCALE)
+        clamped = max(-FULL_SCALE - 1, min(FULL_SCALE, raw))
+        at = SLOTS * channel
+        for slot, value in (
+            (VALUE, clamped),
+            (UNDERRANGE, int(raw < clamped)),
+            (OVERRANGE, int(raw > clamped)),
+            (ERROR, int(raw != clamped)),
+        ):
+            self.core.put_slot(self.position, at + slot, value)
+        self.core.refresh_inputs(self.position)
+
+    def volts(self, channel: int) -> float:
+        """What the terminal measures [V]."""
+        return self.core.slot(self.position, SLOTS * channel + VALUE) / FULL_SCALE * 10

@@ -1,0 +1,263 @@
+"""The microcontroller behind a controller: state machine, mailbox, CoE and process data together.
+
+It runs in the segment's service, never in the path of a frame.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Sequence
+
+from catenary.virtual import _segment
+from catenary.virtual._segment import Core
+from catenary.virtual.coe.dictionary import (
+    ARRAY,
+    MAP_RX,
+    MAP_TX,
+    OCTET_STRING,
+    SIGNED,
+    UNSIGNED8,
+    UNSIGNED16,
+    UNSIGNED32,
+    WRITE_ANY,
+    Dictionary,
+    Entry,
+    constant,
+    number,
+    stored,
+    text,
+)
+from catenary.virtual.coe.information import SDO_INFORMATION, InformationServer
+from catenary.virtual.coe.pdo_objects import RX_ASSIGNMENT, TX_ASSIGNMENT, PdoObjects
+from catenary.virtual.coe.sdo_server import SDO_REQUEST, SdoServer
+from catenary.virtual.description import (
+    VENDOR_ID,
+    Description,
+    MailboxDefault,
+    Pdo,
+    SyncManagerDefault,
+)
+from catenary.virtual.mailbox import HEADER, Mailbox
+from catenary.virtual.scheduler import Scheduler
+from catenary.virtual.state_machine import (
+    INIT,
+    INVALID_INPUT_CONFIGURATION,
+    INVALID_MAILBOX_CONFIGURATION,
+    INVALID_OUTPUT_CONFIGURATION,
+    OP,
+    PRE_OP,
+    SAFE_OP,
+    SYNC_MANAGER_WATCHDOG,
+    StateMachine,
+)
+
+EMERGENCY = 1
+ENABLE_AND_MODE = 0x0F  # of a SyncManager's control: direction and mode
+RAM_START, RAM_END = 0x1000, 0x3000
+BLOB_BYTES = 2048  # an object larger than any usual mailbox
+
+
+def mailbox_of(size: int) -> MailboxDefault:
+    return MailboxDefault(RAM_START, size, RAM_START + size, size, 0x2F)
+
+
+def process_data_areas(mailbox_size: int) -> tuple[int, int, int]:
+    """(start of SM2, start of SM3, most bytes of each): three buffers each share what is left."""
+    outputs = RAM_START + (2 * mailbox_size + 0xFF & ~0xFF)
+    room = (RAM_END - outputs) // 6 & ~0x7F
+    return outputs, outputs + 3 * room, room
+
+
+def sync_managers_of(
+    mailbox_size: int, outputs: Sequence[Pdo], inputs: Sequence[Pdo]
+) -> tuple[SyncManagerDefault, ...]:
+    def size(pdos: Sequence[Pdo]) -> int:
+        return (sum(pdo.bits for pdo in pdos if pdo.sync_manager != 0xFF) + 7) // 8
+
+    out, into, _room = process_data_areas(mailbox_size)
+    return (
+        SyncManagerDefault(RAM_START, mailbox_size, 0x26, 1, 1),
+        SyncManagerDefault(RAM_START + mailbox_size, mailbox_size, 0x22, 1, 2),
+        SyncManagerDefault(out, size(outputs), 0x64, 1 if size(outputs) else 0, 3),
+        SyncManagerDefault(into, size(inputs), 0x20, 1 if size(inputs) else 0, 4),
+    )
+
+
+class Application:
+    """Owns the microcontroller's side of one device."""
+
+    def __init__(
+        self, core: Core, position: int, scheduler: Scheduler, description: Description, *, delay_ns: int
+    ) -> None:
+        box = description.mailbox
+        if box is None:
+            raise ValueError("an application needs a mailbox")
+        self._core = core
+        self._position = position
+        self._box = box
+        self.states = StateMachine(self, scheduler, description.identification)
+        self.dictionary = Dictionary(lambda: self.states.state)
+        self._add_communication_objects(description)
+        out, into, room = process_data_areas(box.receive_size)
+        self._areas = (out, into)
+        self.pdos = PdoObjects(self.dictionary, description.rx_pdos, description.tx_pdos, room)
+        self._sdo = SdoServer(self.dictionary, size=box.send_size - HEADER.size)
+        self._information = InformationServer(self.dictionary, size=box.send_size - HEADER.size)
+        self.mailbox = Mailbox(self, scheduler, self._serve_coe, delay_ns=delay_ns)
+        self._gate(mailbox=False, process_data=False)
+
+    def _add_communication_objects(self, d: Description) -> None:
+        add = self.dictionary.add_variable
+        add(0x1000, number("Device type", UNSIGNED32, 0x0002_0192 if d.axes else 0x0000_1389))
+        add(0x1001, Entry("Error register", UNSIGNED8, 8, 0x07, self._error_register))
+        add(0x1008, text("Manufacturer device name", d.name))
+        add(0x1009, text("Manufacturer hardware version", "1"))
+        add(0x100A, text("Manufacturer software version", "1.0"))
+        identity = zip(
+            ("Vendor ID", "Product code", "Revision number", "Serial number"),
+            (VENDOR_ID, d.product_code, d.revision, d.serial),
+            strict=True,
+        )
+        record = self.dictionary.add_record
+        record(0x1018, "Identity", [number(name, UNSIGNED32, value) for name, value in identity])
+        kinds = [number(f"Subindex {k:03d}", UNSIGNED8, k) for k in (1, 2, 3, 4)]
+        record(0x1C00, "Sync manager type", kinds, code=ARRAY)
+        blob = bytes(k * 7 & 0xFF for k in range(BLOB_BYTES))
+        add(0x2100, constant("Large octet string", OCTET_STRING, blob))
+        add(0x2101, stored("Writable octet string", OCTET_STRING, bytes(BLOB_BYTES), variable_length=True))
+        add(0x2102, stored("Scratch word", UNSIGNED16, bytes(2)))
+
+    def _error_register(self) -> bytes:
+        return b"\x01" if self._core.emergency(self._position) else b"\x00"
+
+    # -- events -----------------------------------------------------------------------------------
+
+    def handle(self, events: int) -> None:
+        if events & _segment.EVENT_WATCHDOG and self.states.state == OP:
+            self.states.fail(SAFE_OP, SYNC_MANAGER_WATCHDOG)
+        if events & _segment.EVENT_AL_CONTROL:
+            self.states.obey()
+        if events & _segment.EVENT_OUTPUTS:
+            self.states.outputs_arrived()
+        if events & _segment.EVENT_MAILBOX_READ:
+            self.mailbox.answer_read()
+        if events & _segment.EVENT_REPEAT_REQUEST:
+            self.mailbox.repeat_requested()
+        if events & _segment.EVENT_MAILBOX_WRITTEN:
+            self.mailbox.request_written()
+        if events & _segment.EVENT_EMERGENCY:
+            self.send_emergency(self._core.emergency(self._position))
+
+    def send_emergency(self, code: int, data: bytes = b"") -> None:
+        """An emergency message, ETG.1000.6 §5.6.4; code 0: the error is gone."""
+        if self.states.state == INIT:
+            return
+        register = 1 if code else 0
+        head = struct.pack("<HHB", EMERGENCY << 12, code, register)
+        self.mailbox.send(head + data[:5].ljust(5, b"\0"))
+
+    def _serve_coe(self, payload: bytes) -> Iterable[bytes]:
+        [header] = struct.unpack_from("<H", payload)
+        if header >> 12 == SDO_REQUEST:
+            return self._sdo.serve(payload[2:])
+        if header >> 12 == SDO_INFORMATION:
+            return self._information.serve(payload[2:])
+        return []
+
+    # -- what the mailbox needs ---------------------------------------------------------------------
+
+    def fetch_request(self) -> bytes | None:
+        return self._core.read_buffer(self._position, 0)
+
+    def put_answer(self, data: bytes) -> bool:
+        return self._core.write_buffer(self._position, 1, data)
+
+    def take_back_answer(self) -> bytes | None:
+        return self._core.take_back(self._position, 1)
+
+    def acknowledge_repeat(self) -> None:
+        self._core.acknowledge_repeat(self._position, 1)
+
+    # -- what the state machine needs ---------------------------------------------------------------
+
+    def fetch_al_control(self) -> int:
+        return self._core.fetch_al_control(self._position)
+
+    def show_al_status(self, status: int, code: int) -> None:
+        self._core.show_al_status(self._position, status, code)
+
+    def check_state(self, state: int) -> int:
+        before = self.states.state
+        if state >= PRE_OP and before == INIT and not self._mailbox_is_configured():
+            return INVALID_MAILBOX_CONFIGURATION
+        if state >= SAFE_OP and before == PRE_OP:
+            if not self._buffer_is_configured(2, RX_ASSIGNMENT, 0x04):
+                return INVALID_OUTPUT_CONFIGURATION
+            if not self._buffer_is_configured(3, TX_ASSIGNMENT, 0x00):
+                return INVALID_INPUT_CONFIGURATION
+        return 0
+
+    def _mailbox_is_configured(self) -> bool:
+        box = self._box
+        expected = (
+            (box.receive_offset, box.receive_size, 0x06),
+            (box.send_offset, box.send_size, 0x02),
+        )
+        for n, (offset, size, control) in enumerate(expected):
+            start, length, found, enabled, _full = self._core.sync_manager(self._position, n)
+            if (start, length, found & ENABLE_AND_MODE, enabled) != (offset, size, control, True):
+                return False
+        return True
+
+    def _buffer_is_configured(self, n: int, assignment: int, control: int) -> bool:
+        size = self.pdos.size(assignment)
+        start, length, found, enabled, _full = self._core.sync_manager(self._position, n)
+        if size == 0:
+            return not enabled or length == 0
+        area = self._areas[n - 2]
+        return (start, length, found & ENABLE_AND_MODE, enabled) == (area, size, control, True)
+
+    def awaits_outputs(self) -> bool:
+        has_outputs = self.pdos.size(RX_ASSIGNMENT) > 0
+        return has_outputs and not self._core.outputs_seen(self._position)
+
+    def enter_state(self, before: int, state: int) -> None:
+        if before == INIT and state == PRE_OP:
+            self.mailbox.reset()
+        if before < SAFE_OP <= state:
+            self._map_process_data()
+        if before != state:
+            self._gate(mailbox=state >= PRE_OP, process_data=state >= SAFE_OP)
+        if before < SAFE_OP <= state:
+            self._core.expect_outputs(self._position)
+            self._core.refresh_inputs(self._position)
+        self._core.enable_outputs(self._position, state == OP)
+
+    def _gate(self, *, mailbox: bool, process_data: bool) -> None:
+        for n, opened in ((0, mailbox), (1, mailbox), (2, process_data), (3, process_data)):
+            self._core.block_sync_manager(self._position, n, not opened)
+
+    def _map_process_data(self) -> None:
+        for n, assignment, flag in ((2, RX_ASSIGNMENT, MAP_RX), (3, TX_ASSIGNMENT, MAP_TX)):
+            entries: list[tuple[int, int, int, bool]] = []
+            for placed in self.pdos.placed(assignment):
+                entry = self.dictionary.entry(placed.index, placed.subindex)
+                if entry.slot >= 0 and entry.access & flag:
+                    signed = entry.data_type in SIGNED
+                    entries.append((placed.bit, placed.bits, entry.slot, signed))
+            self._core.map_process_data(self._position, n == 2, n if entries else -1, entries)
+
+    def slot_entry(self, name: str, data_type: int, bits: int, slot: int, access: int) -> Entry:
+        """A dictionary entry whose value is the model's own."""
+        signed, size = data_type in SIGNED, (bits + 7) // 8
+
+        def read() -> bytes:
+            value = self._core.slot(self._position, slot) & ((1 << bits) - 1)
+            return value.to_bytes(size, "little")
+
+        def write(data: bytes) -> None:
+            value = int.from_bytes(data, "little", signed=signed)
+            self._core.put_slot(self._position, slot, value)
+
+        writable = access & WRITE_ANY
+        return Entry(name, data_type, bits, access, read, write if writable else None, slot)

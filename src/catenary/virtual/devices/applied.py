@@ -1,0 +1,78 @@
+"""A device with a microcontroller: what servos and analogue terminals have in common."""
+
+from __future__ import annotations
+
+from catenary.virtual.devices.application import Application
+from catenary.virtual.devices.device import Device
+from catenary.virtual.scheduler import Scheduler
+
+
+class AppliedDevice(Device):
+    """Owns a device that has an application with mailbox and objects."""
+
+    def __init__(
+        self,
+        *,
+        name: str,
+        alias: int,
+        serial: int,
+        lrw: bool,
+        mailbox_bytes: int,
+        mailbox_delay: float,
+    ) -> None:
+        super().__init__(name=name, alias=alias, serial=serial, lrw=lrw)
+        if not 32 <= mailbox_bytes <= 1024 or mailbox_bytes % 2:
+            raise ValueError(f"a mailbox has 32 to 1024 bytes, an even number, not {mailbox_bytes}")
+        if not 0 <= mailbox_delay <= 10:
+            raise ValueError(f"a mailbox answers after 0 to 10 s, not {mailbox_delay}")
+        self.mailbox_bytes = mailbox_bytes
+        self._mailbox_delay_ns = round(mailbox_delay * 1e9)
+        self._application: Application | None = None
+
+    @property
+    def application(self) -> Application:
+        if self._application is None:
+            raise ValueError(f"{self.name} stands in no segment yet: Segment([...]) places it")
+        return self._application
+
+    def started(self, scheduler: Scheduler) -> None:
+        self._application = Application(
+            self.core,
+            self.position,
+            scheduler,
+            self.description(),
+            delay_ns=self._mailbox_delay_ns,
+        )
+        self.add_objects(self._application)
+
+    def add_objects(self, application: Application) -> None:
+        """The objects of the profile."""
+        raise NotImplementedError
+
+    def handle(self, events: int) -> None:
+        self.application.handle(events)
+
+    def refuse_state(self, state: int, code: int | None) -> None:
+        """The next requests of `state` end in an error with `code`; None: no longer."""
+        refused = self.application.states.refused
+        if code is None:
+            refused.pop(state, None)
+        else:
+            refused[state] = code
+
+    def delay_state(self, state: int, seconds: float | None) -> None:
+        """How long `state` takes [s]; None: it is never reached."""
+        delay = None if seconds is None else round(seconds * 1e9)
+        self.application.states.delays[state] = delay
+
+    @property
+    def mailbox_silent(self) -> bool:
+        return self.application.mailbox.silent
+
+    @mailbox_silent.setter
+    def mailbox_silent(self, silent: bool) -> None:
+        """Requests are taken no longer: SM0 stays full, SM1 empty."""
+        self.application.mailbox.silent = silent
+
+    def send_emergency(self, code: int, data: bytes = b"") -> None:
+        self.application.send_emergency(code, data)

@@ -1,0 +1,37 @@
+"""A bus coupler: no process data, no mailbox; its AL status follows AL control."""
+
+from __future__ import annotations
+
+from catenary.virtual.description import Description
+from catenary.virtual.devices.device import Device
+
+
+class Coupler(Device):
+    """Owns a coupler like the ones terminals are plugged onto."""
+
+    kind = "coupler"
+
+    def __init__(
+        self, *, name: str = "Catenary virtual coupler", alias: int = 0, serial: int = 0
+    ) -> None:
+        super().__init__(name=name, alias=alias, serial=serial, lrw=True)
+
+    def description(self) -> Description:
+        return Description(
+            name=self.name,
+            order="CVK100",
+            group="Couplers",
+            product_code=0x0001_0001,
+            revision=0x0001_0000,
+            serial=self.serial,
+            alias=self.alias,
+            emulation=True,
+            pdi_type=0x00,
+            mailbox=None,
+            sync_managers=(),
+            fmmus=(),
+            rx_pdos=(),
+            tx_pdos=(),
+            clock=True,
+            current_milliampere=-2000,
+        )

@@ -1,0 +1,96 @@
+"""A device on the segment: its description, its place, and the switches tests turn.
+
+Devices whose AL status merely follows AL control (couplers, simple terminals) need nothing more;
+those with a microcontroller add an `Application`.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from catenary.virtual._segment import Core
+from catenary.virtual.description import Description
+from catenary.virtual.scheduler import Scheduler
+from catenary.virtual.sii_image import make_sii_image
+
+INIT, PRE_OP, SAFE_OP, OP = 1, 2, 4, 8
+AL_STATUS, RX_ERRORS, LOST_LINKS, ALIAS = 0x0130, 0x0300, 0x0310, 0x0012
+
+
+class Device:
+    """Owns one virtual device; its place in the segment is given when the segment is made."""
+
+    kind: ClassVar[str]
+
+    def __init__(self, *, name: str, alias: int, serial: int, lrw: bool) -> None:
+        if not 0 <= alias <= 0xFFFF:
+            raise ValueError(f"alias {alias} is no 16-bit number")
+        self.name = name
+        self.alias = alias
+        self.serial = serial
+        self.lrw = lrw
+        self._core: Core | None = None
+        self.position = -1
+
+    def description(self) -> Description:
+        raise NotImplementedError
+
+    @property
+    def core(self) -> Core:
+        if self._core is None:
+            raise ValueError(f"{self.name} stands in no segment yet: Segment([...]) places it")
+        return self._core
+
+    def attach(self, core: Core, position: int, scheduler: Scheduler) -> None:
+        if self._core is not None:
+            raise ValueError(f"{self.name} stands in a segment already")
+        description = self.description()
+        core.make_controller(
+            position,
+            ram=description.ram,
+            sii=make_sii_image(description),
+            slots=description.slots,
+            axes=description.axes,
+            fmmus=8,
+            sync_managers=8,
+            clock=description.clock,
+            lrw=self.lrw,
+            identification=description.identification,
+        )
+        self._core, self.position = core, position
+        self.started(scheduler)
+
+    def started(self, scheduler: Scheduler) -> None:
+        """The controller is there; now what the device adds to it."""
+
+    def handle(self, events: int) -> None:
+        """Events of the controller, on the service's thread."""
+
+    @property
+    def state(self) -> int:
+        """The AL state shown: 1 INIT, 2 PRE-OP, 4 SAFE-OP, 8 OP; bit 4 is the error flag."""
+        return self.core.peek(self.position, AL_STATUS, 1)[0] & 0x1F
+
+    @property
+    def frozen(self) -> bool:
+        return self._frozen
+
+    _frozen = False
+
+    @frozen.setter
+    def frozen(self, frozen: bool) -> None:
+        """The application stands still; the controller goes on answering frames."""
+        self._frozen = frozen
+        self.core.freeze(self.position, frozen)
+
+    def count_errors(self, port: int, *, invalid_frames: int = 0, lost_links: int = 0) -> None:
+        """What a bad cable would leave in the error counters of one port."""
+        if not 0 <= port <= 3:
+            raise ValueError(f"a controller has ports 0 to 3, not {port}")
+        for address, number in ((RX_ERRORS + 2 * port, invalid_frames), (LOST_LINKS + port, lost_links)):
+            before = self.core.peek(self.position, address, 1)[0]
+            self.core.poke(self.position, address, bytes([min(before + number, 255)]))
+
+    def write_alias(self, alias: int) -> None:
+        """What a rotary switch on the device would say, in the register at once."""
+        self.core.poke(self.position, ALIAS, alias.to_bytes(2, "little"))

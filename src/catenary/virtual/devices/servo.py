@@ -1,0 +1,309 @@
+"""A servo drive, CiA 402 (IEC 61800-7-201): CSP, CSV, CST on 1 to 8 axes, objects + 0x800·k.
+
+The motor, its loops and the drive's state machine are compiled (`servo.h`) and stepped at the
+device's own cycle. Positions count `counts_per_turn` a turn; velocities are counts a second;
+torques per mille of the rated one.
+"""
+
+from __future__ import annotations
+
+import math
+
+from catenary.virtual import _segment
+from catenary.virtual.coe.dictionary import (
+    ARRAY,
+    INTEGER8,
+    OUT_OF_RANGE,
+    UNSIGNED8,
+    UNSIGNED16,
+    UNSIGNED32,
+    Abort,
+    Entry,
+    number,
+)
+from catenary.virtual.description import Description, MappedEntry, Pdo
+from catenary.virtual.devices.application import Application, mailbox_of, sync_managers_of
+from catenary.virtual.devices.applied import AppliedDevice
+from catenary.virtual.devices.servo_objects import (
+    BITS,
+    DEFAULT_RX,
+    DEFAULT_TX,
+    OBJECT_BY_INDEX,
+    OBJECTS,
+    RW,
+    RX,
+)
+from catenary.virtual.scheduler import Scheduler
+
+STEP_NS = 250_000
+BOOT_SECONDS = 0.02
+SUPPORTED_MODES = {0, 8, 9, 10}
+SUPPORTED_MODES_MASK = 1 << 7 | 1 << 8 | 1 << 9  # 0x6502: CSP, CSV, CST
+VELOCITY_BANDWIDTH = 2 * math.pi * 80  # rad/s
+POSITION_BANDWIDTH = 100.0  # rad/s
+AXIS_STRIDE, PDO_STRIDE = 0x800, 0x10
+STATES = (
+    "NOT READY TO SWITCH ON",
+    "SWITCH ON DISABLED",
+    "READY TO SWITCH ON",
+    "SWITCHED ON",
+    "OPERATION ENABLED",
+    "QUICK STOP ACTIVE",
+    "FAULT REACTION ACTIVE",
+    "FAULT",
+)
+
+
+def _pdo(index: int, name: str, objects: tuple[int, ...], axis: int, sync_manager: int) -> Pdo:
+    entries = tuple(
+        MappedEntry(
+            o + AXIS_STRIDE * axis,
+            0,
+            BITS[OBJECT_BY_INDEX[o].data_type],
+            OBJECT_BY_INDEX[o].name,
+            OBJECT_BY_INDEX[o].data_type,
+        )
+        for o in objects
+    )
+    return Pdo(index + PDO_STRIDE * axis, name, entries, sync_manager)
+
+
+class Servo(AppliedDevice):
+    """Owns a servo drive of 1 to 8 axes with their motors."""
+
+    kind = "servo"
+
+    def __init__(
+        self,
+        *,
+        name: str = "Catenary virtual servo",
+        alias: int = 0,
+        serial: int = 0,
+        axes: int = 1,
+        counts_per_turn: int = 1 << 20,
+        velocity_counts_per_turn: int | None = None,
+        inertia: float = 5e-4,
+        viscous_friction: float = 1e-3,
+        coulomb_friction: float = 0.02,
+        rated_torque: float = 2.0,
+        max_torque_ratio: float = 3.0,
+        max_velocity: float = 350.0,
+        following_error_turns: float = 0.25,
+        position_limits: tuple[float, float] | None = None,
+        mailbox_bytes: int = 128,
+        mailbox_delay: float = 300e-6,
+        lrw: bool = True,
+    ) -> None:
+        """Units: kg·m², N·m·s/rad, N·m, rad/s, rad; `max_torque_ratio` of the rated torque;
+        `velocity_counts_per_turn`: the unit of 0x606C and 0x60FF, a turn a second."""
+        super().__init__(
+            name=name,
+            alias=alias,
+            serial=serial,
+            lrw=lrw,
+            mailbox_bytes=mailbox_bytes,
+            mailbox_delay=mailbox_delay,
+        )
+        positive = {
+            "counts_per_turn": counts_per_turn,
+            "inertia": inertia,
+            "rated_torque": rated_torque,
+            "max_torque_ratio": max_torque_ratio,
+            "max_velocity": max_velocity,
+        }
+        for field, value in positive.items():
+            if not 0 < value < math.inf:
+                raise ValueError(f"{field} must be positive, not {value}")
+        if not 1 <= axes <= _segment.AXES_MAX:
+            raise ValueError(f"a servo has 1 to {_segment.AXES_MAX} axes, not {axes}")
+        if viscous_friction < 0 or coulomb_friction < 0:
+            raise ValueError("friction cannot be negative")
+        self.axes = axes
+        self.counts_per_turn = counts_per_turn
+        self.velocity_counts_per_turn = velocity_counts_per_turn or counts_per_turn
+        self.inertia = inertia
+        self.viscous_friction = viscous_friction
+        self.coulomb_friction = coulomb_friction
+        self.rated_torque = rated_torque
+        self.max_torque_ratio = max_torque_ratio
+        self.max_velocity = max_velocity
+        self.following_error_turns = following_error_turns
+        self.position_limits = position_limits
+
+    def _pdos(self, base: int, default: tuple[int, ...], others: tuple[tuple[int, ...], ...]) -> list[Pdo]:
+        pdos = []
+        sync_manager = 2 if base < 0x1A00 else 3
+        kind = "RxPDO" if base < 0x1A00 else "TxPDO"
+        for axis in range(self.axes):
+            name = f"Axis {axis + 1} {kind}"
+            pdos.append(_pdo(base, name, default, axis, sync_manager))
+            for k, objects in enumerate(others, 1):
+                pdos.append(_pdo(base + k, f"{name} {k + 1}", objects, axis, 0xFF))
+        return pdos
+
+    def description(self) -> Description:
+        rx = self._pdos(0x1600, DEFAULT_RX, ((0x6040, 0x607A), (0x6040, 0x60FF), (0x6040, 0x6071)))
+        tx = self._pdos(0x1A00, DEFAULT_TX, ((0x6041, 0x6064), (0x60F4,), (0x60FD, 0x603F)))
+        return Description(
+            name=self.name,
+            order=f"CVS{self.axes:03d}",
+            group="Servo drives",
+            product_code=0x0005_0000 + self.axes,
+            revision=0x0001_0000,
+            serial=self.serial,
+            alias=self.alias,
+            emulation=False,
+            pdi_type=0x05,
+            mailbox=mailbox_of(self.mailbox_bytes),
+            sync_managers=sync_managers_of(self.mailbox_bytes, rx, tx),
+            fmmus=(1, 2, 3),
+            rx_pdos=tuple(rx),
+            tx_pdos=tuple(tx),
+            clock=True,
+            axes=self.axes,
+            slots=self.axes * _segment.SLOTS_PER_AXIS,
+        )
+
+    def started(self, scheduler: Scheduler) -> None:
+        counts_per_radian = self.counts_per_turn / (2 * math.pi)
+        velocity_gain = self.inertia * VELOCITY_BANDWIDTH
+        for axis in range(self.axes):
+            self.core.make_axis(
+                self.position,
+                axis,
+                inertia=self.inertia,
+                viscous=self.viscous_friction,
+                coulomb=self.coulomb_friction,
+                rated_torque=self.rated_torque,
+                velocity_limit=self.max_velocity,
+                counts_per_radian=counts_per_radian,
+                velocity_per_radian=self.velocity_counts_per_turn / (2 * math.pi),
+                position_gain=POSITION_BANDWIDTH,
+                velocity_gain=velocity_gain,
+                integral_gain=velocity_gain * VELOCITY_BANDWIDTH / 5,
+                boot=BOOT_SECONDS,
+            )
+            self._preset(axis, counts_per_radian)
+        super().started(scheduler)
+        self.core.run_model(self.position, STEP_NS)
+
+    def _preset(self, axis: int, counts_per_radian: float) -> None:
+        low, high = self.position_limits or (0.0, 0.0)
+        deceleration = round(1000 * self.velocity_counts_per_turn / (2 * math.pi))  # 1000 rad/s2
+        for slot, value in (
+            (_segment.SLOT_QUICK_STOP_OPTION, 2),
+            (_segment.SLOT_DISABLE_OPTION, 1),
+            (_segment.SLOT_FAULT_OPTION, 2),
+            (_segment.SLOT_FOLLOWING_WINDOW, round(self.following_error_turns * self.counts_per_turn)),
+            (_segment.SLOT_FOLLOWING_TIME, 10),
+            (_segment.SLOT_LIMIT_MIN, round(low * counts_per_radian)),
+            (_segment.SLOT_LIMIT_MAX, round(high * counts_per_radian)),
+            (_segment.SLOT_MAX_TORQUE, round(1000 * self.max_torque_ratio)),
+            (_segment.SLOT_MAX_SPEED, round(self.max_velocity * 60 / (2 * math.pi))),
+            (_segment.SLOT_QUICK_STOP_DECELERATION, deceleration),
+            (_segment.SLOT_DECELERATION, deceleration // 2),
+            (_segment.SLOT_INTERPOLATION_PERIOD, 1),
+            (_segment.SLOT_INTERPOLATION_EXPONENT, -3),
+        ):
+            self.core.put_slot(self.position, _segment.SLOTS_PER_AXIS * axis + slot, value)
+
+    def add_objects(self, application: Application) -> None:
+        for axis in range(self.axes):
+            self._add_axis(application, axis)
+
+    def _add_axis(self, application: Application, axis: int) -> None:
+        base, slots = AXIS_STRIDE * axis, _segment.SLOTS_PER_AXIS * axis
+        dictionary = application.dictionary
+        for o in OBJECTS:
+            entry = application.slot_entry(o.name, o.data_type, BITS[o.data_type], slots + o.slot, o.access)
+            if o.index == 0x6060:
+                entry = self._checked_mode(entry)
+            dictionary.add_variable(o.index + base, entry)
+
+        def slot(name: str, data_type: int, number_of_slot: int, access: int) -> Entry:
+            return application.slot_entry(name, data_type, BITS[data_type], slots + number_of_slot, access)
+
+        limits = [
+            slot("Min position limit", 4, _segment.SLOT_LIMIT_MIN, RW),
+            slot("Max position limit", 4, _segment.SLOT_LIMIT_MAX, RW),
+        ]
+        dictionary.add_record(0x607D + base, "Software position limit", limits, code=ARRAY)
+        interpolation = [
+            slot("Interpolation time period value", UNSIGNED8, _segment.SLOT_INTERPOLATION_PERIOD, RW),
+            slot("Interpolation time index", INTEGER8, _segment.SLOT_INTERPOLATION_EXPONENT, RW),
+        ]
+        dictionary.add_record(0x60C2 + base, "Interpolation time period", interpolation)
+        torque = round(self.rated_torque * 1000)
+        dictionary.add_variable(0x6075 + base, number("Motor rated current", UNSIGNED32, 1000))
+        dictionary.add_variable(0x6076 + base, number("Motor rated torque", UNSIGNED32, torque))
+        modes = number("Supported drive modes", UNSIGNED32, SUPPORTED_MODES_MASK)
+        dictionary.add_variable(0x6502 + base, modes)
+        encoder = [
+            number("Encoder increments", UNSIGNED32, self.counts_per_turn),
+            number("Motor revolutions", UNSIGNED32, 1),
+        ]
+        dictionary.add_record(0x608F + base, "Position encoder resolution", encoder, code=ARRAY)
+        velocity = [
+            number("Encoder increments per second", UNSIGNED32, self.velocity_counts_per_turn),
+            number("Motor revolutions per second", UNSIGNED32, 1),
+        ]
+        dictionary.add_record(0x6090 + base, "Velocity encoder resolution", velocity, code=ARRAY)
+        outputs = slot("Physical outputs", UNSIGNED32, _segment.SLOT_DIGITAL_OUTPUTS, RX)
+        dictionary.add_record(0x60FE + base, "Digital outputs", [outputs], code=ARRAY)
+        number_of_type = number("Motor type", UNSIGNED16, 0x0003)  # PM synchronous motor
+        dictionary.add_variable(0x6402 + base, number_of_type)
+
+    @staticmethod
+    def _checked_mode(entry: Entry) -> Entry:
+        write = entry.write
+
+        def checked(data: bytes) -> None:
+            if data[0] not in SUPPORTED_MODES:
+                raise Abort(OUT_OF_RANGE)
+            if write is not None:
+                write(data)
+
+        return Entry(
+            entry.name, entry.data_type, entry.bits, entry.access, entry.read, checked, entry.slot
+        )
+
+    # -- what tests look at and turn ----------------------------------------------------------------
+
+    def axis_position(self, axis: int = 0) -> float:
+        """The motor's true position [rad]."""
+        return self.core.axis(self.position, axis)[0]
+
+    @property
+    def position_rad(self) -> float:
+        """The first axis' true position [rad]."""
+        return self.axis_position()
+
+    @property
+    def velocity_rad_s(self) -> float:
+        """The first axis' true velocity [rad/s]."""
+        return self.core.axis(self.position, 0)[1]
+
+    @property
+    def torque_nm(self) -> float:
+        """The first axis' motor torque [N·m]."""
+        return self.core.axis(self.position, 0)[2]
+
+    def drive_state(self, axis: int = 0) -> str:
+        """The state of the CiA 402 machine, in the standard's words."""
+        return STATES[self.core.axis(self.position, axis)[3]]
+
+    def move_to(self, position: float, axis: int = 0) -> None:
+        """Turns the shaft by hand [rad]."""
+        self.core.move_axis(self.position, axis, position)
+
+    def apply_load(self, torque: float, axis: int = 0) -> None:
+        """A torque on the shaft from outside [N·m]."""
+        self.core.load_axis(self.position, axis, torque)
+
+    def inject_fault(self, code: int, axis: int = 0) -> None:
+        """A fault with this error code (0x603F); 0: its cause is gone and it can be reset."""
+        self.core.inject_axis(self.position, axis, code)
+
+    def switch_sto(self, active: bool, axis: int = 0) -> None:
+        """Safe torque off."""
+        self.core.stop_torque(self.position, axis, active)

@@ -1,0 +1,114 @@
+"""The mailbox of a device, ETG.1000.4 §5.6: requests in by SM0, answers out by SM1, one at a time,
+with repeat on request.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections import deque
+from collections.abc import Callable, Iterable
+from typing import Protocol
+
+from catenary.virtual.scheduler import Scheduler
+
+HEADER = struct.Struct("<HHBB")  # length, address, channel and priority, type and counter
+ERROR_PROTOCOL, COE_PROTOCOL = 0, 3
+ERROR_SYNTAX, ERROR_UNSUPPORTED_PROTOCOL, ERROR_TOO_SHORT, ERROR_SIZE = 0x01, 0x02, 0x06, 0x08
+
+
+class MailboxPorts(Protocol):
+    """The two SyncManagers, from the PDI side."""
+
+    def fetch_request(self) -> bytes | None: ...
+
+    def put_answer(self, data: bytes) -> bool: ...
+
+    def take_back_answer(self) -> bytes | None: ...
+
+    def acknowledge_repeat(self) -> None: ...
+
+
+class Mailbox:
+    """Owns the answers on their way to the MainDevice."""
+
+    def __init__(
+        self,
+        ports: MailboxPorts,
+        scheduler: Scheduler,
+        serve: Callable[[bytes], Iterable[bytes]],
+        *,
+        delay_ns: int,
+    ) -> None:
+        self._ports = ports
+        self._scheduler = scheduler
+        self._serve = serve
+        self._delay_ns = delay_ns
+        self.silent = False
+        self.requests = 0
+        self.reset()
+
+    def reset(self) -> None:
+        """As the device enters PRE-OP: nothing is pending, counting starts anew."""
+        self._waiting: deque[bytes] = deque()
+        self._in_buffer: bytes | None = None
+        self._last_read: bytes | None = None
+        self._counter = 0
+        self._fetching = False
+
+    def request_written(self) -> None:
+        if not self._fetching and not self.silent:
+            self._fetching = True
+            self._scheduler.after(self._delay_ns, self._fetch)
+
+    def _fetch(self) -> None:
+        self._fetching = False
+        request = self._ports.fetch_request()
+        if request is None:
+            return
+        self.requests += 1
+        for answer in self._answers(request):
+            self._queue(answer)
+        self._deliver()
+
+    def _answers(self, request: bytes) -> Iterable[tuple[int, bytes]]:
+        length, _address, _channel, kind = HEADER.unpack_from(request)
+        payload = request[HEADER.size : HEADER.size + length]
+        protocol = kind & 0x0F
+        if length > len(request) - HEADER.size:
+            return [(ERROR_PROTOCOL, struct.pack("<HH", 1, ERROR_SIZE))]
+        if protocol != COE_PROTOCOL:
+            return [(ERROR_PROTOCOL, struct.pack("<HH", 1, ERROR_UNSUPPORTED_PROTOCOL))]
+        if length < 3:
+            return [(ERROR_PROTOCOL, struct.pack("<HH", 1, ERROR_TOO_SHORT))]
+        return [(COE_PROTOCOL, answer) for answer in self._serve(payload)]
+
+    def _queue(self, answer: tuple[int, bytes]) -> None:
+        protocol, payload = answer
+        self._counter = self._counter % 7 + 1
+        header = HEADER.pack(len(payload), 0, 0, protocol | self._counter << 4)
+        self._waiting.append(header + payload)
+
+    def send(self, payload: bytes) -> None:
+        """An unasked CoE message: an emergency. The queue is short, as a device's is."""
+        if len(self._waiting) < 16:
+            self._queue((COE_PROTOCOL, payload))
+            self._deliver()
+
+    def _deliver(self) -> None:
+        if self._waiting and not self.silent and self._ports.put_answer(self._waiting[0]):
+            self._in_buffer = self._waiting.popleft()
+
+    def answer_read(self) -> None:
+        if self._in_buffer is not None:
+            self._last_read, self._in_buffer = self._in_buffer, None
+        self._deliver()
+
+    def repeat_requested(self) -> None:
+        """Puts the answer read last into SM1 again, before what lies there; then acknowledges."""
+        if self._last_read is not None:
+            if self._in_buffer is not None and self._ports.take_back_answer() is not None:
+                self._waiting.appendleft(self._in_buffer)
+            self._in_buffer = None
+            self._waiting.appendleft(self._last_read)
+            self._deliver()
+        self._ports.acknowledge_repeat()

@@ -1,0 +1,44 @@
+"""What the application side has to do later: a heap of actions by time and order of asking."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable
+from itertools import count
+from typing import Protocol
+
+FOREVER = (1 << 63) - 1
+
+
+class Clock(Protocol):
+    @property
+    def now(self) -> int: ...
+
+    def wake_at(self, when: int) -> None: ...
+
+
+class Scheduler:
+    """Owns the actions that are due later, on the segment's clock [ns]."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._heap: list[tuple[int, int, Callable[[], None]]] = []
+        self._order = count()
+
+    @property
+    def now(self) -> int:
+        return self._clock.now
+
+    @property
+    def next_due(self) -> int:
+        return self._heap[0][0] if self._heap else FOREVER
+
+    def after(self, delay_ns: int, action: Callable[[], None]) -> None:
+        when = self._clock.now + delay_ns
+        heapq.heappush(self._heap, (when, next(self._order), action))
+        self._clock.wake_at(when)
+
+    def run_due(self) -> None:
+        """Runs what is due now; an action taken out is done, even where it is interrupted."""
+        while self._heap and self._heap[0][0] <= self._clock.now:
+            heapq.heappop(self._heap)[2]()

@@ -1,0 +1,95 @@
+"""The service: runs the applications of all devices, apart from the path of frames.
+
+In virtual time the compiled clock calls it when an event is there or an action is due. In real
+time a thread does, woken by an event descriptor.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import threading
+from collections.abc import Sequence
+
+from catenary.virtual._segment import Core
+from catenary.virtual.devices.device import Device
+from catenary.virtual.scheduler import FOREVER, Scheduler
+
+IDLE_SECONDS = 0.02  # device models are stepped at least this often while no frame comes
+
+
+class Service:
+    """Owns the scheduler of a segment and hands events to its devices."""
+
+    def __init__(self, core: Core, devices: Sequence[Device]) -> None:
+        self.core = core
+        self.scheduler = Scheduler(core)
+        self._devices = devices
+        for position, device in enumerate(devices):
+            device.attach(core, position, self.scheduler)
+        core.start()
+        core.use_service(self.run)
+
+    def run(self) -> int:
+        """Everything that is to be done now; returns when the next is due [ns].
+
+        Ctrl-C may strike anywhere in here: the step it cut is taken again, then it is passed on.
+        """
+        interrupted = False
+        while True:
+            try:
+                self._run_once()
+                break
+            except KeyboardInterrupt:
+                interrupted = True
+        if interrupted:
+            signal.raise_signal(signal.SIGINT)
+        return self.scheduler.next_due
+
+    def _run_once(self) -> None:
+        while True:
+            events = self.core.take_events()
+            for position, flags in events:
+                self._devices[position].handle(flags)
+            self.scheduler.run_due()
+            if not events:
+                return
+
+
+class ServiceThread:
+    """Owns the thread that runs a service in real time."""
+
+    def __init__(self, service: Service) -> None:
+        self._service = service
+        self._event = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+        self._stopping = False
+        self._thread = threading.Thread(target=self._run, name="virtual-service", daemon=True)
+
+    def start(self) -> None:
+        self._service.core.wake_by(self._event)
+        self._thread.start()
+
+    def _run(self) -> None:
+        core = self._service.core
+        poll = select.poll()
+        poll.register(self._event, select.POLLIN)
+        while not self._stopping:
+            core.advance()
+            due = self._service.run()
+            wait = IDLE_SECONDS if due == FOREVER else min((due - core.now) / 1e9, IDLE_SECONDS)
+            if wait > 0 and poll.poll(wait * 1e3):
+                self._drain()
+
+    def _drain(self) -> None:
+        try:
+            os.eventfd_read(self._event)
+        except BlockingIOError:
+            return
+
+    def stop(self) -> None:
+        self._stopping = True
+        os.eventfd_write(self._event, 1)
+        self._thread.join()
+        self._service.core.wake_by(-1)
+        os.close(self._event)

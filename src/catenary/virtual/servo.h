@@ -1,0 +1,348 @@
+/* A servo axis: motor, control loops and the CiA 402 state machine of the drive's side
+ * (IEC 61800-7-201 §10 state machine, §12 to §14 modes), stepped at the device's own cycle.
+ *
+ * Written from the profile, apart from the MainDevice's side, so that they judge each other.
+ * Motor: J dv/dt = T + T_load - b v - T_c sign(v), semi-implicit Euler. Budget: 0.1 us a step. */
+#ifndef CATENARY_VIRTUAL_SERVO_H
+#define CATENARY_VIRTUAL_SERVO_H
+
+#include <math.h>
+
+#include "controller.h"
+
+/* Slots of one axis, by object. `AXIS_SLOTS * axis + slot`; named for Python in devices/servo.py. */
+enum servo_slot {
+    SLOT_CONTROLWORD, SLOT_STATUSWORD, SLOT_MODE, SLOT_MODE_DISPLAY,
+    SLOT_TARGET_POSITION, SLOT_TARGET_VELOCITY, SLOT_TARGET_TORQUE,
+    SLOT_POSITION_OFFSET, SLOT_VELOCITY_OFFSET, SLOT_TORQUE_OFFSET,
+    SLOT_POSITION_DEMAND, SLOT_POSITION, SLOT_VELOCITY, SLOT_TORQUE_DEMAND, SLOT_TORQUE,
+    SLOT_FOLLOWING_ERROR, SLOT_ERROR_CODE, SLOT_DIGITAL_INPUTS, SLOT_DIGITAL_OUTPUTS,
+    SLOT_QUICK_STOP_OPTION, SLOT_SHUTDOWN_OPTION, SLOT_DISABLE_OPTION, SLOT_FAULT_OPTION,
+    SLOT_FOLLOWING_WINDOW, SLOT_FOLLOWING_TIME, SLOT_LIMIT_MIN, SLOT_LIMIT_MAX,
+    SLOT_MAX_TORQUE, SLOT_MAX_SPEED, SLOT_QUICK_STOP_DECELERATION, SLOT_DECELERATION,
+    SLOT_INTERPOLATION_PERIOD, SLOT_INTERPOLATION_EXPONENT, SLOT_VELOCITY_DEMAND,
+    SLOT_POLARITY, AXIS_SLOTS
+};
+
+enum {
+    NOT_READY, SWITCH_ON_DISABLED, READY_TO_SWITCH_ON, SWITCHED_ON, OPERATION_ENABLED,
+    QUICK_STOP_ACTIVE, FAULT_REACTION_ACTIVE, FAULT
+};
+
+enum { CSP = 8, CSV = 9, CST = 10 };
+
+enum {
+    ERROR_OVERCURRENT = 0x2310, ERROR_STO = 0xFF01, ERROR_FOLLOWING = 0x8611,
+    ERROR_COMMUNICATION = 0x7500, ERROR_OVERSPEED = 0x8400
+};
+
+typedef enum { RAMP_NONE, RAMP_TO_DISABLED, RAMP_AND_STAY, RAMP_TO_READY, RAMP_TO_SWITCHED_ON, RAMP_TO_FAULT } ramp_end;
+
+typedef struct servo_axis {
+    /* the machine, SI */
+    double inertia, viscous, coulomb, load;           /* kg m2, N m s/rad, N m, N m */
+    double rated_torque, velocity_limit;              /* N m, rad/s */
+    double counts_per_radian, velocity_per_radian;    /* units of 0x6064 a rad; of 0x606C a rad/s */
+    double position_gain, velocity_gain, integral_gain;
+    /* its state */
+    double position, velocity, torque, integral;      /* rad, rad/s, N m, N m */
+    /* set-points */
+    int64_t target;                                   /* unwrapped target position, counts */
+    double command, command_velocity, ramp;           /* counts; rad/s; rad/s */
+    double interpolated;                              /* seconds left to reach the target */
+    double following_time;                            /* seconds outside the window */
+    int state, mode;
+    ramp_end ramping;
+    uint16_t last_controlword, injected;
+    uint8_t sto, fed;                                 /* safe torque off; process data is valid */
+    double boot;                                      /* seconds until ready for anything */
+} servo_axis;
+
+static const uint16_t statuswords[] = {
+    [NOT_READY] = 0x0000, [SWITCH_ON_DISABLED] = 0x0040, [READY_TO_SWITCH_ON] = 0x0021,
+    [SWITCHED_ON] = 0x0023, [OPERATION_ENABLED] = 0x0027, [QUICK_STOP_ACTIVE] = 0x0007,
+    [FAULT_REACTION_ACTIVE] = 0x000F, [FAULT] = 0x0008};
+
+static inline int64_t wrap32(int64_t counts) { return (int32_t)(uint32_t)(uint64_t)counts; }
+
+static inline int servo_powered(const servo_axis *a) {
+    return a->state == OPERATION_ENABLED || a->state == QUICK_STOP_ACTIVE || a->state == FAULT_REACTION_ACTIVE;
+}
+
+static inline int64_t servo_counts(const servo_axis *a) {
+    return llround(a->position * a->counts_per_radian);
+}
+
+/* Loops restart from where the motor is: nothing commanded earlier counts. */
+static void servo_hold(servo_axis *a) {
+    a->target = servo_counts(a);
+    a->command = (double)a->target;
+    a->command_velocity = 0;
+    a->ramp = a->velocity;
+    a->integral = 0;
+    a->interpolated = 0;
+    a->following_time = 0;
+}
+
+static void servo_fault(controller *c, servo_axis *a, int64_t *slots, uint16_t code) {
+    if (a->state == FAULT || a->state == FAULT_REACTION_ACTIVE)
+        return;
+    slots[SLOT_ERROR_CODE] = code;
+    c->emergency = code;
+    raise_event(c, EVENT_EMERGENCY);
+    int gentle = a->state == OPERATION_ENABLED && slots[SLOT_FAULT_OPTION] != 0 && !a->sto;
+    a->ramp = a->velocity;
+    a->ramping = gentle ? RAMP_TO_FAULT : RAMP_NONE;
+    a->state = gentle ? FAULT_REACTION_ACTIVE : FAULT;
+}
+
+static void servo_quick_stop(servo_axis *a, int64_t option) {
+    a->ramp = a->velocity;
+    if (option == 0) {
+        a->state = SWITCH_ON_DISABLED;
+        a->ramping = RAMP_NONE;
+        return;
+    }
+    a->state = QUICK_STOP_ACTIVE;
+    a->ramping = option >= 5 ? RAMP_AND_STAY : RAMP_TO_DISABLED;
+}
+
+/* Leaves OPERATION_ENABLED for `state`, at once or after a ramp. */
+static void servo_leave(servo_axis *a, int64_t option, int state, ramp_end ramp) {
+    a->ramp = a->velocity;
+    a->ramping = option == 0 ? RAMP_NONE : ramp;
+    if (option == 0)
+        a->state = state;
+}
+
+/* One controlword: commands are patterns of bits 0 to 3 and an edge of bit 7. */
+static void servo_command(controller *c, servo_axis *a, int64_t *slots) {
+    uint16_t word = (uint16_t)slots[SLOT_CONTROLWORD];
+    int reset = (word & 0x80) && !(a->last_controlword & 0x80);
+    a->last_controlword = word;
+    int disable_voltage = !(word & 0x02), quick_stop = (word & 0x06) == 0x02;
+    int shutdown = (word & 0x07) == 0x06, switch_on = (word & 0x07) == 0x07;
+    int enable = (word & 0x0F) == 0x0F;
+    switch (a->state) {
+    case NOT_READY:
+    case FAULT_REACTION_ACTIVE:
+        return;
+    case SWITCH_ON_DISABLED:
+        if (shutdown && !a->sto)
+            a->state = READY_TO_SWITCH_ON;                                  /* 2 */
+        return;
+    case READY_TO_SWITCH_ON:
+        if (disable_voltage || quick_stop)
+            a->state = SWITCH_ON_DISABLED;                                  /* 7 */
+        else if (switch_on)
+            a->state = SWITCHED_ON;                                         /* 3 */
+        return;
+    case SWITCHED_ON:
+        if (disable_voltage || quick_stop)
+            a->state = SWITCH_ON_DISABLED;                                  /* 10 */
+        else if (shutdown)
+            a->state = READY_TO_SWITCH_ON;                                  /* 6 */
+        else if (enable) {
+            servo_hold(a);
+            a->state = OPERATION_ENABLED;                                   /* 4 */
+            a->ramping = RAMP_NONE;
+        }
+        return;
+    case OPERATION_ENABLED:
+        if (disable_voltage)
+            a->state = SWITCH_ON_DISABLED;                                  /* 9 */
+        else if (quick_stop)
+            servo_quick_stop(a, slots[SLOT_QUICK_STOP_OPTION]);             /* 11 */
+        else if (a->ramping != RAMP_NONE)
+            return;
+        else if (shutdown)
+            servo_leave(a, slots[SLOT_SHUTDOWN_OPTION], READY_TO_SWITCH_ON, RAMP_TO_READY);      /* 8 */
+        else if (switch_on && !enable)
+            servo_leave(a, slots[SLOT_DISABLE_OPTION], SWITCHED_ON, RAMP_TO_SWITCHED_ON);        /* 5 */
+        return;
+    case QUICK_STOP_ACTIVE:
+        if (disable_voltage)
+            a->state = SWITCH_ON_DISABLED;                                  /* 12 */
+        else if (enable && a->ramping == RAMP_AND_STAY && fabs(a->velocity) < 0.05) {
+            servo_hold(a);
+            a->state = OPERATION_ENABLED;                                   /* 16 */
+            a->ramping = RAMP_NONE;
+        }
+        return;
+    case FAULT:
+        if (reset && a->injected == 0) {
+            slots[SLOT_ERROR_CODE] = 0;
+            c->emergency = 0;
+            raise_event(c, EVENT_EMERGENCY);
+            a->state = SWITCH_ON_DISABLED;                                  /* 15 */
+        }
+        return;
+    }
+}
+
+/* What ends a ramp at standstill. */
+static void servo_standstill(servo_axis *a) {
+    static const int after[] = {[RAMP_TO_DISABLED] = SWITCH_ON_DISABLED, [RAMP_TO_READY] = READY_TO_SWITCH_ON,
+                                [RAMP_TO_SWITCHED_ON] = SWITCHED_ON, [RAMP_TO_FAULT] = FAULT};
+    if (a->ramping == RAMP_NONE || a->ramping == RAMP_AND_STAY || a->ramp != 0 || fabs(a->velocity) > 0.05)
+        return;
+    a->state = after[a->ramping];
+    a->ramping = RAMP_NONE;
+}
+
+static void servo_supervise(controller *c, servo_axis *a, int64_t *slots, double dt) {
+    if (a->sto && (servo_powered(a) || a->state == SWITCHED_ON || a->state == READY_TO_SWITCH_ON))
+        a->state = SWITCH_ON_DISABLED;
+    if (a->injected)
+        servo_fault(c, a, slots, a->injected);
+    if (fabs(a->velocity) > 1.2 * a->velocity_limit && servo_powered(a))
+        servo_fault(c, a, slots, ERROR_OVERSPEED);
+    if (a->state != OPERATION_ENABLED || a->mode != CSP || a->ramping != RAMP_NONE) {
+        a->following_time = 0;
+        return;
+    }
+    int64_t window = slots[SLOT_FOLLOWING_WINDOW];
+    int outside = window != 0xFFFFFFFF && llabs(slots[SLOT_FOLLOWING_ERROR]) > window;
+    a->following_time = outside ? a->following_time + dt : 0;
+    if (outside && a->following_time * 1e3 >= (double)slots[SLOT_FOLLOWING_TIME])
+        servo_fault(c, a, slots, ERROR_FOLLOWING);
+}
+
+static double clamp(double value, double limit) { return fmax(-limit, fmin(limit, value)); }
+
+/* A new target position is approached linearly within the interpolation period, 0x60C2. */
+static void servo_interpolate(servo_axis *a, const int64_t *slots, int fresh, double dt) {
+    int64_t goal = slots[SLOT_TARGET_POSITION] + slots[SLOT_POSITION_OFFSET];
+    int64_t unwrapped = a->target + wrap32(goal - a->target);
+    int64_t least = slots[SLOT_LIMIT_MIN], most = slots[SLOT_LIMIT_MAX];
+    if (least < most)
+        unwrapped = unwrapped < least ? least : unwrapped > most ? most : unwrapped;
+    if (fresh || unwrapped != a->target) {
+        double period = (double)slots[SLOT_INTERPOLATION_PERIOD] * pow(10.0, (double)slots[SLOT_INTERPOLATION_EXPONENT]);
+        a->interpolated = fmin(fmax(period, dt), 1.0);
+        a->target = unwrapped;
+    }
+    double before = a->command;
+    if (a->interpolated > dt * 1.001) {
+        a->command += ((double)a->target - a->command) * dt / a->interpolated;
+        a->interpolated -= dt;
+    } else {
+        a->command = (double)a->target;
+        a->interpolated = 0;
+    }
+    a->command_velocity = (a->command - before) / dt / a->counts_per_radian;
+}
+
+static double servo_velocity_loop(servo_axis *a, double velocity, double feed_forward, double limit, double dt) {
+    double error = clamp(velocity, a->velocity_limit) - a->velocity;
+    double torque = a->velocity_gain * error + a->integral + feed_forward;
+    if (fabs(torque) < limit || error * torque < 0)
+        a->integral += a->integral_gain * error * dt;
+    a->integral = clamp(a->integral, limit);
+    return torque;
+}
+
+/* Down a ramp of the velocity to zero, whatever the mode was. */
+static double servo_ramp(servo_axis *a, const int64_t *slots, double limit, double dt) {
+    int quick = a->state == QUICK_STOP_ACTIVE || a->state == FAULT_REACTION_ACTIVE;
+    int64_t raw = slots[quick ? SLOT_QUICK_STOP_DECELERATION : SLOT_DECELERATION];
+    double step = fmax(1e-3, (double)raw / a->velocity_per_radian) * dt;
+    a->ramp = fabs(a->ramp) <= step ? 0 : a->ramp - copysign(step, a->ramp);
+    return servo_velocity_loop(a, a->ramp, 0, limit, dt);
+}
+
+static double servo_drive(servo_axis *a, const int64_t *slots, int fresh, double dt) {
+    double limit = a->rated_torque * (double)slots[SLOT_MAX_TORQUE] * 1e-3;
+    double feed_forward = (double)slots[SLOT_TORQUE_OFFSET] * 1e-3 * a->rated_torque;
+    double torque;
+    if (a->ramping != RAMP_NONE)
+        torque = servo_ramp(a, slots, limit, dt);
+    else if (a->mode == CSP) {
+        servo_interpolate(a, slots, fresh, dt);
+        double offset = (double)slots[SLOT_VELOCITY_OFFSET] / a->velocity_per_radian;
+        double error = a->command / a->counts_per_radian - a->position;
+        torque = servo_velocity_loop(a, a->position_gain * error + a->command_velocity + offset, feed_forward, limit, dt);
+    } else if (a->mode == CSV) {
+        a->command_velocity = (double)(slots[SLOT_TARGET_VELOCITY] + slots[SLOT_VELOCITY_OFFSET]) / a->velocity_per_radian;
+        torque = servo_velocity_loop(a, a->command_velocity, feed_forward, limit, dt);
+    } else if (a->mode == CST) {
+        torque = (double)slots[SLOT_TARGET_TORQUE] * 1e-3 * a->rated_torque + feed_forward;
+        if (fabs(a->velocity) > a->velocity_limit && torque * a->velocity > 0)
+            torque = 0;
+    } else
+        torque = servo_velocity_loop(a, 0, 0, limit, dt);
+    return clamp(torque, limit);
+}
+
+static void servo_motor(servo_axis *a, double dt) {
+    double net = a->torque + a->load - a->viscous * a->velocity;
+    double friction = a->coulomb * dt / a->inertia;
+    double velocity = a->velocity + net * dt / a->inertia;
+    /* dry friction stops a motor; it never turns it round */
+    velocity = fabs(velocity) <= friction ? 0 : velocity - copysign(friction, velocity);
+    a->velocity = velocity;
+    a->position += velocity * dt;
+}
+
+static uint16_t servo_statusword(const servo_axis *a, const int64_t *slots) {
+    uint16_t word = statuswords[a->state];
+    word |= 0x0200;                                          /* remote: controlword is obeyed */
+    if (!a->sto)
+        word |= 0x0010;
+    if (a->state == READY_TO_SWITCH_ON || a->state == SWITCHED_ON || a->state == OPERATION_ENABLED)
+        word |= 0x0020;                                      /* quick stop is not active */
+    if (a->state != OPERATION_ENABLED)
+        return word;
+    int cyclic = a->mode == CSP || a->mode == CSV || a->mode == CST;
+    if (cyclic && a->ramping == RAMP_NONE && a->fed)
+        word |= 0x1000;                                      /* follows the set-point */
+    if (a->mode == CSP && a->following_time > 0)
+        word |= 0x2000;
+    int64_t least = slots[SLOT_LIMIT_MIN], most = slots[SLOT_LIMIT_MAX];
+    if (a->mode == CSP && least < most && (a->target == least || a->target == most))
+        word |= 0x0800;
+    return word;
+}
+
+static void servo_show(servo_axis *a, int64_t *slots) {
+    int64_t counts = servo_counts(a);
+    slots[SLOT_POSITION] = wrap32(counts);
+    slots[SLOT_VELOCITY] = wrap32(llround(a->velocity * a->velocity_per_radian));
+    slots[SLOT_TORQUE] = llround(1e3 * a->torque / a->rated_torque);
+    slots[SLOT_TORQUE_DEMAND] = slots[SLOT_TORQUE];
+    slots[SLOT_POSITION_DEMAND] = wrap32(a->mode == CSP && servo_powered(a) ? llround(a->command) : counts);
+    slots[SLOT_VELOCITY_DEMAND] = wrap32(llround(a->command_velocity * a->velocity_per_radian));
+    slots[SLOT_FOLLOWING_ERROR] = wrap32(slots[SLOT_POSITION_DEMAND] - slots[SLOT_POSITION]);
+    slots[SLOT_DIGITAL_INPUTS] = (slots[SLOT_DIGITAL_INPUTS] & ~8ll) | (a->sto ? 8 : 0);
+    slots[SLOT_MODE_DISPLAY] = a->mode;
+    slots[SLOT_STATUSWORD] = servo_statusword(a, slots);
+}
+
+/* The mode changes at standstill of the set-point: the loops restart bumplessly. */
+static void servo_change_mode(servo_axis *a, const int64_t *slots) {
+    int mode = (int)slots[SLOT_MODE];
+    if (mode == a->mode || (mode != CSP && mode != CSV && mode != CST && mode != 0))
+        return;                                              /* unknown: the display keeps the old one */
+    double integral = a->integral;
+    servo_hold(a);
+    a->integral = integral;
+    a->mode = mode;
+}
+
+/* `fed`: the process data is valid (OPERATIONAL, watchdog content); `fresh`: it came since the last step. */
+static void servo_step(controller *c, servo_axis *a, int64_t *slots, int fed, int fresh, double dt) {
+    if (a->state == NOT_READY && (a->boot -= dt) <= 0)
+        a->state = SWITCH_ON_DISABLED;                       /* 0, 1 */
+    if (a->fed && !fed && a->state == OPERATION_ENABLED)
+        servo_fault(c, a, slots, ERROR_COMMUNICATION);
+    a->fed = (uint8_t)fed;
+    servo_change_mode(a, slots);
+    servo_command(c, a, slots);
+    servo_supervise(c, a, slots, dt);
+    a->torque = servo_powered(a) ? servo_drive(a, slots, fresh, dt) : 0;
+    servo_motor(a, dt);
+    servo_standstill(a);
+    servo_show(a, slots);
+}
+
+#endif

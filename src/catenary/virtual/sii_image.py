@@ -1,0 +1,114 @@
+"""SII images made from a description, ETG.2010: header, strings, general, FMMU, SyncManagers, PDOs,
+clocks. Written apart from `catenary.wire.sii`, which decodes: the two judge each other.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+
+from catenary.virtual.description import VENDOR_ID, Description, Pdo
+
+STRINGS, GENERAL, FMMU, SYNC_MANAGER, TX_PDO, RX_PDO, CLOCK, END = 10, 30, 40, 41, 50, 51, 60, 0xFFFF
+COE_PROTOCOL = 0x0004
+HEADER_BYTES = 128
+
+
+class _Strings:
+    """Owns the string category: each string once, numbered from 1; 0 is none."""
+
+    def __init__(self) -> None:
+        self.texts: list[bytes] = []
+
+    def number(self, text: str) -> int:
+        encoded = text.encode("latin-1", "replace")[:255]
+        if not encoded or (encoded not in self.texts and len(self.texts) == 255):
+            return 0
+        if encoded not in self.texts:
+            self.texts.append(encoded)
+        return self.texts.index(encoded) + 1
+
+    def encode(self) -> bytes:
+        return bytes([len(self.texts)]) + b"".join(bytes([len(t)]) + t for t in self.texts)
+
+
+def checksum(configuration: bytes) -> int:
+    """CRC-8 of the first 14 bytes: x^8 + x^2 + x + 1, start 0xFF."""
+    crc = 0xFF
+    for byte in configuration[:14]:
+        crc ^= byte
+        for _ in range(8):
+            crc = (crc << 1 ^ 0x07 if crc & 0x80 else crc << 1) & 0xFF
+    return crc
+
+
+def _header(device: Description, size: int) -> bytes:
+    pdi_control = device.pdi_type | (0x0100 if device.emulation else 0)
+    configuration = struct.pack("<HHHHH4x", pdi_control, 0, 100, 0, device.alias)
+    words = configuration + struct.pack("<H", checksum(configuration))
+    words += struct.pack("<4I", VENDOR_ID, device.product_code, device.revision, device.serial)
+    words += bytes(8 + 8)  # delays, bootstrap mailbox
+    box = device.mailbox
+    if box is None:
+        words += bytes(10)
+    else:
+        words += struct.pack(
+            "<5H", box.receive_offset, box.receive_size, box.send_offset, box.send_size, COE_PROTOCOL
+        )
+    words = words.ljust(124, b"\0")
+    return words + struct.pack("<HH", max(size * 8 // 1024 - 1, 0), 1)
+
+
+def _general(device: Description, strings: _Strings) -> bytes:
+    group, order = strings.number(device.group), strings.number(device.order)
+    name = strings.number(device.name)
+    details = device.mailbox.coe_details if device.mailbox else 0
+    identification = 0x10 if device.identification else 0
+    return struct.pack(
+        "<BBBBxBBBBBBBhBxHH12x",
+        *(group, 0, order, name, details, 0, 0, 0, device.axes, 0, identification),
+        *(device.current_milliampere, group, 0x0011, 0x0012 if device.identification else 0),
+    )
+
+
+def _pdos(pdos: Sequence[Pdo], strings: _Strings) -> bytes:
+    out = b""
+    for pdo in pdos:
+        count, sync_manager = len(pdo.entries), pdo.sync_manager
+        out += struct.pack("<HBBBBH", pdo.index, count, sync_manager, 0, strings.number(pdo.name), 0)
+        for e in pdo.entries:
+            name = strings.number(e.name)
+            out += struct.pack("<HBBBBH", e.index, e.subindex, name, e.data_type, e.bits, 0)
+    return out
+
+
+def _clock(strings: _Strings) -> bytes:
+    free = struct.pack("<IIIhHhBB4x", 0, 0, 0, 0, 0, 0, strings.number("FreeRun"), 0)
+    return free + struct.pack("<IIIhHhBB4x", 0, 0, 0, 1, 0x0300, 1, strings.number("DC Sync0"), 0)
+
+
+def _category(kind: int, content: bytes) -> bytes:
+    padded = content + b"\0" * (len(content) % 2)
+    return struct.pack("<HH", kind, len(padded) // 2) + padded
+
+
+def make_sii_image(device: Description) -> bytes:
+    """The whole EEPROM, a power of two of at least 2 KiB, unused bytes 0xFF."""
+    strings = _Strings()
+    parts = [(GENERAL, _general(device, strings)), (FMMU, bytes(device.fmmus))]
+    managers = b"".join(
+        struct.pack("<HHBBBB", s.start, s.length, s.control, 0, s.enable, s.kind)
+        for s in device.sync_managers
+    )
+    parts.append((SYNC_MANAGER, managers))
+    parts += [(TX_PDO, _pdos([pdo], strings)) for pdo in device.tx_pdos]
+    parts += [(RX_PDO, _pdos([pdo], strings)) for pdo in device.rx_pdos]
+    if device.clock and device.axes:
+        parts.append((CLOCK, _clock(strings)))
+    parts.insert(0, (STRINGS, strings.encode()))
+    body = b"".join(_category(kind, content) for kind, content in parts if content)
+    body += struct.pack("<HH", END, 0xFFFF)
+    size = 2048
+    while size < HEADER_BYTES + len(body):
+        size *= 2
+    return (_header(device, size) + body).ljust(size, b"\xff")

@@ -1,0 +1,120 @@
+"""The EtherCAT state machine of a device with a microcontroller, ETG.1000.6 §6.4.
+
+A request is judged, prepared, and answered after the time such a device takes. In an error state
+nothing is obeyed until it is acknowledged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from catenary.virtual.scheduler import Scheduler
+
+INIT, PRE_OP, BOOT, SAFE_OP, OP = 1, 2, 3, 4, 8
+ACKNOWLEDGE = ERROR = 0x10
+IDENTIFICATION = 0x20
+
+INVALID_STATE_CHANGE = 0x0011
+UNKNOWN_STATE = 0x0012
+BOOTSTRAP_NOT_SUPPORTED = 0x0013
+INVALID_MAILBOX_CONFIGURATION = 0x0016
+NO_VALID_OUTPUTS = 0x0019
+SYNC_MANAGER_WATCHDOG = 0x001B
+INVALID_OUTPUT_CONFIGURATION = 0x001D
+INVALID_INPUT_CONFIGURATION = 0x001E
+
+UPWARDS = {(INIT, PRE_OP), (PRE_OP, SAFE_OP), (SAFE_OP, OP)}
+MILLISECOND = 1_000_000
+OUTPUTS_TIMEOUT_NS = 200 * MILLISECOND
+
+
+class Controlled(Protocol):
+    """The controller and application a state machine rules."""
+
+    def fetch_al_control(self) -> int: ...
+
+    def show_al_status(self, status: int, code: int) -> None: ...
+
+    def check_state(self, state: int) -> int:
+        """0, or the AL status code why `state` cannot be entered."""
+        ...
+
+    def enter_state(self, before: int, state: int) -> None: ...
+
+    def awaits_outputs(self) -> bool: ...
+
+
+class StateMachine:
+    """Owns the AL state of one device, and the faults injected into it."""
+
+    def __init__(self, device: Controlled, scheduler: Scheduler, identification: int) -> None:
+        self._device = device
+        self._scheduler = scheduler
+        self._identification = identification
+        self._request = 0  # counts requests: a later one overtakes an earlier
+        self.state = INIT
+        self.code = 0
+        self.transition_ns = MILLISECOND
+        self.refused: dict[int, int] = {}  # state → AL status code
+        self.delays: dict[int, int | None] = {}  # state → [ns]; None: it is never reached
+
+    def obey(self) -> None:
+        """AL control was written."""
+        control = self._device.fetch_al_control()
+        requested, acknowledged = control & 0x0F, bool(control & ACKNOWLEDGE)
+        if self.code and not acknowledged:
+            return
+        self._request += 1
+        self.code = 0
+        refusal = self._judge(requested)
+        if refusal:
+            self._later(self.transition_ns, lambda: self.fail(self.state, refusal))
+            return
+        delay = self.delays.get(requested, self.transition_ns)
+        if delay is None:
+            return
+        identify = bool(control & IDENTIFICATION)
+        self._later(delay, lambda: self._enter(requested, identify))
+
+    def _later(self, delay_ns: int, action: Callable[[], None]) -> None:
+        request = self._request
+        self._scheduler.after(delay_ns, lambda: action() if request == self._request else None)
+
+    def _judge(self, requested: int) -> int:
+        if requested in self.refused:
+            return self.refused[requested]
+        if requested == BOOT:
+            return BOOTSTRAP_NOT_SUPPORTED
+        if requested not in (INIT, PRE_OP, SAFE_OP, OP):
+            return UNKNOWN_STATE
+        if requested > self.state and (self.state, requested) not in UPWARDS:
+            return INVALID_STATE_CHANGE
+        return self._device.check_state(requested)
+
+    def _enter(self, state: int, identify: bool) -> None:
+        if state == OP and self.state == SAFE_OP and self._device.awaits_outputs():
+            # nothing came yet: the first process data takes it up, or the time runs out
+            self._later(OUTPUTS_TIMEOUT_NS, lambda: self.fail(SAFE_OP, NO_VALID_OUTPUTS))
+            self.waiting_for_outputs = identify, self._request
+            return
+        before, self.state = self.state, state
+        self._device.enter_state(before, state)
+        shown = IDENTIFICATION if identify and self._identification else 0
+        self._device.show_al_status(state | shown, self._identification if shown else 0)
+
+    waiting_for_outputs: tuple[bool, int] | None = None
+
+    def outputs_arrived(self) -> None:
+        waiting, self.waiting_for_outputs = self.waiting_for_outputs, None
+        if waiting is not None and waiting[1] == self._request:
+            self._request += 1
+            self._enter(OP, waiting[0])
+
+    def fail(self, state: int, code: int) -> None:
+        """Falls to, or stays in, `state` and shows the error."""
+        self._request += 1
+        before, self.state, self.code = self.state, state, code
+        if before != state:
+            self._device.enter_state(before, state)
+        self._device.show_al_status(state | ERROR, code)
