@@ -66,11 +66,14 @@ def acknowledge(station: Station, pending: DeviceState) -> Procedure[DeviceState
     [reply] = yield [write(Command.FPWR, station.address, AL_CONTROL, word)]
     answered(reply, station, "acknowledgement of an AL error")
     deadline, pace = Deadline(TIMEOUTS[State.INIT]), Pace()
+    patience = Deadline(0.01)
     while True:
         [reply] = yield [read_memory(station.address, _STATUS_START, _STATUS_SIZE, repeatable=True)]
         now = _decoded(answered(reply, station, "AL status"))
         if not now.error:
             return now
+        if patience.passed(reply):
+            yield [write(Command.FPWR, station.address, AL_CONTROL, AlControl(state).word)]
         if deadline.passed(reply):
             raise _refused(station, state, now, "does not take the acknowledgement of its error")
         yield after(pace.pause())

@@ -23,6 +23,9 @@ from catenary.wire.register import (
 )
 from catenary.wire.sii_interface import CONFIGURATION_FORCE
 
+# Devices with AL emulation mirror AL control, acknowledge bit included (as SOEM knows too): who
+# still shows an error after this time [s] gets the plain request.
+EMULATION_PATIENCE = 0.01
 RESET_TIMEOUT = 2.0  # [s]; who is not in INIT then is asked by name
 STATION_BASE = 0x1001  # of position 0; 0 would answer nothing, small numbers are likely aliases
 _FMMU_BLOCK = (0x0600, 256)  # all 16 FMMUs
@@ -94,11 +97,14 @@ def _all_to(state: State, device_count: int, timeout: float) -> Procedure[bool]:
     [reply] = yield [write(Command.BWR, 0, AL_CONTROL, AlControl(state, acknowledge=True).word)]
     if device_count and reply.working_counter != device_count:
         raise _came_and_went(device_count, reply.working_counter)
-    deadline, pace = Deadline(timeout), Pace()
+    deadline, pace, patience = Deadline(timeout), Pace(), Deadline(EMULATION_PATIENCE)
     while True:
         [reply] = yield [read(Command.BRD, 0, AL_STATUS)]
-        if AL_STATUS.unpack(reply.data) & 0x1F == state:
+        now = AL_STATUS.unpack(reply.data) & 0x1F
+        if now == state:
             return True
+        if now == state | 0x10 and patience.passed(reply):
+            yield [write(Command.BWR, 0, AL_CONTROL, AlControl(state).word)]
         if reply.lost or deadline.passed(reply):
             return False
         yield after(pace.pause())
