@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from catenary.errors import DecodeError
@@ -54,6 +54,7 @@ def test_single_values_do_not_overlap_unless_one_is_a_half_of_the_other():
 
 
 @pytest.mark.parametrize("each", INTEGERS, ids=str)
+@settings(max_examples=10)
 @given(data=st.data())
 def test_integers_come_back(each, data):
     raw = data.draw(st.binary(min_size=each.size, max_size=each.size))

@@ -38,11 +38,19 @@ words = st.binary(max_size=40).map(lambda data: data + b"\x00" * (len(data) % 2)
 vendor_categories = st.builds(Category, st.integers(0x8000, 0xFFFE), words)
 
 
-def test_the_checksum_of_real_headers():
-    # First 14 bytes and checksum of an EL3004 as printed by `ethercat sii_read -v` are not at hand;
-    # these are of the EK1100 and EL2004 in ethercrab's dumps.
-    assert checksum_of(bytes(14)) == 0x42 ^ checksum_of(bytes(14)) ^ 0x42
-    assert checksum_of(b"\x01" + bytes(13)) != checksum_of(bytes(14))
+# The first 8 words of ethercrab's dumps/ek1100-eeprom-dump.bin, el2004-eeprom-dump.bin, and of
+# MetalMusings EaserCAT 2000
+@pytest.mark.parametrize(
+    "words",
+    [
+        "000d0000000000000000000000004600",
+        "0401000000000f00000000000000d800",
+        "80060344640000000000000000001400",
+    ],
+)
+def test_the_checksum_of_real_headers(words):
+    data = bytes.fromhex(words)
+    assert checksum_of(data) == data[14]
 
 
 @given(headers)
