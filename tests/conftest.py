@@ -14,8 +14,12 @@ from pathlib import Path
 from typing import Never
 
 import pytest
+from hypothesis import settings
 
 from catenary.realtime import private_network
+
+settings.register_profile("catenary", deadline=None)  # nothing timed is asserted
+settings.load_profile("catenary")
 
 ROOT = Path(__file__).resolve().parent.parent
 FIXTURE_OF = {"shared_data": "shared_data", "wire": "veth", "tshark": "tshark"}  # marker: fixture

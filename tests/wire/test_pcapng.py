@@ -13,16 +13,22 @@ from hypothesis import strategies as st
 from catenary.errors import DecodeError
 from catenary.wire.pcapng import (
     Capture,
+    Direction,
     Interface,
     Packet,
     decode_capture,
     encode_header,
     encode_packet,
+    encode_statistics,
 )
 from tests.fuzz.fuzz_wire import FRAME
 from tests.wire.strategies import u64
 
-packets = st.builds(Packet, u64, st.binary(max_size=100), st.text(max_size=20))
+packets = st.builds(
+    Packet,
+    *(u64, st.binary(max_size=100), st.text(max_size=20)),
+    direction=st.sampled_from(Direction),
+)
 
 # A big-endian section of one Ethernet interface (microseconds, as no resolution is given), an
 # enhanced and a simple packet: by the figures of draft-ietf-opsawg-pcapng.
@@ -71,7 +77,7 @@ def test_resolutions(resolution, ticks, time_ns):
 
 
 def test_other_blocks_are_left_out():
-    statistics = struct.pack("<III", 5, 16, 0) + struct.pack("<I", 16)
+    statistics = encode_statistics(5, received=3, dropped=1)
     assert decode_capture(encode_header() + statistics).packets == ()
 
 
