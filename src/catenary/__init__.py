@@ -1,1 +1,80 @@
-"""Catenary: real-time EtherCAT for Python."""
+"""Catenary: real-time EtherCAT for Python.
+
+    import catenary as cat
+
+    with cat.MainDevice("eth0") as main:
+        arm = cat.Drives(main.scan().drives, mode="csp", counts_per_turn=2**20)
+        with cat.Loop(arm, period=1e-3) as loop:
+            home = arm.actual.position.copy()
+            for cycle in loop:
+                arm.target.position[:] = home + 0.1 * math.sin(cycle.time)
+
+Names load when they are used: `import catenary` costs nothing and imports no NumPy, whose threads
+would keep a process from entering a network namespace.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from catenary import types
+    from catenary.bus import SubDevice
+    from catenary.drive import Drives, Inputs, Outputs
+    from catenary.errors import CatenaryError
+    from catenary.loop import Cycle, Loop
+    from catenary.target import MainDevice
+    from catenary.virtual import (
+        AnalogInputs,
+        Coupler,
+        DigitalInputs,
+        DigitalOutputs,
+        Segment,
+        Servo,
+    )
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "AnalogInputs",
+    "CatenaryError",
+    "Coupler",
+    "Cycle",
+    "DigitalInputs",
+    "DigitalOutputs",
+    "Drives",
+    "Inputs",
+    "Loop",
+    "MainDevice",
+    "Outputs",
+    "Segment",
+    "Servo",
+    "SubDevice",
+    "types",
+]
+
+_VIRTUAL = ("AnalogInputs", "Coupler", "DigitalInputs", "DigitalOutputs", "Segment", "Servo")
+_HOMES = {
+    "CatenaryError": "catenary.errors",
+    "Cycle": "catenary.loop",
+    "Drives": "catenary.drive",
+    "Inputs": "catenary.drive",
+    "Loop": "catenary.loop",
+    "MainDevice": "catenary.target",
+    "Outputs": "catenary.drive",
+    "SubDevice": "catenary.bus",
+    **dict.fromkeys(_VIRTUAL, "catenary.virtual"),
+}
+
+
+def __getattr__(name: str) -> object:
+    if name in ("errors", "types"):
+        return import_module(f"catenary.{name}")
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
