@@ -1,0 +1,102 @@
+"""State changes against a state register fed by hand."""
+
+from __future__ import annotations
+
+import struct
+
+import pytest
+
+from catenary.errors import ResponseTimeout, SegmentError, StateError
+from catenary.procedure.al_state import read_state, request_state
+from catenary.procedure.exchange import Reply, Request
+from catenary.wire.al import State
+from tests.procedure.by_hand import STATION, play
+
+
+class Registers:
+    """Owns AL control and AL status of one device. `refuse`: state asked for → status code."""
+
+    def __init__(self, word: int = 0x01, code: int = 0) -> None:
+        self.word, self.code = word, code
+        self.refuse: dict[int, int] = {}
+        self.slow = 0  # reads until a state change shows
+        self.asked: list[int] = []
+        self.working_counter = 1
+        self._coming: int | None = None
+
+    def __call__(self, request: Request) -> Reply:
+        address = request.address >> 16
+        if address == 0x0120:
+            self._ask(int.from_bytes(request.data, "little"))
+            return Reply(request.data, self.working_counter)
+        assert address == 0x0130
+        if self._coming is not None:
+            self.slow -= 1
+            if self.slow < 0:
+                self.word, self._coming = self._coming, None
+        return Reply(struct.pack("<HHH", self.word, 0, self.code), self.working_counter)
+
+    def _ask(self, word: int) -> None:
+        self.asked.append(word)
+        state, acknowledge = word & 0x0F, word & 0x10
+        if self.word & 0x10 and not acknowledge:
+            return  # an error must be acknowledged before anything else
+        if state in self.refuse:
+            self.word, self.code = (self.word & 0x0F) | 0x10, self.refuse[state]
+            return
+        self._coming, self.code = state, 0
+
+
+def test_a_state_is_asked_for_once_and_waited_for() -> None:
+    device = Registers()
+    device.slow = 20
+    assert play(request_state(STATION, State.PRE_OP), device).state is State.PRE_OP
+    assert device.asked == [0x02]
+
+
+def test_a_device_that_is_there_already_is_left_alone() -> None:
+    device = Registers(0x02)
+    play(request_state(STATION, State.PRE_OP), device)
+    assert device.asked == []
+
+
+def test_a_pending_error_is_acknowledged_first() -> None:
+    device = Registers(0x12, code=0x001B)
+    assert play(request_state(STATION, State.SAFE_OP), device).state is State.SAFE_OP
+    assert device.asked == [0x12, 0x04]
+
+
+def test_a_refusal_tells_code_text_and_cause() -> None:
+    device = Registers(0x02)
+    device.refuse = {0x04: 0x001E}
+    with pytest.raises(StateError, match=r"Probe.*SAFE-OP.*PRE-OP.*0x001E.*nput") as caught:
+        play(request_state(STATION, State.SAFE_OP), device)
+    error = caught.value
+    assert (error.position, error.requested, error.actual, error.code) == (3, 4, 2, 0x001E)
+    assert error.hint
+
+
+def test_a_state_never_reached_ends_in_time() -> None:
+    device = Registers(0x02)
+    device.slow = 1_000_000
+    with pytest.raises(StateError, match="did not reach"):
+        play(request_state(STATION, State.SAFE_OP, timeout=0.5), device, steps=1000)
+
+
+def test_a_state_that_is_none_is_waited_out() -> None:
+    device = Registers(0x00)
+    assert play(request_state(STATION, State.PRE_OP), device).state is State.PRE_OP
+
+
+def test_a_device_that_went_away_is_named() -> None:
+    device = Registers()
+    device.working_counter = 0
+    with pytest.raises(ResponseTimeout, match=r"Probe.*0x1004"):
+        play(read_state(STATION), device)
+
+
+def test_two_devices_at_one_address_are_noticed() -> None:
+    device = Registers()
+    device.working_counter = 2
+    with pytest.raises(SegmentError, match="2 devices"):
+        play(read_state(STATION), device)

@@ -1,0 +1,110 @@
+"""What the mailbox does when frames are lost: no message lost, none executed twice."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from catenary.errors import MailboxError, ResponseTimeout
+from catenary.procedure.mailbox import drain
+from catenary.procedure.sdo import download, upload
+from catenary.wire.coe import UploadRequest
+from catenary.wire.mailbox import Mailbox, Type
+from tests.procedure.by_hand import Dictionary, MailboxDevice, channel, play
+
+OBJECT = {(0x2000, 0): b"\x11\x22\x33\x44"}
+
+
+def test_a_read_lost_on_its_way_back_is_repeated_by_the_toggle() -> None:
+    device = MailboxDevice(Dictionary(OBJECT))
+    device.lose_back = {1}  # 0 is the write, 1 the read
+    lane = channel()
+    assert play(upload(lane, 0x2000, 0), device) == OBJECT[0x2000, 0]
+    assert lane.repeat_requested
+    assert len(device.received) == 1
+
+
+def test_a_read_lost_on_its_way_out_is_read_again() -> None:
+    device = MailboxDevice(Dictionary(OBJECT))
+    device.lose_out = {1}
+    assert play(upload(channel(), 0x2000, 0), device) == OBJECT[0x2000, 0]
+
+
+def test_a_write_lost_on_its_way_out_is_written_again() -> None:
+    device = MailboxDevice(Dictionary(OBJECT))
+    device.lose_out = {0}
+    assert play(upload(channel(), 0x2000, 0), device) == OBJECT[0x2000, 0]
+    assert len(device.received) == 1
+
+
+def test_a_write_lost_on_its_way_back_is_not_written_again() -> None:
+    dictionary = Dictionary({})
+    device = MailboxDevice(dictionary)
+    device.deduplicates = False  # as stacks that ignore the counter
+    device.lose_back = {0}
+    play(download(channel(), 0x2000, 0, b"\x01"), device)
+    assert dictionary.written == [(0x2000, 0, b"\x01")]
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    out=st.sets(st.integers(0, 40), max_size=6),
+    back=st.sets(st.integers(0, 40), max_size=6),
+)
+def test_whatever_is_lost_a_segmented_download_arrives_once(out: set[int], back: set[int]) -> None:
+    data = bytes(i & 0xFF for i in range(700))
+    dictionary = Dictionary({})
+    device = MailboxDevice(dictionary)
+    device.lose_out, device.lose_back = out, back - out
+    try:
+        play(download(channel(), 0x2000, 1, data), device)
+    except ResponseTimeout:
+        longest = _longest_run(out | back)
+        assert longest >= 5  # only when as many in a row were lost as are forgiven
+        return
+    assert dictionary.written == [(0x2000, 1, data)]
+
+
+def test_a_device_that_never_answers_is_named_in_time() -> None:
+    with pytest.raises(ResponseTimeout, match=r"device 3 \(Probe\): no answer"):
+        play(upload(channel(), 0x2000, 0), MailboxDevice(lambda _: []))
+
+
+def test_a_device_that_does_not_read_its_mailbox_is_named_in_time() -> None:
+    device = MailboxDevice(lambda _: [])
+    device.deaf = True
+    lane = channel()
+    with pytest.raises(ResponseTimeout):
+        play(upload(lane, 0x2000, 0), device)
+    with pytest.raises(MailboxError, match="has not read its mailbox"):
+        play(upload(lane, 0x2000, 0), device)
+
+
+def test_counters_go_from_1_to_7_and_again() -> None:
+    device = MailboxDevice(Dictionary(OBJECT))
+    lane = channel()
+    for _ in range(9):
+        play(upload(lane, 0x2000, 0), device)
+    assert [message.counter for message in device.received] == [1, 2, 3, 4, 5, 6, 7, 1, 2]
+
+
+def test_drain_empties_the_mailbox() -> None:
+    device = MailboxDevice(lambda _: [])
+    answers = Dictionary(OBJECT)
+    for message in (_request(), _request()):
+        for answer in answers(message):
+            device.send(answer)
+    assert len(play(drain(channel(), lambda message: message), device)) == 2
+
+
+def _request() -> Mailbox:
+    return Mailbox(Type.COE, UploadRequest(0x2000, 0).encode())
+
+
+def _longest_run(numbers: set[int]) -> int:
+    longest = run = 0
+    for number in range(max(numbers, default=0) + 1):
+        run = run + 1 if number in numbers else 0
+        longest = max(longest, run)
+    return longest

@@ -1,0 +1,97 @@
+"""SDO services against a dictionary fed by hand."""
+
+from __future__ import annotations
+
+import pytest
+
+from catenary.errors import MailboxError, SdoAbort
+from catenary.procedure.sdo import download, upload
+from catenary.wire.coe import (
+    Abort,
+    Emergency,
+    UploadRequest,
+    UploadSegment,
+    UploadSegmentRequest,
+    decode_coe,
+)
+from catenary.wire.mailbox import ErrorReply, Mailbox, Type
+from tests.procedure.by_hand import Dictionary, MailboxDevice, channel, coe, play
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 4, 5, 112, 113, 300, 5000])
+def test_upload_of_every_kind(size: int) -> None:
+    data = bytes(i & 0xFF for i in range(size))
+    device = MailboxDevice(Dictionary({(0x2000, 7): data}))
+    assert play(upload(channel(), 0x2000, 7), device) == data
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 4, 5, 112, 113, 300, 5000])
+def test_download_of_every_kind(size: int) -> None:
+    data = bytes(i & 0xFF for i in range(size))
+    dictionary = Dictionary({})
+    play(download(channel(), 0x2000, 7, data), MailboxDevice(dictionary))
+    assert dictionary.written == [(0x2000, 7, data)]
+
+
+def test_an_abort_names_device_object_and_reason() -> None:
+    with pytest.raises(SdoAbort, match=r"Probe.*0x2001:00.*does not exist") as caught:
+        play(upload(channel(), 0x2001, 0), MailboxDevice(Dictionary({})))
+    assert (caught.value.position, caught.value.index, caught.value.code) == (
+        3,
+        0x2001,
+        0x0602_0000,
+    )
+
+
+def test_a_mailbox_error_is_told_in_words() -> None:
+    device = MailboxDevice(lambda _: [Mailbox(Type.ERROR, ErrorReply(2).encode())])
+    with pytest.raises(MailboxError, match="protocol is not supported"):
+        play(upload(channel(), 0x1000, 0), device)
+
+
+def test_an_emergency_on_the_way_is_put_aside() -> None:
+    emergency = Emergency(0x7500, 0x11, b"\x01\x02\x03\x04\x05")
+    dictionary = Dictionary({(0x1000, 0): b"\x92\x01\x02\x00"})
+    device = MailboxDevice(lambda message: [coe(emergency), *dictionary(message)])
+    lane = channel()
+    assert play(upload(lane, 0x1000, 0), device) == b"\x92\x01\x02\x00"
+    assert list(lane.emergencies) == [emergency]
+    assert lane.dropped == 0
+
+
+def test_a_late_answer_to_another_question_is_dropped() -> None:
+    dictionary = Dictionary({(0x1000, 0): b"\x01", (0x1001, 0): b"\x02"})
+    late = Dictionary({(0x1000, 0): b"\x01"})
+    lane = channel()
+    device = MailboxDevice(dictionary)
+    for answer in late(Mailbox(Type.COE, UploadRequest(0x1000, 0).encode())):
+        device.send(answer)
+    assert play(upload(lane, 0x1001, 0), device) == b"\x02"
+    assert lane.dropped == 1
+
+
+def test_a_wrong_toggle_is_aborted() -> None:
+    dictionary = Dictionary({(0x2000, 0): bytes(500)})
+
+    def respond(message: Mailbox) -> list[Mailbox]:
+        if isinstance(decode_coe(message.data), UploadSegmentRequest):
+            return [coe(UploadSegment(True, False, bytes(100)))]
+        return dictionary(message)
+
+    device = MailboxDevice(respond)
+    with pytest.raises(MailboxError, match="Toggle bit not changed"):
+        play(upload(channel(), 0x2000, 0), device)
+    assert decode_coe(device.received[-1].data) == Abort(0x2000, 0, 0x0503_0000)
+
+
+def test_segments_beyond_the_size_told_are_aborted() -> None:
+    dictionary = Dictionary({(0x2000, 0): bytes(200)})
+
+    def respond(message: Mailbox) -> list[Mailbox]:
+        request = decode_coe(message.data)
+        if isinstance(request, UploadSegmentRequest):
+            return [coe(UploadSegment(request.toggle, False, bytes(100)))]
+        return dictionary(message)
+
+    with pytest.raises(MailboxError, match="against the protocol"):
+        play(upload(channel(), 0x2000, 0), MailboxDevice(respond))
