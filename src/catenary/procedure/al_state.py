@@ -20,6 +20,8 @@ TIMEOUTS = {
     State.OP: 10.0,
 }
 
+ACKNOWLEDGE_TIMEOUT = 0.5  # [s]
+
 _STATUS_START = AL_STATUS.address
 _STATUS_SIZE = AL_STATUS_CODE.address + AL_STATUS_CODE.size - AL_STATUS.address
 
@@ -60,22 +62,29 @@ def request_state(
 
 
 def acknowledge(station: Station, pending: DeviceState) -> Procedure[DeviceState]:
-    """Acknowledges an AL error by asking for the state the device is in already."""
+    """Acknowledges an AL error by asking for the state the device is in already.
+
+    A controller that emulates its application only copies AL control into AL status, so its error
+    is the copy of an acknowledgement: asking without one clears it.
+    """
     state = pending.state or State.INIT
-    word = AlControl(state, acknowledge=True).word
-    [reply] = yield [write(Command.FPWR, station.address, AL_CONTROL, word)]
-    answered(reply, station, "acknowledgement of an AL error")
-    deadline, pace = Deadline(TIMEOUTS[State.INIT]), Pace()
-    patience = Deadline(0.01)
+    now = pending
+    for control in (AlControl(state, acknowledge=True), AlControl(state)):
+        [reply] = yield [write(Command.FPWR, station.address, AL_CONTROL, control.word)]
+        answered(reply, station, "acknowledgement of an AL error")
+        now = yield from _await_no_error(station, ACKNOWLEDGE_TIMEOUT)
+        if not now.error:
+            return now
+    raise _refused(station, state, now, "does not take the acknowledgement of its error in")
+
+
+def _await_no_error(station: Station, timeout: float) -> Procedure[DeviceState]:
+    deadline, pace = Deadline(timeout), Pace()
     while True:
         [reply] = yield [read_memory(station.address, _STATUS_START, _STATUS_SIZE, repeatable=True)]
         now = _decoded(answered(reply, station, "AL status"))
-        if not now.error:
+        if not now.error or deadline.passed(reply):
             return now
-        if patience.passed(reply):
-            yield [write(Command.FPWR, station.address, AL_CONTROL, AlControl(state).word)]
-        if deadline.passed(reply):
-            raise _refused(station, state, now, "does not take the acknowledgement of its error")
         yield after(pace.pause())
 
 

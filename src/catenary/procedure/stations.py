@@ -23,9 +23,6 @@ from catenary.wire.register import (
 )
 from catenary.wire.sii_interface import CONFIGURATION_FORCE
 
-# Devices with AL emulation mirror AL control, acknowledge bit included (as SOEM knows too): who
-# still shows an error after this time [s] gets the plain request.
-EMULATION_PATIENCE = 0.01
 RESET_TIMEOUT = 2.0  # [s]; who is not in INIT then is asked by name
 STATION_BASE = 0x1001  # of position 0; 0 would answer nothing, small numbers are likely aliases
 _FMMU_BLOCK = (0x0600, 256)  # all 16 FMMUs
@@ -93,18 +90,27 @@ def bring_all_down(stations: Sequence[Station], state: State, timeout: float) ->
 
 
 def _all_to(state: State, device_count: int, timeout: float) -> Procedure[bool]:
-    """Asks all at once, errors acknowledged, and waits. Whether all are there."""
-    [reply] = yield [write(Command.BWR, 0, AL_CONTROL, AlControl(state, acknowledge=True).word)]
-    if device_count and reply.working_counter != device_count:
-        raise _came_and_went(device_count, reply.working_counter)
-    deadline, pace, patience = Deadline(timeout), Pace(), Deadline(EMULATION_PATIENCE)
+    """Asks all at once, errors acknowledged, and waits. Whether all are there.
+
+    Controllers that emulate their application copy AL control into AL status, the acknowledgement
+    too, which then looks like an error: so the state is asked for a second time without it.
+    """
+    for control in (AlControl(state, acknowledge=True), AlControl(state)):
+        [reply] = yield [write(Command.BWR, 0, AL_CONTROL, control.word)]
+        if reply.working_counter != device_count:
+            raise _came_and_went(device_count, reply.working_counter)
+        if not (yield from _await_all(control.word, timeout)):
+            return False
+    return True
+
+
+def _await_all(word: int, timeout: float) -> Procedure[bool]:
+    """Until the or of all AL status words is `word`, or the same without an error."""
+    deadline, pace = Deadline(timeout), Pace()
     while True:
         [reply] = yield [read(Command.BRD, 0, AL_STATUS)]
-        now = AL_STATUS.unpack(reply.data) & 0x1F
-        if now == state:
+        if AL_STATUS.unpack(reply.data) & 0x1F in (word, word & 0x0F):
             return True
-        if now == state | 0x10 and patience.passed(reply):
-            yield [write(Command.BWR, 0, AL_CONTROL, AlControl(state).word)]
         if reply.lost or deadline.passed(reply):
             return False
         yield after(pace.pause())
