@@ -8,6 +8,7 @@ from catenary.virtual.devices import (
     DigitalOutputs,
     Servo,
 )
+from catenary.virtual.server import Server, serve
 from catenary.virtual.segment import FrameCounters, Segment, demo_segment
 
 __all__ = [
@@ -18,6 +19,8 @@ __all__ = [
     "DigitalOutputs",
     "FrameCounters",
     "Segment",
+    "Server",
     "Servo",
     "demo_segment",
+    "serve",
 ]

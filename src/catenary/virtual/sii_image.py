@@ -60,8 +60,8 @@ def _header(device: Description, size: int) -> bytes:
 
 
 def _general(device: Description, strings: _Strings) -> bytes:
+    name = strings.number(device.name)  # first: SOEM shows string 1 as the name
     group, order = strings.number(device.group), strings.number(device.order)
-    name = strings.number(device.name)
     details = device.mailbox.coe_details if device.mailbox else 0
     identification = 0x10 if device.identification else 0
     return struct.pack(

@@ -1,0 +1,148 @@
+"""A segment as a TOML file: `[[device]]` tables in the order of the line.
+
+    [[device]]
+    kind = "servo"
+    name = "shoulder"
+    alias = 10
+    counts_per_turn = 1048576
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+
+from catenary.errors import ConfigurationError
+from catenary.virtual.devices.analog_inputs import AnalogInputs
+from catenary.virtual.devices.coupler import Coupler
+from catenary.virtual.devices.device import Device
+from catenary.virtual.devices.digital_inputs import DigitalInputs
+from catenary.virtual.devices.digital_outputs import DigitalOutputs
+from catenary.virtual.devices.servo import Servo
+
+
+class _Table(
+    msgspec.Struct, forbid_unknown_fields=True, tag_field="kind", frozen=True, kw_only=True
+):
+    name: str = ""
+    alias: int = 0
+    serial: int = 0
+
+
+class CouplerTable(_Table, tag="coupler", frozen=True, kw_only=True):
+    def device(self) -> Device:
+        return Coupler(
+            name=self.name or "Catenary virtual coupler", alias=self.alias, serial=self.serial
+        )
+
+
+class DigitalOutputsTable(_Table, tag="digital_outputs", frozen=True, kw_only=True):
+    bits: int = 4
+    lrw: bool = True
+
+    def device(self) -> Device:
+        return DigitalOutputs(
+            bits=self.bits, name=self.name, alias=self.alias, serial=self.serial, lrw=self.lrw
+        )
+
+
+class DigitalInputsTable(_Table, tag="digital_inputs", frozen=True, kw_only=True):
+    bits: int = 4
+    lrw: bool = True
+
+    def device(self) -> Device:
+        return DigitalInputs(
+            bits=self.bits, name=self.name, alias=self.alias, serial=self.serial, lrw=self.lrw
+        )
+
+
+class AnalogInputsTable(_Table, tag="analog_inputs", frozen=True, kw_only=True):
+    channels: int = 2
+    mailbox_bytes: int = 128
+    mailbox_delay: float = 300e-6
+    lrw: bool = True
+
+    def device(self) -> Device:
+        return AnalogInputs(
+            channels=self.channels,
+            name=self.name,
+            alias=self.alias,
+            serial=self.serial,
+            mailbox_bytes=self.mailbox_bytes,
+            mailbox_delay=self.mailbox_delay,
+            lrw=self.lrw,
+        )
+
+
+class ServoTable(_Table, tag="servo", frozen=True, kw_only=True):
+    axes: int = 1
+    counts_per_turn: int = 1 << 20
+    velocity_counts_per_turn: int | None = None
+    inertia: float = 5e-4
+    viscous_friction: float = 1e-3
+    coulomb_friction: float = 0.02
+    rated_torque: float = 2.0
+    max_torque_ratio: float = 3.0
+    max_velocity: float = 350.0
+    following_error_turns: float = 0.25
+    position_limits: tuple[float, float] | None = None
+    mailbox_bytes: int = 128
+    mailbox_delay: float = 300e-6
+    lrw: bool = True
+
+    def device(self) -> Device:
+        return Servo(
+            name=self.name or "Catenary virtual servo",
+            alias=self.alias,
+            serial=self.serial,
+            axes=self.axes,
+            counts_per_turn=self.counts_per_turn,
+            velocity_counts_per_turn=self.velocity_counts_per_turn,
+            inertia=self.inertia,
+            viscous_friction=self.viscous_friction,
+            coulomb_friction=self.coulomb_friction,
+            rated_torque=self.rated_torque,
+            max_torque_ratio=self.max_torque_ratio,
+            max_velocity=self.max_velocity,
+            following_error_turns=self.following_error_turns,
+            position_limits=self.position_limits,
+            mailbox_bytes=self.mailbox_bytes,
+            mailbox_delay=self.mailbox_delay,
+            lrw=self.lrw,
+        )
+
+
+DeviceTable = (
+    CouplerTable | DigitalOutputsTable | DigitalInputsTable | AnalogInputsTable | ServoTable
+)
+
+
+class SegmentFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    device: tuple[DeviceTable, ...]
+
+
+def _made(table: DeviceTable, position: int, path: str | Path) -> Device:
+    try:
+        return table.device()
+    except ValueError as error:
+        raise ConfigurationError(
+            f"{path}: device[{position}]: {error}", hint="docs/virtual.md lists the fields"
+        ) from error
+
+
+def read_devices(path: str | Path) -> list[Device]:
+    """The devices of a file. ConfigurationError names the file and the field."""
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise ConfigurationError(f"{path}: {error.strerror}") from error
+    try:
+        file = msgspec.toml.decode(content, type=SegmentFile)
+    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+        raise ConfigurationError(
+            f"{path}: {error}", hint="docs/virtual.md lists the fields"
+        ) from error
+    if not file.device:
+        raise ConfigurationError(f"{path}: a segment needs at least one [[device]]")
+    return [_made(table, position, path) for position, table in enumerate(file.device)]

@@ -1,0 +1,178 @@
+"""The segment on a NIC: an EtherCAT segment for any MainDevice at the other end of the cable."""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+import fcntl
+import os
+import signal
+import socket
+import struct
+import threading
+from collections.abc import Callable
+from types import FrameType
+
+from catenary.errors import LinkError
+from catenary.virtual.segment import Segment
+from catenary.virtual.service import ServiceThread
+
+ETHERCAT = 0x88A4
+SOL_PACKET, PACKET_IGNORE_OUTGOING, PACKET_QDISC_BYPASS = 263, 23, 20
+IFF_UP = 1
+PR_SET_PDEATHSIG = 1
+SIOCGIFFLAGS = 0x8913
+PERMISSION = "sudo setcap cap_net_raw,cap_sys_nice,cap_ipc_lock=ep .venv/bin/python"
+
+
+def _interface_flags(interface: str) -> int:
+    """Asked of the kernel, not of /sys: that may show another network namespace."""
+    request = struct.pack("16sH14x", interface.encode(), 0)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as anything:
+        try:
+            answer = fcntl.ioctl(anything, SIOCGIFFLAGS, request)
+        except OSError:
+            raise LinkError(
+                f"there is no network interface {interface!r}",
+                hint="`ip link` lists those there are",
+            ) from None
+    return int(struct.unpack_from("16sH", answer)[1])
+
+
+def _open_socket(interface: str) -> socket.socket:
+    if "/" in interface or not interface or len(interface) > 15:
+        raise LinkError(f"{interface!r} is no name of a network interface")
+    if not _interface_flags(interface) & IFF_UP:
+        raise LinkError(f"{interface} is down", hint=f"sudo ip link set {interface} up")
+    try:
+        packet = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, 0)
+    except PermissionError:
+        raise LinkError(f"raw frames on {interface} are not permitted", hint=PERMISSION) from None
+    try:
+        packet.setsockopt(SOL_PACKET, PACKET_IGNORE_OUTGOING, 1)
+        packet.setsockopt(SOL_PACKET, PACKET_QDISC_BYPASS, 1)
+        packet.bind((interface, ETHERCAT))
+    except OSError as error:
+        packet.close()
+        raise LinkError(f"{interface}: {os.strerror(error.errno or 0)}") from error
+    return packet
+
+
+def _raise_priority(interface: str, priority: int) -> None:
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+    except PermissionError:
+        raise LinkError(
+            f"the packet loop on {interface} may not run at SCHED_FIFO {priority}", hint=PERMISSION
+        ) from None
+
+
+class Server:
+    """Owns a served segment: the socket, the packet loop's thread and the service's.
+
+    `priority`: SCHED_FIFO 1 to 99 for the packet loop; None: as the process.
+    """
+
+    def __init__(self, segment: Segment, interface: str, *, priority: int | None = None) -> None:
+        if segment.clock != "monotonic":
+            raise ValueError('a served segment needs real time: Segment(..., clock="monotonic")')
+        if priority is not None and not 1 <= priority <= 99:
+            raise ValueError(f"SCHED_FIFO has priorities 1 to 99, not {priority}")
+        self.segment = segment
+        self.interface = interface
+        self._priority = priority
+        self._socket = _open_socket(interface)
+        self._stop = os.eventfd(0, os.EFD_CLOEXEC)
+        self._service = ServiceThread(segment.service)
+        self._thread = threading.Thread(target=self._run, name="virtual-packets", daemon=True)
+        self._started = threading.Event()
+        self._ended = threading.Event()
+        self.failure: LinkError | None = None
+
+    def start(self) -> None:
+        self._service.start()
+        self._thread.start()
+        self._started.wait()
+        if self._ended.is_set():
+            self.stop()
+            self.raise_failure()
+
+    def _run(self) -> None:
+        try:
+            if self._priority is not None:
+                _raise_priority(self.interface, self._priority)
+            self._started.set()
+            result = self.segment.core.answer_packets(self._socket.fileno(), self._stop)
+            if result < 0:
+                hint = "the interface went down" if -result == errno.ENETDOWN else ""
+                raise LinkError(f"{self.interface}: {os.strerror(-result)}", hint=hint)
+        except LinkError as failure:
+            self.failure = failure
+        finally:
+            self._ended.set()
+            self._started.set()
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Waits until the packet loop ends [s]; whether it has."""
+        return self._ended.wait(timeout)
+
+    def raise_failure(self) -> None:
+        if self.failure is not None:
+            raise self.failure
+
+    def stop(self) -> None:
+        if self._socket.fileno() < 0:
+            return
+        os.eventfd_write(self._stop, 1)
+        self._thread.join()
+        self._service.stop()
+        self._socket.close()
+        os.close(self._stop)
+
+    def __enter__(self) -> Server:
+        self.start()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.stop()
+
+
+def die_with_parent() -> None:
+    """This process gets SIGTERM when its parent ends: for segments served on another's behalf."""
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0) != 0:
+        raise OSError(ctypes.get_errno(), "prctl(PR_SET_PDEATHSIG) was refused")
+
+
+def serve(
+    segment: Segment,
+    interface: str,
+    *,
+    priority: int | None = None,
+    with_parent: bool = False,
+    ready: Callable[[], None] | None = None,
+) -> None:
+    """Answers on `interface` until SIGINT or SIGTERM; call it in the main thread.
+
+    `with_parent`: ends with the parent process too. `ready` is called once frames are answered.
+    LinkError: no such interface, down, or not permitted.
+    """
+    if with_parent:
+        die_with_parent()
+    server = Server(segment, interface, priority=priority)
+    asked_to_end = threading.Event()
+
+    def end(_signal: int, _frame: FrameType | None) -> None:
+        asked_to_end.set()
+
+    before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        with server:
+            if ready is not None:
+                ready()
+            while not asked_to_end.wait(0.2) and not server.wait(0):
+                server.raise_failure()
+        server.raise_failure()
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
