@@ -14,7 +14,8 @@ CYCLE_LAW_DONE: Final[int]  # the law returned "finished"
 CYCLE_STOPPED: Final[int]  # the native thread has ended (stop, or an error of the link)
 CYCLE_NONE: Final[int]  # timeout_ns passed without a new cycle: actual is unchanged
 
-# Bits of axis_flags; bits 6 and 7 hold the goal in force (0 disabled, 1 enabled, 2 quick stop).
+# Bits of axis_flags; bits 6 and 7 hold the goal in force (0 disabled, 1 enabled, 2 quick stop,
+# 3 reset).
 AXIS_FOLLOWED: Final[int]  # set-points are followed: enabled, in the asked mode, bit 12
 AXIS_LIMITED: Final[int]  # the set-point sent last was limited
 AXIS_DROPPED: Final[int]  # the goal dropped to disabled by itself since the last request
@@ -77,8 +78,9 @@ class Engine:
         Afterwards the target buffers hold what was commanded last."""
 
     def spend(self, duration_ns: int) -> None:
-        """Lets time pass as if the application computed that long: in virtual time the instants
-        that fall into it happen without it (threaded, law) or are missed (inline)."""
+        """In virtual time: lets time pass as if the application computed that long. The instants
+        that fall into it happen without it (threaded, law) or are missed (inline). RuntimeError
+        on a link whose time passes by itself."""
 
     def quick_stop_all(self) -> None:
         """Every axis' goal becomes quick stop, then disabled, from the next emit on; what follows

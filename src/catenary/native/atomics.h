@@ -13,5 +13,6 @@ static inline void cat_store_release64(uint64_t *p, uint64_t v) { __atomic_store
 static inline uint32_t cat_exchange32(uint32_t *p, uint32_t v) { return __atomic_exchange_n(p, v, __ATOMIC_ACQ_REL); }
 static inline uint32_t cat_add32(uint32_t *p, uint32_t v) { return __atomic_fetch_add(p, v, __ATOMIC_ACQ_REL); }
 static inline uint32_t cat_or32(uint32_t *p, uint32_t v) { return __atomic_fetch_or(p, v, __ATOMIC_ACQ_REL); }
+static inline void cat_fence(void) { __atomic_thread_fence(__ATOMIC_SEQ_CST); }
 
 #endif

@@ -23,7 +23,10 @@ typedef struct cat_image {
     const uint8_t *inputs;            /* input_size bytes, valid after collect */
     const uint8_t *unit_valid;        /* unit_count flags, of the last collect */
     const uint16_t *unit_counter;     /* unit_count sums of working counters, of the last collect */
+    const uint8_t *ok;                /* one flag, of the last collect: every unit that is not optional is
+                                       * valid and no frame that others need is missing */
     const uint8_t *al_status;         /* one byte: OR of all AL states, bit 4: some device signals an error */
+    const uint16_t *al_counter;       /* one value: devices that answered for it in the last collect */
     const int64_t *frame_stamp;       /* one value: when the last cyclic frame was seen [ns]; 0: none */
 
     /* Sends the frames of this cycle. 0, or -errno of the first frame that could not go. */

@@ -1,0 +1,107 @@
+from libc.stdint cimport int8_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
+
+from catenary.core._handover cimport actual_t, target_t
+from catenary.core._native cimport cat_image
+from catenary.core._numbers cimport number_t
+
+cdef enum:  # bits of axis_flags; 6 and 7: the goal in force
+    FOLLOWED = 1
+    LIMITED = 2
+    DROPPED = 4
+    REFUSED = 8
+    FALLBACK = 16
+    GOAL_SHIFT = 6
+
+cdef enum:
+    BANK_REAL = 0
+    BANK_INTEGER = 1
+    BANK_BIT = 2
+
+cdef struct axis_t:
+    # from the plan
+    number_t controlword
+    number_t statusword
+    number_t mode_target
+    number_t mode_actual
+    number_t target_position
+    number_t target_velocity
+    number_t target_torque
+    number_t actual_position
+    number_t actual_velocity
+    number_t actual_torque
+    uint32_t unit
+    double position_min
+    double position_max
+    double velocity_limit
+    double torque_limit
+    double ramp_velocity       # [rad/s²]
+    double ramp_torque         # [N·m/s]
+    double standstill          # [rad/s] at most: at rest
+    # observed
+    uint8_t known              # its inputs were valid once
+    uint8_t lost               # its unit was invalid lost_limit times in a row
+    uint8_t state
+    int8_t mode_shown
+    uint16_t status
+    uint32_t invalid_in_row
+    uint32_t still_cycles      # in a row, at rest
+    uint64_t last_raw
+    int64_t counts             # last_raw without going round
+    double position
+    double velocity
+    double torque
+    # asked
+    uint32_t request           # the last one taken over
+    uint8_t goal
+    uint16_t command           # command bits of the controlword sent last
+    int8_t mode
+    uint8_t armed              # the application has committed targets since the request
+    uint8_t stopping           # the goal dropped: stop by quick stop rather than by disabling
+    uint8_t clear_reset        # bit 7 is kept clear once, so that it makes an edge
+    uint8_t followed
+    uint8_t flags
+    uint64_t followed_since    # cycle
+    uint32_t climbing_cycles   # since the request, not followed yet
+    uint32_t refused_cycles    # in a row, the target was not finite
+    uint32_t beyond_cycles     # in a row, outside a position limit and leaving
+    # sent
+    double commanded_position
+    double commanded_velocity
+    double commanded_torque
+
+cdef struct column_t:
+    number_t number
+    uint8_t bank
+    uint32_t rank              # in its bank
+
+cdef struct axes_t:
+    cat_image *image
+    uint32_t axis_count
+    uint32_t input_count
+    uint32_t output_count
+    axis_t *axes
+    column_t *input_columns
+    column_t *output_columns
+    double period              # [s]
+    uint32_t lost_limit        # the following in cycles; 0: off
+    uint32_t late_limit_position
+    uint32_t late_limit_velocity
+    uint32_t climbing_limit
+    uint32_t still_limit
+    uint32_t beyond_limit
+    uint32_t uncommitted       # instants in a row without new targets
+    uint32_t stop_asked        # counts; from any thread
+    uint32_t stop_seen
+    uint8_t running            # an application commits targets
+    uint8_t limited            # of the last write
+    uint8_t refused
+    uint8_t dropped            # since the last read
+    uint32_t moving
+
+cdef class Axes:
+    """Owns the axis records and column tables."""
+    cdef axes_t c
+
+cdef void axes_read(axes_t *x, actual_t *out, uint64_t number) noexcept nogil
+cdef void axes_write(axes_t *x, const target_t *target, bint fresh) noexcept nogil
+cdef void axes_follow(const axes_t *x, const actual_t *actual, target_t *target) noexcept nogil

@@ -1,0 +1,319 @@
+# cython: boundscheck=False, wraparound=False, cdivision=True
+"""Axes and columns: between the bytes of the process images and arrays in SI units.
+
+An axis is a CiA 402 drive's slot; every quantity sits where the plan says, or nowhere. Position
+counters of any width are followed round to 64 bits. What may be sent is _guard's decision, how a
+drive is led to a state _cia402's. Budget: 60 ns an axis and direction.
+"""
+
+from libc.math cimport INFINITY, NAN, isfinite
+from libc.stdint cimport int8_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
+from libc.stdlib cimport calloc, free
+
+from catenary.core._cia402 cimport (
+    FAULT_REACTION_ACTIVE,
+    OPERATION_ENABLED,
+    QUICK_STOP_ACTIVE,
+    cia402_state,
+)
+from catenary.core._guard cimport (
+    guard_controlword,
+    guard_observe,
+    guard_request,
+    guard_setpoints,
+    guard_stop,
+)
+from catenary.core._native cimport cat_load_acquire32
+from catenary.core._numbers cimport REAL as REAL_KIND
+from catenary.core._numbers cimport (
+    make_number,
+    number_bits,
+    number_integer,
+    number_put_bits,
+    number_put_value,
+    number_put_wrapped,
+    number_value,
+)
+
+cdef double STANDSTILL_RATIO = 0.01    # of the velocity limit
+cdef double STANDSTILL = 0.05          # [rad/s] where there is no limit
+STILL_NS = 5_000_000                   # at rest for so long: stopped
+BEYOND_NS = 20_000_000                 # CSV: outside a limit and leaving for so long: quick stop
+CLIMBING_NS = 10_000_000_000           # a request to enable lapses
+
+
+# ---- inputs
+
+cdef void read_position(axis_t *a, const uint8_t *inputs, double period) noexcept nogil:
+    cdef number_t *n = &a.actual_position
+    cdef uint64_t raw
+    cdef double before = a.position
+    if n.kind == REAL_KIND:
+        a.position = number_value(n, inputs)
+    else:
+        raw = number_bits(n, inputs)
+        if not a.known:
+            a.counts = number_integer(n, inputs)
+        else:  # the shorter way round
+            a.counts += (<int64_t>((raw - a.last_raw) << (64 - n.bits))) >> (64 - n.bits)
+        a.last_raw = raw
+        a.position = a.counts * n.scale + n.offset
+    if not a.actual_velocity.present:
+        a.velocity = (a.position - before) / period if a.known else 0.0
+
+
+cdef void read_axis(axes_t *x, axis_t *a) noexcept nogil:
+    cdef const uint8_t *inputs = x.image.inputs
+    a.status = <uint16_t>number_bits(&a.statusword, inputs)
+    a.state = cia402_state(a.status)
+    a.mode_shown = a.mode
+    if a.mode_actual.present:
+        a.mode_shown = <int8_t>number_integer(&a.mode_actual, inputs)
+    if a.actual_velocity.present:
+        a.velocity = number_value(&a.actual_velocity, inputs)
+    if a.actual_position.present:
+        read_position(a, inputs, x.period)
+    if a.actual_torque.present:
+        a.torque = number_value(&a.actual_torque, inputs)
+    a.known = 1
+    if -a.standstill <= a.velocity <= a.standstill:
+        if a.still_cycles < x.still_limit:
+            a.still_cycles += 1
+    else:
+        a.still_cycles = 0
+
+
+cdef void read_columns(const axes_t *x, actual_t *out) noexcept nogil:
+    cdef const column_t *c
+    cdef uint32_t k
+    for k in range(x.input_count):
+        c = &x.input_columns[k]
+        if c.bank == BANK_REAL:
+            out.input_reals[c.rank] = number_value(&c.number, x.image.inputs)
+        elif c.bank == BANK_INTEGER:
+            out.input_integers[c.rank] = number_integer(&c.number, x.image.inputs)
+        else:
+            out.input_bits[c.rank] = number_bits(&c.number, x.image.inputs) != 0
+
+
+cdef void axes_read(axes_t *x, actual_t *out, uint64_t number) noexcept nogil:
+    """After collect of cycle `number`: the input image → actual values."""
+    cdef axis_t *a
+    cdef uint32_t i
+    cdef uint8_t before
+    x.moving = 0
+    for i in range(x.axis_count):
+        a = &x.axes[i]
+        before = a.state
+        if x.image.unit_valid[a.unit]:
+            read_axis(x, a)
+        guard_observe(x, a, x.image.unit_valid[a.unit], before, number)
+        if not a.lost and (a.state == OPERATION_ENABLED or a.state == QUICK_STOP_ACTIVE
+                           or a.state == FAULT_REACTION_ACTIVE):
+            x.moving += 1
+        out.position[i] = a.position
+        out.velocity[i] = a.velocity
+        out.torque[i] = a.torque
+        out.commanded_position[i] = a.commanded_position
+        out.commanded_velocity[i] = a.commanded_velocity
+        out.commanded_torque[i] = a.commanded_torque
+        out.statusword[i] = a.status
+        out.mode[i] = a.mode_shown
+        out.state[i] = a.state
+        out.flags[i] = a.flags | (FOLLOWED if a.followed else 0) | (a.goal << GOAL_SHIFT)
+    read_columns(x, out)
+
+
+# ---- outputs
+
+cdef void write_axis(axes_t *x, axis_t *a, uint16_t controlword) noexcept nogil:
+    cdef uint8_t *outputs = x.image.outputs
+    cdef bint cut = False
+    number_put_bits(&a.controlword, outputs, controlword)
+    if a.mode_target.present:
+        number_put_bits(&a.mode_target, outputs, <uint64_t><int64_t>a.mode)
+    if a.target_position.present and a.known:
+        cut |= number_put_wrapped(&a.target_position, outputs, a.commanded_position)
+    if a.target_velocity.present:
+        cut |= number_put_value(&a.target_velocity, outputs, a.commanded_velocity)
+    if a.target_torque.present:
+        cut |= number_put_value(&a.target_torque, outputs, a.commanded_torque)
+    if cut:
+        a.flags |= LIMITED
+
+
+cdef void write_columns(axes_t *x, const target_t *t) noexcept nogil:
+    """A column that is not finite keeps what was sent last."""
+    cdef const column_t *c
+    cdef uint32_t k
+    for k in range(x.output_count):
+        c = &x.output_columns[k]
+        if c.bank == BANK_REAL:
+            if not isfinite(t.output_reals[c.rank]):
+                x.refused = 1
+            elif number_put_value(&c.number, x.image.outputs, t.output_reals[c.rank]):
+                x.limited = 1
+        elif c.bank == BANK_INTEGER:
+            number_put_bits(&c.number, x.image.outputs, <uint64_t>t.output_integers[c.rank])
+        else:
+            number_put_bits(&c.number, x.image.outputs, t.output_bits[c.rank] != 0)
+
+
+cdef void axes_write(axes_t *x, const target_t *target, bint fresh) noexcept nogil:
+    """Before emit: the committed targets, as far as they count → the output image. `fresh`: they
+    were not there at the last instant."""
+    cdef axis_t *a
+    cdef uint32_t i, asked = cat_load_acquire32(&x.stop_asked)
+    cdef uint16_t controlword
+    x.limited = 0
+    x.refused = 0
+    if target.header.hold:
+        x.running = 0
+        x.uncommitted = 0
+        fresh = False
+    elif fresh:
+        x.running = 1
+        x.uncommitted = 0
+    else:
+        x.uncommitted += 1
+    for i in range(x.axis_count):
+        x.axes[i].mode = target.mode[i]
+        guard_request(x, &x.axes[i], target, i)
+    if asked != x.stop_seen:
+        x.stop_seen = asked
+        guard_stop(x)
+    for i in range(x.axis_count):
+        a = &x.axes[i]
+        guard_setpoints(x, a, target, i, fresh)
+        controlword = guard_controlword(x, a, target.controlword_bits[i])
+        write_axis(x, a, controlword)
+        if a.flags & LIMITED:
+            x.limited = 1
+        if a.flags & REFUSED:
+            x.refused = 1
+    write_columns(x, target)
+
+
+cdef void axes_follow(const axes_t *x, const actual_t *actual, target_t *target) noexcept nogil:
+    """Targets of axes that are not followed: the actual position, no velocity, no torque."""
+    cdef uint32_t i
+    for i in range(x.axis_count):
+        if not actual.flags[i] & FOLLOWED:
+            target.position[i] = actual.position[i]
+            target.velocity[i] = 0.0
+            target.torque[i] = 0.0
+
+
+# ---- the edge
+
+def finite_or(value, double absent, where, *, positive=True):
+    """A limit as a float; None: `absent`."""
+    if value is None:
+        return absent
+    if not isfinite(value) or (positive and value <= 0):
+        raise ValueError(f"{where}: {value}")
+    return value
+
+
+def cycles_of(duration_ns, period_ns, where):
+    """Whole cycles that last at least so long; 0 stays 0: off."""
+    if not 0 <= duration_ns < 1 << 62:
+        raise ValueError(f"{where}: {duration_ns}")
+    return min(-(-duration_ns // period_ns), 0x7FFFFFFF)
+
+
+cdef class Axes:
+    def __cinit__(self, plan):
+        self.c.axes = <axis_t *>calloc(len(plan.axes) + 1, sizeof(axis_t))
+        self.c.input_columns = <column_t *>calloc(len(plan.input_columns) + 1, sizeof(column_t))
+        self.c.output_columns = <column_t *>calloc(len(plan.output_columns) + 1, sizeof(column_t))
+        if not (self.c.axes and self.c.input_columns and self.c.output_columns):
+            raise MemoryError
+        if plan.lost_limit < 1:
+            raise ValueError(f"lost_limit: {plan.lost_limit}")
+        self.c.period = plan.period_ns / 1e9
+        self.c.lost_limit = min(plan.lost_limit, 0x7FFFFFFF)
+        self.c.late_limit_position = cycles_of(
+            plan.late_limit_position_ns, plan.period_ns, "late_limit_position_ns"
+        )
+        self.c.late_limit_velocity = cycles_of(
+            plan.late_limit_velocity_ns, plan.period_ns, "late_limit_velocity_ns"
+        )
+        self.c.climbing_limit = cycles_of(CLIMBING_NS, plan.period_ns, "")
+        self.c.still_limit = max(cycles_of(STILL_NS, plan.period_ns, ""), 3)
+        self.c.beyond_limit = cycles_of(BEYOND_NS, plan.period_ns, "")
+        for axis in plan.axes:
+            self.make_axis(axis, plan)
+        self.c.input_count = self.make_columns(plan.input_columns, plan.input_size, True)
+        self.c.output_count = self.make_columns(plan.output_columns, plan.output_size, False)
+
+    def make_axis(self, plan, cycle):
+        name = f"axis {plan.name}"
+        cdef axis_t *a = &self.c.axes[self.c.axis_count]
+        if plan.controlword is None or plan.statusword is None:
+            raise ValueError(f"{name}: controlword and statusword must be mapped")
+        for size, where, number in (
+            (cycle.output_size, "controlword", plan.controlword),
+            (cycle.input_size, "statusword", plan.statusword),
+        ):
+            if number.bit_length != 16:
+                raise ValueError(f"{name}: {where} has {number.bit_length} bits, must be 16")
+        if plan.target_position is not None and plan.actual_position is None:
+            raise ValueError(f"{name}: a position target without an actual position cannot be held")
+        if not 0 <= plan.sync_unit < len(cycle.sync_units):
+            raise ValueError(f"{name}: sync unit {plan.sync_unit} of {len(cycle.sync_units)}")
+        if not -128 <= plan.mode <= 127:
+            raise ValueError(f"{name}: mode {plan.mode}")
+        outputs, inputs = cycle.output_size, cycle.input_size
+        make_number(&a.controlword, plan.controlword, outputs, f"{name} controlword")
+        make_number(&a.statusword, plan.statusword, inputs, f"{name} statusword")
+        make_number(&a.mode_target, plan.mode_target, outputs, f"{name} mode_target")
+        make_number(&a.mode_actual, plan.mode_actual, inputs, f"{name} mode_actual")
+        make_number(&a.target_position, plan.target_position, outputs, f"{name} target_position")
+        make_number(&a.target_velocity, plan.target_velocity, outputs, f"{name} target_velocity")
+        make_number(&a.target_torque, plan.target_torque, outputs, f"{name} target_torque")
+        make_number(&a.actual_position, plan.actual_position, inputs, f"{name} actual_position")
+        make_number(&a.actual_velocity, plan.actual_velocity, inputs, f"{name} actual_velocity")
+        make_number(&a.actual_torque, plan.actual_torque, inputs, f"{name} actual_torque")
+        self.make_limits(plan, name)
+        a.unit = plan.sync_unit
+        a.mode = plan.mode
+        a.mode_shown = 0
+        a.position = a.velocity = a.torque = NAN
+        self.c.axis_count += 1
+
+    def make_limits(self, plan, name):
+        cdef axis_t *a = &self.c.axes[self.c.axis_count]
+        limits = plan.limits
+        a.position_min = finite_or(limits.position_min, -INFINITY, f"{name} position_min", positive=False)
+        a.position_max = finite_or(limits.position_max, INFINITY, f"{name} position_max", positive=False)
+        if a.position_min >= a.position_max:
+            raise ValueError(f"{name}: position limits {a.position_min} to {a.position_max}")
+        if plan.actual_position is None and (limits.position_min, limits.position_max) != (None, None):
+            raise ValueError(f"{name}: position limits without an actual position")
+        a.velocity_limit = finite_or(limits.velocity, INFINITY, f"{name} velocity limit")
+        a.torque_limit = finite_or(limits.torque, INFINITY, f"{name} torque limit")
+        a.ramp_velocity = finite_or(plan.ramp_velocity, INFINITY, f"{name} ramp_velocity")
+        a.ramp_torque = finite_or(plan.ramp_torque, INFINITY, f"{name} ramp_torque")
+        a.standstill = STANDSTILL
+        if limits.velocity is not None:
+            a.standstill = STANDSTILL_RATIO * a.velocity_limit
+
+    def make_columns(self, columns, image_size, bint inputs):
+        cdef column_t *c = self.c.input_columns if inputs else self.c.output_columns
+        ranks = [0, 0, 0]
+        for k, column in enumerate(columns):
+            if column.bank not in (BANK_REAL, BANK_INTEGER, BANK_BIT) or column.number is None:
+                raise ValueError(f"column {column.name}: bank {column.bank}")
+            if column.number.kind == REAL_KIND and column.bank != BANK_REAL:
+                raise ValueError(f"column {column.name}: a real number belongs in the real bank")
+            make_number(&c[k].number, column.number, image_size, f"column {column.name}")
+            c[k].bank = column.bank
+            c[k].rank = ranks[column.bank]
+            ranks[column.bank] += 1
+        return len(columns)
+
+    def __dealloc__(self):
+        free(self.c.axes)
+        free(self.c.input_columns)
+        free(self.c.output_columns)

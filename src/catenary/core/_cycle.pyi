@@ -1,0 +1,1 @@
+"""One cycle in its three orders; used by the compiled modules only."""

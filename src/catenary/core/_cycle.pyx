@@ -1,0 +1,291 @@
+# cython: boundscheck=False, wraparound=False, cdivision=True
+"""One cycle in its three orders, and the instants it keeps.
+
+    threaded   wait, emit, collect by a deadline, publish               in the native thread
+    inline     wait, collect, [Python], emit                            in Python's thread
+    law        wait, collect, law, emit, publish                        in the native thread
+
+In virtual time all three run in the caller's thread. Instants are origin + k·period: late ones are
+skipped and counted, never made up for by a burst.
+
+Phases. receive: wait returned → inputs usable (threaded: last frame seen → inputs published).
+process: the application's body. send: its end → the last cyclic send returned (threaded: wake →).
+in_controller: their sum. tail: what remains before the next wait. round_trip: sent → last frame seen
+(threaded only: the others look at the next instant). Budget: 1 us for three drives, without the link.
+"""
+
+from libc.errno cimport EINTR
+from libc.stdint cimport int32_t, int64_t, uint8_t, uint32_t, uint64_t
+from libc.string cimport memset
+
+from catenary.core._axes cimport axes_follow, axes_read, axes_write
+from catenary.core._handover cimport actual_header_t, handover_latch, handover_publish
+from catenary.core._histogram cimport histogram_add
+from catenary.core._lane cimport lane_send
+from catenary.core._native cimport cat_law_frame
+
+
+cdef inline int64_t now(const cycle_t *c) noexcept nogil:
+    return c.link.now(c.link.self)
+
+
+cdef inline record_t *record_of(cycle_t *c) noexcept nogil:
+    return &c.records[c.number % RECORDS]
+
+
+cdef inline int32_t short_ns(int64_t value) noexcept nogil:
+    return <int32_t>value if value < 0x7FFFFFFF else 0x7FFFFFFF
+
+
+# ---- instants
+
+cdef void cycle_start(cycle_t *c) noexcept nogil:
+    """The first instant is one period from now; after a stop the old grid goes on."""
+    cdef int64_t present = now(c)
+    if c.origin == 0:
+        c.origin = present + c.period
+    c.next = c.origin
+    if present >= c.origin:
+        c.next += ((present - c.origin) // c.period + 1) * c.period
+    c.skipped = 0
+    c.usable = 0
+    c.begun = 0
+
+
+cdef inline void skip(cycle_t *c, int64_t instants) noexcept nogil:
+    c.next += instants * c.period
+    c.skipped += <uint32_t>instants
+    c.late += <uint64_t>instants
+
+
+cdef int cycle_wait(cycle_t *c) noexcept nogil:
+    """Waits for the next instant and opens its cycle. 0; -EINTR: call again; or -errno."""
+    cdef int64_t present = now(c)
+    cdef int rc
+    if present > c.next:
+        skip(c, (present - c.next + c.period - 1) // c.period)
+    rc = c.link.wait_until(c.link.self, c.next, 0)
+    if rc < 0:
+        return rc
+    present = now(c)
+    if present < c.next:
+        return -EINTR
+    if present - c.next >= c.period:
+        skip(c, (present - c.next) // c.period)
+    begin(c, present)
+    return 0
+
+
+cdef void begin(cycle_t *c, int64_t wake) noexcept nogil:
+    cdef record_t *record
+    c.number += 1
+    c.scheduled = c.next
+    c.next += c.period
+    record = record_of(c)
+    memset(record, 0, sizeof(record_t))
+    record.number = c.number
+    record.scheduled_ns = c.scheduled
+    record.wake_ns = wake
+    record.skipped = c.skipped
+    record.period_ns = -1
+    record.receive_ns = -1
+    record.process_ns = -1
+    record.send_ns = -1
+    record.tail_ns = -1
+    record.round_trip_ns = -1
+    record.lateness_ns = short_ns(wake - c.scheduled)
+    histogram_add(&c.histograms[LATENESS], wake - c.scheduled)
+    if c.begun > 0:
+        record.period_ns = short_ns(wake - c.wake)
+        histogram_add(&c.histograms[PERIOD], wake - c.wake)
+    c.begun += 1
+    c.wake = wake
+    c.process = -1
+    c.flags = LATE if c.skipped else 0
+    c.skipped = 0
+
+
+# ---- halves
+
+cdef void collect(cycle_t *c, actual_t *actual, int64_t deadline) noexcept nogil:
+    """The compiled half after the wire: frames → images → actual values."""
+    cdef int rc = c.image.collect(c.image.self, deadline)
+    c.missing = rc if rc >= 0 else -1
+    axes_read(c.axes, actual, c.number)
+    if c.image.ok[0]:
+        c.lost_in_row = 0
+        c.flags |= OK
+    else:
+        c.lost += 1
+        c.lost_in_row += 1
+        if c.lost_in_row >= c.lost_limit:
+            c.flags |= WORKING_COUNTER
+
+
+cdef void close_header(cycle_t *c, actual_t *actual) noexcept nogil:
+    """What is said of the cycle beside its values, in the header and in the log."""
+    cdef actual_header_t *header = actual.header
+    cdef record_t *record = record_of(c)
+    cdef uint32_t unit
+    if c.axes.limited:
+        c.flags |= LIMITED_SOME
+    if c.axes.refused:
+        c.flags |= REFUSED_SOME
+    if c.axes.dropped:
+        c.flags |= DROPPED_SOME
+        c.axes.dropped = 0
+    header.number = c.number
+    header.time_ns = c.scheduled - c.origin
+    header.flags = c.flags
+    header.lost_in_row = c.lost_in_row
+    header.skipped = record.skipped
+    header.moving = c.axes.moving
+    header.missing_frames = <uint16_t>c.missing if c.missing >= 0 else 0xFFFF
+    header.al_counter = c.image.al_counter[0]
+    header.al_status = c.image.al_status[0]
+    for unit in range(c.image.unit_count):
+        actual.unit_valid[unit] = c.image.unit_valid[unit]
+        actual.unit_counter[unit] = c.image.unit_counter[unit]
+    record.flags = c.flags
+    record.lost_in_row = c.lost_in_row
+    record.missing_frames = header.missing_frames
+    record.al_counter = header.al_counter
+    record.al_status = header.al_status
+
+
+cdef void emit(cycle_t *c, const target_t *target, bint fresh) noexcept nogil:
+    """The compiled half before the wire: targets → images → frames. A frame that could not be
+    sent is counted by the image and is missing at collect."""
+    axes_write(c.axes, target, fresh)
+    c.image.emit(c.image.self)
+
+
+cdef void tail(cycle_t *c, int64_t since) noexcept nogil:
+    """Acyclic frames; then the figures of the cycle."""
+    cdef record_t *record
+    cdef histogram_t *h = c.histograms
+    cdef int64_t took
+    lane_send(c.lane, c.link)
+    if c.number == 0:
+        return
+    record = record_of(c)
+    if record.receive_ns >= 0:
+        histogram_add(&h[RECEIVE], record.receive_ns)
+    if record.send_ns >= 0:
+        histogram_add(&h[SEND], record.send_ns)
+    if record.round_trip_ns >= 0:
+        histogram_add(&h[ROUND_TRIP], record.round_trip_ns)
+    if c.process >= 0:
+        record.process_ns = short_ns(c.process)
+        histogram_add(&h[PROCESS], c.process)
+        if record.receive_ns >= 0 and record.send_ns >= 0:
+            histogram_add(&h[IN_CONTROLLER], c.process + record.receive_ns + record.send_ns)
+    took = now(c) - since
+    record.tail_ns = short_ns(took)
+    histogram_add(&h[TAIL], took)
+
+
+# ---- orders
+
+cdef void cycle_threaded(cycle_t *c) noexcept nogil:
+    cdef bint fresh
+    cdef target_t *target = handover_latch(c.handover, &fresh)
+    cdef actual_t *actual = &c.handover.actual[c.handover.actual_triple.back]
+    cdef record_t *record = record_of(c)
+    cdef int64_t sent, seen, published
+    emit(c, target, fresh)
+    sent = now(c)
+    record.send_ns = short_ns(sent - c.wake)
+    if fresh:
+        c.process = target.header.process_ns
+    elif c.axes.running:
+        c.flags |= UNCOMMITTED
+        c.uncommitted += 1
+    collect(c, actual, c.wake + c.collect_deadline)
+    close_header(c, actual)
+    handover_publish(c.handover)
+    published = now(c)
+    seen = c.image.frame_stamp[0]
+    record.receive_ns = short_ns(published - seen)
+    if c.missing == 0:
+        record.round_trip_ns = short_ns(seen - sent)
+    tail(c, published)
+
+
+cdef void run_law(cycle_t *c, actual_t *actual, target_t *target) noexcept nogil:
+    cdef cat_law_frame frame
+    axes_follow(c.axes, actual, target)
+    target.header.seen = c.number
+    frame.axis_count = c.axes.axis_count
+    frame.ok = c.flags & OK
+    frame.time = (c.scheduled - c.origin) * 1e-9
+    frame.period = c.period * 1e-9
+    frame.actual_position = actual.position
+    frame.actual_velocity = actual.velocity
+    frame.actual_torque = actual.torque
+    frame.axis_flags = actual.flags
+    frame.target_position = target.position
+    frame.target_velocity = target.velocity
+    frame.target_torque = target.torque
+    frame.input_reals = actual.input_reals
+    frame.input_integers = actual.input_integers
+    frame.input_bits = actual.input_bits
+    frame.output_reals = target.output_reals
+    frame.output_integers = target.output_integers
+    frame.output_bits = target.output_bits
+    if c.law.step(c.law.self, &frame) != 0:
+        c.law_done = 1
+
+
+cdef void cycle_law(cycle_t *c) noexcept nogil:
+    """The application's commit starts the law; without a law, or after its end, axes hold."""
+    cdef bint fresh
+    cdef target_t *target = handover_latch(c.handover, &fresh)
+    cdef actual_t *actual = &c.handover.actual[c.handover.actual_triple.back]
+    cdef record_t *record = record_of(c)
+    cdef int64_t usable, done, sent
+    collect(c, actual, 0)
+    usable = now(c)
+    record.receive_ns = short_ns(usable - c.wake)
+    done = usable
+    if c.law == NULL or c.law_done:
+        target.header.hold = 1
+    if not target.header.hold:
+        run_law(c, actual, target)
+        done = now(c)
+        c.process = done - usable
+    if c.law_done:
+        c.flags |= LAW_DONE
+    emit(c, target, True)
+    sent = now(c)
+    record.send_ns = short_ns(sent - done)
+    close_header(c, actual)
+    handover_publish(c.handover)
+    tail(c, sent)
+
+
+cdef void cycle_inputs(cycle_t *c, actual_t *actual) noexcept nogil:
+    """inline, after the wait."""
+    collect(c, actual, 0)
+    close_header(c, actual)
+
+
+cdef void cycle_usable(cycle_t *c) noexcept nogil:
+    """inline: from here on Python works with the inputs."""
+    c.usable = now(c)
+    record_of(c).receive_ns = short_ns(c.usable - c.wake)
+
+
+cdef void cycle_outputs(cycle_t *c, target_t *target, bint application) noexcept nogil:
+    """inline, after Python's body; `application` False: nobody computed."""
+    cdef int64_t done = now(c)
+    cdef int64_t sent
+    target.header.seen = c.number
+    target.header.hold = not application
+    emit(c, target, True)
+    sent = now(c)
+    if c.number > 0 and c.usable != 0:
+        record_of(c).send_ns = short_ns(sent - done)
+        if application:
+            c.process = done - c.usable
+    tail(c, sent)

@@ -1,0 +1,87 @@
+from libc.stdint cimport int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
+
+from catenary.core._native cimport cat_image, cat_link
+from catenary.core._lane cimport lane_t
+
+cdef enum:
+    FRAME_COUNT_MAX = 32   # so that an index comes again after four cycles at the earliest
+    INDEX_COUNT = 128      # 0x00 to 0x7F are the cycle's, the rest the lane's
+
+cdef enum:
+    LOOK = 0
+    WAIT = 1
+    SPIN = 2
+
+cdef struct copy_t:
+    uint32_t frame_offset
+    uint32_t image_offset
+    uint32_t size
+
+cdef struct datagram_t:
+    uint8_t kind
+    uint8_t command
+    uint8_t address_moves      # devices count the position up: ADP is not compared
+    uint16_t length            # of the data
+    uint16_t expected_counter
+    uint16_t counter           # of the last return
+    int32_t unit               # -1: none
+    uint32_t frame
+    uint32_t offset            # of the header, in the frame
+    uint32_t first_output
+    uint32_t output_count
+    uint32_t first_input
+    uint32_t input_count
+
+cdef struct frame_t:
+    uint32_t length
+    uint32_t used              # up to the end of the last datagram; padding follows
+    uint32_t first_datagram
+    uint32_t datagram_count
+    uint8_t index
+    uint8_t needed             # its loss makes the cycle bad
+    uint8_t back
+    uint8_t template[1536]
+    uint8_t returned[1536]
+
+cdef struct frame_counters_t:
+    uint64_t stale             # ours, of an earlier cycle
+    uint64_t alien             # another protocol, source or index
+    uint64_t corrupt           # an EtherCAT frame that contradicts itself or its template
+    uint64_t duplicate         # ours, a second time in this cycle
+    uint64_t unprocessed       # an echo no device has touched
+    uint64_t send_errors
+    uint64_t receive_errors
+
+cdef struct frames_t:
+    cat_image image
+    const cat_link *link
+    lane_t *lane
+    int receive_mode
+    uint32_t frame_count
+    uint32_t datagram_count
+    frame_t *frames
+    datagram_t *datagrams
+    copy_t *copies
+    uint8_t *outputs
+    uint8_t *inputs
+    uint8_t *unit_valid
+    uint8_t *unit_optional
+    uint16_t *unit_counter
+    uint8_t al_status
+    uint16_t al_counter
+    int64_t frame_stamp
+    uint32_t next_index
+    uint32_t serial            # of the emit
+    uint32_t missing
+    uint8_t ok                 # every needed unit valid, every needed frame back
+    uint8_t frame_of_index[128]
+    uint32_t serial_of_index[128]   # 0: never sent
+    frame_counters_t counters
+
+cdef class Frames:
+    """Owns the templates, images and tables of one cyclic exchange."""
+    cdef frames_t c
+    cdef object link_owner
+    cdef make_table(self)
+
+cdef void frames_flush(frames_t *f) noexcept nogil

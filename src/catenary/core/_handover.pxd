@@ -1,0 +1,87 @@
+from libc.stdint cimport int8_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
+
+from catenary.core._native cimport cat_triple
+
+cdef struct counts_t:
+    uint32_t axes
+    uint32_t units
+    uint32_t input_reals
+    uint32_t input_integers
+    uint32_t input_bits
+    uint32_t output_reals
+    uint32_t output_integers
+    uint32_t output_bits
+
+cdef struct actual_header_t:
+    uint64_t number            # cycles done
+    int64_t time_ns            # its instant, from the first one
+    int64_t receive_ns
+    uint32_t flags
+    uint32_t lost_in_row
+    uint32_t skipped
+    uint32_t moving            # axes under power and not at rest
+    uint16_t missing_frames
+    uint16_t al_counter
+    uint8_t al_status
+
+cdef struct actual_t:
+    actual_header_t *header
+    double *position
+    double *velocity
+    double *torque
+    double *commanded_position
+    double *commanded_velocity
+    double *commanded_torque
+    double *input_reals
+    int64_t *input_integers
+    uint16_t *statusword
+    uint16_t *unit_counter
+    int8_t *mode
+    uint8_t *state
+    uint8_t *flags
+    uint8_t *input_bits
+    uint8_t *unit_valid
+
+cdef struct target_header_t:
+    uint64_t seen              # the cycle whose actual values the application had read
+    int64_t process_ns         # what its body took
+    uint32_t hold              # no application: set-points do not count
+
+cdef struct target_t:
+    target_header_t *header
+    double *position
+    double *velocity
+    double *torque
+    double *output_reals
+    int64_t *output_integers
+    uint32_t *request
+    uint16_t *controlword_bits
+    int8_t *mode
+    uint8_t *goal
+    uint8_t *output_bits
+
+cdef struct handover_t:
+    counts_t counts
+    uint32_t actual_size
+    uint32_t target_size
+    cat_triple actual_triple
+    cat_triple target_triple
+    actual_t actual[4]         # three to hand over, the last one Python's own
+    target_t target[4]
+    uint32_t published         # futex word: counts publications
+    uint32_t waiting           # Python sleeps on it
+
+cdef enum:
+    PRIVATE = 3
+
+cdef class Handover:
+    """Owns the buffers between the cycle and Python."""
+    cdef handover_t c
+    cdef uint8_t *memory
+    cdef allocate(self)
+    cdef field(self, void *start, uint32_t count, size_t itemsize, bytes format, bint writable)
+
+cdef void handover_commit(handover_t *h) noexcept nogil
+cdef target_t *handover_latch(handover_t *h, bint *fresh) noexcept nogil
+cdef void handover_publish(handover_t *h) noexcept nogil
+cdef bint handover_swap(handover_t *h) noexcept nogil

@@ -1,0 +1,114 @@
+"""The C headers in catenary/native, for cimport."""
+
+from libc.stdint cimport int64_t, uint8_t, uint16_t, uint32_t, uint64_t
+
+
+cdef extern from "<stdlib.h>" nogil:
+    void *aligned_alloc(size_t alignment, size_t size)
+
+
+cdef extern from "atomics.h" nogil:
+    uint32_t cat_load_acquire32(const uint32_t *p)
+    uint32_t cat_load_relaxed32(const uint32_t *p)
+    void cat_store_release32(uint32_t *p, uint32_t v)
+    uint32_t cat_add32(uint32_t *p, uint32_t v)
+    uint32_t cat_exchange32(uint32_t *p, uint32_t v)
+    void cat_fence()
+
+
+cdef extern from "futex.h" nogil:
+    int cat_futex_wait(uint32_t *word, uint32_t value, int64_t timeout_ns)
+    void cat_futex_wake(uint32_t *word)
+
+
+cdef extern from "link.h" nogil:
+    const char *CAT_LINK_CAPSULE
+    const uint32_t CAT_LINK_VERSION
+    const uint32_t CAT_FRAME_MAX
+    const uint32_t CAT_FRAME_MIN
+    const uint32_t CAT_LINK_VIRTUAL_TIME
+
+    ctypedef struct cat_link:
+        uint32_t version
+        uint32_t flags
+        void *self
+        int (*send)(void *self, const uint8_t *frame, uint32_t length) noexcept nogil
+        int (*receive)(void *self, const uint8_t **frame) noexcept nogil
+        int64_t (*now)(void *self) noexcept nogil
+        int (*wait_until)(void *self, int64_t deadline, int wake_on_frame) noexcept nogil
+
+
+cdef extern from "image.h" nogil:
+    const uint32_t CAT_IMAGE_VERSION
+
+    ctypedef struct cat_image:
+        uint32_t version
+        uint32_t unit_count
+        uint32_t output_size
+        uint32_t input_size
+        void *self
+        uint8_t *outputs
+        const uint8_t *inputs
+        const uint8_t *unit_valid
+        const uint16_t *unit_counter
+        const uint8_t *ok
+        const uint8_t *al_status
+        const uint16_t *al_counter
+        const int64_t *frame_stamp
+        int (*emit)(void *self) noexcept nogil
+        int (*collect)(void *self, int64_t deadline) noexcept nogil
+
+
+cdef extern from "packet_ring.h" nogil:
+    const uint32_t CAT_RING_SLOTS
+
+    ctypedef struct cat_packet:
+        uint32_t length
+        int64_t stamp
+        uint8_t *bytes
+
+    ctypedef struct cat_packet_ring:
+        pass
+
+    int cat_ring_push(cat_packet_ring *ring, const uint8_t *bytes, uint32_t length, int64_t stamp)
+    const cat_packet *cat_ring_peek(const cat_packet_ring *ring)
+    void cat_ring_drop(cat_packet_ring *ring)
+
+
+cdef extern from "triple_buffer.h" nogil:
+    ctypedef struct cat_triple:
+        uint32_t back
+        uint32_t front
+
+    void cat_triple_init(cat_triple *triple)
+    void cat_triple_publish(cat_triple *triple)
+    int cat_triple_take(cat_triple *triple)
+
+
+cdef extern from "law.h" nogil:
+    const char *CAT_LAW_CAPSULE
+    const uint32_t CAT_LAW_VERSION
+
+    ctypedef struct cat_law_frame:
+        uint32_t axis_count
+        uint32_t ok
+        double time
+        double period
+        const double *actual_position
+        const double *actual_velocity
+        const double *actual_torque
+        const uint8_t *axis_flags
+        double *target_position
+        double *target_velocity
+        double *target_torque
+        const double *input_reals
+        const int64_t *input_integers
+        const uint8_t *input_bits
+        double *output_reals
+        int64_t *output_integers
+        uint8_t *output_bits
+
+    ctypedef struct cat_law:
+        uint32_t version
+        void *self
+        int (*step)(void *self, const cat_law_frame *frame) noexcept nogil

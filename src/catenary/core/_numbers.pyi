@@ -1,0 +1,1 @@
+"""Numbers in a process image; used by the compiled modules only."""

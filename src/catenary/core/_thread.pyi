@@ -1,0 +1,1 @@
+"""The native thread; used by the compiled modules only."""

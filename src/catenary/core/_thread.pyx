@@ -1,0 +1,166 @@
+"""The native thread: SCHED_FIFO, a CPU of its own, a touched stack, no signals, never the GIL.
+
+What is not permitted is done without and said: the cycle then runs under the ordinary scheduler.
+"""
+
+import errno as error_names
+
+from libc.errno cimport errno
+from libc.stdint cimport uint32_t
+from libc.string cimport memset
+
+from catenary.core._native cimport (
+    cat_futex_wait,
+    cat_futex_wake,
+    cat_load_acquire32,
+    cat_store_release32,
+)
+
+cdef extern from *:
+    """
+    #include <pthread.h>
+    #include <sched.h>
+    #include <signal.h>
+    #include <sys/prctl.h>
+
+    #define STACK_SIZE (512 * 1024)
+    #define STACK_TOUCHED (128 * 1024)
+
+    /* Faults the pages in now rather than in a cycle. */
+    static __attribute__((noinline)) void touch_stack(void) {
+        volatile char pages[STACK_TOUCHED];
+        for (unsigned i = 0; i < STACK_TOUCHED; i += 1024) pages[i] = 0;
+    }
+
+    /* A thread that takes no signals: they belong to Python's. */
+    static int create_thread(pthread_t *handle, void *(*body)(void *), void *argument) {
+        pthread_attr_t attributes;
+        sigset_t all, before;
+        int rc = pthread_attr_init(&attributes);
+        if (rc) return rc;
+        pthread_attr_setstacksize(&attributes, STACK_SIZE);
+        sigfillset(&all);
+        pthread_sigmask(SIG_SETMASK, &all, &before);
+        rc = pthread_create(handle, &attributes, body, argument);
+        pthread_sigmask(SIG_SETMASK, &before, 0);
+        pthread_attr_destroy(&attributes);
+        return rc;
+    }
+
+    static int set_priority(int priority) {
+        struct sched_param parameters = {.sched_priority = priority};
+        return pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
+    }
+
+    static int set_cpu(int cpu) {
+        cpu_set_t cpus;
+        if (cpu >= CPU_SETSIZE) return EINVAL;
+        CPU_ZERO(&cpus);
+        CPU_SET(cpu, &cpus);
+        return pthread_setaffinity_np(pthread_self(), sizeof cpus, &cpus);
+    }
+
+    static void obtained_scheduling(int *policy, int *priority) {
+        struct sched_param parameters;
+        pthread_getschedparam(pthread_self(), policy, &parameters);
+        *priority = parameters.sched_priority;
+    }
+
+    static int save_scheduling(cat_scheduling *saved) {
+        obtained_scheduling(&saved->policy, &saved->priority);
+        return pthread_getaffinity_np(pthread_self(), sizeof saved->cpus, &saved->cpus);
+    }
+
+    static void restore_scheduling(const cat_scheduling *saved) {
+        struct sched_param parameters = {.sched_priority = saved->priority};
+        pthread_setschedparam(pthread_self(), saved->policy, &parameters);
+        pthread_setaffinity_np(pthread_self(), sizeof saved->cpus, &saved->cpus);
+    }
+
+    /* The ordinary scheduler rounds waits up by 50 us unless told otherwise. */
+    static void sharpen_timers(void) { prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL); }
+    """
+    int SCHED_FIFO
+    int SCHED_RR
+    void touch_stack() nogil
+    int create_thread(pthread_t *handle, void *(*body)(void *) noexcept nogil, void *argument) nogil
+    int pthread_join(pthread_t handle, void **result) nogil
+    int set_priority(int priority) nogil
+    int set_cpu(int cpu) nogil
+    void obtained_scheduling(int *policy, int *priority) nogil
+    int save_scheduling(cat_scheduling *saved) nogil
+    void restore_scheduling(const cat_scheduling *saved) nogil
+    void sharpen_timers() nogil
+
+cdef enum:
+    START_TIMEOUT_NS = 5_000_000_000
+
+
+cdef void thread_schedule(thread_t *t) noexcept nogil:
+    """Asks for priority and CPU for the calling thread, and notes what it got."""
+    t.priority_error = set_priority(t.priority) if t.priority > 0 else 0
+    t.cpu_error = set_cpu(t.cpu) if t.cpu >= 0 else 0
+    sharpen_timers()
+    obtained_scheduling(&t.policy, &t.obtained)
+
+
+cdef void *thread_body(void *argument) noexcept nogil:
+    cdef thread_t *t = <thread_t *>argument
+    touch_stack()
+    thread_schedule(t)
+    cat_store_release32(&t.started, 1)
+    cat_futex_wake(&t.started)
+    t.body(t.argument)
+    cat_store_release32(&t.ended, 1)
+    return NULL
+
+
+cdef int thread_start(thread_t *t) noexcept nogil:
+    """Starts the body once the scheduling is known. 0 or -errno."""
+    cdef int rc
+    t.started = 0
+    t.stop = 0
+    t.ended = 0
+    rc = create_thread(&t.handle, thread_body, t)
+    if rc != 0:
+        return -rc
+    t.running = 1
+    while not cat_load_acquire32(&t.started):
+        cat_futex_wait(&t.started, 0, START_TIMEOUT_NS)
+    return 0
+
+
+cdef void thread_join(thread_t *t) noexcept nogil:
+    if not t.running:
+        return
+    cat_store_release32(&t.stop, 1)
+    pthread_join(t.handle, NULL)
+    t.running = 0
+
+
+cdef int scheduling_save(cat_scheduling *saved) noexcept nogil:
+    return save_scheduling(saved)
+
+
+cdef void scheduling_restore(const cat_scheduling *saved) noexcept nogil:
+    restore_scheduling(saved)
+
+
+cdef object refused(str what, int error):
+    if not error:
+        return ""
+    name = error_names.errorcode.get(error, str(error))
+    return f"{what}: {'not permitted' if name == 'EPERM' else 'refused'} ({name})"
+
+
+cdef object scheduling_text(const thread_t *t):
+    """For people and reports: "SCHED_FIFO 80, CPU 1"."""
+    if t.policy == SCHED_FIFO:
+        text = f"SCHED_FIFO {t.obtained}"
+    elif t.policy == SCHED_RR:
+        text = f"SCHED_RR {t.obtained}"
+    else:
+        text = refused("SCHED_OTHER", t.priority_error) or "SCHED_OTHER"
+    if t.cpu >= 0:
+        text += f", {refused(f'CPU {t.cpu}', t.cpu_error) or f'CPU {t.cpu}'}"
+    return text

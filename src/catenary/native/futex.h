@@ -1,0 +1,23 @@
+/* Waiting for a 32-bit word to change, across threads (private futex, CLOCK_MONOTONIC). */
+#ifndef CATENARY_FUTEX_H
+#define CATENARY_FUTEX_H
+
+#include <errno.h>
+#include <linux/futex.h>
+#include <stdint.h>
+#include <sys/syscall.h>
+#include <time.h>
+#include <unistd.h>
+
+/* Sleeps while *word == value, at most timeout_ns. 0: woken or changed; -ETIMEDOUT; -EINTR. */
+static inline int cat_futex_wait(uint32_t *word, uint32_t value, int64_t timeout_ns) {
+    struct timespec timeout = {timeout_ns / 1000000000, timeout_ns % 1000000000};
+    if (syscall(SYS_futex, word, FUTEX_WAIT_PRIVATE, value, &timeout, 0, 0) == 0) return 0;
+    return errno == EAGAIN ? 0 : -errno;
+}
+
+static inline void cat_futex_wake(uint32_t *word) {
+    syscall(SYS_futex, word, FUTEX_WAKE_PRIVATE, 0x7fffffff, 0, 0, 0);
+}
+
+#endif
