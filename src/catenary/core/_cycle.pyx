@@ -39,19 +39,6 @@ cdef inline int32_t short_ns(int64_t value) noexcept nogil:
 
 # ---- instants
 
-cdef void cycle_start(cycle_t *c) noexcept nogil:
-    """The first instant is one period from now; after a stop the old grid goes on."""
-    cdef int64_t present = now(c)
-    if c.origin == 0:
-        c.origin = present + c.period
-    c.next = c.origin
-    if present >= c.origin:
-        c.next += ((present - c.origin) // c.period + 1) * c.period
-    c.skipped = 0
-    c.usable = 0
-    c.begun = 0
-
-
 cdef inline void skip(cycle_t *c, int64_t instants) noexcept nogil:
     c.next += instants * c.period
     c.skipped += <uint32_t>instants
@@ -186,6 +173,22 @@ cdef void tail(cycle_t *c, int64_t since) noexcept nogil:
 
 
 # ---- orders
+
+cdef void cycle_start(cycle_t *c) noexcept nogil:
+    """The first instant is one period from now; after a stop the old grid goes on."""
+    cdef int64_t present = now(c)
+    cdef bint fresh
+    if c.origin == 0:
+        c.origin = present + c.period
+    c.next = c.origin
+    if present >= c.origin:
+        c.next += ((present - c.origin) // c.period + 1) * c.period
+    c.skipped = 0
+    c.usable = 0
+    c.begun = 0
+    if c.order == LAW:  # its first collect finds the frames of this
+        emit(c, handover_latch(c.handover, &fresh), False)
+
 
 cdef void cycle_threaded(cycle_t *c) noexcept nogil:
     cdef bint fresh
