@@ -65,7 +65,7 @@ def _pack_sdo(
 def _pack_initiate(
     service: Service, specifier: int, message: DownloadRequest | UploadResponse
 ) -> bytes:
-    """§5.6.2.1: the data in the four bytes (expedited), else its complete size and what fits."""
+    """The data in the four bytes (expedited), else its complete size and what fits (normal)."""
     command = specifier << 5 | _SIZE_GIVEN
     command |= _COMPLETE_ACCESS if message.complete_access else 0
     size, data = message.size, message.data
@@ -82,8 +82,8 @@ def _pack_initiate(
 
 @dataclass(frozen=True, slots=True)
 class DownloadRequest:
-    """Initiate download, §5.6.2.1: write an object. `size` is of the whole; the rest follows in
-    segments where it is more than `data`."""
+    """Initiate download, §5.6.2.1 and §5.6.2.2: write an object. `size` is of the whole; the rest
+    follows in segments where it is more than `data`."""
 
     index: int
     subindex: int
@@ -99,7 +99,7 @@ class DownloadRequest:
 
 @dataclass(frozen=True, slots=True)
 class DownloadResponse:
-    """Initiate download response, §5.6.2.1."""
+    """Initiate download response, §5.6.2.1 and §5.6.2.2."""
 
     index: int
     subindex: int
@@ -113,7 +113,7 @@ class DownloadResponse:
 
 @dataclass(frozen=True, slots=True)
 class UploadRequest:
-    """Initiate upload, §5.6.2.4: read an object."""
+    """Initiate upload, §5.6.2.4 and §5.6.2.5: read an object."""
 
     index: int
     subindex: int
