@@ -23,6 +23,7 @@ T = TypeVar("T")
 
 FRAME_TIMEOUT = 0.05  # [s]; a frame takes microseconds, a busy machine's scheduler much longer
 ATTEMPTS = 4  # of a repeatable request
+GRID_NS = 50_000  # of the ends of pauses
 WINDOW = 16  # frames under way at once: less than any receive ring holds
 
 
@@ -95,6 +96,8 @@ class BlockingRunner:
             self._wake(running)
 
     def _sleep_until(self, deadline_ns: int) -> None:
+        """Until a deadline, rounded up: who wakes at almost the same time shares frames."""
+        deadline_ns = -(-deadline_ns // GRID_NS) * GRID_NS
         while self._link.now() < deadline_ns:
             self._link.wait_until(deadline_ns, False)
 

@@ -24,7 +24,7 @@ from catenary.model.topology import open_ports
 from catenary.wire import sii_categories
 from catenary.wire.features import decode_information
 from catenary.wire.sii import CHECKSUM_WORD, MailboxProtocol, Sii, decode_sii
-from catenary.wire.sii_categories import CoeDetails, SyncManagerEnable, SyncManagerUse
+from catenary.wire.sii_categories import CoeDetails, General, SyncManagerEnable, SyncManagerUse
 from catenary.wire.sync_manager import Buffering, Control
 from catenary.wire.sync_manager import Direction as Flow
 
@@ -92,12 +92,12 @@ def _decoded(image: bytes, notes: list[str]) -> Sii | None:
 def _filled(bare: DeviceDescription, sii: Sii, notes: list[str]) -> DeviceDescription:
     header = sii.header
     managers = _sync_managers(sii)
-    outputs = _pdos(sii, sii.receive_pdos, managers, SyncManagerUse.OUTPUTS, notes)
-    inputs = _pdos(sii, sii.transmit_pdos, managers, SyncManagerUse.INPUTS, notes)
-    general = sii.general
-    group = sii.string(general.group) if general else ""
-    order = _tidy(sii.string(general.order)) if general else ""
-    name = _tidy(sii.string(general.name)) if general else ""
+    texts = _Texts(sii)
+    outputs = _pdos(texts, sii.receive_pdos, managers, SyncManagerUse.OUTPUTS, notes)
+    inputs = _pdos(texts, sii.transmit_pdos, managers, SyncManagerUse.INPUTS, notes)
+    general = sii.general or General()
+    order = texts[general.order]
+    name = texts[general.name]
     nameless = f"0x{header.vendor:08X}:0x{header.product:08X}"
     return replace(
         bare,
@@ -109,7 +109,7 @@ def _filled(bare: DeviceDescription, sii: Sii, notes: list[str]) -> DeviceDescri
         inputs=assignments(inputs),
         output_pdos=outputs,
         input_pdos=inputs,
-        group=_tidy(group),
+        group=texts[general.group],
         order=order,
     )
 
@@ -170,7 +170,7 @@ def _kind(entry: sii_categories.SyncManagerEntry) -> SyncManagerUse:
 
 
 def _pdos(
-    sii: Sii,
+    texts: _Texts,
     pdos: tuple[sii_categories.Pdo, ...],
     managers: tuple[SyncManager, ...],
     kind: SyncManagerUse,
@@ -187,7 +187,7 @@ def _pdos(
             )
             channel = None
         entries = tuple(
-            Entry(e.index, e.subindex, e.bit_length, _tidy(sii.string(e.name)), e.data_type)
+            Entry(e.index, e.subindex, e.bit_length, texts[e.name], e.data_type)
             for e in pdo.entries
         )
         found.append(
@@ -197,10 +197,20 @@ def _pdos(
                 channel,
                 fixed=bool(pdo.flags & _FIXED_CONTENT),
                 mandatory=bool(pdo.flags & _MANDATORY),
-                name=_tidy(sii.string(pdo.name)),
+                name=texts[pdo.name],
             )
         )
     return tuple(found)
+
+
+class _Texts:
+    """The printable part of an image's strings, by number from 1; empty where there is none."""
+
+    def __init__(self, sii: Sii) -> None:
+        self._strings = ["", *(_tidy(text) for text in sii.strings)]
+
+    def __getitem__(self, number: int) -> str:
+        return self._strings[number] if number < len(self._strings) else ""
 
 
 def _tidy(text: str) -> str:

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from catenary.wire.dl import DlStatus
+
 PORT_ORDER = (3, 1, 2)  # in which a device sends a frame onwards after port 0
 Ports = tuple[bool, bool, bool, bool]
 
@@ -20,12 +22,13 @@ class Place:
 
 
 def open_ports(dl_status: int) -> Ports:
-    """Ports with a communicating neighbour (bits 9, 11, 13, 15 of DL status)."""
+    """Ports with a communicating neighbour."""
+    port_0, port_1, port_2, port_3 = DlStatus.from_word(dl_status).ports
     return (
-        bool(dl_status & 0x0200),
-        bool(dl_status & 0x0800),
-        bool(dl_status & 0x2000),
-        bool(dl_status & 0x8000),
+        port_0.communication,
+        port_1.communication,
+        port_2.communication,
+        port_3.communication,
     )
 
 

@@ -1,0 +1,121 @@
+"""Descriptions from real SII images, odd ones included (`data/MANIFEST.tsv` says where from)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from catenary.model.describe import describe
+from catenary.model.device import DeviceDescription, Identity
+from catenary.wire.sii_categories import SyncManagerUse
+
+INFORMATION = bytes((0x11, 0, 2, 0, 3, 4, 8, 0x0F, 0, 0))
+
+
+def described(image: bytes) -> DeviceDescription:
+    return describe(
+        5,
+        station_address=0x1006,
+        alias=0,
+        dl_status=0x0A00,
+        information=INFORMATION,
+        image=image,
+    )
+
+
+@pytest.fixture
+def image(shared_data: Path, request: pytest.FixtureRequest) -> bytes:
+    return (shared_data / "sii" / f"{request.param}.bin").read_bytes()
+
+
+@pytest.mark.parametrize("image", ["beckhoff_ek1100"], indirect=True)
+def test_a_coupler_has_neither_mailbox_nor_process_data(image: bytes) -> None:
+    device = described(image)
+    assert device.name == "EK1100"
+    assert device.identity == Identity(2, 0x044C_2C52, 0x0012_0000, 0)
+    assert device.mailbox is None
+    assert device.outputs == device.inputs == ()
+
+
+@pytest.mark.parametrize("image", ["beckhoff_el2004"], indirect=True)
+def test_a_terminal_of_four_bits(image: bytes) -> None:
+    device = described(image)
+    [assignment] = device.outputs
+    assert (assignment.sync_manager, assignment.bit_length, assignment.byte_length) == (0, 4, 1)
+    assert all(pdo.fixed for pdo in device.output_pdos)
+    assert device.inputs == ()
+
+
+@pytest.mark.parametrize("image", ["beckhoff_el2889"], indirect=True)
+def test_a_terminal_with_two_sync_managers(image: bytes) -> None:
+    device = described(image)
+    assert [(a.sync_manager, a.bit_length) for a in device.outputs] == [(0, 8), (1, 8)]
+    assert [channel.start for channel in device.sync_managers] == [0x0F00, 0x0F01]
+
+
+@pytest.mark.parametrize("image", ["metalmusings_EaserCAT_6000"], indirect=True)
+def test_a_card_whose_pdos_are_in_its_dictionary_alone(image: bytes) -> None:
+    device = described(image)
+    assert device.mailbox is not None
+    assert device.mailbox.coe
+    assert (device.mailbox.receive_offset, device.mailbox.receive_size) == (0x1000, 512)
+    assert device.outputs == device.inputs == ()
+    uses = [channel.use for channel in device.sync_managers]
+    assert uses[2:] == [SyncManagerUse.OUTPUTS, SyncManagerUse.INPUTS]
+
+
+@pytest.mark.parametrize("image", ["pollen_Orbita2d"], indirect=True)
+def test_vendor_0_without_fmmus_and_end_mark(image: bytes) -> None:
+    device = described(image)
+    assert device.identity.vendor == 0
+    assert device.name == "Orbita2d"
+    assert [a.bit_length for a in device.outputs] == [344]
+    assert [a.bit_length for a in device.inputs] == [528]
+    assert device.notes == ()
+
+
+@pytest.mark.parametrize("image", ["pollen_LeftElbowOrbita2d_fw1.0"], indirect=True)
+def test_a_pdo_of_a_sync_manager_that_is_none_for_it_is_left_out_and_noted(image: bytes) -> None:
+    device = described(image)
+    assert [(a.sync_manager, [pdo.index for pdo in a.pdos]) for a in device.inputs] == [
+        (2, [0x1800])
+    ]
+    assert any("0x1700" in note for note in device.notes)
+
+
+@pytest.mark.parametrize("image", ["empty_issue286"], indirect=True)
+def test_an_unprogrammed_eeprom_is_a_device_of_which_nothing_is_known(image: bytes) -> None:
+    device = described(image)
+    assert device.name == "unknown"
+    assert device.mailbox is None
+    assert device.notes
+
+
+@pytest.mark.parametrize("image", ["beckhoff_el2004"], indirect=True)
+def test_a_wrong_checksum_alone_is_noted_not_fatal(image: bytes) -> None:
+    device = described(image[:14] + bytes([image[14] ^ 0xFF]) + image[15:])
+    assert device.name == "EL2004"
+    assert any("checksum" in note for note in device.notes)
+
+
+def test_every_image_of_the_shared_data_is_described(shared_data: Path) -> None:
+    images = sorted((shared_data / "sii").glob("*.bin"))
+    assert images
+    for path in images:
+        described(path.read_bytes())
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.binary(max_size=600))
+def test_any_bytes_are_described(image: bytes) -> None:
+    described(image)
+
+
+@settings(max_examples=200, deadline=None)
+@given(data=st.binary(max_size=400), product=st.integers(1, 0xFFFF_FFFE))
+def test_any_categories_are_described(data: bytes, product: int) -> None:
+    header = bytes(14) + b"\xa4\x88" + bytes(4) + product.to_bytes(4, "little")
+    described(header.ljust(128, b"\x00") + data)
