@@ -1,0 +1,166 @@
+"""The whole plan: the demo's segment byte by byte, and what its counters must be."""
+
+from __future__ import annotations
+
+import itertools
+
+import pytest
+
+from catenary.errors import ConfigurationError
+from catenary.model.device import Direction
+from catenary.plan import Number, NumberKind, make_plan
+from catenary.plan.cycle import Copy, DatagramKind, DatagramPlan
+from catenary.wire.datagram import Command
+from catenary.wire.frame import decode_frame
+from tests.plan.devices import asks, coupler, demo, lamps, servo
+
+
+def test_the_demo_segment_in_one_frame() -> None:
+    """What SOEM (2 · outputsWKC + inputsWKC) and IgH compute for this segment: five devices with
+    outputs, three with inputs: 2 · 5 + 3 = 13."""
+    plan = make_plan(demo())
+    cycle = plan.cycle
+    assert (cycle.output_size, cycle.input_size) == (1 + 3 * 13 + 1, 3 * 13)
+    [frame] = cycle.frames
+    assert frame.datagrams == (
+        DatagramPlan(DatagramKind.AL_STATUS, Command.BRD, 16, 2, 6, -1),
+        DatagramPlan(
+            DatagramKind.PROCESS_DATA,
+            Command.LRW,
+            30,
+            80,
+            13,
+            0,
+            outputs=(Copy(40, 0, 41),),
+            inputs=(Copy(81, 0, 39),),
+        ),
+    )
+    assert cycle.period_ns == 1_000_000
+    assert cycle.device_count == 6
+    assert [unit.devices for unit in cycle.sync_units] == [(1, 2, 3, 4, 5)]
+
+
+def test_the_template_is_a_frame_of_its_datagrams() -> None:
+    [frame] = make_plan(demo()).cycle.frames
+    decoded = decode_frame(frame.template)
+    assert [d.command for d in decoded.datagrams] == [Command.BRD, Command.LRW]
+    assert decoded.datagrams[0].address == 0x0130_0000
+    assert decoded.datagrams[1].address == 0x0001_0000
+    assert not any(decoded.datagrams[1].data)
+
+
+def test_where_objects_are() -> None:
+    layout = make_plan(demo()).layout
+    assert layout.output(1, 0x7010, 1) == Number(1, 1, NumberKind.UNSIGNED)
+    assert layout.output(2, 0x6040, 0) == Number(8, 16, NumberKind.UNSIGNED)
+    assert layout.output(3, 0x607A, 0) == Number((14 + 7) * 8, 32, NumberKind.SIGNED)
+    assert layout.input(4, 0x6064, 0) == Number((26 + 7) * 8, 32, NumberKind.SIGNED)
+    assert layout.output(2, 0x6064, 0) is None
+    assert layout.sync_unit(0) == -1
+    assert layout.sync_unit(5) == 0
+
+
+def test_what_each_device_is_told() -> None:
+    plan = make_plan(demo())
+    drive = plan.devices[3]
+    assert drive.station_address == 0x1004
+    assert [(m.index, m.start, m.length, m.control) for m in drive.layout.sync_managers] == [
+        (2, 0x1100, 13, 0x64),
+        (3, 0x1400, 13, 0x20),
+    ]
+    assert [
+        (f.direction, f.logical_start, f.physical_start, f.length) for f in drive.layout.fmmus
+    ] == [
+        (Direction.OUTPUT, 0x1_0000 + 14, 0x1100, 13),
+        (Direction.INPUT, 0x1_0000 + 41 + 13, 0x1400, 13),
+    ]
+    assert drive.downloads == ()
+    assert drive.watchdog_count == 1000
+    assert plan.devices[0].watchdog_ns == 0  # nothing to take down
+
+
+def test_equal_plans_are_equal() -> None:
+    assert make_plan(demo()) == make_plan(demo())
+    assert make_plan(demo()) != make_plan(demo(), period=2e-3)
+
+
+def test_a_plan_prints_what_it_holds() -> None:
+    text = str(make_plan(demo()))
+    for part in (
+        "6 devices, period 1 ms",
+        "device   2  Servo  station 0x1003  13 out, 13 in, watchdog 100 ms",
+        "SyncManager 2 out  0x1100 + 13",
+        "FMMU 0 out  logical 0x00010001 + 13  → 0x1100",
+        "0x607A:00 (32 bits) Target position",
+        "LRW  80 bytes at 30  expected counter 13",
+    ):
+        assert part in text
+
+
+def test_a_device_without_lrw_gets_lrd_and_lwr() -> None:
+    cycle = make_plan([coupler(0), servo(1), servo(2, lrw=False)]).cycle
+    kinds = [
+        (Command(d.command).name, d.length, d.expected_counter, d.sync_unit)
+        for d in cycle.frames[0].datagrams
+    ]
+    assert kinds == [("BRD", 2, 3, -1), ("LRW", 26, 3, 0), ("LWR", 13, 1, 1), ("LRD", 13, 1, 1)]
+    assert cycle.sync_units[1].devices == (2,)
+
+
+def test_outputs_alone_need_no_lrw() -> None:
+    cycle = make_plan([lamps(0), lamps(1)]).cycle
+    datagram = cycle.frames[0].datagrams[1]
+    assert (datagram.command, datagram.expected_counter) == (Command.LWR, 2)
+
+
+def test_an_optional_device_is_a_unit_of_its_own() -> None:
+    cycle = make_plan(demo(), optional=[3]).cycle
+    assert [(unit.devices, unit.optional) for unit in cycle.sync_units] == [
+        ((1, 2, 4, 5), False),
+        ((3,), True),
+    ]
+    counters = [d.expected_counter for d in cycle.frames[0].datagrams[1:]]
+    assert counters == [2 * 4 + 2, 3]
+
+
+@pytest.mark.parametrize("count", [40, 56, 57, 120, 200])
+def test_many_devices_take_several_frames_and_never_straddle(count: int) -> None:
+    plan = make_plan([servo(position) for position in range(count)])
+    cycle = plan.cycle
+    assert all(len(frame.template) <= 1514 for frame in cycle.frames)
+    found = [d for frame in cycle.frames for d in frame.datagrams if d.sync_unit >= 0]
+    assert sum(d.expected_counter for d in found) == 3 * count
+    assert sum(unit.devices == () for unit in cycle.sync_units) == 0
+    assert sorted(p for unit in cycle.sync_units for p in unit.devices) == list(range(count))
+    outputs = sorted((copy.image_offset, copy.size) for d in found for copy in d.outputs)
+    assert outputs[0][0] == 0
+    for (start, size), (following, _) in itertools.pairwise(outputs):
+        assert start + size == following
+    logical = sorted(
+        (fmmu.logical_start, fmmu.length) for each in plan.devices for fmmu in each.layout.fmmus
+    )
+    for (start, length), (following, _) in itertools.pairwise(logical):
+        assert start + length <= following
+
+
+def test_a_wish_for_a_device_that_is_not_there() -> None:
+    with pytest.raises(ConfigurationError, match="device 9; the segment has 6"):
+        make_plan(demo(), [asks(9)])
+
+
+@pytest.mark.parametrize(
+    ("period", "watchdog", "match"),
+    [
+        (0.0, 0.1, "period"),
+        (1e-3, 1e-3, "expire"),
+        (1e-3, 10.0, "watchdog"),
+        (1e-3, 0.0, "watchdog"),
+    ],
+)
+def test_times_that_cannot_be(period: float, watchdog: float, match: str) -> None:
+    with pytest.raises(ValueError, match=match):
+        make_plan(demo(), period=period, watchdog=watchdog)
+
+
+def test_the_watchdog_can_be_off() -> None:
+    assert make_plan(demo(), watchdog=None).devices[2].watchdog_count == 0
