@@ -16,6 +16,13 @@ ifneq ($(origin PYTHON),file)
   endif
 endif
 
+ifeq ($(wildcard $(VENV)/.built)$(filter clean,$(MAKECMDGOALS)),)
+  MISSING := $(shell tools/missing_prerequisites $(PYTHON))
+  ifneq ($(MISSING),)
+    $(error $(MISSING))
+  endif
+endif
+
 .PHONY: demo test lint build clean
 
 demo: $(VENV)/.built
@@ -28,7 +35,7 @@ lint: $(VENV)/.with-lint
 	@$(VENV)/bin/ruff check $(wildcard $(CHECKED))
 	@$(VENV)/bin/ruff format --check $(wildcard $(CHECKED))
 	@$(VENV)/bin/mypy
-	@$(VENV)/bin/lint-imports
+	@$(VENV)/bin/lint-imports --no-logo
 
 build: $(VENV)/.with-test
 

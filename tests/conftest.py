@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Never
 
+import hypothesis
 import pytest
 from hypothesis import settings
 
@@ -23,6 +24,13 @@ settings.load_profile("catenary")
 
 ROOT = Path(__file__).resolve().parent.parent
 FIXTURE_OF = {"shared_data": "shared_data", "wire": "veth", "tshark": "tshark"}  # marker: fixture
+
+# no deadlines: nothing timed is asserted; the same examples each time where CI says so
+hypothesis.settings.register_profile(
+    "catenary", max_examples=50, deadline=None, derandomize=bool(os.environ.get("CI"))
+)
+hypothesis.settings.load_profile("catenary")
+
 REQUIRED = pytest.StashKey[set[str]]()
 PASSED = pytest.StashKey[set[str]]()
 

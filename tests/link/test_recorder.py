@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import concurrent.futures
 import json
+import os
 import resource
 import subprocess
 from pathlib import Path
@@ -10,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from catenary.link import Interface, Recorder
+from catenary.wire.pcapng import decode_capture
 from tests.link.python_link import PythonLink, frame
 
 
@@ -91,6 +94,29 @@ def test_a_disk_that_fills_up_is_said_at_the_end(tmp_path, files_of_4096_bytes, 
         link.close()
     assert link.dropped + link.recorded == 4000
     assert inner.closed
+
+
+def read_all(descriptor: int) -> bytes:
+    with open(descriptor, "rb") as file:
+        return file.read()
+
+
+def test_a_slow_disk_drops_counts_and_never_holds_up_the_sender(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    link = Recorder(PythonLink(latency_ns=0, flags=0), pipe)
+    for _ in range(4000):  # 6 MB; the ring takes 4, and nobody reads
+        link.send(frame(bytes(1486)))
+    os.set_blocking(reader, True)
+    with concurrent.futures.ThreadPoolExecutor() as executor:
+        content = executor.submit(read_all, reader)
+        with pytest.warns(RuntimeWarning, match=r"pipe lacks \d+ frames: the disk was too slow"):
+            link.close()
+        packets = decode_capture(content.result()).packets
+    assert link.dropped > 0
+    assert link.recorded + link.dropped == 4000
+    assert len(packets) == link.recorded
 
 
 def test_stamps_a_real_link_with_the_time_of_day(veth, tshark, tmp_path):

@@ -252,7 +252,8 @@ cdef class Recorder(WrapperLink):
         return 0
 
     cdef int finish_file(self) except -1:
-        drain(&self.recorder)
+        with nogil:
+            drain(&self.recorder)
         number = self.recorder.write_error
         if number == 0:
             stamp = self.inner.now(self.inner.self) + self.recorder.stamp_offset
