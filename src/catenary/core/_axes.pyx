@@ -195,13 +195,24 @@ cdef void axes_write(axes_t *x, const target_t *target, bint fresh) noexcept nog
 
 
 cdef void axes_follow(const axes_t *x, const actual_t *actual, target_t *target) noexcept nogil:
-    """Targets of axes that are not followed: the actual position, no velocity, no torque."""
+    """Targets of axes that are not followed: the actual position, no velocity, no torque.
+
+    An axis that has become followed since the application last looked starts from what it is
+    commanded: what was written before cannot have been meant for it. Its torque stays: it is
+    what the axis was enabled with.
+    """
     cdef uint32_t i
+    cdef bint followed
     for i in range(x.axis_count):
-        if not actual.flags[i] & FOLLOWED:
+        followed = actual.flags[i] & FOLLOWED != 0
+        if not followed:
             target.position[i] = actual.position[i]
             target.velocity[i] = 0.0
             target.torque[i] = 0.0
+        elif not target.followed[i]:
+            target.position[i] = actual.commanded_position[i]
+            target.velocity[i] = actual.commanded_velocity[i]
+        target.followed[i] = followed
 
 
 # ---- the edge

@@ -58,6 +58,7 @@ cdef struct target_t:
     uint16_t *controlword_bits
     int8_t *mode
     uint8_t *goal
+    uint8_t *followed          # by axis: it was when the application last looked
     uint8_t *output_bits
 
 cdef struct handover_t:

@@ -69,6 +69,7 @@ cdef size_t lay_target(target_t *t, uint8_t *block, const counts_t *n) noexcept:
     t.controlword_bits = <uint16_t *>carve(&place, n.axes, 2)
     t.mode = <int8_t *>carve(&place, n.axes, 1)
     t.goal = carve(&place, n.axes, 1)
+    t.followed = carve(&place, n.axes, 1)
     t.output_bits = carve(&place, n.output_bits, 1)
     return place - block
 
