@@ -73,8 +73,9 @@ def reset(device_count: int) -> Procedure[None]:
 
 def bring_all_down(stations: Sequence[Station], state: State, timeout: float) -> Procedure[None]:
     """All devices to a lower state by broadcast, whatever each of them is in. StateError names
-    the first that stays up."""
-    if (yield from _all_to(state, len(stations), timeout)):
+    the first that stays up. Devices that are gone are nobody's business here: those that are
+    left must come down all the same."""
+    if (yield from _all_to(state, None, timeout)):
         return
     for station in stations:
         now = yield from read_state(station)
@@ -89,7 +90,7 @@ def bring_all_down(stations: Sequence[Station], state: State, timeout: float) ->
             )
 
 
-def _all_to(state: State, device_count: int, timeout: float) -> Procedure[bool]:
+def _all_to(state: State, device_count: int | None, timeout: float) -> Procedure[bool]:
     """Asks all at once, errors acknowledged, and waits. Whether all are there.
 
     Controllers that emulate their application copy AL control into AL status, the acknowledgement
@@ -97,8 +98,8 @@ def _all_to(state: State, device_count: int, timeout: float) -> Procedure[bool]:
     """
     for control in (AlControl(state, acknowledge=True), AlControl(state)):
         [reply] = yield [write(Command.BWR, 0, AL_CONTROL, control.word)]
-        if reply.working_counter != device_count:
-            raise _came_and_went(device_count, reply.working_counter)
+        if device_count not in (None, reply.working_counter):
+            raise _came_and_went(device_count or 0, reply.working_counter)
         if not (yield from _await_all(control.word, timeout)):
             return False
     return True
