@@ -1,0 +1,19 @@
+"""Texts of drives' error codes."""
+
+import pytest
+
+from catenary.wire.drive_error import error_text
+
+
+@pytest.mark.parametrize(
+    ("code", "text"),
+    [
+        (0x8611, "following error"),
+        (0x7308, "sensor"),  # by its group
+        (0x2315, "continuous over-current"),
+        (0xFF42, "manufacturer specific"),
+        (0xB123, "unknown error"),
+    ],
+)
+def test_a_code_has_a_text_or_that_of_its_group(code: int, text: str) -> None:
+    assert error_text(code) == text
