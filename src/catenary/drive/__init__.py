@@ -1,1 +1,6 @@
-"""(being built)"""
+"""CiA 402 axes and I/O as wishes: objects, units, arrays."""
+
+from catenary.drive.drives import Drives
+from catenary.drive.io import Inputs, Outputs
+
+__all__ = ["Drives", "Inputs", "Outputs"]

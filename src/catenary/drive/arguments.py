@@ -1,0 +1,81 @@
+"""What an application may write in `Drives(...)`, checked before anything is sent."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TypeAlias
+
+from catenary.bus import SubDevice
+from catenary.drive.axis import MEASURED
+from catenary.drive.objects import NAMED_COLUMNS, AxisObject
+from catenary.plan.cycle import AxisLimits
+from catenary.wire.cia402 import Mode
+
+AxisSource: TypeAlias = SubDevice | tuple[SubDevice, int]
+
+MODES: dict[str, Mode] = {"csp": Mode.CSP, "csv": Mode.CSV, "cst": Mode.CST}
+
+
+def axis_sources(subs: Iterable[AxisSource]) -> list[tuple[SubDevice, int]]:
+    """(SubDevice, slot) of every axis; a SubDevice alone stands for all of its slots."""
+    sources: list[tuple[SubDevice, int]] = []
+    for source in subs:
+        if isinstance(source, tuple):
+            sources.append(source)
+        else:
+            sources.extend((source, slot) for slot in source.slots or (0,))
+    if not sources:
+        raise ValueError("no axes: the list of SubDevices is empty")
+    places = [(sub.position, slot) for sub, slot in sources]
+    for place in places:
+        if places.count(place) > 1:
+            raise ValueError(f"device {place[0]}, slot {place[1]} is given twice")
+    return sources
+
+
+def axis_name(sub: SubDevice, slot: int) -> str:
+    return f"{sub.position} {sub.name}" + (f" slot {slot}" if slot else "")
+
+
+def axis_modes(first: str, others: Sequence[str]) -> tuple[Mode, ...]:
+    return tuple(dict.fromkeys(mode_of(name) for name in (first, *others)))
+
+
+def mode_of(name: str) -> Mode:
+    try:
+        return MODES[name.lower()]
+    except KeyError:
+        raise ValueError(f"mode {name!r}; known: {', '.join(MODES)}") from None
+
+
+def axis_limits(
+    position_min: float | None,
+    position_max: float | None,
+    velocity: float | None,
+    torque: float | None,
+) -> AxisLimits:
+    if position_min is not None and position_max is not None and position_min >= position_max:
+        raise ValueError(f"position_min {position_min} is not below position_max {position_max}")
+    for name, value in (("velocity_limit", velocity), ("torque_limit", torque)):
+        if value is not None and not value > 0:
+            raise ValueError(f"{name} must be positive, not {value}")
+    return AxisLimits(position_min, position_max, velocity, torque)
+
+
+def known(measured: Sequence[str]) -> tuple[str, ...]:
+    for name in measured:
+        if name not in MEASURED:
+            raise ValueError(f"measured {name!r}; known: {', '.join(MEASURED)}")
+    return tuple(measured)
+
+
+def named_columns(columns: Sequence[str | tuple[str, AxisObject]]) -> dict[str, AxisObject]:
+    named: dict[str, AxisObject] = {}
+    for column in columns:
+        if isinstance(column, tuple):
+            named[column[0]] = column[1]
+        elif column in NAMED_COLUMNS:
+            named[column] = NAMED_COLUMNS[column]
+        else:
+            raise ValueError(f"columns {column!r}; known: {', '.join(NAMED_COLUMNS)}")
+    return named

@@ -1,0 +1,139 @@
+"""One CiA 402 axis as a wish: which objects it exchanges, and their places as an AxisPlan."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from catenary.drive import objects
+from catenary.drive.objects import AxisObject, Unit
+from catenary.drive.units import AxisUnits
+from catenary.errors import MappingError
+from catenary.plan.cycle import AxisLimits, AxisPlan, Bank, Column, Number, NumberKind
+from catenary.plan.wish import ImageLayout, PdoWish
+from catenary.wire.cia402 import SLOT_OFFSET, Mode
+
+TARGETS: dict[int, AxisObject] = {
+    Mode.CSP: objects.TARGET_POSITION,
+    Mode.CSV: objects.TARGET_VELOCITY,
+    Mode.CST: objects.TARGET_TORQUE,
+}
+MEASURED: dict[str, AxisObject] = {
+    "position": objects.ACTUAL_POSITION,
+    "velocity": objects.ACTUAL_VELOCITY,
+    "torque": objects.ACTUAL_TORQUE,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """Slot `slot` of the device at `device`. `modes[0]` is the mode at the start."""
+
+    name: str
+    device: int
+    slot: int
+    modes: tuple[Mode, ...]
+    units: AxisUnits
+    limits: AxisLimits
+    measured: tuple[str, ...] = tuple(MEASURED)
+    columns: Mapping[str, AxisObject] = field(default_factory=dict)
+
+    def index(self, base: int) -> int:
+        """The number of slot 0's object `base` in this slot."""
+        return base + SLOT_OFFSET * self.slot
+
+    @property
+    def uses_torque(self) -> bool:
+        """Whether anything asked for is a torque."""
+        return (
+            "torque" in self.measured
+            or Mode.CST in self.modes
+            or self.limits.torque is not None
+            or any(column.unit is Unit.TORQUE for column in self.columns.values())
+        )
+
+    def pdo_wish(self, start_up: tuple[tuple[int, int, bytes], ...] = ()) -> PdoWish:
+        """Everything the axis exchanges every cycle."""
+        wanted = [objects.CONTROLWORD, objects.MODE_TARGET, *(TARGETS[m] for m in self.modes)]
+        given = [objects.STATUSWORD, objects.MODE_ACTUAL, *(MEASURED[m] for m in self.measured)]
+        for column in self.columns.values():
+            (wanted if column.output else given).append(column)
+        return PdoWish(
+            outputs=tuple(o.reference(self.slot) for o in dict.fromkeys(wanted)),
+            inputs=tuple(o.reference(self.slot) for o in dict.fromkeys(given)),
+            start_up=start_up,
+        )
+
+    def plan(self, layout: ImageLayout) -> AxisPlan:
+        """The axis as numbers. What was not wished for but is mapped is used as well."""
+        return AxisPlan(
+            name=self.name,
+            device=self.device,
+            slot=self.slot,
+            sync_unit=layout.sync_unit(self.device),
+            mode=int(self.modes[0]),
+            controlword=self._required(layout, objects.CONTROLWORD),
+            statusword=self._required(layout, objects.STATUSWORD),
+            mode_target=self._place(layout, objects.MODE_TARGET),
+            mode_actual=self._place(layout, objects.MODE_ACTUAL),
+            target_position=self._place(layout, objects.TARGET_POSITION),
+            target_velocity=self._place(layout, objects.TARGET_VELOCITY),
+            target_torque=self._place(layout, objects.TARGET_TORQUE),
+            actual_position=self._place(layout, objects.ACTUAL_POSITION),
+            actual_velocity=self._place(layout, objects.ACTUAL_VELOCITY),
+            actual_torque=self._place(layout, objects.ACTUAL_TORQUE),
+            limits=self.limits,
+        )
+
+    def column(self, name: str, layout: ImageLayout) -> Column:
+        """The named column, with its place."""
+        wanted = self.columns[name]
+        return Column(
+            name=f"{self.name}.{name}",
+            number=self._required(layout, wanted),
+            bank=column_bank(wanted),
+            device=self.device,
+            sync_unit=layout.sync_unit(self.device),
+        )
+
+    def _required(self, layout: ImageLayout, wanted: AxisObject) -> Number:
+        place = self._place(layout, wanted)
+        if place is None:
+            index = self.index(wanted.index)
+            raise MappingError(
+                f"device {self.device} ({self.name}): 0x{index:04X}:{wanted.subindex:02X} "
+                "is not in its process data",
+                hint="see the device's mapping with `catenary scan`",
+            )
+        return place
+
+    def _place(self, layout: ImageLayout, wanted: AxisObject) -> Number | None:
+        find = layout.output if wanted.output else layout.input
+        place = find(self.device, self.index(wanted.index), wanted.subindex)
+        if place is None or (wanted.unit is Unit.TORQUE and self.units.rated_torque is None):
+            return None
+        # The layout knows places and widths; signs are the standard's, unless the device says REAL.
+        kind = NumberKind.SIGNED if wanted.signed else NumberKind.UNSIGNED
+        if place.kind is not NumberKind.REAL:
+            place = replace(place, kind=kind)
+        return self.units.apply(place, wanted.unit)
+
+
+def column_bank(wanted: AxisObject) -> Bank:
+    """Where a column of this object lives: SI values are float64, raw ones int64."""
+    return Bank.INTEGER if wanted.unit is Unit.RAW else Bank.REAL
+
+
+EXPONENTS = (-3, -6, -4, -5, -2, -1, 0, -7, -8, -9)  # ms and us first: some drives know no other
+
+
+def interpolation_time(period_ns: int) -> tuple[int, int] | None:
+    """0x60C2 for a period: (value, exponent) with value · 10^exponent s; None: not expressible.
+
+    1 ms is 1·10⁻³, 250 us is 250·10⁻⁶.
+    """
+    for exponent in EXPONENTS:
+        value, rest = divmod(period_ns, 10 ** (9 + exponent))
+        if rest == 0 and 1 <= value <= 255:
+            return value, exponent
+    return None

@@ -1,0 +1,210 @@
+"""Inputs and Outputs: any SubDevice's process data as named columns, single bits included."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+from catenary.bus import SubDevice
+from catenary.errors import MappingError
+from catenary.model.device import Assignment, DeviceDescription, Direction, Entry
+from catenary.plan.cycle import Bank, Column, NumberKind
+from catenary.plan.wish import (
+    Bytes,
+    ImageLayout,
+    Integers,
+    ObjectReference,
+    PdoWish,
+    Reals,
+    Views,
+    WishTables,
+)
+
+# Data types of ETG.1000.6 table 64 that are not unsigned integers.
+SIGNED_TYPES = frozenset((0x02, 0x03, 0x04, 0x10, 0x12, 0x13, 0x14, 0x15))
+REAL_TYPES = frozenset((0x08, 0x11))
+
+
+class Channel(NamedTuple):
+    """One entry of a device's process data and the name it goes by."""
+
+    name: str
+    device: int
+    entry: Entry
+    scale: float | None  # SI value = raw · scale; None: the raw number
+
+    @property
+    def kind(self) -> NumberKind:
+        if self.entry.data_type in REAL_TYPES:
+            return NumberKind.REAL
+        return NumberKind.SIGNED if self.entry.data_type in SIGNED_TYPES else NumberKind.UNSIGNED
+
+    @property
+    def bank(self) -> Bank:
+        if self.scale is not None or self.kind is NumberKind.REAL:
+            return Bank.REAL
+        return Bank.BIT if self.entry.bit_length == 1 else Bank.INTEGER
+
+
+class _Channels:
+    """The process data of some devices in one direction, as a wish."""
+
+    direction: Direction
+
+    def __init__(self, *subs: SubDevice, scale: Mapping[str, float] | None = None) -> None:
+        self.subs = subs
+        self._channels = channels([sub.description for sub in subs], self.direction, scale or {})
+        self._places: dict[str, tuple[Reals | Integers | Bytes, int]] = {}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of all channels, in the order of the process data."""
+        return tuple(channel.name for channel in self._channels)
+
+    def __getitem__(self, name: str) -> float | int:
+        """The channel's value: 0 or 1, the raw integer, or the float where it has a scale."""
+        array, place = self._place(name)
+        value: float | int = array.item(place)
+        return value
+
+    def pdos(self, period_ns: int) -> Mapping[int, PdoWish]:
+        """What is mapped already: nothing changes on the device."""
+        wishes: dict[int, PdoWish] = {}
+        for sub in self.subs:
+            mine = tuple(reference(c.entry) for c in self._channels if c.device == sub.position)
+            output = self.direction is Direction.OUTPUT
+            wishes[sub.position] = PdoWish(outputs=mine) if output else PdoWish(inputs=mine)
+        return wishes
+
+    def tables(self, layout: ImageLayout) -> WishTables:
+        """One column per channel."""
+        columns = tuple(column(channel, layout, self.direction) for channel in self._channels)
+        if self.direction is Direction.OUTPUT:
+            return WishTables(output_columns=columns)
+        return WishTables(input_columns=columns)
+
+    def _bind(self, reals: Reals, integers: Integers, bits: Bytes) -> None:
+        self.reals, self.integers, self.bits = reals, integers, bits
+        arrays: dict[Bank, Reals | Integers | Bytes] = {
+            Bank.REAL: reals,
+            Bank.INTEGER: integers,
+            Bank.BIT: bits,
+        }
+        used = dict.fromkeys(Bank, 0)
+        for channel in self._channels:
+            self._places[channel.name] = (arrays[channel.bank], used[channel.bank])
+            used[channel.bank] += 1
+
+    def _place(self, name: str) -> tuple[Reals | Integers | Bytes, int]:
+        try:
+            return self._places[name]
+        except KeyError:
+            if name in self.names:
+                raise RuntimeError(f"{name!r} has no value before a Loop is open") from None
+            raise KeyError(f"no channel {name!r}; there are: {', '.join(self.names)}") from None
+
+
+class Inputs(_Channels):
+    """The inputs of SubDevices: `.bits` (uint8), `.integers` (int64) and `.reals` (float64), each
+    in the order of the process data, or one by name: `buttons["Input 1"]`.
+
+    `scale` turns raw numbers into floats: `Inputs(sub, scale={"Value": 10 / 0x7FFF})`.
+    """
+
+    direction = Direction.INPUT
+
+    def bind(self, views: Views) -> None:
+        """Receives the arrays of the loop that opens."""
+        self._bind(views.input_reals, views.input_integers, views.input_bits)
+
+
+class Outputs(_Channels):
+    """The outputs of SubDevices, all 0 at the start: write `.bits[:]`, `.integers[:]`, `.reals[:]`,
+    or one by name: `lamps["Output 1"] = 1`. `scale` as for `Inputs`."""
+
+    direction = Direction.OUTPUT
+
+    def __setitem__(self, name: str, value: float | int) -> None:
+        array, place = self._place(name)
+        array[place] = value
+
+    def bind(self, views: Views) -> None:
+        """Receives the arrays of the loop that opens."""
+        self._bind(views.output_reals, views.output_integers, views.output_bits)
+
+
+def channels(
+    devices: Iterable[DeviceDescription], direction: Direction, scale: Mapping[str, float]
+) -> tuple[Channel, ...]:
+    """All channels of the devices, each with a name of its own."""
+    found = [
+        (device, pdo, entry)
+        for device in devices
+        for assignment in device.assignments(direction)
+        for pdo, entry in named_entries(assignment)
+    ]
+    if not found:
+        raise ValueError(f"no {direction.name.lower()} process data in the devices given")
+    names = unique_names([(entry.name, pdo, str(device.position)) for device, pdo, entry in found])
+    for name in scale:
+        if name not in names:
+            raise ValueError(f"scale: no channel {name!r}; there are: {', '.join(names)}")
+    return tuple(
+        Channel(name, device.position, entry, scale.get(name))
+        for name, (device, _, entry) in zip(names, found, strict=True)
+    )
+
+
+def named_entries(assignment: Assignment) -> list[tuple[str, Entry]]:
+    """(name of the PDO, entry) without gaps and without what no number can hold."""
+    return [
+        (pdo.name, entry)
+        for pdo in assignment.pdos
+        for entry in pdo.entries
+        if entry.index and 1 <= entry.bit_length <= 64
+    ]
+
+
+def unique_names(parts: list[tuple[str, str, str]]) -> list[str]:
+    """A name for each (entry, PDO, position): as short as tells them apart, then numbered.
+
+    Terminals call every channel's entry "Output" and tell them apart by their PDO, "Channel 3".
+    """
+    for spelling in (short_name, pdo_name, full_name):
+        names = [spelling(*part) for part in parts]
+        if len(set(names)) == len(names):
+            return names
+    return [f"{name} {names[: i + 1].count(name)}" for i, name in enumerate(names)]
+
+
+def short_name(entry: str, pdo: str, position: str) -> str:
+    return entry or pdo or "value"
+
+
+def pdo_name(entry: str, pdo: str, position: str) -> str:
+    return f"{pdo} {entry}".strip() or "value"
+
+
+def full_name(entry: str, pdo: str, position: str) -> str:
+    return f"{position} {pdo_name(entry, pdo, position)}"
+
+
+def reference(entry: Entry) -> ObjectReference:
+    return ObjectReference(entry.index, entry.subindex, entry.bit_length)
+
+
+def column(channel: Channel, layout: ImageLayout, direction: Direction) -> Column:
+    """The channel with its place."""
+    entry = channel.entry
+    find = layout.output if direction is Direction.OUTPUT else layout.input
+    number = find(channel.device, entry.index, entry.subindex)
+    if number is None:
+        raise MappingError(f"device {channel.device}: {entry} is not in its process data")
+    return Column(
+        name=channel.name,
+        number=replace(number, kind=channel.kind, scale=channel.scale or 1.0, offset=0.0),
+        bank=channel.bank,
+        device=channel.device,
+        sync_unit=layout.sync_unit(channel.device),
+    )

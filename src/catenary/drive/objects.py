@@ -1,0 +1,65 @@
+"""The CiA 402-2 objects an axis exchanges: number, width and what one count means.
+
+Slot k of a device has them at index + SLOT_OFFSET · k (ETG.6010 §5.1).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from catenary.plan.wish import ObjectReference
+from catenary.wire.cia402 import SLOT_OFFSET, Object
+
+
+class Unit(Enum):
+    """Which scale of the axis an object uses; RAW: none, an integer column."""
+
+    POSITION = "position"
+    DISTANCE = "distance"  # a difference of positions: without the axis' offset
+    VELOCITY = "velocity"
+    TORQUE = "torque"
+    RAW = "raw"
+
+
+@dataclass(frozen=True, slots=True)
+class AxisObject:
+    """One object of an axis. `output`: MainDevice → drive."""
+
+    index: int  # of slot 0
+    subindex: int
+    bit_length: int
+    signed: bool = False
+    unit: Unit = Unit.RAW
+    output: bool = False
+
+    def reference(self, slot: int) -> ObjectReference:
+        return ObjectReference(self.index + SLOT_OFFSET * slot, self.subindex, self.bit_length)
+
+
+CONTROLWORD = AxisObject(Object.CONTROLWORD, 0, 16, False, Unit.RAW, True)
+STATUSWORD = AxisObject(Object.STATUSWORD, 0, 16, False, Unit.RAW, False)
+MODE_TARGET = AxisObject(Object.MODE_OF_OPERATION, 0, 8, True, Unit.RAW, True)
+MODE_ACTUAL = AxisObject(Object.MODE_OF_OPERATION_DISPLAY, 0, 8, True, Unit.RAW, False)
+ACTUAL_POSITION = AxisObject(Object.POSITION_ACTUAL, 0, 32, True, Unit.POSITION, False)
+ACTUAL_VELOCITY = AxisObject(Object.VELOCITY_ACTUAL, 0, 32, True, Unit.VELOCITY, False)
+TARGET_TORQUE = AxisObject(Object.TARGET_TORQUE, 0, 16, True, Unit.TORQUE, True)
+ACTUAL_TORQUE = AxisObject(Object.TORQUE_ACTUAL, 0, 16, True, Unit.TORQUE, False)
+TARGET_POSITION = AxisObject(Object.TARGET_POSITION, 0, 32, True, Unit.POSITION, True)
+TARGET_VELOCITY = AxisObject(Object.TARGET_VELOCITY, 0, 32, True, Unit.VELOCITY, True)
+
+# Columns that can be asked for by name, in the order of their numbers.
+NAMED_COLUMNS: dict[str, AxisObject] = {
+    "error_code": AxisObject(Object.ERROR_CODE, 0, 16, False, Unit.RAW, False),
+    "position_demand": AxisObject(0x6062, 0, 32, True, Unit.POSITION, False),
+    "velocity_demand": AxisObject(0x606B, 0, 32, True, Unit.VELOCITY, False),
+    "torque_demand": AxisObject(0x6074, 0, 16, True, Unit.TORQUE, False),
+    "velocity_offset": AxisObject(Object.VELOCITY_OFFSET, 0, 32, True, Unit.VELOCITY, True),
+    "torque_offset": AxisObject(Object.TORQUE_OFFSET, 0, 16, True, Unit.TORQUE, True),
+    "touch_probe_function": AxisObject(0x60B8, 0, 16, False, Unit.RAW, True),
+    "touch_probe_status": AxisObject(0x60B9, 0, 16, False, Unit.RAW, False),
+    "touch_probe_position": AxisObject(0x60BA, 0, 32, True, Unit.POSITION, False),
+    "following_error": AxisObject(Object.FOLLOWING_ERROR_ACTUAL, 0, 32, True, Unit.DISTANCE, False),
+    "digital_inputs": AxisObject(Object.DIGITAL_INPUTS, 0, 32, False, Unit.RAW, False),
+    "digital_outputs": AxisObject(Object.DIGITAL_OUTPUTS, 1, 32, False, Unit.RAW, True),
+}

@@ -1,0 +1,58 @@
+"""What a drive is asked and told once, in PRE-OP: rated torque, interpolation time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from catenary.bus import SubDevice
+from catenary.drive.axis import Axis, interpolation_time
+from catenary.errors import ConfigurationError, SdoAbort
+from catenary.types import SINT, UDINT, USINT
+from catenary.wire.cia402 import Object
+
+# SDO abort codes of an object a drive does not have: no object, no subindex.
+OBJECT_MISSING = (0x06020000, 0x06090011)
+
+
+def with_rated_torque(axis: Axis, sub: SubDevice) -> Axis:
+    """The axis with the rated torque of 0x6076, unless the application gave it."""
+    if axis.units.rated_torque is not None or not axis.uses_torque:
+        return axis
+    index = axis.index(Object.MOTOR_RATED_TORQUE)
+    try:
+        rated = sub.sdo.read(index, 0, type=UDINT)
+    except SdoAbort as abort:
+        if abort.code not in OBJECT_MISSING:
+            raise
+        rated = 0
+    if rated <= 0:
+        raise ConfigurationError(
+            f"{axis.name} does not know its rated torque (0x{index:04X})",
+            hint="give Drives(rated_torque=...) in N·m, or leave torque out of measured=",
+        )
+    return replace(axis, units=replace(axis.units, rated_torque=rated * 1e-3))
+
+
+def downloads(axis: Axis, sub: SubDevice, period_ns: int) -> tuple[tuple[int, int, bytes], ...]:
+    """0x60C2 for this period. Nothing where the drive has no such object or agrees already."""
+    index = axis.index(Object.INTERPOLATION_TIME_PERIOD)
+    try:
+        found = (sub.sdo.read(index, 1, type=USINT), sub.sdo.read(index, 2, type=SINT))
+    except SdoAbort as abort:
+        if abort.code not in OBJECT_MISSING:
+            raise
+        return ()
+    wanted = interpolation_time(period_ns)
+    if wanted is None:
+        raise ConfigurationError(
+            f"{axis.name}: a period of {period_ns / 1e3:g} us cannot be said in 0x{index:04X} "
+            "(1 to 255 times a power of ten)",
+            hint="choose a period such as 1 ms, 500 us, 250 us or 125 us",
+        )
+    if found == wanted:
+        return ()
+    value, exponent = wanted
+    return (
+        (index, 1, value.to_bytes(1, "little")),
+        (index, 2, exponent.to_bytes(1, "little", signed=True)),
+    )

@@ -1,0 +1,66 @@
+"""The CiA 402 step in plain Python: the twin of `core/_cia402.pyx`, tested on the same tables.
+
+IEC 61800-7-201 §6, the MainDevice's side only; the virtual servo's machine is written apart from
+this one, so that they judge each other.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+from catenary.wire.cia402 import (
+    DISABLE_OPERATION,
+    DISABLE_VOLTAGE,
+    ENABLE_OPERATION,
+    FAULT_RESET,
+    QUICK_STOP,
+    SHUTDOWN,
+    SWITCH_ON,
+    Command,
+    State,
+)
+
+
+class Goal(IntEnum):
+    """What an axis is to become; the core's numbers."""
+
+    DISABLED = 0
+    ENABLED = 1
+    QUICK_STOP = 2
+    RESET = 3  # disabled, and a fault is acknowledged
+
+
+# (state, goal): the command that leads there. What is not listed: DISABLE_VOLTAGE, which waits in
+# a state the drive leaves by itself (0, 14), leaves a quick stop (12) and clears bit 7 in a fault.
+TOWARDS: dict[tuple[State, Goal], Command] = {
+    (State.READY_TO_SWITCH_ON, Goal.DISABLED): SHUTDOWN,  # stays
+    (State.SWITCHED_ON, Goal.DISABLED): SHUTDOWN,  # transition 6
+    (State.OPERATION_ENABLED, Goal.DISABLED): DISABLE_OPERATION,  # transition 5, ramp of 0x605C
+    (State.SWITCH_ON_DISABLED, Goal.ENABLED): SHUTDOWN,  # transition 2
+    (State.READY_TO_SWITCH_ON, Goal.ENABLED): SWITCH_ON,  # transition 3
+    (State.SWITCHED_ON, Goal.ENABLED): ENABLE_OPERATION,  # transition 4
+    (State.OPERATION_ENABLED, Goal.ENABLED): ENABLE_OPERATION,  # stays
+    (State.FAULT, Goal.ENABLED): FAULT_RESET,  # transition 15
+    (State.READY_TO_SWITCH_ON, Goal.QUICK_STOP): QUICK_STOP,  # transition 7
+    (State.SWITCHED_ON, Goal.QUICK_STOP): QUICK_STOP,  # transition 10
+    (State.OPERATION_ENABLED, Goal.QUICK_STOP): QUICK_STOP,  # transition 11, by 0x605A
+    (State.QUICK_STOP_ACTIVE, Goal.QUICK_STOP): QUICK_STOP,  # stays; 16 would move at once
+    (State.READY_TO_SWITCH_ON, Goal.RESET): SHUTDOWN,
+    (State.SWITCHED_ON, Goal.RESET): SHUTDOWN,
+    (State.OPERATION_ENABLED, Goal.RESET): DISABLE_OPERATION,
+    (State.FAULT, Goal.RESET): FAULT_RESET,
+}
+
+
+def controlword_towards(state: State | None, goal: Goal, previous: int) -> int:
+    """The command bits (0 to 3 and 7) that lead from `state` towards `goal`.
+
+    `previous`: the controlword sent last. A fault is reset by a rising edge of bit 7, so the
+    commands of a drive that was enabled are cleared first.
+    """
+    if state is None:
+        return DISABLE_VOLTAGE.value
+    command = TOWARDS.get((state, goal), DISABLE_VOLTAGE)
+    if command is FAULT_RESET and previous & 0x000F:
+        return DISABLE_VOLTAGE.value
+    return command.value

@@ -1,0 +1,97 @@
+"""From a drive's raw numbers to SI units and back: one axis, seen at the joint (after the gear).
+
+CiA 402-2 §8 (factor group) leaves the units to the drive; what most deliver and what is assumed
+unless said otherwise: position in encoder counts, velocity in counts per second, torque in
+thousandths of the rated torque 0x6076 (mN·m).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+from catenary.drive.objects import Unit
+from catenary.plan.cycle import Number
+
+V = TypeVar("V")
+
+
+@dataclass(frozen=True, slots=True)
+class AxisUnits:
+    """What one raw count of an axis means at the joint.
+
+    `counts_per_turn`: of the motor's encoder. `gear_ratio`: motor turns per joint turn.
+    `direction`: +1, or -1 where the joint turns against the motor. `offset` [rad]: the joint's
+    position when the drive says 0. `velocity_unit` [rad/s of the motor]: of one raw count; None:
+    one position count per second. `rated_torque` [N·m at the motor]: None until read from 0x6076.
+    """
+
+    counts_per_turn: float
+    gear_ratio: float = 1.0
+    direction: int = 1
+    offset: float = 0.0
+    velocity_unit: float | None = None
+    rated_torque: float | None = None
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.counts_per_turn) and self.counts_per_turn > 0):
+            raise ValueError(f"counts_per_turn must be positive, not {self.counts_per_turn}")
+        if not (math.isfinite(self.gear_ratio) and self.gear_ratio > 0):
+            raise ValueError(
+                f"gear_ratio must be positive, not {self.gear_ratio}; use direction=-1"
+            )
+        if self.direction not in (1, -1):
+            raise ValueError(f"direction must be 1 or -1, not {self.direction}")
+        if not math.isfinite(self.offset):
+            raise ValueError(f"offset must be a finite angle [rad], not {self.offset}")
+        for name in ("velocity_unit", "rated_torque"):
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and value > 0):
+                raise ValueError(f"{name} must be positive, not {value}")
+
+    @property
+    def position_scale(self) -> float:
+        """[rad] of one position count."""
+        return self.direction * 2.0 * math.pi / (self.counts_per_turn * self.gear_ratio)
+
+    @property
+    def velocity_scale(self) -> float:
+        """[rad/s] of one velocity count."""
+        if self.velocity_unit is None:
+            return self.position_scale
+        return self.direction * self.velocity_unit / self.gear_ratio
+
+    @property
+    def torque_scale(self) -> float:
+        """[N·m] of one torque count."""
+        if self.rated_torque is None:
+            raise ValueError("the rated torque is not known yet")
+        return self.direction * self.rated_torque * self.gear_ratio / 1000.0
+
+    def apply(self, number: Number, unit: Unit) -> Number:
+        """`number` with this axis' scale for `unit`; RAW: as it is."""
+        match unit:
+            case Unit.POSITION:
+                return replace(number, scale=self.position_scale, offset=self.offset)
+            case Unit.DISTANCE:
+                return replace(number, scale=self.position_scale, offset=0.0)
+            case Unit.VELOCITY:
+                return replace(number, scale=self.velocity_scale, offset=0.0)
+            case Unit.TORQUE:
+                return replace(number, scale=self.torque_scale, offset=0.0)
+            case Unit.RAW:
+                return replace(number, scale=1.0, offset=0.0)
+
+
+def per_axis(name: str, value: V | Sequence[V], n: int) -> tuple[V, ...]:
+    """One value for all of n axes, or one for each."""
+    return one_each(name, value, n) if isinstance(value, Sequence) else (value,) * n
+
+
+def one_each(name: str, values: Sequence[V], n: int) -> tuple[V, ...]:
+    """As many values as axes."""
+    if len(values) != n:
+        raise ValueError(f"{name} has {len(values)} values for {n} axes")
+    return tuple(values)

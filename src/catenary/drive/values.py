@@ -1,0 +1,62 @@
+"""The arrays of a wish: bound to the loop's private buffers when it opens."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from catenary.plan.wish import Modes, Reals
+
+Array = npt.NDArray[np.float64] | npt.NDArray[np.int64]
+
+
+class AxisValues:
+    """The quantities of n axes, one array each. They stay the same objects as long as the loop is
+    open: read them, write into targets with `[:] =`, keep a value with `.copy()`."""
+
+    __slots__ = ("_columns", "_owner", "mode", "position", "torque", "velocity")
+
+    position: Reals  # (n,) [rad]
+    velocity: Reals  # (n,) [rad/s]
+    torque: Reals  # (n,) [N·m]
+    mode: Modes  # (n,) modes of operation: 8 CSP, 9 CSV, 10 CST
+
+    _owner: str
+    _columns: Mapping[str, Array]
+
+    def __init__(self, owner: str) -> None:
+        object.__setattr__(self, "_owner", owner)
+
+    def bind(
+        self,
+        position: Reals,
+        velocity: Reals,
+        torque: Reals,
+        mode: Modes,
+        columns: Mapping[str, Array],
+    ) -> None:
+        """Receives the arrays of the loop that opens."""
+        object.__setattr__(self, "position", position)
+        object.__setattr__(self, "velocity", velocity)
+        object.__setattr__(self, "torque", torque)
+        object.__setattr__(self, "mode", mode)
+        object.__setattr__(self, "_columns", columns)
+
+    def __getitem__(self, name: str) -> Array:
+        """The column `name`, (n,): SI float64, or raw int64 for words of bits."""
+        try:
+            return self._columns[name]
+        except KeyError:
+            known = ", ".join(self._columns) or "none"
+            raise KeyError(
+                f"no column {name!r}; asked for in Drives(columns=...): {known}"
+            ) from None
+
+    def __getattr__(self, name: str) -> object:
+        # Reached only where a slot is still empty.
+        raise AttributeError(f"{self._owner}.{name} has no values before a Loop is open")
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError(f"write into the array: {self._owner}.{name}[:] = ...")

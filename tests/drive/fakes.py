@@ -1,0 +1,110 @@
+"""A layout and SubDevices out of thin air: the drive layer needs no bus to be judged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+
+import numpy as np
+
+from catenary.errors import SdoAbort
+from catenary.plan.cycle import Number, NumberKind
+from catenary.plan.wish import PdoWish, Views, WishTables
+
+
+@dataclass
+class FakeLayout:
+    """Lays the objects of each device one behind the other."""
+
+    outputs: dict[int, dict[tuple[int, int], int]] = field(default_factory=dict)
+    inputs: dict[int, dict[tuple[int, int], int]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, wishes: dict[int, PdoWish]) -> FakeLayout:
+        def sizes(references: tuple) -> dict[tuple[int, int], int]:
+            return {(r.index, r.subindex): r.bit_length for r in references}
+
+        return cls(
+            {device: sizes(wish.outputs) for device, wish in wishes.items()},
+            {device: sizes(wish.inputs) for device, wish in wishes.items()},
+        )
+
+    def output(self, device: int, index: int, subindex: int) -> Number | None:
+        return place(self.outputs, device, index, subindex)
+
+    def input(self, device: int, index: int, subindex: int) -> Number | None:
+        return place(self.inputs, device, index, subindex)
+
+    def sync_unit(self, device: int) -> int:
+        return device
+
+
+def place(
+    objects: dict[int, dict[tuple[int, int], int]], device: int, index: int, subindex: int
+) -> Number | None:
+    offset = 0
+    for at in sorted(objects):
+        for key, bits in objects[at].items():
+            if (at, *key) == (device, index, subindex):
+                return Number(offset, bits, NumberKind.UNSIGNED)
+            offset += bits
+    return None
+
+
+@dataclass
+class FakeSdo:
+    """A dictionary of 32-bit values; what is not in it does not exist."""
+
+    values: dict[tuple[int, int], int]
+    position: int = 0
+
+    def read(self, index: int, subindex: int, *, type: object = None) -> int:
+        if (index, subindex) not in self.values:
+            raise SdoAbort(
+                "no object", position=self.position, index=index, subindex=subindex, code=0x06020000
+            )
+        return self.values[index, subindex]
+
+
+def fake_sub(
+    position: int, values: dict[tuple[int, int], int] | None = None, slots: tuple[int, ...] = (0,)
+) -> SimpleNamespace:
+    """What the drive layer sees of a SubDevice: 0.64 N·m rated, interpolation time settable."""
+    if values is None:
+        values = {(0x6076, 0): 640, (0x60C2, 1): 2, (0x60C2, 2): -3}
+    return SimpleNamespace(
+        position=position,
+        name="Servo",
+        sdo=FakeSdo(values, position),
+        slots=slots,
+    )
+
+
+def views_of(tables: WishTables) -> Views:
+    """Zeroed arrays of the right sizes."""
+    n = len(tables.axes)
+
+    def count(columns: tuple, bank: int) -> int:
+        return sum(column.bank == bank for column in columns)
+
+    reals = [np.zeros(n) for _ in range(6)]
+    return Views(
+        *reals[:3],
+        statusword=np.zeros(n, np.uint16),
+        mode_actual=np.zeros(n, np.int8),
+        axis_state=np.zeros(n, np.uint8),
+        axis_flags=np.zeros(n, np.uint8),
+        target_position=reals[3],
+        target_velocity=reals[4],
+        target_torque=reals[5],
+        mode_target=np.zeros(n, np.int8),
+        goal=np.zeros(n, np.uint8),
+        request=np.zeros(n, np.uint32),
+        controlword_bits=np.zeros(n, np.uint16),
+        input_reals=np.zeros(count(tables.input_columns, 0)),
+        input_integers=np.zeros(count(tables.input_columns, 1), np.int64),
+        input_bits=np.zeros(count(tables.input_columns, 2), np.uint8),
+        output_reals=np.zeros(count(tables.output_columns, 0)),
+        output_integers=np.zeros(count(tables.output_columns, 1), np.int64),
+        output_bits=np.zeros(count(tables.output_columns, 2), np.uint8),
+    )
