@@ -104,6 +104,11 @@ class LaneRunner:
         result: T = waiting.task.result()
         return result
 
+    @property
+    def busy(self) -> bool:
+        """Whether anything waits for a step."""
+        return bool(self._active or self._submitted)
+
     def step(self) -> None:
         """One exchange of everything that is under way."""
         now = self._lane.now()

@@ -1,1 +1,6 @@
-"""(being built)"""
+"""The cyclic loop: from wishes to `for cycle in loop`, and safely back."""
+
+from catenary.loop.cycle import Cycle
+from catenary.loop.loop import Loop
+
+__all__ = ["Cycle", "Loop"]

@@ -1,0 +1,65 @@
+"""The engine's private buffers, cut into the views of each wish."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from catenary.plan.cycle import Bank, Column
+from catenary.plan.wish import Views, Wish, WishTables
+
+AXIS_BUFFERS = (
+    "actual_position",
+    "actual_velocity",
+    "actual_torque",
+    "statusword",
+    "mode_actual",
+    "axis_state",
+    "axis_flags",
+    "target_position",
+    "target_velocity",
+    "target_torque",
+    "mode_target",
+    "goal",
+    "request",
+    "controlword_bits",
+)
+COLUMN_BUFFERS: dict[tuple[bool, Bank], str] = {
+    (False, Bank.REAL): "input_reals",
+    (False, Bank.INTEGER): "input_integers",
+    (False, Bank.BIT): "input_bits",
+    (True, Bank.REAL): "output_reals",
+    (True, Bank.INTEGER): "output_integers",
+    (True, Bank.BIT): "output_bits",
+}
+
+
+def bind_wishes(
+    wishes: Sequence[Wish], tables: Sequence[WishTables], buffers: Mapping[str, memoryview]
+) -> Views:
+    """Binds every wish to its part of the buffers, in the order of the plan. Returns the whole."""
+    arrays = {name: np.asarray(buffers[name]) for name in (*AXIS_BUFFERS, *COLUMN_BUFFERS.values())}
+    used = dict.fromkeys(("axes", *COLUMN_BUFFERS.values()), 0)
+    for wish, table in zip(wishes, tables, strict=True):
+        sizes = dict.fromkeys(AXIS_BUFFERS, len(table.axes)) | column_sizes(table)
+        starts = {name: used.get(name, used["axes"]) for name in sizes}
+        parts = {name: arrays[name][starts[name] :][: sizes[name]] for name in sizes}
+        wish.bind(Views(**parts))
+        used["axes"] += len(table.axes)
+        for name in COLUMN_BUFFERS.values():
+            used[name] += sizes[name]
+    return Views(**arrays)
+
+
+def column_sizes(table: WishTables) -> dict[str, int]:
+    """How many columns a wish has in each bank."""
+    sides: tuple[tuple[bool, tuple[Column, ...]], ...] = (
+        (False, table.input_columns),
+        (True, table.output_columns),
+    )
+    sizes = dict.fromkeys(COLUMN_BUFFERS.values(), 0)
+    for output, columns in sides:
+        for column in columns:
+            sizes[COLUMN_BUFFERS[output, column.bank]] += 1
+    return sizes

@@ -1,0 +1,112 @@
+"""From a cycle that went wrong to an error that names the device."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from catenary.errors import DriveError, StateError, WorkingCounterError
+from catenary.procedure.survey import Answer
+from catenary.wire.al import State, status_code
+from catenary.wire.cia402 import State as DriveState
+from catenary.wire.drive_error import error_text
+
+STATE_BITS = 0x0F
+ERROR_BIT = 0x10
+IN_FAULT = (DriveState.FAULT_REACTION_ACTIVE, DriveState.FAULT)
+
+
+def silence_error(
+    answers: Sequence[Answer], suspects: Sequence[int], lost: int, log: object
+) -> WorkingCounterError:
+    """The error for `lost` bad cycles in a row; `suspects`: devices of the units that failed."""
+    silent = [answer.station for answer in answers if answer.word is None]
+    others = [a for a in answers if a.station.position in suspects and a.word is not None]
+    stray = [answer for answer in others if is_astray(answer)]
+    if silent and len(silent) == len(answers):
+        who, hint = "no device answers", "check the cable and power of the first device"
+    elif silent:
+        who = f"silent: {', '.join(map(str, silent))}"
+        hint = "check the cable before it and its power; what hangs behind it is silent too"
+    elif stray:
+        who = f"not in OP: {'; '.join(map(described, stray))}"
+        hint = "a device that was switched off and on again must be brought up again"
+    else:
+        who = f"all devices answer to single reads; affected: devices {listed(suspects)}"
+        hint = (
+            "frames are lost or corrupted on the way: check cables, and other traffic on the port"
+        )
+    return WorkingCounterError(
+        f"{lost} cycles in a row without all answers; {who}", log=log, hint=hint
+    )
+
+
+def state_error(answers: Sequence[Answer], log: object) -> StateError | None:
+    """The error for devices that left OP; None: all are there."""
+    astray = [answer for answer in answers if is_astray(answer)]
+    if not astray:
+        return None
+    first = astray[0]
+    known = status_code(first.code)
+    error = StateError(
+        f"{described(first)}, out of OP",
+        position=first.station.position,
+        requested=int(State.OP),
+        actual=(first.word or 0) & STATE_BITS,
+        code=first.code,
+        log=log,
+        hint=known.cause or "see its manual for what makes it leave OP",
+    )
+    for other in astray[1:]:
+        error.add_note(f"also: {described(other)}")
+    return error
+
+
+class AxisTrouble(NamedTuple):
+    """One axis and what it says about itself."""
+
+    name: str
+    state: DriveState | None
+    code: int | None  # object 0x603F; None: it could not be read
+
+    def __str__(self) -> str:
+        state = self.state.name if self.state is not None else "in no state of CiA 402"
+        if self.code is None:
+            return f"{self.name}: {state}, its error code cannot be read"
+        return f"{self.name}: {state}, error code 0x{self.code:04X} ({error_text(self.code)})"
+
+
+def drive_error(axes: Sequence[AxisTrouble], what: str, log: object) -> DriveError:
+    """The error for axes of which `what` is to be said: "in fault", "cannot be enabled"."""
+    faulty = any(axis.state in IN_FAULT for axis in axes)
+    hint = (
+        "remove the cause; a new Loop, or Drives.enable(), resets the fault"
+        if faulty
+        else "check its main supply, safe torque off and the enable input"
+    )
+    return DriveError(f"{what}: {'; '.join(map(str, axes))}", log=log, hint=hint)
+
+
+def is_astray(answer: Answer) -> bool:
+    """Answers, but not from OP."""
+    return answer.word is not None and answer.word & (STATE_BITS | ERROR_BIT) != State.OP
+
+
+def described(answer: Answer) -> str:
+    """The device, its state and its reason."""
+    assert answer.word is not None
+    try:
+        state = str(State(answer.word & STATE_BITS))
+    except ValueError:
+        state = f"state {answer.word & STATE_BITS}"
+    error = " with an error" if answer.word & ERROR_BIT else ""
+    reason = (
+        f" (AL status code 0x{answer.code:04X}: {status_code(answer.code).text})"
+        if answer.code
+        else ""
+    )
+    return f"{answer.station} is in {state}{error}{reason}"
+
+
+def listed(positions: Sequence[int]) -> str:
+    return ", ".join(map(str, positions)) or "none"

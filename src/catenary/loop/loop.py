@@ -1,0 +1,181 @@
+"""Loop: wishes become a plan, the plan a cycle that runs, the cycle `for cycle in loop`.
+
+Entering ends with the drives enabled and holding, or with everything safe and a specific error.
+Leaving, for whatever reason, stops the drives natively before the states go down.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from types import TracebackType
+from typing import Literal
+
+from catenary.core import CYCLE_DROPPED, CYCLE_NONE, CYCLE_STOPPED, CYCLE_WORKING_COUNTER
+from catenary.loop.cycle import Cycle
+from catenary.loop.devices import DeviceWish, main_device_of
+from catenary.loop.running import LogArray, Running, take_down
+from catenary.loop.signals import SignalGuard
+from catenary.loop.timing import Timing
+from catenary.plan.cycle import ReceiveMode
+from catenary.plan.make import Plan, make_plan
+from catenary.wire.al import State
+
+TROUBLE = CYCLE_WORKING_COUNTER | CYCLE_DROPPED | CYCLE_STOPPED | CYCLE_NONE
+LATE_LIMIT_POSITION = 0.050  # [s], CSP
+LATE_LIMIT_VELOCITY = 0.010  # [s], CSV and CST
+
+
+class Loop:
+    """Owns the cyclic exchange of the devices its wishes name, as a context manager and an iterator
+    of one `Cycle`.
+
+    `period` [s]. `run`: "threaded", a native thread keeps the instants and Python follows; or
+    "inline", the thread that iterates exchanges the frames itself. `receive`: "look", "wait" or
+    "spin"; None: "wait" when threaded, "look" when inline. `enable`: drives are enabled on entry.
+    `late_limit` [s] after which drives are stopped quickly when no targets come; None: 50 ms in
+    CSP, 10 ms in CSV and CST; 0: never. `lost_limit`: cycles in a row without all answers before
+    WorkingCounterError. `stop_deadline` [s] for standing still when leaving. `watchdog` [s] of the
+    devices' outputs. `raise_faults`: a drive in fault raises DriveError; else see `Drives.faults`.
+    `cpu` and `priority` (SCHED_FIFO) of the native thread; None: as they are.
+    """
+
+    def __init__(
+        self,
+        *wishes: DeviceWish,
+        period: float = 1e-3,
+        run: Literal["threaded", "inline"] = "threaded",
+        receive: ReceiveMode | None = None,
+        enable: bool = True,
+        late_limit: float | None = None,
+        lost_limit: int = 3,
+        stop_deadline: float = 2.0,
+        watchdog: float | None = 0.1,
+        raise_faults: bool = True,
+        cpu: int | None = None,
+        priority: int | None = 80,
+    ) -> None:
+        if run not in ("threaded", "inline"):
+            raise ValueError(f'run={run!r}: "threaded" or "inline"')
+        self._wishes = wishes
+        self._main = main_device_of(wishes)
+        self._period = period
+        self._run: Literal["threaded", "inline"] = run
+        self._receive: ReceiveMode = receive or ("look" if run == "inline" else "wait")
+        self._enable = enable
+        self._late_limit = late_limit
+        self._lost_limit = lost_limit
+        self._stop_deadline = stop_deadline
+        self._watchdog = watchdog
+        self._raise_faults = raise_faults
+        self._cpu = cpu
+        self._priority = priority
+        self._guard = SignalGuard((Loop.__exit__.__code__, Loop._leave.__code__))
+        self._running: Running | None = None
+        self._cycle: Cycle | None = None
+
+    def __enter__(self) -> Loop:
+        try:
+            self._guard.install()
+            self._running = self._cycle = None
+            plan = self._make_plan()
+            self._main.configure(plan)
+            self._running = Running(self._main, plan, self._wishes)
+            self._running.open()
+            if self._enable:
+                self._running.enable()
+            self._running.engine.reset_histograms()
+        except BaseException as error:
+            for problem in self._leave():
+                error.add_note(f"on the way down: {problem}")
+            raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        problems = self._leave()
+        if error is not None:
+            for problem in problems:
+                error.add_note(f"on the way down: {problem}")
+        elif problems:
+            raise problems[0]
+
+    def __iter__(self) -> Iterator[Cycle]:
+        running = self._opened
+        step, engine, operational = running.engine.next, running.engine, int(State.OP)
+        cycle = self._cycle
+        if cycle is None:
+            # The first cycle commits nothing: the body has not said anything yet.
+            flags = engine.run(1)
+            cycle = self._cycle = Cycle(engine)
+        else:
+            flags = step()
+        while True:
+            if flags & TROUBLE or engine.al_status != operational:
+                running.judge(flags, faults=self._raise_faults)
+            yield cycle
+            flags = step()
+
+    def __next__(self) -> Cycle:
+        return next(iter(self))
+
+    @property
+    def plan(self) -> Plan:
+        """What runs: print it."""
+        return self._opened.plan
+
+    @property
+    def timing(self) -> Timing:
+        """The phases of the cycles since the loop was entered; stays readable after it."""
+        engine = self._opened.engine
+        return Timing(engine.histograms(), engine.counters)
+
+    @property
+    def scheduling(self) -> str:
+        """What the thread that keeps the instants obtained."""
+        return self._opened.engine.scheduling
+
+    @property
+    def log(self) -> LogArray:
+        """The last 1000 cycles, oldest first, as a structured array."""
+        return self._opened.log()
+
+    def histogram(self, phase: str) -> list[tuple[float, float, int]]:
+        """(lower, upper, count) in us of every bucket of a phase of `timing` that is not empty."""
+        return self._opened.engine.histogram_counts(phase)
+
+    @property
+    def _opened(self) -> Running:
+        if self._running is None:
+            raise RuntimeError("the loop is not open: with Loop(...) as loop:")
+        return self._running
+
+    def _make_plan(self) -> Plan:
+        """What the wishes come to; nothing is written to the devices yet."""
+        late = self._late_limit
+        self._main.read_mappings(*self._wishes, period=self._period)
+        return make_plan(
+            [sub.description for sub in self._main.subs],
+            self._wishes,
+            period=self._period,
+            order=self._run,
+            receive_mode=self._receive,
+            watchdog=self._watchdog,
+            lost_limit=self._lost_limit,
+            late_limit_position=LATE_LIMIT_POSITION if late is None else late,
+            late_limit_velocity=LATE_LIMIT_VELOCITY if late is None else late,
+            stop_deadline=self._stop_deadline,
+            cpu=self._cpu,
+            priority=self._priority,
+        )
+
+    def _leave(self) -> list[Exception]:
+        try:
+            if self._running is not None:
+                return self._running.leave(self._guard)
+            return take_down(self._main)
+        finally:
+            self._guard.restore()

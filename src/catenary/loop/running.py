@@ -1,0 +1,210 @@
+"""What an open loop owns: the engine, its arrays, and the conversations beside the cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+
+import numpy as np
+import numpy.typing as npt
+
+from catenary.bus import MainDevice
+from catenary.core import (
+    AXIS_FOLLOWED,
+    CYCLE_NONE,
+    CYCLE_OK,
+    CYCLE_STOPPED,
+    CYCLE_WORKING_COUNTER,
+    GOAL_ENABLED,
+    RECORD_FIELDS,
+    Engine,
+)
+from catenary.errors import CatenaryError, DriveError, LoopError
+from catenary.loop.buffers import bind_wishes
+from catenary.loop.diagnosis import IN_FAULT, AxisTrouble, drive_error, silence_error, state_error
+from catenary.loop.service import Service
+from catenary.loop.signals import SignalGuard
+from catenary.plan.make import Plan
+from catenary.plan.wish import Wish
+from catenary.procedure.al_state import request_state
+from catenary.procedure.sdo import upload
+from catenary.procedure.survey import survey
+from catenary.types import UINT
+from catenary.wire.al import State
+from catenary.wire.cia402 import SLOT_OFFSET, Mode, Object, state_of
+
+LogArray = npt.NDArray[np.void]
+
+FATAL = CYCLE_WORKING_COUNTER | CYCLE_STOPPED | CYCLE_NONE
+ENABLE_TIMEOUT_NS = 5_000_000_000  # mains contactors and brakes are slow, but not this slow
+SETTLE_CYCLES = 50  # until the first cycle with all answers
+STOP_SLICE_NS = 20_000_000  # between looks at "hurry" while the drives brake
+
+
+class Running:
+    """Owns the engine of one MainDevice while its loop is open."""
+
+    def __init__(self, main: MainDevice, plan: Plan, wishes: Sequence[Wish]) -> None:
+        self.main = main
+        self.plan = plan
+        self.engine = Engine(plan.cycle, main.link.capsule)
+        self.views = bind_wishes(wishes, plan.tables, self.engine.buffers)
+        self.service = Service(self.engine)
+        self._attached = ExitStack()
+        self._stations = [sub.station for sub in main.subs]
+
+    # Opening
+
+    def open(self) -> None:
+        """From SAFE-OP to OP: the cycle starts, and valid outputs flow while the states change."""
+        self.engine.start()
+        self.service.start()
+        self._attached.enter_context(self.main.attached(self.service.runner))
+        self._settle()
+        self.service.converse(*(request_state(station, State.OP) for station in self._stations))
+
+    def enable(self) -> None:
+        """Enables all axes. Position axes hold when this returns; velocity and torque axes wait for
+        their first targets."""
+        self.views.goal[:] = GOAL_ENABLED
+        self.views.request[:] += 1
+        in_position = self.views.mode_target == Mode.CSP
+        deadline = self.engine.now() + ENABLE_TIMEOUT_NS
+        while True:
+            flags = self.engine.run(1)
+            waiting = in_position & (self.views.axis_flags & AXIS_FOLLOWED == 0)
+            if not waiting.any():
+                return
+            if flags & FATAL or self.engine.al_status != State.OP:
+                self.judge(flags, faults=False)
+            if self.engine.now() > deadline:
+                raise self._drive_error(np.flatnonzero(waiting).tolist(), "cannot be enabled")
+
+    def _settle(self) -> None:
+        """Until all units answer: the first cycles of a new thread may find nobody."""
+        for _ in range(SETTLE_CYCLES):
+            flags = self.engine.run(1)
+            self._raise_ended(flags)
+            if flags & CYCLE_OK:
+                return
+        raise self._silence_error()
+
+    # Running
+
+    def judge(self, flags: int, *, faults: bool) -> None:
+        """Raises the error for a cycle in trouble; returns where it was a false alarm."""
+        self._raise_ended(flags)
+        if flags & CYCLE_WORKING_COUNTER:
+            raise self._silence_error()
+        if self.engine.al_status != State.OP:
+            self._raise_astray()
+        states = [state_of(word) for word in self.views.statusword.tolist()]
+        faulty = [axis for axis, state in enumerate(states) if state in IN_FAULT]
+        if faulty and faults:
+            raise self._drive_error(faulty, "in fault")
+
+    def _raise_ended(self, flags: int) -> None:
+        if flags & CYCLE_STOPPED:
+            raise LoopError("the cycle has ended: the link failed", log=self.log())
+        if flags & CYCLE_NONE:
+            raise LoopError(
+                "no new cycle for 1 s",
+                log=self.log(),
+                hint="the native thread does not get the CPU: see loop.scheduling",
+            )
+
+    def log(self) -> LogArray:
+        """The last cycles, oldest first."""
+        return np.frombuffer(self.engine.log(), dtype=np.dtype(RECORD_FIELDS))
+
+    # Leaving
+
+    def leave(self, guard: SignalGuard) -> list[Exception]:
+        """Brings everything down, best effort: each step is taken whatever the one before met.
+        What went wrong on the way."""
+        steps: tuple[Callable[[SignalGuard], None], ...] = (
+            self._stop_axes,
+            self._stop_cycle,
+            self._take_down,
+        )
+        problems: list[Exception] = []
+        for step in steps:
+            try:
+                step(guard)
+            except Exception as problem:  # the next step matters more; all are told at the end
+                problems.append(problem)
+        return problems
+
+    def _stop_axes(self, guard: SignalGuard) -> None:
+        """Quick stop as each drive's 0x605A says, exchanged until all stand."""
+        if not self.plan.cycle.axes:
+            return
+        self.engine.quick_stop_all()
+        for _ in range(self.plan.cycle.stop_deadline_ns // STOP_SLICE_NS + 1):
+            if guard.hurry or self.engine.run_until_stopped(STOP_SLICE_NS):
+                return
+
+    def _stop_cycle(self, guard: SignalGuard) -> None:
+        self._attached.close()
+        self.service.end()
+        self.engine.stop()
+
+    def _take_down(self, guard: SignalGuard) -> None:
+        self.main.leave()
+
+    # Errors
+
+    def _silence_error(self) -> CatenaryError:
+        lost, log = self.engine.lost_in_row, self.log()
+        suspects = [
+            position
+            for unit, valid in zip(self.plan.cycle.sync_units, self._valid_units(), strict=True)
+            if not valid and not unit.optional
+            for position in unit.devices
+        ]
+        self.engine.quick_stop_all()  # what still answers need not wait for the questions
+        [answers] = self.service.converse(survey(self._stations))
+        return silence_error(answers, suspects, lost, log)
+
+    def _valid_units(self) -> list[int]:
+        return list(self.engine.buffers["unit_valid"].tolist())
+
+    def _raise_astray(self) -> None:
+        log = self.log()
+        [answers] = self.service.converse(survey(self._stations))
+        error = state_error(answers, log)
+        if error is not None:
+            raise error
+
+    def _drive_error(self, axes: Sequence[int], what: str) -> DriveError:
+        """The error for some axes, with what each drive says about it."""
+        log = self.log()
+        states = [state_of(self.views.statusword.item(axis)) for axis in axes]
+        self.engine.quick_stop_all()
+        troubles = [
+            AxisTrouble(self.plan.cycle.axes[axis].name, state, self._error_code(axis))
+            for axis, state in zip(axes, states, strict=True)
+        ]
+        return drive_error(troubles, what, log)
+
+    def _error_code(self, axis: int) -> int | None:
+        """Object 0x603F of the axis; None where the drive does not tell."""
+        plan = self.plan.cycle.axes[axis]
+        channel = self.main.subs[plan.device].channel
+        if channel is None:
+            return None
+        index = Object.ERROR_CODE + SLOT_OFFSET * plan.slot
+        try:
+            [data] = self.service.converse(upload(channel, index, 0))
+            return UINT.decode(data)
+        except CatenaryError:
+            return None  # a drive in trouble may not talk; the error says that the code is unknown
+
+
+def take_down(main: MainDevice) -> list[Exception]:
+    """The way down of a loop that never began to cycle."""
+    try:
+        main.leave()
+    except CatenaryError as problem:
+        return [problem]
+    return []

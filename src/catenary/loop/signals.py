@@ -1,0 +1,67 @@
+"""Ctrl-C and SIGTERM while a loop is open: leaving is never cut short half-way.
+
+Only in the main thread, where Python delivers signals. Outside of leaving, Ctrl-C does what it did
+before and SIGTERM, where nobody handles it, raises SystemExit: both end in the loop's `__exit__`.
+While the loop is being left neither raises: each asks to hurry.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable
+from types import CodeType, FrameType
+from typing import TypeAlias
+
+Handler: TypeAlias = Callable[[int, FrameType | None], object] | int | None
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class SignalGuard:
+    """Owns the handlers of SIGINT and SIGTERM while a loop is open.
+
+    `leaving`: the code objects of the functions that leave; a signal that finds one of them on the
+    stack only sets `hurry`. (A flag set by those functions would leave a gap at their first line.)
+    """
+
+    def __init__(self, leaving: tuple[CodeType, ...]) -> None:
+        self._leaving = leaving
+        self._before: dict[signal.Signals, Handler] = {}
+        self.hurry = False
+
+    def install(self) -> None:
+        """Takes the signals over; nothing outside of the main thread."""
+        if threading.current_thread() is not threading.main_thread():
+            return
+        for number in SIGNALS:
+            before = signal.getsignal(number)
+            # None: not from Python, so not ours to give back. SIG_IGN: ignored on purpose.
+            if before is None or before is signal.SIG_IGN:
+                continue
+            self._before[number] = before
+            signal.signal(number, self._handle)
+
+    def restore(self) -> None:
+        """Gives the signals back."""
+        while self._before:
+            number, before = self._before.popitem()
+            signal.signal(number, before)
+
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        if self._is_leaving(frame):
+            self.hurry = True
+            return
+        before = self._before.get(signal.Signals(number))
+        if callable(before):
+            before(number, frame)
+        elif number == signal.SIGTERM:
+            raise SystemExit(128 + number)  # what a shell reports of a process ended by SIGTERM
+        else:
+            raise KeyboardInterrupt
+
+    def _is_leaving(self, frame: FrameType | None) -> bool:
+        while frame is not None:
+            if frame.f_code in self._leaving:
+                return True
+            frame = frame.f_back
+        return False

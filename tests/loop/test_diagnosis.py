@@ -1,0 +1,67 @@
+"""Errors that name the device."""
+
+from catenary.loop.diagnosis import AxisTrouble, drive_error, silence_error, state_error
+from catenary.procedure.station import Station
+from catenary.procedure.survey import Answer
+from catenary.wire.al import State
+from catenary.wire.cia402 import State as DriveState
+
+COUPLER = Station(0, 0x1000, "Coupler")
+SERVO = Station(1, 0x1001, "Servo")
+LAMP = Station(2, 0x1002, "Lamp")
+LOG = object()
+
+
+def test_silent_devices_are_named() -> None:
+    answers = [Answer(COUPLER, State.OP), Answer(SERVO, None), Answer(LAMP, None)]
+    error = silence_error(answers, [1, 2], 3, LOG)
+    assert "device 1 (Servo), device 2 (Lamp)" in str(error)
+    assert error.log is LOG
+
+
+def test_silence_of_all_is_the_cable() -> None:
+    error = silence_error([Answer(COUPLER, None), Answer(SERVO, None)], [1], 3, LOG)
+    assert "no device answers" in str(error)
+
+
+def test_a_device_that_came_back_is_not_silent_but_not_in_op() -> None:
+    answers = [Answer(COUPLER, State.OP), Answer(SERVO, State.INIT)]
+    assert "device 1 (Servo) is in INIT" in str(silence_error(answers, [1], 3, LOG))
+
+
+def test_lost_frames_without_a_silent_device_are_said_as_such() -> None:
+    error = silence_error([Answer(COUPLER, State.OP), Answer(SERVO, State.OP)], [1], 5, LOG)
+    assert str(error).startswith("5 cycles in a row")
+    assert "frames are lost" in error.hint
+
+
+def test_who_left_op_is_told_with_the_reason() -> None:
+    answers = [Answer(COUPLER, State.OP), Answer(SERVO, State.SAFE_OP | 0x10, 0x001B)]
+    error = state_error(answers, LOG)
+    assert error is not None
+    assert (error.position, error.requested, error.actual, error.code) == (1, 8, 4, 0x001B)
+    assert "device 1 (Servo) is in SAFE-OP with an error" in str(error)
+    assert "0x001B" in str(error)
+
+
+def test_all_in_op_is_no_error() -> None:
+    assert state_error([Answer(COUPLER, State.OP), Answer(SERVO, State.OP)], LOG) is None
+
+
+def test_others_that_left_op_are_noted() -> None:
+    answers = [Answer(SERVO, State.SAFE_OP), Answer(LAMP, State.PRE_OP)]
+    error = state_error(answers, LOG)
+    assert error is not None
+    assert error.__notes__ == ["also: device 2 (Lamp) is in PRE-OP"]
+
+
+def test_a_fault_is_told_by_its_code() -> None:
+    error = drive_error([AxisTrouble("1 Servo", DriveState.FAULT, 0x8611)], "in fault", LOG)
+    assert "0x8611 (following error)" in str(error)
+    assert "resets the fault" in error.hint
+
+
+def test_a_drive_without_power_is_not_in_fault() -> None:
+    trouble = AxisTrouble("1 Servo", DriveState.SWITCH_ON_DISABLED, None)
+    error = drive_error([trouble], "cannot be enabled", LOG)
+    assert "supply" in error.hint
