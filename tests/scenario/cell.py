@@ -1,0 +1,73 @@
+"""A cell for scenarios: a virtual segment, a fault injector round its link, a MainDevice on it.
+
+What is asserted is the segment's own truth: `cell.states`, `cell.servos[i].drive_state()`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import catenary as cat
+from catenary.bus import SubDevices
+from catenary.link import Fault, FaultInjector
+from catenary.virtual import Coupler, Device, DigitalOutputs, Segment, Servo
+
+PRE_OP, SAFE_OP, OP = 2, 4, 8
+TURN = 2 * math.pi
+
+
+@dataclass
+class Cell:
+    segment: Segment
+    link: FaultInjector
+    main: cat.MainDevice
+
+    @property
+    def subs(self) -> SubDevices:
+        return self.main.subs
+
+    @property
+    def servos(self) -> list[Servo]:
+        return [device for device in self.segment if isinstance(device, Servo)]
+
+    @property
+    def states(self) -> list[int]:
+        """The AL state every device shows, error bit included."""
+        return [device.state for device in self.segment]
+
+    @property
+    def drive_states(self) -> list[str]:
+        return [servo.drive_state() for servo in self.servos]
+
+    def drives(self, **options: object) -> cat.Drives:
+        """All servos, counted in the segment's default resolution."""
+        return cat.Drives(self.subs.drives, **{"counts_per_turn": 2**20, **options})  # type: ignore[arg-type]
+
+    def spoil(self, fault: str, cycles: int, **options: object) -> None:
+        """Does this to the next cycles' frames."""
+        now = self.link.seen(traffic="cyclic")
+        frames = range(now, now + cycles)
+        self.link.inject(Fault(kind=fault, traffic="cyclic", frames=frames, **options))  # type: ignore[arg-type]
+
+    def let_pass(self, seconds: float) -> None:
+        """Time goes by without a MainDevice."""
+        self.link.wait_until(self.link.now() + round(seconds * 1e9), False)
+
+    def assert_safe(self) -> None:
+        """Nothing turns, nothing is under power, nobody is in OP."""
+        assert all(state & 0x0F < OP for state in self.states), self.states
+        assert "OPERATION ENABLED" not in self.drive_states, self.drive_states
+        assert all(abs(servo.velocity_rad_s) < 0.05 for servo in self.servos)
+
+
+@contextmanager
+def cell_of(*devices: Device) -> Iterator[Cell]:
+    """A cell that has been scanned; by default a coupler, lamps and two servos."""
+    segment = Segment(devices or (Coupler(), DigitalOutputs(), Servo(serial=1), Servo(serial=2)))
+    link = FaultInjector(segment)
+    with cat.MainDevice(link) as main:
+        main.scan()
+        yield Cell(segment, link, main)

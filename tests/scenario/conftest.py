@@ -1,0 +1,12 @@
+from collections.abc import Iterator
+
+import pytest
+
+from tests.scenario.cell import Cell, cell_of
+
+
+@pytest.fixture
+def cell() -> Iterator[Cell]:
+    """A coupler, lamps, two servos."""
+    with cell_of() as cell:
+        yield cell
