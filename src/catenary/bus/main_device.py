@@ -99,8 +99,9 @@ class MainDevice:
         if self._link is None:
             return
         try:
-            with contextlib.suppress(CatenaryError):  # the segment may be gone: that is why we go
-                self._bring_down(State.INIT)
+            if self.subs:
+                with contextlib.suppress(CatenaryError):  # the segment may be gone, so we go too
+                    self._bring_down(State.INIT)
         finally:
             link, self._link, self._blocking, self._attached = self._link, None, None, None
             link.close()

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from catenary.errors import NoDeviceError, SegmentError, StateError
-from catenary.procedure.al_state import read_state
 from catenary.procedure.exchange import Procedure, Request, after, physical, read, write
 from catenary.procedure.station import Deadline, Pace, Station, answered
+from catenary.procedure.survey import survey
 from catenary.wire.al import AlControl, State
 from catenary.wire.datagram import Command
 from catenary.wire.register import (
@@ -59,7 +59,7 @@ def count() -> Procedure[int]:
 def reset(device_count: int) -> Procedure[None]:
     """All devices to INIT with errors acknowledged; FMMUs, SyncManagers, SYNC signals cleared;
     their EEPROM taken from the process data interface."""
-    yield from _all_to(State.INIT, device_count, RESET_TIMEOUT)
+    yield from _all_to(State.INIT, RESET_TIMEOUT)
     replies = yield [
         _clear(*_FMMU_BLOCK),
         _clear(*_SYNC_MANAGER_BLOCK),
@@ -68,38 +68,39 @@ def reset(device_count: int) -> Procedure[None]:
         write(Command.BWR, 0, SII_CONFIGURATION, 0),
     ]
     if replies[-1].working_counter != device_count:
-        raise _came_and_went(device_count, replies[-1].working_counter)
+        raise SegmentError(
+            f"{device_count} devices were counted, {replies[-1].working_counter} took a broadcast",
+            hint="devices come and go: look for a loose contact, then scan again",
+        )
 
 
 def bring_all_down(stations: Sequence[Station], state: State, timeout: float) -> Procedure[None]:
     """All devices to a lower state by broadcast, whatever each of them is in. StateError names
     the first that stays up. Devices that are gone are nobody's business here: those that are
     left must come down all the same."""
-    if (yield from _all_to(state, None, timeout)):
+    if (yield from _all_to(state, timeout)):
         return
-    for station in stations:
-        now = yield from read_state(station)
-        if now.state is None or now.state > state:
-            raise StateError(
-                f"{station} stays in {now.name}; {state} was asked for",
-                position=station.position,
-                requested=int(state),
-                actual=now.word & 0x0F,
-                code=now.code,
-                hint="its outputs may be on: switch off its power",
-            )
+    for answer in (yield from survey(stations)):
+        if answer.word is None or answer.word & 0x0F <= state:
+            continue
+        raise StateError(
+            f"{answer.station} stays in state {answer.word & 0x0F}; {state} was asked for",
+            position=answer.station.position,
+            requested=int(state),
+            actual=answer.word & 0x0F,
+            code=answer.code,
+            hint="its outputs may be on: switch off its power",
+        )
 
 
-def _all_to(state: State, device_count: int | None, timeout: float) -> Procedure[bool]:
+def _all_to(state: State, timeout: float) -> Procedure[bool]:
     """Asks all at once, errors acknowledged, and waits. Whether all are there.
 
     Controllers that emulate their application copy AL control into AL status, the acknowledgement
     too, which then looks like an error: so the state is asked for a second time without it.
     """
     for control in (AlControl(state, acknowledge=True), AlControl(state)):
-        [reply] = yield [write(Command.BWR, 0, AL_CONTROL, control.word)]
-        if device_count not in (None, reply.working_counter):
-            raise _came_and_went(device_count or 0, reply.working_counter)
+        yield [write(Command.BWR, 0, AL_CONTROL, control.word)]
         if not (yield from _await_all(control.word, timeout)):
             return False
     return True
@@ -115,13 +116,6 @@ def _await_all(word: int, timeout: float) -> Procedure[bool]:
         if reply.lost or deadline.passed(reply):
             return False
         yield after(pace.pause())
-
-
-def _came_and_went(expected: int, found: int) -> SegmentError:
-    return SegmentError(
-        f"{expected} devices were counted, {found} took a broadcast",
-        hint="devices come and go: look for a loose contact, then scan again",
-    )
 
 
 def assign(device_count: int) -> Procedure[tuple[StationRegisters, ...]]:
