@@ -107,6 +107,7 @@ def veth(pytestconfig: pytest.Config) -> Iterator[tuple[str, str]]:
     """The names of two connected network interfaces, nobody else's."""
     state = private_network.state()
     if isinstance(state, private_network.Refused):
-        lacking(pytestconfig, "wire", f"no wire: {state.reason}: run `make test`")
+        hint = "" if private_network.VARIABLE in os.environ else " (`make test` starts it in one)"
+        lacking(pytestconfig, "wire", f"no wire: {state.reason}{hint}")
     with private_network.veth_pair() as names:
         yield names
