@@ -13,14 +13,8 @@ import pytest
 
 from catenary.link import Interface, Recorder
 from catenary.wire.pcapng import decode_capture
+from tests.link.dissector import dissect
 from tests.link.python_link import PythonLink, frame
-
-
-def dissect(tshark: str, path: Path, *fields: str) -> list[list[str]]:
-    options = [part for field in fields for part in ("-e", field)]
-    command = [tshark, "-r", str(path), "-T", "fields", *options]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    return [line.split("\t") for line in done.stdout.splitlines()]
 
 
 def test_records_both_directions_with_stamps_in_virtual_time(tshark, tmp_path):
