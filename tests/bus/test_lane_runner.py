@@ -1,0 +1,229 @@
+"""Procedures beside a cycle: a lane of a few frames, one step a millisecond."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+
+import pytest
+
+from catenary.bus import LaneRunner, MainDevice
+from catenary.errors import LoopError, ResponseTimeout, SdoAbort
+from catenary.link import Link
+from catenary.procedure.exchange import Procedure, after, read
+from catenary.procedure.sdo import upload
+from catenary.types import UDINT
+from catenary.virtual import demo_segment
+from catenary.wire.datagram import Command
+from catenary.wire.frame import decode_frame
+from catenary.wire.register import AL_STATUS
+
+PERIOD_NS = 1_000_000
+
+
+class Lane:
+    """Owns a lane over a virtual link: what is pushed goes out with the next cycle."""
+
+    def __init__(self, link: Link, *, slots: int = 64) -> None:
+        self.link = link
+        self.slots = slots
+        self.lose: set[int] = set()
+        self.pushed: list[bytes] = []
+        self._queue: list[bytes] = []
+        self._back: deque[bytes] = deque()
+
+    def lane_push(self, frame: bytes) -> bool:
+        if len(self._queue) >= self.slots:
+            return False
+        self._queue.append(frame)
+        self.pushed.append(frame)
+        return True
+
+    def lane_pop(self) -> bytes | None:
+        return self._back.popleft() if self._back else None
+
+    def now(self) -> int:
+        return self.link.now()
+
+    def cycle(self) -> None:
+        first = len(self.pushed) - len(self._queue)
+        for number, frame in enumerate(self._queue, start=first):
+            if number not in self.lose:
+                self.link.send(frame)
+        self._queue.clear()
+        self.link.wait_until(self.link.now() + PERIOD_NS, False)
+        while (frame := self.link.receive()) is not None:
+            self._back.append(frame)
+
+
+def settle(lane: Lane, runner: LaneRunner, cycles: int = 5000) -> int:
+    for number in range(cycles):
+        if not runner.busy:
+            return number
+        runner.step()
+        lane.cycle()
+    raise AssertionError(f"still busy after {cycles} cycles")
+
+
+def test_an_upload_takes_one_step_a_cycle() -> None:
+    with MainDevice(demo_segment()) as main:
+        [drive, *_] = main.scan().drives
+        lane = Lane(main.link)
+        runner = LaneRunner(lane)
+        task = runner.submit(upload(drive.channel, 0x1000, 0))
+        cycles = settle(lane, runner)
+        assert UDINT.decode(task.result()) & 0xFFFF == 402
+        assert 3 <= cycles <= 12
+        assert runner.counts.sent <= cycles
+
+
+def test_many_procedures_share_the_frame_of_a_cycle() -> None:
+    with MainDevice(demo_segment()) as main:
+        subs = main.scan()
+        lane = Lane(main.link)
+        runner = LaneRunner(lane)
+        tasks = [runner.submit(_state(sub.station.address)) for sub in subs]
+        settle(lane, runner)
+        assert [task.result() for task in tasks] == [2] * 6
+        [frame] = lane.pushed
+        assert len(decode_frame(frame).datagrams) == 6
+        assert all(datagram.index >= 0x80 for datagram in decode_frame(frame).datagrams)
+
+
+def test_procedures_of_one_lane_take_turns() -> None:
+    with MainDevice(demo_segment()) as main:
+        drive = main.scan()[2]
+        lane = Lane(main.link)
+        runner = LaneRunner(lane)
+        places = [(0x1000, 0), (0x1018, 1), (0x1018, 2), (0x5FFF, 0), (0x1008, 0)]
+        tasks = [runner.submit(upload(drive.channel, *place), lane=2) for place in places]
+        settle(lane, runner)
+        assert tasks[1].result() == UDINT.encode(drive.identity.vendor)
+        assert tasks[2].result() == UDINT.encode(drive.identity.product)
+        assert tasks[4].result() == b"Catenary virtual servo 1"
+        with pytest.raises(SdoAbort):
+            tasks[3].result()
+        assert drive.channel.dropped == 0
+
+
+def test_a_full_lane_delays_but_loses_nothing() -> None:
+    with MainDevice(demo_segment()) as main:
+        subs = main.scan()
+        lane = Lane(main.link, slots=0)
+        runner = LaneRunner(lane)
+        task = runner.submit(_state(subs[0].station.address))
+        for _ in range(5):
+            runner.step()
+            lane.cycle()
+        assert not task.done
+        lane.slots = 1
+        settle(lane, runner)
+        assert task.result() == 2
+
+
+def test_lost_frames_are_repeated_or_recovered() -> None:
+    with MainDevice(demo_segment()) as main:
+        drive = main.scan()[2]
+        lane = Lane(main.link)
+        lane.lose = {0, 2, 4, 7}
+        runner = LaneRunner(lane)
+        task = runner.submit(upload(drive.channel, 0x1018, 1))
+        settle(lane, runner)
+        assert task.result() == UDINT.encode(drive.identity.vendor)
+        assert runner.counts.lost >= 3
+
+
+def test_a_segment_that_is_gone_ends_in_time() -> None:
+    segment = demo_segment()
+    with MainDevice(segment) as main:
+        drive = main.scan()[2]
+        segment.unplug()
+        lane = Lane(main.link)
+        runner = LaneRunner(lane)
+        task = runner.submit(upload(drive.channel, 0x1018, 1))
+        assert settle(lane, runner) < 2000
+        with pytest.raises(ResponseTimeout, match="device 2"):
+            task.result()
+
+
+def test_a_blocking_call_in_the_loops_own_thread_raises_at_once() -> None:
+    with MainDevice(demo_segment()) as main:
+        drive = main.scan()[2]
+        lane = Lane(main.link)
+        with (
+            main.attached(LaneRunner(lane)),
+            pytest.raises(RuntimeError, match="loop's own thread"),
+        ):
+            drive.sdo.read(0x1000)
+        assert lane.pushed == []
+        assert drive.sdo.read(0x1000)  # detached again
+
+
+def test_a_scan_is_refused_while_a_loop_runs() -> None:
+    with MainDevice(demo_segment()) as main:
+        main.scan()
+        with (
+            main.attached(LaneRunner(Lane(main.link))),
+            pytest.raises(RuntimeError, match="while a loop runs"),
+        ):
+            main.scan()
+
+
+def test_another_thread_reads_while_the_loop_runs() -> None:
+    with MainDevice(demo_segment()) as main:
+        drive = main.scan()[2]
+        lane = Lane(main.link)
+        runner = LaneRunner(lane)
+        found: list[int] = []
+        with main.attached(runner):
+            thread = threading.Thread(
+                target=lambda: found.append(drive.sdo.read(0x1018, 1, type=UDINT))
+            )
+            thread.start()
+            while thread.is_alive():  # each step is a cycle of virtual time; no clock is asked
+                runner.step()
+                lane.cycle()
+                thread.join(0.001)
+        assert found == [drive.identity.vendor]
+
+
+def test_closing_ends_those_who_wait() -> None:
+    with MainDevice(demo_segment()) as main:
+        drive = main.scan()[2]
+        runner = LaneRunner(Lane(main.link))
+        failures: list[BaseException] = []
+
+        def ask() -> None:
+            try:
+                runner.run(upload(drive.channel, 0x1000, 0))
+            except LoopError as error:
+                failures.append(error)
+
+        thread = threading.Thread(target=ask)
+        thread.start()
+        while not runner.busy:
+            thread.join(0.001)
+        runner.close()
+        thread.join(10.0)
+        assert len(failures) == 1
+        with pytest.raises(LoopError, match="has ended"):
+            runner.submit(upload(drive.channel, 0x1000, 0))
+
+
+def test_pauses_are_counted_in_the_lanes_time() -> None:
+    with demo_segment().open_link() as link:
+        lane = Lane(link)
+        runner = LaneRunner(lane)
+
+        def waits() -> Procedure[str]:
+            yield after(0.020)
+            return "done"
+
+        task = runner.submit(waits())
+        assert 19 <= settle(lane, runner) <= 22
+        assert task.result() == "done"
+
+
+def _state(station: int) -> Procedure[int]:
+    [reply] = yield [read(Command.FPRD, station, AL_STATUS)]
+    return AL_STATUS.unpack(reply.data)

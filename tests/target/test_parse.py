@@ -1,0 +1,57 @@
+"""Names of segments."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from catenary.errors import CatenaryError, ConfigurationError
+from catenary.link import Interface
+from catenary.target import MainDevice, parse
+from catenary.virtual import Coupler, Segment
+
+
+def test_a_network_interface() -> None:
+    assert parse("eth0") == Interface("eth0")
+    assert parse("enp3s0.2") == Interface("enp3s0.2")
+
+
+def test_virtual_is_a_new_demo_segment_each_time() -> None:
+    first, second = parse("virtual"), parse("virtual")
+    assert isinstance(first, Segment)
+    assert len(first) == 6
+    assert first is not second
+
+
+def test_virtual_with_a_file(tmp_path: Path) -> None:
+    file = tmp_path / "cell.toml"
+    file.write_text('[[device]]\nkind = "coupler"\n')
+    segment = parse(f"virtual:{file}")
+    assert isinstance(segment, Segment)
+    assert len(segment) == 1
+
+
+def test_a_file_that_is_not_there_is_named() -> None:
+    with pytest.raises(CatenaryError, match="no_such_file"):
+        parse("virtual:no_such_file.toml")
+
+
+@pytest.mark.parametrize("target", ["", " ", "virtual:", "eth0:1", "a b", "dev/eth0"])
+def test_what_is_no_target(target: str) -> None:
+    with pytest.raises(ConfigurationError, match="is no target"):
+        parse(target)
+
+
+def test_what_this_version_cannot_do_says_so() -> None:
+    with pytest.raises(ConfigurationError, match="ring of two ports"):
+        parse("eth0,eth1")
+    with pytest.raises(ConfigurationError, match="IgH"):
+        parse("igh:0")
+
+
+def test_a_main_device_takes_a_name_or_a_source() -> None:
+    with MainDevice("virtual") as main:
+        assert len(main.scan()) == 6
+    with MainDevice(Segment([Coupler()])) as main:
+        assert len(main.scan()) == 1

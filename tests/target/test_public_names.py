@@ -1,0 +1,33 @@
+"""`import catenary as cat`: the names, and what they cost."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+import catenary as cat
+
+
+@pytest.mark.parametrize("name", cat.__all__)
+def test_every_public_name_is_there(name: str) -> None:
+    assert getattr(cat, name) is not None
+
+
+def test_an_unknown_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="Drivez"):
+        _ = cat.Drivez
+
+
+@pytest.mark.parametrize(
+    "use",
+    [
+        "import catenary",
+        "import catenary.realtime",
+        "import catenary as cat; cat.MainDevice('virtual').__enter__().scan()",
+    ],
+)
+def test_numpy_is_not_imported_before_it_is_needed(use: str) -> None:
+    code = f"{use}\nimport sys\nassert 'numpy' not in sys.modules, 'numpy'"
+    subprocess.run([sys.executable, "-c", code], check=True)
