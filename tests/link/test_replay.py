@@ -55,7 +55,7 @@ def test_time_passes_in_waiting_alone():
 
 def test_more_answers_under_way_than_there_is_room_for_are_refused():
     link = Replay([(QUESTION, QUESTION)])
-    for _ in range(64):
+    for _ in range(63):
         link.send(QUESTION)
     with pytest.raises(LinkError, match="cannot send"):
         link.send(QUESTION)

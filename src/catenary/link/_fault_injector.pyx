@@ -100,7 +100,9 @@ cdef bint hits(injector_state *injector, const rule *fault, const int64_t *numbe
     return fault.always or draw(injector) < fault.below
 
 
-cdef verdict judge(injector_state *injector, int direction, const uint8_t *frame, uint32_t length) noexcept nogil:
+cdef verdict judge(
+    injector_state *injector, int direction, const uint8_t *frame, uint32_t length
+) noexcept nogil:
     """Numbers the frame and decides what happens to it."""
     cdef verdict result
     cdef int64_t numbers[3]
@@ -133,7 +135,9 @@ cdef verdict judge(injector_state *injector, int direction, const uint8_t *frame
     return result
 
 
-cdef void corrupt(injector_state *injector, uint8_t *frame, uint32_t length, int offset) noexcept nogil:
+cdef void corrupt(
+    injector_state *injector, uint8_t *frame, uint32_t length, int offset
+) noexcept nogil:
     cdef uint32_t size
     cdef uint64_t number
     if offset >= 0:
@@ -167,6 +171,10 @@ cdef void hold(
     injector.injected[LOSE] += 1
 
 
+cdef inline bint is_before(const held_frame *a, const held_frame *b) noexcept nogil:
+    return a.due < b.due or (a.due == b.due and a.order < b.order)
+
+
 cdef held_frame *earliest(injector_state *injector, int direction) noexcept nogil:
     cdef held_frame *best = NULL
     cdef held_frame *slot
@@ -175,12 +183,14 @@ cdef held_frame *earliest(injector_state *injector, int direction) noexcept nogi
         slot = &injector.held[i]
         if not slot.used or slot.direction != direction:
             continue
-        if best == NULL or slot.due < best.due or (slot.due == best.due and slot.order < best.order):
+        if best == NULL or is_before(slot, best):
             best = slot
     return best
 
 
-cdef int enter(injector_state *injector, int direction, const uint8_t *frame, uint32_t length) noexcept nogil:
+cdef int enter(
+    injector_state *injector, int direction, const uint8_t *frame, uint32_t length
+) noexcept nogil:
     """Judges a frame; sends it, or stores it until it is due."""
     cdef verdict result = judge(injector, direction, frame, length)
     cdef int64_t now

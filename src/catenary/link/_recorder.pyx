@@ -78,7 +78,9 @@ ctypedef struct recorder_state:
     bint inline_writer
 
 
-cdef void put(recorder_state *recorder, uint64_t position, const void *data, size_t size) noexcept nogil:
+cdef void put(
+    recorder_state *recorder, uint64_t position, const void *data, size_t size
+) noexcept nogil:
     cdef size_t at = <size_t> (position & (RING_BYTES - 1))
     cdef size_t first = min(size, <size_t> RING_BYTES - at)
     memcpy(recorder.ring + at, data, first)
@@ -88,7 +90,8 @@ cdef void put(recorder_state *recorder, uint64_t position, const void *data, siz
 cdef void record(
     recorder_state *recorder, const uint8_t *frame, uint32_t length, uint32_t direction
 ) noexcept nogil:
-    cdef uint64_t stamp = <uint64_t> (recorder.inner.now(recorder.inner.self) + recorder.stamp_offset)
+    cdef int64_t now = recorder.inner.now(recorder.inner.self)
+    cdef uint64_t stamp = <uint64_t> (now + recorder.stamp_offset)
     cdef uint32_t padded = (length + 3) & ~<uint32_t> 3
     cdef uint32_t total = <uint32_t> sizeof(packet_head) + padded + <uint32_t> sizeof(packet_tail)
     cdef uint64_t head = recorder.head

@@ -1,7 +1,7 @@
 """A link that answers as a recorded segment did: deterministic, in virtual time, without a segment.
 
-A frame sent is looked up by its datagrams with all indices 0 (FNV-1a, then compared); the answers to
-the same question come in the recorded order, the last one again and again. The answer carries the
+A frame sent is looked up by its datagrams with all indices 0 (FNV-1a, then compared); the answers
+to the same question come in the recorded order, the last one again and again. The answer carries the
 indices of the frame sent and comes after the recorded latency.
 """
 
@@ -130,7 +130,7 @@ cdef int put_under_way(replay_state *replay, question *slot, const uint8_t *fram
     cdef answer *reply
     cdef queued *place
     cdef int64_t last = 0
-    if replay.head - replay.tail >= QUEUE:
+    if replay.head - replay.tail >= QUEUE - 1:  # one slot is lent to the receiver
         return -ENOBUFS
     if replay.head != replay.tail:
         last = replay.queue[(replay.head - 1) & (QUEUE - 1)].due
@@ -152,7 +152,7 @@ cdef int replay_receive(void *self, const uint8_t **frame) noexcept nogil:
     cdef queued *place = &replay.queue[replay.tail & (QUEUE - 1)]
     if replay.head == replay.tail or place.due > replay.time:
         return 0
-    replay.tail += 1                  # its bytes stay until QUEUE more are sent, or it is lent again
+    replay.tail += 1
     frame[0] = place.bytes
     return <int> place.length
 

@@ -103,7 +103,7 @@ def inside_command(command: Sequence[str]) -> list[str]:
 
 
 def try_real_frames() -> None:
-    """Sends one frame over a veth pair of our own; OSError or CalledProcessError: refused."""
+    """Sends one frame over a veth pair of our own; OSError: refused."""
     frame = b"\xff" * 6 + bytes(6) + ETHERTYPE.to_bytes(2, "big") + bytes(46)
     with (
         veth_pair() as (first, second),
