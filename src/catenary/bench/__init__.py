@@ -1,1 +1,62 @@
-"""(being built)"""
+"""Benchmarks: the loop beside C and PySOEM, the bring-up beside PySOEM's, virtual time.
+
+`enter_private_network` comes first: it may run the program anew, which NumPy's threads would spoil.
+So nothing here imports anything before it is used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+
+def enter_private_network() -> None:
+    """Goes on in a network namespace of its own. `CatenaryError`: refused here."""
+    from catenary.errors import LinkError
+    from catenary.realtime import private_network
+
+    state = private_network.enter()
+    if isinstance(state, private_network.Refused):
+        raise LinkError(
+            f"the benchmark needs a private network: {state.reason}",
+            hint="run it as root; `catenary bench virtual` needs none",
+        )
+
+
+def measure_loop(
+    *,
+    drives: int,
+    rate: int,
+    seconds: float,
+    peers: Sequence[str],
+    body: str = "sine",
+    spin: bool = False,
+    file: Path | None = None,
+) -> None:
+    """Prints the phases of the cycle of every peer, and writes them to `file` as JSON."""
+    from catenary.bench import loop
+
+    loop.measure(
+        drives=drives, rate=rate, seconds=seconds, peers=peers, body=body, spin=spin, file=file
+    )
+
+
+def measure_cost(*, seconds: float, file: Path | None = None) -> None:
+    """Prints what a cycle costs as a + b·axes + c·bytes."""
+    from catenary.bench import loop
+
+    loop.measure_cost(seconds=seconds, file=file)
+
+
+def measure_scan(*, drives: int, file: Path | None = None) -> None:
+    """Prints frames and time from nothing to PRE-OP, beside PySOEM's."""
+    from catenary.bench import scan
+
+    scan.measure(drives=drives, file=file)
+
+
+def measure_virtual(*, drives: int, seconds: float, file: Path | None = None) -> None:
+    """Prints how much faster than real time a segment in this process runs."""
+    from catenary.bench import virtual_time
+
+    virtual_time.measure(drives=drives, seconds=seconds, file=file)

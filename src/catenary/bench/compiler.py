@@ -1,0 +1,41 @@
+"""Compiles the C peers on the spot, from the package's own data, with the machine's compiler."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+from catenary.errors import CatenaryError
+
+SOURCES = Path(__file__).parent / "peers"
+RECEIVERS = {"c": "receive_recv.c", "c-ring": "receive_ring.c"}
+FLAGS = ("-O2", "-std=gnu11")
+
+
+class CompilerError(CatenaryError):
+    """A C peer cannot be compiled here."""
+
+
+def compile_peer(name: str, folder: Path) -> Path:
+    """The program of the C peer `name`, in `folder`; compiled once."""
+    program = folder / name
+    if program.exists():
+        return program
+    compiler = shutil.which("cc")
+    if compiler is None:
+        raise CompilerError(
+            f"the peer {name} needs a C compiler, and there is no `cc`",
+            hint="sudo apt install gcc libc6-dev, or leave it out: --peers pysoem",
+        )
+    sources = [SOURCES / "peer.c", SOURCES / RECEIVERS[name]]
+    done = subprocess.run(
+        [compiler, *FLAGS, "-o", program, *sources, "-lm"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode != 0:
+        first = next(iter(done.stderr.splitlines()), f"{compiler} failed")
+        raise CompilerError(f"the peer {name} does not compile: {first}")
+    return program

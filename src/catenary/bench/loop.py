@@ -1,0 +1,129 @@
+"""`catenary bench loop` and `catenary bench cost`: from what is asked to runs, and their report."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from catenary.bench.cost import Point, fit
+from catenary.bench.job import Body, Job
+from catenary.bench.peers import MODULES
+from catenary.bench.report import as_json, as_text, machine
+from catenary.bench.rounds import WARM_UP_CYCLES, interleave
+from catenary.bench.segment import (
+    ANALOG_CHANNELS,
+    COUNTS_PER_TURN,
+    PRIORITY,
+    RATED_TORQUE,
+    Served,
+    processors,
+    served,
+)
+from catenary.bench.statistics import Run, combine, ratios
+
+OURS = ("catenary-inline", "catenary-threaded")
+ROUND_CYCLES = 1000  # as far as the loop's log reaches back
+DRIVE_BYTES = 26  # both ways
+INPUT_BYTES = 2 * ANALOG_CHANNELS  # of one terminal
+COST_SEGMENTS = ((3, 0), (10, 0), (20, 0), (33, 0), (3, 20), (3, 40), (10, 40))  # drives, terminals
+
+
+def measure(
+    *,
+    drives: int,
+    rate: int,
+    seconds: float,
+    peers: Sequence[str],
+    body: str,
+    spin: bool,
+    file: Path | None,
+) -> None:
+    names = peer_names(peers)
+    setting = {"drives": drives, "rate": rate, "seconds": seconds, "body": body, "spin": spin}
+    with served(drives) as segment:
+        runs = run_all(names, segment, rate=rate, seconds=seconds, body=Body(body), spin=spin)
+    quotients = ratios(runs)
+    print(f"{machine()}\n{drives} drives at {rate} Hz, body {body}{', spinning' * spin}\n")
+    print(as_text(runs, quotients))
+    write(file, as_json(runs, quotients, setting))
+
+
+def measure_cost(*, seconds: float, file: Path | None) -> None:
+    costs: dict[str, list[Point]] = {name: [] for name in OURS}
+    for drives, terminals in COST_SEGMENTS:
+        with served(drives, terminals) as segment:
+            runs = run_all(OURS, segment, rate=1000, seconds=seconds, body=Body.SINE, spin=False)
+        size = drives * DRIVE_BYTES + terminals * INPUT_BYTES
+        for run in runs:
+            cost = run.timing_us["in_controller"]["p50"] + run.timing_us["tail"]["p50"]
+            costs[run.name].append(Point(drives, size, round(cost, 3)))
+    fits = {name: fit(points) for name, points in costs.items()}
+    print(f"{machine()}\nmedian of in_controller + tail:")
+    for name, found in fits.items():
+        print(f"  {name:18} {found}")
+    write(
+        file,
+        {
+            "machine": machine(),
+            "costs": [
+                {
+                    "name": name,
+                    "base_us": round(fits[name].base_us, 3),
+                    "per_axis_us": round(fits[name].per_axis_us, 4),
+                    "per_byte_us": round(fits[name].per_byte_us, 5),
+                    "residual_us": round(fits[name].residual_us, 3),
+                    "points": [[point.axes, point.size, point.cost_us] for point in points],
+                }
+                for name, points in costs.items()
+            ],
+        },
+    )
+
+
+def peer_names(peers: Sequence[str]) -> list[str]:
+    """Ours and the chosen ones. ValueError names one that is unknown."""
+    for name in peers:
+        if name not in MODULES:
+            known = ", ".join(name for name in MODULES if name not in OURS)
+            raise ValueError(f"there is no peer {name!r}; known: {known}")
+    return [*OURS, *(name for name in peers if name not in OURS)]
+
+
+def run_all(
+    names: Sequence[str], segment: Served, *, rate: int, seconds: float, body: Body, spin: bool
+) -> list[Run]:
+    cycles = round(seconds * rate)
+    rounds = math.ceil(cycles / ROUND_CYCLES)
+    jobs = [
+        Job(
+            peer=name,
+            interface=segment.interface,
+            drives=segment.drives,
+            body=body,
+            period_ns=round(1e9 / rate),
+            warm_up=WARM_UP_CYCLES,
+            cycles=math.ceil(cycles / rounds),
+            cpu=processors().masters,
+            priority=PRIORITY,
+            counts_per_turn=COUNTS_PER_TURN,
+            rated_torque=RATED_TORQUE,
+            spin=spin,
+        )
+        for name in names
+    ]
+    found = interleave(jobs, rounds, show_progress)
+    return [combine(name, found[name]) for name in names]
+
+
+def show_progress(peer: str, number: int, rounds: int) -> None:
+    if sys.stderr.isatty():
+        print(f"\r\x1b[Kround {number} of {rounds}: {peer} ", end="", file=sys.stderr, flush=True)
+
+
+def write(file: Path | None, figures: dict[str, object]) -> None:
+    if file is not None:
+        file.write_text(json.dumps(figures, indent=1) + "\n")
+        print(f"wrote {file}")

@@ -1,0 +1,24 @@
+"""The peers of `catenary bench loop`: one file each, `run(job) -> Round`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+
+from catenary.bench.job import Job, Round
+
+Peer = Callable[[Job], Round]
+
+MODULES = {
+    "catenary-inline": "with_catenary",
+    "catenary-threaded": "with_catenary",
+    "c": "with_c",
+    "c-ring": "with_c",
+    "pysoem": "with_pysoem",
+}
+
+
+def load(name: str) -> Peer:
+    """The peer called `name`; imports nothing of the others."""
+    peer: Peer = import_module(f"{__name__}.{MODULES[name]}").run
+    return peer

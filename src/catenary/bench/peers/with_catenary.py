@@ -1,0 +1,76 @@
+"""Catenary itself, as its users write it, in both orders."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+import catenary as cat
+from catenary.bench.job import PHASES, Body, Job, Round
+
+ORDER = {"catenary-inline": "inline", "catenary-threaded": "threaded"}
+MODE = {Body.SINE: "csp", Body.PD: "cst"}
+
+
+def run(job: Job) -> Round:
+    with cat.MainDevice(job.interface) as main:
+        subs = main.scan()
+        arm = cat.Drives(
+            [subs[position] for position in job.drives],
+            mode=MODE[job.body],
+            counts_per_turn=job.counts_per_turn,
+        )
+        with cat.Loop(
+            arm,
+            period=job.period_ns * 1e-9,
+            run=ORDER[job.peer],
+            cpu=job.cpu,
+            priority=job.priority,
+        ) as loop:
+            return _measure(loop, arm, job)
+
+
+def _measure(loop: cat.Loop, arm: cat.Drives, job: Job) -> Round:
+    body = _sine(arm, job) if job.body is Body.SINE else _pd(arm, job)
+    before, cpu = dict(loop.timing.counters), 0
+    for cycle in loop:
+        if cycle.number == job.warm_up:
+            before, cpu = dict(loop.timing.counters), time.process_time_ns()
+        body(cycle.time)
+        if cycle.number >= job.warm_up + job.cycles:
+            break
+    cpu = time.process_time_ns() - cpu
+    after = loop.timing.counters
+    log = loop.log[-job.cycles :]
+    samples = np.stack([log[f"{phase}_ns"] for phase in PHASES], axis=1).astype(np.int64)
+    return Round(
+        samples,
+        lost=after["lost"] - before["lost"],
+        cpu_ns=cpu,
+        late=after["uncommitted"] - before["uncommitted"],
+    )
+
+
+def _sine(arm: cat.Drives, job: Job) -> Callable[[float], None]:
+    home = arm.actual.position.copy()
+    target, amplitude = arm.target.position, job.amplitude
+
+    def body(t: float) -> None:
+        target[:] = home + amplitude * math.sin(math.pi * t)
+
+    return body
+
+
+def _pd(arm: cat.Drives, job: Job) -> Callable[[float], None]:
+    home = arm.actual.position.copy()
+    actual, target = arm.actual, arm.target
+
+    def body(t: float) -> None:
+        reference = home + job.amplitude * math.sin(math.pi * t)
+        error = reference - actual.position
+        target.torque[:] = job.stiffness * error - job.damping * actual.velocity
+
+    return body

@@ -1,0 +1,47 @@
+"""Runs peers in short rounds, one after the other (A B C A B C ...), each round in a fresh process:
+what the machine does meanwhile meets all of them alike."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from catenary.bench.job import Job, Round, read_round, write_job
+from catenary.errors import CatenaryError
+from catenary.realtime.child import start_python
+
+ROUND_SECONDS = 1.0  # as long as the loop's log reaches back at 1 kHz
+WARM_UP_CYCLES = 200
+BRING_UP_SECONDS = 60.0  # at most, for bring-up and enabling in a round
+
+Progress = Callable[[str, int, int], None]  # peer, round, rounds
+
+
+class RoundError(CatenaryError):
+    """A peer could not do its round."""
+
+
+def interleave(jobs: Sequence[Job], rounds: int, progress: Progress) -> Mapping[str, list[Round]]:
+    """All rounds of every job, by the peer's name."""
+    found: dict[str, list[Round]] = {job.peer: [] for job in jobs}
+    with tempfile.TemporaryDirectory(prefix="catenary-bench-") as name:
+        for number in range(rounds):
+            for job in jobs:
+                progress(job.peer, number + 1, rounds)
+                found[job.peer].append(run_round(job, Path(name)))
+    return found
+
+
+def run_round(job: Job, folder: Path) -> Round:
+    job_path, result_path = folder / "job.json", folder / "result.npz"
+    result_path.unlink(missing_ok=True)
+    write_job(job, job_path)
+    arguments = ["-m", "catenary.bench.worker", str(job_path), str(result_path)]
+    seconds = BRING_UP_SECONDS + (job.warm_up + job.cycles) * job.period_ns * 1e-9
+    with start_python(arguments) as worker:
+        said = worker.read_line(seconds)
+    if said != "done":
+        reason = said or f"it said nothing within {seconds:.0f} s"
+        raise RoundError(f"the peer {job.peer} failed: {reason}")
+    return read_round(result_path)

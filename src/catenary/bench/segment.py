@@ -1,0 +1,73 @@
+"""The segment of the benchmarks: a coupler and drives, served on a network interface by a process
+of its own: `python -m catenary.bench.segment NIC DRIVES INPUTS CPU`."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from catenary.errors import LinkError
+from catenary.realtime.child import start_python
+from catenary.realtime.private_network import veth_pair
+from catenary.realtime.scheduling import request_scheduling
+from catenary.virtual import AnalogInputs, Coupler, Segment, Servo, serve
+
+START_SECONDS = 30.0
+COUNTS_PER_TURN = 2**20
+RATED_TORQUE = 1.0  # [N·m]
+PRIORITY = 80
+ANALOG_CHANNELS = 4  # of one input terminal
+
+
+@dataclass(frozen=True, slots=True)
+class Served:
+    interface: str  # of the MainDevice
+    drives: tuple[int, ...]  # positions
+
+
+@dataclass(frozen=True, slots=True)
+class Processors:
+    """The segment has one, all masters the other; None: the machine has not two."""
+
+    segment: int | None
+    masters: int | None
+
+
+def processors() -> Processors:
+    allowed = sorted(os.sched_getaffinity(0))
+    if len(allowed) < 2:
+        return Processors(None, None)
+    return Processors(allowed[0], allowed[-1])
+
+
+def make_segment(drives: int, inputs: int = 0, *, clock: str = "monotonic") -> Segment:
+    """A coupler, `drives` servos, and `inputs` terminals of analogue inputs: bytes without axes."""
+    servos = [Servo() for _ in range(drives)]
+    terminals = [AnalogInputs(channels=ANALOG_CHANNELS) for _ in range(inputs)]
+    return Segment([Coupler(), *servos, *terminals], clock=clock)
+
+
+@contextmanager
+def served(drives: int, inputs: int = 0) -> Iterator[Served]:
+    """The segment on one end of a pair of interfaces, for as long as the block lasts."""
+    cpu = processors().segment
+    with veth_pair() as (ours, theirs):
+        arguments = [theirs, str(drives), str(inputs), "" if cpu is None else str(cpu)]
+        with start_python(["-m", "catenary.bench.segment", *arguments]) as server:
+            if server.read_line(START_SECONDS) is None:
+                raise LinkError("the segment of the benchmark did not start")
+            yield Served(ours, tuple(range(1, drives + 1)))
+
+
+def main(arguments: Sequence[str]) -> None:
+    interface, drives, inputs, cpu = arguments
+    segment = make_segment(int(drives), int(inputs))
+    request_scheduling(priority=PRIORITY, cpu=int(cpu) if cpu else None)
+    serve(segment, interface)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,45 @@
+"""`catenary bench virtual`: how much faster than real time a loop runs on a segment in this
+process, whose clock advances only while everybody waits."""
+
+from __future__ import annotations
+
+import math
+import time
+from pathlib import Path
+
+import catenary as cat
+from catenary.bench.loop import write
+from catenary.bench.report import machine
+from catenary.bench.segment import COUNTS_PER_TURN, make_segment
+
+PERIOD = 1e-3  # [s]
+
+
+def measure(*, drives: int, seconds: float, file: Path | None) -> None:
+    found = {order: run(drives, seconds, order) for order in ("inline", "threaded")}
+    print(f"{machine()}\n{drives} drives, {seconds:g} s of virtual time at {1 / PERIOD:.0f} Hz")
+    for order, took in found.items():
+        print(f"  {order:10} {took:7.3f} s: {seconds / took:6.0f} times real time")
+    write(
+        file,
+        {
+            "machine": machine(),
+            "drives": drives,
+            "virtual_seconds": seconds,
+            "times_real_time": {order: round(seconds / took, 1) for order, took in found.items()},
+        },
+    )
+
+
+def run(drives: int, seconds: float, order: str) -> float:
+    """How long the loop took [s], without bring-up and leaving."""
+    with cat.MainDevice(make_segment(drives, clock="virtual")) as main:
+        arm = cat.Drives(main.scan().drives, mode="csp", counts_per_turn=COUNTS_PER_TURN)
+        with cat.Loop(arm, period=PERIOD, run=order) as loop:
+            home = arm.actual.position.copy()
+            start = time.perf_counter()
+            for cycle in loop:
+                arm.target.position[:] = home + 0.1 * math.sin(cycle.time)
+                if cycle.time >= seconds:
+                    break
+            return time.perf_counter() - start

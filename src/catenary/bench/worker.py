@@ -1,0 +1,66 @@
+"""One peer, once, in a process of its own: `python -m catenary.bench.worker JOB RESULT`.
+
+Every peer gets the same processor and scheduling here. A fresh process for every round lets all of
+them start from the same state, and keeps one peer's memory from another's timing."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import threading
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from catenary.bench import peers
+from catenary.bench.job import Job, read_job, write_round
+from catenary.realtime.scheduling import Scheduling, request_scheduling, what_scheduling
+
+
+def main(arguments: Sequence[str]) -> None:
+    job_path, result_path = map(Path, arguments)
+    job = read_job(job_path)
+    peer = peers.load(job.peer)
+    with spinning(job) if job.spin else contextlib.nullcontext():
+        obtained = schedule(job)
+        result = peer(job)
+    write_round(replace(result, scheduling=str(obtained)), result_path)
+    print("done", flush=True)
+
+
+def schedule(job: Job) -> Scheduling:
+    if job.priority is None:
+        return what_scheduling()
+    # Locked memory would only be asked of the Python peers: the C programs lock their own.
+    return request_scheduling(priority=job.priority, lock_memory=True, cpu=job.cpu)
+
+
+@contextlib.contextmanager
+def spinning(job: Job) -> Iterator[None]:
+    """A Python thread that never rests, on the processor of the loop, with ordinary scheduling:
+    it is started before the main thread asks for more."""
+    stop = threading.Event()
+
+    def spin() -> None:
+        if job.cpu is not None:
+            os.sched_setaffinity(0, {job.cpu})
+        while not stop.is_set():
+            sum(range(100))
+
+    thread = threading.Thread(target=spin, name="spin", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join()
+
+
+if __name__ == "__main__":
+    try:
+        main(sys.argv[1:])
+    except Exception as error:
+        # One line for whoever leads the benchmark; the traceback for whoever repairs the peer.
+        print(f"{type(error).__name__}: {' '.join(str(error).split())}", flush=True)
+        raise

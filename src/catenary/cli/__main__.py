@@ -1,0 +1,7 @@
+"""`python -m catenary.cli`, the same as `catenary`."""
+
+import sys
+
+from catenary.cli import main
+
+sys.exit(main())

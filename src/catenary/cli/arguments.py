@@ -1,0 +1,63 @@
+"""Words of the command line as numbers. Numbers are decimal, or hexadecimal with 0x."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass
+
+FIRST_OBJECT = 0x1000  # below are data types, not objects: ETG.1000.6 §5.6.7.1
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """An entry of an object dictionary."""
+
+    index: int
+    subindex: int
+
+
+def number(text: str) -> int:
+    try:
+        return int(text, 0)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no number (decimal, or hexadecimal as 0x1F)"
+        ) from None
+
+
+def position(text: str) -> int:
+    value = number(text)
+    if not 0 <= value <= 0xFFFF:
+        raise argparse.ArgumentTypeError(f"position {value} is outside 0 to 65535")
+    return value
+
+
+def entry(text: str) -> Entry:
+    """`0x6041` or `0x1018:1`."""
+    index_text, _, subindex_text = text.partition(":")
+    index, subindex = number(index_text), number(subindex_text or "0")
+    if not 0 <= index <= 0xFFFF or not 0 <= subindex <= 0xFF:
+        raise argparse.ArgumentTypeError(f"{text!r} is outside 0xFFFF:255")
+    if index < FIRST_OBJECT:
+        guess = f"; did you mean 0x{index_text}?" if index_text.isdigit() else ""
+        raise argparse.ArgumentTypeError(
+            f"index {text!r} is 0x{index:04X}, below the first object 0x1000{guess}"
+        )
+    return Entry(index, subindex)
+
+
+def positive_number(text: str) -> int:
+    value = number(text)
+    if value <= 0:
+        raise argparse.ArgumentTypeError(f"{text} is not positive")
+    return value
+
+
+def positive_seconds(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of seconds") from None
+    if not 0.0 < value < 1e6:
+        raise argparse.ArgumentTypeError(f"{text} s is not between 0 and a million")
+    return value

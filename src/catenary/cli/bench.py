@@ -1,0 +1,137 @@
+"""`catenary bench`: measures the loop beside its peers, the bring-up, and virtual time."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from catenary.cli.arguments import positive_number, positive_seconds
+from catenary.cli.parsers import Commands, add_command
+
+
+def add_parser(commands: Commands) -> None:
+    group = add_command(
+        commands,
+        "bench",
+        help="measure the loop beside C and PySOEM",
+        description="Measures on virtual devices, in a private network of its own.",
+        example="catenary bench loop --peers c,c-ring,pysoem\ncatenary bench scan --drives 100",
+    ).add_subparsers(title="commands", metavar="COMMAND", required=True)
+    _add_loop(group)
+    _add_cost(group)
+    _add_scan(group)
+    _add_virtual(group)
+
+
+def _add_loop(group: Commands) -> None:
+    parser = add_command(
+        group,
+        "loop",
+        help="the cyclic exchange, phase by phase",
+        description="Runs catenary-inline, catenary-threaded and the peers in short rounds, one "
+        "after the other, on the same segment with the same scheduling.",
+        example="catenary bench loop --seconds 10 --peers c,c-ring,pysoem --json loop.json\n"
+        "catenary bench loop --drives 33 --body pd --peers pysoem",
+    )
+    parser.add_argument("--drives", type=positive_number, default=3, metavar="N")
+    parser.add_argument("--rate", type=positive_number, default=1000, metavar="HZ")
+    parser.add_argument(
+        "--seconds", type=positive_seconds, default=10.0, metavar="S", help="of every peer (10)"
+    )
+    parser.add_argument(
+        "--peers", default="c,pysoem", metavar="A,B", help="of c, c-ring, pysoem (c,pysoem)"
+    )
+    parser.add_argument(
+        "--body", choices=("sine", "pd"), default="sine", help="what the user computes (sine)"
+    )
+    parser.add_argument(
+        "--spin", action="store_true", help="a Python thread spins beside every loop"
+    )
+    _add_file(parser)
+    parser.set_defaults(run=run_loop)
+
+
+def _add_cost(group: Commands) -> None:
+    parser = add_command(
+        group,
+        "cost",
+        help="what an axis and a byte cost",
+        description="Measures segments that differ in axes and in bytes, and fits "
+        "a + b·axes + c·bytes.",
+        example="catenary bench cost --seconds 3",
+    )
+    parser.add_argument("--seconds", type=positive_seconds, default=3.0, metavar="S")
+    _add_file(parser)
+    parser.set_defaults(run=run_cost)
+
+
+def _add_scan(group: Commands) -> None:
+    parser = add_command(
+        group,
+        "scan",
+        help="bring-up: frames and time",
+        description="Brings a segment to PRE-OP with Catenary and with PySOEM and counts frames.",
+        example="catenary bench scan --drives 100",
+    )
+    parser.add_argument("--drives", type=positive_number, default=100, metavar="N")
+    _add_file(parser)
+    parser.set_defaults(run=run_scan)
+
+
+def _add_virtual(group: Commands) -> None:
+    parser = add_command(
+        group,
+        "virtual",
+        help="how much faster than real time a virtual segment runs",
+        description="Runs a loop on a segment in this process, in virtual time.",
+        example="catenary bench virtual --drives 3 --seconds 20",
+    )
+    parser.add_argument("--drives", type=positive_number, default=3, metavar="N")
+    parser.add_argument(
+        "--seconds", type=positive_seconds, default=20.0, metavar="S", help="of virtual time (20)"
+    )
+    _add_file(parser)
+    parser.set_defaults(run=run_virtual)
+
+
+def _add_file(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there")
+
+
+def run_loop(arguments: argparse.Namespace) -> int:
+    from catenary import bench
+
+    bench.enter_private_network()
+    bench.measure_loop(
+        drives=arguments.drives,
+        rate=arguments.rate,
+        seconds=arguments.seconds,
+        peers=[name for name in arguments.peers.split(",") if name],
+        body=arguments.body,
+        spin=arguments.spin,
+        file=arguments.json,
+    )
+    return 0
+
+
+def run_cost(arguments: argparse.Namespace) -> int:
+    from catenary import bench
+
+    bench.enter_private_network()
+    bench.measure_cost(seconds=arguments.seconds, file=arguments.json)
+    return 0
+
+
+def run_scan(arguments: argparse.Namespace) -> int:
+    from catenary import bench
+
+    bench.enter_private_network()
+    bench.measure_scan(drives=arguments.drives, file=arguments.json)
+    return 0
+
+
+def run_virtual(arguments: argparse.Namespace) -> int:
+    from catenary import bench
+
+    bench.measure_virtual(drives=arguments.drives, seconds=arguments.seconds, file=arguments.json)
+    return 0

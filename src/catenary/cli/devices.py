@@ -1,0 +1,60 @@
+"""Devices of a segment for people and for programs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+
+from catenary.bus import SubDevice
+from catenary.cli.failure import UsageError
+
+HEADINGS = ("pos", "name", "vendor", "product", "revision", "serial", "state")
+
+
+def as_table(devices: Sequence[SubDevice]) -> str:
+    rows = [HEADINGS, *(_row(device) for device in devices)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return "\n".join(
+        "  ".join(word.ljust(width) for word, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    )
+
+
+def _row(device: SubDevice) -> tuple[str, ...]:
+    identity = device.identity
+    return (
+        str(device.position),
+        device.name,
+        f"0x{identity.vendor:08X}",
+        f"0x{identity.product:08X}",
+        f"0x{identity.revision:08X}",
+        str(identity.serial),
+        device.state.name,
+    )
+
+
+def as_json(devices: Sequence[SubDevice]) -> str:
+    return json.dumps(
+        [
+            {
+                "position": device.position,
+                "name": device.name,
+                "vendor": device.identity.vendor,
+                "product": device.identity.product,
+                "revision": device.identity.revision,
+                "serial": device.identity.serial,
+                "state": device.state.name,
+            }
+            for device in devices
+        ],
+        indent=2,
+    )
+
+
+def device_at(devices: Sequence[SubDevice], position: int) -> SubDevice:
+    if position >= len(devices):
+        raise UsageError(
+            f"there is no device {position}: the segment has {len(devices)}",
+            hint=f"positions go from 0 to {len(devices) - 1}; catenary scan lists them",
+        )
+    return devices[position]

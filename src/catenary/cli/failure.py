@@ -1,0 +1,58 @@
+"""From an exception to what a user reads, and to the exit status."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+from catenary.errors import CatenaryError
+
+FAILED = 1
+USAGE = 2
+INTERRUPTED = 130  # 128 + SIGINT
+BROKEN_PIPE = 141  # 128 + SIGPIPE
+
+
+class UsageError(Exception):
+    """The command line asks for what cannot be; found only while the command ran."""
+
+    def __init__(self, message: str, *, hint: str = "") -> None:
+        super().__init__(message)
+        self.hint = hint
+
+
+def report(error: Exception) -> int:
+    """Prints one line and a hint to stderr; the exit status."""
+    message, hint = describe(error)
+    print(f"catenary: {message}", file=sys.stderr)
+    if hint:
+        print(f"  hint: {hint}", file=sys.stderr)
+    return USAGE if isinstance(error, UsageError) else FAILED
+
+
+def describe(error: Exception) -> tuple[str, str]:
+    """What went wrong and what to do next, each on one line."""
+    if isinstance(error, CatenaryError):
+        return one_line(error.message), one_line(error.hint)
+    if isinstance(error, UsageError):
+        return one_line(str(error)), error.hint
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{error.filename}: {error.strerror}", ""
+    if isinstance(error, ValueError | OSError):
+        return one_line(str(error)), ""
+    kind = type(error).__name__
+    return (
+        f"internal error: {kind}: {one_line(str(error))}",
+        "--debug shows where; please report it",
+    )
+
+
+def one_line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def silence_stdout() -> int:
+    """Whoever read our output went away (`catenary scan | head -1`): nothing more is to be said,
+    and the interpreter must not say it while it flushes at exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return BROKEN_PIPE

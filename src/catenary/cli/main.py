@@ -1,0 +1,71 @@
+"""`catenary`: reads the arguments, runs one command, turns every error into a line and a status."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from typing import NoReturn
+
+from catenary.cli import bench, demo, scan, sdo, virtual
+from catenary.cli.failure import INTERRUPTED, USAGE, report, silence_stdout
+
+DESCRIPTION = "Real-time EtherCAT for Python."
+EPILOG = """\
+TARGET is a network interface (eth0) or a virtual segment (virtual, virtual:FILE.toml).
+
+example:
+  catenary demo
+  catenary scan eth0
+"""
+
+
+class Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line and where the help is."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(USAGE, f"{self.prog}: {message}\n  hint: {self.prog} --help\n")
+
+
+class ShowVersion(argparse.Action):
+    """Looks the version up only when it is asked for: that takes longer than all the rest."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from importlib.metadata import version
+
+        print(f"catenary {version('catenary')}")
+        parser.exit()
+
+
+def make_parser() -> argparse.ArgumentParser:
+    parser = Parser(
+        prog="catenary",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action=ShowVersion, nargs=0, help="print the version")
+    parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for command in (scan, sdo, demo, bench, virtual):
+        command.add_parser(commands)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs one command. The exit status: 0, 1 for what failed, 2 for a wrong command line."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    debug = "--debug" in given  # before or after the command
+    parsed = make_parser().parse_args([word for word in given if word != "--debug"])
+    try:
+        status = int(parsed.run(parsed))
+        sys.stdout.flush()
+        return status
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except BrokenPipeError:
+        return silence_stdout()
+    except Exception as error:
+        if debug:
+            raise
+        return report(error)

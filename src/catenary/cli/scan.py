@@ -1,0 +1,30 @@
+"""`catenary scan TARGET`: which devices are there."""
+
+from __future__ import annotations
+
+import argparse
+
+from catenary.cli.parsers import Commands, add_command, add_json
+
+
+def add_parser(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "scan",
+        help="list the devices of a segment",
+        description="Brings all devices to PRE-OP and lists them.",
+        example="catenary scan eth0\ncatenary scan virtual --json",
+    )
+    parser.add_argument("target", metavar="TARGET", help="eth0, virtual or virtual:FILE.toml")
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from catenary.cli.devices import as_json, as_table
+    from catenary.target import open_main_device
+
+    with open_main_device(arguments.target) as main:
+        devices = main.scan()
+        print(as_json(devices) if arguments.json else as_table(devices))
+    return 0

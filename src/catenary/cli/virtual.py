@@ -1,0 +1,43 @@
+"""`catenary virtual serve NIC`: a virtual segment that answers on a network interface."""
+
+from __future__ import annotations
+
+import argparse
+
+from catenary.cli.parsers import Commands, add_command
+
+
+def add_parser(commands: Commands) -> None:
+    group = add_command(
+        commands,
+        "virtual",
+        help="a segment of virtual devices",
+        description="A virtual segment that any MainDevice can drive.",
+        example="catenary virtual serve veth1 --config machine.toml",
+    ).add_subparsers(title="commands", metavar="COMMAND", required=True)
+    parser = add_command(
+        group,
+        "serve",
+        help="answer on a network interface",
+        description="Serves a virtual segment on a network interface until Ctrl-C. "
+        "Without --config: the segment of the demo (coupler, digital output, three servos, "
+        "digital output).",
+        example="ip link add veth0 type veth peer name veth1\n"
+        "ip link set veth0 up && ip link set veth1 up\n"
+        "catenary virtual serve veth1 &\n"
+        "catenary scan veth0",
+    )
+    parser.add_argument("interface", metavar="NIC", help="the interface to answer on")
+    parser.add_argument("--config", metavar="FILE.toml", help="the devices of the segment")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from catenary.virtual import Segment, demo_segment, serve
+
+    if arguments.config is None:
+        segment = demo_segment(clock="monotonic")
+    else:
+        segment = Segment.from_toml(arguments.config, clock="monotonic")
+    serve(segment, arguments.interface)
+    return 0

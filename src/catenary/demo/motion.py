@@ -1,0 +1,62 @@
+"""The motion of the demo: three sines of 0.5 Hz, a third of a turn apart, and their recording."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+import catenary as cat
+from catenary.demo.result import Motion
+from catenary.demo.text import ProgressBar
+
+PERIOD = 1e-3  # [s]
+COUNTS_PER_TURN = 2**20
+AMPLITUDE = math.pi  # [rad]
+PULSATION = math.pi  # [rad/s]
+FADE_IN = 1.0  # [s] in which the amplitude grows, so that the drives start from rest
+
+
+def drives_of(subs: Sequence[cat.SubDevice]) -> cat.Drives:
+    drives = [sub for sub in subs if sub.is_drive]
+    return cat.Drives(drives, mode="csp", counts_per_turn=COUNTS_PER_TURN)
+
+
+def follow(loop: cat.Loop, arm: cat.Drives, recording: Recording, progress: ProgressBar) -> None:
+    """Moves the drives for as long as the recording has room."""
+    home = arm.actual.position.copy()
+    phases = np.arange(len(arm)) * (math.tau / len(arm))
+    for cycle in loop:
+        t = cycle.time
+        growth = AMPLITUDE * min(t / FADE_IN, 1.0) ** 2
+        reference = home + growth * np.sin(PULSATION * t + phases)
+        arm.target.position[:] = reference
+        if not recording.add(t, reference, arm.actual.position):
+            return
+        progress.show(t)
+
+
+class Recording:
+    """Owns what was asked and what was measured, one row per cycle; made beforehand, so that
+    recording costs the loop two small copies."""
+
+    def __init__(self, seconds: float, drives: int) -> None:
+        rows = max(round(seconds / PERIOD), 1)
+        self._time = np.zeros(rows)
+        self._reference = np.zeros((rows, drives))
+        self._actual = np.zeros((rows, drives))
+        self._used = 0
+
+    def add(self, time: float, reference: np.ndarray, actual: np.ndarray) -> bool:
+        """False when this was the last row."""
+        row = self._used
+        self._time[row] = time
+        self._reference[row] = reference
+        self._actual[row] = actual
+        self._used = row + 1
+        return self._used < len(self._time)
+
+    def motion(self) -> Motion:
+        used = slice(self._used)
+        return Motion(self._time[used], self._reference[used], self._actual[used])

@@ -1,0 +1,54 @@
+"""The demo from beginning to end, as a user sees it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import catenary as cat
+from catenary.demo.ground import ground
+from catenary.demo.motion import PERIOD, Recording, drives_of, follow
+from catenary.demo.page import as_html
+from catenary.demo.result import PHASES, Device, Result, as_json
+from catenary.demo.text import ProgressBar, closing_lines, device_lines, timing_lines
+
+
+def show(seconds: float, folder: Path, *, refused: str | None) -> None:
+    """`refused`: why there are no real frames; None: there are."""
+    folder.mkdir(parents=True, exist_ok=True)
+    result = run(seconds, refused=refused)
+    print(timing_lines(result))
+    print(closing_lines(result))
+    (folder / "demo.json").write_text(as_json(result) + "\n")
+    (folder / "demo.html").write_text(as_html(result))
+    print(f"wrote {folder / 'demo.json'} and {folder / 'demo.html'}")
+
+
+def run(seconds: float, *, refused: str | None) -> Result:
+    with ground(refused) as here, cat.MainDevice(here.source) as main:
+        if refused is not None:
+            print(f"no real frames here ({refused}): the segment runs in this process")
+        arm = drives_of(main.scan())
+        recording = Recording(seconds, len(arm))
+        progress = ProgressBar(seconds)
+        with cat.Loop(arm, period=PERIOD) as loop:
+            devices = [device(sub) for sub in main.subs]
+            print(device_lines(devices))
+            follow(loop, arm, recording, progress)
+        progress.clear()
+        return Result(
+            devices=devices,
+            period=PERIOD,
+            cycles=loop.timing.counters["cycles"],
+            lost=loop.timing.counters["lost"],
+            late=loop.timing.counters["late"],
+            timing_us={phase: loop.timing[phase] for phase in PHASES},
+            histograms={phase: loop.histogram(phase) for phase in (*PHASES, "round_trip")},
+            motion=recording.motion(),
+            link=here.link,
+            scheduling=loop.scheduling,
+        )
+
+
+def device(sub: cat.SubDevice) -> Device:
+    identity = sub.identity
+    return Device(sub.position, sub.name, identity.vendor, identity.product, sub.state.name)

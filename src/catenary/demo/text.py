@@ -1,0 +1,65 @@
+"""What the demo prints: devices, a progress bar, the table of figures."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import TextIO
+
+from catenary.demo.result import FIGURES, PHASES, Device, Result
+
+HEADINGS = {"p999": "p99.9"}
+BAR = 40  # characters
+REDRAW_SECONDS = 0.1
+
+
+def device_lines(devices: Sequence[Device]) -> str:
+    width = max((len(device.name) for device in devices), default=0)
+    return "\n".join(
+        f"  {d.position:3d}  {d.name:{width}}  0x{d.vendor:08X}:0x{d.product:08X}  {d.state}"
+        for d in devices
+    )
+
+
+def timing_lines(result: Result) -> str:
+    head = f"  {'[us]':14}" + "".join(f"{HEADINGS.get(name, name):>10}" for name in FIGURES)
+    rows = [
+        f"  {phase:14}" + "".join(f"{result.timing_us[phase][name]:10.1f}" for name in FIGURES)
+        for phase in PHASES
+    ]
+    return "\n".join([head, *rows])
+
+
+def closing_lines(result: Result) -> str:
+    error = result.tracking_error
+    return (
+        f"  cycles {result.cycles}, lost {result.lost}, late {result.late}\n"
+        f"  tracking error {error['rms'] * 1e3:.2f} mrad rms, {error['max'] * 1e3:.2f} mrad max\n"
+        f"  scheduling {result.scheduling}; link {result.link}"
+    )
+
+
+class ProgressBar:
+    """Owns the last line of a terminal; on anything else it stays silent."""
+
+    def __init__(self, seconds: float, stream: TextIO | None = None) -> None:
+        self._seconds = seconds
+        self._stream = stream or sys.stdout
+        self._next = 0.0 if self._stream.isatty() else float("inf")
+
+    def show(self, elapsed: float) -> None:
+        """Cheap when there is nothing to redraw: called in every cycle."""
+        if elapsed < self._next:
+            return
+        self._next = elapsed + REDRAW_SECONDS
+        part = min(elapsed / self._seconds, 1.0)
+        done = round(part * BAR)
+        self._stream.write(
+            f"\r  {'█' * done}{'░' * (BAR - done)} {min(elapsed, self._seconds):4.1f} s"
+        )
+        self._stream.flush()
+
+    def clear(self) -> None:
+        if self._next != float("inf"):
+            self._stream.write("\r\x1b[K")
+            self._stream.flush()

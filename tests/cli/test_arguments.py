@@ -1,0 +1,49 @@
+import argparse
+
+import pytest
+
+from catenary.cli.arguments import Entry, entry, number, position, positive_seconds
+
+
+@pytest.mark.parametrize(
+    ("text", "value"), [("17", 17), ("0x1F", 31), ("0b101", 5), ("-3", -3), ("0xff", 255)]
+)
+def test_number_is_decimal_or_hexadecimal(text: str, value: int) -> None:
+    assert number(text) == value
+
+
+@pytest.mark.parametrize("text", ["", "1F", "0x", "1.5", "five"])
+def test_number_refuses_what_is_none(text: str) -> None:
+    with pytest.raises(argparse.ArgumentTypeError, match="no number"):
+        number(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "index", "subindex"),
+    [("0x6041", 0x6041, 0), ("0x1018:1", 0x1018, 1), ("0x1018:0x04", 0x1018, 4)],
+)
+def test_entry(text: str, index: int, subindex: int) -> None:
+    assert entry(text) == Entry(index, subindex)
+
+
+def test_entry_without_0x_is_taken_for_a_slip() -> None:
+    with pytest.raises(argparse.ArgumentTypeError, match="did you mean 0x1018"):
+        entry("1018:1")
+
+
+@pytest.mark.parametrize("text", ["0x10000", "0x1018:256", "0x1018:-1", "-1"])
+def test_entry_refuses_what_is_outside(text: str) -> None:
+    with pytest.raises(argparse.ArgumentTypeError, match="outside"):
+        entry(text)
+
+
+@pytest.mark.parametrize("text", ["-1", "65536"])
+def test_position_refuses_what_is_outside(text: str) -> None:
+    with pytest.raises(argparse.ArgumentTypeError, match="outside"):
+        position(text)
+
+
+@pytest.mark.parametrize("text", ["0", "-1", "nan", "inf", "soon"])
+def test_seconds_are_positive_and_finite(text: str) -> None:
+    with pytest.raises(argparse.ArgumentTypeError):
+        positive_seconds(text)

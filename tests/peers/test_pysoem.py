@@ -1,0 +1,129 @@
+"""A foreign MainDevice judges the virtual segment: PySOEM, unmodified, over a pair of network
+interfaces, on the segment of the demo."""
+
+from __future__ import annotations
+
+import struct
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from catenary.virtual import demo_segment
+
+pysoem = pytest.importorskip("pysoem", reason="PySOEM is not installed (extra `peers`)")
+
+SERVO = struct.Struct("<Hbiih")  # both ways: word, mode, velocity, position, torque
+DRIVES = (2, 3, 4)
+CYCLES = 1000
+OBJECT_DOES_NOT_EXIST = 0x06020000
+ENABLING = {0x40: 0x06, 0x21: 0x07, 0x23: 0x0F, 0x27: 0x0F}
+
+
+@pytest.fixture
+def master(served: str) -> Iterator[Any]:
+    master = pysoem.Master()
+    master.open(served)
+    try:
+        assert master.config_init() == 6
+        yield master
+    finally:
+        master.state = pysoem.INIT_STATE
+        master.write_state()
+        master.close()
+
+
+def test_finds_every_device(master: Any) -> None:
+    found = [(slave.name, slave.man, slave.id, slave.rev) for slave in master.slaves]
+    expected = [(device.name, *device.identity[:3]) for device in demo_segment().devices]
+    assert found == expected
+
+
+def test_reads_the_sii(master: Any) -> None:
+    """Words 0x08 to 0x0F: vendor, product, revision, serial (ETG.1000.6 table 16)."""
+    for slave, device in zip(master.slaves, demo_segment().devices, strict=True):
+        words = b"".join(slave.eeprom_read(address) for address in (0x08, 0x0A, 0x0C, 0x0E))
+        assert struct.unpack("<4I", words) == tuple(device.identity)
+
+
+def test_sdo_expedited(master: Any) -> None:
+    servo = master.slaves[DRIVES[0]]
+    assert struct.unpack("<I", servo.sdo_read(0x1018, 1)) == (servo.man,)
+    servo.sdo_write(0x6065, 0, struct.pack("<I", 5000))
+    assert servo.sdo_read(0x6065, 0) == struct.pack("<I", 5000)
+
+
+def test_sdo_normal(master: Any) -> None:
+    """More than four bytes, in one mailbox."""
+    servo = master.slaves[DRIVES[0]]
+    assert servo.sdo_read(0x1008, 0).rstrip(b"\0").decode() == servo.name
+
+
+def test_sdo_segmented(master: Any) -> None:
+    """More than one mailbox holds."""
+    servo = master.slaves[DRIVES[0]]
+    text = servo.sdo_read(0x2000, 0)
+    assert len(text) > 512
+
+
+def test_sdo_abort(master: Any) -> None:
+    with pytest.raises(pysoem.SdoError) as caught:
+        master.slaves[DRIVES[0]].sdo_read(0x5FFF, 0)
+    assert caught.value.abort_code == OBJECT_DOES_NOT_EXIST
+
+
+def test_a_thousand_cycles_with_the_expected_counter(master: Any) -> None:
+    to_operational(master)
+    counters = [exchange(master) for _ in range(CYCLES)]
+    assert counters == [master.expected_wkc] * CYCLES
+
+
+def test_a_servo_goes_through_its_states_to_a_position(master: Any) -> None:
+    to_operational(master)
+    servo = master.slaves[DRIVES[1]]
+    seen: list[int] = []
+
+    def enabled() -> bool:
+        status, _, _, position, _ = SERVO.unpack(servo.input)
+        state = status & 0x6F if status & 0x6F in ENABLING else status & 0x4F
+        if state not in seen:
+            seen.append(state)
+        servo.output = SERVO.pack(ENABLING[state], 8, 0, position, 0)
+        return state == 0x27
+
+    cycle_until(master, enabled)
+    assert seen == [0x40, 0x21, 0x23, 0x27]  # disabled, ready, switched on, operation enabled
+
+    _, _, _, start, _ = SERVO.unpack(servo.input)
+    path = iter(range(start, start + 100_001, 500))
+
+    def arrived() -> bool:
+        servo.output = SERVO.pack(0x0F, 8, 0, next(path, start + 100_000), 0)
+        return abs(SERVO.unpack(servo.input)[3] - start - 100_000) <= 100
+
+    cycle_until(master, arrived)
+
+
+def to_operational(master: Any) -> None:
+    master.config_map()
+    assert master.state_check(pysoem.SAFEOP_STATE, 2_000_000) == pysoem.SAFEOP_STATE
+    master.state = pysoem.OP_STATE
+    master.write_state()
+
+    def operational() -> bool:
+        return bool(master.state_check(pysoem.OP_STATE, 1000) == pysoem.OP_STATE)
+
+    cycle_until(master, operational)
+
+
+def cycle_until(master: Any, done: Callable[[], bool], seconds: float = 20.0) -> None:
+    deadline = time.monotonic() + seconds
+    while not done():
+        assert time.monotonic() < deadline
+        exchange(master)
+
+
+def exchange(master: Any) -> int:
+    master.send_processdata()
+    return int(master.receive_processdata(200_000))
