@@ -1,0 +1,78 @@
+"""A foreign dissector judges our MainDevice: tshark reads what a bring-up and a run put on the wire,
+and what came back."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import subprocess
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+import catenary as cat
+from catenary.link import Recorder
+from catenary.types import UDINT
+from catenary.virtual import demo_segment
+from catenary.wire.datagram import Command
+from catenary.wire.frame import decode_frame
+from catenary.wire.pcapng import decode_capture
+
+CYCLES = 300
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Scan, SDOs of all lengths, an abort, SAFE-OP, OP, some cycles, and the way back."""
+    path = tmp_path_factory.mktemp("tshark") / "run.pcapng"
+    with Recorder(demo_segment(clock="virtual"), path) as link, cat.MainDevice(link) as main:
+        subs = main.scan()
+        servo = subs.drives[0]
+        servo.sdo.read(0x1018, 1, type=UDINT)
+        servo.sdo.read(0x1008)
+        servo.sdo.write(0x6065, 0, 5000, type=UDINT)
+        with pytest.raises(cat.SdoAbort):
+            servo.sdo.read(0x5FFF)
+        arm = cat.Drives(subs.drives, mode="csp", counts_per_turn=2**20)
+        with cat.Loop(arm, period=1e-3) as loop:
+            home = arm.actual.position.copy()
+            for cycle in loop:
+                arm.target.position[:] = home + 0.1 * math.sin(cycle.time)
+                if cycle.number >= CYCLES:
+                    break
+    assert link.dropped == 0
+    return path
+
+
+def tshark(path: Path, *options: str) -> list[str]:
+    if shutil.which("tshark") is None:
+        pytest.skip("tshark is not installed (apt install tshark)")
+    command = ["tshark", "-r", str(path), *options]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    return done.stdout.splitlines()
+
+
+def values(path: Path, field: str) -> list[list[int]]:
+    """The numbers a field has in every frame, in their order."""
+    lines = tshark(path, "-T", "fields", "-e", field)
+    return [[int(word, 0) for word in line.split(",")] for line in lines]
+
+
+def test_no_frame_is_malformed(recording: Path) -> None:
+    assert tshark(recording, "-Y", "_ws.malformed || _ws.expert.severity >= 0x600000") == []
+
+
+def test_every_frame_is_ethercat(recording: Path) -> None:
+    protocols = Counter(tshark(recording, "-T", "fields", "-e", "frame.protocols"))
+    assert sum(protocols.values()) > 2 * CYCLES
+    assert [name for name in protocols if "ecat" not in name.split(":")] == []
+
+
+def test_every_datagram_is_recognised(recording: Path) -> None:
+    packets = decode_capture(recording.read_bytes()).packets
+    ours = [decode_frame(packet.data).datagrams for packet in packets]
+    assert values(recording, "ecat.cmd") == [[d.command for d in frame] for frame in ours]
+    assert values(recording, "ecat.idx") == [[d.index for d in frame] for frame in ours]
+    assert values(recording, "ecat.cnt") == [[d.working_counter for d in frame] for frame in ours]
+    assert {d.command for frame in ours for d in frame} <= set(Command)
