@@ -1,5 +1,5 @@
-"""A foreign dissector judges our MainDevice: tshark reads what a bring-up and a run put on the wire,
-and what came back."""
+"""A foreign dissector judges our MainDevice: tshark reads what a bring-up and a run put on
+the wire, and what came back."""
 
 from __future__ import annotations
 

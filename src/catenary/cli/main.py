@@ -56,11 +56,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command. The exit status: 0, 1 for what failed, 2 for a wrong command line."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in given  # before or after the command
-    parsed = make_parser().parse_args([word for word in given if word != "--debug"])
     try:
-        status = int(parsed.run(parsed))
-        sys.stdout.flush()
-        return status
+        return run([word for word in given if word != "--debug"])
     except KeyboardInterrupt:
         return INTERRUPTED
     except BrokenPipeError:
@@ -69,3 +66,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if debug:
             raise
         return report(error)
+
+
+def run(arguments: Sequence[str]) -> int:
+    try:
+        parsed = make_parser().parse_args(arguments)
+        return int(parsed.run(parsed))
+    finally:
+        sys.stdout.flush()  # here, where a reader that went away can still be handled

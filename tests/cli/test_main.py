@@ -1,0 +1,140 @@
+"""Exit statuses, one-line errors, help: everything around the commands."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import pytest
+
+from catenary.cli import scan
+from catenary.cli.main import main, make_parser
+from catenary.errors import LinkError
+
+
+def parsers(
+    parser: argparse.ArgumentParser, path: str = "catenary"
+) -> Iterator[tuple[str, argparse.ArgumentParser]]:
+    yield path, parser
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for name, command in action.choices.items():
+                yield from parsers(command, f"{path} {name}")
+
+
+ALL = dict(parsers(make_parser()))
+
+
+@pytest.fixture
+def failing_scan(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
+    def fail(_: argparse.Namespace) -> int:
+        raise request.param
+
+    monkeypatch.setattr(scan, "run", fail)
+
+
+def test_the_commands_of_the_manual_are_there() -> None:
+    assert {
+        "catenary scan",
+        "catenary sdo read",
+        "catenary sdo write",
+        "catenary demo",
+        "catenary bench loop",
+        "catenary virtual serve",
+    } <= set(ALL)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_every_help_has_an_example_that_parses(name: str) -> None:
+    text = ALL[name].format_help()
+    _, found, examples = text.partition("example:\n")
+    assert found
+    calls = [line.strip() for line in examples.splitlines() if line.strip().startswith("catenary")]
+    assert calls
+    for call in calls:
+        make_parser().parse_args(call.removesuffix("&").split()[1:])
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "",
+        "scann eth0",
+        "scan",
+        "scan eth0 eth1",
+        "sdo read eth0 two 0x1018",
+        "sdo read eth0 2 1018:1",
+        "sdo write eth0 2 0x6065",
+        "demo --seconds -1",
+        "bench loop --drives 0",
+        "virtual serve",
+    ],
+)
+def test_a_wrong_command_line_is_one_line_a_hint_and_status_2(
+    line: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(line.split())
+    assert caught.value.code == 2
+    message, hint = capsys.readouterr().err.splitlines()
+    assert message.startswith("catenary")
+    assert hint.startswith("  hint: ")
+
+
+@pytest.mark.parametrize(
+    "failing_scan", [LinkError("no such interface", hint="there are: lo")], indirect=True
+)
+@pytest.mark.usefixtures("failing_scan")
+def test_an_error_is_a_line_and_a_hint(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["scan", "eth0"]) == 1
+    assert capsys.readouterr().err == "catenary: no such interface\n  hint: there are: lo\n"
+
+
+@pytest.mark.parametrize("failing_scan", [LinkError("no such interface")], indirect=True)
+@pytest.mark.parametrize("line", ["--debug scan eth0", "scan eth0 --debug"])
+@pytest.mark.usefixtures("failing_scan")
+def test_debug_shows_the_traceback(line: str) -> None:
+    with pytest.raises(LinkError):
+        main(line.split())
+
+
+@pytest.mark.parametrize("failing_scan", [KeyError("oh")], indirect=True)
+@pytest.mark.usefixtures("failing_scan")
+def test_a_bug_is_called_one(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["scan", "eth0"]) == 1
+    assert "internal error: KeyError: 'oh'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("failing_scan", [KeyboardInterrupt()], indirect=True)
+@pytest.mark.usefixtures("failing_scan")
+def test_ctrl_c_is_quiet_and_130(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["scan", "eth0"]) == 130
+    assert capsys.readouterr() == ("", "")
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(["--version"])
+    assert caught.value.code == 0
+    assert capsys.readouterr().out.startswith("catenary ")
+
+
+def test_a_reader_that_goes_away_is_no_error_message() -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    command = [sys.executable, "-m", "catenary.cli", "--help"]
+    done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, check=False)
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (141, b"")
+
+
+def test_start_up_imports_nothing_heavy() -> None:
+    code = (
+        "import sys; from catenary.cli.main import make_parser; make_parser();"
+        "print(*{'numpy', 'msgspec', 'catenary.core', 'subprocess'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
