@@ -1,0 +1,41 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from catenary.bench.job import PHASES, Round
+from catenary.bench.loop import peer_names
+from catenary.bench.report import as_json, as_text, machine
+from catenary.bench.statistics import combine, ratios
+from tests.bench.test_statistics import make_round
+
+
+def test_ours_run_beside_the_chosen_peers() -> None:
+    assert peer_names(["c", "pysoem"]) == ["catenary-inline", "catenary-threaded", "c", "pysoem"]
+    assert peer_names([]) == ["catenary-inline", "catenary-threaded"]
+
+
+def test_an_unknown_peer_is_named() -> None:
+    with pytest.raises(ValueError, match=r"no peer 'soem'; known: c, c-ring, pysoem"):
+        peer_names(["soem"])
+
+
+def test_json_has_the_published_form(tmp_path: Path) -> None:
+    rounds: list[Round] = [make_round(500, 4000, 5500)]
+    runs = [combine("catenary-inline", rounds), combine("c", rounds)]
+    figures = json.loads(json.dumps(as_json(runs, ratios(runs), {"drives": 3})))
+    assert figures["machine"] == machine()
+    assert [run["name"] for run in figures["runs"]] == ["catenary-inline", "c"]
+    for run in figures["runs"]:
+        assert {"name", "cycles", "lost", "timing_us", "cpu_us_per_cycle"} <= set(run)
+        assert set(run["timing_us"]) == {*PHASES, "in_controller"}
+    assert figures["ratios"]["in_controller: catenary-inline / c"] == 1.0
+
+
+def test_text_names_every_peer_in_every_table() -> None:
+    runs = [combine(name, [make_round(500, 4000, 5500)]) for name in ("catenary-inline", "pysoem")]
+    text = as_text(runs, ratios(runs))
+    assert text.count("pysoem  ") == 5  # four quantiles and the totals
+    assert "in_controller+tail: catenary-inline / pysoem" in text
