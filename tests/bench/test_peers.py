@@ -1,4 +1,4 @@
-"""Every peer, briefly, on a served segment: what it hands back has the right form; nothing timed."""
+"""Every peer, briefly, on a served segment: the form of what it hands back; nothing timed."""
 
 from __future__ import annotations
 
