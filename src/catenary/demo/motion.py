@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
 import catenary as cat
+from catenary.bus import SubDevices
 from catenary.demo.result import Motion
 from catenary.demo.text import ProgressBar
 
@@ -18,9 +18,8 @@ PULSATION = math.pi  # [rad/s]
 FADE_IN = 1.0  # [s] in which the amplitude grows, so that the drives start from rest
 
 
-def drives_of(subs: Sequence[cat.SubDevice]) -> cat.Drives:
-    drives = [sub for sub in subs if sub.is_drive]
-    return cat.Drives(drives, mode="csp", counts_per_turn=COUNTS_PER_TURN)
+def drives_of(subs: SubDevices) -> cat.Drives:
+    return cat.Drives(subs.drives, mode="csp", counts_per_turn=COUNTS_PER_TURN)
 
 
 def follow(loop: cat.Loop, arm: cat.Drives, recording: Recording, progress: ProgressBar) -> None:

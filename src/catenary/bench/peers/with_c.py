@@ -16,8 +16,7 @@ import catenary as cat
 from catenary.bench.compiler import compile_peer
 from catenary.bench.job import PHASES, Body, Job, Round
 from catenary.errors import CatenaryError
-from catenary.plan import CyclePlan, make_plan
-from catenary.plan.cycle import AxisPlan, DatagramKind, FramePlan, Number
+from catenary.plan.cycle import AxisPlan, CyclePlan, DatagramKind, FramePlan, Number
 from catenary.wire.al import State
 from catenary.wire.datagram import Command, Datagram
 from catenary.wire.frame import encode_frame
@@ -60,7 +59,7 @@ def bring_up(job: Job) -> CyclePlan:
             mode=MODE[job.body],
             counts_per_turn=job.counts_per_turn,
         )
-        plan = make_plan([sub.description for sub in subs], [arm], period=job.period_ns * 1e-9)
+        plan = main.plan(arm, period=job.period_ns * 1e-9)
         main.configure(plan)
         return plan.cycle
 
