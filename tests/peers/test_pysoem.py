@@ -11,6 +11,8 @@ from typing import Any
 import pytest
 
 from catenary.virtual import demo_segment
+from catenary.virtual.description import VENDOR_ID, Description
+from catenary.virtual.devices.application import BLOB_BYTES
 
 pysoem = pytest.importorskip("pysoem", reason="PySOEM is not installed (extra `peers`)")
 
@@ -34,17 +36,20 @@ def master(served: str) -> Iterator[Any]:
         master.close()
 
 
+def described() -> list[Description]:
+    return [device.description() for device in demo_segment()]
+
+
 def test_finds_every_device(master: Any) -> None:
     found = [(slave.name, slave.man, slave.id, slave.rev) for slave in master.slaves]
-    expected = [(device.name, *device.identity[:3]) for device in demo_segment().devices]
-    assert found == expected
+    assert found == [(d.name, VENDOR_ID, d.product_code, d.revision) for d in described()]
 
 
 def test_reads_the_sii(master: Any) -> None:
     """Words 0x08 to 0x0F: vendor, product, revision, serial (ETG.1000.6 table 16)."""
-    for slave, device in zip(master.slaves, demo_segment().devices, strict=True):
+    for slave, d in zip(master.slaves, described(), strict=True):
         words = b"".join(slave.eeprom_read(address) for address in (0x08, 0x0A, 0x0C, 0x0E))
-        assert struct.unpack("<4I", words) == tuple(device.identity)
+        assert struct.unpack("<4I", words) == (VENDOR_ID, d.product_code, d.revision, d.serial)
 
 
 def test_sdo_expedited(master: Any) -> None:
@@ -63,8 +68,10 @@ def test_sdo_normal(master: Any) -> None:
 def test_sdo_segmented(master: Any) -> None:
     """More than one mailbox holds."""
     servo = master.slaves[DRIVES[0]]
-    text = servo.sdo_read(0x2000, 0)
-    assert len(text) > 512
+    assert servo.sdo_read(0x2100, 0, 4096) == bytes(k * 7 & 0xFF for k in range(BLOB_BYTES))
+    written = bytes(range(256)) * (BLOB_BYTES // 256)
+    servo.sdo_write(0x2101, 0, written)
+    assert servo.sdo_read(0x2101, 0, 4096) == written
 
 
 def test_sdo_abort(master: Any) -> None:

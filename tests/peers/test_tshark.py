@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import catenary as cat
+from catenary.errors import SdoAbort
 from catenary.link import Recorder
 from catenary.types import UDINT
 from catenary.virtual import demo_segment
@@ -30,7 +31,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
         servo.sdo.read(0x1018, 1, type=UDINT)
         servo.sdo.read(0x1008)
         servo.sdo.write(0x6065, 0, 5000, type=UDINT)
-        with pytest.raises(cat.SdoAbort):
+        with pytest.raises(SdoAbort):
             servo.sdo.read(0x5FFF)
         arm = cat.Drives(subs.drives, mode="csp", counts_per_turn=2**20)
         with cat.Loop(arm, period=1e-3) as loop:

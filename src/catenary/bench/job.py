@@ -40,8 +40,8 @@ class Job:
     rated_torque: float  # of every drive [N·m]
     spin: bool = False  # a Python thread spins beside the loop
     amplitude: float = 3.0  # of the sine [rad]
-    stiffness: float = 0.02  # PD [N·m/rad]
-    damping: float = 0.002  # PD [N·m/(rad/s)]
+    stiffness: float = 0.5  # PD [N·m/rad]
+    damping: float = 0.02  # PD [N·m/(rad/s)]
 
     @property
     def counts_per_rad(self) -> float:

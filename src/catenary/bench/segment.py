@@ -17,7 +17,7 @@ from catenary.virtual import AnalogInputs, Coupler, Segment, Servo, serve
 
 START_SECONDS = 30.0
 COUNTS_PER_TURN = 2**20
-RATED_TORQUE = 1.0  # [N·m]
+RATED_TORQUE = 2.0  # [N·m]
 PRIORITY = 80
 ANALOG_CHANNELS = 4  # of one input terminal
 
@@ -45,7 +45,7 @@ def processors() -> Processors:
 
 def make_segment(drives: int, inputs: int = 0, *, clock: str = "monotonic") -> Segment:
     """A coupler, `drives` servos, and `inputs` terminals of analogue inputs: bytes without axes."""
-    servos = [Servo() for _ in range(drives)]
+    servos = [Servo(counts_per_turn=COUNTS_PER_TURN, rated_torque=RATED_TORQUE) for _ in range(drives)]
     terminals = [AnalogInputs(channels=ANALOG_CHANNELS) for _ in range(inputs)]
     return Segment([Coupler(), *servos, *terminals], clock=clock)
 
