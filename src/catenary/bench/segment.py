@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Literal
 
 from catenary.errors import LinkError
 from catenary.realtime.child import start_python
@@ -43,9 +44,13 @@ def processors() -> Processors:
     return Processors(allowed[0], allowed[-1])
 
 
-def make_segment(drives: int, inputs: int = 0, *, clock: str = "monotonic") -> Segment:
+def make_segment(
+    drives: int, inputs: int = 0, *, clock: Literal["virtual", "monotonic"] = "monotonic"
+) -> Segment:
     """A coupler, `drives` servos, and `inputs` terminals of analogue inputs: bytes without axes."""
-    servos = [Servo(counts_per_turn=COUNTS_PER_TURN, rated_torque=RATED_TORQUE) for _ in range(drives)]
+    servos = [
+        Servo(counts_per_turn=COUNTS_PER_TURN, rated_torque=RATED_TORQUE) for _ in range(drives)
+    ]
     terminals = [AnalogInputs(channels=ANALOG_CHANNELS) for _ in range(inputs)]
     return Segment([Coupler(), *servos, *terminals], clock=clock)
 
@@ -66,7 +71,7 @@ def main(arguments: Sequence[str]) -> None:
     interface, drives, inputs, cpu = arguments
     segment = make_segment(int(drives), int(inputs))
     request_scheduling(priority=PRIORITY, cpu=int(cpu) if cpu else None)
-    serve(segment, interface)
+    serve(segment, interface, ready=lambda: print("ready", flush=True))
 
 
 if __name__ == "__main__":

@@ -29,8 +29,12 @@ def _row(device: SubDevice) -> tuple[str, ...]:
         f"0x{identity.product:08X}",
         f"0x{identity.revision:08X}",
         str(identity.serial),
-        device.state.name,
+        state_name(device),
     )
+
+
+def state_name(device: SubDevice) -> str:
+    return device.state.name.replace("_", "-") if device.state is not None else "unknown"
 
 
 def as_json(devices: Sequence[SubDevice]) -> str:
@@ -43,7 +47,7 @@ def as_json(devices: Sequence[SubDevice]) -> str:
                 "product": device.identity.product,
                 "revision": device.identity.revision,
                 "serial": device.identity.serial,
-                "state": device.state.name,
+                "state": state_name(device),
             }
             for device in devices
         ],

@@ -89,7 +89,7 @@ def run_write(arguments: argparse.Namespace) -> int:
     try:
         value = kind.parse(arguments.value)
     except ValueError as error:
-        raise UsageError(str(error)) from error
+        raise UsageError(str(error), hint="numbers are decimal or 0x...") from error
     at: Entry = arguments.entry
     data = kind.encode(value)
     with open_main_device(arguments.target) as main:
@@ -100,23 +100,30 @@ def run_write(arguments: argparse.Namespace) -> int:
 
 
 def _data_type(name: str | None) -> DataType[Value] | None:
-    from catenary.types import by_name
+    from difflib import get_close_matches
 
+    from catenary.types import ALL, by_name
+
+    if name is None:
+        return None
     try:
-        return by_name(name) if name else None
+        return by_name(name)
     except ValueError as error:
-        raise UsageError(str(error)) from error
+        near = get_close_matches(name.upper(), [kind.name for kind in ALL], n=1, cutoff=0.5)
+        guess = f"did you mean {near[0]}? " if near else ""
+        hint = f"{guess}known: BOOL, SINT, INT, DINT, USINT, UINT, UDINT, REAL, STRING, BYTES, ..."
+        raise UsageError(f"unknown data type {name!r}", hint=hint) from error
 
 
 def explain(data: bytes) -> str:
     """Bytes without a type: as hex, and as the number or text that they may be."""
-    meanings = []
     if len(data) in NUMBER_SIZES:
-        meanings.append(f"unsigned {int.from_bytes(data, 'little')}")
+        number = int.from_bytes(data, "little")
+        return f"{data.hex(' ')}  (0x{number:0{2 * len(data)}X}, {number})"
     text = data.rstrip(b"\x00")
     if text and all(0x20 <= byte < 0x7F for byte in text):
-        meanings.append(f"text {text.decode()!r}")
-    return f"{data.hex(' ')}" + (f"  ({', '.join(meanings)})" if meanings else "")
+        return f"{data.hex(' ')}  ({text.decode()!r})"
+    return data.hex(" ")
 
 
 def _as_json(arguments: argparse.Namespace, data: bytes, value: Value | None) -> str:

@@ -39,5 +39,9 @@ def run(arguments: argparse.Namespace) -> int:
         segment = demo_segment(clock="monotonic")
     else:
         segment = Segment.from_toml(arguments.config, clock="monotonic")
-    serve(segment, arguments.interface)
+
+    def say() -> None:
+        print(f"{len(segment)} devices answer on {arguments.interface}; Ctrl-C ends", flush=True)
+
+    serve(segment, arguments.interface, ready=say)
     return 0

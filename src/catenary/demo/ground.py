@@ -1,8 +1,9 @@
-"""Where the demo's segment lives: on a network interface, served by a process of its own, or in
-this process where the machine allows no more."""
+"""Where the demo's segment lives: on a network interface, served by a process of its own
+(`python -m catenary.demo.ground NIC`), or in this process where the machine allows no more."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ from catenary.errors import LinkError
 from catenary.link import Interface, LinkSource
 from catenary.realtime.child import start_python
 from catenary.realtime.private_network import veth_pair
-from catenary.virtual import demo_segment
+from catenary.virtual import demo_segment, serve
 
 START_SECONDS = 20.0
 
@@ -30,8 +31,18 @@ def ground(refused: str | None) -> Iterator[Ground]:
         return
     with (
         veth_pair() as (ours, theirs),
-        start_python(["-m", "catenary.cli", "virtual", "serve", theirs]) as server,
+        start_python(["-m", "catenary.demo.ground", theirs]) as server,
     ):
         if server.read_line(START_SECONDS) is None:
             raise LinkError("the virtual segment did not start", hint="its own message is above")
         yield Ground(Interface(ours), "veth")
+
+
+def main(interface: str) -> None:
+    """The other process: the segment behind the other end of the cable."""
+    segment = demo_segment(clock="monotonic")
+    serve(segment, interface, ready=lambda: print("ready", flush=True))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

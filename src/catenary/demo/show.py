@@ -51,4 +51,5 @@ def run(seconds: float, *, refused: str | None) -> Result:
 
 def device(sub: cat.SubDevice) -> Device:
     identity = sub.identity
-    return Device(sub.position, sub.name, identity.vendor, identity.product, sub.state.name)
+    state = sub.state.name.replace("_", "-") if sub.state is not None else "unknown"
+    return Device(sub.position, sub.name, identity.vendor, identity.product, state)

@@ -1,0 +1,87 @@
+"""`scan` and `sdo` on a virtual segment: what people and programs read, and what goes wrong."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from catenary.cli.main import main
+from catenary.virtual.description import VENDOR_ID
+
+
+def call(line: str, capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    status = main(line.split())
+    printed = capsys.readouterr()
+    return status, printed.out, printed.err
+
+
+def test_scan_lists_every_device(capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = call("scan virtual", capsys)
+    assert status == 0
+    heading, *lines = out.splitlines()
+    assert heading.split()[:2] == ["pos", "name"]
+    assert [line.split()[0] for line in lines] == list("012345")
+    assert {line.split()[-1] for line in lines} == {"PRE-OP"}
+
+
+def test_scan_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = call("scan virtual --json", capsys)
+    devices = json.loads(out)
+    assert [device["position"] for device in devices] == list(range(6))
+    assert {device["vendor"] for device in devices} == {VENDOR_ID}
+    assert [device["serial"] for device in devices[2:5]] == [1, 2, 3]
+
+
+def test_sdo_read_without_a_type_shows_bytes_and_number(capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = call("sdo read virtual 2 0x1018:1", capsys)
+    assert out == "59 4e 54 43  (0x43544E59, 1129598553)\n"
+
+
+def test_sdo_read_with_a_type(capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = call("sdo read virtual 3 0x1008 --type STRING", capsys)
+    assert out == "Catenary virtual servo 2\n"
+
+
+def test_sdo_read_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = call("sdo read virtual 2 0x1018:1 --type UDINT --json", capsys)
+    assert json.loads(out) == {
+        "position": 2,
+        "index": 0x1018,
+        "subindex": 1,
+        "type": "UDINT",
+        "data": "594e5443",
+        "value": VENDOR_ID,
+    }
+
+
+def test_sdo_write(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("sdo write virtual 2 0x6065 0x1388 --type UDINT", capsys) == (0, "", "")
+
+
+@pytest.mark.parametrize(
+    ("line", "status", "message"),
+    [
+        ("sdo read virtual 2 0x5FFF", 1, "0x06020000"),
+        ("sdo read virtual 0 0x1018:1", 1, "no mailbox"),
+        ("sdo read virtual 6 0x1018:1", 2, "the segment has 6"),
+        ("sdo read virtual 2 0x1018:1 --type UNIT", 2, "did you mean UINT?"),
+        ("sdo read virtual 2 0x1018:1 --type UINT", 1, "needs 2 bytes, received 4"),
+        ("sdo write virtual 2 0x6065 5", 2, "needs --type"),
+        ("sdo write virtual 2 0x6065 -5 --type UDINT", 2, "-5 is not in 0 to 4294967295"),
+        ("sdo write virtual 2 0x1018:1 5 --type UDINT", 1, "0x06010002"),
+        ("scan eth0,eth1", 1, "ring"),
+        ("scan nosuchnic", 1, "there is no network interface 'nosuchnic'"),
+        ("scan virtual:nosuchfile.toml", 1, "nosuchfile.toml"),
+    ],
+)
+def test_mistakes_name_the_thing(
+    line: str, status: int, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found, out, err = call(line, capsys)
+    assert found == status
+    assert out == ""
+    assert message in err
+    assert err.startswith("catenary: ")
+    assert len(err.splitlines()) <= 2
+    assert "internal error" not in err
