@@ -1,26 +1,32 @@
 """A foreign MainDevice judges the virtual segment: PySOEM, unmodified, over a pair of network
-interfaces, on the segment of the demo."""
+interfaces."""
 
 from __future__ import annotations
 
 import struct
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from catenary.virtual import demo_segment
+from catenary.virtual import Segment
 from catenary.virtual.description import VENDOR_ID, Description
 from catenary.virtual.devices.application import BLOB_BYTES
 
 pysoem = pytest.importorskip("pysoem", reason="PySOEM is not installed (extra `peers`)")
 
 SERVO = struct.Struct("<Hbiih")  # both ways: word, mode, velocity, position, torque
-DRIVES = (2, 3, 4)
+SHOULDER, ELBOW = 2, 3
 CYCLES = 1000
 OBJECT_DOES_NOT_EXIST = 0x06020000
 ENABLING = {0x40: 0x06, 0x21: 0x07, 0x23: 0x0F, 0x27: 0x0F}
+
+
+@pytest.fixture
+def devices(line: Path) -> list[Description]:
+    return [device.description() for device in Segment.from_toml(line)]
 
 
 @pytest.fixture
@@ -36,24 +42,23 @@ def master(served: str) -> Iterator[Any]:
         master.close()
 
 
-def described() -> list[Description]:
-    return [device.description() for device in demo_segment()]
+def test_finds_every_device(master: Any, devices: list[Description]) -> None:
+    found = [(slave.man, slave.id, slave.rev) for slave in master.slaves]
+    assert found == [(VENDOR_ID, d.product_code, d.revision) for d in devices]
+    # SOEM reads the name of the first of a kind only, and copies it to the others.
+    names = {slave.id: slave.name for slave in master.slaves}
+    assert names == {d.product_code: d.name for d in reversed(devices)}
 
 
-def test_finds_every_device(master: Any) -> None:
-    found = [(slave.name, slave.man, slave.id, slave.rev) for slave in master.slaves]
-    assert found == [(d.name, VENDOR_ID, d.product_code, d.revision) for d in described()]
-
-
-def test_reads_the_sii(master: Any) -> None:
+def test_reads_the_sii(master: Any, devices: list[Description]) -> None:
     """Words 0x08 to 0x0F: vendor, product, revision, serial (ETG.1000.6 table 16)."""
-    for slave, d in zip(master.slaves, described(), strict=True):
+    for slave, d in zip(master.slaves, devices, strict=True):
         words = b"".join(slave.eeprom_read(address) for address in (0x08, 0x0A, 0x0C, 0x0E))
         assert struct.unpack("<4I", words) == (VENDOR_ID, d.product_code, d.revision, d.serial)
 
 
 def test_sdo_expedited(master: Any) -> None:
-    servo = master.slaves[DRIVES[0]]
+    servo = master.slaves[SHOULDER]
     assert struct.unpack("<I", servo.sdo_read(0x1018, 1)) == (servo.man,)
     servo.sdo_write(0x6065, 0, struct.pack("<I", 5000))
     assert servo.sdo_read(0x6065, 0) == struct.pack("<I", 5000)
@@ -61,13 +66,13 @@ def test_sdo_expedited(master: Any) -> None:
 
 def test_sdo_normal(master: Any) -> None:
     """More than four bytes, in one mailbox."""
-    servo = master.slaves[DRIVES[0]]
-    assert servo.sdo_read(0x1008, 0).rstrip(b"\0").decode() == servo.name
+    servo = master.slaves[SHOULDER]
+    assert servo.sdo_read(0x1008, 0).rstrip(b"\0") == b"shoulder"
 
 
 def test_sdo_segmented(master: Any) -> None:
     """More than one mailbox holds."""
-    servo = master.slaves[DRIVES[0]]
+    servo = master.slaves[SHOULDER]
     assert servo.sdo_read(0x2100, 0, 4096) == bytes(k * 7 & 0xFF for k in range(BLOB_BYTES))
     written = bytes(range(256)) * (BLOB_BYTES // 256)
     servo.sdo_write(0x2101, 0, written)
@@ -76,7 +81,7 @@ def test_sdo_segmented(master: Any) -> None:
 
 def test_sdo_abort(master: Any) -> None:
     with pytest.raises(pysoem.SdoError) as caught:
-        master.slaves[DRIVES[0]].sdo_read(0x5FFF, 0)
+        master.slaves[SHOULDER].sdo_read(0x5FFF, 0)
     assert caught.value.abort_code == OBJECT_DOES_NOT_EXIST
 
 
@@ -88,7 +93,7 @@ def test_a_thousand_cycles_with_the_expected_counter(master: Any) -> None:
 
 def test_a_servo_goes_through_its_states_to_a_position(master: Any) -> None:
     to_operational(master)
-    servo = master.slaves[DRIVES[1]]
+    servo = master.slaves[ELBOW]
     seen: list[int] = []
 
     def enabled() -> bool:

@@ -101,8 +101,9 @@ def make_sii_image(device: Description) -> bytes:
         for s in device.sync_managers
     )
     parts.append((SYNC_MANAGER, managers))
-    parts += [(TX_PDO, _pdos([pdo], strings)) for pdo in device.tx_pdos]
-    parts += [(RX_PDO, _pdos([pdo], strings)) for pdo in device.rx_pdos]
+    # All PDOs of a direction in one category, as in real terminals: SOEM reads no second one.
+    parts.append((TX_PDO, _pdos(device.tx_pdos, strings)))
+    parts.append((RX_PDO, _pdos(device.rx_pdos, strings)))
     if device.clock and device.axes:
         parts.append((CLOCK, _clock(strings)))
     parts.insert(0, (STRINGS, strings.encode()))
