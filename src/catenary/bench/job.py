@@ -57,7 +57,7 @@ class Job:
 class Round:
     """What one peer measured in one round."""
 
-    samples: Nanoseconds  # (cycles, phases) [ns]
+    samples: Nanoseconds  # (cycles, phases) [ns]; -1: did not occur in that cycle
     lost: int
     cpu_ns: int  # processor time of the whole process over the measured cycles
     scheduling: str = ""

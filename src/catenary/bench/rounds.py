@@ -11,7 +11,6 @@ from catenary.bench.job import Job, Round, read_round, write_job
 from catenary.errors import CatenaryError
 from catenary.realtime.child import start_python
 
-ROUND_SECONDS = 1.0  # as long as the loop's log reaches back at 1 kHz
 WARM_UP_CYCLES = 200
 BRING_UP_SECONDS = 60.0  # at most, for bring-up and enabling in a round
 

@@ -27,7 +27,8 @@ class Run:
 
 
 def combine(name: str, rounds: Sequence[Round]) -> Run:
-    samples = np.concatenate([one.samples for one in rounds]).astype(np.float64) * 1e-3
+    measured = np.concatenate([one.samples for one in rounds])
+    samples = np.where(measured < 0, np.nan, measured * 1e-3)
     columns = dict(zip(PHASES, samples.T, strict=True))
     columns["in_controller"] = columns["receive"] + columns["process"] + columns["send"]
     # The first period of a round began in another process' time.
@@ -39,7 +40,7 @@ def combine(name: str, rounds: Sequence[Round]) -> Run:
         late=sum(one.late for one in rounds),
         cpu_us_per_cycle=sum(one.cpu_ns for one in rounds) * 1e-3 / len(samples),
         scheduling=" / ".join(sorted({one.scheduling for one in rounds})),
-        timing_us={phase: summarise(values) for phase, values in columns.items()},
+        timing_us={phase: summarise(v[~np.isnan(v)]) for phase, v in columns.items()},
     )
 
 

@@ -6,17 +6,21 @@ from __future__ import annotations
 import math
 import time
 from pathlib import Path
+from typing import Literal
 
 import catenary as cat
 from catenary.bench.loop import write
 from catenary.bench.report import machine
 from catenary.bench.segment import COUNTS_PER_TURN, make_segment
 
+Order = Literal["inline", "threaded"]
+
 PERIOD = 1e-3  # [s]
+ORDERS: tuple[Order, ...] = ("inline", "threaded")
 
 
 def measure(*, drives: int, seconds: float, file: Path | None) -> None:
-    found = {order: run(drives, seconds, order) for order in ("inline", "threaded")}
+    found = {order: run(drives, seconds, order) for order in ORDERS}
     print(f"{machine()}\n{drives} drives, {seconds:g} s of virtual time at {1 / PERIOD:.0f} Hz")
     for order, took in found.items():
         print(f"  {order:10} {took:7.3f} s: {seconds / took:6.0f} times real time")
@@ -31,7 +35,7 @@ def measure(*, drives: int, seconds: float, file: Path | None) -> None:
     )
 
 
-def run(drives: int, seconds: float, order: str) -> float:
+def run(drives: int, seconds: float, order: Order) -> float:
     """How long the loop took [s], without bring-up and leaving."""
     with cat.MainDevice(make_segment(drives, clock="virtual")) as main:
         arm = cat.Drives(main.scan().drives, mode="csp", counts_per_turn=COUNTS_PER_TURN)

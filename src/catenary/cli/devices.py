@@ -34,7 +34,7 @@ def _row(device: SubDevice) -> tuple[str, ...]:
 
 
 def state_name(device: SubDevice) -> str:
-    return device.state.name.replace("_", "-") if device.state is not None else "unknown"
+    return str(device.state) if device.state is not None else "unknown"
 
 
 def as_json(devices: Sequence[SubDevice]) -> str:

@@ -56,6 +56,9 @@ class Recording:
         self._used = row + 1
         return self._used < len(self._time)
 
+    def __len__(self) -> int:
+        return self._used
+
     def motion(self) -> Motion:
         used = slice(self._used)
         return Motion(self._time[used], self._reference[used], self._actual[used])

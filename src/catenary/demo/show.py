@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import catenary as cat
@@ -33,14 +34,16 @@ def run(seconds: float, *, refused: str | None) -> Result:
         with cat.Loop(arm, period=PERIOD) as loop:
             devices = [device(sub) for sub in main.subs]
             print(device_lines(devices))
+            before = loop.timing.counters  # of the start-up
             follow(loop, arm, recording, progress)
-        progress.clear()
+            progress.clear()
+        after = loop.timing.counters
         return Result(
             devices=devices,
             period=PERIOD,
-            cycles=loop.timing.counters["cycles"],
-            lost=loop.timing.counters["lost"],
-            late=loop.timing.counters["late"],
+            cycles=len(recording),
+            lost=after["lost"] - before["lost"],
+            late=late(after) - late(before),
             timing_us={phase: loop.timing[phase] for phase in PHASES},
             histograms={phase: loop.histogram(phase) for phase in (*PHASES, "round_trip")},
             motion=recording.motion(),
@@ -49,7 +52,11 @@ def run(seconds: float, *, refused: str | None) -> Result:
         )
 
 
+def late(counters: Mapping[str, int]) -> int:
+    """Instants that were skipped, and those that Python had no new targets for."""
+    return counters["late"] + counters["uncommitted"]
+
+
 def device(sub: cat.SubDevice) -> Device:
     identity = sub.identity
-    state = sub.state.name.replace("_", "-") if sub.state is not None else "unknown"
-    return Device(sub.position, sub.name, identity.vendor, identity.product, state)
+    return Device(sub.position, sub.name, identity.vendor, identity.product, str(sub.state))

@@ -62,6 +62,8 @@ class Running:
         self._attached.enter_context(self.main.attached(self.service.runner))
         self._settle()
         self.service.converse(*(request_state(station, State.OP) for station in self._stations))
+        for sub in self.main.subs:
+            sub.state = State.OP
 
     def enable(self) -> None:
         """Enables all axes. Position axes hold when this returns; velocity and torque axes wait for

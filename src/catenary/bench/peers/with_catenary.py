@@ -5,13 +5,17 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
 
 import catenary as cat
 from catenary.bench.job import PHASES, Body, Job, Round
 
-ORDER = {"catenary-inline": "inline", "catenary-threaded": "threaded"}
+ORDER: dict[str, Literal["inline", "threaded"]] = {
+    "catenary-inline": "inline",
+    "catenary-threaded": "threaded",
+}
 MODE = {Body.SINE: "csp", Body.PD: "cst"}
 
 
@@ -35,16 +39,16 @@ def run(job: Job) -> Round:
 
 def _measure(loop: cat.Loop, arm: cat.Drives, job: Job) -> Round:
     body = _sine(arm, job) if job.body is Body.SINE else _pd(arm, job)
-    before, cpu = dict(loop.timing.counters), 0
+    before, cpu = loop.timing.counters, 0
     for cycle in loop:
-        if cycle.number == job.warm_up:
-            before, cpu = dict(loop.timing.counters), time.process_time_ns()
+        if cycle.number == job.warm_up - 1:
+            before, cpu = loop.timing.counters, time.process_time_ns()
         body(cycle.time)
         if cycle.number >= job.warm_up + job.cycles:
             break
     cpu = time.process_time_ns() - cpu
     after = loop.timing.counters
-    log = loop.log[-job.cycles :]
+    log = loop.log[-job.cycles - 1 : -1]  # the last one was left unfinished
     samples = np.stack([log[f"{phase}_ns"] for phase in PHASES], axis=1).astype(np.int64)
     return Round(
         samples,
