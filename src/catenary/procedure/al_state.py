@@ -21,6 +21,7 @@ TIMEOUTS = {
 }
 
 ACKNOWLEDGE_TIMEOUT = 0.5  # [s]
+TAKE_TIMEOUT = 0.5  # [s]; an application looks at AL control every few milliseconds
 
 _STATUS_START = AL_STATUS.address
 _STATUS_SIZE = AL_STATUS_CODE.address + AL_STATUS_CODE.size - AL_STATUS.address
@@ -55,10 +56,25 @@ def request_state(
         yield from acknowledge(station, before)
     elif before.state is target:
         return before
-    word = AlControl(target).word
-    [reply] = yield [write(Command.FPWR, station.address, AL_CONTROL, word)]
-    answered(reply, station, f"request for {target}")
+    yield from write_control(station, AlControl(target))
     return (yield from _await_state(station, target, timeout or TIMEOUTS[target]))
+
+
+def write_control(station: Station, control: AlControl) -> Procedure[None]:
+    """Asks for a state. A controller takes no AL control before its application has read the one
+    before (ET1100 datasheet, register 0x0120): then it is asked again."""
+    deadline, pace = Deadline(TAKE_TIMEOUT), Pace()
+    while True:
+        [taken, status] = yield [
+            write(Command.FPWR, station.address, AL_CONTROL, control.word),
+            read_memory(station.address, _STATUS_START, _STATUS_SIZE, repeatable=True),
+        ]
+        if not taken.lost and taken.working_counter == 1:
+            return
+        now = _decoded(answered(status, station, f"request for {control.state}"))
+        if deadline.passed(status):
+            raise _refused(station, control.state, now, "does not look at the request for")
+        yield after(pace.pause())
 
 
 def acknowledge(station: Station, pending: DeviceState) -> Procedure[DeviceState]:
@@ -70,8 +86,7 @@ def acknowledge(station: Station, pending: DeviceState) -> Procedure[DeviceState
     state = pending.state or State.INIT
     now = pending
     for control in (AlControl(state, acknowledge=True), AlControl(state)):
-        [reply] = yield [write(Command.FPWR, station.address, AL_CONTROL, control.word)]
-        answered(reply, station, "acknowledgement of an AL error")
+        yield from write_control(station, control)
         now = yield from _await_no_error(station, ACKNOWLEDGE_TIMEOUT)
         if not now.error:
             return now

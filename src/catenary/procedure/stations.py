@@ -100,20 +100,27 @@ def _all_to(state: State, timeout: float) -> Procedure[bool]:
     too, which then looks like an error: so the state is asked for a second time without it.
     """
     for control in (AlControl(state, acknowledge=True), AlControl(state)):
-        yield [write(Command.BWR, 0, AL_CONTROL, control.word)]
-        if not (yield from _await_all(control.word, timeout)):
+        if not (yield from _ask_all(control.word, timeout)):
             return False
     return True
 
 
-def _await_all(word: int, timeout: float) -> Procedure[bool]:
-    """Until the or of all AL status words is `word`, or the same without an error."""
+def _ask_all(word: int, timeout: float) -> Procedure[bool]:
+    """Until the or of all AL status words is `word`, or the same without an error.
+
+    A controller takes no AL control before its application has read the one before (working
+    counter too small): then all are asked again.
+    """
     deadline, pace = Deadline(timeout), Pace()
+    taken = False
     while True:
-        [reply] = yield [read(Command.BRD, 0, AL_STATUS)]
-        if AL_STATUS.unpack(reply.data) & 0x1F in (word, word & 0x0F):
+        asked = [] if taken else [write(Command.BWR, 0, AL_CONTROL, word)]
+        replies = yield [*asked, read(Command.BRD, 0, AL_STATUS)]
+        status = replies[-1]
+        taken = taken or replies[0].working_counter >= status.working_counter
+        if taken and AL_STATUS.unpack(status.data) & 0x1F in (word, word & 0x0F):
             return True
-        if reply.lost or deadline.passed(reply):
+        if status.lost or deadline.passed(status):
             return False
         yield after(pace.pause())
 
