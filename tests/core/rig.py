@@ -1,5 +1,5 @@
-"""A bench for the engine: plans made by hand, and a link written in Python whose far end is a row of
-scripted drives. Everything happens in virtual time; the tests lose, repeat and spoil its frames.
+"""A bench for the engine: plans made by hand, and a link written in Python whose far end is a row
+of scripted drives. Everything happens in virtual time; the tests lose, repeat and spoil its frames.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ from libc.stdint cimport int32_t, int64_t, uint8_t, uint32_t, uint64_t
 from libc.string cimport memset
 
 from catenary.core._axes cimport axes_follow, axes_read, axes_write
-from catenary.core._handover cimport actual_header_t, handover_latch, handover_publish
+from catenary.core._handover cimport actual_header_t, handover_latch, handover_publish, handover_wake
 from catenary.core._histogram cimport histogram_add
 from catenary.core._lane cimport lane_send
 from catenary.core._native cimport cat_law_frame
@@ -208,6 +208,7 @@ cdef void cycle_threaded(cycle_t *c) noexcept nogil:
     close_header(c, actual)
     handover_publish(c.handover)
     published = now(c)
+    handover_wake(c.handover)
     seen = c.image.frame_stamp[0]
     record.receive_ns = short_ns(published - seen)
     if c.missing == 0:
@@ -264,6 +265,7 @@ cdef void cycle_law(cycle_t *c) noexcept nogil:
     record.send_ns = short_ns(sent - done)
     close_header(c, actual)
     handover_publish(c.handover)
+    handover_wake(c.handover)
     tail(c, sent)
 
 

@@ -85,4 +85,5 @@ cdef class Handover:
 cdef void handover_commit(handover_t *h) noexcept nogil
 cdef target_t *handover_latch(handover_t *h, bint *fresh) noexcept nogil
 cdef void handover_publish(handover_t *h) noexcept nogil
+cdef void handover_wake(handover_t *h) noexcept nogil
 cdef bint handover_swap(handover_t *h) noexcept nogil

@@ -87,9 +87,13 @@ cdef target_t *handover_latch(handover_t *h, bint *fresh) noexcept nogil:
 
 
 cdef void handover_publish(handover_t *h) noexcept nogil:
-    """The cycle's side: offers the actual values in the back slot and wakes Python."""
+    """The cycle's side: offers the actual values in the back slot."""
     cat_triple_publish(&h.actual_triple)
     cat_add32(&h.published, 1)
+
+
+cdef void handover_wake(handover_t *h) noexcept nogil:
+    """Wakes Python where it sleeps; a system call, only then."""
     cat_fence()  # published before waiting is read: else a sleeper may be missed
     if cat_load_acquire32(&h.waiting):
         cat_futex_wake(&h.published)

@@ -1,0 +1,104 @@
+"""The acyclic lane: opaque frames beside the cycle, bounded both ways."""
+
+import pytest
+
+from catenary.wire.datagram import Command, Datagram
+from catenary.wire.frame import decode_frame, encode_frame
+from tests.core.rig import MS, Bench, axis, bench
+
+
+def request(number: int = 0, size: int = 2, index: int = 0x80) -> bytes:
+    return encode_frame([Datagram(Command.FPRD, number, bytes(size), index=index)])
+
+
+def lane_frames(b: Bench) -> list[bytes]:
+    return [f for f in b.link.sent if decode_frame(f).datagrams[0].index >= 0x80]
+
+
+@pytest.mark.parametrize("order", ["threaded", "inline", "law"])
+def test_a_frame_goes_out_after_the_cyclic_one_and_comes_back(order: str) -> None:
+    b = bench(axis(0), order=order)
+    b.engine.run(1)
+    sent = len(b.link.sent)
+    assert b.engine.lane_push(request(7))
+    b.engine.run(2)
+    cyclic, acyclic = b.link.sent[sent : sent + 2]
+    assert decode_frame(cyclic).datagrams[0].index < 0x80
+    assert acyclic == request(7)
+    back = b.engine.lane_pop()
+    assert back is not None
+    assert decode_frame(back).datagrams[0].working_counter == 1
+    assert b.engine.lane_pop() is None
+    assert b.ok
+
+
+def test_at_most_four_a_cycle_in_their_order() -> None:
+    b = bench(axis(0))
+    for k in range(10):
+        assert b.engine.lane_push(request(k))
+    seen = []
+    for _ in range(3):
+        before = len(lane_frames(b))
+        b.engine.run(1)
+        seen.append(len(lane_frames(b)) - before)
+    assert seen == [4, 4, 2]
+    assert [decode_frame(f).datagrams[0].address for f in lane_frames(b)] == list(range(10))
+
+
+@pytest.mark.parametrize(("period", "expected"), [(MS, 2), (MS // 4, 1), (2 * MS, 4)])
+def test_at_most_a_quarter_of_the_period_on_the_wire(period: int, expected: int) -> None:
+    b = bench(axis(0), period_ns=period, collect_deadline_ns=period // 2)
+    for k in range(8):
+        assert b.engine.lane_push(request(k, size=1400))
+    b.engine.run(1)
+    assert len(lane_frames(b)) == expected
+
+
+def test_a_full_queue_refuses() -> None:
+    b = bench(axis(0))
+    assert [b.engine.lane_push(request(k)) for k in range(65)] == [True] * 64 + [False]
+    b.engine.run(1)
+    assert b.engine.lane_push(request(64))
+
+
+def test_answers_nobody_takes_are_dropped_and_counted() -> None:
+    b = bench(axis(0))
+    for k in range(70):
+        b.link.arrive(request(k), 1000)
+    b.engine.run(1)
+    counters = b.engine.counters
+    assert (counters["lane_received"], counters["lane_dropped"]) == (64, 6)
+    assert b.ok
+    assert sum(b.engine.lane_pop() is not None for _ in range(70)) == 64
+
+
+def test_a_frame_the_link_refuses_is_dropped_and_counted() -> None:
+    b = bench(axis(0))
+    b.engine.lane_push(request())
+    b.link.send_result = -105
+    b.engine.run(1)
+    assert b.engine.counters["lane_dropped"] == 1
+    assert b.engine.counters["lane_sent"] == 0
+
+
+@pytest.mark.parametrize(
+    ("frame", "message"),
+    [
+        (request(index=0x7F), "belongs to the cycle"),
+        (request()[:59], "59 bytes"),
+        (request() + bytes(1500), "1560 bytes"),
+        (request()[:12] + b"\x08\0" + request()[14:], "EtherType"),
+    ],
+)
+def test_what_is_no_acyclic_frame_is_refused(frame: bytes, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        bench(axis(0)).engine.lane_push(frame)
+
+
+def test_waiting_says_whether_a_frame_is_there() -> None:
+    b = bench(axis(0))
+    assert not b.engine.lane_wait(0)
+    b.engine.lane_push(request())
+    b.engine.run(1)
+    b.engine.run(1)
+    assert b.engine.lane_wait(10**12)
