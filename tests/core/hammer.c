@@ -11,31 +11,31 @@
 typedef struct {
     cat_triple triple;
     uint64_t slots[3][WORDS];
-    uint64_t exchanges;
+    uint32_t stop;
 } triple_work;
 
 static void *write_vectors(void *argument) {
     triple_work *w = argument;
-    for (uint64_t n = 1; n <= w->exchanges; n++) {
+    for (uint64_t n = 1; !cat_load_acquire32(&w->stop); n++) {
         for (int i = 0; i < WORDS; i++) w->slots[w->triple.back][i] = n;
         cat_triple_publish(&w->triple);
+        if (n % 32 == 0) sched_yield();  /* where there is one CPU */
     }
     return 0;
 }
 
-/* seen: vectors taken; torn: with unequal words; backward: older than one before. */
-void hammer_triple(uint64_t exchanges, uint64_t *seen, uint64_t *torn, uint64_t *backward) {
+/* Until the reader has taken `count` vectors. torn: with unequal words; backward: not newer. */
+void hammer_triple(uint64_t count, uint64_t *torn, uint64_t *backward) {
     static triple_work w;
     pthread_t writer;
-    uint64_t last = 0;
+    uint64_t last = 0, seen = 0, idle = 0;
     memset(&w, 0, sizeof w);
     cat_triple_init(&w.triple);
-    w.exchanges = exchanges;
-    *seen = *torn = *backward = 0;
+    *torn = *backward = 0;
     pthread_create(&writer, 0, write_vectors, &w);
-    while (last < exchanges) {
+    while (seen < count) {
         if (!cat_triple_take(&w.triple)) {
-            sched_yield();
+            if (++idle % 1000 == 0) sched_yield();
             continue;
         }
         const uint64_t *slot = w.slots[w.triple.front];
@@ -48,8 +48,9 @@ void hammer_triple(uint64_t exchanges, uint64_t *seen, uint64_t *torn, uint64_t 
         }
         if (first <= last) ++*backward;
         last = first;
-        ++*seen;
+        seen++;
     }
+    cat_store_release32(&w.stop, 1);
     pthread_join(writer, 0);
 }
 

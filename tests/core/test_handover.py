@@ -11,12 +11,10 @@ from tests.core.rig import axis, bench
 
 
 def test_no_torn_vector_in_a_million_exchanges() -> None:
-    seen, torn, backward = (ctypes.c_uint64() for _ in range(3))
-    load_hammer().hammer_triple(
-        ctypes.c_uint64(1_000_000), ctypes.byref(seen), ctypes.byref(torn), ctypes.byref(backward)
-    )
+    torn, backward = ctypes.c_uint64(), ctypes.c_uint64()
+    taken = ctypes.c_uint64(1_000_000)
+    load_hammer().hammer_triple(taken, ctypes.byref(torn), ctypes.byref(backward))
     assert (torn.value, backward.value) == (0, 0)
-    assert seen.value >= 1
 
 
 def test_a_packet_ring_keeps_order_and_bytes() -> None:

@@ -117,6 +117,7 @@ cdef void axes_read(axes_t *x, actual_t *out, uint64_t number) noexcept nogil:
         out.commanded_position[i] = a.commanded_position
         out.commanded_velocity[i] = a.commanded_velocity
         out.commanded_torque[i] = a.commanded_torque
+        out.followed_since[i] = a.followed_since
         out.statusword[i] = a.status
         out.mode[i] = a.mode_shown
         out.state[i] = a.state
@@ -197,22 +198,19 @@ cdef void axes_write(axes_t *x, const target_t *target, bint fresh) noexcept nog
 cdef void axes_follow(const axes_t *x, const actual_t *actual, target_t *target) noexcept nogil:
     """Targets of axes that are not followed: the actual position, no velocity, no torque.
 
-    An axis that has become followed since the application last looked starts from what it is
-    commanded: what was written before cannot have been meant for it. Its torque stays: it is
-    what the axis was enabled with.
+    An axis that has become followed since the last commit starts from what it is commanded: what
+    was written before cannot have been meant for it. Its torque stays: it is what the axis was
+    enabled with.
     """
     cdef uint32_t i
-    cdef bint followed
     for i in range(x.axis_count):
-        followed = actual.flags[i] & FOLLOWED != 0
-        if not followed:
+        if not actual.flags[i] & FOLLOWED:
             target.position[i] = actual.position[i]
             target.velocity[i] = 0.0
             target.torque[i] = 0.0
-        elif not target.followed[i]:
+        elif actual.followed_since[i] > target.header.seen:
             target.position[i] = actual.commanded_position[i]
             target.velocity[i] = actual.commanded_velocity[i]
-        target.followed[i] = followed
 
 
 # ---- the edge

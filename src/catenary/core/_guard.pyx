@@ -113,9 +113,7 @@ cdef void guard_observe(axes_t *x, axis_t *a, bint valid, uint8_t state_before,
             drop(x, a)
         return
     a.invalid_in_row = 0
-    if a.lost:
-        a.lost = 0
-        drop(x, a)  # asked while nobody could hear it: ask again
+    a.lost = 0
     if a.goal == ENABLED:
         if state_before == OPERATION_ENABLED and a.state != OPERATION_ENABLED:
             drop(x, a)
@@ -148,6 +146,8 @@ cdef void guard_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noe
         a.stopping = 0
         a.armed = 0
         a.climbing_cycles = 0
+        if a.lost:
+            drop(x, a)  # nobody can hear it: it must not come true later
     if a.goal == ENABLED and not a.followed:
         if not t.header.hold:
             a.armed = 1

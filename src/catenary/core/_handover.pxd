@@ -34,6 +34,7 @@ cdef struct actual_t:
     double *commanded_torque
     double *input_reals
     int64_t *input_integers
+    uint64_t *followed_since   # the cycle; of axes that are followed
     uint16_t *statusword
     uint16_t *unit_counter
     int8_t *mode
@@ -58,7 +59,6 @@ cdef struct target_t:
     uint16_t *controlword_bits
     int8_t *mode
     uint8_t *goal
-    uint8_t *followed          # by axis: it was when the application last looked
     uint8_t *output_bits
 
 cdef struct handover_t:

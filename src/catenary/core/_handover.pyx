@@ -46,6 +46,7 @@ cdef size_t lay_actual(actual_t *a, uint8_t *block, const counts_t *n) noexcept:
     a.commanded_torque = <double *>carve(&place, n.axes, 8)
     a.input_reals = <double *>carve(&place, n.input_reals, 8)
     a.input_integers = <int64_t *>carve(&place, n.input_integers, 8)
+    a.followed_since = <uint64_t *>carve(&place, n.axes, 8)
     a.statusword = <uint16_t *>carve(&place, n.axes, 2)
     a.unit_counter = <uint16_t *>carve(&place, n.units, 2)
     a.mode = <int8_t *>carve(&place, n.axes, 1)
@@ -69,7 +70,6 @@ cdef size_t lay_target(target_t *t, uint8_t *block, const counts_t *n) noexcept:
     t.controlword_bits = <uint16_t *>carve(&place, n.axes, 2)
     t.mode = <int8_t *>carve(&place, n.axes, 1)
     t.goal = carve(&place, n.axes, 1)
-    t.followed = carve(&place, n.axes, 1)
     t.output_bits = carve(&place, n.output_bits, 1)
     return place - block
 
