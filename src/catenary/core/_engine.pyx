@@ -243,6 +243,7 @@ cdef class Engine:
         self.e.error = 0
         self.e.done = 0
         self.left = -1
+        handover_swap(self.h)  # what an earlier run left
         self.e.thread.body = thread_loop
         self.e.thread.argument = &self.e
         if self.native:
@@ -395,6 +396,7 @@ cdef class Engine:
         cdef uint32_t flags = actual.header.flags
         if self.e.cycle.order != INLINE:
             self.commit(True)
+            handover_swap(self.h)  # cycles are counted from the commit on
         while cycles > 0:
             batch = 1 if until_stopped else min(cycles, max(SIGNALS_NS // self.e.cycle.period, 1))
             flags = self.hold_native(batch) if self.native else self.hold_here(batch)

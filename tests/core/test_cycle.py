@@ -1,0 +1,400 @@
+"""The three orders, the instants, the figures, the law's place. Virtual time throughout."""
+
+import ctypes
+
+import numpy as np
+import pytest
+
+from catenary.core import (
+    CYCLE_LATE,
+    CYCLE_LAW_DONE,
+    CYCLE_LIMITED,
+    CYCLE_OK,
+    GOAL_ENABLED,
+    RECORD_FIELDS,
+)
+from catenary.plan.cycle import AxisLimits
+from catenary.wire.frame import decode_frame
+from tests.core.rig import (
+    CST,
+    LAW_NAME,
+    MS,
+    PERIOD,
+    Bench,
+    axis,
+    bench,
+    capsule_new,
+    make_plan,
+)
+
+ORDERS = ("threaded", "inline", "law")
+
+
+class Trace(Bench):
+    """Notes what the engine does with its link, and when."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.engine.stop()
+        self.events: list[tuple[str, int]] = []
+        send, wait = self.link.table_send, self.link.table_wait_until
+
+        def note_send(*arguments) -> int:
+            self.events.append(("send", self.link.time))
+            return send(*arguments)
+
+        def note_wait(_, deadline, wake_on_frame) -> int:
+            self.events.append(("collect" if wake_on_frame else "wait", deadline))
+            return wait(_, deadline, wake_on_frame)
+
+        # the table holds C callbacks: exchange what they call
+        self.link.table.send = type(self.link.table.send)(note_send)
+        self.link.table.wait_until = type(self.link.table.wait_until)(note_wait)
+        self.engine.start()
+
+
+def traced(order: str) -> Trace:
+    return Trace(make_plan([axis(0)], order=order))
+
+
+def test_threaded_waits_sends_and_collects_by_the_deadline() -> None:
+    b = traced("threaded")
+    b.steps(2)
+    assert b.events == [
+        ("wait", PERIOD),
+        ("send", PERIOD),
+        ("collect", PERIOD + PERIOD // 2),
+        ("wait", 2 * PERIOD),
+        ("send", 2 * PERIOD),
+        ("collect", 2 * PERIOD + PERIOD // 2),
+    ]
+
+
+@pytest.mark.parametrize("order", ["inline", "law"])
+def test_inline_and_law_never_wait_for_frames(order: str) -> None:
+    b = traced(order)
+    b.steps(3)
+    kinds = [kind for kind, _ in b.events]
+    assert "collect" not in kinds
+    assert b.engine.counters["lost"] == 0
+
+
+def test_inline_sends_when_the_body_ends_and_sees_the_frame_of_the_cycle_before() -> None:
+    b = traced("inline")
+    b.steps(1)
+    assert b.events == [("send", 0), ("wait", PERIOD)]
+    b.drives[0].position = 5  # after the frame passed
+    b.engine.next()
+    assert b.actual_position[0] == pytest.approx(0.005)
+    assert b.events[2:] == [("send", PERIOD), ("wait", 2 * PERIOD)]
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_number_time_and_instants(order: str) -> None:
+    b = bench(axis(0), order=order)
+    seen = []
+    for _ in range(5):
+        b.engine.next()
+        seen.append((b.engine.number, b.engine.time_ns))
+    assert seen == [(k + 1, k * PERIOD) for k in range(5)]
+    assert b.engine.counters["cycles"] == 5
+
+
+@pytest.mark.parametrize("spent", [2.5, 3.0])
+def test_inline_skips_missed_instants_and_never_bursts(spent: float) -> None:
+    b = bench(axis(0), order="inline")
+    b.steps(2)
+    sent = len(b.link.sent)
+    b.engine.spend(int(spent * PERIOD))
+    flags = b.engine.next()
+    assert flags & CYCLE_LATE
+    skipped = 2
+    assert b.engine.skipped == skipped
+    assert b.engine.counters["late"] == skipped
+    assert b.engine.time_ns == (2 + skipped) * PERIOD
+    assert len(b.link.sent) == sent + 1
+    assert not b.engine.next() & CYCLE_LATE
+    assert b.engine.time_ns == (3 + skipped) * PERIOD
+
+
+@pytest.mark.parametrize("order", ["threaded", "law"])
+def test_a_late_python_does_not_hold_the_bus_up(order: str) -> None:
+    b = bench(axis(0), order=order)
+    b.steps(2)
+    before = len(b.link.sent)
+    b.engine.spend(7 * PERIOD)
+    assert len(b.link.sent) == before + 7
+    assert b.engine.next() & CYCLE_LATE
+    assert b.engine.counters["late"] == 0
+    assert b.engine.number == 2 + 7 + 1
+
+
+def test_a_wait_that_ends_late_keeps_to_the_grid() -> None:
+    b = bench(axis(0), order="inline")
+    b.steps(1)
+    wait = b.link.table_wait_until
+
+    def oversleep(_, deadline, wake_on_frame) -> int:
+        wait(_, deadline, wake_on_frame)
+        b.link.time += 2 * PERIOD + 300
+        return 0
+
+    b.link.table.wait_until = type(b.link.table.wait_until)(oversleep)
+    b.engine.next()
+    assert b.engine.time_ns == 3 * PERIOD
+    assert b.engine.skipped == 2
+    record = records(b)[-1]
+    assert record["lateness_ns"] == 300
+    assert record["period_ns"] == 3 * PERIOD + 300
+
+
+def records(b: Bench) -> np.ndarray:
+    return np.frombuffer(b.engine.log(), np.dtype(RECORD_FIELDS))
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_the_log_holds_the_last_thousand_cycles(order: str) -> None:
+    b = bench(axis(0), order=order)
+    b.engine.run(1)
+    assert len(records(b)) == 1
+    b.engine.run(1499)
+    log = records(b)
+    assert log["number"].tolist() == list(range(501, 1501))
+    assert (np.diff(log["scheduled_ns"]) == PERIOD).all()
+    assert (log["flags"] & CYCLE_OK == CYCLE_OK).all()
+    assert (log["period_ns"] == PERIOD).all()
+    assert (log["al_status"] == 8).all()
+    assert (log["al_counter"] == 1).all()
+
+
+def test_the_log_shows_a_lost_cycle() -> None:
+    b = bench(axis(0))
+    b.engine.run(5)
+    b.segment.spoil = lambda frame: []
+    b.engine.run(2)
+    log = records(b)
+    assert log["lost_in_row"].tolist() == [0] * 5 + [1, 2]
+    assert log["missing_frames"].tolist() == [0] * 5 + [1, 1]
+
+
+def test_phases_of_the_inline_order() -> None:
+    b = bench(axis(0), order="inline")
+    b.steps(2)
+    b.engine.reset_histograms()
+    for _ in range(10):
+        b.link.time += 40_000  # the body takes this long
+        b.engine.next()
+    figures = b.engine.histograms()
+    assert figures["process"] == {
+        "count": 10,
+        "sd": 0.0,
+        **dict.fromkeys(("mean", "min", "max", "p50", "p99", "p999"), 40.0),
+    }
+    assert figures["in_controller"]["mean"] == 40.0
+    assert figures["period"]["mean"] == 1000.0
+    assert figures["round_trip"] == {"count": 0}
+    [(lower, upper, count)] = b.engine.histogram_counts("process")
+    assert count == 10
+    assert lower <= 40.0 < upper
+
+
+def test_phases_of_the_threaded_order() -> None:
+    b = bench(axis(0))
+    b.steps(2)
+    b.engine.reset_histograms()
+    for _ in range(10):
+        b.engine.spend(40_000)
+        b.engine.next()
+    figures = b.engine.histograms()
+    assert figures["process"]["mean"] == 40.0
+    assert figures["round_trip"]["mean"] == 100.0
+    assert figures["in_controller"]["count"] == 10
+
+
+def test_start_up_without_an_application_has_no_process_phase() -> None:
+    for order in ORDERS:
+        b = bench(axis(0), order=order)
+        b.engine.run(20)
+        assert b.engine.histograms()["process"] == {"count": 0}
+
+
+def test_an_unknown_phase_is_refused() -> None:
+    with pytest.raises(ValueError, match="lunch"):
+        bench(axis(0)).engine.histogram_counts("lunch")
+
+
+# ---- the law's place
+
+POINTER = ctypes.POINTER(ctypes.c_double)
+
+
+class LawFrame(ctypes.Structure):
+    """`cat_law_frame` of native/law.h, as far as these laws look."""
+
+    _fields_ = (
+        ("axis_count", ctypes.c_uint32),
+        ("ok", ctypes.c_uint32),
+        ("time", ctypes.c_double),
+        ("period", ctypes.c_double),
+        ("actual_position", POINTER),
+        ("actual_velocity", POINTER),
+        ("actual_torque", POINTER),
+        ("axis_flags", ctypes.POINTER(ctypes.c_uint8)),
+        ("target_position", POINTER),
+        ("target_velocity", POINTER),
+        ("target_torque", POINTER),
+    )
+
+
+STEP = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.POINTER(LawFrame))
+
+
+class LawTable(ctypes.Structure):
+    """`cat_law` of native/law.h."""
+
+    _fields_ = (
+        ("version", ctypes.c_uint32),
+        ("reserved", ctypes.c_uint32),
+        ("self", ctypes.c_void_p),
+        ("step", STEP),
+    )
+
+
+def with_law(law, *axes, **more: object) -> tuple[Bench, LawTable]:
+    b = bench(*axes, order="law", **more)
+    b.engine.stop()
+    table = LawTable(1, 0, None, STEP(lambda _, frame: law(frame.contents)))
+    b.engine.set_law(capsule_new(ctypes.addressof(table), LAW_NAME, None))
+    b.engine.start()
+    return b, table
+
+
+def test_a_law_acts_on_the_inputs_of_its_own_cycle() -> None:
+    def spring(frame: LawFrame) -> int:
+        frame.target_torque[0] = -0.5 * frame.actual_position[0]
+        return 0
+
+    b, table = with_law(spring, axis(0, mode=CST))
+    b.ask(GOAL_ENABLED)
+    b.engine.run(10)
+    assert b.drives[0].state == 1  # no law has run yet
+    b.steps(8)
+    assert b.axis_flags[0] & 1
+    b.drives[0].position = 2000
+    b.steps(2)  # one frame to see it, one to act
+    assert b.drives[0].target_torque == -1000
+    assert table.version == 1
+
+
+def test_the_limits_hold_for_laws_too() -> None:
+    def wild(frame: LawFrame) -> int:
+        frame.target_torque[0] = float("nan") if frame.time > 0.05 else 99.0
+        return 0
+
+    limits = AxisLimits(torque=2.0)
+    b, _table = with_law(wild, axis(0, mode=CST, limits=limits, ramp_torque=100.0))
+    b.ask(GOAL_ENABLED)
+    assert b.steps(20) & CYCLE_LIMITED
+    assert b.drives[0].target_torque == 2000
+    b.steps(35)
+    assert 0 < b.drives[0].target_torque < 2000
+    b.steps(20)
+    assert b.drives[0].state == 1
+
+
+def test_a_finished_law_leaves_the_axes_holding() -> None:
+    def until_soon(frame: LawFrame) -> int:
+        frame.target_position[0] = frame.actual_position[0] + 0.01
+        return frame.time > 0.03
+
+    b, _table = with_law(until_soon, axis(0))
+    b.ask(GOAL_ENABLED)
+    flags = b.steps(60)
+    assert flags & CYCLE_LAW_DONE
+    held = b.drives[0].target_position
+    b.steps(10)
+    assert b.drives[0].target_position == held > 0
+    assert b.drives[0].state == 4
+
+
+def test_without_a_law_the_law_order_holds() -> None:
+    b = bench(axis(0), order="law")
+    b.enable()
+    b.target_position[0] = 1.0
+    b.steps(5)
+    assert b.drives[0].target_position == 0
+
+
+def test_what_is_no_law_is_refused() -> None:
+    b = bench(axis(0), order="law")
+    with pytest.raises(RuntimeError, match="stopped"):
+        b.engine.set_law(None)
+    b.engine.stop()
+    with pytest.raises(ValueError, match=r"catenary\.law"):
+        b.engine.set_law(object())
+    wrong = LawTable(9, 0, None, STEP(lambda _, frame: 0))
+    with pytest.raises(ValueError, match="version 9"):
+        b.engine.set_law(capsule_new(ctypes.addressof(wrong), LAW_NAME, None))
+
+
+# ---- interruptions and errors of the link
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_an_interrupted_wait_goes_on_and_sends_once(order: str) -> None:
+    b = bench(axis(0), order=order)
+    b.steps(1)
+    sent = len(b.link.sent)
+    b.link.wait_results = [-4, -4]  # -EINTR
+    b.steps(1)
+    assert len(b.link.sent) == sent + 1
+    assert b.ok
+    assert b.engine.number == 2
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("method", ["next", "run"])
+def test_a_wait_that_fails_is_an_os_error(order: str, method: str) -> None:
+    b = bench(axis(0), order=order)
+    b.steps(1)
+    b.link.wait_results = [-100]  # -ENETDOWN
+    with pytest.raises(OSError, match="link") as caught:
+        b.engine.next() if method == "next" else b.engine.run(1)
+    assert caught.value.errno == 100
+    assert b.engine.run(1) & CYCLE_OK  # it may recover
+
+
+def test_nothing_runs_before_start_or_after_stop() -> None:
+    b = bench(axis(0))
+    with pytest.raises(RuntimeError, match="running"):
+        b.engine.start()
+    b.engine.stop()
+    for call in (b.engine.next, lambda: b.engine.run(1), lambda: b.engine.run_until_stopped(1)):
+        with pytest.raises(RuntimeError, match="start"):
+            call()
+    b.engine.stop()
+
+
+def test_after_a_pause_the_grid_goes_on() -> None:
+    b = bench(axis(0))
+    b.engine.run(3)
+    b.engine.stop()
+    b.link.time += 4 * PERIOD + MS // 3
+    b.engine.start()
+    b.engine.run(1)
+    assert b.engine.number == 4
+    assert b.engine.time_ns == 7 * PERIOD
+    assert records(b)[-1]["period_ns"] == -1
+    assert b.engine.counters["late"] == 0
+
+
+def test_frames_of_the_former_run_are_not_taken_for_new_ones() -> None:
+    b = bench(axis(0))
+    b.engine.run(1)
+    old = b.segment.answer(b.link.sent[-1])[0][1]
+    b.engine.stop()
+    b.engine.start()
+    b.link.arrive(old, 1000)
+    b.engine.run(1)
+    assert b.engine.counters["stale"] == 1
+    assert decode_frame(old).datagrams[0].index == 0

@@ -1,0 +1,184 @@
+"""The engine on the machine's own clock: native thread, signals, scheduling. Nothing timed is
+asserted; a virtual segment in this process answers."""
+
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from dataclasses import replace
+
+import pytest
+
+from catenary.core import CYCLE_NONE, CYCLE_OK, CYCLE_STOPPED, Engine
+from catenary.plan.cycle import CyclePlan
+from catenary.virtual import Coupler, Segment
+from catenary.wire.datagram import Command, Datagram
+from catenary.wire.frame import decode_frame, encode_frame
+from tests.core.rig import Bench, al_status, axis, frame_plan, make_plan
+
+ORDERS = ("threaded", "inline", "law")
+
+
+def plan(order: str, **more: object) -> CyclePlan:
+    """A BRD of the AL status alone: two couplers answer it."""
+    frames = (frame_plan([al_status(2)]),)
+    made = make_plan([], units=0, order=order, frames=frames, priority=None)
+    return replace(made, **more)
+
+
+@pytest.fixture
+def link() -> Iterator[object]:
+    with Segment([Coupler(), Coupler()], clock="monotonic").open_link() as link:
+        yield link
+
+
+@pytest.fixture(params=ORDERS)
+def engine(request: pytest.FixtureRequest, link) -> Iterator[Engine]:
+    engine = Engine(plan(request.param), link.capsule)
+    engine.start()
+    yield engine
+    engine.stop()
+
+
+def test_cycles_run_and_figures_are_kept(engine: Engine) -> None:
+    assert engine.run(20) & CYCLE_OK
+    numbers = []
+    for _ in range(20):
+        assert not engine.next() & (CYCLE_NONE | CYCLE_STOPPED)
+        numbers.append(engine.number)
+    assert numbers == sorted(set(numbers))
+    assert engine.al_counter == 2
+    engine.stop()
+    counters = engine.counters
+    assert counters["cycles"] >= 40
+    assert engine.histograms()["period"]["count"] == counters["cycles"] - 1
+    assert engine.scheduling.startswith("SCHED_")
+
+
+def test_a_native_thread_does_not_need_python(link) -> None:
+    engine = Engine(plan("threaded"), link.capsule)
+    engine.start()
+    engine.run(1)
+    before = engine.counters["cycles"]
+    while engine.counters["cycles"] < before + 20:  # this thread does nothing for it
+        pass
+    engine.stop()
+    assert engine.counters["cycles"] - engine.counters["lost"] >= 20
+
+
+def test_a_signal_handler_runs_at_once_and_its_exception_comes_out(engine: Engine) -> None:
+    def handler(number: int, frame: object) -> None:
+        raise InterruptedError("a handler's")
+
+    before = signal.signal(signal.SIGALRM, handler)
+    try:
+        for step in (lambda: engine.run(10**9), lambda: [engine.next() for _ in range(10**9)]):
+            signal.setitimer(signal.ITIMER_REAL, 0.02)
+            with pytest.raises(InterruptedError, match="a handler's"):
+                step()
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    assert engine.run(2) & CYCLE_OK
+
+
+def test_the_lane_and_its_waiting_thread(engine: Engine) -> None:
+    frame = encode_frame([Datagram(Command.BRD, 0x0130 << 16, bytes(2), index=0x91)])
+    answers = []
+
+    def serve() -> None:
+        for _ in range(5):
+            engine.lane_push(frame)
+            while not engine.lane_wait(1_000_000_000):
+                pass
+            answers.append(engine.lane_pop())
+
+    service = threading.Thread(target=serve)
+    service.start()
+    while service.is_alive():
+        engine.next()
+    service.join()
+    assert [decode_frame(a).datagrams[0].working_counter for a in answers] == [2] * 5
+    assert engine.counters["alien"] == engine.counters["stale"] == 0
+
+
+def test_time_is_not_to_be_spent_on_a_real_clock(engine: Engine) -> None:
+    with pytest.raises(RuntimeError, match="by itself"):
+        engine.spend(1)
+
+
+def test_stop_and_start_again(engine: Engine) -> None:
+    for _ in range(3):
+        engine.run(3)
+        engine.stop()
+        done = engine.counters["cycles"]
+        assert engine.number <= done
+        engine.start()
+        assert engine.number <= done
+        assert engine.run(1) & CYCLE_OK
+        assert engine.number > done
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_scheduling_that_was_not_to_be_had_is_said(order: str, link) -> None:
+    policy, cpus = os.sched_getscheduler(0), os.sched_getaffinity(0)
+    engine = Engine(plan(order, cpu=1023, priority=1), link.capsule)
+    engine.start()
+    engine.run(2)
+    text = engine.scheduling
+    engine.stop()
+    assert text.startswith(("SCHED_FIFO 1", "SCHED_OTHER: not permitted (EPERM)"))
+    assert text.endswith("CPU 1023: refused (EINVAL)")
+    assert (os.sched_getscheduler(0), os.sched_getaffinity(0)) == (policy, cpus)
+
+
+def test_the_thread_of_a_failed_link_ends_and_says_why() -> None:
+    b = Bench(plan("threaded", sync_units=()))
+    b.engine.stop()
+    b.link.table.flags = 0  # no virtual time: a native thread, waiting by a Python callback
+    b.link.table.wait_until = type(b.link.table.wait_until)(lambda *_: -100)
+    engine = Engine(b.plan, b.link.capsule)
+    engine.start()
+    with pytest.raises(OSError, match="link") as caught:
+        engine.next()
+    assert caught.value.errno == 100
+    engine.stop()
+
+
+def test_no_new_cycle_in_time_is_said() -> None:
+    b = Bench(plan("threaded", sync_units=()))
+    b.engine.stop()
+    b.link.table.flags = 0
+    gate = threading.Event()
+
+    def blocked(_, deadline, wake_on_frame) -> int:
+        gate.wait()
+        return -100
+
+    b.link.table.wait_until = type(b.link.table.wait_until)(blocked)
+    # the engine's clock must pass, though the link's waits do not
+    b.link.table.now = type(b.link.table.now)(lambda _: count_up(b))
+    engine = Engine(b.plan, b.link.capsule)
+    engine.start()
+    assert engine.next(timeout_ns=5_000_000) & CYCLE_NONE
+    gate.set()
+    engine.stop()
+
+
+def count_up(b: Bench) -> int:
+    b.link.time += 1_000_000
+    return b.link.time
+
+
+def test_a_forgotten_engine_ends_its_thread(link) -> None:
+    engine = Engine(plan("threaded"), link.capsule)
+    before = set(os.listdir("/proc/self/task"))
+    engine.start()
+    assert len(os.listdir("/proc/self/task")) == len(before) + 1
+    del engine
+    assert set(os.listdir("/proc/self/task")) == before
+
+
+def test_axes_without_a_unit_are_refused(link) -> None:
+    with pytest.raises(ValueError, match="sync unit 0 of 0"):
+        Engine(plan("threaded", axes=(axis(0),)), link.capsule)
