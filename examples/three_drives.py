@@ -1,4 +1,4 @@
-"""Three drives follow a sine: `python examples/three_drives.py eth0`, without hardware `virtual`."""
+"""Three drives follow a sine: `python three_drives.py eth0`, or `virtual` without hardware."""
 
 import math
 import sys

@@ -18,5 +18,5 @@ with cat.MainDevice(sys.argv[1] if len(sys.argv) > 1 else "virtual") as main:
                 break
             if cycle.time > 1.0:
                 arm.switch("cst", axes=[0])
-                arm.target.torque[0] = 0.02 - 0.01 * arm.actual.velocity[0]  # [N·m]
+                arm.target.torque[0] = 0.1 - 0.02 * arm.actual.velocity[0]  # [N·m]
         print(f"axis 0 turned to {arm.actual.position[0]:.3f} rad")

@@ -159,8 +159,9 @@ class Drives:
         self._ask(Goal.QUICK_STOP, axes)
 
     def reset_faults(self, axes: Axes = ALL) -> None:
-        """Asks axes in fault to forget it; nothing moves before `enable`."""
-        self._ask(Goal.RESET, axes)
+        """Asks those axes that are in fault to forget it; nothing moves before `enable`."""
+        chosen = set(np.atleast_1d(np.arange(len(self))[axes]).tolist())
+        self._ask(Goal.RESET, sorted(chosen & set(self.faults)))
 
     def switch(self, mode: str, axes: Axes = ALL) -> None:
         """Asks axes to change to `mode`, one of those the Drives were made with."""

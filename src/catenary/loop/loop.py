@@ -84,11 +84,11 @@ class Loop:
             if self._enable:
                 self._running.enable()
             self._running.engine.reset_histograms()
+            return self  # inside: a signal may come at this line too
         except BaseException as error:
             for problem in self._leave():
                 error.add_note(f"on the way down: {problem}")
             raise
-        return self
 
     def __exit__(
         self,

@@ -1,0 +1,94 @@
+"""A drive falls into fault while all move.
+By default that is a DriveError with the drive's own code, and everybody stops.
+An application that wants to go on sees the fault, and nothing of that axis moves before it asks.
+"""
+
+import pytest
+
+import catenary as cat
+from catenary.errors import DriveError
+from catenary.wire.cia402 import State
+from tests.scenario.cell import Cell
+
+OVER_CURRENT = 0x2310
+
+
+def test_a_fault_ends_the_loop_with_the_drives_own_code(cell: Cell) -> None:
+    arm = cell.drives()
+    with pytest.raises(DriveError) as caught, cat.Loop(arm) as loop:
+        home = arm.actual.position.copy()
+        for cycle in loop:
+            arm.target.position[:] = home + 2.0 * cycle.time
+            if cycle.number == 100:
+                cell.servos[1].inject_fault(OVER_CURRENT)
+            assert cycle.number < 120
+    assert "3 CVS001" in str(caught.value)
+    assert "0x2310 (continuous over-current)" in str(caught.value)
+    assert caught.value.log is not None
+    assert len(caught.value.log) > 100  # type: ignore[arg-type]
+    cell.assert_safe()
+
+
+def test_an_application_may_go_on_and_decide_itself(cell: Cell) -> None:
+    arm = cell.drives()
+    faulty = cell.servos[1]
+    with cat.Loop(arm, raise_faults=False) as loop:
+        home = arm.actual.position.copy()
+        for cycle in loop:
+            arm.target.position[:] = home + 0.5 * cycle.time
+            if cycle.number == 100:
+                faulty.inject_fault(OVER_CURRENT)
+            if cycle.number == 200:
+                assert arm.faults == (1,)
+                assert arm.enabled.tolist() == [True, False]
+                stopped = faulty.position_rad
+                faulty.inject_fault(0)  # the cause is gone
+            if cycle.number == 300:
+                assert arm.faults == (1,)  # nobody resets a fault unasked
+                arm.reset_faults()
+            if cycle.number == 400:
+                assert arm.faults == ()
+                assert arm.state == (State.OPERATION_ENABLED, State.SWITCH_ON_DISABLED)
+                arm.enable(1)
+            if cycle.number == 405:
+                assert faulty.position_rad == pytest.approx(stopped, abs=1e-3)
+            if cycle.number == 500:
+                break
+        assert arm.enabled.all()
+    cell.assert_safe()
+
+
+def test_reset_alone_moves_nothing(cell: Cell) -> None:
+    arm = cell.drives()
+    with cat.Loop(arm, raise_faults=False) as loop:
+        for cycle in loop:
+            arm.target.position[:] = 1.0
+            if cycle.number == 0:
+                for servo in cell.servos:
+                    servo.inject_fault(OVER_CURRENT)
+            if cycle.number == 100:
+                for servo in cell.servos:
+                    servo.inject_fault(0)
+                arm.reset_faults()
+                stopped = [servo.position_rad for servo in cell.servos]
+            if cycle.number == 300:
+                break
+        assert set(cell.drive_states) == {"SWITCH ON DISABLED"}
+        assert [servo.position_rad for servo in cell.servos] == pytest.approx(stopped, abs=1e-3)
+
+
+def test_a_drive_that_stays_in_fault_cannot_be_entered_with(cell: Cell) -> None:
+    cell.servos[0].inject_fault(OVER_CURRENT)
+    arm = cell.drives()
+    with pytest.raises(DriveError, match=r"cannot be enabled.*0x2310"), cat.Loop(arm):
+        pytest.fail("entered with a drive in fault")
+    cell.assert_safe()
+
+
+def test_an_old_fault_is_reset_by_entering(cell: Cell) -> None:
+    cell.servos[0].inject_fault(OVER_CURRENT)
+    cell.let_pass(0.1)
+    cell.servos[0].inject_fault(0)
+    arm = cell.drives()
+    with cat.Loop(arm):
+        assert set(cell.drive_states) == {"OPERATION ENABLED"}

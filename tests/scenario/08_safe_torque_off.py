@@ -1,0 +1,48 @@
+"""Somebody opens the guard: STO takes the torque away. Closing it again must move nothing.
+The goal has dropped to disabled; only the application's request brings the axis back.
+"""
+
+import pytest
+
+import catenary as cat
+from catenary.errors import DriveError
+from tests.scenario.cell import OP, Cell
+
+
+def test_nothing_moves_after_sto_until_the_application_asks(cell: Cell) -> None:
+    arm = cell.drives()
+    servo = cell.servos[0]
+    with cat.Loop(arm) as loop:
+        home = arm.actual.position.copy()
+        for cycle in loop:
+            if cycle.number < 100 or cycle.number >= 400:
+                arm.target.position[1] = home[1] + 0.5 * cycle.time
+            if cycle.number == 100:
+                servo.switch_sto(True)
+            if cycle.number == 200:
+                assert not arm.enabled[0]
+                assert arm.faults == ()
+                servo.switch_sto(False)
+                stopped = servo.position_rad
+            if 200 < cycle.number < 400:
+                arm.target.position[0] = home[0] + 10.0
+                assert cell.drive_states[0] != "OPERATION ENABLED"
+                assert servo.position_rad == pytest.approx(stopped, abs=1e-3)
+            if cycle.number == 400:
+                arm.enable(0)
+            if cycle.number == 405:
+                assert servo.position_rad == pytest.approx(stopped, abs=1e-3)
+            if cycle.number == 450:
+                break
+        assert arm.enabled.all()
+        assert cell.states == [OP] * 4
+    cell.assert_safe()
+
+
+def test_without_release_of_sto_entering_says_what_to_look_at(cell: Cell) -> None:
+    cell.servos[1].switch_sto(True)
+    arm = cell.drives()
+    with pytest.raises(DriveError, match="SWITCH_ON_DISABLED") as caught, cat.Loop(arm):
+        pytest.fail("entered without torque")
+    assert "safe torque off" in caught.value.hint
+    cell.assert_safe()

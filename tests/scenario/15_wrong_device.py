@@ -1,0 +1,63 @@
+"""The devices on the cable are not those the program was written for.
+That is refused before SAFE-OP, with what was expected and what was found.
+"""
+
+import pytest
+
+import catenary as cat
+from catenary.errors import CatenaryError, IdentityError, MappingError, SegmentError
+from catenary.virtual import Coupler, DigitalOutputs, Servo
+from catenary.virtual.description import VENDOR_ID
+from tests.scenario.cell import PRE_OP, Cell, cell_of
+
+SERVO = (VENDOR_ID, 0x0005_0001)
+LAMPS = (VENDOR_ID, 0x0002_0004)
+
+
+def test_a_wrong_device_is_refused_with_both_identities(cell: Cell) -> None:
+    with pytest.raises(IdentityError) as caught:
+        cell.main.scan(expected=[None, SERVO, SERVO, SERVO])
+    assert caught.value.position == 1
+    assert f"0x{SERVO[1]:08X}" in str(caught.value)
+    assert f"0x{LAMPS[1]:08X}" in str(caught.value)
+    assert all(state <= PRE_OP for state in cell.states)
+
+
+def test_a_missing_device_is_refused(cell: Cell) -> None:
+    with pytest.raises(SegmentError, match="5 devices expected, 4 found"):
+        cell.main.scan(expected=[None, LAMPS, SERVO, SERVO, SERVO])
+    assert all(state <= PRE_OP for state in cell.states)
+
+
+def test_the_right_devices_are_taken(cell: Cell) -> None:
+    cell.main.scan(expected=[None, LAMPS, SERVO, SERVO])
+    with cat.Loop(cell.drives()):
+        assert set(cell.drive_states) == {"OPERATION ENABLED"}
+
+
+def test_a_terminal_is_no_drive(cell: Cell) -> None:
+    arm = cat.Drives([cell.subs[1]], counts_per_turn=1, rated_torque=1.0)
+    with pytest.raises(CatenaryError) as caught, cat.Loop(arm):
+        pytest.fail("entered with a lamp for a drive")
+    assert "device 1" in str(caught.value)
+    assert all(state <= PRE_OP for state in cell.states)
+
+
+def test_an_object_the_drive_cannot_map_is_named(cell: Cell) -> None:
+    from catenary.drive.objects import AxisObject
+
+    arm = cell.drives(columns=[("heat", AxisObject(0x2FFF, 1, 16))])
+    with pytest.raises(MappingError, match="0x2FFF:01"), cat.Loop(arm):
+        pytest.fail("entered without an object")
+    assert all(state <= PRE_OP for state in cell.states)
+
+
+def test_a_device_exchanged_since_the_scan_is_noticed() -> None:
+    with cell_of(Coupler(), DigitalOutputs(bits=4), Servo()) as cell:
+        arm = cell.drives()
+        with cat.Loop(arm):
+            pass
+        cell.segment.plug(2)  # the servo is gone
+        with pytest.raises(CatenaryError), cat.Loop(arm):
+            pytest.fail("entered without its servo")
+        assert all(state <= PRE_OP for state in cell.states[:2])
