@@ -8,8 +8,8 @@ from catenary.virtual.devices import (
     DigitalOutputs,
     Servo,
 )
-from catenary.virtual.server import Server, serve
 from catenary.virtual.segment import FrameCounters, Segment, demo_segment
+from catenary.virtual.server import Server, serve
 
 __all__ = [
     "AnalogInputs",

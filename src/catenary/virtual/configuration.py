@@ -1,10 +1,10 @@
 """A segment as a TOML file: `[[device]]` tables in the order of the line.
 
-    [[device]]
-    kind = "servo"
-    name = "shoulder"
-    alias = 10
-    counts_per_turn = 1048576
+[[device]]
+kind = "servo"
+name = "shoulder"
+alias = 10
+counts_per_turn = 1048576
 """
 
 from __future__ import annotations

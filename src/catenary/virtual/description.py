@@ -1,4 +1,4 @@
-"""What a virtual device says of itself: the description its SII image and its objects are made of."""
+"""What a virtual device says of itself: its SII image and its objects are made of this."""
 
 from __future__ import annotations
 

@@ -9,7 +9,16 @@ from collections.abc import Sequence
 
 from catenary.virtual.description import VENDOR_ID, Description, Pdo
 
-STRINGS, GENERAL, FMMU, SYNC_MANAGER, TX_PDO, RX_PDO, CLOCK, END = 10, 30, 40, 41, 50, 51, 60, 0xFFFF
+STRINGS, GENERAL, FMMU, SYNC_MANAGER, TX_PDO, RX_PDO, CLOCK, END = (
+    10,
+    30,
+    40,
+    41,
+    50,
+    51,
+    60,
+    0xFFFF,
+)
 COE_PROTOCOL = 0x0004
 HEADER_BYTES = 128
 
@@ -53,7 +62,12 @@ def _header(device: Description, size: int) -> bytes:
         words += bytes(10)
     else:
         words += struct.pack(
-            "<5H", box.receive_offset, box.receive_size, box.send_offset, box.send_size, COE_PROTOCOL
+            "<5H",
+            box.receive_offset,
+            box.receive_size,
+            box.send_offset,
+            box.send_size,
+            COE_PROTOCOL,
         )
     words = words.ljust(124, b"\0")
     return words + struct.pack("<HH", max(size * 8 // 1024 - 1, 0), 1)
@@ -75,7 +89,9 @@ def _pdos(pdos: Sequence[Pdo], strings: _Strings) -> bytes:
     out = b""
     for pdo in pdos:
         count, sync_manager = len(pdo.entries), pdo.sync_manager
-        out += struct.pack("<HBBBBH", pdo.index, count, sync_manager, 0, strings.number(pdo.name), 0)
+        out += struct.pack(
+            "<HBBBBH", pdo.index, count, sync_manager, 0, strings.number(pdo.name), 0
+        )
         for e in pdo.entries:
             name = strings.number(e.name)
             out += struct.pack("<HBBBBH", e.index, e.subindex, name, e.data_type, e.bits, 0)

@@ -130,7 +130,9 @@ class Dictionary:
     def add_variable(self, index: int, entry: Entry) -> None:
         self.add(index, entry.name, {0: entry}, code=VARIABLE)
 
-    def add_record(self, index: int, name: str, entries: list[Entry], *, code: int = RECORD) -> None:
+    def add_record(
+        self, index: int, name: str, entries: list[Entry], *, code: int = RECORD
+    ) -> None:
         """Entries from subindex 1 on; subindex 0 counts them."""
         counted = {0: number("Number of entries", UNSIGNED8, len(entries))}
         self.add(index, name, counted | dict(enumerate(entries, 1)), code=code)

@@ -1,4 +1,4 @@
-"""SDO information services, ETG.1000.6 §5.6.3: the list of objects, object and entry descriptions."""
+"""SDO information services, ETG.1000.6 §5.6.3: object list, object and entry descriptions."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class InformationServer:
         return [_message(ERROR, struct.pack("<I", UNKNOWN_COMMAND))]
 
     def _indices(self, kind: int) -> list[int]:
-        objects = self._dictionary.objects.values()
+        objects = list(self._dictionary.objects.values())
         if kind in (2, 3):
             flag = MAP_RX if kind == 2 else MAP_TX
             objects = [o for o in objects if any(e.access & flag for e in o.entries.values())]

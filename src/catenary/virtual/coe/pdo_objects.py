@@ -65,7 +65,9 @@ class Placed:
 class PdoObjects:
     """Owns which objects are in the process data of a device, and where."""
 
-    def __init__(self, dictionary: Dictionary, rx: Sequence[Pdo], tx: Sequence[Pdo], limit: int) -> None:
+    def __init__(
+        self, dictionary: Dictionary, rx: Sequence[Pdo], tx: Sequence[Pdo], limit: int
+    ) -> None:
         self._dictionary = dictionary
         self._limit_bits = 8 * limit
         self._mappings: dict[int, _Table] = {}
@@ -129,7 +131,9 @@ class PdoObjects:
             )
 
         entries = {
-            0: Entry("Subindex 000", UNSIGNED8, 8, access, lambda: bytes([table.count]), write_count)
+            0: Entry(
+                "Subindex 000", UNSIGNED8, 8, access, lambda: bytes([table.count]), write_count
+            )
         }
         entries |= {place + 1: entry(place) for place in range(len(table.places))}
         self._dictionary.add(index, name, entries, code=RECORD if allowed is None else ARRAY)

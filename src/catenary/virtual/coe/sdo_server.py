@@ -50,7 +50,7 @@ def _aborted(index: int, subindex: int, code: int) -> bytes:
 
 
 class SdoServer:
-    """Owns the one transfer a device has under way. `size` is the mailbox's, its header excluded."""
+    """Owns the one transfer a device has under way. `size`: of the mailbox without its header."""
 
     def __init__(self, dictionary: Dictionary, *, size: int) -> None:
         self._dictionary = dictionary

@@ -87,7 +87,13 @@ class Application:
     """Owns the microcontroller's side of one device."""
 
     def __init__(
-        self, core: Core, position: int, scheduler: Scheduler, description: Description, *, delay_ns: int
+        self,
+        core: Core,
+        position: int,
+        scheduler: Scheduler,
+        description: Description,
+        *,
+        delay_ns: int,
     ) -> None:
         box = description.mailbox
         if box is None:
@@ -124,13 +130,16 @@ class Application:
         record(0x1C00, "Sync manager type", kinds, code=ARRAY)
         blob = bytes(k * 7 & 0xFF for k in range(BLOB_BYTES))
         add(0x2100, constant("Large octet string", OCTET_STRING, blob))
-        add(0x2101, stored("Writable octet string", OCTET_STRING, bytes(BLOB_BYTES), variable_length=True))
+        add(
+            0x2101,
+            stored("Writable octet string", OCTET_STRING, bytes(BLOB_BYTES), variable_length=True),
+        )
         add(0x2102, stored("Scratch word", UNSIGNED16, bytes(2)))
 
     def _error_register(self) -> bytes:
         return b"\x01" if self._core.emergency(self._position) else b"\x00"
 
-    # -- events -----------------------------------------------------------------------------------
+    # -- events --------------------------------------------------------------------------------
 
     def handle(self, events: int) -> None:
         if events & _segment.EVENT_WATCHDOG and self.states.state == OP:
@@ -164,7 +173,7 @@ class Application:
             return self._information.serve(payload[2:])
         return []
 
-    # -- what the mailbox needs ---------------------------------------------------------------------
+    # -- what the mailbox needs ----------------------------------------------------------------
 
     def fetch_request(self) -> bytes | None:
         return self._core.read_buffer(self._position, 0)
@@ -178,7 +187,7 @@ class Application:
     def acknowledge_repeat(self) -> None:
         self._core.acknowledge_repeat(self._position, 1)
 
-    # -- what the state machine needs ---------------------------------------------------------------
+    # -- what the state machine needs ----------------------------------------------------------
 
     def fetch_al_control(self) -> int:
         return self._core.fetch_al_control(self._position)

@@ -71,23 +71,18 @@ class Device:
         """The AL state shown: 1 INIT, 2 PRE-OP, 4 SAFE-OP, 8 OP; bit 4 is the error flag."""
         return self.core.peek(self.position, AL_STATUS, 1)[0] & 0x1F
 
-    @property
-    def frozen(self) -> bool:
-        return self._frozen
-
-    _frozen = False
-
-    @frozen.setter
-    def frozen(self, frozen: bool) -> None:
-        """The application stands still; the controller goes on answering frames."""
-        self._frozen = frozen
+    def freeze(self, frozen: bool = True) -> None:
+        """The device's model stands still; its controller goes on answering frames."""
         self.core.freeze(self.position, frozen)
 
     def count_errors(self, port: int, *, invalid_frames: int = 0, lost_links: int = 0) -> None:
         """What a bad cable would leave in the error counters of one port."""
         if not 0 <= port <= 3:
             raise ValueError(f"a controller has ports 0 to 3, not {port}")
-        for address, number in ((RX_ERRORS + 2 * port, invalid_frames), (LOST_LINKS + port, lost_links)):
+        for address, number in (
+            (RX_ERRORS + 2 * port, invalid_frames),
+            (LOST_LINKS + port, lost_links),
+        ):
             before = self.core.peek(self.position, address, 1)[0]
             self.core.poke(self.position, address, bytes([min(before + number, 255)]))
 

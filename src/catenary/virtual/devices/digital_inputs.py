@@ -27,7 +27,10 @@ class DigitalInputs(Device):
         if not 1 <= bits <= 16:
             raise ValueError(f"digital inputs have 1 to 16 bits, not {bits}")
         super().__init__(
-            name=name or f"Catenary virtual {bits}-channel input", alias=alias, serial=serial, lrw=lrw
+            name=name or f"Catenary virtual {bits}-channel input",
+            alias=alias,
+            serial=serial,
+            lrw=lrw,
         )
         self.bits = bits
         self._inputs = 0

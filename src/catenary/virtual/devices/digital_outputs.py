@@ -29,14 +29,18 @@ class DigitalOutputs(Device):
         if not 1 <= bits <= 16:
             raise ValueError(f"digital outputs have 1 to 16 bits, not {bits}")
         super().__init__(
-            name=name or f"Catenary virtual {bits}-channel output", alias=alias, serial=serial, lrw=lrw
+            name=name or f"Catenary virtual {bits}-channel output",
+            alias=alias,
+            serial=serial,
+            lrw=lrw,
         )
         self.bits = bits
 
     def description(self) -> Description:
         # one SyncManager for each byte, as such terminals have
         managers = tuple(
-            SyncManagerDefault(0x1000 + 16 * k, 1, 0x44, 0x09, 3) for k in range((self.bits + 7) // 8)
+            SyncManagerDefault(0x1000 + 16 * k, 1, 0x44, 0x09, 3)
+            for k in range((self.bits + 7) // 8)
         )
         channels = tuple(
             Pdo(

@@ -130,7 +130,9 @@ class Servo(AppliedDevice):
         self.following_error_turns = following_error_turns
         self.position_limits = position_limits
 
-    def _pdos(self, base: int, default: tuple[int, ...], others: tuple[tuple[int, ...], ...]) -> list[Pdo]:
+    def _pdos(
+        self, base: int, default: tuple[int, ...], others: tuple[tuple[int, ...], ...]
+    ) -> list[Pdo]:
         pdos = []
         sync_manager = 2 if base < 0x1A00 else 3
         kind = "RxPDO" if base < 0x1A00 else "TxPDO"
@@ -194,7 +196,10 @@ class Servo(AppliedDevice):
             (_segment.SLOT_QUICK_STOP_OPTION, 2),
             (_segment.SLOT_DISABLE_OPTION, 1),
             (_segment.SLOT_FAULT_OPTION, 2),
-            (_segment.SLOT_FOLLOWING_WINDOW, round(self.following_error_turns * self.counts_per_turn)),
+            (
+                _segment.SLOT_FOLLOWING_WINDOW,
+                round(self.following_error_turns * self.counts_per_turn),
+            ),
             (_segment.SLOT_FOLLOWING_TIME, 10),
             (_segment.SLOT_LIMIT_MIN, round(low * counts_per_radian)),
             (_segment.SLOT_LIMIT_MAX, round(high * counts_per_radian)),
@@ -215,13 +220,17 @@ class Servo(AppliedDevice):
         base, slots = AXIS_STRIDE * axis, _segment.SLOTS_PER_AXIS * axis
         dictionary = application.dictionary
         for o in OBJECTS:
-            entry = application.slot_entry(o.name, o.data_type, BITS[o.data_type], slots + o.slot, o.access)
+            entry = application.slot_entry(
+                o.name, o.data_type, BITS[o.data_type], slots + o.slot, o.access
+            )
             if o.index == 0x6060:
                 entry = self._checked_mode(entry)
             dictionary.add_variable(o.index + base, entry)
 
         def slot(name: str, data_type: int, number_of_slot: int, access: int) -> Entry:
-            return application.slot_entry(name, data_type, BITS[data_type], slots + number_of_slot, access)
+            return application.slot_entry(
+                name, data_type, BITS[data_type], slots + number_of_slot, access
+            )
 
         limits = [
             slot("Min position limit", 4, _segment.SLOT_LIMIT_MIN, RW),
@@ -229,7 +238,9 @@ class Servo(AppliedDevice):
         ]
         dictionary.add_record(0x607D + base, "Software position limit", limits, code=ARRAY)
         interpolation = [
-            slot("Interpolation time period value", UNSIGNED8, _segment.SLOT_INTERPOLATION_PERIOD, RW),
+            slot(
+                "Interpolation time period value", UNSIGNED8, _segment.SLOT_INTERPOLATION_PERIOD, RW
+            ),
             slot("Interpolation time index", INTEGER8, _segment.SLOT_INTERPOLATION_EXPONENT, RW),
         ]
         dictionary.add_record(0x60C2 + base, "Interpolation time period", interpolation)
@@ -267,7 +278,7 @@ class Servo(AppliedDevice):
             entry.name, entry.data_type, entry.bits, entry.access, entry.read, checked, entry.slot
         )
 
-    # -- what tests look at and turn ----------------------------------------------------------------
+    # -- what tests look at and turn -----------------------------------------------------------
 
     def axis_position(self, axis: int = 0) -> float:
         """The motor's true position [rad]."""

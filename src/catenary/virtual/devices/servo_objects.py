@@ -46,7 +46,9 @@ OBJECTS = (
     AxisObject(0x6041, "Statusword", UNSIGNED16, TX, _segment.SLOT_STATUSWORD),
     AxisObject(0x605A, "Quick stop option code", INTEGER16, RW, _segment.SLOT_QUICK_STOP_OPTION),
     AxisObject(0x605B, "Shutdown option code", INTEGER16, RW, _segment.SLOT_SHUTDOWN_OPTION),
-    AxisObject(0x605C, "Disable operation option code", INTEGER16, RW, _segment.SLOT_DISABLE_OPTION),
+    AxisObject(
+        0x605C, "Disable operation option code", INTEGER16, RW, _segment.SLOT_DISABLE_OPTION
+    ),
     AxisObject(0x605E, "Fault reaction option code", INTEGER16, RW, _segment.SLOT_FAULT_OPTION),
     AxisObject(0x6060, "Modes of operation", INTEGER8, RX, _segment.SLOT_MODE),
     AxisObject(0x6061, "Modes of operation display", INTEGER8, TX, _segment.SLOT_MODE_DISPLAY),
@@ -69,7 +71,9 @@ OBJECTS = (
     AxisObject(0x60B0, "Position offset", INTEGER32, RX, _segment.SLOT_POSITION_OFFSET),
     AxisObject(0x60B1, "Velocity offset", INTEGER32, RX, _segment.SLOT_VELOCITY_OFFSET),
     AxisObject(0x60B2, "Torque offset", INTEGER16, RX, _segment.SLOT_TORQUE_OFFSET),
-    AxisObject(0x60F4, "Following error actual value", INTEGER32, TX, _segment.SLOT_FOLLOWING_ERROR),
+    AxisObject(
+        0x60F4, "Following error actual value", INTEGER32, TX, _segment.SLOT_FOLLOWING_ERROR
+    ),
     AxisObject(0x60FD, "Digital inputs", UNSIGNED32, TX, _segment.SLOT_DIGITAL_INPUTS),
     AxisObject(0x60FF, "Target velocity", INTEGER32, RX, _segment.SLOT_TARGET_VELOCITY),
 )
