@@ -5,6 +5,8 @@ under the GIL.
 
 from cpython.bytes cimport PyBytes_FromStringAndSize
 from cpython.pycapsule cimport PyCapsule_New
+from cpython.exc cimport PyErr_SetInterrupt
+from libc.errno cimport EINTR, EIO
 from libc.stdint cimport int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 from libc.string cimport memcpy
 
@@ -213,13 +215,17 @@ cdef class Core:
         self._segment.event_fd = event_fd
 
     cdef int _run_service(self) noexcept:
+        self._segment.service_due = NEVER
         try:
-            self._segment.service_due = FOREVER
             self._segment.service_due = self._service()
             return 0
+        except KeyboardInterrupt:          # before or after the work: the caller gets it back
+            self._segment.service_due = self._segment.now
+            PyErr_SetInterrupt()
+            return -EINTR
         except BaseException as failure:
             self.failure = failure
-            return -5
+            return -EIO
 
     def raise_failure(self):
         """An exception in the application side, where the caller can see it."""
@@ -238,15 +244,18 @@ cdef class Core:
     def take_events(self):
         """[(position, events)], cleared by being taken."""
         cdef int k
+        cdef uint32_t events
         taken = []
-        lock(self._segment)
-        if self._segment.pending:
-            self._segment.pending = 0
-            for k in range(self.count):
-                if self._segment.controllers[k].events:
-                    taken.append((k, self._segment.controllers[k].events))
-                    self._segment.controllers[k].events = 0
-        unlock(self._segment)
+        if not self._segment.pending:
+            return taken
+        self._segment.pending = 0          # before the look: what comes now raises it again
+        for k in range(self.count):
+            if self._segment.controllers[k].events:
+                lock(self._segment)
+                events = self._segment.controllers[k].events
+                self._segment.controllers[k].events = 0
+                unlock(self._segment)
+                taken.append((k, events))
         return taken
 
     # -- the PDI side ---------------------------------------------------------------------------
@@ -550,7 +559,7 @@ cdef class SegmentLink:
         cdef int result
         with nogil:
             result = line_wait_until(self._core._segment, deadline_ns, wake_on_frame)
-        if result == -4:
+        if result == -EINTR:
             return False                   # a signal came first: Python handles it on return
         return bool(self._check(result))
 

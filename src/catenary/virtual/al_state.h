@@ -32,7 +32,7 @@ static void al_control_written(controller *c) {
         code = c->identification;
     }
     al_show(c, status, code);
-    c->outputs_valid = (status & AL_STATE) == AL_OP;
+    c->outputs_valid = (status & AL_STATE) == AL_OP && !c->watchdog_expired;
 }
 
 #endif

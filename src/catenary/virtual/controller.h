@@ -112,7 +112,7 @@ typedef struct controller {
     sii_access sii;
     dc_clock clock;
     int64_t watchdog_due, pdi_watchdog_due;
-    uint8_t watchdog_armed;
+    uint8_t watchdog_armed, watchdog_expired;
     /* model */
     int model;
     int64_t step_period, step_due;   /* [ns] */
@@ -146,6 +146,7 @@ typedef struct cat_segment {
     int64_t passage;                 /* when the frame in work reaches the first device */
     int64_t busy_until;              /* the wire towards the segment is occupied */
     int64_t next_due;                /* of compiled work */
+    int64_t sii_due;                 /* of the earliest EEPROM access, for the packet loop */
     int64_t service_due;             /* of the application, Python */
     int pending;                     /* some controller has events */
     int event_fd;                    /* wakes the service thread, -1: none */

@@ -55,6 +55,12 @@ class Mailbox:
         self._counter = 0
         self._fetching = False
 
+    def silence(self, silent: bool) -> None:
+        """Requests are taken no longer; or again, with what still waits."""
+        self.silent = silent
+        self.request_written()
+        self._deliver()
+
     def request_written(self) -> None:
         if not self._fetching and not self.silent:
             self._fetching = True

@@ -11,6 +11,17 @@
 
 #include "line.h"
 
+/* EEPROM accesses end before the frame that asks; all other models may be stepped after it. */
+static void finish_sii(cat_segment *s) {
+    s->sii_due = NEVER;
+    for (int n = 0; n < s->count; n++) {
+        controller *c = &s->controllers[n];
+        sii_check(c);
+        if (c->sii.due < s->sii_due)
+            s->sii_due = c->sii.due;
+    }
+}
+
 /* 1: answered or passed over, 0: nothing there, or -errno. */
 static int packet_answer(cat_segment *s, int fd) {
     static __thread uint8_t frame[65536 + 64];
@@ -27,6 +38,10 @@ static int packet_answer(cat_segment *s, int fd) {
     }
     lock(s);
     s->passage = monotonic_now();
+    if (s->passage > s->now)
+        s->now = s->passage;
+    if (s->sii_due <= s->now)
+        finish_sii(s);
     int back = frame_through(s, frame, (uint32_t)length) && s->connected && s->reachable > 0;
     unlock(s);
     if (back && send(fd, frame, (size_t)length, 0) < 0 && errno != ENOBUFS && errno != EAGAIN)

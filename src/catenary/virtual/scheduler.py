@@ -39,6 +39,6 @@ class Scheduler:
         self._clock.wake_at(when)
 
     def run_due(self) -> None:
-        """Runs what is due now; an action taken out is done, even where it is interrupted."""
+        """Runs what is due now."""
         while self._heap and self._heap[0][0] <= self._clock.now:
             heapq.heappop(self._heap)[2]()

@@ -106,7 +106,7 @@ static cat_segment *segment_make(int count, int is_virtual) {
     s->count = s->reachable = count;
     s->is_virtual = is_virtual;
     s->now = s->power_on = is_virtual ? 0 : monotonic_now();
-    s->next_due = s->service_due = NEVER;
+    s->next_due = s->service_due = s->sii_due = NEVER;
     s->event_fd = -1;
     s->connected = 1;
     make_write_mask(s->write_mask);

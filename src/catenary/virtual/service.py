@@ -16,6 +16,7 @@ from catenary.virtual._segment import Core
 from catenary.virtual.devices.device import Device
 from catenary.virtual.scheduler import FOREVER, Scheduler
 
+STOP_SIGNALS = {signal.SIGINT, signal.SIGTERM}
 IDLE_SECONDS = 0.02  # device models are stepped at least this often while no frame comes
 
 
@@ -34,20 +35,18 @@ class Service:
     def run(self) -> int:
         """Everything that is to be done now; returns when the next is due [ns].
 
-        Ctrl-C may strike anywhere in here: the step it cut is taken again, then it is passed on.
+        Signals wait meanwhile: a device does not lose a request because the MainDevice's program
+        was interrupted.
         """
-        interrupted = False
-        while True:
-            try:
-                self._run_once()
-                break
-            except KeyboardInterrupt:
-                interrupted = True
-        if interrupted:
-            signal.raise_signal(signal.SIGINT)
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
+        try:
+            signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
+            self._run_due()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
         return self.scheduler.next_due
 
-    def _run_once(self) -> None:
+    def _run_due(self) -> None:
         while True:
             events = self.core.take_events()
             for position, flags in events:

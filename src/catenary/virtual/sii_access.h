@@ -53,6 +53,8 @@ static inline void sii_start(controller *c, uint16_t command, int64_t time) {
     c->sii.due = c->segment->now + time;
     store16(control, load16(control) | SII_BUSY);
     due_at(c, c->sii.due);
+    if (c->sii.due < c->segment->sii_due)
+        c->segment->sii_due = c->sii.due;
 }
 
 /* The control word was written with `value`: one command at a time, else an error bit. */

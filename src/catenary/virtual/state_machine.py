@@ -67,12 +67,12 @@ class StateMachine:
             return
         self._request += 1
         self.code = 0
-        refusal = self._judge(requested)
-        if refusal:
-            self._later(self.transition_ns, lambda: self.fail(self.state, refusal))
-            return
         delay = self.delays.get(requested, self.transition_ns)
         if delay is None:
+            return
+        refusal = self._judge(requested)
+        if refusal:
+            self._later(delay, lambda: self.fail(self.state, refusal))
             return
         identify = bool(control & IDENTIFICATION)
         self._later(delay, lambda: self._enter(requested, identify))

@@ -14,6 +14,7 @@ static inline void watchdog_trigger(controller *c) {
     int64_t time = watchdog_time(c, REG_WATCHDOG_PROCESS_DATA);
     c->memory[REG_WATCHDOG_STATUS] |= 1;
     c->watchdog_armed = time > 0;
+    c->watchdog_expired = 0;
     c->watchdog_due = time > 0 ? c->segment->now + time : NEVER;
     due_at(c, c->watchdog_due);
     if (c->emulation)
@@ -31,7 +32,7 @@ static inline void watchdog_reconfigured(controller *c) {
     int64_t time = watchdog_time(c, REG_WATCHDOG_PROCESS_DATA);
     if (time == 0) {
         c->memory[REG_WATCHDOG_STATUS] |= 1;
-        c->watchdog_armed = 0;
+        c->watchdog_armed = c->watchdog_expired = 0;
         c->watchdog_due = NEVER;
     } else if (c->watchdog_armed) {
         c->watchdog_due = c->segment->now + time;
@@ -47,6 +48,7 @@ static inline void count_up(uint8_t *counter) {
 static inline void watchdog_check(controller *c) {
     if (c->watchdog_armed && c->watchdog_due <= c->segment->now) {
         c->watchdog_armed = 0;
+        c->watchdog_expired = 1;
         c->watchdog_due = NEVER;
         c->memory[REG_WATCHDOG_STATUS] &= (uint8_t)~1u;
         count_up(c->memory + REG_WATCHDOG_COUNTER_PROCESS_DATA);

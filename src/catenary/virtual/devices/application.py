@@ -142,8 +142,8 @@ class Application:
     # -- events --------------------------------------------------------------------------------
 
     def handle(self, events: int) -> None:
-        if events & _segment.EVENT_WATCHDOG and self.states.state == OP:
-            self.states.fail(SAFE_OP, SYNC_MANAGER_WATCHDOG)
+        if events & _segment.EVENT_WATCHDOG:
+            self._outputs_stayed_away()
         if events & _segment.EVENT_AL_CONTROL:
             self.states.obey()
         if events & _segment.EVENT_OUTPUTS:
@@ -156,6 +156,11 @@ class Application:
             self.mailbox.request_written()
         if events & _segment.EVENT_EMERGENCY:
             self.send_emergency(self._core.emergency(self._position))
+
+    def _outputs_stayed_away(self) -> None:
+        self._core.expect_outputs(self._position)
+        if self.states.state == OP:
+            self.states.fail(SAFE_OP, SYNC_MANAGER_WATCHDOG)
 
     def send_emergency(self, code: int, data: bytes = b"") -> None:
         """An emergency message, ETG.1000.6 §5.6.4; code 0: the error is gone."""
@@ -237,7 +242,7 @@ class Application:
             self._map_process_data()
         if before != state:
             self._gate(mailbox=state >= PRE_OP, process_data=state >= SAFE_OP)
-        if before < SAFE_OP <= state:
+        if before != state == SAFE_OP:
             self._core.expect_outputs(self._position)
             self._core.refresh_inputs(self._position)
         self._core.enable_outputs(self._position, state == OP)

@@ -72,7 +72,7 @@ class AppliedDevice(Device):
     @mailbox_silent.setter
     def mailbox_silent(self, silent: bool) -> None:
         """Requests are taken no longer: SM0 stays full, SM1 empty."""
-        self.application.mailbox.silent = silent
+        self.application.mailbox.silence(silent)
 
     def send_emergency(self, code: int, data: bytes = b"") -> None:
         self.application.send_emergency(code, data)

@@ -9,7 +9,6 @@ from catenary.virtual.description import Description, MappedEntry, Pdo, SyncMana
 from catenary.virtual.devices.device import Device
 
 BOOLEAN = 1
-START = 0x0F00  # where digital outputs of such controllers sit
 
 
 class DigitalOutputs(Device):

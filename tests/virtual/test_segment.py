@@ -1,0 +1,153 @@
+"""The segment as a whole: time, determinism, links, size."""
+
+from __future__ import annotations
+
+import itertools
+import struct
+
+import pytest
+
+from catenary.virtual import Coupler, DigitalOutputs, Segment, Servo, demo_segment
+from catenary.wire.datagram import Command, Datagram
+from catenary.wire.frame import encode_frame
+from tests.virtual.main_device import STATION, MainDevice
+
+BRD = encode_frame([Datagram(Command.BRD, 0, b"\0")])
+
+
+def test_time_stands_still_except_while_waiting() -> None:
+    with demo_segment().open_link() as link:
+        before = link.now()
+        link.send(BRD)
+        assert link.receive() is None
+        assert link.now() == before
+        assert not link.wait_until(before + 5_000_000, False)
+        assert link.now() == before + 5_000_000
+
+
+def test_a_frame_wakes_at_its_arrival() -> None:
+    with demo_segment().open_link() as link:
+        link.send(BRD)
+        assert link.wait_until(10_000_000, True)
+        # 60 + 24 bytes at 100 Mbit/s, six devices there and back
+        assert link.now() == 84 * 80 + 2 * 6 * 600
+        assert link.receive() is not None
+        assert not link.wait_until(10_000_000, True)
+
+
+def test_frames_sent_together_arrive_one_after_the_other() -> None:
+    with demo_segment().open_link() as link:
+        arrivals = []
+        for _ in range(3):
+            link.send(BRD)
+        while link.wait_until(1_000_000, True):
+            arrivals.append(link.now())
+            link.receive()
+        assert [b - a for a, b in itertools.pairwise(arrivals)] == [6720, 6720]
+
+
+def test_a_queue_that_is_full_says_so() -> None:
+    with demo_segment().open_link() as link:
+        for _ in range(256):
+            link.send(BRD)
+        with pytest.raises(OSError, match="refused"):
+            link.send(BRD)
+
+
+def run(steps: int) -> list[bytes]:
+    main = MainDevice(Segment([Servo(), Servo()]))
+    main.number_stations()
+    main.let_pass(30)
+    main.start_servo(STATION, 0)
+    answers = []
+    for k in range(steps):
+        out = struct.pack("<HbiiH", (6, 7, 15)[min(k // 10, 2)], 10, 0, 0, 150)
+        answers.append(main.exchange_logical(Command.LRW, 0, out + bytes(13)).data)
+        if k == 0:
+            main.request(STATION, 8)
+        main.let_pass(1)
+    return answers
+
+
+def test_two_runs_are_the_same_bit_for_bit() -> None:
+    first, second = run(200), run(200)
+    assert first == second
+    assert len(set(first)) > 50
+
+
+def test_one_link_at_a_time() -> None:
+    segment = demo_segment()
+    link = segment.open_link()
+    with pytest.raises(ValueError, match="open link"):
+        segment.open_link()
+    link.close()
+    segment.open_link().close()
+
+
+def test_a_device_stands_in_one_segment() -> None:
+    coupler = Coupler()
+    Segment([coupler])
+    with pytest.raises(ValueError, match="stands in a segment"):
+        Segment([coupler])
+
+
+def test_three_hundred_devices() -> None:
+    segment = Segment([Coupler(), *(Servo() for _ in range(299))])
+    main = MainDevice(segment)
+    assert main.exchange(Command.BRD, 0, 0x0130, bytes(2)).working_counter == 300
+    main.number_stations()
+    assert main.read(STATION + 299, 0x0010, 2) == struct.pack("<H", STATION + 299)
+
+
+def test_an_empty_line_swallows_frames() -> None:
+    with Segment([]).open_link() as link:
+        link.send(BRD)
+        assert not link.wait_until(1_000_000, True)
+
+
+def test_an_exception_in_the_service_reaches_the_caller() -> None:
+    segment = Segment([DigitalOutputs()])
+
+    def fail() -> None:
+        raise RuntimeError("application")
+
+    with segment.open_link() as link:
+        segment.service.scheduler.after(1_000, fail)
+        with pytest.raises(RuntimeError, match="application"):
+            link.wait_until(1_000_000, False)
+
+
+def test_clocks_run_and_latch_with_the_delay_of_the_line() -> None:
+    main = MainDevice(Segment([Coupler(), Coupler(), Coupler()]))
+    main.number_stations()
+    main.exchange(Command.BWR, 0, 0x0900, bytes(4))
+    times = [struct.unpack("<II", main.read(STATION + k, 0x0900, 8)) for k in range(3)]
+    assert times[0][1] - times[0][0] == 2 * 2 * 600
+    assert times[1][0] - times[0][0] == 600
+    assert times[2][1] == 0  # nothing behind the last
+    before = struct.unpack("<Q", main.read(STATION, 0x0910, 8))[0]
+    main.let_pass(1)
+    assert struct.unpack("<Q", main.read(STATION, 0x0910, 8))[0] - before > 1_000_000
+    offset = struct.pack("<Q", 10**15)
+    main.write(STATION, 0x0920, offset)
+    assert struct.unpack("<Q", main.read(STATION, 0x0910, 8))[0] > 10**15
+
+
+def test_a_drifting_clock_is_steered_by_the_reference() -> None:
+    segment = Segment([Coupler(), Coupler()])
+    segment.core.tune_clock(1, 1.00002, 600)
+    main = MainDevice(segment)
+    main.number_stations()
+    main.write(STATION + 1, 0x0928, struct.pack("<I", 600))
+
+    def difference() -> int:
+        [raw] = struct.unpack("<I", main.read(STATION + 1, 0x092C, 4))
+        return -(raw & 0x7FFFFFFF) if raw >> 31 else raw
+
+    main.let_pass(100)
+    main.exchange(Command.FRMW, STATION, 0x0910, bytes(8))
+    assert difference() != 0
+    for _ in range(5000):
+        main.exchange(Command.FRMW, STATION, 0x0910, bytes(8))
+        main.let_pass(1)
+    assert abs(difference()) < 100
