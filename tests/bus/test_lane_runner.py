@@ -90,13 +90,13 @@ def test_many_procedures_share_the_frame_of_a_cycle() -> None:
         assert all(datagram.index >= 0x80 for datagram in decode_frame(frame).datagrams)
 
 
-def test_procedures_of_one_lane_take_turns() -> None:
+def test_conversations_with_one_mailbox_take_turns() -> None:
     with MainDevice(demo_segment()) as main:
         drive = main.scan()[2]
         lane = Lane(main.link)
         runner = LaneRunner(lane)
         places = [(0x1000, 0), (0x1018, 1), (0x1018, 2), (0x5FFF, 0), (0x1008, 0)]
-        tasks = [runner.submit(upload(drive.channel, *place), lane=2) for place in places]
+        tasks = [runner.submit(upload(drive.channel, *place)) for place in places]
         settle(lane, runner)
         assert tasks[1].result() == UDINT.encode(drive.identity.vendor)
         assert tasks[2].result() == UDINT.encode(drive.identity.product)

@@ -59,7 +59,6 @@ class _UnderWay:
 @dataclass(slots=True, eq=False)
 class _Waiting:
     task: Task[Any]
-    lane: int | None
     finished: threading.Event = field(default_factory=threading.Event)
 
 
@@ -82,14 +81,13 @@ class LaneRunner:
         self._outbox: deque[_Item] = deque()
         self._under_way: dict[int, _UnderWay] = {}
 
-    def submit(self, procedure: Procedure[T], *, lane: int | None = None) -> Task[T]:
-        """Lets a procedure begin at the next step; `task.done` and `task.result()` tell the rest.
-        Procedures of the same `lane` run one after another."""
+    def submit(self, procedure: Procedure[T]) -> Task[T]:
+        """Lets a procedure begin at the next step; `task.done` and `task.result()` tell the rest."""
         task = Task(procedure)
-        self._submit(_Waiting(task, lane))
+        self._submit(_Waiting(task))
         return task
 
-    def run(self, procedure: Procedure[T], *, lane: int | None = None) -> T:
+    def run(self, procedure: Procedure[T]) -> T:
         """Waits for the result, in another thread than the loop's. RuntimeError in the loop's
         own: it would wait for itself."""
         if threading.get_ident() == self._owner:
@@ -98,7 +96,7 @@ class LaneRunner:
                 "a blocking call inside the loop's own thread would stop the loop: "
                 "make it from another thread, or before the loop"
             )
-        waiting = _Waiting(Task(procedure), lane)
+        waiting = _Waiting(Task(procedure))
         self._submit(waiting)
         waiting.finished.wait()  # the procedure's own deadlines, or close(), end this
         result: T = waiting.task.result()
@@ -173,20 +171,12 @@ class LaneRunner:
             self._enqueue(turn.task)
 
     def _begin(self, now: int) -> None:
-        busy = {waiting.lane for waiting in self._active if waiting.lane is not None}
         with self._lock:
-            queue, self._submitted = self._submitted, deque()
-            for waiting in queue:
-                if waiting.lane in busy:
-                    self._submitted.append(waiting)
-                    continue
-                if waiting.lane is not None:
-                    busy.add(waiting.lane)
-                self._active.append(waiting)
-        for waiting in self._active:
-            if not waiting.task.started:
-                waiting.task.start(now)
-                self._enqueue(waiting.task)
+            begun, self._submitted = self._submitted, deque()
+            self._active.extend(begun)
+        for waiting in begun:
+            waiting.task.start(now)
+            self._enqueue(waiting.task)
 
     def _wake(self, now: int) -> None:
         for waiting in self._active:

@@ -180,10 +180,10 @@ class MainDevice:
         self._bring_down(State.SAFE_OP, timeout)
         self._bring_down(State.PRE_OP, timeout)
 
-    def converse(self, procedure: Procedure[T], *, lane: int | None = None) -> T:
-        """Runs a procedure, alone or beside the running loop. Those of one lane take turns."""
+    def converse(self, procedure: Procedure[T]) -> T:
+        """Runs a procedure, alone or beside the running loop."""
         runner: Runner = self._attached or self._runner
-        return runner.run(procedure, lane=lane)
+        return runner.run(procedure)
 
     @contextlib.contextmanager
     def attached(self, runner: Runner) -> Iterator[None]:

@@ -28,9 +28,9 @@ WINDOW = 16  # frames under way at once: less than any receive ring holds
 
 
 class Runner(Protocol):
-    """Runs procedures to their end. `lane`: those of one lane never run at the same time."""
+    """Runs a procedure to its end."""
 
-    def run(self, procedure: Procedure[T], *, lane: int | None = None) -> T: ...
+    def run(self, procedure: Procedure[T]) -> T: ...
 
 
 @dataclass(slots=True)
@@ -58,7 +58,8 @@ class BlockingRunner:
         self._indices = indices()
         self._lock = threading.Lock()
 
-    def run(self, procedure: Procedure[T], *, lane: int | None = None) -> T:
+    def run(self, procedure: Procedure[T]) -> T:
+        """Runs one to its end."""
         return self.run_all([procedure])[0]
 
     def run_all(self, procedures: Sequence[Procedure[T]]) -> list[T]:

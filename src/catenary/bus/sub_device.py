@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, TypeVar, overload
 from catenary.errors import MailboxError
 from catenary.model.device import DeviceDescription, Identity
 from catenary.procedure.al_state import DeviceState, read_state
-from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.sdo import download, upload
 from catenary.procedure.station import Station
@@ -71,13 +70,9 @@ class SubDevice:
 
     def read_state(self) -> DeviceState:
         """Asks for its EtherCAT state."""
-        found = self.converse(read_state(self.station))
+        found = self.main.converse(read_state(self.station))
         self.state = found.state
         return found
-
-    def converse(self, procedure: Procedure[T]) -> T:
-        """Runs a conversation with this device; one at a time."""
-        return self.main.converse(procedure, lane=self.description.station_address)
 
     def __repr__(self) -> str:
         return f"<SubDevice {self.position} {self.name!r} {self.state or 'state unknown'}>"
@@ -96,7 +91,7 @@ class Sdo:
     def read(self, index: int, subindex: int = 0, *, type: DataType[T] | None = None) -> T | bytes:
         """Reads an object: bytes, or with a `type` its value. SdoAbort if the device refuses."""
         channel = self._usable(index, subindex)
-        data = self._sub.converse(upload(channel, index, subindex))
+        data = self._sub.main.converse(upload(channel, index, subindex))
         return data if type is None else type.decode(data)
 
     @overload
@@ -111,7 +106,7 @@ class Sdo:
         data = value if type is None else type.encode(value)  # type: ignore[arg-type]
         if not isinstance(data, bytes):
             raise TypeError(f"give a type for {value!r}, or bytes: type=catenary.types.UDINT")
-        self._sub.converse(download(channel, index, subindex, data))
+        self._sub.main.converse(download(channel, index, subindex, data))
 
     def _usable(self, index: int, subindex: int) -> MailboxChannel:
         if not 0 <= index <= 0xFFFF or not 0 <= subindex <= 0xFF:

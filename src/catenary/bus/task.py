@@ -16,14 +16,12 @@ class Task(Generic[T]):
         self._procedure = procedure
         self.requests: list[Request] = []  # of this step; empty: none to send
         self.wake_ns: int | None = None  # sleeping until then
-        self.started = False
         self.done = False
         self.error: BaseException | None = None
         self._result: T | None = None
 
     def start(self, now_ns: int) -> None:
         """Runs to the first step."""
-        self.started = True
         self._advance(None, now_ns)
 
     def resume(self, replies: list[Reply], now_ns: int) -> None:

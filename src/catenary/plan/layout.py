@@ -16,15 +16,12 @@ from dataclasses import dataclass
 
 from catenary.errors import ConfigurationError, MappingError
 from catenary.model.device import Assignment, DeviceDescription, Direction
-from catenary.plan.cycle import Number, NumberKind
+from catenary.plan.cycle import Number
+from catenary.plan.numbers import numbers
 
 LOGICAL_BASE = 0x0001_0000
 LOGICAL_STRIDE = 0x0000_0800  # units start at multiples: no two share an FMMU's range
 UNIT_MAX = 1472  # bytes of a unit: a frame's 1486 less the 14 of the AL status datagram
-
-_SIGNED_TYPES = {0x0002, 0x0003, 0x0004, 0x0010, 0x0012, 0x0013, 0x0014, 0x0015}
-_REAL_TYPES = {0x0008, 0x0011}
-
 
 @dataclass(frozen=True, slots=True)
 class SyncManagerPlan:
@@ -88,6 +85,10 @@ class DeviceData:
     inputs: tuple[Assignment, ...]
 
     @property
+    def position(self) -> int:
+        return self.description.position
+
+    @property
     def output_size(self) -> int:
         return sum(assignment.byte_length for assignment in self.outputs)
 
@@ -108,13 +109,14 @@ class Layout:
     devices: tuple[DeviceLayout, ...]
     output_size: int
     input_size: int
-    numbers: Mapping[tuple[Direction, int, int, int], Number]
+    outputs: tuple[Mapping[tuple[int, int], Number], ...]  # by position, then index, subindex
+    inputs: tuple[Mapping[tuple[int, int], Number], ...]
 
     def output(self, device: int, index: int, subindex: int) -> Number | None:
-        return self.numbers.get((Direction.OUTPUT, device, index, subindex))
+        return self.outputs[device].get((index, subindex))
 
     def input(self, device: int, index: int, subindex: int) -> Number | None:
-        return self.numbers.get((Direction.INPUT, device, index, subindex))
+        return self.inputs[device].get((index, subindex))
 
     def sync_unit(self, device: int) -> int:
         return self.devices[device].sync_unit
@@ -136,13 +138,17 @@ def make_layout(devices: Sequence[DeviceData], *, optional: Collection[int] = ()
         span = unit.output_size + unit.input_size
         logical_start += -(-span // LOGICAL_STRIDE) * LOGICAL_STRIDE
     ordered = tuple(
-        places.get(
-            data.description.position,
-            DeviceLayout(data.description.position, -1, 0, 0, 0, 0),
-        )
-        for data in devices
+        places.get(data.position, DeviceLayout(data.position, -1, 0, 0, 0, 0)) for data in devices
     )
-    return Layout(tuple(units), ordered, output_offset, input_offset, _numbers(devices, ordered))
+    both = tuple(zip(devices, ordered, strict=True))
+    return Layout(
+        tuple(units),
+        ordered,
+        output_offset,
+        input_offset,
+        tuple(numbers(data.outputs, place.output_offset) for data, place in both),
+        tuple(numbers(data.inputs, place.input_offset) for data, place in both),
+    )
 
 
 def _grouped(devices: Sequence[DeviceData], optional: Collection[int]) -> list[list[DeviceData]]:
@@ -158,7 +164,7 @@ def _grouped(devices: Sequence[DeviceData], optional: Collection[int]) -> list[l
                 f"of {UNIT_MAX} bytes",
                 hint="map fewer objects",
             )
-        if data.description.position in optional:
+        if data.position in optional:
             groups.append([data])
             continue
         kind = data.description.controller.supports_lrw
@@ -182,7 +188,7 @@ def _unit(
     output_offset: int,
     input_offset: int,
 ) -> UnitLayout:
-    positions = tuple(data.description.position for data in members)
+    positions = tuple(data.position for data in members)
     first, last = positions[0], positions[-1]
     name = f"device {first}" if first == last else f"devices {first} to {last}"
     return UnitLayout(
@@ -212,8 +218,8 @@ def _places(
         )
         outputs_at = unit.logical_start + output_offset
         inputs_at = unit.logical_start + unit.output_size + input_offset
-        places[data.description.position] = DeviceLayout(
-            position=data.description.position,
+        places[data.position] = DeviceLayout(
+            position=data.position,
             sync_unit=number,
             output_offset=unit.output_offset + output_offset,
             output_size=data.output_size,
@@ -290,33 +296,3 @@ def _fmmus(
             hint="map fewer SyncManagers",
         )
     return tuple(plans)
-
-
-def _numbers(
-    devices: Sequence[DeviceData], places: Sequence[DeviceLayout]
-) -> dict[tuple[Direction, int, int, int], Number]:
-    numbers: dict[tuple[Direction, int, int, int], Number] = {}
-    for data, place in zip(devices, places, strict=True):
-        sides = (
-            (Direction.OUTPUT, data.outputs, place.output_offset),
-            (Direction.INPUT, data.inputs, place.input_offset),
-        )
-        for direction, assignments, offset in sides:
-            for assignment in assignments:
-                bit = offset * 8
-                for pdo in assignment.pdos:
-                    for entry in pdo.entries:
-                        key = (direction, place.position, entry.index, entry.subindex)
-                        if entry.index:
-                            kind = number_kind(entry.data_type)
-                            numbers.setdefault(key, Number(bit, entry.bit_length, kind))
-                        bit += entry.bit_length
-                offset += assignment.byte_length
-    return numbers
-
-
-def number_kind(data_type: int) -> NumberKind:
-    """How an object of this data type is read (ETG.1000.6 table 64)."""
-    if data_type in _SIGNED_TYPES:
-        return NumberKind.SIGNED
-    return NumberKind.REAL if data_type in _REAL_TYPES else NumberKind.UNSIGNED

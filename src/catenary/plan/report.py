@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import groupby
 
 from catenary.model.device import Assignment, Direction
 from catenary.plan.cycle import CyclePlan, DatagramPlan
 from catenary.plan.layout import Layout
+from catenary.plan.numbers import entry_places
 from catenary.plan.start_up import DevicePlan
 from catenary.wire.datagram import Command
 
@@ -51,16 +53,14 @@ def _devices(devices: Sequence[DevicePlan]) -> Iterator[str]:
             yield f"    {len(device.downloads)} SDO downloads before SAFE-OP"
 
 
-def _entries(direction: Direction, assignments: Sequence[Assignment], offset: int) -> Iterator[str]:
-    for assignment in assignments:
-        bit = offset * 8
-        for pdo in assignment.pdos:
-            yield f"    PDO 0x{pdo.index:04X} {_ARROW[direction]}  {pdo.name}".rstrip()
-            for entry in pdo.entries:
-                what = str(entry) if entry.index else f"gap ({entry.bit_length} bits)"
-                yield f"        {bit // 8:>5}.{bit % 8}  {what}"
-                bit += entry.bit_length
-        offset += assignment.byte_length
+def _entries(
+    direction: Direction, assignments: Sequence[Assignment], offset: int
+) -> Iterator[str]:
+    for pdo, places in groupby(entry_places(assignments, offset), key=lambda place: place.pdo):
+        yield f"    PDO 0x{pdo.index:04X} {_ARROW[direction]}  {pdo.name}".rstrip()
+        for _, entry, bit in places:
+            what = str(entry) if entry.index else f"gap ({entry.bit_length} bits)"
+            yield f"        {bit // 8:>5}.{bit % 8}  {what}"
 
 
 def _frames(cycle: CyclePlan) -> Iterator[str]:

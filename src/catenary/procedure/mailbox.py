@@ -1,6 +1,6 @@
 """The mailbox of one SubDevice, ETG.1000.4 §5.6 and §6.7, ETG.1000.6 §5.1.
 
-One message is outstanding at a time. What the network loses is recovered by the standard's own
+One message is outstanding at a time, and whole transfers take turns (`exclusively`). What the network loses is recovered by the standard's own
 means, never by blindly sending the datagram again, which jams mailboxes (SOEM#684):
 
 - A lost read: toggle the repeat request of SyncManager 1, wait for the acknowledge, read again.
@@ -46,6 +46,7 @@ OUT, IN = 0, 1  # SyncManagers of the mailbox, by the standard
 WRITE_TIMEOUT = 1.0  # [s] until the device has emptied its mailbox
 READ_TIMEOUT = 2.0  # [s] until it answers; AKDs take their time over 0x1010
 REPEAT_TIMEOUT = 0.2  # [s] until it acknowledges a repeat request
+TURN = 0.5e-3  # [s] between two looks whether the mailbox is free
 GRACE = 0.1  # [s] for an answer to a message whose frame was lost
 RECOVERIES = 5  # of one message, then the cable is to blame
 EMERGENCIES_KEPT = 64
@@ -64,11 +65,24 @@ class MailboxChannel:
         default_factory=lambda: deque(maxlen=EMERGENCIES_KEPT)
     )
     dropped: int = 0  # messages nobody waited for, duplicates
+    busy: bool = False  # a conversation holds it
 
     def reset(self) -> None:
         """After the SyncManagers were configured anew."""
         self.counter = self.received_counter = 0
         self.repeat_requested = False
+
+
+def exclusively(channel: MailboxChannel, conversation: Procedure[T]) -> Procedure[T]:
+    """The conversation, once nobody else talks to this device: whoever runs it, transfers never
+    mix. The wait ends, because every conversation does."""
+    while channel.busy:
+        yield after(TURN)
+    channel.busy = True
+    try:
+        return (yield from conversation)
+    finally:
+        channel.busy = False
 
 
 def converse(

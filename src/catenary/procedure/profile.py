@@ -11,7 +11,7 @@ from dataclasses import replace
 from catenary.errors import SdoAbort
 from catenary.model.device import DeviceDescription, ObjectInformation
 from catenary.procedure.exchange import Procedure
-from catenary.procedure.mailbox import MailboxChannel, converse
+from catenary.procedure.mailbox import MailboxChannel, converse, exclusively
 from catenary.procedure.sdo import upload
 from catenary.wire.coe import decode_coe
 from catenary.wire.mailbox import Mailbox, Type
@@ -75,7 +75,8 @@ def _describe(
         return message if isinstance(message, SdoInformation) else None
 
     request = entry_request(index, subindex)
-    answer = yield from converse(channel, Type.COE, request.encode(), accept)
+    talk = converse(channel, Type.COE, request.encode(), accept)
+    answer = yield from exclusively(channel, talk)
     if answer.opcode is not Opcode.ENTRY_RESPONSE:
         return None
     entry = decode_entry_description(answer.data)

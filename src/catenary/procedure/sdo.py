@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from catenary.errors import DecodeError, MailboxError, SdoAbort
 from catenary.procedure.exchange import Procedure
-from catenary.procedure.mailbox import MailboxChannel, converse, tell
+from catenary.procedure.mailbox import MailboxChannel, converse, exclusively, tell
 from catenary.wire.abort import abort_code
 from catenary.wire.coe import (
     EXPEDITED_MAXIMUM,
@@ -39,6 +39,12 @@ def upload(
     channel: MailboxChannel, index: int, subindex: int, *, complete_access: bool = False
 ) -> Procedure[bytes]:
     """Reads one object. SdoAbort if the device refuses."""
+    return exclusively(channel, _upload(channel, index, subindex, complete_access))
+
+
+def _upload(
+    channel: MailboxChannel, index: int, subindex: int, complete_access: bool
+) -> Procedure[bytes]:
     first = yield from _ask(
         channel,
         UploadRequest(index, subindex, complete_access),
@@ -72,6 +78,12 @@ def download(
     complete_access: bool = False,
 ) -> Procedure[None]:
     """Writes one object. SdoAbort if the device refuses."""
+    return exclusively(channel, _download(channel, index, subindex, data, complete_access))
+
+
+def _download(
+    channel: MailboxChannel, index: int, subindex: int, data: bytes, complete_access: bool
+) -> Procedure[None]:
     room = channel.layout.receive_size - INITIATE_OVERHEAD
     expedited = 0 < len(data) <= EXPEDITED_MAXIMUM and not complete_access
     sent = len(data) if expedited else min(len(data), room)
