@@ -23,6 +23,7 @@ LOGICAL_BASE = 0x0001_0000
 LOGICAL_STRIDE = 0x0000_0800  # units start at multiples: no two share an FMMU's range
 UNIT_MAX = 1472  # bytes of a unit: a frame's 1486 less the 14 of the AL status datagram
 
+
 @dataclass(frozen=True, slots=True)
 class SyncManagerPlan:
     """One SyncManager of process data as it will be written."""

@@ -53,9 +53,7 @@ def _devices(devices: Sequence[DevicePlan]) -> Iterator[str]:
             yield f"    {len(device.downloads)} SDO downloads before SAFE-OP"
 
 
-def _entries(
-    direction: Direction, assignments: Sequence[Assignment], offset: int
-) -> Iterator[str]:
+def _entries(direction: Direction, assignments: Sequence[Assignment], offset: int) -> Iterator[str]:
     for pdo, places in groupby(entry_places(assignments, offset), key=lambda place: place.pdo):
         yield f"    PDO 0x{pdo.index:04X} {_ARROW[direction]}  {pdo.name}".rstrip()
         for _, entry, bit in places:
