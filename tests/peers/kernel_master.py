@@ -176,7 +176,7 @@ class KernelMaster:
 
     @property
     def app_time(self) -> int:
-        return APP_EPOCH + self.link.now() - self.start_ns
+        return APP_EPOCH + int(self.link.now()) - self.start_ns
 
     # -- frames (master.c: ec_master_send_datagrams, ec_master_receive_datagrams)
 
