@@ -82,7 +82,7 @@ class LaneRunner:
         self._under_way: dict[int, _UnderWay] = {}
 
     def submit(self, procedure: Procedure[T]) -> Task[T]:
-        """Lets a procedure begin at the next step; `task.done` and `task.result()` tell the rest."""
+        """Lets a procedure begin at the next step; `task.done`, `task.result()` tell the rest."""
         task = Task(procedure)
         self._submit(_Waiting(task))
         return task

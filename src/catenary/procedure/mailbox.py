@@ -1,7 +1,8 @@
 """The mailbox of one SubDevice, ETG.1000.4 §5.6 and §6.7, ETG.1000.6 §5.1.
 
-One message is outstanding at a time, and whole transfers take turns (`exclusively`). What the network loses is recovered by the standard's own
-means, never by blindly sending the datagram again, which jams mailboxes (SOEM#684):
+One message is outstanding at a time, and whole transfers take turns (`exclusively`). What the
+network loses is recovered by the standard's own means, never by blindly sending the datagram again,
+which jams mailboxes (SOEM#684):
 
 - A lost read: toggle the repeat request of SyncManager 1, wait for the acknowledge, read again.
 - A lost write: nobody knows whether it arrived. An answer within a grace says that it did; else
