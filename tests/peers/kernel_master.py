@@ -164,7 +164,7 @@ class KernelMaster:
 
     def __init__(self, segment: Segment) -> None:
         self.link = segment.open_link()
-        self.start_ns = self.link.now()
+        self.start_ns: int = self.link.now()
         self.domains: list[Domain] = []
         self.clock: Slave | None = None  # reference clock
         self.slaves: list[Slave] = []
@@ -176,7 +176,8 @@ class KernelMaster:
 
     @property
     def app_time(self) -> int:
-        return APP_EPOCH + int(self.link.now()) - self.start_ns
+        now: int = self.link.now()
+        return APP_EPOCH + now - self.start_ns
 
     # -- frames (master.c: ec_master_send_datagrams, ec_master_receive_datagrams)
 
