@@ -1,6 +1,13 @@
 """The compiled cyclic core: frames, axes, hand-over, cycle, thread. It knows bytes, arrays and the
 tables of a CyclePlan, read by attribute; it imports nothing of catenary."""
 
+from catenary.core._axes import (
+    AXIS_DROPPED,
+    AXIS_FALLBACK,
+    AXIS_FOLLOWED,
+    AXIS_LIMITED,
+    AXIS_REFUSED,
+)
 from catenary.core._cia402 import (
     GOAL_DISABLED,
     GOAL_ENABLED,
@@ -9,12 +16,7 @@ from catenary.core._cia402 import (
     controlword_towards,
     state_of,
 )
-from catenary.core._engine import (
-    AXIS_DROPPED,
-    AXIS_FALLBACK,
-    AXIS_FOLLOWED,
-    AXIS_LIMITED,
-    AXIS_REFUSED,
+from catenary.core._cycle import (
     CYCLE_DROPPED,
     CYCLE_LATE,
     CYCLE_LAW_DONE,
@@ -26,8 +28,8 @@ from catenary.core._engine import (
     CYCLE_UNCOMMITTED,
     CYCLE_WORKING_COUNTER,
     RECORD_FIELDS,
-    Engine,
 )
+from catenary.core._engine import Engine
 
 __all__ = [
     "AXIS_DROPPED",

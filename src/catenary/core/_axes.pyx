@@ -35,6 +35,12 @@ from catenary.core._numbers cimport (
     number_value,
 )
 
+AXIS_FOLLOWED = FOLLOWED
+AXIS_LIMITED = LIMITED
+AXIS_DROPPED = DROPPED
+AXIS_REFUSED = REFUSED
+AXIS_FALLBACK = FALLBACK
+
 cdef double STANDSTILL_RATIO = 0.01    # of the velocity limit
 cdef double STANDSTILL = 0.05          # [rad/s] where there is no limit
 STILL_NS = 5_000_000                   # at rest for so long: stopped
@@ -59,7 +65,8 @@ cdef void read_position(axis_t *a, const uint8_t *inputs, double period) noexcep
         a.last_raw = raw
         a.position = a.counts * n.scale + n.offset
     if not a.actual_velocity.present:
-        a.velocity = (a.position - before) / period if a.known else 0.0
+        # over the cycles since it was read last
+        a.velocity = (a.position - before) / (period * (a.invalid_in_row + 1)) if a.known else 0.0
 
 
 cdef void read_axis(axes_t *x, axis_t *a) noexcept nogil:

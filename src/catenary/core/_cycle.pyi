@@ -1,1 +1,24 @@
-"""One cycle in its three orders; used by the compiled modules only."""
+"""One cycle in its three orders: its flags, phases and records."""
+
+from typing import Final
+
+# Flags that `next` and `run` return, and that `flags` keeps.
+CYCLE_OK: Final[int]  # every needed sync unit answered in this cycle
+CYCLE_LATE: Final[int]  # instants were skipped before this cycle (or Python missed cycles)
+CYCLE_LIMITED: Final[int]  # the set-points sent last were limited on some axis
+CYCLE_WORKING_COUNTER: Final[int]  # lost_limit cycles in a row were not ok: time to raise
+CYCLE_DROPPED: Final[int]  # some axis' goal dropped to disabled in this cycle
+CYCLE_REFUSED: Final[int]  # some target was NaN or infinite: the axis held instead
+CYCLE_UNCOMMITTED: Final[int]  # threaded: no new targets were there at this instant
+CYCLE_LAW_DONE: Final[int]  # the law returned "finished"
+CYCLE_STOPPED: Final[int]  # the native thread has ended (stop, or an error of the link)
+CYCLE_NONE: Final[int]  # timeout_ns passed without a new cycle: actual is unchanged
+
+ORDERS: Final[dict[str, int]]
+PHASE_NAMES: Final[dict[str, int]]  # in the order of a report
+RECORD_FIELDS: Final[list[tuple[str, str]]]
+"""The fields of one record of `log()`, for `numpy.dtype(RECORD_FIELDS)`; no padding.
+
+number u8 · scheduled_ns, wake_ns i8 (the link's clock) · period_ns, lateness_ns, receive_ns,
+process_ns, send_ns, tail_ns, round_trip_ns i4 · flags u4 · lost_in_row, skipped u4 ·
+missing_frames, al_counter u2 · al_status u1 ..."""

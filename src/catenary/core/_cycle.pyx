@@ -24,6 +24,48 @@ from catenary.core._histogram cimport histogram_add
 from catenary.core._lane cimport lane_send
 from catenary.core._native cimport cat_law_frame
 
+CYCLE_OK = OK
+CYCLE_LATE = LATE
+CYCLE_LIMITED = LIMITED_SOME
+CYCLE_WORKING_COUNTER = WORKING_COUNTER
+CYCLE_DROPPED = DROPPED_SOME
+CYCLE_REFUSED = REFUSED_SOME
+CYCLE_UNCOMMITTED = UNCOMMITTED
+CYCLE_LAW_DONE = LAW_DONE
+CYCLE_STOPPED = STOPPED
+CYCLE_NONE = NONE
+
+ORDERS = {"threaded": THREADED, "inline": INLINE, "law": LAW}
+PHASE_NAMES = {
+    "period": PERIOD,
+    "lateness": LATENESS,
+    "receive": RECEIVE,
+    "process": PROCESS,
+    "send": SEND,
+    "tail": TAIL,
+    "round_trip": ROUND_TRIP,
+    "in_controller": IN_CONTROLLER,
+}
+RECORD_FIELDS = [
+    ("number", "<u8"),
+    ("scheduled_ns", "<i8"),
+    ("wake_ns", "<i8"),
+    ("period_ns", "<i4"),
+    ("lateness_ns", "<i4"),
+    ("receive_ns", "<i4"),
+    ("process_ns", "<i4"),
+    ("send_ns", "<i4"),
+    ("tail_ns", "<i4"),
+    ("round_trip_ns", "<i4"),
+    ("flags", "<u4"),
+    ("lost_in_row", "<u4"),
+    ("skipped", "<u4"),
+    ("missing_frames", "<u2"),
+    ("al_counter", "<u2"),
+    ("al_status", "u1"),
+    ("reserved", "3u1"),
+]
+
 
 cdef inline int64_t now(const cycle_t *c) noexcept nogil:
     return c.link.now(c.link.self)

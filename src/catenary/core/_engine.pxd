@@ -4,6 +4,7 @@ from catenary.core._axes cimport Axes
 from catenary.core._cycle cimport cycle_t
 from catenary.core._frames cimport Frames
 from catenary.core._handover cimport Handover, handover_t
+from catenary.core._histogram cimport histogram_t
 from catenary.core._lane cimport Lane
 from catenary.core._thread cimport cat_scheduling, thread_t
 
@@ -24,6 +25,7 @@ cdef class Engine:
     cdef dict _buffers
     cdef cat_scheduling scheduling_before
     cdef bint saved_scheduling
+    cdef histogram_t *spare_histograms
     cdef bint virtual          # the link's time is virtual: everything in the caller's thread
     cdef bint native           # the cycle runs in its own thread
     cdef bint running

@@ -1,34 +1,5 @@
 """Engine: owns everything a cyclic exchange needs, and is the only way in from Python."""
 
-from typing import Final
-
-# Flags that `next` and `run` return, and that `flags` keeps.
-CYCLE_OK: Final[int]  # every needed sync unit answered in this cycle
-CYCLE_LATE: Final[int]  # instants were skipped before this cycle (or Python missed cycles)
-CYCLE_LIMITED: Final[int]  # the set-points sent last were limited on some axis
-CYCLE_WORKING_COUNTER: Final[int]  # lost_limit cycles in a row were not ok: time to raise
-CYCLE_DROPPED: Final[int]  # some axis' goal dropped to disabled in this cycle
-CYCLE_REFUSED: Final[int]  # some target was NaN or infinite: the axis held instead
-CYCLE_UNCOMMITTED: Final[int]  # threaded: no new targets were there at this instant
-CYCLE_LAW_DONE: Final[int]  # the law returned "finished"
-CYCLE_STOPPED: Final[int]  # the native thread has ended (stop, or an error of the link)
-CYCLE_NONE: Final[int]  # timeout_ns passed without a new cycle: actual is unchanged
-
-# Bits of axis_flags; bits 6 and 7 hold the goal in force (0 disabled, 1 enabled, 2 quick stop,
-# 3 reset).
-AXIS_FOLLOWED: Final[int]  # set-points are followed: enabled, in the asked mode, bit 12
-AXIS_LIMITED: Final[int]  # the set-point sent last was limited
-AXIS_DROPPED: Final[int]  # the goal dropped to disabled by itself since the last request
-AXIS_REFUSED: Final[int]  # the committed target was NaN or infinite
-AXIS_FALLBACK: Final[int]  # no fresh target: holding (position) or ramping to zero
-
-RECORD_FIELDS: Final[list[tuple[str, str]]]
-"""The fields of one record of `log()`, for `numpy.dtype(RECORD_FIELDS)`; no padding.
-
-number u8 · scheduled_ns, wake_ns i8 (the link's clock) · period_ns, lateness_ns, receive_ns,
-process_ns, send_ns, tail_ns, round_trip_ns i4 · flags u4 · lost_in_row, skipped u4 ·
-missing_frames, al_counter u2 · al_status u1 ..."""
-
 class Engine:
     """Owns one cyclic exchange: frames, buffers, lane, histograms and, where the plan's order is
     threaded or law, its native thread. The thread that iterates is the only one that may call

@@ -5,6 +5,9 @@ Where another thread could want the GIL it is released round waits only; in virt
 there. Budget of `next` beside the link: 1 us for three drives.
 """
 
+import os
+
+cimport cython
 from cpython.exc cimport PyErr_CheckSignals
 from cpython.pycapsule cimport PyCapsule_GetPointer, PyCapsule_IsValid
 from libc.errno cimport EINTR
@@ -12,35 +15,16 @@ from libc.stdint cimport int64_t, uint32_t, uint64_t
 from libc.stdlib cimport calloc, free
 from libc.string cimport memcpy
 
-import os
-
 from catenary.core._axes cimport Axes, axes_follow
-from catenary.core._axes cimport DROPPED, FALLBACK, FOLLOWED, LIMITED, REFUSED
 from catenary.core._cycle cimport (
-    DROPPED_SOME,
-    IN_CONTROLLER,
     INLINE,
     LATE,
-    LATENESS,
     LAW,
-    LAW_DONE,
-    LIMITED_SOME,
     LOG_LENGTH,
     NONE,
-    OK,
-    PERIOD,
     PHASES,
-    PROCESS,
-    RECEIVE,
     RECORDS,
-    REFUSED_SOME,
-    ROUND_TRIP,
-    SEND,
     STOPPED,
-    TAIL,
-    THREADED,
-    UNCOMMITTED,
-    WORKING_COUNTER,
     cycle_inputs,
     cycle_law,
     cycle_outputs,
@@ -51,6 +35,7 @@ from catenary.core._cycle cimport (
     cycle_wait,
     record_t,
 )
+from catenary.core._cycle import ORDERS, PHASE_NAMES
 from catenary.core._frames cimport Frames, frames_flush
 from catenary.core._handover cimport (
     PRIVATE,
@@ -91,54 +76,6 @@ from catenary.core._thread cimport (
     thread_t,
 )
 
-CYCLE_OK = OK
-CYCLE_LATE = LATE
-CYCLE_LIMITED = LIMITED_SOME
-CYCLE_WORKING_COUNTER = WORKING_COUNTER
-CYCLE_DROPPED = DROPPED_SOME
-CYCLE_REFUSED = REFUSED_SOME
-CYCLE_UNCOMMITTED = UNCOMMITTED
-CYCLE_LAW_DONE = LAW_DONE
-CYCLE_STOPPED = STOPPED
-CYCLE_NONE = NONE
-
-AXIS_FOLLOWED = FOLLOWED
-AXIS_LIMITED = LIMITED
-AXIS_DROPPED = DROPPED
-AXIS_REFUSED = REFUSED
-AXIS_FALLBACK = FALLBACK
-
-ORDERS = {"threaded": THREADED, "inline": INLINE, "law": LAW}
-PHASE_NAMES = {
-    "period": PERIOD,
-    "lateness": LATENESS,
-    "receive": RECEIVE,
-    "process": PROCESS,
-    "send": SEND,
-    "tail": TAIL,
-    "round_trip": ROUND_TRIP,
-    "in_controller": IN_CONTROLLER,
-}
-RECORD_FIELDS = [
-    ("number", "<u8"),
-    ("scheduled_ns", "<i8"),
-    ("wake_ns", "<i8"),
-    ("period_ns", "<i4"),
-    ("lateness_ns", "<i4"),
-    ("receive_ns", "<i4"),
-    ("process_ns", "<i4"),
-    ("send_ns", "<i4"),
-    ("tail_ns", "<i4"),
-    ("round_trip_ns", "<i4"),
-    ("flags", "<u4"),
-    ("lost_in_row", "<u4"),
-    ("skipped", "<u4"),
-    ("missing_frames", "<u2"),
-    ("al_counter", "<u2"),
-    ("al_status", "u1"),
-    ("reserved", "3u1"),
-]
-
 cdef enum:
     SIGNALS_NS = 10_000_000    # native cycles in a row, before signal handlers get their turn
     SILENCE_NS = 1_000_000_000 # and periods: longest wait for a cycle of a thread that lives
@@ -172,6 +109,7 @@ def columns_by_bank(columns):
     return [sum(column.bank == bank for column in columns) for bank in range(3)]
 
 
+@cython.no_gc_clear  # its parts must outlive the native thread
 cdef class Engine:
     def __cinit__(self, plan, link):
         if plan.order not in ORDERS:
@@ -208,7 +146,8 @@ cdef class Engine:
         cdef int slot
         c.records = <record_t *>calloc(RECORDS, sizeof(record_t))
         c.histograms = <histogram_t *>calloc(PHASES, sizeof(histogram_t))
-        if not (c.records and c.histograms):
+        self.spare_histograms = <histogram_t *>calloc(PHASES, sizeof(histogram_t))
+        if not (c.records and c.histograms and self.spare_histograms):
             raise MemoryError
         self.frames.c.lane = &self.lane.c
         self.axes.c.image = &self.frames.c.image
@@ -579,9 +518,14 @@ cdef class Engine:
         return histogram_counts(&self.e.cycle.histograms[<int>PHASE_NAMES[phase]])
 
     def reset_histograms(self):
+        """By exchanging them: the native thread may be adding to the old ones this very moment."""
+        cdef histogram_t *old = self.e.cycle.histograms
         cdef int phase
         for phase in range(PHASES):
-            histogram_reset(&self.e.cycle.histograms[phase])
+            histogram_reset(&self.spare_histograms[phase])
+        cat_fence()
+        self.e.cycle.histograms = self.spare_histograms
+        self.spare_histograms = old
 
     def log(self):
         cdef uint64_t last = self.e.cycle.number
@@ -626,6 +570,8 @@ cdef class Engine:
         self.e.cycle.law_done = 0
 
     def __dealloc__(self):
-        thread_join(&self.e.thread)
+        with nogil:
+            thread_join(&self.e.thread)
         free(self.e.cycle.records)
         free(self.e.cycle.histograms)
+        free(self.spare_histograms)
