@@ -1,4 +1,4 @@
-"""Safety in the step: every rule of docs/architecture.md, "Safety in the core"."""
+"""Safety in the step: every rule of docs/safety.md, "In the core"."""
 
 import math
 from itertools import pairwise

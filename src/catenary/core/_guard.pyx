@@ -1,6 +1,6 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
 """Safety of one axis in one cycle: whether its set-points count, what is sent where they do not,
-limits, and when its goal drops. docs/architecture.md, "Safety in the core".
+limits, and when its goal drops. docs/safety.md, "In the core".
 
 - Set-points count only while *followed*: goal enabled, OPERATION_ENABLED, the mode shown is the one
   asked, bit 12 where the mode defines it, the unit answers. Until then target := actual, and a
