@@ -139,6 +139,49 @@ def test_bit_12_and_the_mode_shown_are_needed(drive: ScriptedDrive) -> None:
     assert followed(b)
 
 
+def mute_drive() -> Bench:
+    """In the second after OPERATION_ENABLED its drive has not shown bit 12 (as KickCAT's)."""
+    b = bench(axis(0), drives=[ScriptedDrive(position=300, follows=False)])
+    b.ask(GOAL_ENABLED)
+    b.steps(900)
+    assert not followed(b)
+    b.steps(200)
+    return b
+
+
+def test_a_drive_that_never_shows_bit_12_is_followed_after_a_second() -> None:
+    b = mute_drive()
+    assert followed(b)
+    assert b.drives[0].target_position == 300
+    b.target_position[0] = 2.0
+    b.steps(2)
+    assert b.drives[0].target_position == 2000
+
+
+def test_a_drive_that_is_known_to_lack_bit_12_need_not_be_waited_for_again() -> None:
+    b = mute_drive()
+    b.ask(GOAL_DISABLED)
+    b.steps(20)
+    assert not followed(b)
+    b.ask(GOAL_ENABLED)
+    b.steps(12)
+    assert followed(b)
+
+
+def test_bit_12_that_comes_after_all_drops_the_goal_once() -> None:
+    b = mute_drive()
+    b.drives[0].follows = True
+    b.steps(2)
+    assert dropped(b)
+    assert not followed(b)
+    b.ask(GOAL_ENABLED)
+    b.steps(12)
+    assert followed(b)
+    b.drives[0].follows = False
+    b.steps(2)
+    assert not followed(b)  # it has the bit: without it nothing counts
+
+
 def test_a_mode_may_change_while_running() -> None:
     b = driving(CSP)
     b.target_position[0] = 0.3

@@ -59,9 +59,11 @@ cdef struct axis_t:
     uint8_t stopping           # the goal dropped: stop by quick stop rather than by disabling
     uint8_t clear_reset        # bit 7 is kept clear once, so that it makes an edge
     uint8_t followed
+    uint8_t tells              # bit 12 was seen: the drive has it
     uint8_t flags
     uint64_t followed_since    # cycle
     uint32_t climbing_cycles   # since the request, not followed yet
+    uint32_t mute_cycles       # followed but for bit 12; stays at the limit
     uint32_t refused_cycles    # in a row, the target was not finite
     uint32_t beyond_cycles     # in a row, outside a position limit and leaving
     # sent
@@ -87,6 +89,7 @@ cdef struct axes_t:
     uint32_t late_limit_position
     uint32_t late_limit_velocity
     uint32_t climbing_limit
+    uint32_t mute_limit
     uint32_t still_limit
     uint32_t beyond_limit
     uint32_t uncommitted       # instants in a row without new targets

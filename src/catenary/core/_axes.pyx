@@ -46,6 +46,7 @@ cdef double STANDSTILL = 0.05          # [rad/s] where there is no limit
 STILL_NS = 5_000_000                   # at rest for so long: stopped
 BEYOND_NS = 20_000_000                 # CSV: outside a limit and leaving for so long: quick stop
 CLIMBING_NS = 10_000_000_000           # a request to enable lapses
+MUTE_NS = 1_000_000_000                # without bit 12: longer than a brake takes to open
 
 
 # ---- inputs
@@ -256,6 +257,7 @@ cdef class Axes:
             plan.late_limit_velocity_ns, plan.period_ns, "late_limit_velocity_ns"
         )
         self.c.climbing_limit = cycles_of(CLIMBING_NS, plan.period_ns, "")
+        self.c.mute_limit = max(cycles_of(MUTE_NS, plan.period_ns, ""), 1)
         self.c.still_limit = max(cycles_of(STILL_NS, plan.period_ns, ""), 3)
         self.c.beyond_limit = cycles_of(BEYOND_NS, plan.period_ns, "")
         for axis in plan.axes:

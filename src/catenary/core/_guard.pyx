@@ -5,6 +5,8 @@ limits, and when its goal drops. docs/safety.md, "In the core".
 - Set-points count only while *followed*: goal enabled, OPERATION_ENABLED, the mode shown is the one
   asked, bit 12 where the mode defines it, the unit answers. Until then target := actual, and a
   position committed before the application could see that the axis is followed is ignored.
+- Some drives never set bit 12. One that has not shown it once while all else was right for the mute
+  limit counts as followed without it; should it show it later after all, the goal drops.
 - Whatever leaves that state by itself (fault, STO, quick stop, unit lost) drops the goal: only a new
   request brings it back.
 - Without a fresh target a position holds; velocity and torque ramp to zero; after the late limit the
@@ -92,14 +94,28 @@ cdef bint is_mapped(const axis_t *a) noexcept nogil:
     return quantity != TORQUE or a.target_torque.present
 
 
-cdef bint is_trusted(const axis_t *a) noexcept nogil:
+cdef bint is_ready(const axis_t *a) noexcept nogil:
+    """All that makes an axis followed, but bit 12."""
     if a.goal != ENABLED or a.state != OPERATION_ENABLED or a.lost or not is_mapped(a):
         return False
-    if a.mode_actual.present and a.mode_shown != a.mode:
+    return not a.mode_actual.present or a.mode_shown == a.mode
+
+
+cdef bint is_trusted(axes_t *x, axis_t *a) noexcept nogil:
+    if not is_ready(a):
+        if a.mute_cycles < x.mute_limit:
+            a.mute_cycles = 0
         return False
-    if a.mode in (CSP, CSV, CST) and not a.status & FOLLOWS_COMMAND:
-        return False
-    return True
+    if a.mode not in (CSP, CSV, CST):
+        return True
+    if a.status & FOLLOWS_COMMAND:
+        if a.followed and not a.tells:
+            drop(x, a)  # it has the bit: what was sent until now it did not follow
+        a.tells = 1
+        return a.goal == ENABLED
+    if a.mute_cycles < x.mute_limit:
+        a.mute_cycles += 1
+    return not a.tells and a.mute_cycles >= x.mute_limit
 
 
 cdef void guard_observe(axes_t *x, axis_t *a, bint valid, uint8_t state_before,
@@ -126,7 +142,7 @@ cdef void guard_observe(axes_t *x, axis_t *a, bint valid, uint8_t state_before,
             a.goal = DISABLED
     elif a.goal == RESET and a.state != FAULT:
         a.goal = DISABLED
-    if not is_trusted(a):
+    if not is_trusted(x, a):
         a.followed = 0
     elif not a.followed:
         a.followed = 1
