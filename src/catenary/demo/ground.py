@@ -13,9 +13,11 @@ from catenary.errors import LinkError
 from catenary.link import Interface, LinkSource
 from catenary.realtime.child import start_python
 from catenary.realtime.private_network import veth_pair
+from catenary.realtime.scheduling import request_scheduling
 from catenary.virtual import demo_segment, serve
 
 START_SECONDS = 20.0
+PRIORITY = 80  # as the loop: devices do not wait for their MainDevice
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +43,7 @@ def ground(refused: str | None) -> Iterator[Ground]:
 def main(interface: str) -> None:
     """The other process: the segment behind the other end of the cable."""
     segment = demo_segment(clock="monotonic")
+    request_scheduling(priority=PRIORITY)  # refused to ordinary users: it then answers later
     serve(segment, interface, ready=lambda: print("ready", flush=True))
 
 
