@@ -27,8 +27,8 @@ def test_entry(text: str, index: int, subindex: int) -> None:
 
 
 def test_entry_without_0x_is_taken_for_a_slip() -> None:
-    with pytest.raises(argparse.ArgumentTypeError, match="did you mean 0x1018"):
-        entry("1018:1")
+    with pytest.raises(argparse.ArgumentTypeError, match="write 0x6041"):
+        entry("6041")
 
 
 @pytest.mark.parametrize("text", ["0x10000", "0x1018:256", "0x1018:-1", "-1"])

@@ -35,14 +35,15 @@ def position(text: str) -> int:
 def entry(text: str) -> Entry:
     """`0x6041` or `0x1018:1`."""
     index_text, _, subindex_text = text.partition(":")
+    if index_text.isalnum() and not index_text.lower().startswith("0x"):
+        raise argparse.ArgumentTypeError(
+            f"index {index_text!r} is not hexadecimal; write 0x{index_text}"
+        )
     index, subindex = number(index_text), number(subindex_text or "0")
     if not 0 <= index <= 0xFFFF or not 0 <= subindex <= 0xFF:
         raise argparse.ArgumentTypeError(f"{text!r} is outside 0xFFFF:255")
     if index < FIRST_OBJECT:
-        guess = f"; did you mean 0x{index_text}?" if index_text.isdigit() else ""
-        raise argparse.ArgumentTypeError(
-            f"index {text!r} is 0x{index:04X}, below the first object 0x1000{guess}"
-        )
+        raise argparse.ArgumentTypeError(f"index 0x{index:04X} is below the first object 0x1000")
     return Entry(index, subindex)
 
 

@@ -40,11 +40,12 @@ def run(job: Job) -> Round:
 def _measure(loop: cat.Loop, arm: cat.Drives, job: Job) -> Round:
     body = _sine(arm, job) if job.body is Body.SINE else _pd(arm, job)
     before, cpu = loop.timing.counters, 0
-    for cycle in loop:
-        if cycle.number == job.warm_up - 1:
-            before, cpu = loop.timing.counters, time.process_time_ns()
+    last_unmeasured, end = job.warm_up - 1, job.warm_up + job.cycles
+    for number, cycle in enumerate(loop):
         body(cycle.time)
-        if cycle.number >= job.warm_up + job.cycles:
+        if number == last_unmeasured:
+            before, cpu = loop.timing.counters, time.process_time_ns()
+        elif number == end:
             break
     cpu = time.process_time_ns() - cpu
     after = loop.timing.counters
