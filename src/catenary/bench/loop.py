@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from catenary.bench.cost import Point, fit
-from catenary.bench.job import Body, Job
+from catenary.bench.job import Body, Job, Round
 from catenary.bench.peers import MODULES
 from catenary.bench.report import as_json, as_text, machine
 from catenary.bench.rounds import WARM_UP_CYCLES, interleave
@@ -52,18 +52,24 @@ def measure(
 
 
 def measure_cost(*, seconds: float, file: Path | None) -> None:
+    rounds = math.ceil(seconds * 1000 / ROUND_CYCLES)
+    found: dict[tuple[str, int, int], list[Round]] = {}
+    for _ in range(rounds):  # all segments in turn: the machine's drift must not look like a cost
+        for drives, terminals in COST_SEGMENTS:
+            with served(drives, terminals) as segment:
+                jobs = make_jobs(OURS, segment, 1000, ROUND_CYCLES, Body.SINE, spin=False)
+                for name, one in interleave(jobs, 1, show_progress).items():
+                    found.setdefault((name, drives, terminals), []).extend(one)
     costs: dict[str, list[Point]] = {name: [] for name in OURS}
-    for drives, terminals in COST_SEGMENTS:
-        with served(drives, terminals) as segment:
-            runs = run_all(OURS, segment, rate=1000, seconds=seconds, body=Body.SINE, spin=False)
+    for (name, drives, terminals), ones in found.items():
+        run = combine(name, ones)
+        cost = run.timing_us["in_controller"]["p50"] + run.timing_us["tail"]["p50"]
         size = drives * DRIVE_BYTES + terminals * INPUT_BYTES
-        for run in runs:
-            cost = run.timing_us["in_controller"]["p50"] + run.timing_us["tail"]["p50"]
-            costs[run.name].append(Point(drives, size, round(cost, 3)))
+        costs[name].append(Point(drives, size, round(cost, 3)))
     fits = {name: fit(points) for name, points in costs.items()}
     print(f"{machine()}\nmedian of in_controller + tail:")
-    for name, found in fits.items():
-        print(f"  {name:18} {found}")
+    for name, cost_line in fits.items():
+        print(f"  {name:18} {cost_line}")
     write(
         file,
         {
@@ -97,7 +103,16 @@ def run_all(
 ) -> list[Run]:
     cycles = round(seconds * rate)
     rounds = math.ceil(cycles / ROUND_CYCLES)
-    jobs = [
+    jobs = make_jobs(names, segment, rate, math.ceil(cycles / rounds), body, spin=spin)
+    found = interleave(jobs, rounds, show_progress)
+    return [combine(name, found[name]) for name in names]
+
+
+def make_jobs(
+    names: Sequence[str], segment: Served, rate: int, cycles: int, body: Body, *, spin: bool
+) -> list[Job]:
+    """The same for every peer, for one round."""
+    return [
         Job(
             peer=name,
             interface=segment.interface,
@@ -105,7 +120,7 @@ def run_all(
             body=body,
             period_ns=round(1e9 / rate),
             warm_up=WARM_UP_CYCLES,
-            cycles=math.ceil(cycles / rounds),
+            cycles=cycles,
             cpu=processors().masters,
             priority=PRIORITY,
             counts_per_turn=COUNTS_PER_TURN,
@@ -114,8 +129,6 @@ def run_all(
         )
         for name in names
     ]
-    found = interleave(jobs, rounds, show_progress)
-    return [combine(name, found[name]) for name in names]
 
 
 def show_progress(peer: str, number: int, rounds: int) -> None:

@@ -16,6 +16,8 @@ ORDER: dict[str, Literal["inline", "threaded"]] = {
     "catenary-inline": "inline",
     "catenary-threaded": "threaded",
 }
+# Like the peers, it counts lost and late cycles and goes on; by default it would stop the drives.
+LOST_LIMIT = 1000
 MODE = {Body.SINE: "csp", Body.PD: "cst"}
 
 
@@ -33,6 +35,8 @@ def run(job: Job) -> Round:
             run=ORDER[job.peer],
             cpu=job.cpu,
             priority=job.priority,
+            lost_limit=LOST_LIMIT,
+            late_limit=0.0,
         ) as loop:
             return _measure(loop, arm, job)
 
@@ -71,11 +75,11 @@ def _sine(arm: cat.Drives, job: Job) -> Callable[[float], None]:
 
 def _pd(arm: cat.Drives, job: Job) -> Callable[[float], None]:
     home = arm.actual.position.copy()
-    actual, target = arm.actual, arm.target
+    position, velocity, torque = arm.actual.position, arm.actual.velocity, arm.target.torque
+    amplitude, stiffness, damping = job.amplitude, job.stiffness, job.damping
 
     def body(t: float) -> None:
-        reference = home + job.amplitude * math.sin(math.pi * t)
-        error = reference - actual.position
-        target.torque[:] = job.stiffness * error - job.damping * actual.velocity
+        reference = home + amplitude * math.sin(math.pi * t)
+        torque[:] = stiffness * (reference - position) - damping * velocity
 
     return body

@@ -134,14 +134,16 @@ def _sine(drives: list[Any], homes: list[int], job: Job) -> Callable[[float], No
 
 def _pd(drives: list[Any], homes: list[int], job: Job) -> Callable[[float], None]:
     scale = 1.0 / job.counts_per_rad
+    amplitude, stiffness, damping = job.amplitude, job.stiffness, job.damping
+    counts_per_torque = job.counts_per_torque
 
     def body(t: float) -> None:
-        reference = job.amplitude * math.sin(math.pi * t)
+        reference = amplitude * math.sin(math.pi * t)
         for drive, home in zip(drives, homes, strict=True):
             _, _, velocity, position, _ = INPUTS.unpack(drive.input)
-            torque = job.stiffness * (reference - (position - home) * scale)
-            torque -= job.damping * velocity * scale
-            counts = int(torque * job.counts_per_torque)
+            torque = stiffness * (reference - (position - home) * scale)
+            torque -= damping * velocity * scale
+            counts = int(torque * counts_per_torque)
             drive.output = OUTPUTS.pack(0x0F, 10, 0, 0, counts)
 
     return body
