@@ -50,10 +50,33 @@ def test_a_period_that_cannot_be_said_is_refused_by_its_object() -> None:
 
 def test_a_drive_that_does_not_know_its_rated_torque_asks_for_it() -> None:
     sub = fake_sub(3, {})
-    with pytest.raises(ConfigurationError, match="rated_torque="):
-        Drives([sub], counts_per_turn=1).pdos(MILLISECOND)
+    for asked in ({"mode": "cst"}, {"measured": ["torque"]}, {"torque_limit": 1.0}):
+        with pytest.raises(ConfigurationError, match="rated_torque="):
+            Drives([sub], counts_per_turn=1, **asked).pdos(MILLISECOND)
     assert Drives([sub], counts_per_turn=1, measured=["position"]).pdos(MILLISECOND)
     assert Drives([sub], counts_per_turn=1, rated_torque=2.0).pdos(MILLISECOND)
+
+
+def test_without_a_rated_torque_the_torque_is_absent() -> None:
+    drives = Drives([fake_sub(3, {})], counts_per_turn=1)
+    (axis,) = drives.tables(FakeLayout.of(dict(drives.pdos(MILLISECOND)))).axes
+    assert axis.actual_torque is None
+    assert axis.actual_velocity is not None
+
+
+def test_what_a_drive_may_lack_is_not_required() -> None:
+    def required(drives: Drives) -> list[int]:
+        wish = drives.pdos(MILLISECOND)[3]
+        return [r.index for r in wish.outputs + wish.inputs if r.required]
+
+    assert required(Drives([fake_sub(3)], counts_per_turn=1)) == [0x6040, 0x607A, 0x6041, 0x6064]
+    switching = Drives([fake_sub(3)], counts_per_turn=1, other_modes=["csv"], measured=["velocity"])
+    assert required(switching) == [0x6040, 0x6060, 0x607A, 0x60FF, 0x6041, 0x6061, 0x606C]
+
+
+def test_the_mode_is_written_once_where_the_drive_has_it() -> None:
+    sub = fake_sub(3, {(0x6076, 0): 640, (0x6060, 0): 1})
+    assert Drives([sub], counts_per_turn=1).pdos(MILLISECOND)[3].start_up == ((0x6060, 0, b"\x08"),)
 
 
 def test_slots_are_axes_of_their_own() -> None:

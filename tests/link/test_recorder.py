@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import concurrent.futures
+import contextlib
 import json
 import os
 import resource
@@ -70,22 +71,26 @@ def test_a_disk_full_from_the_start_is_an_error():
     assert inner.closed
 
 
-@pytest.fixture
+@contextlib.contextmanager
 def files_of_4096_bytes():
+    """Not a fixture: it would still hold when pytest writes its report, into a file perhaps."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (4096, before[1]))
-    yield
-    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 @pytest.mark.parametrize("flags", [0, 1], ids=["writer thread", "virtual time"])
-def test_a_disk_that_fills_up_is_said_at_the_end(tmp_path, files_of_4096_bytes, flags):
+def test_a_disk_that_fills_up_is_said_at_the_end(tmp_path, flags):
     inner = PythonLink(latency_ns=0, flags=flags)
-    link = Recorder(inner, tmp_path / "run.pcapng")
-    for _ in range(4000):
-        link.send(frame(bytes(1486)))
-    with pytest.warns(RuntimeWarning, match="is incomplete: File too large"):
-        link.close()
+    with files_of_4096_bytes():
+        link = Recorder(inner, tmp_path / "run.pcapng")
+        for _ in range(4000):
+            link.send(frame(bytes(1486)))
+        with pytest.warns(RuntimeWarning, match="is incomplete: File too large"):
+            link.close()
     assert link.dropped + link.recorded == 4000
     assert inner.closed
 

@@ -58,6 +58,11 @@ def test_fixed_pdos_refuse_and_say_what_there_is() -> None:
     assert "0x6064:00" in caught.value.hint
 
 
+def test_fixed_pdos_keep_what_they_have_where_the_rest_is_not_required() -> None:
+    wished = [POSITION, replace(FOLLOWING_ERROR, required=False)]
+    assert not make_mapping(servo(0, fixed=True), Direction.INPUT, wished).changed
+
+
 def test_without_coe_nothing_changes() -> None:
     with pytest.raises(MappingError, match="no CoE mailbox"):
         make_mapping(servo(0, coe=False), Direction.INPUT, [FOLLOWING_ERROR])

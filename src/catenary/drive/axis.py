@@ -36,6 +36,7 @@ class Axis:
     units: AxisUnits
     limits: AxisLimits
     measured: tuple[str, ...] = tuple(MEASURED)
+    measured_required: bool = False  # else what the drive cannot map reads NaN
     columns: Mapping[str, AxisObject] = field(default_factory=dict)
 
     def index(self, base: int) -> int:
@@ -45,8 +46,13 @@ class Axis:
     @property
     def uses_torque(self) -> bool:
         """Whether anything asked for is a torque."""
+        return "torque" in self.measured or self.needs_torque
+
+    @property
+    def needs_torque(self) -> bool:
+        """Whether the axis is of no use without its torque in N·m."""
         return (
-            "torque" in self.measured
+            ("torque" in self.measured and self.measured_required)
             or Mode.CST in self.modes
             or self.limits.torque is not None
             or any(column.unit is Unit.TORQUE for column in self.columns.values())
@@ -58,11 +64,24 @@ class Axis:
         given = [objects.STATUSWORD, objects.MODE_ACTUAL, *(MEASURED[m] for m in self.measured)]
         for column in self.columns.values():
             (wanted if column.output else given).append(column)
+        optional = self._optional()
         return PdoWish(
-            outputs=tuple(o.reference(self.slot) for o in dict.fromkeys(wanted)),
-            inputs=tuple(o.reference(self.slot) for o in dict.fromkeys(given)),
+            outputs=tuple(
+                o.reference(self.slot, required=o not in optional) for o in dict.fromkeys(wanted)
+            ),
+            inputs=tuple(
+                o.reference(self.slot, required=o not in optional) for o in dict.fromkeys(given)
+            ),
             start_up=start_up,
         )
+
+    def _optional(self) -> set[AxisObject]:
+        """What a drive may lack: velocity and torque, unless asked for by name; and the mode, which
+        the start-up list sets, where it never changes."""
+        optional = set() if self.measured_required else {MEASURED["velocity"], MEASURED["torque"]}
+        if len(self.modes) == 1:
+            optional |= {objects.MODE_TARGET, objects.MODE_ACTUAL}
+        return optional - set(self.columns.values())
 
     def plan(self, layout: ImageLayout) -> AxisPlan:
         """The axis as numbers. What was not wished for but is mapped is used as well."""

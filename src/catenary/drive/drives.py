@@ -51,8 +51,10 @@ class Drives:
     Limits at the joint, enforced by the core whatever is written: `position_min`, `position_max`
     [rad], `velocity_limit` [rad/s], `torque_limit` [N·m].
 
-    `measured`: which of position, velocity and torque are wished for. `columns`: further objects,
-    by a name of `NAMED_COLUMNS` or as `(name, AxisObject)`: `arm.actual["following_error"]`.
+    `measured`: which of position, velocity and torque the drives must give; None: all three, where
+    a drive cannot give velocity or torque it reads NaN (velocity: estimated). `columns`: further
+    objects, by a name of `NAMED_COLUMNS` or as `(name, AxisObject)`:
+    `arm.actual["following_error"]`.
     """
 
     def __init__(
@@ -71,7 +73,7 @@ class Drives:
         position_max: PerAxis[float | None] = None,
         velocity_limit: PerAxis[float | None] = None,
         torque_limit: PerAxis[float | None] = None,
-        measured: Sequence[str] = tuple(MEASURED),
+        measured: Sequence[str] | None = None,
         columns: Sequence[str | tuple[str, AxisObject]] = (),
     ) -> None:
         sources = axis_sources(subs)
@@ -103,7 +105,8 @@ class Drives:
                 modes=axis_modes(first, other_modes),
                 units=unit,
                 limits=limit,
-                measured=known(measured),
+                measured=known(tuple(MEASURED) if measured is None else measured),
+                measured_required=measured is not None,
                 columns=self._columns,
             )
             for (sub, slot), first, unit, limit in zip(

@@ -33,8 +33,9 @@ class AxisObject:
     unit: Unit = Unit.RAW
     output: bool = False
 
-    def reference(self, slot: int) -> ObjectReference:
-        return ObjectReference(self.index + SLOT_OFFSET * slot, self.subindex, self.bit_length)
+    def reference(self, slot: int, *, required: bool = True) -> ObjectReference:
+        index = self.index + SLOT_OFFSET * slot
+        return ObjectReference(index, self.subindex, self.bit_length, required)
 
 
 CONTROLWORD = AxisObject(Object.CONTROLWORD, 0, 16, False, Unit.RAW, True)

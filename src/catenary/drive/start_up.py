@@ -1,4 +1,4 @@
-"""What a drive is asked and told once, in PRE-OP: rated torque, interpolation time."""
+"""What a drive is asked and told once, in PRE-OP: rated torque, mode, interpolation time."""
 
 from __future__ import annotations
 
@@ -25,6 +25,8 @@ def with_rated_torque(axis: Axis, sub: SubDevice) -> Axis:
         if abort.code not in OBJECT_MISSING:
             raise
         rated = 0
+    if rated <= 0 and not axis.needs_torque:
+        return axis  # its torque reads NaN
     if rated <= 0:
         raise ConfigurationError(
             f"{axis.name} does not know its rated torque (0x{index:04X})",
@@ -34,6 +36,27 @@ def with_rated_torque(axis: Axis, sub: SubDevice) -> Axis:
 
 
 def downloads(axis: Axis, sub: SubDevice, period_ns: int) -> tuple[tuple[int, int, bytes], ...]:
+    """0x6060 and 0x60C2, for drives that do not map the mode and for the period."""
+    return _mode(axis, sub) + _interpolation(axis, sub, period_ns)
+
+
+def _mode(axis: Axis, sub: SubDevice) -> tuple[tuple[int, int, bytes], ...]:
+    """The first mode. Nothing where the drive has no such object or agrees already."""
+    index = axis.index(Object.MODE_OF_OPERATION)
+    try:
+        found = sub.sdo.read(index, 0, type=SINT)
+    except SdoAbort as abort:
+        if abort.code not in OBJECT_MISSING:
+            raise
+        return ()
+    if found == int(axis.modes[0]):
+        return ()
+    return ((index, 0, SINT.encode(int(axis.modes[0]))),)
+
+
+def _interpolation(
+    axis: Axis, sub: SubDevice, period_ns: int
+) -> tuple[tuple[int, int, bytes], ...]:
     """0x60C2 for this period. Nothing where the drive has no such object or agrees already."""
     index = axis.index(Object.INTERPOLATION_TIME_PERIOD)
     try:

@@ -44,7 +44,20 @@ class Mapping:
 def make_mapping(
     device: DeviceDescription, direction: Direction, wished: Sequence[ObjectReference]
 ) -> Mapping:
-    """The mapping that carries all objects wished for; MappingError says which one cannot be."""
+    """The mapping that carries all objects wished for, or at least the required ones;
+    MappingError says which of those cannot be."""
+    required = tuple(reference for reference in wished if reference.required)
+    try:
+        return _carrying(device, direction, wished)
+    except MappingError:
+        if len(required) == len(wished):
+            raise
+    return _carrying(device, direction, required)
+
+
+def _carrying(
+    device: DeviceDescription, direction: Direction, wished: Sequence[ObjectReference]
+) -> Mapping:
     current = Mapping(device.assignments(direction))
     missing = _missing(device, direction, current.assignments, wished)
     if not missing:

@@ -24,11 +24,13 @@ Modes = npt.NDArray[np.int8]
 
 @dataclass(frozen=True, slots=True)
 class ObjectReference:
-    """An entry of the object dictionary, to be mapped into the process data."""
+    """An entry of the object dictionary, to be mapped into the process data. One that is not
+    `required` is left out where the device cannot map it."""
 
     index: int
     subindex: int
     bit_length: int
+    required: bool = True
 
 
 @dataclass(frozen=True, slots=True)

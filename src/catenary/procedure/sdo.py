@@ -122,8 +122,9 @@ def _ask(
     def accept(mailbox: Mailbox) -> T | Abort | None:
         message = _decoded(channel, mailbox)
         if isinstance(message, Abort):
-            # Aborts of segments name no object with some devices.
-            return message if (message.index, message.subindex) in (place, (0, 0)) else None
+            # Some devices name no object, or another one; one service runs at a time, so it is
+            # ours. SOEM (ecx_SDOread) and IgH (fsm_coe.c) do not compare it either.
+            return message
         return message if isinstance(message, expected) and matches(message) else None
 
     talk: Procedure[T | Abort] = converse(channel, Type.COE, request.encode(), accept)
