@@ -9,18 +9,15 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Never
 
 import hypothesis
 import pytest
-from hypothesis import settings
 
 from catenary.realtime import private_network
-
-settings.register_profile("catenary", deadline=None)  # nothing timed is asserted
-settings.load_profile("catenary")
 
 ROOT = Path(__file__).resolve().parent.parent
 FIXTURE_OF = {"shared_data": "shared_data", "wire": "veth", "tshark": "tshark"}  # marker: fixture
@@ -47,6 +44,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    # A shell ignores SIGINT for what it starts in the background, and that is inherited.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     config.stash[REQUIRED] = set(config.getoption("--require"))
     config.stash[PASSED] = set()
 

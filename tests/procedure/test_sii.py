@@ -13,6 +13,10 @@ from catenary.procedure.sii import read_image
 from catenary.wire.sii import decode_sii
 from tests.procedure.by_hand import STATION, play
 
+STRINGS_BODY = bytes([1, 250]) + bytes(range(1, 251)) + bytes(244)
+ONE_LONG_CATEGORY = (
+    bytes(128) + struct.pack("<HH", 10, len(STRINGS_BODY) // 2) + STRINGS_BODY + b"\xff\xff"
+)
 READ, BUSY, ERROR, EIGHT = 0x0100, 0x8000, 0x2000, 0x0040
 
 
@@ -25,17 +29,30 @@ class Eeprom:
         self.busy_for = busy_for
         self.fails = 0
         self.reads = 0
+        self.loses: set[int] = set()  # numbers of read commands whose frame does not come back
+        self.slow: set[int] = set()  # numbers of read commands that take a look longer
         self._busy = 0
         self._word = 0
         self._error = False
+        self._losing = False
 
     def __call__(self, request: Request) -> Reply:
+        """A frame that is lost has reached the device all the same."""
+        is_fetch = len(request.data) != 6
+        if is_fetch:
+            self._losing = not request.repeatable and self.reads in self.loses
+        reply = self._answer(request)
+        return Reply(b"", 0, lost=True) if self._losing and not request.repeatable else reply
+
+    def _answer(self, request: Request) -> Reply:
         assert request.address >> 16 == 0x0502
         if len(request.data) == 6:
             command, self._word = struct.unpack("<HI", request.data)
             if command == READ:
                 self.reads += 1
-                self._busy = self.busy_for
+                if self._busy:
+                    return Reply(request.data, 0)
+                self._busy = self.busy_for + (self.reads in self.slow)
                 self._error, self.fails = self.fails > 0, max(self.fails - 1, 0)
             else:
                 self._error = False
@@ -96,6 +113,28 @@ def test_a_missed_acknowledge_is_forgiven_a_dead_eeprom_not() -> None:
     eeprom.fails = 1_000_000
     with pytest.raises(EepromError, match=r"Probe.*SII word 0x0000"):
         play(read_image(STATION), eeprom)
+
+
+@pytest.mark.parametrize("eight", [False, True])
+def test_a_prompt_eeprom_is_commanded_ahead(eight: bool) -> None:
+    eeprom = Eeprom(ONE_LONG_CATEGORY, eight=eight)
+    frames = 0
+
+    def counted(request: Request) -> Reply:
+        nonlocal frames
+        frames += request.repeatable or len(request.data) == 6
+        return eeprom(request)
+
+    assert play(read_image(STATION), counted)[:-2] == ONE_LONG_CATEGORY[:628]
+    assert frames < 1.2 * eeprom.reads
+
+
+@pytest.mark.parametrize("eight", [False, True])
+@pytest.mark.parametrize("trouble", ["slow", "loses"])
+def test_trouble_with_what_was_commanded_ahead_spoils_no_word(trouble: str, eight: bool) -> None:
+    eeprom = Eeprom(ONE_LONG_CATEGORY, eight=eight)
+    getattr(eeprom, trouble).update(range(3, 200, 5))
+    assert play(read_image(STATION), eeprom)[:-2] == ONE_LONG_CATEGORY[:628]
 
 
 def test_an_eeprom_busy_for_ever_ends_in_time() -> None:

@@ -1,8 +1,8 @@
 """Reading the SII, ETG.1000.4 §6.4 (interface) and ETG.1000.6 §5.4 (content).
 
 Frugal: of the header's 64 words only those are read that say something, of the categories those
-that somebody wants, and no word twice. One frame carries the commands to all devices, one brings
-back all their answers.
+that somebody wants, and no word twice. Where an EEPROM has been ready by the next frame, the frame
+that fetches a word also carries the command for the one after it.
 """
 
 from __future__ import annotations
@@ -69,6 +69,8 @@ class _Reader:
         self._start = 0  # word address of `_data`
         self._data = b""
         self._typical = 0.0  # [s]
+        self._prompt = False  # the first look found it ready, without a pause
+        self._commanded = (-1, 0)  # the word whose read is under way, and since when [ns]
 
     def words(self, first: int, count: int) -> Procedure[bytes]:
         """`count` words from word address `first`."""
@@ -78,15 +80,67 @@ class _Reader:
             data = self._data[2 * (first - self._start) :]
         while len(data) < 2 * count:
             self._start = first + len(data) // 2
-            self._data = yield from self._read(self._start)
+            # The width is that of the last read; without one nothing is asked for ahead.
+            ahead = self._start + len(self._data) // 2
+            wanted = self._start < ahead < first + count
+            self._data = yield from self._read(self._start, ahead if wanted else None)
             data += self._data
         return data[: 2 * count]
 
-    def _read(self, word: int) -> Procedure[bytes]:
-        """What one read command brings: 4 or 8 bytes."""
+    def _read(self, word: int, ahead: int | None) -> Procedure[bytes]:
+        """What one read command brings: 4 or 8 bytes. `ahead`: the word that is wanted next."""
+        if ahead is not None and self._prompt:
+            data = yield from self._read_and_command(word, ahead)
+            if data:
+                return data
+        return (yield from self._read_alone(word))
+
+    def _read_and_command(self, word: int, ahead: int) -> Procedure[bytes]:
+        """Fetches `word` and commands `ahead` in one frame. Nothing where that did not work out:
+        then it is unknown which of the two the EEPROM has read, and `word` must be asked for
+        again."""
+        started_ns = yield from self._under_way(word)
+        command = _COMMAND.pack(Command.READ << 8, ahead)
+        station = self._station
+        fetched, commanded = yield [
+            read_memory(station.address, _START, _SIZE, repeatable=False),
+            write_memory(station.address, _START, command, repeatable=False),
+        ]
+        status = int.from_bytes(fetched.data[:2], "little")
+        lost = fetched.lost or commanded.lost or fetched.working_counter != 1
+        if lost or status & _NOT_READY:
+            self._prompt = False
+            yield from self._until_idle(word)
+            return b""
+        if commanded.working_counter == 1:
+            self._commanded = (ahead, commanded.time_ns)
+        self._learn(1, (fetched.time_ns - started_ns) * 1e-9)
+        return fetched.data[_DATA : _DATA + (8 if status & _EIGHT_BYTES else 4)]
+
+    def _until_idle(self, word: int) -> Procedure[None]:
+        """Lets a read that nobody wants any more come to its end."""
+        deadline, pace = Deadline(READ_TIMEOUT), Pace()
+        while True:
+            [reply] = yield [read_memory(self._station.address, _START, 2, repeatable=True)]
+            status = int.from_bytes(answered(reply, self._station, "SII status"), "little")
+            if not status & _BUSY:
+                return
+            if deadline.passed(reply):
+                raise _failed(self._station, word, status)
+            yield after(pace.pause())
+
+    def _under_way(self, word: int) -> Procedure[int]:
+        """The read of `word` has been commanded, now or ahead; when [ns]."""
+        commanded, since_ns = self._commanded
+        self._commanded = (-1, 0)
+        if commanded == word:
+            return since_ns
+        return (yield from self._command(Command.READ, word))
+
+    def _read_alone(self, word: int) -> Procedure[bytes]:
         station = self._station
         deadline, pace, errors, looks = Deadline(READ_TIMEOUT), Pace(), 0, 0
-        started_ns = yield from self._command(Command.READ, word)
+        started_ns = yield from self._under_way(word)
         if self._typical:
             yield after(self._typical)
         while True:
@@ -109,6 +163,7 @@ class _Reader:
 
     def _learn(self, looks: int, elapsed: float) -> None:
         """The pause before the next first look: as long as this took, then slowly shorter."""
+        self._prompt = looks == 1 and not self._typical
         if looks > 1:
             self._typical = elapsed
         elif self._typical:
