@@ -34,7 +34,9 @@ def silence_error(
     else:
         who = f"all devices answer to single reads; affected: devices {listed(suspects)}"
         hint = (
-            "frames are lost or corrupted on the way: check cables, and other traffic on the port"
+            "frames are lost, corrupted or late on the way: check cables and other traffic on the "
+            "port; where the segment is a program on a busy machine, allow it more cycles with "
+            "Loop(lost_limit=...)"
         )
     return WorkingCounterError(
         f"{lost} cycles in a row without all answers; {who}", log=log, hint=hint
