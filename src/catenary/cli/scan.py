@@ -22,9 +22,9 @@ def add_parser(commands: Commands) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     from catenary.cli.devices import as_json, as_table
-    from catenary.target import open_main_device
+    from catenary.target import MainDevice
 
-    with open_main_device(arguments.target) as main:
+    with MainDevice(arguments.target) as main:
         devices = main.scan()
         print(as_json(devices) if arguments.json else as_table(devices))
     return 0

@@ -64,11 +64,11 @@ def _add_type(parser: argparse.ArgumentParser) -> None:
 
 def run_read(arguments: argparse.Namespace) -> int:
     from catenary.cli.devices import device_at
-    from catenary.target import open_main_device
+    from catenary.target import MainDevice
 
     kind = _data_type(arguments.type)
     at: Entry = arguments.entry
-    with open_main_device(arguments.target) as main:
+    with MainDevice(arguments.target) as main:
         device = device_at(main.scan(), arguments.position)
         data = device.sdo.read(at.index, at.subindex)
     value = kind.decode(data) if kind else None
@@ -81,7 +81,7 @@ def run_read(arguments: argparse.Namespace) -> int:
 
 def run_write(arguments: argparse.Namespace) -> int:
     from catenary.cli.devices import device_at
-    from catenary.target import open_main_device
+    from catenary.target import MainDevice
 
     kind = _data_type(arguments.type)
     if kind is None:
@@ -92,7 +92,7 @@ def run_write(arguments: argparse.Namespace) -> int:
         raise UsageError(str(error), hint="numbers are decimal or 0x...") from error
     at: Entry = arguments.entry
     data = kind.encode(value)
-    with open_main_device(arguments.target) as main:
+    with MainDevice(arguments.target) as main:
         device_at(main.scan(), arguments.position).sdo.write(at.index, at.subindex, data)
     if arguments.json:
         print(_as_json(arguments, data, value))

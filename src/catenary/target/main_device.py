@@ -20,10 +20,3 @@ class MainDevice(bus.MainDevice):
 
     def __init__(self, target: str | LinkSource) -> None:
         super().__init__(parse(target) if isinstance(target, str) else target)
-
-
-def open_main_device(target: str | LinkSource) -> MainDevice:
-    """The same, open already."""
-    main = MainDevice(target)
-    main.open()
-    return main
