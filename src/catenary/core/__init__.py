@@ -30,6 +30,7 @@ from catenary.core._cycle import (
     RECORD_FIELDS,
 )
 from catenary.core._engine import Engine
+from catenary.core._iteration import Cycle, Iteration
 
 __all__ = [
     "AXIS_DROPPED",
@@ -52,7 +53,9 @@ __all__ = [
     "GOAL_QUICK_STOP",
     "GOAL_RESET",
     "RECORD_FIELDS",
+    "Cycle",
     "Engine",
+    "Iteration",
     "controlword_towards",
     "state_of",
 ]

@@ -3,7 +3,7 @@ from libc.stdint cimport int64_t, uint32_t
 from catenary.core._axes cimport Axes
 from catenary.core._cycle cimport cycle_t
 from catenary.core._frames cimport Frames
-from catenary.core._handover cimport Handover, handover_t
+from catenary.core._handover cimport Handover, actual_header_t, handover_t
 from catenary.core._histogram cimport histogram_t
 from catenary.core._lane cimport Lane
 from catenary.core._thread cimport cat_scheduling, thread_t
@@ -33,10 +33,12 @@ cdef class Engine:
     cdef int64_t left          # when `next` returned [ns]; -1: no application since
 
     cdef connect(self, plan)
+    cdef uint32_t step(self, int64_t timeout_ns=*) except? 0xFFFFFFFF
+    cdef actual_header_t *actual_header(self) noexcept
     cdef void inline_outputs(self, bint application) noexcept nogil
     cdef int inline_inputs(self) except -1
     cdef int lockstep(self) except -1
-    cdef next_native(self, int64_t timeout_ns)
+    cdef uint32_t step_native(self, int64_t timeout_ns) except? 0xFFFFFFFF
     cdef void commit(self, bint hold) noexcept
     cdef int await_cycle(self, int64_t timeout_ns) except -1
     cdef uint32_t hold(self, int64_t cycles, bint until_stopped,

@@ -88,7 +88,7 @@ cdef void thread_loop(void *argument) noexcept nogil:
     while not cat_load_acquire32(&e.thread.stop):
         rc = cycle_wait(&e.cycle)
         if rc == 0:
-            step_native(e)
+            native_cycle(e)
         elif rc != -EINTR:
             e.error = rc
             break
@@ -97,7 +97,7 @@ cdef void thread_loop(void *argument) noexcept nogil:
     cat_futex_wake(&e.cycle.handover.published)
 
 
-cdef inline void step_native(engine_t *e) noexcept nogil:
+cdef inline void native_cycle(engine_t *e) noexcept nogil:
     if e.cycle.order == LAW:
         cycle_law(&e.cycle)
     else:
@@ -211,10 +211,13 @@ cdef class Engine:
     # ---- steps
 
     def next(self, int64_t timeout_ns=SILENCE_NS):
+        return self.step(timeout_ns)
+
+    cdef uint32_t step(self, int64_t timeout_ns=SILENCE_NS) except? 0xFFFFFFFF:
         if not self.running:
             raise RuntimeError("the engine is not running: start it first")
         if self.native:
-            return self.next_native(timeout_ns)
+            return self.step_native(timeout_ns)
         if self.e.cycle.order == INLINE:
             self.inline_outputs(True)
             self.inline_inputs()
@@ -223,6 +226,10 @@ cdef class Engine:
             self.lockstep()
         axes_follow(&self.axes.c, &self.h.actual[PRIVATE], &self.h.target[PRIVATE])
         return self.h.actual[PRIVATE].header.flags
+
+    cdef actual_header_t *actual_header(self) noexcept:
+        """Of the cycle that Python's actual values belong to; lives as long as the engine."""
+        return self.h.actual[PRIVATE].header
 
     cdef void inline_outputs(self, bint application) noexcept nogil:
         """Once a cycle: a wait that a signal ended must not send a second time."""
@@ -258,7 +265,7 @@ cdef class Engine:
         while True:
             rc = cycle_wait(&self.e.cycle)
             if rc == 0:
-                step_native(&self.e)
+                native_cycle(&self.e)
                 handover_swap(self.h)
                 if before > 0 and header.number > before + 1:
                     header.flags |= LATE  # cycles happened in `spend`
@@ -266,7 +273,7 @@ cdef class Engine:
                 return 0
             self.interrupted(rc)
 
-    cdef next_native(self, int64_t timeout_ns):
+    cdef uint32_t step_native(self, int64_t timeout_ns) except? 0xFFFFFFFF:
         cdef actual_header_t *header = self.h.actual[PRIVATE].header
         cdef uint64_t before = header.number
         cdef uint32_t flags
@@ -375,7 +382,7 @@ cdef class Engine:
                     else:
                         rc = cycle_wait(c)
                         if rc == 0:
-                            step_native(&self.e)
+                            native_cycle(&self.e)
                             handover_swap(self.h)
                     if rc == 0:
                         cycles -= 1
@@ -419,7 +426,7 @@ cdef class Engine:
         """A cycle that happens while the application computes: it does not see it yet."""
         cdef int rc = cycle_wait(&self.e.cycle)
         if rc == 0:
-            step_native(&self.e)
+            native_cycle(&self.e)
             return 0
         return self.interrupted(rc)
 

@@ -1,6 +1,6 @@
 """The cyclic loop: from wishes to `for cycle in loop`, and safely back."""
 
-from catenary.loop.cycle import Cycle
+from catenary.core import Cycle
 from catenary.loop.loop import Loop
 
 __all__ = ["Cycle", "Loop"]

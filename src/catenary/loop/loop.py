@@ -6,12 +6,18 @@ Leaving, for whatever reason, stops the drives natively before the states go dow
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from functools import partial
 from types import TracebackType
 from typing import Literal
 
-from catenary.core import CYCLE_DROPPED, CYCLE_NONE, CYCLE_STOPPED, CYCLE_WORKING_COUNTER
-from catenary.loop.cycle import Cycle
+from catenary.core import (
+    CYCLE_DROPPED,
+    CYCLE_NONE,
+    CYCLE_STOPPED,
+    CYCLE_WORKING_COUNTER,
+    Cycle,
+    Iteration,
+)
 from catenary.loop.devices import DeviceWish, main_device_of
 from catenary.loop.running import LogArray, Running, take_down
 from catenary.loop.signals import SignalGuard
@@ -71,12 +77,12 @@ class Loop:
         self._priority = priority
         self._guard = SignalGuard((Loop.__exit__.__code__, Loop._leave.__code__))
         self._running: Running | None = None
-        self._cycle: Cycle | None = None
+        self._iteration: Iteration | None = None
 
     def __enter__(self) -> Loop:
         try:
             self._guard.install()
-            self._running = self._cycle = None
+            self._running = self._iteration = None
             plan = self._make_plan()
             self._main.configure(plan)
             self._running = Running(self._main, plan, self._wishes)
@@ -103,21 +109,17 @@ class Loop:
         elif problems:
             raise problems[0]
 
-    def __iter__(self) -> Iterator[Cycle]:
+    def __iter__(self) -> Iteration:
+        """Iterating again goes on where the last iteration ended."""
         running = self._opened
-        step, engine, operational = running.engine.next, running.engine, int(State.OP)
-        cycle = self._cycle
-        if cycle is None:
-            # The first cycle commits nothing: the body has not said anything yet.
-            flags = engine.run(1)
-            cycle = self._cycle = Cycle(engine)
-        else:
-            flags = step()
-        while True:
-            if flags & TROUBLE or engine.al_status != operational:
-                running.judge(flags, faults=self._raise_faults)
-            yield cycle
-            flags = step()
+        if self._iteration is None:
+            self._iteration = Iteration(
+                running.engine,
+                partial(running.judge, faults=self._raise_faults),
+                trouble=TROUBLE,
+                al_status=State.OP,
+            )
+        return self._iteration
 
     def __next__(self) -> Cycle:
         return next(iter(self))

@@ -1,0 +1,74 @@
+# cython: boundscheck=False, wraparound=False, cdivision=True
+"""What `for cycle in loop` runs through: compiled, because the first microseconds after a wait go to
+whatever is not in the caches, and a Python generator and its properties are a lot of it.
+"""
+
+from libc.stdint cimport int64_t, uint32_t, uint64_t
+
+from catenary.core._cycle cimport LATE, LIMITED_SOME, OK, REFUSED_SOME, UNCOMMITTED
+from catenary.core._engine cimport Engine
+
+
+cdef class Cycle:
+    def __init__(self, Engine engine not None):
+        self.engine = engine
+        self.header = engine.actual_header()
+        self.first_number = self.header.number
+        self.first_ns = self.header.time_ns
+
+    @property
+    def number(self):
+        return self.header.number - self.first_number
+
+    @property
+    def time(self):
+        return <double>(self.header.time_ns - self.first_ns) * 1e-9
+
+    @property
+    def ok(self):
+        return (self.header.flags & OK) != 0
+
+    @property
+    def lost(self):
+        return self.header.lost_in_row
+
+    @property
+    def late(self):
+        return (self.header.flags & (LATE | UNCOMMITTED)) != 0
+
+    @property
+    def limited(self):
+        return (self.header.flags & LIMITED_SOME) != 0
+
+    @property
+    def refused(self):
+        return (self.header.flags & REFUSED_SOME) != 0
+
+    def spend(self, double seconds):
+        self.engine.spend(round(seconds * 1e9))
+
+    def __repr__(self):
+        return f"Cycle(number={self.number}, time={self.time:.6f}, ok={self.ok})"
+
+
+cdef class Iteration:
+    def __init__(self, Engine engine not None, judge, *, uint32_t trouble, int al_status):
+        self.engine = engine
+        self.judge = judge
+        self.trouble = trouble
+        self.al_status = al_status
+
+    def __iter__(self):
+        return self
+
+    def __next__(self):
+        cdef uint32_t flags
+        if self.cycle is None:
+            # The first cycle commits nothing: the body has not said anything yet.
+            flags = self.engine.run(1)
+            self.cycle = Cycle(self.engine)
+        else:
+            flags = self.engine.step()
+        if flags & self.trouble or self.cycle.header.al_status != self.al_status:
+            self.judge(flags)
+        return self.cycle
