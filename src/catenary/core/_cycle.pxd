@@ -89,6 +89,8 @@ cdef struct cycle_t:
 
 cdef void cycle_start(cycle_t *c) noexcept nogil
 cdef int cycle_wait(cycle_t *c) noexcept nogil
+cdef int cycle_sleep(cycle_t *c, int64_t lead) noexcept nogil
+cdef void cycle_open(cycle_t *c) noexcept nogil
 cdef void cycle_threaded(cycle_t *c) noexcept nogil
 cdef void cycle_law(cycle_t *c) noexcept nogil
 cdef void cycle_inputs(cycle_t *c, actual_t *actual) noexcept nogil

@@ -89,20 +89,33 @@ cdef inline void skip(cycle_t *c, int64_t instants) noexcept nogil:
 
 cdef int cycle_wait(cycle_t *c) noexcept nogil:
     """Waits for the next instant and opens its cycle. 0; -EINTR: call again; or -errno."""
+    cdef int rc = cycle_sleep(c, 0)
+    if rc == 0:
+        cycle_open(c)
+    return rc
+
+
+cdef int cycle_sleep(cycle_t *c, int64_t lead) noexcept nogil:
+    """Sleeps until `lead` before the next instant. 0; -EINTR: call again; or -errno."""
     cdef int64_t present = now(c)
     cdef int rc
     if present > c.next:
         skip(c, (present - c.next + c.period - 1) // c.period)
-    rc = c.link.wait_until(c.link.self, c.next, 0)
+    rc = c.link.wait_until(c.link.self, c.next - lead, 0)
     if rc < 0:
         return rc
-    present = now(c)
-    if present < c.next:
-        return -EINTR
+    return 0 if now(c) >= c.next - lead else -EINTR
+
+
+cdef void cycle_open(cycle_t *c) noexcept nogil:
+    """Opens the cycle of the next instant, as soon as it is there: what is left of the lead is
+    waited for without sleep."""
+    cdef int64_t present = now(c)
+    while present < c.next:
+        present = now(c)
     if present - c.next >= c.period:
         skip(c, (present - c.next) // c.period)
     begin(c, present)
-    return 0
 
 
 cdef void begin(cycle_t *c, int64_t wake) noexcept nogil:

@@ -1,5 +1,7 @@
 """Engine: owns everything a cyclic exchange needs, and is the only way in from Python."""
 
+from collections.abc import Callable
+
 class Engine:
     """Owns one cyclic exchange: frames, buffers, lane, histograms and, where the plan's order is
     threaded or law, its native thread. The thread that iterates is the only one that may call
@@ -127,6 +129,10 @@ class Engine:
 
     def lane_wait(self, timeout_ns: int) -> bool:
         """Waits, without the GIL, until a frame can be popped: True; or `timeout_ns`: False."""
+
+    def set_rehearsal(self, rehearsal: Callable[[], object] | None) -> None:
+        """inline with a lead (`lead_ns` of the plan): called between waking and the instant, when at
+        least a third of the lead is left; what it raises comes out of `next`."""
 
     # For the law order; step 2 compiles laws, the place is here.
     def set_law(self, law: object) -> None:

@@ -27,7 +27,9 @@ from catenary.core._cycle cimport (
     STOPPED,
     cycle_inputs,
     cycle_law,
+    cycle_open,
     cycle_outputs,
+    cycle_sleep,
     cycle_start,
     cycle_t,
     cycle_threaded,
@@ -125,8 +127,11 @@ cdef class Engine:
             raise ValueError(f"priority: {plan.priority}, must be 1 to 99 or None")
         if plan.cpu is not None and not 0 <= plan.cpu < 1024:
             raise ValueError(f"cpu: {plan.cpu}")
+        if not 0 <= plan.lead_ns < plan.period_ns:
+            raise ValueError(f"lead_ns: {plan.lead_ns}, must be less than the period")
         self.e.thread.priority = plan.priority or 0
         self.e.thread.cpu = -1 if plan.cpu is None else plan.cpu
+        self.lead = plan.lead_ns
         self.frames = Frames(plan, link)
         self.lane = Lane(plan.period_ns)
         self.axes = Axes(plan)
@@ -238,24 +243,27 @@ cdef class Engine:
             self.emitted = True
 
     cdef int inline_inputs(self) except -1:
-        """The wait, and the half of the cycle behind it, in Python's thread."""
+        """The wait, and the half of the cycle behind it, in Python's thread. With a lead it wakes
+        ahead of the instant, takes the GIL back and calls the rehearsal, if there is time: then
+        what Python needs next is in the caches when the inputs come."""
         cdef cycle_t *c = &self.e.cycle
         cdef int rc
         while True:
             if self.virtual:
-                rc = cycle_wait(c)
-                if rc == 0:
-                    cycle_inputs(c, &self.h.actual[PRIVATE])
+                rc = cycle_sleep(c, 0)
             else:
                 with nogil:
-                    rc = cycle_wait(c)
-                    if rc == 0:
-                        cycle_inputs(c, &self.h.actual[PRIVATE])
+                    rc = cycle_sleep(c, self.lead)
             if rc == 0:
-                cycle_usable(c)
-                self.emitted = False
-                return 0
+                break
             self.interrupted(rc)
+        if self.rehearsal is not None and 3 * (c.next - self.now_ns()) > self.lead > 0:
+            self.rehearsal()
+        cycle_open(c)
+        cycle_inputs(c, &self.h.actual[PRIVATE])
+        cycle_usable(c)
+        self.emitted = False
+        return 0
 
     cdef int lockstep(self) except -1:
         """One cycle of an order that has its own thread in real time, in the caller's here."""
@@ -559,6 +567,9 @@ cdef class Engine:
 
     def lane_wait(self, int64_t timeout_ns):
         return self.lane.wait(timeout_ns)
+
+    def set_rehearsal(self, rehearsal):
+        self.rehearsal = rehearsal
 
     # ---- law
 

@@ -22,6 +22,7 @@ from catenary.core import (
 from catenary.errors import CatenaryError, DriveError, LoopError
 from catenary.loop.buffers import bind_wishes
 from catenary.loop.diagnosis import IN_FAULT, AxisTrouble, drive_error, silence_error, state_error
+from catenary.loop.rehearsal import make_rehearsal
 from catenary.loop.service import Service
 from catenary.loop.signals import SignalGuard
 from catenary.plan.make import Plan
@@ -49,6 +50,8 @@ class Running:
         self.plan = plan
         self.engine = Engine(plan.cycle, main.link.capsule)
         self.views = bind_wishes(wishes, plan.tables, self.engine.buffers)
+        if plan.cycle.lead_ns:
+            self.engine.set_rehearsal(make_rehearsal(self.views))
         self.service = Service(self.engine)
         self._attached = ExitStack()
         self._stations = [sub.station for sub in main.subs]

@@ -49,13 +49,15 @@ def make_plan(
     late_limit_position: float = 0.050,
     late_limit_velocity: float = 0.010,
     stop_deadline: float = 2.0,
+    lead: float = 0.0,
     cpu: int | None = None,
     priority: int | None = 80,
 ) -> Plan:
     """The plan that fulfils all wishes, or an error that names the object that cannot be.
 
     `period` [s]; `watchdog` [s] of process data, None: off; `collect_share`: when threaded,
-    the part of the period in which frames may come back; `late_limit_*`, `stop_deadline` [s].
+    the part of the period in which frames may come back; `late_limit_*`, `stop_deadline` [s];
+    `lead` [s]: when inline, awake that long before the instant.
     """
     period_ns = round(period * 1e9)
     if period_ns <= 0:
@@ -86,6 +88,7 @@ def make_plan(
         late_limit_position_ns=round(late_limit_position * 1e9),
         late_limit_velocity_ns=round(late_limit_velocity * 1e9),
         stop_deadline_ns=round(stop_deadline * 1e9),
+        lead_ns=round(lead * 1e9),
         cpu=cpu,
         priority=priority,
     )
