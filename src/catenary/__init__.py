@@ -19,7 +19,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from catenary import types
+    from catenary import realtime, types
     from catenary.bus import SubDevice
     from catenary.drive import Drives, Inputs, Outputs
     from catenary.errors import CatenaryError
@@ -51,6 +51,7 @@ __all__ = [
     "Segment",
     "Servo",
     "SubDevice",
+    "realtime",
     "types",
 ]
 
@@ -69,7 +70,7 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> object:
-    if name in ("errors", "types"):
+    if name in ("errors", "realtime", "types"):
         return import_module(f"catenary.{name}")
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -118,3 +118,16 @@ class WorkingCounterError(LoopError):
 
 class DriveError(LoopError):
     """A drive is in fault or cannot be enabled."""
+
+
+class RealtimeError(CatenaryError):
+    """The machine does not give what real time needs: says what, and how to get it."""
+
+
+class TaskError(RealtimeError):
+    """A task raised, died, missed a deadline that stops it, or would not end."""
+
+    def __init__(self, message: str, *, task: str, exit_code: int | None = None, hint: str = ""):
+        super().__init__(message, hint=hint)
+        self.task = task
+        self.exit_code = exit_code

@@ -1,4 +1,4 @@
-/* Waiting for a 32-bit word to change, across threads (private futex, CLOCK_MONOTONIC). */
+/* Waiting for a 32-bit word to change, across threads or processes (CLOCK_MONOTONIC). */
 #ifndef CATENARY_FUTEX_H
 #define CATENARY_FUTEX_H
 
@@ -18,6 +18,19 @@ static inline int cat_futex_wait(uint32_t *word, uint32_t value, int64_t timeout
 
 static inline void cat_futex_wake(uint32_t *word) {
     syscall(SYS_futex, word, FUTEX_WAKE_PRIVATE, 0x7fffffff, 0, 0, 0);
+}
+
+/* The same for a word in memory that processes share, until an absolute `deadline_ns`
+ * (INT64_MAX: for ever). As punctual as clock_nanosleep, and it can be woken. */
+static inline int cat_futex_wait_shared(uint32_t *word, uint32_t value, int64_t deadline_ns) {
+    struct timespec until = {deadline_ns / 1000000000, deadline_ns % 1000000000};
+    struct timespec *timeout = deadline_ns == INT64_MAX ? 0 : &until;
+    if (syscall(SYS_futex, word, FUTEX_WAIT_BITSET, value, timeout, 0, FUTEX_BITSET_MATCH_ANY) == 0) return 0;
+    return errno == EAGAIN ? 0 : -errno;
+}
+
+static inline void cat_futex_wake_shared(uint32_t *word) {
+    syscall(SYS_futex, word, FUTEX_WAKE, 0x7fffffff, 0, 0, 0);
 }
 
 #endif

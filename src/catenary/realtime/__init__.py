@@ -1,5 +1,76 @@
-"""The operating system: private networks, real-time scheduling, children. Imports no NumPy.
+"""Real time from Python: tasks with fixed priorities, their analysis, a clock that can be virtual;
+private networks, scheduling, children. Imports no NumPy before it is used.
 
-`private_network` runs a program in a network namespace of its own, `scheduling` asks for
-real-time scheduling and says what was obtained, `child` starts programs that end with us.
+    def control(task, gain):
+        for job in task:            # every 2 ms, until it is to end
+            ...
+
+    with realtime.Tasks(realtime.Task(control, (0.5,), period=2e-3, priority=90)) as tasks:
+        tasks.join(60.0)
+    print(tasks)
 """
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from catenary.realtime.analysis import Demand, Verdict, analyse
+    from catenary.realtime.analysis_file import read_demands
+    from catenary.realtime.clock import Participant, VirtualClock
+    from catenary.realtime.exchange import Queue, Value
+    from catenary.realtime.preparation import Session, session
+    from catenary.realtime.running import Job, Running
+    from catenary.realtime.statistics import Statistics
+    from catenary.realtime.task import Task
+    from catenary.realtime.tasks import Tasks
+    from catenary.realtime.trigger import Signal
+
+__all__ = [
+    "Demand",
+    "Job",
+    "Participant",
+    "Queue",
+    "Running",
+    "Session",
+    "Signal",
+    "Statistics",
+    "Task",
+    "Tasks",
+    "Value",
+    "Verdict",
+    "VirtualClock",
+    "analyse",
+    "read_demands",
+    "session",
+]
+
+_HOMES = {
+    "Demand": "analysis",
+    "Job": "running",
+    "Participant": "clock",
+    "Queue": "exchange",
+    "Running": "running",
+    "Session": "preparation",
+    "Signal": "trigger",
+    "Statistics": "statistics",
+    "Task": "task",
+    "Tasks": "tasks",
+    "Value": "exchange",
+    "Verdict": "analysis",
+    "VirtualClock": "clock",
+    "analyse": "analysis",
+    "read_demands": "analysis_file",
+    "session": "preparation",
+}
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

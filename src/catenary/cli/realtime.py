@@ -1,0 +1,83 @@
+"""`catenary realtime analyse FILE.toml`: whether tasks of fixed priority meet their deadlines."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from catenary.cli.failure import FAILED
+from catenary.cli.parsers import Commands, add_command, add_json
+
+if TYPE_CHECKING:
+    from catenary.realtime import Verdict
+
+EXAMPLE = """\
+cat > tasks.toml <<END
+[[task]]
+name = "control"
+period = 0.001      # [s]
+execution = 0.0002
+priority = 90       # greater is higher
+[[task]]
+name = "log"
+period = 0.1
+execution = 0.03
+priority = 10
+END
+catenary realtime analyse tasks.toml"""
+
+
+def add_parser(commands: Commands) -> None:
+    group = add_command(
+        commands,
+        "realtime",
+        help="tasks with deadlines",
+        description="Tasks with fixed priorities.",
+        example="catenary realtime analyse tasks.toml",
+    ).add_subparsers(title="commands", metavar="COMMAND", required=True)
+    parser = add_command(
+        group,
+        "analyse",
+        help="whether all deadlines hold",
+        description="Response-time analysis for fixed priorities. Each [[task]] has name, period "
+        "and execution, and may have deadline, blocking, jitter (seconds), priority (without any: "
+        "the shorter the deadline, the higher) and cpu. Exit status 1: a deadline can be missed.",
+        example=EXAMPLE,
+    )
+    parser.add_argument("file", metavar="FILE.toml", help="the tasks")
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from catenary.realtime import analyse, read_demands
+
+    verdict = analyse(read_demands(arguments.file))
+    print(as_json(verdict) if arguments.json else verdict)
+    return 0 if verdict.schedulable else FAILED
+
+
+def as_json(verdict: Verdict) -> str:
+    """Times in seconds; a response of null has no bound."""
+    import json
+
+    return json.dumps(
+        {
+            "schedulable": verdict.schedulable,
+            "utilisation": verdict.utilisation,
+            "hyperperiod": verdict.hyperperiod,
+            "tasks": [
+                {
+                    "name": task.name,
+                    "priority": task.priority,
+                    "period": task.period,
+                    "execution": task.execution,
+                    "deadline": task.deadline,
+                    "response": task.response,
+                    "in_time": task.in_time,
+                }
+                for task in verdict.responses
+            ],
+        },
+        indent=2,
+    )

@@ -1,0 +1,35 @@
+"""Values and queues between tasks, as bytes: neither side ever waits for the other."""
+
+from typing_extensions import Buffer
+
+def value_size(size: int) -> int:
+    """Bytes of memory for a value of `size` bytes."""
+
+def queue_size(size: int, length: int) -> int:
+    """Bytes of memory for a queue of `length` records of `size` bytes."""
+
+class ValueCore:
+    """A value in shared memory that was zeros at first; ValueError: bytes of another size."""
+
+    writer: int
+    def __init__(self, memory: Buffer, size: int) -> None: ...
+    @property
+    def number(self) -> int: ...
+    def write(self, data: Buffer) -> None: ...
+    def read(self, into: Buffer) -> int:
+        """The number of the value copied; -1: overwritten at every try."""
+
+class QueueCore:
+    """A queue in shared memory that was zeros at first; ValueError: bytes of another size."""
+
+    producer: int
+    consumer: int
+    def __init__(self, memory: Buffer, size: int, length: int, overwrite: bool) -> None: ...
+    @property
+    def waiting(self) -> int: ...
+    @property
+    def refused(self) -> int: ...
+    @property
+    def lost(self) -> int: ...
+    def put(self, data: Buffer) -> bool: ...
+    def take(self, into: Buffer) -> bool: ...

@@ -1,0 +1,248 @@
+"""Response-time analysis of tasks with fixed priorities that preempt one another.
+
+Joseph and Pandya, "Finding response times in a real-time system", 1986, and its extension to
+release jitter, blocking and arbitrary deadlines: Tindell, Burns and Wellings, "An extendible
+approach for analysing fixed priority hard real-time tasks", 1994, equations 12 to 16:
+
+    w(q) = (q + 1) C + B + sum over j, of no lower priority: ceil((w(q) + Jj) / Tj) Cj
+    R    = max over q = 0, 1, ... of  J + w(q) - q T,  until job q ends before its next release
+
+Tasks of equal priority count as if each were the higher one: SCHED_FIFO serves them in the order
+of their releases, so none waits longer than that. All sums are integers, in nanoseconds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+MOST_STEPS = 1_000_000  # of the iteration, for one task; reached only where load is close to 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Demand:
+    """What a task asks of its processor. Times in [s].
+
+    execution: the longest of one job.
+    deadline: after the release; None: the period. It may be longer than the period.
+    blocking: the longest time a task of lower priority keeps it waiting.
+    jitter: the longest delay of its release behind the period's instants.
+    priority: greater is higher; None for all tasks: the shorter the deadline, the higher.
+    cpu: its processor; None for all: there is one.
+    """
+
+    name: str
+    period: float
+    execution: float
+    deadline: float | None = None
+    blocking: float = 0.0
+    jitter: float = 0.0
+    priority: int | None = None
+    cpu: int | None = None
+
+    def __post_init__(self) -> None:
+        for what, seconds in (("period", self.period), ("deadline", self.deadline)):
+            if seconds is not None and not (math.isfinite(seconds) and round(seconds * 1e9) > 0):
+                raise ValueError(f"task {self.name!r}: a {what} of {seconds} s is not positive")
+        for what, seconds in (
+            ("execution", self.execution),
+            ("blocking", self.blocking),
+            ("jitter", self.jitter),
+        ):
+            if not math.isfinite(seconds) or seconds < 0:
+                raise ValueError(f"task {self.name!r}: {what} of {seconds} s is negative")
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """The longest response of one task [s]; None: there is no bound."""
+
+    name: str
+    priority: int
+    period: float
+    execution: float
+    deadline: float
+    response: float | None
+
+    @property
+    def in_time(self) -> bool:
+        return self.response is not None and self.response <= self.deadline
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """Whether all deadlines hold. `utilisation`: of the busiest processor; `hyperperiod` [s]."""
+
+    utilisation: float
+    hyperperiod: float
+    responses: tuple[Response, ...]  # highest priority first
+
+    @property
+    def schedulable(self) -> bool:
+        return all(response.in_time for response in self.responses)
+
+    def __str__(self) -> str:
+        lines = [f"{'task':16}{'priority':>9}" + "".join(f"{name:>14}" for name in COLUMNS)]
+        lines += [as_line(response) for response in self.responses]
+        word = "schedulable" if self.schedulable else "NOT schedulable"
+        lines.append(
+            f"{word}: utilisation {self.utilisation:.1%}, hyperperiod {self.hyperperiod * 1e3:g} ms"
+        )
+        return "\n".join(lines)
+
+
+COLUMNS = ("period [ms]", "execution", "deadline", "response")
+
+
+def as_line(response: Response) -> str:
+    times = (response.period, response.execution, response.deadline)
+    found = "unbounded" if response.response is None else f"{response.response * 1e3:.3f}"
+    mark = "" if response.in_time else "  MISSED"
+    return (
+        f"{response.name:16}{response.priority:9d}"
+        + "".join(f"{seconds * 1e3:14.3f}" for seconds in times)
+        + f"{found:>14}{mark}"
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """A demand in whole nanoseconds."""
+
+    period: int
+    execution: int
+    deadline: int
+    blocking: int
+    jitter: int
+
+
+def analyse(demands: Sequence[Demand]) -> Verdict:
+    """The verdict on tasks that share a processor, or each have theirs. ValueError: no tasks, two
+    of one name, or a priority or processor given for some and not for others."""
+    check(demands)
+    ranked = sorted(with_priorities(demands), key=lambda demand: -rank(demand))
+    responses = []
+    for demand in ranked:
+        above = [
+            as_load(other)
+            for other in ranked
+            if other is not demand and other.cpu == demand.cpu and rank(other) >= rank(demand)
+        ]
+        found = longest_response(as_load(demand), above)
+        responses.append(
+            Response(
+                demand.name,
+                rank(demand),
+                demand.period,
+                demand.execution,
+                deadline_of(demand),
+                None if found is None else found * 1e-9,
+            )
+        )
+    return Verdict(utilisation(demands), hyperperiod(demands), tuple(responses))
+
+
+def check(demands: Sequence[Demand]) -> None:
+    if not demands:
+        raise ValueError("there are no tasks to analyse")
+    names = [demand.name for demand in demands]
+    for name in names:
+        if names.count(name) > 1:
+            raise ValueError(f"two tasks are called {name!r}")
+    for what in ("priority", "cpu"):
+        missing = [demand.name for demand in demands if getattr(demand, what) is None]
+        if missing and len(missing) < len(demands):
+            raise ValueError(
+                f"task {missing[0]!r} has no {what}, others have one: give all of them one, or none"
+            )
+
+
+def with_priorities(demands: Sequence[Demand]) -> list[Demand]:
+    """Deadline-monotonic where none are given: optimal for deadlines up to the period."""
+    if demands[0].priority is not None:
+        return list(demands)
+    deadlines = sorted({deadline_of(demand) for demand in demands}, reverse=True)
+    return [
+        replace(demand, priority=deadlines.index(deadline_of(demand)) + 1) for demand in demands
+    ]
+
+
+def rank(demand: Demand) -> int:
+    assert demand.priority is not None  # with_priorities
+    return demand.priority
+
+
+def deadline_of(demand: Demand) -> float:
+    return demand.period if demand.deadline is None else demand.deadline
+
+
+def as_load(demand: Demand) -> Load:
+    seconds = (
+        demand.period,
+        demand.execution,
+        deadline_of(demand),
+        demand.blocking,
+        demand.jitter,
+    )
+    return Load(*(round(value * 1e9) for value in seconds))
+
+
+def utilisation(demands: Sequence[Demand]) -> float:
+    """Of the busiest processor, from 0 to 1 and above."""
+    processors = {demand.cpu for demand in demands}
+    return max(
+        math.fsum(demand.execution / demand.period for demand in demands if demand.cpu == cpu)
+        for cpu in processors
+    )
+
+
+def hyperperiod(demands: Sequence[Demand]) -> float:
+    """[s] after which the pattern of releases repeats."""
+    return math.lcm(*(as_load(demand).period for demand in demands)) * 1e-9
+
+
+def longest_response(task: Load, above: Sequence[Load]) -> int | None:
+    """[ns]; None: no bound, or none found within a million steps."""
+    loads = (task, *above)
+    if not bounded(loads):
+        return None
+    longest, window, steps = 0, task.blocking + task.execution, 0
+    for job in range(MOST_STEPS):
+        window = max(window, task.blocking + (job + 1) * task.execution)
+        while (needed := demand_within(window, job, task, above)) != window:
+            window = needed
+            steps += 1
+            if steps > MOST_STEPS:
+                return None
+        longest = max(longest, task.jitter + window - job * task.period)
+        if window + task.jitter <= (job + 1) * task.period:
+            return longest
+        if exactly_full(loads) and (job + 1) * task.period >= repeat_after(loads):
+            return longest  # from here on the responses repeat
+        window += task.execution
+    return None
+
+
+def demand_within(window: int, job: int, task: Load, above: Sequence[Load]) -> int:
+    """What must be computed before the job of this number is done."""
+    return (
+        (job + 1) * task.execution
+        + task.blocking
+        + sum(-(-(window + other.jitter) // other.period) * other.execution for other in above)
+    )
+
+
+def bounded(loads: Sequence[Load]) -> bool:
+    """Load up to 1, exactly."""
+    span = repeat_after(loads)
+    return sum(span // load.period * load.execution for load in loads) <= span
+
+
+def exactly_full(loads: Sequence[Load]) -> bool:
+    span = repeat_after(loads)
+    return sum(span // load.period * load.execution for load in loads) == span
+
+
+def repeat_after(loads: Sequence[Load]) -> int:
+    return math.lcm(*(load.period for load in loads))

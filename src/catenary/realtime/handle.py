@@ -1,0 +1,110 @@
+"""Handle: one running task, seen by whoever started it."""
+
+from __future__ import annotations
+
+from catenary.errors import TaskError
+from catenary.realtime._task import BLOCK_SIZE, ENDED, FAILED, NEW, Block
+from catenary.realtime.clock import VirtualClock
+from catenary.realtime.memory import SharedMemory
+from catenary.realtime.place import Place
+from catenary.realtime.statistics import Statistics, read_histogram, read_statistics
+from catenary.realtime.task import Task, check_period
+
+
+class Handle:
+    """Owns the memory of one task."""
+
+    def __init__(self, task: Task, clock: VirtualClock | None) -> None:
+        participant = None
+        if clock is not None:
+            participant = clock.participate(priority=task.priority or 0, cpu=task.cpu or 0)
+        self.task = task
+        self.place = Place(SharedMemory(BLOCK_SIZE), participant)
+        self.block = Block(self.place.memory.buffer)
+        self.block.prepare(
+            check_period(task.name, "period", task.period),
+            0 if task.deadline is None else round(task.deadline * 1e9),
+            task.trigger is not None,
+            task.on_miss == "skip",
+        )
+        self._timer = self.place.open_timer()
+
+    @property
+    def name(self) -> str:
+        return self.task.name
+
+    @property
+    def running(self) -> bool:
+        return self.block.state not in (ENDED, FAILED)
+
+    @property
+    def process(self) -> int:
+        """Its process; 0 before it has started."""
+        return self.block.process
+
+    @property
+    def period(self) -> float:
+        """[s]. Set it to change the time between releases while the task runs."""
+        return self.block.period_ns * 1e-9
+
+    @period.setter
+    def period(self, seconds: float) -> None:
+        self.block.period_ns = check_period(self.name, "period", seconds)
+        self._timer.wake()
+
+    @property
+    def statistics(self) -> Statistics:
+        return read_statistics(self.name, self.block)
+
+    def histogram(self, figure: str) -> list[tuple[float, float, int]]:
+        """(lowest, lowest above, jobs) of each bucket of a figure of `statistics`; times in [s]."""
+        return read_histogram(self.block, figure)
+
+    def stop(self) -> None:
+        """The task ends when it next waits."""
+        self.block.stop()
+        self._timer.wake()
+
+    def make_ready_again(self) -> None:
+        """For a restart: the next release is the first that has not passed."""
+        self.block.restart()
+        self.block.skip_to(self._timer.now_ns)
+        if self.place.participant is not None:
+            self.place.participant.expect()
+
+    def leave(self) -> None:
+        """Its worker is gone, or will never be."""
+        if self.place.participant is not None:
+            self.place.participant.leave()
+        if self.running:
+            self.block.state = FAILED
+
+    def failure(self, exit_code: int | None) -> TaskError | None:
+        """Why its worker ended, if it should not have."""
+        if self.block.state == ENDED:
+            return None
+        if self.block.state == FAILED:
+            message = f"{self.task}{self._where()}: {self.block.failure}"
+            return TaskError(message, task=self.name, exit_code=exit_code)
+        return TaskError(
+            f"{self.task} (process {self.process}) {how_it_died(exit_code)}{self._where()}",
+            task=self.name,
+            exit_code=exit_code,
+            hint='on_failure="restart" starts such a task again; '
+            "SIGKILL comes from somebody, or from the kernel out of memory (dmesg)",
+        )
+
+    def _where(self) -> str:
+        if self.block.state == NEW or not self.block.counts[0]:
+            return " before its first job"
+        released = (self.block.release_ns - self.block.origin_ns) * 1e-9
+        inside = "in" if self.block.busy else "after"
+        return f" {inside} job {self.block.number}, released at {released:.6f} s"
+
+
+def how_it_died(exit_code: int | None) -> str:
+    if exit_code is not None and exit_code < 0:
+        import signal
+
+        return f"was killed by {signal.Signals(-exit_code).name}"
+    return f"ended with exit status {exit_code}"

@@ -1,0 +1,151 @@
+"""`with realtime.session():` a process prepared for real time; all is undone at the end."""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import os
+import struct
+import sys
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+from catenary.errors import RealtimeError
+from catenary.realtime import libc
+from catenary.realtime._stack import touch_stack
+from catenary.realtime.scheduling import lock_all_memory, locked_kilobytes
+
+TOUCHED_STACK = 128 * 1024  # [bytes], as the core's own thread does
+LATENCY_DEVICE = "/dev/cpu_dma_latency"
+SET_CAPABILITIES = "sudo setcap cap_net_raw,cap_sys_nice,cap_ipc_lock=ep .venv/bin/python"
+
+HOW_TO_GET = {
+    "locked memory": f"run as root, or once: {SET_CAPABILITIES}; or `ulimit -l unlimited` by a "
+    "memlock line in /etc/security/limits.d",
+    "CPU latency": f"run as root, or let a udev rule open {LATENCY_DEVICE}: KERNEL=="
+    '"cpu_dma_latency", MODE="0660", GROUP="realtime"',
+    "heap": "glibc has the calls it takes",
+    "timer slack": "Linux 2.6.28 or newer has it",
+}
+
+Undo = contextlib.ExitStack
+
+
+class Session:
+    """Owns what a process has asked of the machine, from `with` to its end."""
+
+    def __init__(self, heap_size: int, switch_interval: float, best_effort: bool) -> None:
+        if heap_size < 0:
+            raise ValueError(f"a heap of {heap_size} bytes is negative")
+        if not 1e-6 <= switch_interval <= 1.0:
+            raise ValueError(f"a switch interval of {switch_interval} s is not within 1e-6 to 1")
+        self.heap_size = heap_size
+        self.switch_interval = switch_interval
+        self.best_effort = best_effort
+        self.refusals: tuple[str, ...] = ()
+        self._undo: Undo | None = None
+
+    def __reduce__(self) -> tuple[type[Session], tuple[int, float, bool]]:
+        return Session, (self.heap_size, self.switch_interval, self.best_effort)
+
+    def __enter__(self) -> Self:
+        if self._undo is not None:
+            raise RuntimeError("this session has begun already")
+        with contextlib.ExitStack() as undo:
+            refused = list(filter(None, (attempt(*step, undo) for step in self._steps())))
+            if refused and not self.best_effort:
+                raise RealtimeError(
+                    "; ".join(f"{what} refused ({why})" for what, why in refused),
+                    hint="; ".join(f"{what}: {HOW_TO_GET[what]}" for what, _ in refused)
+                    + "; or best_effort=True does without",
+                )
+            self.refusals = tuple(f"{what} refused ({why})" for what, why in refused)
+            self._undo = undo.pop_all()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        undo, self._undo = self._undo, None
+        if undo is not None:
+            undo.close()
+
+    def _steps(self) -> list[tuple[str, Callable[[Undo], None]]]:
+        return [
+            ("garbage collector", freeze_collector),
+            ("switch interval", self._change_switch_interval),
+            ("heap", self._keep_heap),
+            ("timer slack", sharpen_timers),
+            ("CPU latency", hold_latency),
+            ("locked memory", lock_memory),
+        ]
+
+    def _change_switch_interval(self, undo: Undo) -> None:
+        """How long a Python thread may keep the interpreter from another: 5 ms at first."""
+        undo.callback(sys.setswitchinterval, sys.getswitchinterval())
+        sys.setswitchinterval(self.switch_interval)
+
+    def _keep_heap(self, undo: Undo) -> None:
+        """What is freed stays ours, and is touched once: no page faults from malloc."""
+        undo.callback(libc.trim_heap)
+        undo.callback(libc.change_malloc, libc.TRIM_THRESHOLD, libc.MMAP_MAX)
+        libc.change_malloc(-1, 0)
+        libc.touch_heap(self.heap_size)
+
+
+def session(
+    *, heap_size: int = 16 * 2**20, switch_interval: float = 1e-4, best_effort: bool = False
+) -> Session:
+    """Prepares this process: memory locked and touched, the garbage collector frozen and off,
+    precise timers of this thread and those it starts, processors kept from deep sleep, a short
+    switch interval [s], `heap_size` bytes of heap that malloc keeps.
+
+    What could not be had is a RealtimeError that says how to get it; with `best_effort` it is in
+    `refusals`. All that it changed is undone at the end.
+    """
+    return Session(heap_size, switch_interval, best_effort)
+
+
+def attempt(what: str, step: Callable[[Undo], None], undo: Undo) -> tuple[str, str] | None:
+    """What was refused and why; nothing is left of a step that failed."""
+    try:
+        with contextlib.ExitStack() as own:
+            step(own)
+            undo.push(own.pop_all())
+    except OSError as error:
+        return what, error.strerror or str(error)
+    return None
+
+
+def freeze_collector(undo: Undo) -> None:
+    """What is there now is never looked at again, and nothing is collected until the end."""
+    if gc.isenabled():
+        undo.callback(gc.enable)
+    if gc.get_freeze_count() == 0:
+        undo.callback(gc.unfreeze)
+        gc.collect()
+        gc.freeze()
+    gc.disable()
+
+
+def sharpen_timers(undo: Undo) -> None:
+    undo.callback(libc.change_timer_slack, libc.timer_slack_ns())
+    libc.change_timer_slack(1)
+
+
+def hold_latency(undo: Undo) -> None:
+    """Processors stay awake for as long as the device is open: kernel's PM QoS interface."""
+    device = os.open(LATENCY_DEVICE, os.O_WRONLY)
+    undo.callback(os.close, device)
+    os.write(device, struct.pack("=i", 0))
+
+
+def lock_memory(undo: Undo) -> None:
+    touch_stack(TOUCHED_STACK)
+    if locked_kilobytes() == 0:
+        undo.callback(libc.unlock_all_memory)
+    lock_all_memory()

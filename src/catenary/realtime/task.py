@@ -1,0 +1,113 @@
+"""Task: what is to run, how often and how important it is. A value; `Tasks` runs it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+if TYPE_CHECKING:
+    from catenary.realtime.running import Job
+    from catenary.realtime.trigger import Signal
+
+OnMiss: TypeAlias = "Literal['count', 'skip', 'stop'] | Callable[[Job], object]"
+OnFailure: TypeAlias = Literal["stop", "restart", "continue"]
+
+SHORTEST_PERIOD = 20e-6  # [s] a wake-up alone takes several microseconds
+LONGEST_PERIOD = 1e6
+PRIORITIES = range(1, 100)  # SCHED_FIFO on Linux, sched(7)
+SMALLEST_STACK = 32 * 1024  # threading.stack_size
+PAGE = 4096
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """A function that is run as a task: `function(task, *arguments)` with `for job in task:`.
+
+    period: [s] from release to release; with a `trigger`: the least time between two.
+    name: in reports and errors; the function's where not given.
+    priority: 1..99, greater is higher (SCHED_FIFO); None: ordinary scheduling.
+    cpu: the processor it is bound to; None: any.
+    stack_size: [bytes], a multiple of 4096 from 32 KiB.
+    deadline: [s] after its release; None: the period.
+    trigger: a Signal makes the task sporadic: it sleeps until the signal is set.
+    on_miss: "count" the job and go on with the next release, late or not; "skip" the releases that
+        have passed; "stop" the task with an error; or call this with the job that ended late.
+    on_failure: when the task raises or its process dies: "stop" all tasks with an error, "restart"
+        it at its next release, or "continue" without it.
+    """
+
+    function: Callable[..., object]
+    arguments: tuple[object, ...] = ()
+    period: float = field(kw_only=True)
+    name: str = field(default="", kw_only=True)
+    priority: int | None = field(default=None, kw_only=True)
+    cpu: int | None = field(default=None, kw_only=True)
+    stack_size: int | None = field(default=None, kw_only=True)
+    deadline: float | None = field(default=None, kw_only=True)
+    trigger: Signal | None = field(default=None, kw_only=True)
+    on_miss: OnMiss = field(default="count", kw_only=True)
+    on_failure: OnFailure = field(default="stop", kw_only=True)
+
+    def __post_init__(self) -> None:
+        if not callable(self.function):
+            raise TypeError(f"the task's function is {self.function!r}, which cannot be called")
+        if not isinstance(self.arguments, tuple):
+            raise TypeError(f"arguments is a tuple, not {self.arguments!r}; one is (x,)")
+        if not self.name:
+            name = getattr(self.function, "__name__", type(self.function).__name__)
+            object.__setattr__(self, "name", name)
+        check_period(self.name, "period", self.period)
+        if self.deadline is not None:
+            check_period(self.name, "deadline", self.deadline)
+        check_place(self)
+        check_policies(self)
+
+    def __str__(self) -> str:
+        return f"task {self.name!r}"
+
+
+def check_period(task: str, what: str, seconds: float) -> int:
+    """In ns; ValueError: not positive, or beyond the machine."""
+    if isinstance(seconds, bool) or not isinstance(seconds, int | float):
+        raise TypeError(f"task {task!r}: {what} is a number of seconds, not {seconds!r}")
+    if not math.isfinite(seconds) or seconds <= 0:
+        raise ValueError(f"task {task!r}: a {what} of {seconds} s is not positive")
+    if seconds < SHORTEST_PERIOD:
+        raise ValueError(
+            f"task {task!r}: a {what} of {seconds * 1e6:g} us is beyond this machine, whose "
+            f"wake-ups take microseconds: the shortest is {SHORTEST_PERIOD * 1e6:g} us"
+        )
+    if seconds > LONGEST_PERIOD:
+        raise ValueError(
+            f"task {task!r}: a {what} of {seconds:g} s is longer than {LONGEST_PERIOD:g} s; "
+            "is it in seconds?"
+        )
+    return round(seconds * 1e9)
+
+
+def check_place(task: Task) -> None:
+    """Priority, processor and stack: what no machine has."""
+    if task.priority is not None and task.priority not in PRIORITIES:
+        raise ValueError(
+            f"{task}: priority {task.priority} is not within 1..99; None is ordinary scheduling"
+        )
+    if task.cpu is not None and (not isinstance(task.cpu, int) or not 0 <= task.cpu < 1024):
+        raise ValueError(f"{task}: CPU {task.cpu} does not exist")
+    size = task.stack_size
+    if size is not None and (size < SMALLEST_STACK or size % PAGE):
+        raise ValueError(
+            f"{task}: a stack of {size} bytes: it takes a multiple of {PAGE} from {SMALLEST_STACK}"
+        )
+
+
+def check_policies(task: Task) -> None:
+    if task.on_miss not in ("count", "skip", "stop") and not callable(task.on_miss):
+        raise ValueError(
+            f'{task}: on_miss is "count", "skip", "stop" or a function, not {task.on_miss!r}'
+        )
+    if task.on_failure not in ("stop", "restart", "continue"):
+        raise ValueError(
+            f'{task}: on_failure is "stop", "restart" or "continue", not {task.on_failure!r}'
+        )

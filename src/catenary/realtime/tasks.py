@@ -1,0 +1,205 @@
+"""Tasks: a set of tasks that run together, from their common start to their end.
+
+More than one task: each runs in a process of its own, because under one interpreter lock a task of
+low priority keeps one of high priority waiting, up to 5 ms for every hand-over.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator, Mapping
+from types import TracebackType
+from typing import Self
+
+from catenary.errors import TaskError
+from catenary.realtime._task import NEW
+from catenary.realtime.analysis import Verdict, analyse
+from catenary.realtime.clock import VirtualClock
+from catenary.realtime.handle import Handle
+from catenary.realtime.preparation import Session
+from catenary.realtime.runner import START_SECONDS, Work
+from catenary.realtime.statistics import as_table, measured_demand
+from catenary.realtime.supervisor import Supervisor
+from catenary.realtime.task import Task
+from catenary.realtime.worker import ProcessWorker, Run, ThreadWorker, Worker, check_importable
+
+LEAD_SECONDS = 0.01  # from the last task's start to the first release of all
+STOP_SECONDS = 5.0
+
+
+class Tasks:
+    """Owns running tasks: `with Tasks(a, b) as tasks:` starts them together, the end of the block
+    ends them. `tasks["a"]` is one of them; `print(tasks)` shows what their jobs took.
+
+    run: "processes" or "threads"; None: processes for more than one.
+    clock: a VirtualClock simulates them, by priority and processor (`cpu`; None counts as 0).
+    session: entered in each process (`realtime.session()`).
+    best_effort: priorities and processors that are refused are done without.
+    """
+
+    def __init__(
+        self,
+        *tasks: Task,
+        run: Run | None = None,
+        clock: VirtualClock | None = None,
+        session: Session | None = None,
+        best_effort: bool = False,
+    ) -> None:
+        check_set(tasks, run)
+        if clock is None:
+            check_cpus(tasks)
+        self.run: Run = run or ("processes" if len(tasks) > 1 else "threads")
+        self._tasks = tasks
+        self._clock = clock
+        self._session = session
+        self._best_effort = best_effort
+        self._handles: Mapping[str, Handle] = {}
+        self._supervisor: Supervisor | None = None
+
+    def __getitem__(self, name: str) -> Handle:
+        if name not in self._handles:
+            known = ", ".join(self._handles) or "none is running"
+            raise KeyError(f"there is no task {name!r}: {known}")
+        return self._handles[name]
+
+    def __iter__(self) -> Iterator[Handle]:
+        return iter(self._handles.values())
+
+    def __len__(self) -> int:
+        return len(self._tasks)
+
+    @property
+    def failures(self) -> tuple[TaskError, ...]:
+        """What went wrong so far, oldest first; also what was restarted or done without."""
+        return self._supervisor.failures if self._supervisor else ()
+
+    def start(self) -> None:
+        """Starts all tasks; their first release is at one instant, once all have started."""
+        if self._supervisor is not None:
+            raise RuntimeError("these tasks have been started already")
+        if self.run == "processes":
+            for task in self._tasks:
+                check_importable(task)
+        self._handles = {task.name: Handle(task, self._clock) for task in self._tasks}
+        for handle in self:
+            if handle.task.trigger is not None:
+                handle.task.trigger.bind(handle.place)
+        self._supervisor = Supervisor(self._handles, self._make_worker, self._wake_clock)
+        try:
+            if self.run == "threads" and self._session is not None:
+                self._supervisor.enter(self._session)
+            self._supervisor.start()
+            self._wait_for_all()
+        except BaseException:
+            self.stop(raising=False)
+            raise
+        origin = self._now_ns() + (0 if self._clock else round(LEAD_SECONDS * 1e9))
+        for handle in self:
+            handle.block.start_at(origin)
+
+    def join(self, seconds: float | None = None) -> bool:
+        """Waits until all tasks have ended, at most so long [s of the tasks' clock]. True: they
+        have. On a virtual clock this is where time passes. TaskError: a task failed."""
+        supervisor = self._started()
+        if self._clock is None:
+            ended = supervisor.wait(seconds)
+        elif seconds is None:
+            self._clock.home.step_aside()
+            ended = supervisor.wait(None)
+            self._clock.home.expect()
+        else:
+            self._clock.wait_until(self._clock.now_ns + round(seconds * 1e9))
+            ended = supervisor.wait(0.0)
+        supervisor.raise_failure()
+        return ended
+
+    def stop(self, seconds: float = STOP_SECONDS, *, raising: bool = True) -> None:
+        """Ends all tasks: they see it when they next wait. Processes that do not within `seconds`
+        are ended by SIGTERM, then SIGKILL. TaskError: a task failed, or would not end."""
+        supervisor = self._started()
+        supervisor.ask_to_stop()
+        if self._clock is not None:
+            self._clock.home.step_aside()
+        supervisor.end(seconds)
+        if self._clock is not None:
+            self._clock.home.expect()
+        if raising:
+            supervisor.raise_failure()
+
+    def verdict(self) -> Verdict:
+        """Whether these tasks are schedulable, by the longest execution times measured so far."""
+        return analyse([measured_demand(handle.task, handle.statistics) for handle in self])
+
+    def __str__(self) -> str:
+        return as_table(handle.statistics for handle in self)
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.stop(raising=error is None)
+
+    def _started(self) -> Supervisor:
+        if self._supervisor is None:
+            raise RuntimeError("these tasks have not been started: use `with Tasks(...)`")
+        return self._supervisor
+
+    def _make_worker(self, handle: Handle, supervisor: Supervisor) -> Worker:
+        work = Work(handle.task, handle.place, self._best_effort)
+        if self.run == "threads":
+            return ThreadWorker(work, supervisor.thread_ended)
+        return ProcessWorker(work, self._session)
+
+    def _wait_for_all(self) -> None:
+        deadline = time.monotonic_ns() + round(START_SECONDS * 1e9)
+        for handle in self:
+            while handle.block.state == NEW and time.monotonic_ns() < deadline:
+                handle.block.wait_while(NEW, time.monotonic_ns() + 50_000_000)
+                self._started().raise_failure()
+            if handle.block.state == NEW:
+                raise TaskError(
+                    f"{handle.task} did not start within {START_SECONDS:g} s", task=handle.name
+                )
+        self._started().raise_failure()
+
+    def _now_ns(self) -> int:
+        return time.monotonic_ns() if self._clock is None else self._clock.now_ns
+
+    def _wake_clock(self) -> None:
+        """A failure ends `join`."""
+        if self._clock is not None:
+            self._clock.home.wake()
+
+
+def check_set(tasks: tuple[Task, ...], run: Run | None) -> None:
+    if not tasks:
+        raise ValueError("no tasks: Tasks(task, ...)")
+    for task in tasks:
+        if not isinstance(task, Task):
+            raise TypeError(f"{task!r} is not a Task; Task(function, period=...) makes one")
+    names = [task.name for task in tasks]
+    for name in names:
+        if names.count(name) > 1:
+            raise ValueError(f"two tasks are called {name!r}: give them a `name`")
+    triggers = [task.trigger for task in tasks if task.trigger is not None]
+    if len(set(map(id, triggers))) < len(triggers):
+        raise ValueError("two tasks have the same trigger: a Signal releases one task")
+    if run not in (None, "processes", "threads"):
+        raise ValueError(f'run is "processes" or "threads", not {run!r}')
+
+
+def check_cpus(tasks: tuple[Task, ...]) -> None:
+    ours = os.sched_getaffinity(0)
+    for task in tasks:
+        if task.cpu is not None and task.cpu not in ours:
+            raise ValueError(
+                f"{task}: CPU {task.cpu} does not exist or is not ours; this process may use "
+                + ", ".join(map(str, sorted(ours)))
+            )

@@ -1,0 +1,239 @@
+/* Virtual time: a discrete-event simulation of fixed priorities, for threads and processes alike.
+ *
+ * The table lies in shared memory. Of all participants exactly one runs, in no time; it blocks by
+ * waiting for an instant or by spending execution time. Whoever blocks last decides who is next:
+ *  - who has just spent its time runs before anything is released at the same instant: a job that
+ *    is done when another begins was not preempted by it, as response-time analysis has it;
+ *  - what is due is released;
+ *  - on every processor the ready one of the highest priority is served, and stays so until it
+ *    waits or a higher one is released; equals are served in the order of their release
+ *    (SCHED_FIFO, sched(7));
+ *  - of those served that have nothing left to spend, the one of the highest priority runs;
+ *  - if there is none, time advances to the next release or end of spending.
+ * A robust mutex guards the table: a participant killed inside leaves it usable, and whoever
+ * notices the death calls vt_remove.
+ */
+#ifndef CATENARY_VIRTUAL_TIME_H
+#define CATENARY_VIRTUAL_TIME_H
+
+#include <errno.h>
+#include <pthread.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "atomics.h"
+#include "clock.h"
+#include "futex.h"
+
+#define VT_PARTICIPANTS 64
+#define VT_OWN_PROCESSOR (-1)
+
+enum {
+    VT_FREE,                          /* the slot is nobody's */
+    VT_EXPECTED,                      /* will come: time stands still until then */
+    VT_WAITING,                       /* for `due`, or to be woken */
+    VT_READY,                         /* wants its processor: to spend `remaining`, then to run */
+    VT_RUNNING,                       /* its code runs: time stands still */
+    VT_ASIDE,                         /* does other things; time goes on without it */
+};
+
+typedef struct vt_participant {
+    uint32_t turn;                    /* futex word: counts the turns it was given */
+    uint32_t seen;                    /* the turns it has taken */
+    uint32_t state;
+    uint32_t woken;
+    uint32_t spent;                   /* its time at this very instant: runs before any release */
+    int32_t priority;
+    int32_t cpu;                      /* VT_OWN_PROCESSOR: competes with nobody */
+    int64_t due;
+    int64_t remaining;
+    uint64_t order;                   /* of becoming ready, among equals */
+} vt_participant;
+
+typedef struct virtual_time {
+    pthread_mutex_t lock;
+    int64_t now;
+    uint64_t order;
+    vt_participant who[VT_PARTICIPANTS];
+} virtual_time;
+
+static int vt_init(virtual_time *v) {
+    pthread_mutexattr_t attributes;
+    int error = pthread_mutexattr_init(&attributes);
+    if (error) return error;
+    pthread_mutexattr_setpshared(&attributes, PTHREAD_PROCESS_SHARED);
+    pthread_mutexattr_setrobust(&attributes, PTHREAD_MUTEX_ROBUST);
+    error = pthread_mutex_init(&v->lock, &attributes);
+    pthread_mutexattr_destroy(&attributes);
+    return error;
+}
+
+static void vt_lock(virtual_time *v) {
+    if (pthread_mutex_lock(&v->lock) == EOWNERDEAD) pthread_mutex_consistent(&v->lock);
+}
+
+static void vt_unlock(virtual_time *v) { pthread_mutex_unlock(&v->lock); }
+
+static void vt_make_ready(virtual_time *v, vt_participant *p, int64_t remaining) {
+    p->state = VT_READY;
+    p->remaining = remaining;
+    p->order = ++v->order;
+}
+
+static int vt_precedes(const vt_participant *a, const vt_participant *b) {
+    if (a->spent != b->spent) return a->spent;
+    if (a->priority != b->priority) return a->priority > b->priority;
+    return a->order < b->order;
+}
+
+/* Is this one served by its processor? */
+static int vt_served(const virtual_time *v, const vt_participant *p) {
+    if (p->state != VT_READY) return 0;
+    if (p->cpu == VT_OWN_PROCESSOR) return 1;
+    for (int k = 0; k < VT_PARTICIPANTS; k++) {
+        const vt_participant *other = &v->who[k];
+        if (other->state == VT_READY && other->cpu == p->cpu && vt_precedes(other, p)) return 0;
+    }
+    return 1;
+}
+
+static int vt_time_stands(const virtual_time *v) {
+    for (int k = 0; k < VT_PARTICIPANTS; k++)
+        if (v->who[k].state == VT_RUNNING || v->who[k].state == VT_EXPECTED) return 1;
+    return 0;
+}
+
+static void vt_release_due(virtual_time *v) {
+    for (int k = 0; k < VT_PARTICIPANTS; k++) {
+        vt_participant *p = &v->who[k];
+        if (p->state == VT_WAITING && p->due <= v->now) vt_make_ready(v, p, 0);
+    }
+}
+
+static vt_participant *vt_next(virtual_time *v) {
+    vt_participant *next = NULL;
+    for (int k = 0; k < VT_PARTICIPANTS; k++) {
+        vt_participant *p = &v->who[k];
+        if (!vt_served(v, p) || p->remaining > 0) continue;
+        if (next == NULL || vt_precedes(p, next)) next = p;
+    }
+    return next;
+}
+
+/* Advances to the next event. 0: there is none, until somebody is woken from outside. */
+static int vt_advance(virtual_time *v) {
+    int64_t step = INT64_MAX;
+    int served[VT_PARTICIPANTS];
+    for (int k = 0; k < VT_PARTICIPANTS; k++) {
+        vt_participant *p = &v->who[k];
+        served[k] = vt_served(v, p);
+        if (served[k] && p->remaining < step) step = p->remaining;
+        if (p->state == VT_WAITING && p->due != CAT_CLOCK_FOREVER && p->due - v->now < step)
+            step = p->due - v->now;
+    }
+    if (step == INT64_MAX) return 0;
+    for (int k = 0; k < VT_PARTICIPANTS; k++) {
+        if (!served[k]) continue;
+        v->who[k].remaining -= step;
+        v->who[k].spent = v->who[k].remaining == 0;
+    }
+    v->now += step;
+    return 1;
+}
+
+/* Gives the turn to whoever is next, unless somebody runs. Every round releases somebody or ends
+ * a spending, so there are at most two for each participant. */
+static void vt_schedule(virtual_time *v) {
+    if (vt_time_stands(v)) return;
+    do {
+        vt_release_due(v);
+        vt_participant *next = vt_next(v);
+        if (next == NULL) continue;
+        next->state = VT_RUNNING;
+        next->spent = 0;
+        cat_store_release32(&next->turn, next->turn + 1);
+        cat_futex_wake_shared(&next->turn);
+        return;
+    } while (vt_advance(v));
+}
+
+/* Sleeps until the turn comes. -EINTR: a signal came first; it stays blocked. */
+static int vt_sleep(vt_participant *p) {
+    while (cat_load_acquire32(&p->turn) == p->seen) {
+        int error = cat_futex_wait_shared(&p->turn, p->seen, CAT_CLOCK_FOREVER);
+        if (error == -EINTR) return error;
+    }
+    p->seen = p->turn;
+    return 0;
+}
+
+/* A slot for somebody who will come: time stands still until then. -ENOSPC: all are taken. */
+static int vt_join(virtual_time *v, int32_t priority, int32_t cpu) {
+    int found = -ENOSPC;
+    vt_lock(v);
+    for (int k = 0; k < VT_PARTICIPANTS && found < 0; k++) {
+        if (v->who[k].state != VT_FREE) continue;
+        uint32_t turn = v->who[k].turn;
+        v->who[k] = (vt_participant){
+            .turn = turn, .seen = turn, .state = VT_EXPECTED, .priority = priority, .cpu = cpu};
+        found = k;
+    }
+    vt_unlock(v);
+    return found;
+}
+
+static void vt_change(virtual_time *v, int slot, uint32_t state) {
+    vt_lock(v);
+    v->who[slot].state = state;
+    vt_schedule(v);
+    vt_unlock(v);
+}
+
+/* Blocks until `deadline`. 0: it need not; 1: it has to sleep until its turn. */
+static int vt_begin_waiting(virtual_time *v, vt_participant *p, int64_t deadline) {
+    int goes_on = p->state == VT_WAITING || p->state == VT_READY;     /* a signal came first */
+    int has_turn = p->state == VT_RUNNING && p->turn != p->seen;      /* meanwhile */
+    if (goes_on || has_turn) return 1;
+    if (p->state == VT_RUNNING && (p->woken || deadline <= v->now)) return 0;
+    p->due = p->woken ? v->now : deadline;
+    p->state = VT_WAITING;
+    vt_schedule(v);
+    return 1;
+}
+
+/* 0: the deadline has passed; 1: woken before; -EINTR: a signal came first: call again. */
+static int vt_wait_until(virtual_time *v, int slot, int64_t deadline) {
+    vt_participant *p = &v->who[slot];
+    vt_lock(v);
+    int blocked = vt_begin_waiting(v, p, deadline);
+    vt_unlock(v);
+    if (blocked && vt_sleep(p) < 0) return -EINTR;
+    vt_lock(v);
+    int woken = p->woken && v->now < deadline;
+    p->woken = 0;
+    vt_unlock(v);
+    return woken;
+}
+
+/* 0: spent; -EINTR: a signal came first: call vt_sleep to go on. */
+static int vt_spend(virtual_time *v, int slot, int64_t duration) {
+    vt_participant *p = &v->who[slot];
+    if (duration <= 0) return 0;
+    vt_lock(v);
+    vt_make_ready(v, p, duration);
+    p->order = 0;                     /* it is served already: ahead of its equals */
+    vt_schedule(v);
+    vt_unlock(v);
+    return vt_sleep(p);
+}
+
+static void vt_wake(virtual_time *v, int slot) {
+    vt_participant *p = &v->who[slot];
+    vt_lock(v);
+    p->woken = 1;
+    if (p->state == VT_WAITING && p->due > v->now) p->due = v->now;
+    vt_schedule(v);
+    vt_unlock(v);
+}
+
+#endif

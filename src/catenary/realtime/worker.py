@@ -1,0 +1,91 @@
+"""Workers: the thread or the process that a task runs in, started, watched and ended alike."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import pickle
+import signal
+from collections.abc import Callable
+from multiprocessing.context import SpawnProcess
+from typing import Literal, Protocol, TypeAlias
+
+from catenary.realtime.preparation import Session
+from catenary.realtime.runner import Work, run_in_process, start_thread
+from catenary.realtime.task import Task
+
+Run: TypeAlias = Literal["processes", "threads"]
+
+
+class Worker(Protocol):
+    """Owns what one task runs in."""
+
+    def start(self) -> None: ...
+
+    def wait(self) -> int | None:
+        """Until it is gone, which was noticed already. Its exit status, negative: the signal that
+        killed it; None: a thread has none."""
+
+    def kill(self, number: signal.Signals) -> bool:
+        """False: it cannot be ended against its will."""
+
+
+class ProcessWorker:
+    """A process of its own, started afresh (spawn): it shares no interpreter with anybody."""
+
+    def __init__(self, work: Work, session: Session | None) -> None:
+        arguments = (work, session, os.getpid())
+        self._process: SpawnProcess = multiprocessing.get_context("spawn").Process(
+            target=run_in_process, args=arguments, name=work.task.name, daemon=True
+        )
+
+    @property
+    def sentinel(self) -> int:
+        """A descriptor that becomes readable when the process is gone."""
+        return self._process.sentinel
+
+    def start(self) -> None:
+        self._process.start()
+
+    def wait(self) -> int | None:
+        if self._process.pid is None:
+            return None  # never started
+        self._process.join()
+        return self._process.exitcode
+
+    def kill(self, number: signal.Signals) -> bool:
+        if self._process.pid is not None:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(self._process.pid, number)
+        return True
+
+
+class ThreadWorker:
+    """A thread of this process: the interpreter serves one of them at a time."""
+
+    def __init__(self, work: Work, ended: Callable[[str], None]) -> None:
+        self._work = work
+        self._ended = ended
+
+    def start(self) -> None:
+        start_thread(self._work, self._ended)
+
+    def wait(self) -> int | None:
+        return None
+
+    def kill(self, number: signal.Signals) -> bool:
+        return False
+
+
+def check_importable(task: Task) -> None:
+    """A process imports the task's function by its name. TypeError: it cannot."""
+    functions = (task.function, task.on_miss)
+    for function in filter(callable, functions):
+        try:
+            pickle.dumps(function)
+        except (pickle.PicklingError, AttributeError, TypeError) as error:
+            raise TypeError(
+                f"{task}: its process cannot import {function!r}: {error}. Define it at the top of "
+                'a module, or take run="threads"'
+            ) from error
