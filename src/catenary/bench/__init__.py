@@ -60,3 +60,10 @@ def measure_virtual(*, drives: int, seconds: float, file: Path | None = None) ->
     from catenary.bench import virtual_time
 
     virtual_time.measure(drives=drives, seconds=seconds, file=file)
+
+
+def measure_tasks(*, seconds: float, file: Path | None = None) -> None:
+    """Prints the response of a task beside a busy one, as processes and as threads."""
+    from catenary.bench import tasks
+
+    tasks.measure(seconds=seconds, file=file)

@@ -1,4 +1,5 @@
-"""`catenary bench`: measures the loop beside its peers, the bring-up, and virtual time."""
+"""`catenary bench`: measures the loop beside its peers, the bring-up, virtual time and
+tasks."""
 
 from __future__ import annotations
 
@@ -21,6 +22,7 @@ def add_parser(commands: Commands) -> None:
     _add_cost(group)
     _add_scan(group)
     _add_virtual(group)
+    _add_tasks(group)
 
 
 def _add_loop(group: Commands) -> None:
@@ -94,6 +96,22 @@ def _add_virtual(group: Commands) -> None:
     parser.set_defaults(run=run_virtual)
 
 
+def _add_tasks(group: Commands) -> None:
+    parser = add_command(
+        group,
+        "tasks",
+        help="a task beside a busy one: processes and threads",
+        description="Measures the response of a 1 kHz task of high priority: alone, beside a "
+        "process that is busy at low priority, and beside a thread that is.",
+        example="catenary bench tasks --seconds 10",
+    )
+    parser.add_argument(
+        "--seconds", type=positive_seconds, default=10.0, metavar="S", help="of every way (10)"
+    )
+    _add_file(parser)
+    parser.set_defaults(run=run_tasks)
+
+
 def _add_file(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there")
 
@@ -134,4 +152,11 @@ def run_virtual(arguments: argparse.Namespace) -> int:
     from catenary import bench
 
     bench.measure_virtual(drives=arguments.drives, seconds=arguments.seconds, file=arguments.json)
+    return 0
+
+
+def run_tasks(arguments: argparse.Namespace) -> int:
+    from catenary import bench
+
+    bench.measure_tasks(seconds=arguments.seconds, file=arguments.json)
     return 0

@@ -74,6 +74,7 @@ def as_json(verdict: Verdict) -> str:
                     "execution": task.execution,
                     "deadline": task.deadline,
                     "response": task.response,
+                    "response_ms": None if task.response is None else task.response * 1e3,
                     "in_time": task.in_time,
                 }
                 for task in verdict.responses

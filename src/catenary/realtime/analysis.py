@@ -137,7 +137,7 @@ def analyse(demands: Sequence[Demand]) -> Verdict:
                 demand.period,
                 demand.execution,
                 deadline_of(demand),
-                None if found is None else found * 1e-9,
+                None if found is None else found / 1e9,
             )
         )
     return Verdict(utilisation(demands), hyperperiod(demands), tuple(responses))
@@ -199,7 +199,7 @@ def utilisation(demands: Sequence[Demand]) -> float:
 
 def hyperperiod(demands: Sequence[Demand]) -> float:
     """[s] after which the pattern of releases repeats."""
-    return math.lcm(*(as_load(demand).period for demand in demands)) * 1e-9
+    return math.lcm(*(as_load(demand).period for demand in demands)) / 1e9
 
 
 def longest_response(task: Load, above: Sequence[Load]) -> int | None:

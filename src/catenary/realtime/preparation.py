@@ -86,7 +86,8 @@ class Session:
 
     def _change_switch_interval(self, undo: Undo) -> None:
         """How long a Python thread may keep the interpreter from another: 5 ms at first."""
-        undo.callback(sys.setswitchinterval, sys.getswitchinterval())
+        # Python keeps whole microseconds and rounds down: half of one brings the same back.
+        undo.callback(sys.setswitchinterval, sys.getswitchinterval() + 0.5e-6)
         sys.setswitchinterval(self.switch_interval)
 
     def _keep_heap(self, undo: Undo) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
+from dataclasses import dataclass
 
 from catenary.realtime._task import FIGURE_NAMES, Block
 from catenary.realtime.analysis import Demand
@@ -12,7 +12,8 @@ from catenary.realtime.task import Task
 TIMES = ("period", "jitter", "response", "execution")  # in [s]; the others are counts
 
 
-class Figure(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Figure:
     """One quantity over all jobs that ended."""
 
     count: int
@@ -25,7 +26,8 @@ class Figure(NamedTuple):
     p999: float
 
 
-class Statistics(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Statistics:
     """Of one task. Figures of a running task may lack the job that is being counted."""
 
     name: str

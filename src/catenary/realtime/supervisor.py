@@ -7,15 +7,14 @@ bound to the life of the thread that started it, prctl(2).
 
 from __future__ import annotations
 
-import contextlib
 import signal
 import threading
 from collections.abc import Callable, Mapping
 from multiprocessing import connection
 
 from catenary.errors import TaskError
+from catenary.realtime._task import FAILED
 from catenary.realtime.handle import Handle
-from catenary.realtime.preparation import Session
 from catenary.realtime.worker import ProcessWorker, Worker
 
 RESTARTS = 3  # of one task; the next failure stops all
@@ -43,38 +42,35 @@ class Supervisor:
         self._stubborn: set[str] = set()
         self._failures: list[TaskError] = []
         self._fatal: TaskError | None = None
+        self._raised = False
         self._stopping = False
-        self._undo = contextlib.ExitStack()
 
     @property
     def failures(self) -> tuple[TaskError, ...]:
         return tuple(self._failures)
-
-    def enter(self, session: Session) -> None:
-        """A session that lasts as long as the tasks do."""
-        self._undo.enter_context(session)
 
     def start(self) -> None:
         """Starts all workers."""
         if any(isinstance(worker, ProcessWorker) for worker in self._workers.values()):
             threading.Thread(target=self._watch, name="task supervisor", daemon=True).start()
             return
-        for worker in self._workers.values():
-            worker.start()
+        for name in self._workers:
+            self._start(name)
 
     def wait(self, seconds: float | None) -> bool:
         """True: all have ended."""
         return self._all_ended.wait(seconds)
 
     def raise_failure(self) -> None:
-        """What stopped all tasks, if something did."""
-        if self._fatal is not None:
+        """What stopped all tasks, if something did: once."""
+        if self._fatal is not None and not self._raised:
+            self._raised = True
             raise self._fatal
 
     def thread_ended(self, name: str) -> None:
         """Called by a task's thread, last of all."""
         if self._take_note(name):
-            self._workers[name].start()
+            self._start(name)
 
     def ask_to_stop(self) -> None:
         """Every task ends when it next waits."""
@@ -89,7 +85,6 @@ class Supervisor:
         for number in (signal.SIGTERM, signal.SIGKILL):
             if not ended and self._kill(number, seconds):
                 ended = self._all_ended.wait(KILL_SECONDS)
-        self._undo.close()
 
     def _kill(self, number: signal.Signals, seconds: float) -> bool:
         """Notes who would not end. False: threads are among them, which nothing ends."""
@@ -107,8 +102,9 @@ class Supervisor:
         running: dict[int, str] = {}
         while to_start or running:
             for name in to_start:
-                if (sentinel := self._start_process(name)) is not None:
-                    running[sentinel] = name
+                worker = self._start(name)
+                if isinstance(worker, ProcessWorker):
+                    running[worker.sentinel] = name
             to_start = []
             for ready in connection.wait(list(running)) if running else ():
                 assert isinstance(ready, int)  # it was one of the sentinels
@@ -116,27 +112,26 @@ class Supervisor:
                 if self._take_note(name):
                     to_start.append(name)
 
-    def _start_process(self, name: str) -> int | None:
-        """Its sentinel; None: it could not be started, and that was noted."""
+    def _start(self, name: str) -> Worker | None:
+        """None: it could not be started, and that was noted."""
         worker = self._workers[name]
-        assert isinstance(worker, ProcessWorker)
         try:
             worker.start()
-        except Exception as error:  # whatever pickling the user's arguments raises, or fork
-            self._handles[name].block.failure = f"it could not be started: {error}"
-            self._handles[name].leave()
-            self._take_note(name)
+        except Exception as error:  # of pickling the user's arguments, or of the system's limits
+            block = self._handles[name].block
+            block.failure, block.state = f"it could not be started: {error}", FAILED
+            self._take_note(name, may_restart=False)
             return None
-        return worker.sentinel
+        return worker
 
-    def _take_note(self, name: str) -> bool:
+    def _take_note(self, name: str, *, may_restart: bool = True) -> bool:
         """A task has ended. True: its new worker is to be started."""
         handle = self._handles[name]
         with self._lock:
             failure = handle.failure(self._workers[name].wait())
             if failure is not None and name not in self._stubborn:
                 self._failures.append(failure)
-                if self._may_restart(handle):
+                if may_restart and self._wants_restart(handle):
                     self._restarts[name] += 1
                     handle.make_ready_again()
                     self._workers[name] = self._make_worker(handle, self)
@@ -153,7 +148,7 @@ class Supervisor:
             self._all_ended.set()
         return False
 
-    def _may_restart(self, handle: Handle) -> bool:
+    def _wants_restart(self, handle: Handle) -> bool:
         wanted = handle.task.on_failure == "restart" and not self._stopping
         return wanted and self._restarts[handle.name] < RESTARTS
 

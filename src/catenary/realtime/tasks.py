@@ -6,6 +6,7 @@ low priority keeps one of high priority waiting, up to 5 ms for every hand-over.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import time
 from collections.abc import Iterator, Mapping
@@ -34,7 +35,7 @@ class Tasks:
 
     run: "processes" or "threads"; None: processes for more than one.
     clock: a VirtualClock simulates them, by priority and processor (`cpu`; None counts as 0).
-    session: entered in each process (`realtime.session()`).
+    session: `realtime.session()`, entered in each process, or in this one for threads.
     best_effort: priorities and processors that are refused are done without.
     """
 
@@ -56,6 +57,7 @@ class Tasks:
         self._best_effort = best_effort
         self._handles: Mapping[str, Handle] = {}
         self._supervisor: Supervisor | None = None
+        self._undo = contextlib.ExitStack()  # of a session that all threads share
 
     def __getitem__(self, name: str) -> Handle:
         if name not in self._handles:
@@ -81,14 +83,14 @@ class Tasks:
         if self.run == "processes":
             for task in self._tasks:
                 check_importable(task)
+        if self.run == "threads" and self._session is not None:
+            self._undo.enter_context(self._session)
         self._handles = {task.name: Handle(task, self._clock) for task in self._tasks}
         for handle in self:
             if handle.task.trigger is not None:
                 handle.task.trigger.bind(handle.place)
         self._supervisor = Supervisor(self._handles, self._make_worker, self._wake_clock)
         try:
-            if self.run == "threads" and self._session is not None:
-                self._supervisor.enter(self._session)
             self._supervisor.start()
             self._wait_for_all()
         except BaseException:
@@ -122,6 +124,7 @@ class Tasks:
         if self._clock is not None:
             self._clock.home.step_aside()
         supervisor.end(seconds)
+        self._undo.close()
         if self._clock is not None:
             self._clock.home.expect()
         if raising:

@@ -1,0 +1,171 @@
+"""Values and queues: whole, in order, counted; across processes, and across their deaths."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from catenary.realtime import Queue, Task, Tasks, Value
+from tests.realtime.bodies import put_forever, write_forever
+
+
+def test_a_value_is_zeros_until_it_is_written():
+    value = Value("f8", 3)
+    assert value.number == 0
+    assert value.read().tolist() == [0.0, 0.0, 0.0]
+    value.write([1.0, 2.0, 3.0])
+    value.write(np.arange(3))
+    assert value.number == 2
+    assert value.read().tolist() == [0.0, 1.0, 2.0]
+
+
+def test_a_value_may_be_a_single_number_or_a_structure():
+    single = Value("i4")
+    single.write(7)
+    assert single.read() == 7
+    pose = Value([("position", "f8", 2), ("valid", "?")])
+    pose.write(np.array(([1.0, 2.0], True), pose.read().dtype))
+    assert pose.read()["position"].tolist() == [1.0, 2.0]
+
+
+@pytest.mark.parametrize("wrong", [[1.0, 2.0], [[1.0, 2.0, 3.0]], 1.0, ["a", "b", "c"]])
+def test_what_does_not_fit_is_refused(wrong):
+    value, queue = Value("f8", 3), Queue("f8", 3, length=2)
+    for use in (value.write, queue.put):
+        with pytest.raises(ValueError, match=r"float64 of shape \(3,\)"):
+            use(wrong)
+    assert (value.number, len(queue)) == (0, 0)
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "words"),
+    [
+        (lambda: Value("O"), TypeError, "Python objects"),
+        (lambda: Value("f8", 0), ValueError, "no bytes"),
+        (lambda: Queue("f8", length=0), ValueError, "length of 0 records"),
+        (lambda: Queue("f8", length=4, full="wait"), ValueError, '"refuse" or "overwrite"'),
+    ],
+)
+def test_refuses(make, error, words):
+    with pytest.raises(error, match=words):
+        make()
+
+
+def test_a_full_queue_refuses_the_newest_and_counts():
+    queue = Queue("i8", length=3)
+    assert [queue.put(k) for k in range(5)] == [True, True, True, False, False]
+    assert (len(queue), queue.refused, queue.lost) == (3, 2, 0)
+    assert [queue.take() for _ in range(4)] == [0, 1, 2, None]
+
+
+def test_a_full_queue_overwrites_the_oldest_where_asked():
+    queue = Queue("i8", length=3, full="overwrite")
+    assert all(queue.put(k) for k in range(5))
+    assert [queue.take() for _ in range(4)] == [2, 3, 4, None]
+    assert (queue.lost, queue.refused) == (2, 0)
+
+
+@given(st.lists(st.booleans(), max_size=60), st.sampled_from(["refuse", "overwrite"]))
+def test_a_queue_is_a_queue(steps, full):
+    """Against a list: True puts the next number, False takes one."""
+    queue, model, number = Queue("i8", length=4, full=full), [], 0
+    for put in steps:
+        if not put:
+            taken = queue.take()
+            assert (None if taken is None else int(taken)) == (model.pop(0) if model else None)
+            continue
+        number += 1
+        accepted = queue.put(number)
+        assert accepted == (full == "overwrite" or len(model) < 4)
+        model = [*model, number][-4:] if accepted else model
+        assert len(queue) == len(model)
+
+
+def in_a_thread(call) -> list[object]:
+    """What the call returned or raised there; the thread lives until it is looked at."""
+    found, done, looked = [], threading.Event(), threading.Event()
+
+    def body() -> None:
+        try:
+            found.append(call())
+        except RuntimeError as error:
+            found.append(str(error))
+        done.set()
+        looked.wait(10.0)
+
+    thread = threading.Thread(target=body)
+    thread.start()
+    done.wait(10.0)
+    looked.set()
+    thread.join()
+    return found
+
+
+def test_one_writer_one_producer_one_consumer():
+    import copy
+
+    value, queue = Value("i8"), Queue("i8", length=4)
+    value.write(1)
+    queue.put(1)
+    queue.take()
+    again = copy.copy(value), copy.copy(queue)  # as another task has them
+    assert "a writer already" in str(in_a_thread(lambda: again[0].write(2)))
+    assert "a producer already" in str(in_a_thread(lambda: again[1].put(2)))
+    assert "a consumer already" in str(in_a_thread(again[1].take))
+
+
+def test_the_successor_of_a_writer_that_died_may_write():
+    import copy
+
+    value = Value("i8")
+    in_a_thread(lambda: value.write(1))
+    successor = copy.copy(value)
+    successor.write(2)
+    assert successor.read() == 2
+
+
+def test_read_while_written_by_another_process_and_after_its_death():
+    """Every array that is read holds one number: none is torn, also not by SIGKILL in mid-write."""
+    value = Value("f8", 512)
+    task = Task(write_forever, (value,), period=1e-3, on_failure="continue")
+    with Tasks(task, run="processes") as tasks:
+        newest = 0.0
+        while newest < 3000:
+            array = value.read()
+            assert array.min() == array.max() >= newest
+            newest = float(array[0])
+        os.kill(tasks["write_forever"].process, signal.SIGKILL)
+        tasks.join(10.0)
+    last = value.read()
+    assert last.min() == last.max() == value.number
+    value.write(np.zeros(512))  # whose writer is dead
+    assert value.read().max() == 0.0
+
+
+@pytest.mark.parametrize("full", ["refuse", "overwrite"])
+def test_taken_while_put_by_another_process_and_after_its_death(full):
+    """Records are whole and in order; what is missing was counted."""
+    queue = Queue("f8", 64, length=8, full=full)
+    task = Task(put_forever, (queue,), period=1e-3, on_failure="continue")
+    taken, last = 0, 0.0
+    with Tasks(task, run="processes") as tasks:
+        while taken < 3000:
+            record = queue.take()
+            if record is None:
+                continue
+            assert record.min() == record.max() > last
+            last, taken = float(record[0]), taken + 1
+        os.kill(tasks["put_forever"].process, signal.SIGKILL)
+        tasks.join(10.0)
+    while (record := queue.take()) is not None:
+        assert record.min() == record.max() > last
+        last, taken = float(record[0]), taken + 1
+    if full == "overwrite":
+        assert taken + queue.lost == last
+    assert queue.put(np.zeros(64))  # whose producer is dead

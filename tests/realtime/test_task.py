@@ -1,0 +1,90 @@
+"""What a task may be: every mistake is an error that names the task and what it takes."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from catenary.realtime import Signal, Task, Tasks
+from tests.realtime.bodies import idle
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"period": 0.0}, "period of 0.0 s is not positive"),
+        ({"period": -1e-3}, "is not positive"),
+        ({"period": math.nan}, "is not positive"),
+        ({"period": math.inf}, "is not positive"),
+        ({"period": 1e-6}, "period of 1 us is beyond this machine.*shortest is 20 us"),
+        ({"period": 1e7}, "is it in seconds"),
+        ({"deadline": 0.0}, "deadline of 0.0 s is not positive"),
+        ({"priority": 0}, r"priority 0 is not within 1\.\.99"),
+        ({"priority": 100}, r"priority 100 is not within 1\.\.99"),
+        ({"cpu": -1}, "CPU -1 does not exist"),
+        ({"cpu": 5000}, "CPU 5000 does not exist"),
+        ({"stack_size": 1000}, "a stack of 1000 bytes"),
+        ({"stack_size": 65537}, "a multiple of 4096 from 32768"),
+        ({"on_miss": "ignore"}, 'on_miss is "count", "skip", "stop" or a function'),
+        ({"on_failure": "ignore"}, 'on_failure is "stop", "restart" or "continue"'),
+    ],
+)
+def test_refuses(options, words):
+    with pytest.raises(ValueError, match=f"task 'arm'.*{words}"):
+        Task(idle, **({"period": 1e-3, "name": "arm"} | options))
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Task(3, period=1e-3), "cannot be called"),
+        (lambda: Task(idle, 3.0, period=1e-3), r"one is \(x,\)"),
+        (lambda: Task(idle, period="1 ms"), "a number of seconds"),
+        (lambda: Task(idle, period=True), "a number of seconds"),
+    ],
+)
+def test_refuses_what_is_of_another_kind(make, words):
+    with pytest.raises(TypeError, match=words):
+        make()
+
+
+def test_is_called_like_its_function():
+    assert Task(idle, period=1e-3).name == "idle"
+    assert Task(idle, period=1e-3) == Task(idle, period=1e-3)
+
+
+def test_a_set_refuses():
+    one, other = Task(idle, period=1e-3), Task(idle, period=2e-3)
+    alarm = Signal()
+    with pytest.raises(ValueError, match="no tasks"):
+        Tasks()
+    with pytest.raises(ValueError, match="two tasks are called 'idle'"):
+        Tasks(one, other)
+    with pytest.raises(TypeError, match="is not a Task"):
+        Tasks(idle)
+    with pytest.raises(ValueError, match='run is "processes" or "threads"'):
+        Tasks(one, run="fibers")
+    with pytest.raises(ValueError, match="task 'idle': CPU 1000 does not exist or is not ours"):
+        Tasks(Task(idle, period=1e-3, cpu=1000))
+    with pytest.raises(ValueError, match="the same trigger"):
+        Tasks(
+            Task(idle, name="a", period=1e-3, trigger=alarm),
+            Task(idle, name="b", period=1e-3, trigger=alarm),
+        )
+
+
+def test_a_function_that_a_process_cannot_import_is_refused_before_anything_starts():
+    tasks = Tasks(Task(lambda task: None, name="arm", period=1e-3), run="processes")
+    with pytest.raises(TypeError, match=r"'arm': its process cannot import .*top of a module"):
+        tasks.start()
+
+
+def test_before_they_are_started():
+    tasks = Tasks(Task(idle, period=1e-3))
+    with pytest.raises(RuntimeError, match="have not been started"):
+        tasks.join()
+    with pytest.raises(KeyError, match="none is running"):
+        tasks["idle"]
+    with pytest.raises(RuntimeError, match="no task was started with this signal"):
+        Signal().set()

@@ -1,0 +1,481 @@
+"""Tasks that run: on a virtual clock what they do, on the machine's that it is done, and what
+happens when they fail: with real processes and real kills."""
+
+from __future__ import annotations
+
+import os
+import resource
+import select
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from catenary.errors import RealtimeError, TaskError
+from catenary.realtime import Queue, Signal, Task, Tasks, Value, VirtualClock
+from tests.realtime import bodies
+from tests.realtime.test_clock import MS, records
+
+BOTH = pytest.mark.parametrize("run", ["threads", "processes"])
+
+
+def wait_for(value: Value, tasks: Tasks) -> int:
+    """Until a task has written it; its deadline is the task's own."""
+    while value.number == 0:
+        tasks.join(0.01)
+    return int(value.read())
+
+
+# what they do, in virtual time
+
+
+@BOTH
+def test_a_period_changed_by_the_task_itself(run):
+    notes = Queue("i8", 3, length=100)
+    task = Task(bodies.double_the_period, (notes,), period=10e-3)
+    with VirtualClock() as clock, Tasks(task, run=run, clock=clock) as tasks:
+        tasks.join(60e-3)
+        tasks.stop()
+        assert tasks["double_the_period"].period == 20e-3
+    assert [release // MS for _, release, _ in records(notes)] == [0, 10, 30, 50]
+
+
+def test_a_period_changed_by_another():
+    notes = Queue("i8", 3, length=100)
+    task = Task(bodies.note, (notes,), period=10e-3)
+    with VirtualClock() as clock, Tasks(task, clock=clock) as tasks:
+        tasks.join(25e-3)
+        tasks["note"].period = 2e-3
+        tasks.join(5e-3)
+        with pytest.raises(ValueError, match="not positive"):
+            tasks["note"].period = 0.0
+    # from the last release on: 20, then 22 and 24, which have passed at 25, then 26, 28
+    assert [(release // MS, now // MS) for _, release, now in records(notes)] == [
+        (0, 0),
+        (10, 10),
+        (20, 20),
+        (22, 25),
+        (24, 25),
+        (26, 26),
+        (28, 28),
+    ]
+
+
+def test_a_missed_deadline_is_counted_and_later_releases_happen_late():
+    notes = Queue("i8", 3, length=100)
+    task = Task(bodies.overrun_once, (1, 25e-3, notes), name="a", period=10e-3)
+    with VirtualClock() as clock, Tasks(task, clock=clock) as tasks:
+        tasks.join(60e-3)
+    assert [(number, release // MS, now // MS) for number, release, now in records(notes)] == [
+        (0, 0, 0),
+        (1, 10, 10),
+        (2, 20, 35),
+        (3, 30, 35),
+        (4, 40, 40),
+        (5, 50, 50),
+    ]
+    statistics = tasks["a"].statistics
+    assert (statistics.jobs, statistics.misses, statistics.skipped) == (6, 2, 0)
+    assert statistics.response.max == pytest.approx(25e-3)
+
+
+def test_skip_leaves_out_the_releases_that_have_passed():
+    notes = Queue("i8", 3, length=100)
+    task = Task(bodies.overrun_once, (1, 25e-3, notes), name="a", period=10e-3, on_miss="skip")
+    with VirtualClock() as clock, Tasks(task, clock=clock) as tasks:
+        tasks.join(60e-3)
+    assert [release // MS for _, release, _ in records(notes)] == [0, 10, 40, 50]
+    statistics = tasks["a"].statistics
+    assert (statistics.jobs, statistics.misses, statistics.skipped) == (4, 1, 2)
+
+
+def test_stop_ends_the_task_with_an_error():
+    notes = Queue("i8", 3, length=100)
+    task = Task(
+        bodies.overrun_once,
+        (1, 5e-3, notes),
+        name="a",
+        period=10e-3,
+        deadline=4e-3,
+        on_miss="stop",
+    )
+    with (
+        VirtualClock() as clock,
+        pytest.raises(TaskError, match=r"'a'.*job 1, .*0\.010000 s.*deadline of 4\.000 ms") as told,
+        Tasks(task, clock=clock) as tasks,
+    ):
+        tasks.join(60e-3)
+    assert told.value.task == "a"
+
+
+def test_call_is_told_which_job_was_late():
+    notes, late = Queue("i8", 3, length=100), []
+    task = Task(
+        bodies.overrun_once,
+        (1, 25e-3, notes),
+        name="a",
+        period=10e-3,
+        on_miss=lambda job: late.append((job.number, job.time)),
+    )
+    with VirtualClock() as clock, Tasks(task, clock=clock) as tasks:
+        tasks.join(60e-3)
+    assert late == [(1, pytest.approx(10e-3)), (2, pytest.approx(20e-3))]
+
+
+def test_a_sporadic_task_keeps_its_distance():
+    """Three signals at once, one job every 3 ms."""
+    alarm, notes = Signal(), Queue("i8", 3, length=100)
+    tasks = [
+        Task(bodies.set_at_every_job, (alarm, 3), name="cause", period=20e-3, priority=9),
+        Task(bodies.note, (notes,), name="effect", period=3e-3, trigger=alarm),
+    ]
+    with VirtualClock() as clock, Tasks(*tasks, run="threads", clock=clock) as running:
+        running.join(30e-3)
+    assert [now // MS for _, _, now in records(notes)] == [0, 3, 6, 20, 23, 26]
+
+
+def test_signals_beyond_what_can_wait_are_refused_and_counted():
+    alarm = Signal()
+    task = Task(bodies.idle, period=1e-3, trigger=alarm)
+    with VirtualClock() as clock, Tasks(task, clock=clock) as running:
+        assert [alarm.set() for _ in range(70)].count(False) == 6
+        running.join(1.0)
+        statistics = running["idle"].statistics
+    assert (statistics.jobs, statistics.signals_refused) == (64, 6)
+
+
+def test_statistics_of_the_published_experiment():
+    tasks = [
+        Task(bodies.spend, (execution,), name=name, period=period, priority=priority)
+        for name, period, execution, priority in (
+            ("tau1", 10e-3, 3e-3, 3),
+            ("tau2", 20e-3, 5e-3, 2),
+            ("tau3", 40e-3, 10e-3, 1),
+        )
+    ]
+    with VirtualClock() as clock, Tasks(*tasks, run="threads", clock=clock) as running:
+        running.join(0.4)
+    tau3 = running["tau3"].statistics
+    assert tau3.jobs == 10
+    assert tau3.period.min == tau3.period.max == pytest.approx(40e-3)
+    assert tau3.jitter.max == pytest.approx(8e-3)  # released at 0, it starts when the others rest
+    assert tau3.response.max == tau3.response.p50 == pytest.approx(29e-3)
+    assert tau3.execution.max == pytest.approx(10e-3)
+    [(low, above, count)] = running["tau3"].histogram("response")
+    assert low <= 29e-3 < above
+    assert count == 10
+    with pytest.raises(ValueError, match="no figure 'delay'; there are period, jitter"):
+        running["tau3"].histogram("delay")
+    assert [round(one.response * 1e3) for one in running.verdict().responses] == [3, 8, 29]
+    assert str(running).splitlines()[3].split()[:3] == ["tau3", "10", "0"]
+
+
+def test_without_a_job_there_is_no_verdict():
+    task = Task(bodies.idle, period=1e-3, trigger=Signal())
+    with (
+        VirtualClock() as clock,
+        Tasks(task, clock=clock) as running,
+        pytest.raises(ValueError, match="no job has ended yet"),
+    ):
+        running.verdict()
+
+
+def test_a_histogram_places_values_within_half_a_percent():
+    task = Task(bodies.spend, (1.234567e-3,), period=10e-3)
+    with VirtualClock() as clock, Tasks(task, clock=clock) as running:
+        running.join(1.0)
+    figure = running["spend"].statistics.response
+    assert figure.count == 100
+    for value in (figure.mean, figure.min, figure.max, figure.p50, figure.p99):
+        assert value == pytest.approx(1.234567e-3, rel=4e-3)
+    assert figure.sd == pytest.approx(0.0, abs=1e-12)
+
+
+# on the machine's clock: that it is done
+
+
+@BOTH
+def test_tasks_end_by_themselves(run):
+    tasks = [Task(bodies.count_to, (n,), name=f"to {n}", period=1e-3) for n in (3, 5)]
+    with Tasks(*tasks, run=run) as running:
+        assert running.join(30.0)
+        assert not any(handle.running for handle in running)
+        assert [handle.statistics.jobs for handle in running] == [4, 6]
+
+
+def test_more_than_one_run_as_processes_one_as_a_thread():
+    one, two = (Task(bodies.idle, name=name, period=1e-3) for name in "ab")
+    assert Tasks(one).run == "threads"
+    assert Tasks(one, two).run == "processes"
+
+
+def test_a_sporadic_task_sleeps_until_it_is_signalled_from_another_process():
+    alarm = Signal()
+    tasks = [
+        Task(bodies.set_at_every_job, (alarm, 1), name="cause", period=2e-3),
+        Task(bodies.count_to, (4,), name="effect", period=0.1e-3, trigger=alarm),
+    ]
+    with Tasks(*tasks) as running:
+        while running["effect"].running:
+            running.join(0.01)
+        assert running["effect"].statistics.jobs == 5
+
+
+@BOTH
+def test_the_place_that_is_asked_for_is_obtained(run):
+    cpu = max(os.sched_getaffinity(0))
+    found = Value("i8", 4)
+    task = Task(bodies.report_scheduling, (found,), period=1e-3, cpu=cpu, priority=7)
+    try:
+        with Tasks(task, run=run) as running:
+            assert running.join(30.0)
+    except RealtimeError as error:
+        pytest.skip(f"needs real-time scheduling: {error.message}")
+    policy, priority, process, at = (int(value) for value in found.read())
+    assert (policy, priority, at) == (os.SCHED_FIFO, 7, cpu)
+    assert (process == os.getpid()) == (run == "threads")
+
+
+@BOTH
+def test_a_stack_of_its_own_size(run):
+    before = threading.stack_size(), resource.getrlimit(resource.RLIMIT_STACK)
+    found = Value("i8", 2)
+    task = Task(bodies.stack_deep, (found,), period=1e-3, stack_size=256 * 1024)
+    with Tasks(task, run=run) as running:
+        assert running.join(30.0)
+    if run == "processes":
+        assert found.read()[1] == 256 * 1024
+    assert (threading.stack_size(), resource.getrlimit(resource.RLIMIT_STACK)) == before
+
+
+# what happens when they fail
+
+
+@BOTH
+def test_a_task_that_raises_stops_all_and_is_named(run):
+    tasks = [
+        Task(bodies.fail_at, (2,), name="bad", period=2e-3),
+        Task(bodies.idle, name="good", period=1e-3),
+    ]
+    with (
+        pytest.raises(
+            TaskError, match=r"'bad' in job 2.*ArithmeticError: the sum.*bodies\.py:"
+        ) as e,
+        Tasks(*tasks, run=run) as running,
+    ):
+        running.join(30.0)
+    assert e.value.task == "bad"
+    assert not any(handle.running for handle in running)
+    assert running["good"].statistics.jobs > 0
+
+
+@BOTH
+def test_continue_goes_on_without_it(run):
+    tasks = [
+        Task(bodies.fail_at, (0,), name="bad", period=2e-3, on_failure="continue"),
+        Task(bodies.count_to, (20,), name="good", period=2e-3),
+    ]
+    with Tasks(*tasks, run=run) as running:
+        assert running.join(30.0)
+        assert [failure.task for failure in running.failures] == ["bad"]
+        assert running["good"].statistics.jobs == 21
+
+
+@BOTH
+def test_restarted_too_often_it_stops_all(run):
+    task = Task(bodies.fail_always, name="bad", period=1e-3, on_failure="restart")
+    with pytest.raises(TaskError, match="the sum"), Tasks(task, run=run) as running:
+        running.join(30.0)
+    assert len(running.failures) == 4  # the first, and three restarts
+
+
+def test_killed_in_mid_cycle_the_error_says_which_and_when():
+    there = Value("i8")
+    tasks = [
+        Task(bodies.hang_at, (3, there), name="victim", period=2e-3),
+        Task(bodies.idle, name="other", period=2e-3),
+    ]
+    with Tasks(*tasks) as running:
+        assert wait_for(there, running) == running["victim"].process
+        os.kill(running["victim"].process, signal.SIGKILL)
+        with pytest.raises(TaskError) as told:
+            running.join(30.0)
+    assert "task 'victim' (process" in str(told.value)
+    assert "was killed by SIGKILL in job 3, released at 0.006000 s" in str(told.value)
+    assert told.value.exit_code == -signal.SIGKILL
+    assert not running["other"].running
+
+
+def test_killed_in_mid_cycle_it_is_restarted_at_a_release_and_its_figures_go_on():
+    there = Value("i8")
+    task = Task(bodies.hang_at, (3, there), name="victim", period=2e-3, on_failure="restart")
+    other = Task(bodies.idle, name="other", period=2e-3)
+    with Tasks(task, other) as running:
+        first = wait_for(there, running)
+        os.kill(first, signal.SIGKILL)
+        while running["victim"].statistics.jobs < 10:
+            running.join(0.01)
+        assert running["victim"].process != first
+        assert [failure.exit_code for failure in running.failures] == [-signal.SIGKILL]
+        assert running["other"].running
+        statistics = running["victim"].statistics
+    assert statistics.skipped > 0  # while there was nobody
+    assert statistics.response.count >= statistics.jobs - 2  # the one it died in has no end
+
+
+def test_killed_on_a_virtual_clock_time_goes_on_without_it():
+    there, notes = Value("i8"), Queue("i8", 3, length=100)
+    tasks = [
+        Task(bodies.hang_at, (1, there), name="victim", period=10e-3, on_failure="continue"),
+        Task(bodies.note, (notes,), name="other", period=10e-3),
+    ]
+    with VirtualClock() as clock, Tasks(*tasks, clock=clock) as running:
+
+        def kill() -> None:
+            while there.number == 0:
+                pause.wait(0.005)
+            os.kill(running["victim"].process, signal.SIGKILL)
+
+        pause = threading.Event()
+        thread = threading.Thread(target=kill)
+        thread.start()
+        running.join(50e-3)  # time stands while the victim hangs in its job
+        thread.join()
+        assert [failure.task for failure in running.failures] == ["victim"]
+    assert [release // MS for _, release, _ in records(notes)] == [0, 10, 20, 30, 40]
+
+
+def test_a_process_that_does_not_end_is_ended_by_force_and_named():
+    there = Value("i8")
+    task = Task(bodies.ignore_the_end, (there,), name="deaf", period=1e-3)
+    running = Tasks(task, run="processes")
+    running.start()
+    wait_for(there, running)
+    with pytest.raises(TaskError, match=r"'deaf' did not end within 0\.05 s"):
+        running.stop(0.05)
+    assert not running["deaf"].running
+
+
+def test_a_process_that_never_waits_can_clean_up_when_it_is_ended(tmp_path):
+    there, trace = Value("i8"), tmp_path / "trace"
+    task = Task(bodies.leave_a_trace, (str(trace), there), name="deaf", period=1e-3)
+    running = Tasks(task, run="processes")
+    running.start()
+    wait_for(there, running)
+    with pytest.raises(TaskError, match="did not end"):
+        running.stop(0.05)
+    assert trace.read_text() == "cleaned up"
+
+
+PARENT = """
+import sys, time
+from catenary.realtime import Task, Tasks, Value
+from tests.realtime.bodies import leave_a_trace
+if __name__ == "__main__":
+    there = Value("i8")
+    with Tasks(Task(leave_a_trace, (sys.argv[1], there), period=1e-3), run="processes") as tasks:
+        while there.number == 0:
+            tasks.join(0.01)
+        print(int(there.read()), flush=True)
+        time.sleep(60.0)
+"""
+
+
+def test_tasks_end_with_their_parent_however_that_ends(tmp_path):
+    script, trace = tmp_path / "parent.py", tmp_path / "trace"
+    script.write_text(PARENT)
+    parent = subprocess.Popen(
+        [sys.executable, str(script), str(trace)],
+        stdout=subprocess.PIPE,
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[2])},
+    )
+    assert parent.stdout is not None
+    watched = os.pidfd_open(int(parent.stdout.readline()))
+    parent.kill()
+    parent.communicate()
+    assert select.select([watched], [], [], 20.0)[0] == [watched]
+    os.close(watched)
+    assert trace.read_text() == "cleaned up"
+
+
+def test_arguments_that_cannot_be_handed_over_are_an_error():
+    task = Task(bodies.spend, (lambda: 1,), name="a", period=1e-3)
+    with pytest.raises(TaskError, match=r"task 'a'.*could not be started"):
+        Tasks(task, run="processes").start()
+
+
+def test_priorities_that_are_refused_are_an_error_that_says_how_to_get_them(monkeypatch):
+    def refuse(*_: object) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(os, "sched_setscheduler", refuse)
+    task = Task(bodies.count_to, (1,), name="a", period=1e-3, priority=50)
+    with pytest.raises(TaskError, match=r"SCHED_FIFO 50 refused \(Operation not permitted\)") as e:
+        Tasks(task).start()
+    assert "setcap" in str(e.value)
+    assert "rtprio" in str(e.value)
+    with Tasks(task, best_effort=True) as running:
+        assert running.join(30.0)
+
+
+def test_killed_at_any_instant_the_others_go_on():
+    """Ten deaths while processes hand virtual time to one another thousands of times a second."""
+    tasks = [
+        Task(bodies.spend, (10e-6,), name="victim", period=50e-6, on_failure="continue"),
+        Task(bodies.spend, (10e-6,), name="other", period=70e-6, on_failure="continue"),
+    ]
+    for number in range(10):
+        with VirtualClock() as clock, Tasks(*tasks, clock=clock) as running:
+            victim = running["victim"].process
+            death = threading.Timer(0.003 * number, os.kill, (victim, signal.SIGKILL))
+            death.start()
+            while running["victim"].running:
+                running.join(0.1)
+            death.join()
+            before = running["other"].statistics.jobs
+            running.join(0.1)
+            assert running["other"].statistics.jobs - before == pytest.approx(0.1 / 70e-6, abs=2)
+
+
+INTERRUPTED = """
+import sys
+from catenary.realtime import Task, Tasks, VirtualClock
+from tests.realtime.bodies import idle
+if __name__ == "__main__":
+    clock = VirtualClock() if sys.argv[2] == "virtual" else None
+    task = Task(idle, period=20e-6 if clock else 1e-3)
+    try:
+        with Tasks(task, run=sys.argv[1], clock=clock) as tasks:
+            print("ready", flush=True)
+            tasks.join(1e5)
+    except KeyboardInterrupt:
+        print("stopped", tasks["idle"].running, tasks.failures, flush=True)
+"""
+
+
+@BOTH
+@pytest.mark.parametrize("clock", ["virtual", "machine"])
+def test_ctrl_c_ends_all(run, clock, tmp_path):
+    script = tmp_path / "interrupted.py"
+    script.write_text(INTERRUPTED)
+    process = subprocess.Popen(
+        [sys.executable, str(script), run, clock],
+        stdout=subprocess.PIPE,
+        text=True,
+        process_group=0,
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[2])},
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "ready\n"
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: the tasks' processes get it too
+    out, _ = process.communicate(timeout=30.0)
+    assert out == "stopped False ()\n"
+
+
+def test_a_thread_that_cannot_be_started_is_an_error():
+    task = Task(bodies.idle, name="huge", period=1e-3, stack_size=2**46)
+    with pytest.raises(TaskError, match=r"'huge'.*could not be started"):
+        Tasks(task).start()

@@ -1,0 +1,23 @@
+"""examples/three_tasks.py runs, and shows what was published."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "three_tasks.py"
+
+
+def test_its_responses_are_the_published_ones():
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLE), "virtual"], capture_output=True, text=True, check=True
+    )
+    lines = done.stdout.splitlines()
+    assert [line.split()[1] for line in lines[1:4]] == ["400", "200", "100"]
+    assert [line.split()[-1] for line in lines[5:8]] == ["3.000", "8.000", "29.000"]
+    assert lines[8].startswith("schedulable: utilisation 80.0%")
+
+
+def test_it_is_short():
+    assert len(EXAMPLE.read_text().splitlines()) <= 40

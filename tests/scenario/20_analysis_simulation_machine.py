@@ -1,0 +1,60 @@
+"""The published experiment, three ways: by analysis, on a virtual clock, and on this machine.
+Three tasks spend 3, 5 and 10 ms every 10, 20 and 40 ms on one processor.
+All three say that their responses take 3, 8 and 29 ms.
+"""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from catenary.errors import RealtimeError
+from catenary.realtime import Demand, Statistics, Task, Tasks, VirtualClock, analyse, session
+from tests.realtime.bodies import spend
+
+TASKS = (("tau1", 10e-3, 3e-3, 30), ("tau2", 20e-3, 5e-3, 20), ("tau3", 40e-3, 10e-3, 10))
+RESPONSES = [3e-3, 8e-3, 29e-3]
+
+
+def run(clock: VirtualClock | None, seconds: float) -> list[Statistics]:
+    cpu = max(os.sched_getaffinity(0))
+    tasks = [
+        Task(spend, (execution,), name=name, period=period, priority=priority, cpu=cpu)
+        for name, period, execution, priority in TASKS
+    ]
+    with Tasks(*tasks, clock=clock, session=session(best_effort=True)) as running:
+        running.join(seconds)
+        running.stop()
+        assert running.verdict().utilisation == pytest.approx(0.8, rel=0.2)
+        return [handle.statistics for handle in running]
+
+
+def test_by_analysis():
+    demands = [
+        Demand(name=name, period=period, execution=execution, priority=priority)
+        for name, period, execution, priority in TASKS
+    ]
+    verdict = analyse(demands)
+    assert [one.response for one in verdict.responses] == RESPONSES
+
+
+def test_on_a_virtual_clock_twice_the_same():
+    with VirtualClock() as clock:
+        first = run(clock, 4.0)
+    with VirtualClock() as clock:
+        second = run(clock, 4.0)
+    assert [one.response.max for one in first] == pytest.approx(RESPONSES, abs=1e-12)
+    assert [one.jobs for one in first] == [400, 200, 100]
+    times = [(one.period, one.jitter, one.response, one.execution) for one in first]
+    assert times == [(one.period, one.jitter, one.response, one.execution) for one in second]
+
+
+def test_on_this_machine():
+    """The median: what else the machine does may delay a job, never hasten it."""
+    try:
+        found = run(None, 2.0)
+    except RealtimeError as error:
+        pytest.skip(f"needs real-time scheduling: {error.message}")
+    assert [one.response.p50 for one in found] == pytest.approx(RESPONSES, rel=0.1)
+    assert [one.response.min for one in found] >= RESPONSES
