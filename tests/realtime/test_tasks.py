@@ -479,3 +479,25 @@ def test_a_thread_that_cannot_be_started_is_an_error():
     task = Task(bodies.idle, name="huge", period=1e-3, stack_size=2**46)
     with pytest.raises(TaskError, match=r"'huge'.*could not be started"):
         Tasks(task).start()
+
+
+@BOTH
+def test_restarted_on_a_virtual_clock_it_takes_its_place_again(run):
+    notes = Queue("i8", 3, length=100)
+    tasks = [
+        Task(bodies.fail_at, (1,), name="bad", period=10e-3, priority=9, on_failure="restart"),
+        Task(bodies.note, (notes,), name="good", period=10e-3),
+    ]
+    with VirtualClock() as clock, Tasks(*tasks, run=run, clock=clock) as running:
+        running.join(50e-3)
+        running.stop()
+        assert len(running.failures) == 1
+        assert running["bad"].statistics.jobs == 5
+    assert [release // MS for _, release, _ in records(notes)] == [0, 10, 20, 30, 40]
+
+
+def test_join_without_an_end_lets_virtual_time_pass_until_all_have_ended():
+    tasks = [Task(bodies.count_to, (n,), name=f"to {n}", period=1e-3) for n in (30, 500)]
+    with VirtualClock() as clock, Tasks(*tasks, clock=clock) as running:
+        assert running.join()
+        assert clock.now_ns == 500 * MS

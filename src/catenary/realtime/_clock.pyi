@@ -43,6 +43,9 @@ class VirtualTime:
     def join(self, priority: int, cpu: int) -> int:
         """A slot for somebody who is expected: time stands still until then."""
 
+    def expect(self, slot: int) -> None:
+        """As after `join`: somebody will come to this slot, again."""
+
     def run(self, slot: int) -> None:
         """The participant runs: time stands still until it waits."""
 

@@ -26,6 +26,7 @@ cdef extern from "virtual_time.h":
         vt_participant who[1]
     int vt_init(virtual_time *) nogil
     int vt_join(virtual_time *, int32_t priority, int32_t cpu) nogil
+    void vt_expect(virtual_time *, int slot) nogil
     void vt_change(virtual_time *, int slot, uint32_t state) nogil
     int vt_wait_until(virtual_time *, int slot, int64_t deadline) nogil
     int vt_spend(virtual_time *, int slot, int64_t duration) nogil
@@ -135,6 +136,9 @@ cdef class VirtualTime:
         if slot < 0:
             raise ValueError(f"a virtual clock has room for {VT_PARTICIPANTS} participants")
         return slot
+
+    def expect(self, int slot):
+        vt_expect(self.time, self.checked(slot))
 
     def run(self, int slot):
         vt_change(self.time, self.checked(slot), VT_RUNNING)

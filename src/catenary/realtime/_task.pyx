@@ -97,7 +97,7 @@ cdef class Block:
             return
         passed = (now_ns - self.c.origin + self.c.period - 1) // self.c.period
         if self.c.released:
-            passed = (now_ns - self.c.release + self.c.period - 1) // self.c.period
+            passed = max((now_ns - self.c.release + self.c.period - 1) // self.c.period, 1)
             self.c.release += (passed - 1) * self.c.period
             self.c.skipped += passed - 1
         else:

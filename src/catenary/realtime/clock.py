@@ -54,12 +54,16 @@ class Participant:
         self.timer.wake()
 
     def expect(self) -> None:
-        """Time stands still until the participant waits."""
-        self._time.run(self.timer.slot)
+        """Somebody will come, again: time stands still until then."""
+        self._time.expect(self.timer.slot)
 
     def step_aside(self) -> None:
-        """Time goes on without the participant, until it waits again."""
+        """Time goes on without the participant, until it returns or waits."""
         self._time.step_aside(self.timer.slot)
+
+    def return_to(self) -> None:
+        """Time stands still until the participant waits: it runs."""
+        self._time.run(self.timer.slot)
 
     def leave(self) -> None:
         self._time.remove(self.timer.slot)
@@ -74,7 +78,7 @@ class VirtualClock:
         self._time = VirtualTime(self._memory.buffer)
         self._time.reset()
         self.home = self.participate(priority=FIRST)
-        self.home.expect()
+        self.home.return_to()
 
     def participate(self, *, priority: int = 0, cpu: int | None = None) -> Participant:
         """A place for a loop or task; time stands still until it first waits.

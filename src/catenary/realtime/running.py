@@ -96,7 +96,8 @@ class Running:
 
     def spend(self, seconds: float) -> None:
         """Spends this much execution time [s]. On a virtual clock it is declared: time passes, and
-        tasks of higher priority preempt it. On the machine's the thread computes that long."""
+        tasks of higher priority preempt it. On the machine's the thread computes that long, without
+        the interpreter's lock."""
         self._releases.spend(round(seconds * 1e9))
 
     def stop(self) -> None:

@@ -109,7 +109,7 @@ class Tasks:
         elif seconds is None:
             self._clock.home.step_aside()
             ended = supervisor.wait(None)
-            self._clock.home.expect()
+            self._clock.home.return_to()
         else:
             self._clock.wait_until(self._clock.now_ns + round(seconds * 1e9))
             ended = supervisor.wait(0.0)
@@ -126,7 +126,7 @@ class Tasks:
         supervisor.end(seconds)
         self._undo.close()
         if self._clock is not None:
-            self._clock.home.expect()
+            self._clock.home.return_to()
         if raising:
             supervisor.raise_failure()
 

@@ -182,6 +182,14 @@ static int vt_join(virtual_time *v, int32_t priority, int32_t cpu) {
     return found;
 }
 
+/* The same for one whose place is kept: its process died and is started again. */
+static void vt_expect(virtual_time *v, int slot) {
+    vt_lock(v);
+    v->who[slot].state = VT_EXPECTED;
+    v->who[slot].seen = v->who[slot].turn;
+    vt_unlock(v);
+}
+
 static void vt_change(virtual_time *v, int slot, uint32_t state) {
     vt_lock(v);
     v->who[slot].state = state;
