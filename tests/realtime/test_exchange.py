@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 import signal
 import threading
@@ -108,8 +109,6 @@ def in_a_thread(call) -> list[object]:
 
 
 def test_one_writer_one_producer_one_consumer():
-    import copy
-
     value, queue = Value("i8"), Queue("i8", length=4)
     value.write(1)
     queue.put(1)
@@ -121,10 +120,10 @@ def test_one_writer_one_producer_one_consumer():
 
 
 def test_the_successor_of_a_writer_that_died_may_write():
-    import copy
-
     value = Value("i8")
-    in_a_thread(lambda: value.write(1))
+    [writer] = in_a_thread(lambda: value.write(1) or threading.get_native_id())
+    while os.path.exists(f"/proc/{writer}"):  # Python's join returns a little before its end
+        threading.Event().wait(0.001)
     successor = copy.copy(value)
     successor.write(2)
     assert successor.read() == 2

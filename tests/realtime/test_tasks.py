@@ -15,7 +15,16 @@ from pathlib import Path
 import pytest
 
 from catenary.errors import RealtimeError, TaskError
-from catenary.realtime import Queue, Signal, Task, Tasks, Value, VirtualClock
+from catenary.realtime import (
+    Queue,
+    Signal,
+    Task,
+    Tasks,
+    Value,
+    VirtualClock,
+    preparation,
+    session,
+)
 from tests.realtime import bodies
 from tests.realtime.test_clock import MS, records
 
@@ -501,3 +510,39 @@ def test_join_without_an_end_lets_virtual_time_pass_until_all_have_ended():
     with VirtualClock() as clock, Tasks(*tasks, clock=clock) as running:
         assert running.join()
         assert clock.now_ns == 500 * MS
+
+
+def test_all_on_a_virtual_clock_share_a_processor_until_the_end():
+    before = os.sched_getaffinity(0)
+    found = Value("i8", 4)
+    task = Task(bodies.report_scheduling, (found,), period=1e-3, cpu=7)  # a simulated one
+    with VirtualClock() as clock, Tasks(task, run="processes", clock=clock) as running:
+        [ours] = os.sched_getaffinity(0)
+        running.join(1e-3)
+        assert found.read()[3] == ours
+    assert os.sched_getaffinity(0) == before
+
+
+def test_a_session_that_is_refused_leaves_nothing_started(monkeypatch):
+    def refuse(*_: object) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(preparation, "lock_all_memory", refuse)
+    interval = sys.getswitchinterval()
+    with VirtualClock() as clock:
+        task = Task(bodies.idle, period=1e-3)
+        with pytest.raises(RealtimeError, match=r"locked memory refused .*not permitted"):
+            Tasks(task, run="threads", clock=clock, session=session()).start()
+        assert clock.wait_until(MS)  # nobody is waited for
+    assert sys.getswitchinterval() == interval
+
+
+def test_more_tasks_than_a_virtual_clock_has_places_leave_it_as_it_was():
+    tasks = [Task(bodies.idle, name=str(number), period=1e-3) for number in range(64)]
+    with VirtualClock() as clock:
+        with pytest.raises(ValueError, match="room for 64"):
+            Tasks(*tasks, run="threads", clock=clock).start()
+        assert clock.wait_until(MS)
+        with Tasks(*tasks[:63], run="threads", clock=clock) as running:
+            running.join(2e-3)
+        assert sum(handle.statistics.jobs for handle in running) == 126

@@ -43,6 +43,7 @@ class Supervisor:
         self._failures: list[TaskError] = []
         self._fatal: TaskError | None = None
         self._raised = False
+        self._started = False
         self._stopping = False
 
     @property
@@ -51,6 +52,7 @@ class Supervisor:
 
     def start(self) -> None:
         """Starts all workers."""
+        self._started = True
         if any(isinstance(worker, ProcessWorker) for worker in self._workers.values()):
             threading.Thread(target=self._watch, name="task supervisor", daemon=True).start()
             return
@@ -81,6 +83,10 @@ class Supervisor:
     def end(self, seconds: float) -> None:
         """Waits for the ends of all tasks, and brings those about that have not come after
         `seconds`."""
+        if not self._started:
+            for handle in self._handles.values():
+                handle.leave()
+            return
         ended = self._all_ended.wait(seconds)
         for number in (signal.SIGTERM, signal.SIGKILL):
             if not ended and self._kill(number, seconds):
