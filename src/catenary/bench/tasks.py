@@ -31,6 +31,7 @@ class Found:
     responses: Counter[float]  # [s]
     jobs: int = 0
     missed: int = 0
+    scheduling: str = ""
 
     def percentile(self, fraction: float) -> float:
         """[us]"""
@@ -81,6 +82,7 @@ def run_round(way: str, found: Found) -> None:
     statistics: Statistics = tasks["high"].statistics
     found.jobs += statistics.jobs
     found.missed += statistics.misses
+    found.scheduling = statistics.scheduling
     for low_edge, above, count in tasks["high"].histogram("response"):
         found.responses[(low_edge + above) / 2] += count
 
@@ -106,6 +108,7 @@ def as_json(found: Mapping[str, Found], ratio: float) -> dict[str, object]:
             way: {
                 "jobs": one.jobs,
                 "missed": one.missed,
+                "scheduling": one.scheduling,
                 "response_us": {
                     name: one.percentile(fraction) for name, fraction in FIGURES.items()
                 },

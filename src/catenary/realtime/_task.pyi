@@ -38,6 +38,7 @@ class Block:
     process: int
     period_ns: int
     failure: str
+    scheduling: str
     @property
     def stopped(self) -> bool: ...
     @property

@@ -32,13 +32,14 @@ cdef extern from "histogram.h" nogil:
 
 cdef extern from "task_block.h" nogil:
     enum:
-        TASK_FAILURE_SIZE, FIGURES, TASK_NEW, TASK_STARTED, TASK_ENDED, TASK_FAILED
+        TASK_FAILURE_SIZE, TASK_SCHEDULING_SIZE, FIGURES, TASK_NEW, TASK_STARTED, TASK_ENDED, TASK_FAILED
     ctypedef struct task_block:
         uint32_t state, stop, sporadic, skip, origin_set, busy
         int32_t process
         int64_t origin, period, deadline, release, start, spent, collections
         uint64_t number, released, misses, skipped, signals_refused
         char *failure
+        char *scheduling
         cat_histogram *figures
     int64_t task_deadline(const task_block *b)
     int task_wait(task_block *b, const cat_clock *clock)
@@ -51,6 +52,16 @@ FIGURE_NAMES = (
     "period", "jitter", "response", "execution", "page_faults", "switches", "collections"
 )                                        # in the order of task_block.h
 assert len(FIGURE_NAMES) == FIGURES
+
+
+cdef str read_text(const char *text):
+    return text[:strlen(text)].decode(errors="replace")
+
+
+cdef void write_text(char *text, str value, size_t size):
+    cdef bytes data = value.encode(errors="replace")[:size - 1]
+    memcpy(text, <const char *>data, len(data))
+    text[len(data)] = 0
 
 
 cdef class Block:
@@ -175,13 +186,19 @@ cdef class Block:
 
     @property
     def failure(self):
-        return self.c.failure[:strlen(self.c.failure)].decode(errors="replace")
+        return read_text(self.c.failure)
 
     @failure.setter
     def failure(self, str text):
-        cdef bytes data = text.encode(errors="replace")[:TASK_FAILURE_SIZE - 1]
-        memcpy(<char *>self.c.failure, <const char *>data, len(data))
-        self.c.failure[len(data)] = 0
+        write_text(self.c.failure, text, TASK_FAILURE_SIZE)
+
+    @property
+    def scheduling(self):
+        return read_text(self.c.scheduling)
+
+    @scheduling.setter
+    def scheduling(self, str text):
+        write_text(self.c.scheduling, text, TASK_SCHEDULING_SIZE)
 
     def figure(self, int number):
         cdef const cat_histogram *h = self.histogram(number)

@@ -84,8 +84,9 @@ class Handle:
         if self.block.state == ENDED:
             return None
         if self.block.state == FAILED:
-            message = f"{self.task}{self._where()}: {self.block.failure}"
-            return TaskError(message, task=self.name, exit_code=exit_code)
+            what, _, hint = self.block.failure.partition("\n  hint: ")  # as errors print it
+            message = f"{self.task}{self._where()}: {what}"
+            return TaskError(message, task=self.name, exit_code=exit_code, hint=hint)
         return TaskError(
             f"{self.task} (process {self.process}) {how_it_died(exit_code)}{self._where()}",
             task=self.name,

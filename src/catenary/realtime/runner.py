@@ -12,7 +12,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from catenary.errors import CatenaryError, RealtimeError
 from catenary.realtime import libc
@@ -21,7 +21,7 @@ from catenary.realtime._task import ENDED, FAILED, STARTED, Block, Releases
 from catenary.realtime.place import Place
 from catenary.realtime.preparation import SET_CAPABILITIES, Session
 from catenary.realtime.running import Running
-from catenary.realtime.scheduling import refusal
+from catenary.realtime.scheduling import Scheduling, refusal, what_scheduling
 from catenary.realtime.task import Task
 
 START_SECONDS = 60.0  # at most, from one task's start to that of all
@@ -87,13 +87,11 @@ def run(work: Work) -> bool:
     """False: it failed, and its block says why."""
     block = Block(work.place.memory.buffer)
     try:
-        prepare(work)
+        block.scheduling = prepare(work)
         block.process = os.getpid()
         block.state = STARTED
         if not block.wait_for_start(time.monotonic_ns() + round(START_SECONDS * 1e9)):
-            raise RealtimeError(
-                f"{work.task}: the other tasks did not start within {START_SECONDS} s"
-            )
+            raise RealtimeError(f"the other tasks did not start within {START_SECONDS} s")
         iterate(work, block)
     except Exception as error:
         block.failure = reason(error)
@@ -103,17 +101,19 @@ def run(work: Work) -> bool:
     return True
 
 
-def prepare(work: Work) -> None:
+def prepare(work: Work) -> str:
+    """How the calling thread is scheduled, in words."""
     task = work.task
-    if work.place.participant is None:
-        schedule(task, work.best_effort)
-        with contextlib.suppress(OSError):  # without it, wake-ups are up to 50 us less precise
-            libc.change_timer_slack(1)
     if task.stack_size is not None:
         touch_stack(max(task.stack_size - STACK_LEFT, 0) // 2)
+    if work.place.participant is not None:
+        return f"simulated: priority {task.priority or 0}, CPU {task.cpu or 0}"
+    with contextlib.suppress(OSError):  # without it, wake-ups are up to 50 us less precise
+        libc.change_timer_slack(1)
+    return str(schedule(task, work.best_effort))
 
 
-def schedule(task: Task, best_effort: bool) -> None:
+def schedule(task: Task, best_effort: bool) -> Scheduling:
     """Priority and processor of the calling thread."""
     refusals = []
     if task.cpu is not None:
@@ -126,10 +126,11 @@ def schedule(task: Task, best_effort: bool) -> None:
     )
     if refusals and not best_effort:
         raise RealtimeError(
-            f"{task}: {'; '.join(refusals)}",
+            "; ".join(refusals),
             hint=f"run as root, or once: {SET_CAPABILITIES}; or an rtprio line in "
             "/etc/security/limits.d; or best_effort=True does without",
         )
+    return replace(what_scheduling(), refusals=tuple(refusals))
 
 
 def iterate(work: Work, block: Block) -> None:

@@ -88,8 +88,7 @@ class Running:
             self._task.on_miss(self._job)
         elif self._task.on_miss == "stop":
             raise TaskError(
-                f"{self._task}: job {self._job.number}, released at {self._job.time:.6f} s, ended "
-                f"after its deadline of {self._block.deadline_ns * 1e-6:.3f} ms",
+                f"it ended after its deadline of {self._block.deadline_ns * 1e-6:.3f} ms",
                 task=self.name,
                 hint='its statistics say how long jobs take; on_miss="count" goes on',
             )

@@ -35,6 +35,7 @@ class Statistics:
     misses: int  # ended after the deadline
     skipped: int  # releases that did not happen
     signals_refused: int
+    scheduling: str  # what its thread obtained, and what it was refused
     period: Figure  # [s] from start to start
     jitter: Figure  # [s] from release to start
     response: Figure  # [s] from release to end
@@ -47,7 +48,7 @@ class Statistics:
 def read_statistics(name: str, block: Block) -> Statistics:
     jobs, misses, skipped, refused = block.counts
     figures = (read_figure(block, number) for number in range(len(FIGURE_NAMES)))
-    return Statistics(name, jobs, misses, skipped, refused, *figures)
+    return Statistics(name, jobs, misses, skipped, refused, block.scheduling, *figures)
 
 
 def read_figure(block: Block, number: int) -> Figure:
@@ -85,7 +86,7 @@ def as_table(all_statistics: Iterable[Statistics]) -> str:
     lines = [
         f"{'task':14}{'jobs':>8}{'missed':>8}"
         + "".join(f"{name + ' [ms]: mean/min/max/sd':>36}" for name in ("period", "response"))
-        + f"{'jitter max':>12}{'faults':>8}{'switches':>10}{'GC':>5}"
+        + f"{'jitter max':>12}{'faults':>8}{'switches':>10}{'GC':>5}  scheduling"
     ]
     lines += [as_line(statistics) for statistics in all_statistics]
     return "\n".join(lines)
@@ -102,6 +103,7 @@ def as_line(s: Statistics) -> str:
         + "".join(f"{text:>36}" for text in times)
         + f"{s.jitter.max * 1e3:12.3f}"
         + "".join(f"{count:>{width}d}" for count, width in zip(counts, (8, 10, 5), strict=True))
+        + f"  {s.scheduling}"
     )
 
 

@@ -15,6 +15,7 @@
 
 #define TASK_SIGNALS 64               /* that can wait for their job */
 #define TASK_FAILURE_SIZE 4096
+#define TASK_SCHEDULING_SIZE 256
 
 enum { TASK_NEW, TASK_STARTED, TASK_ENDED, TASK_FAILED };
 
@@ -66,7 +67,8 @@ typedef struct task_block {
     uint64_t released;
     uint64_t misses;
     uint64_t skipped;
-    char failure[TASK_FAILURE_SIZE];
+    char failure[TASK_FAILURE_SIZE];          /* texts end with a zero */
+    char scheduling[TASK_SCHEDULING_SIZE];
     cat_histogram figures[FIGURES];
 } task_block;
 
