@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 import time
 from pathlib import Path
 
@@ -136,3 +137,7 @@ def report_scheduling(task: Running, found: Value) -> None:
         cpu = min(os.sched_getaffinity(0))
         found.write([os.sched_getscheduler(0), priority, os.getpid(), cpu])
         return
+
+
+def wait_for_event(task: Running, event: threading.Event) -> None:
+    event.wait(30.0)

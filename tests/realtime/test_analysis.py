@@ -134,6 +134,7 @@ def test_refuses(demands, words):
         {"period": 0.0},
         {"period": -1.0},
         {"period": math.nan},
+        {"period": 1e300},
         {"deadline": 0.0},
         {"execution": -1.0},
         {"execution": math.inf},
@@ -144,6 +145,13 @@ def test_refuses(demands, words):
 def test_refuses_times_that_cannot_be(wrong):
     with pytest.raises(ValueError, match=f"task 'a': .*{next(iter(wrong))}"):
         Demand(**({"name": "a", "period": 1.0, "execution": 0.1} | wrong))
+
+
+def test_a_hyperperiod_beyond_all_numbers_is_infinite():
+    odd = [Demand(name=str(n), period=1 + n * 1e-9, execution=1e-3) for n in range(1, 90)]
+    verdict = analyse(odd)
+    assert verdict.hyperperiod == math.inf
+    assert verdict.schedulable
 
 
 def test_reads_well():

@@ -304,3 +304,36 @@ def test_more_tasks_than_a_virtual_clock_has_places_leave_it_as_it_was():
         with Tasks(*tasks[:63], run="threads", clock=clock) as running:
             running.join(2e-3)
         assert sum(handle.statistics.jobs for handle in running) == 126
+
+
+def test_a_thread_that_does_not_end_is_named():
+    event = threading.Event()
+    running = Tasks(Task(bodies.wait_for_event, (event,), name="deaf", period=1e-3))
+    running.start()
+    with pytest.raises(TaskError, match=r"'deaf' did not end within 0\.05 s"):
+        running.stop(0.05)
+    assert running["deaf"].running
+    event.set()
+    running.stop()
+    assert not running["deaf"].running
+
+
+WITHOUT_GUARD = """
+from catenary.realtime import Task, Tasks
+from tests.realtime.bodies import idle
+Tasks(Task(idle, period=1e-3), run="processes").start()
+"""
+
+
+def test_a_program_without_a_guard_is_told_so(tmp_path):
+    script = tmp_path / "program.py"
+    script.write_text(WITHOUT_GUARD)
+    done = subprocess.run(
+        [sys.executable, str(script)],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[2])},
+    )
+    assert "its process ended with exit status 1 before it could start" in done.stderr
+    assert '`if __name__ == "__main__":`' in done.stderr

@@ -58,14 +58,15 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def as_json(verdict: Verdict) -> str:
-    """Times in seconds; a response of null has no bound."""
+    """Times in seconds; a response of null has no bound, a hyperperiod of null is too long."""
     import json
+    from math import isfinite
 
     return json.dumps(
         {
             "schedulable": verdict.schedulable,
             "utilisation": verdict.utilisation,
-            "hyperperiod": verdict.hyperperiod,
+            "hyperperiod": verdict.hyperperiod if isfinite(verdict.hyperperiod) else None,
             "tasks": [
                 {
                     "name": task.name,

@@ -17,6 +17,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+LONGEST = 1e9  # [s]
 MOST_STEPS = 1_000_000  # of the iteration, for one task; reached only where load is close to 1
 
 
@@ -42,16 +43,20 @@ class Demand:
     cpu: int | None = None
 
     def __post_init__(self) -> None:
-        for what, seconds in (("period", self.period), ("deadline", self.deadline)):
-            if seconds is not None and not (math.isfinite(seconds) and round(seconds * 1e9) > 0):
-                raise ValueError(f"task {self.name!r}: a {what} of {seconds} s is not positive")
-        for what, seconds in (
-            ("execution", self.execution),
-            ("blocking", self.blocking),
-            ("jitter", self.jitter),
-        ):
-            if not math.isfinite(seconds) or seconds < 0:
-                raise ValueError(f"task {self.name!r}: {what} of {seconds} s is negative")
+        for what in ("period", "deadline", "execution", "blocking", "jitter"):
+            seconds = getattr(self, what)
+            if seconds is not None:
+                self._check(what, seconds, 1 if what in ("period", "deadline") else 0)
+
+    def _check(self, what: str, seconds: float, least_ns: int) -> None:
+        if not math.isfinite(seconds) or seconds > LONGEST:
+            raise ValueError(
+                f"task {self.name!r}: {what} of {seconds} s is beyond {LONGEST:g} s; "
+                "is it in seconds?"
+            )
+        if round(seconds * 1e9) < least_ns:
+            word = "not positive" if least_ns else "negative"
+            raise ValueError(f"task {self.name!r}: {what} of {seconds} s is {word}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,8 +203,11 @@ def utilisation(demands: Sequence[Demand]) -> float:
 
 
 def hyperperiod(demands: Sequence[Demand]) -> float:
-    """[s] after which the pattern of releases repeats."""
-    return math.lcm(*(as_load(demand).period for demand in demands)) / 1e9
+    """[s] after which the pattern of releases repeats; infinite where no float is that long."""
+    try:
+        return math.lcm(*(as_load(demand).period for demand in demands)) / 1e9
+    except OverflowError:
+        return math.inf
 
 
 def longest_response(task: Load, above: Sequence[Load]) -> int | None:
@@ -207,6 +215,7 @@ def longest_response(task: Load, above: Sequence[Load]) -> int | None:
     loads = (task, *above)
     if not bounded(loads):
         return None
+    repeats = repeat_after(loads) if exactly_full(loads) else None
     longest, window, steps = 0, task.blocking + task.execution, 0
     for job in range(MOST_STEPS):
         window = max(window, task.blocking + (job + 1) * task.execution)
@@ -218,7 +227,7 @@ def longest_response(task: Load, above: Sequence[Load]) -> int | None:
         longest = max(longest, task.jitter + window - job * task.period)
         if window + task.jitter <= (job + 1) * task.period:
             return longest
-        if exactly_full(loads) and (job + 1) * task.period >= repeat_after(loads):
+        if repeats is not None and (job + 1) * task.period >= repeats:
             return longest  # from here on the responses repeat
         window += task.execution
     return None

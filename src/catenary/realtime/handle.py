@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+
 from catenary.errors import TaskError
 from catenary.realtime._task import BLOCK_SIZE, ENDED, FAILED, NEW, Block
 from catenary.realtime.clock import VirtualClock
@@ -87,6 +89,14 @@ class Handle:
             what, _, hint = self.block.failure.partition("\n  hint: ")  # as errors print it
             message = f"{self.task}{self._where()}: {what}"
             return TaskError(message, task=self.name, exit_code=exit_code, hint=hint)
+        if self.block.state == NEW:
+            return TaskError(
+                f"{self.task}: its process {how_it_died(exit_code)} before it could start",
+                task=self.name,
+                exit_code=exit_code,
+                hint="what it printed says why; it imports the program's file, so whatever starts "
+                'the program belongs under `if __name__ == "__main__":`',
+            )
         return TaskError(
             f"{self.task} (process {self.process}) {how_it_died(exit_code)}{self._where()}",
             task=self.name,
@@ -96,7 +106,7 @@ class Handle:
         )
 
     def _where(self) -> str:
-        if self.block.state == NEW or not self.block.counts[0]:
+        if not self.block.counts[0]:
             return " before its first job"
         released = (self.block.release_ns - self.block.origin_ns) * 1e-9
         inside = "in" if self.block.busy else "after"
@@ -105,7 +115,5 @@ class Handle:
 
 def how_it_died(exit_code: int | None) -> str:
     if exit_code is not None and exit_code < 0:
-        import signal
-
         return f"was killed by {signal.Signals(-exit_code).name}"
     return f"ended with exit status {exit_code}"

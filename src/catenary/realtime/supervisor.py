@@ -125,7 +125,8 @@ class Supervisor:
             worker.start()
         except Exception as error:  # of pickling the user's arguments, or of the system's limits
             block = self._handles[name].block
-            block.failure, block.state = f"it could not be started: {error}", FAILED
+            block.failure = f"it could not be started: {' '.join(str(error).split())}"
+            block.state = FAILED
             self._take_note(name, may_restart=False)
             return None
         return worker
