@@ -1,29 +1,20 @@
-"""The three orders, the instants, the figures, the law's place. Virtual time throughout."""
-
-import ctypes
+"""The three orders, the instants, the figures. Virtual time throughout."""
 
 import numpy as np
 import pytest
 
 from catenary.core import (
     CYCLE_LATE,
-    CYCLE_LAW_DONE,
-    CYCLE_LIMITED,
     CYCLE_OK,
-    GOAL_ENABLED,
     RECORD_FIELDS,
 )
-from catenary.plan.cycle import AxisLimits
 from catenary.wire.frame import decode_frame
 from tests.core.rig import (
-    CST,
-    LAW_NAME,
     MS,
     PERIOD,
     Bench,
     axis,
     bench,
-    capsule_new,
     make_plan,
 )
 
@@ -221,120 +212,6 @@ def test_start_up_without_an_application_has_no_process_phase() -> None:
 def test_an_unknown_phase_is_refused() -> None:
     with pytest.raises(ValueError, match="lunch"):
         bench(axis(0)).engine.histogram_counts("lunch")
-
-
-# ---- the law's place
-
-POINTER = ctypes.POINTER(ctypes.c_double)
-
-
-class LawFrame(ctypes.Structure):
-    """`cat_law_frame` of native/law.h, as far as these laws look."""
-
-    _fields_ = (
-        ("axis_count", ctypes.c_uint32),
-        ("ok", ctypes.c_uint32),
-        ("time", ctypes.c_double),
-        ("period", ctypes.c_double),
-        ("actual_position", POINTER),
-        ("actual_velocity", POINTER),
-        ("actual_torque", POINTER),
-        ("axis_flags", ctypes.POINTER(ctypes.c_uint8)),
-        ("target_position", POINTER),
-        ("target_velocity", POINTER),
-        ("target_torque", POINTER),
-    )
-
-
-STEP = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.POINTER(LawFrame))
-
-
-class LawTable(ctypes.Structure):
-    """`cat_law` of native/law.h."""
-
-    _fields_ = (
-        ("version", ctypes.c_uint32),
-        ("reserved", ctypes.c_uint32),
-        ("self", ctypes.c_void_p),
-        ("step", STEP),
-    )
-
-
-def with_law(law, *axes, **more: object) -> tuple[Bench, LawTable]:
-    b = bench(*axes, order="law", **more)
-    b.engine.stop()
-    table = LawTable(1, 0, None, STEP(lambda _, frame: law(frame.contents)))
-    b.engine.set_law(capsule_new(ctypes.addressof(table), LAW_NAME, None))
-    b.engine.start()
-    return b, table
-
-
-def test_a_law_acts_on_the_inputs_of_its_own_cycle() -> None:
-    def spring(frame: LawFrame) -> int:
-        frame.target_torque[0] = -0.5 * frame.actual_position[0]
-        return 0
-
-    b, table = with_law(spring, axis(0, mode=CST))
-    b.ask(GOAL_ENABLED)
-    b.engine.run(10)
-    assert b.drives[0].state == 1  # no law has run yet
-    b.steps(8)
-    assert b.axis_flags[0] & 1
-    b.drives[0].position = 2000
-    b.steps(2)  # one frame to see it, one to act
-    assert b.drives[0].target_torque == -1000
-    assert table.version == 1
-
-
-def test_the_limits_hold_for_laws_too() -> None:
-    def wild(frame: LawFrame) -> int:
-        frame.target_torque[0] = float("nan") if frame.time > 0.05 else 99.0
-        return 0
-
-    limits = AxisLimits(torque=2.0)
-    b, _table = with_law(wild, axis(0, mode=CST, limits=limits, ramp_torque=100.0))
-    b.ask(GOAL_ENABLED)
-    assert b.steps(20) & CYCLE_LIMITED
-    assert b.drives[0].target_torque == 2000
-    b.steps(35)
-    assert 0 < b.drives[0].target_torque < 2000
-    b.steps(20)
-    assert b.drives[0].state == 1
-
-
-def test_a_finished_law_leaves_the_axes_holding() -> None:
-    def until_soon(frame: LawFrame) -> int:
-        frame.target_position[0] = frame.actual_position[0] + 0.01
-        return frame.time > 0.03
-
-    b, _table = with_law(until_soon, axis(0))
-    b.ask(GOAL_ENABLED)
-    flags = b.steps(60)
-    assert flags & CYCLE_LAW_DONE
-    held = b.drives[0].target_position
-    b.steps(10)
-    assert b.drives[0].target_position == held > 0
-    assert b.drives[0].state == 4
-
-
-def test_without_a_law_the_law_order_holds() -> None:
-    b = bench(axis(0), order="law")
-    b.enable()
-    b.target_position[0] = 1.0
-    b.steps(5)
-    assert b.drives[0].target_position == 0
-
-
-def test_what_is_no_law_is_refused() -> None:
-    b = bench(axis(0), order="law")
-    with pytest.raises(RuntimeError, match="stopped"):
-        b.engine.set_law(None)
-    b.engine.stop()
-    with pytest.raises(ValueError, match=r"catenary\.law"):
-        b.engine.set_law(object())
-    wrong = LawTable(9, 0, None, STEP(lambda _, frame: 0))
-    with pytest.raises(ValueError, match="version 9"):
-        b.engine.set_law(capsule_new(ctypes.addressof(wrong), LAW_NAME, None))
 
 
 # ---- interruptions and errors of the link

@@ -20,6 +20,7 @@ from catenary.core._cycle import (
     CYCLE_DROPPED,
     CYCLE_LATE,
     CYCLE_LAW_DONE,
+    CYCLE_LAW_FAILED,
     CYCLE_LIMITED,
     CYCLE_NONE,
     CYCLE_OK,
@@ -31,6 +32,16 @@ from catenary.core._cycle import (
 )
 from catenary.core._engine import Engine
 from catenary.core._iteration import Cycle, Iteration
+from catenary.core._law import (
+    LAW_FINISHED,
+    LAW_NEVER_RETURNED,
+    LAW_NOT_FINITE,
+    LAW_OVERRUN,
+    LAW_RAISED,
+    LAW_RUNNING,
+    LAW_STOPPED,
+    Law,
+)
 
 __all__ = [
     "AXIS_DROPPED",
@@ -41,6 +52,7 @@ __all__ = [
     "CYCLE_DROPPED",
     "CYCLE_LATE",
     "CYCLE_LAW_DONE",
+    "CYCLE_LAW_FAILED",
     "CYCLE_LIMITED",
     "CYCLE_NONE",
     "CYCLE_OK",
@@ -52,10 +64,18 @@ __all__ = [
     "GOAL_ENABLED",
     "GOAL_QUICK_STOP",
     "GOAL_RESET",
+    "LAW_FINISHED",
+    "LAW_NEVER_RETURNED",
+    "LAW_NOT_FINITE",
+    "LAW_OVERRUN",
+    "LAW_RAISED",
+    "LAW_RUNNING",
+    "LAW_STOPPED",
     "RECORD_FIELDS",
     "Cycle",
     "Engine",
     "Iteration",
+    "Law",
     "controlword_towards",
     "state_of",
 ]

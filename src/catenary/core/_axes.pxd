@@ -107,4 +107,5 @@ cdef class Axes:
 
 cdef void axes_read(axes_t *x, actual_t *out, uint64_t number) noexcept nogil
 cdef void axes_write(axes_t *x, const target_t *target, bint fresh) noexcept nogil
+cdef void axes_tell(const axes_t *x, actual_t *out) noexcept nogil
 cdef void axes_follow(const axes_t *x, const actual_t *actual, target_t *target) noexcept nogil

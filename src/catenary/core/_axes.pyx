@@ -129,6 +129,7 @@ cdef void axes_read(axes_t *x, actual_t *out, uint64_t number) noexcept nogil:
         out.statusword[i] = a.status
         out.mode[i] = a.mode_shown
         out.state[i] = a.state
+        out.enabled[i] = a.followed
         out.flags[i] = a.flags | (FOLLOWED if a.followed else 0) | (a.goal << GOAL_SHIFT)
     read_columns(x, out)
 
@@ -201,6 +202,15 @@ cdef void axes_write(axes_t *x, const target_t *target, bint fresh) noexcept nog
         if a.flags & REFUSED:
             x.refused = 1
     write_columns(x, target)
+
+
+cdef void axes_tell(const axes_t *x, actual_t *out) noexcept nogil:
+    """What was commanded by the last write, where the values of `axes_read` are already there."""
+    cdef uint32_t i
+    for i in range(x.axis_count):
+        out.commanded_position[i] = x.axes[i].commanded_position
+        out.commanded_velocity[i] = x.axes[i].commanded_velocity
+        out.commanded_torque[i] = x.axes[i].commanded_torque
 
 
 cdef void axes_follow(const axes_t *x, const actual_t *actual, target_t *target) noexcept nogil:

@@ -4,7 +4,8 @@ from catenary.core._axes cimport axes_t
 from catenary.core._handover cimport actual_t, handover_t, target_t
 from catenary.core._histogram cimport histogram_t
 from catenary.core._lane cimport lane_t
-from catenary.core._native cimport cat_image, cat_law, cat_link
+from catenary.core._law cimport law_t
+from catenary.core._native cimport cat_image, cat_link
 
 cdef enum:  # flags of a cycle
     OK = 1
@@ -17,6 +18,7 @@ cdef enum:  # flags of a cycle
     LAW_DONE = 128
     STOPPED = 256
     NONE = 512
+    LAW_FAILED = 1024
 
 cdef enum:
     THREADED = 0
@@ -63,7 +65,10 @@ cdef struct cycle_t:
     axes_t *axes
     lane_t *lane
     handover_t *handover
-    const cat_law *law
+    law_t *law                 # NULL: none runs
+    law_t *law_asked           # NULL: none is to run
+    uint32_t law_request       # counts what was asked
+    uint32_t law_seen
     int order
     int64_t period
     int64_t collect_deadline
@@ -78,7 +83,6 @@ cdef struct cycle_t:
     uint32_t skipped           # instants before this cycle
     uint32_t lost_in_row
     uint32_t flags
-    uint32_t law_done
     int missing
     uint64_t lost
     uint64_t late
@@ -91,8 +95,8 @@ cdef void cycle_start(cycle_t *c) noexcept nogil
 cdef int cycle_wait(cycle_t *c) noexcept nogil
 cdef int cycle_sleep(cycle_t *c, int64_t lead) noexcept nogil
 cdef void cycle_open(cycle_t *c) noexcept nogil
-cdef void cycle_threaded(cycle_t *c) noexcept nogil
-cdef void cycle_law(cycle_t *c) noexcept nogil
+cdef void cycle_native(cycle_t *c) noexcept nogil
+cdef void cycle_take_law(cycle_t *c, const target_t *orders) noexcept nogil
 cdef void cycle_inputs(cycle_t *c, actual_t *actual) noexcept nogil
 cdef void cycle_usable(cycle_t *c) noexcept nogil
 cdef void cycle_outputs(cycle_t *c, target_t *target, bint application) noexcept nogil

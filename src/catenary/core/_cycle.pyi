@@ -11,6 +11,7 @@ CYCLE_DROPPED: Final[int]  # some axis' goal dropped to disabled in this cycle
 CYCLE_REFUSED: Final[int]  # some target was NaN or infinite: the axis held instead
 CYCLE_UNCOMMITTED: Final[int]  # threaded: no new targets were there at this instant
 CYCLE_LAW_DONE: Final[int]  # the law returned "finished"
+CYCLE_LAW_FAILED: Final[int]  # the law failed: the drives stop
 CYCLE_STOPPED: Final[int]  # the native thread has ended (stop, or an error of the link)
 CYCLE_NONE: Final[int]  # timeout_ns passed without a new cycle: actual is unchanged
 

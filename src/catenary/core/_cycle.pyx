@@ -5,6 +5,8 @@
     inline     wait, collect, [Python], emit                            in Python's thread
     law        wait, collect, law, emit, publish                        in the native thread
 
+A law may be asked for while another order runs: its cycles take the law's order until it ends.
+
 In virtual time all three run in the caller's thread. Instants are origin + k·period: late ones are
 skipped and counted, never made up for by a burst.
 
@@ -16,13 +18,31 @@ in_controller: their sum. tail: what remains before the next wait. round_trip: s
 
 from libc.errno cimport EINTR
 from libc.stdint cimport int32_t, int64_t, uint8_t, uint32_t, uint64_t
-from libc.string cimport memset
+from libc.string cimport memcpy, memset
 
-from catenary.core._axes cimport axes_follow, axes_read, axes_write
-from catenary.core._handover cimport actual_header_t, handover_latch, handover_publish, handover_wake
+from catenary.core._axes cimport axes_follow, axes_read, axes_tell, axes_write
+from catenary.core._handover cimport (
+    BEFORE_LAW,
+    OF_LAW,
+    actual_header_t,
+    counts_t,
+    handover_latch,
+    handover_publish,
+    handover_wake,
+)
 from catenary.core._histogram cimport histogram_add
 from catenary.core._lane cimport lane_send
-from catenary.core._native cimport cat_law_frame
+from catenary.core._law cimport (
+    FINISHED,
+    RUNNING,
+    STOPPED_BY_APPLICATION,
+    law_begin,
+    law_end,
+    law_run,
+    law_t,
+    law_took,
+)
+from catenary.core._native cimport cat_add32, cat_load_acquire32
 
 CYCLE_OK = OK
 CYCLE_LATE = LATE
@@ -32,6 +52,7 @@ CYCLE_DROPPED = DROPPED_SOME
 CYCLE_REFUSED = REFUSED_SOME
 CYCLE_UNCOMMITTED = UNCOMMITTED
 CYCLE_LAW_DONE = LAW_DONE
+CYCLE_LAW_FAILED = LAW_FAILED
 CYCLE_STOPPED = STOPPED
 CYCLE_NONE = NONE
 
@@ -176,6 +197,7 @@ cdef void close_header(cycle_t *c, actual_t *actual) noexcept nogil:
     if c.axes.dropped:
         c.flags |= DROPPED_SOME
         c.axes.dropped = 0
+    header.ok = c.flags & OK
     header.number = c.number
     header.time_ns = c.scheduled - c.origin
     header.flags = c.flags
@@ -271,53 +293,106 @@ cdef void cycle_threaded(cycle_t *c) noexcept nogil:
     tail(c, published)
 
 
-cdef void run_law(cycle_t *c, actual_t *actual, target_t *target) noexcept nogil:
-    cdef cat_law_frame frame
-    axes_follow(c.axes, actual, target)
+cdef void cycle_native(cycle_t *c) noexcept nogil:
+    """One cycle after the wait, in the order that holds now. A threaded cycle before the first one
+    of a law sends a second time: the law's first collect finds those frames."""
+    cdef bint fresh
+    if c.order == LAW or c.law != NULL:
+        cycle_law(c)
+    else:
+        cycle_threaded(c)
+    if c.law_seen != cat_load_acquire32(&c.law_request):
+        if c.order == THREADED and c.law == NULL and c.law_asked != NULL:
+            cycle_take_law(c, handover_latch(c.handover, &fresh))
+            emit(c, &c.handover.target[OF_LAW], False)
+        else:
+            cycle_take_law(c, handover_latch(c.handover, &fresh))
+
+
+cdef void cycle_take_law(cycle_t *c, const target_t *orders) noexcept nogil:
+    """From the next cycle on the law that was asked for runs, from what is commanded now."""
+    cdef target_t *target = &c.handover.target[OF_LAW]
+    cdef uint32_t i
+    c.law_seen = cat_load_acquire32(&c.law_request)
+    end_law(c, STOPPED_BY_APPLICATION)
+    c.law = c.law_asked
+    if c.law == NULL:
+        return
+    memcpy(target.header, orders.header, c.handover.target_size)
+    for i in range(c.axes.axis_count):
+        target.position[i] = c.axes.axes[i].commanded_position
+        target.velocity[i] = c.axes.axes[i].commanded_velocity
+        target.torque[i] = c.axes.axes[i].commanded_torque
+    target.header.hold = 1
     target.header.seen = c.number
-    frame.axis_count = c.axes.axis_count
-    frame.ok = c.flags & OK
-    frame.time = (c.scheduled - c.origin) * 1e-9
-    frame.period = c.period * 1e-9
-    frame.actual_position = actual.position
-    frame.actual_velocity = actual.velocity
-    frame.actual_torque = actual.torque
-    frame.axis_flags = actual.flags
-    frame.target_position = target.position
-    frame.target_velocity = target.velocity
-    frame.target_torque = target.torque
-    frame.input_reals = actual.input_reals
-    frame.input_integers = actual.input_integers
-    frame.input_bits = actual.input_bits
-    frame.output_reals = target.output_reals
-    frame.output_integers = target.output_integers
-    frame.output_bits = target.output_bits
-    if c.law.step(c.law.self, &frame) != 0:
-        c.law_done = 1
+    law_begin(c.law, c.next)
+
+
+cdef void end_law(cycle_t *c, uint32_t status) noexcept nogil:
+    """The axes hold from now on: what was committed before the law counts no longer."""
+    if c.law == NULL:
+        return
+    c.handover.target[c.handover.target_triple.front].header.hold = 1
+    c.handover.target[OF_LAW].header.hold = 1
+    if status != RUNNING:
+        law_end(c.law, status, c.number)
+    c.law = NULL
+
+
+cdef void take_orders(target_t *target, const target_t *committed, const counts_t *n) noexcept nogil:
+    """What the application still says while a law runs: goals and modes."""
+    memcpy(target.request, committed.request, n.axes * sizeof(uint32_t))
+    memcpy(target.controlword_bits, committed.controlword_bits, n.axes * sizeof(uint16_t))
+    memcpy(target.mode, committed.mode, n.axes)
+    memcpy(target.goal, committed.goal, n.axes)
+
+
+cdef bint step_law(cycle_t *c, actual_t *actual, target_t *target, int64_t usable) noexcept nogil:
+    """One step of the law. False: what it left in the targets must not be sent."""
+    cdef law_t *law = c.law
+    cdef bint goes_on
+    axes_follow(c.axes, actual, target)
+    target.header.hold = 0
+    target.header.seen = c.number
+    actual.header.ok = c.flags & OK
+    memcpy(c.handover.target[BEFORE_LAW].header, target.header, c.handover.target_size)
+    goes_on = law_run(law, c.axes, actual, target, c.scheduled, c.number)
+    c.process = now(c) - usable
+    if goes_on and law_took(law, c.process, c.number):
+        return True
+    if law.status == FINISHED:
+        c.flags |= LAW_DONE
+        end_law(c, RUNNING)
+        target.header.hold = 0  # its last targets are sent
+        return True
+    c.flags |= LAW_FAILED
+    memcpy(target.header, c.handover.target[BEFORE_LAW].header, c.handover.target_size)
+    cat_add32(&c.axes.stop_asked, 1)
+    end_law(c, RUNNING)
+    return False
 
 
 cdef void cycle_law(cycle_t *c) noexcept nogil:
-    """The application's commit starts the law; without a law, or after its end, axes hold."""
+    """Without a law, or after its end, axes hold."""
     cdef bint fresh
-    cdef target_t *target = handover_latch(c.handover, &fresh)
+    cdef target_t *committed = handover_latch(c.handover, &fresh)
+    cdef target_t *target = &c.handover.target[OF_LAW]
     cdef actual_t *actual = &c.handover.actual[c.handover.actual_triple.back]
     cdef record_t *record = record_of(c)
     cdef int64_t usable, done, sent
+    if fresh:
+        take_orders(target, committed, &c.handover.counts)
     collect(c, actual, 0)
     usable = now(c)
     record.receive_ns = short_ns(usable - c.wake)
     done = usable
-    if c.law == NULL or c.law_done:
-        target.header.hold = 1
-    if not target.header.hold:
-        run_law(c, actual, target)
-        done = now(c)
-        c.process = done - usable
-    if c.law_done:
-        c.flags |= LAW_DONE
-    emit(c, target, True)
+    if c.law != NULL:
+        fresh = step_law(c, actual, target, usable)
+        done = usable + c.process
+    emit(c, target, fresh)
     sent = now(c)
     record.send_ns = short_ns(sent - done)
+    axes_tell(c.axes, actual)
     close_header(c, actual)
     handover_publish(c.handover)
     handover_wake(c.handover)

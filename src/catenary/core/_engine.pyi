@@ -2,6 +2,8 @@
 
 from collections.abc import Callable
 
+from catenary.core._law import Law
+
 class Engine:
     """Owns one cyclic exchange: frames, buffers, lane, histograms and, where the plan's order is
     threaded or law, its native thread. The thread that iterates is the only one that may call
@@ -134,7 +136,27 @@ class Engine:
         """inline with a lead (`lead_ns` of the plan): called between waking and the instant, when at
         least a third of the lead is left; what it raises comes out of `next`."""
 
-    # For the law order; step 2 compiles laws, the place is here.
-    def set_law(self, law: object) -> None:
-        """A capsule "catenary.law" (native/law.h), called natively between collect and emit in the
-        order "law"; None: hold. Only while stopped."""
+    # Laws.
+    def law_fields(
+        self,
+    ) -> tuple[dict[str, tuple[int, str, int | None]], dict[str, tuple[int, str, int | None]]]:
+        """The blocks a law works on, (actual, target): name → (offset, NumPy format, count; None for
+        a single number). actual: n, ok, dt [s], position, velocity, torque, enabled, reals,
+        integers, bits; target: position, velocity, torque, reals, integers, bits."""
+
+    def blocks(self) -> tuple[memoryview, memoryview]:
+        """The private buffers as the whole blocks of `law_fields`; the second is writable."""
+
+    def start_law(self, law: Law) -> None:
+        """From the next cycle on the law says the set-points and the output columns, natively, in
+        the order "law", from what is commanded now. Goals, modes and control bits stay with the
+        application. A law that runs already is stopped. While it runs, `next` overwrites the target
+        buffers with what is commanded."""
+
+    def stop_law(self) -> None:
+        """The axes hold; the application says the targets again."""
+
+    def run_law(self, duration_ns: int, trouble: int) -> int:
+        """Waits without the GIL while the law runs: until it has ended, for `duration_ns`, or (where
+        the caller's thread does the cycles) until one of the flags of `trouble` comes. Returns the
+        flags of the newest cycle."""

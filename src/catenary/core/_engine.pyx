@@ -9,64 +9,46 @@ import os
 
 cimport cython
 from cpython.exc cimport PyErr_CheckSignals
-from cpython.pycapsule cimport PyCapsule_GetPointer, PyCapsule_IsValid
 from libc.errno cimport EINTR
 from libc.stdint cimport int64_t, uint32_t, uint64_t
-from libc.stdlib cimport calloc, free
 from libc.string cimport memcpy
 
-from catenary.core._axes cimport Axes, axes_follow
+from catenary.core._axes cimport axes_follow
 from catenary.core._cycle cimport (
     INLINE,
     LATE,
-    LAW,
-    LOG_LENGTH,
     NONE,
-    PHASES,
-    RECORDS,
     STOPPED,
     cycle_inputs,
-    cycle_law,
+    cycle_native,
     cycle_open,
     cycle_outputs,
     cycle_sleep,
     cycle_start,
     cycle_t,
-    cycle_threaded,
+    cycle_take_law,
     cycle_usable,
     cycle_wait,
-    record_t,
 )
-from catenary.core._cycle import ORDERS, PHASE_NAMES
-from catenary.core._frames cimport Frames, frames_flush
+from catenary.core._frames cimport frames_flush
 from catenary.core._handover cimport (
     PRIVATE,
-    Handover,
     actual_header_t,
     actual_t,
     handover_commit,
     handover_swap,
     target_t,
 )
-from catenary.core._histogram cimport (
-    histogram_counts,
-    histogram_reset,
-    histogram_summary,
-    histogram_t,
-)
-from catenary.core._lane cimport Lane
+from catenary.core._law cimport Law, law_t
 from catenary.core._native cimport (
-    CAT_LAW_CAPSULE,
-    CAT_LAW_VERSION,
-    CAT_LINK_VIRTUAL_TIME,
     cat_add32,
     cat_fence,
     cat_futex_wait,
     cat_futex_wake,
-    cat_law,
     cat_load_acquire32,
     cat_store_release32,
 )
+from catenary.core._parts cimport Parts, engine_t
 from catenary.core._thread cimport (
     cat_scheduling,
     scheduling_restore,
@@ -75,7 +57,6 @@ from catenary.core._thread cimport (
     thread_join,
     thread_schedule,
     thread_start,
-    thread_t,
 )
 
 cdef enum:
@@ -90,7 +71,7 @@ cdef void thread_loop(void *argument) noexcept nogil:
     while not cat_load_acquire32(&e.thread.stop):
         rc = cycle_wait(&e.cycle)
         if rc == 0:
-            native_cycle(e)
+            cycle_native(&e.cycle)
         elif rc != -EINTR:
             e.error = rc
             break
@@ -99,83 +80,13 @@ cdef void thread_loop(void *argument) noexcept nogil:
     cat_futex_wake(&e.cycle.handover.published)
 
 
-cdef inline void native_cycle(engine_t *e) noexcept nogil:
-    if e.cycle.order == LAW:
-        cycle_law(&e.cycle)
-    else:
-        cycle_threaded(&e.cycle)
-
-
-def columns_by_bank(columns):
-    """How many columns each bank has."""
-    return [sum(column.bank == bank for column in columns) for bank in range(3)]
-
-
 @cython.no_gc_clear  # its parts must outlive the native thread
-cdef class Engine:
+cdef class Engine(Parts):
     def __cinit__(self, plan, link):
-        if plan.order not in ORDERS:
-            raise ValueError(f"order: {plan.order!r}, must be one of {', '.join(ORDERS)}")
-        if not 1000 <= plan.period_ns <= 1 << 40:
-            raise ValueError(f"period_ns: {plan.period_ns}")
-        if not 0 <= plan.collect_deadline_ns <= plan.period_ns:
-            raise ValueError(
-                f"collect_deadline_ns: {plan.collect_deadline_ns}, must lie in the period"
-                f" of {plan.period_ns}"
-            )
-        if plan.priority is not None and not 1 <= plan.priority <= 99:
-            raise ValueError(f"priority: {plan.priority}, must be 1 to 99 or None")
-        if plan.cpu is not None and not 0 <= plan.cpu < 1024:
-            raise ValueError(f"cpu: {plan.cpu}")
-        if not 0 <= plan.lead_ns < plan.period_ns:
-            raise ValueError(f"lead_ns: {plan.lead_ns}, must be less than the period")
-        self.e.thread.priority = plan.priority or 0
-        self.e.thread.cpu = -1 if plan.cpu is None else plan.cpu
         self.lead = plan.lead_ns
-        self.frames = Frames(plan, link)
-        self.lane = Lane(plan.period_ns)
-        self.axes = Axes(plan)
-        self.handover = Handover(
-            len(plan.axes),
-            len(plan.sync_units),
-            columns_by_bank(plan.input_columns),
-            columns_by_bank(plan.output_columns),
-        )
-        self.connect(plan)
-        self._buffers = self.handover.fields()
-
-    cdef connect(self, plan):
-        """Lets the parts know each other."""
-        cdef cycle_t *c = &self.e.cycle
-        cdef uint32_t i
-        cdef int slot
-        c.records = <record_t *>calloc(RECORDS, sizeof(record_t))
-        c.histograms = <histogram_t *>calloc(PHASES, sizeof(histogram_t))
-        self.spare_histograms = <histogram_t *>calloc(PHASES, sizeof(histogram_t))
-        if not (c.records and c.histograms and self.spare_histograms):
-            raise MemoryError
-        self.frames.c.lane = &self.lane.c
-        self.axes.c.image = &self.frames.c.image
-        c.link = self.frames.c.link
-        c.image = &self.frames.c.image
-        c.axes = &self.axes.c
-        c.lane = &self.lane.c
-        c.handover = &self.handover.c
-        c.order = ORDERS[plan.order]
-        c.period = plan.period_ns
-        c.collect_deadline = plan.collect_deadline_ns
-        c.lost_limit = plan.lost_limit
-        self.h = &self.handover.c
-        self.virtual = c.link.flags & CAT_LINK_VIRTUAL_TIME != 0
-        self.native = c.order != INLINE and not self.virtual
+        self.laws = []
+        self.native = self.e.cycle.order != INLINE and not self.virtual
         self.left = -1
-        for slot in range(4):
-            for i in range(c.axes.axis_count):
-                self.h.target[slot].mode[i] = c.axes.axes[i].mode
-        for i in range(c.axes.axis_count):
-            self.h.actual[PRIVATE].position[i] = c.axes.axes[i].position
-            self.h.actual[PRIVATE].velocity[i] = c.axes.axes[i].velocity
-            self.h.actual[PRIVATE].torque[i] = c.axes.axes[i].torque
 
     # ---- life
 
@@ -223,18 +134,36 @@ cdef class Engine:
             raise RuntimeError("the engine is not running: start it first")
         if self.native:
             return self.step_native(timeout_ns)
-        if self.e.cycle.order == INLINE:
+        if self.is_native_cycle(True):
+            self.commit(self.law is not None)
+            self.lockstep()
+        else:
             self.inline_outputs(True)
             self.inline_inputs()
-        else:
-            self.commit(False)
-            self.lockstep()
-        axes_follow(&self.axes.c, &self.h.actual[PRIVATE], &self.h.target[PRIVATE])
+        self.follow()
         return self.h.actual[PRIVATE].header.flags
 
-    cdef actual_header_t *actual_header(self) noexcept:
-        """Of the cycle that Python's actual values belong to; lives as long as the engine."""
-        return self.h.actual[PRIVATE].header
+    cdef bint is_native_cycle(self, bint application) noexcept nogil:
+        """Whether the next cycle of the caller's thread has the order of a native one. Inline: only
+        while a law runs; one that was asked for is taken over here, behind Python's last outputs."""
+        cdef cycle_t *c = &self.e.cycle
+        if c.order != INLINE:
+            return True
+        if c.law_seen != c.law_request:
+            self.inline_outputs(application)
+            cycle_take_law(c, &self.h.target[PRIVATE])
+        return c.law != NULL
+
+    cdef void follow(self) noexcept:
+        """After new actual values: Python's targets where they follow by themselves. While a law
+        runs that is all of them, and until the cycle of its end has been seen."""
+        cdef actual_t *actual = &self.h.actual[PRIVATE]
+        if self.law is None:
+            axes_follow(&self.axes.c, actual, &self.h.target[PRIVATE])
+            return
+        self.take_commanded()
+        if self.law.ended_before(actual.header.number):
+            self.law = None
 
     cdef void inline_outputs(self, bint application) noexcept nogil:
         """Once a cycle: a wait that a signal ended must not send a second time."""
@@ -271,23 +200,45 @@ cdef class Engine:
         cdef uint64_t before = header.number
         cdef int rc
         while True:
-            rc = cycle_wait(&self.e.cycle)
+            if self.virtual:
+                rc = self.native_cycle_here()
+            else:
+                with nogil:
+                    rc = self.native_cycle_here()
             if rc == 0:
-                native_cycle(&self.e)
-                handover_swap(self.h)
                 if before > 0 and header.number > before + 1:
                     header.flags |= LATE  # cycles happened in `spend`
                 self.left = self.now_ns()
                 return 0
             self.interrupted(rc)
 
+    cdef int native_cycle_here(self) noexcept nogil:
+        cdef int rc = cycle_wait(&self.e.cycle)
+        if rc == 0:
+            cycle_native(&self.e.cycle)
+            handover_swap(self.h)
+            self.emitted = True
+        return rc
+
+    cdef int inline_cycle_here(self) noexcept nogil:
+        """Nobody computes."""
+        cdef cycle_t *c = &self.e.cycle
+        cdef int rc
+        self.inline_outputs(False)
+        rc = cycle_wait(c)
+        if rc == 0:
+            cycle_inputs(c, &self.h.actual[PRIVATE])
+            cycle_usable(c)
+            self.emitted = False
+        return rc
+
     cdef uint32_t step_native(self, int64_t timeout_ns) except? 0xFFFFFFFF:
         cdef actual_header_t *header = self.h.actual[PRIVATE].header
         cdef uint64_t before = header.number
         cdef uint32_t flags
-        self.commit(False)
+        self.commit(self.law is not None)
         flags = self.await_cycle(timeout_ns)
-        axes_follow(&self.axes.c, &self.h.actual[PRIVATE], &self.h.target[PRIVATE])
+        self.follow()
         self.left = self.now_ns()
         if flags:
             return header.flags | flags
@@ -375,23 +326,14 @@ cdef class Engine:
 
     cdef uint32_t hold_here(self, int64_t cycles) except? 0xFFFFFFFF:
         """Does so many cycles in the caller's thread, without the GIL."""
-        cdef cycle_t *c = &self.e.cycle
         cdef int rc = 0
         while cycles > 0:
             with nogil:
                 while cycles > 0 and rc == 0:
-                    if c.order == INLINE:
-                        self.inline_outputs(False)
-                        rc = cycle_wait(c)
-                        if rc == 0:
-                            cycle_inputs(c, &self.h.actual[PRIVATE])
-                            cycle_usable(c)
-                            self.emitted = False
+                    if self.is_native_cycle(False):
+                        rc = self.native_cycle_here()
                     else:
-                        rc = cycle_wait(c)
-                        if rc == 0:
-                            native_cycle(&self.e)
-                            handover_swap(self.h)
+                        rc = self.inline_cycle_here()
                     if rc == 0:
                         cycles -= 1
             if rc != 0:
@@ -434,7 +376,7 @@ cdef class Engine:
         """A cycle that happens while the application computes: it does not see it yet."""
         cdef int rc = cycle_wait(&self.e.cycle)
         if rc == 0:
-            native_cycle(&self.e)
+            cycle_native(&self.e.cycle)
             return 0
         return self.interrupted(rc)
 
@@ -455,101 +397,8 @@ cdef class Engine:
         self.hold(1 << 62, True, self.now_ns() + timeout_ns)
         return self.h.actual[PRIVATE].header.moving == 0
 
-    # ---- the cycle that `actual` belongs to
-
-    cdef inline int64_t now_ns(self) noexcept:
-        return self.e.cycle.link.now(self.e.cycle.link.self)
-
-    def now(self):
-        return self.now_ns()
-
-    @property
-    def buffers(self):
-        return dict(self._buffers)
-
-    @property
-    def number(self):
-        return self.h.actual[PRIVATE].header.number
-
-    @property
-    def time_ns(self):
-        return self.h.actual[PRIVATE].header.time_ns
-
-    @property
-    def flags(self):
-        return self.h.actual[PRIVATE].header.flags
-
-    @property
-    def lost_in_row(self):
-        return self.h.actual[PRIVATE].header.lost_in_row
-
-    @property
-    def skipped(self):
-        return self.h.actual[PRIVATE].header.skipped
-
-    @property
-    def missing_frames(self):
-        return self.h.actual[PRIVATE].header.missing_frames
-
-    @property
-    def al_status(self):
-        return self.h.actual[PRIVATE].header.al_status
-
-    @property
-    def al_counter(self):
-        return self.h.actual[PRIVATE].header.al_counter
-
-    # ---- figures
-
-    @property
-    def counters(self):
-        frames = self.frames.c.counters
-        return {
-            "cycles": self.e.cycle.number,
-            "lost": self.e.cycle.lost,
-            "late": self.e.cycle.late,
-            "uncommitted": self.e.cycle.uncommitted,
-            "stale": frames.stale,
-            "alien": frames.alien,
-            "corrupt": frames.corrupt,
-            "duplicate": frames.duplicate,
-            "unprocessed": frames.unprocessed,
-            "lane_sent": self.lane.c.sent,
-            "lane_received": self.lane.c.received,
-            "lane_dropped": self.lane.c.dropped,
-            "send_errors": frames.send_errors,
-            "receive_errors": frames.receive_errors,
-        }
-
-    def histograms(self):
-        return {
-            name: histogram_summary(&self.e.cycle.histograms[phase])
-            for name, phase in PHASE_NAMES.items()
-        }
-
-    def histogram_counts(self, str phase not None):
-        if phase not in PHASE_NAMES:
-            raise ValueError(f"phase {phase!r}: must be one of {', '.join(PHASE_NAMES)}")
-        return histogram_counts(&self.e.cycle.histograms[<int>PHASE_NAMES[phase]])
-
-    def reset_histograms(self):
-        """By exchanging them: the native thread may be adding to the old ones this very moment."""
-        cdef histogram_t *old = self.e.cycle.histograms
-        cdef int phase
-        for phase in range(PHASES):
-            histogram_reset(&self.spare_histograms[phase])
-        cat_fence()
-        self.e.cycle.histograms = self.spare_histograms
-        self.spare_histograms = old
-
-    def log(self):
-        cdef uint64_t last = self.e.cycle.number
-        cdef uint64_t count = min(last, <uint64_t>LOG_LENGTH)
-        cdef uint64_t number
-        parts = []
-        for number in range(last - count + 1, last + 1):
-            parts.append((<char *>&self.e.cycle.records[number % RECORDS])[: sizeof(record_t)])
-        return b"".join(parts)
+    def set_rehearsal(self, rehearsal):
+        self.rehearsal = rehearsal
 
     @property
     def scheduling(self):
@@ -557,39 +406,43 @@ cdef class Engine:
             return "virtual time"
         return scheduling_text(&self.e.thread)
 
-    # ---- the acyclic lane
+    # ---- laws
 
-    def lane_push(self, bytes frame not None):
-        return self.lane.push(frame)
-
-    def lane_pop(self):
-        return self.lane.pop()
-
-    def lane_wait(self, int64_t timeout_ns):
-        return self.lane.wait(timeout_ns)
-
-    def set_rehearsal(self, rehearsal):
-        self.rehearsal = rehearsal
-
-    # ---- law
-
-    def set_law(self, law):
-        if self.running:
-            raise RuntimeError("a law is set while the engine is stopped")
-        if law is not None and not PyCapsule_IsValid(law, CAT_LAW_CAPSULE):
-            raise ValueError("law: not a capsule \"catenary.law\"")
-        cdef const cat_law *table = NULL
-        if law is not None:
-            table = <const cat_law *>PyCapsule_GetPointer(law, CAT_LAW_CAPSULE)
-            if table.version != CAT_LAW_VERSION:
-                raise ValueError(f"law: table version {table.version}")
+    def start_law(self, Law law not None):
+        if not self.running:
+            raise RuntimeError("the engine is not running: start it first")
+        self.laws = [*self.laws[-1:], law]  # the cycle may still be in the one before
         self.law = law
-        self.e.cycle.law = table
-        self.e.cycle.law_done = 0
+        self.ask_law(&law.c)
+
+    def stop_law(self):
+        self.ask_law(NULL)
+
+    cdef void ask_law(self, law_t *law) noexcept:
+        self.e.cycle.law_asked = law
+        cat_add32(&self.e.cycle.law_request, 1)
+
+    def run_law(self, int64_t duration_ns, uint32_t trouble):
+        cdef int64_t cycles = duration_ns // self.e.cycle.period + 1
+        cdef uint32_t flags = self.h.actual[PRIVATE].header.flags
+        cdef Law law = self.law
+        if not self.running or law is None:
+            raise RuntimeError("no law runs: start one first")
+        if self.native:
+            law.wait(duration_ns)
+            handover_swap(self.h)
+            flags = self.h.actual[PRIVATE].header.flags
+            if cat_load_acquire32(&self.e.done):
+                flags |= STOPPED
+        else:
+            self.commit(True)
+            while cycles > 0 and not law.ended and not flags & trouble:
+                flags = self.hold_here(1)
+                cycles -= 1
+        self.follow()
+        self.left = -1
+        return flags
 
     def __dealloc__(self):
         with nogil:
             thread_join(&self.e.thread)
-        free(self.e.cycle.records)
-        free(self.e.cycle.histograms)
-        free(self.spare_histograms)

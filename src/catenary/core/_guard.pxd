@@ -1,7 +1,30 @@
-from libc.stdint cimport uint8_t, uint16_t, uint32_t, uint64_t
+from libc.stdint cimport int8_t, uint8_t, uint16_t, uint32_t, uint64_t
 
 from catenary.core._axes cimport axes_t, axis_t
 from catenary.core._handover cimport target_t
+
+cdef enum:  # modes of operation, 0x6060
+    PROFILE_POSITION = 1
+    PROFILE_VELOCITY = 3
+    PROFILE_TORQUE = 4
+    CSP = 8
+    CSV = 9
+    CST = 10
+
+cdef enum:
+    NO_QUANTITY = 0
+    POSITION = 1
+    VELOCITY = 2
+    TORQUE = 3
+
+cdef inline uint8_t quantity_of(int8_t mode) noexcept nogil:
+    if mode == CSP or mode == PROFILE_POSITION:
+        return POSITION
+    if mode == CSV or mode == PROFILE_VELOCITY:
+        return VELOCITY
+    if mode == CST or mode == PROFILE_TORQUE:
+        return TORQUE
+    return NO_QUANTITY
 
 cdef void guard_observe(axes_t *x, axis_t *a, bint valid, uint8_t state_before,
                         uint64_t number) noexcept nogil

@@ -32,34 +32,10 @@ from catenary.core._cia402 cimport (
     cia402_command,
 )
 
-cdef enum:  # modes of operation, 0x6060
-    PROFILE_POSITION = 1
-    PROFILE_VELOCITY = 3
-    PROFILE_TORQUE = 4
-    CSP = 8
-    CSV = 9
-    CST = 10
-
-cdef enum:
-    NO_QUANTITY = 0
-    POSITION = 1
-    VELOCITY = 2
-    TORQUE = 3
-
 cdef enum:
     FOLLOWS_COMMAND = 0x1000   # statusword bit 12 in CSP, CSV, CST
     MODE_BITS = 0x0270         # controlword bits 4, 5, 6, 9: the mode's, in OPERATION_ENABLED
     FREE_BITS = 0xF800         # 11 to 15: the manufacturer's, always
-
-
-cdef inline uint8_t quantity_of(int8_t mode) noexcept nogil:
-    if mode == CSP or mode == PROFILE_POSITION:
-        return POSITION
-    if mode == CSV or mode == PROFILE_VELOCITY:
-        return VELOCITY
-    if mode == CST or mode == PROFILE_TORQUE:
-        return TORQUE
-    return NO_QUANTITY
 
 
 cdef inline double clamp(axis_t *a, double value, double low, double high) noexcept nogil:

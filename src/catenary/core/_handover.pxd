@@ -20,9 +20,12 @@ cdef struct actual_header_t:
     uint32_t lost_in_row
     uint32_t skipped
     uint32_t moving            # axes under power and not at rest
+    double period              # [s]
+    uint32_t axis_count
     uint16_t missing_frames
     uint16_t al_counter
     uint8_t al_status
+    uint8_t ok
 
 cdef struct actual_t:
     actual_header_t *header
@@ -40,6 +43,7 @@ cdef struct actual_t:
     int8_t *mode
     uint8_t *state
     uint8_t *flags
+    uint8_t *enabled           # bit 0 of flags, for laws
     uint8_t *input_bits
     uint8_t *unit_valid
 
@@ -68,12 +72,15 @@ cdef struct handover_t:
     cat_triple actual_triple
     cat_triple target_triple
     actual_t actual[4]         # three to hand over, the last one Python's own
-    target_t target[4]
+    target_t target[6]         # and the law's two
     uint32_t published         # futex word: counts publications
     uint32_t waiting           # Python sleeps on it
 
 cdef enum:
     PRIVATE = 3
+    OF_LAW = 4
+    BEFORE_LAW = 5             # what the law found: restored when it fails
+    TARGETS = 6
 
 cdef class Handover:
     """Owns the buffers between the cycle and Python."""

@@ -52,6 +52,7 @@ cdef size_t lay_actual(actual_t *a, uint8_t *block, const counts_t *n) noexcept:
     a.mode = <int8_t *>carve(&place, n.axes, 1)
     a.state = carve(&place, n.axes, 1)
     a.flags = carve(&place, n.axes, 1)
+    a.enabled = carve(&place, n.axes, 1)
     a.input_bits = carve(&place, n.input_bits, 1)
     a.unit_valid = carve(&place, n.units, 1)
     return place - block
@@ -157,13 +158,16 @@ cdef class Handover:
     cdef allocate(self):
         cdef size_t actual = (self.c.actual_size // CACHE_LINE + 1) * CACHE_LINE
         cdef size_t target = (self.c.target_size // CACHE_LINE + 1) * CACHE_LINE
+        cdef size_t size = 4 * actual + TARGETS * target
         cdef int k
-        self.memory = <uint8_t *>aligned_alloc(CACHE_LINE, 4 * (actual + target))
+        self.memory = <uint8_t *>aligned_alloc(CACHE_LINE, size)
         if self.memory == NULL:
             raise MemoryError
-        memset(self.memory, 0, 4 * (actual + target))
+        memset(self.memory, 0, size)
         for k in range(4):
             lay_actual(&self.c.actual[k], self.memory + k * actual, &self.c.counts)
+            self.c.actual[k].header.axis_count = self.c.counts.axes
+        for k in range(TARGETS):
             lay_target(&self.c.target[k], self.memory + 4 * actual + k * target, &self.c.counts)
             self.c.target[k].header.hold = 1  # nothing was committed yet
 
@@ -196,6 +200,45 @@ cdef class Handover:
             "output_integers": self.field(t.output_integers, n.output_integers, 8, b"q", True),
             "output_bits": self.field(t.output_bits, n.output_bits, 1, b"B", True),
         }
+
+    def law_fields(self):
+        """The blocks a law works on, (actual, target): name → (offset, NumPy format, count; None for
+        a single number)."""
+        cdef actual_t *a = &self.c.actual[PRIVATE]
+        cdef target_t *t = &self.c.target[PRIVATE]
+        cdef counts_t *n = &self.c.counts
+        cdef char *of_actual = <char *>a.header
+        cdef char *of_target = <char *>t.header
+        actual = {
+            "n": (<char *>&a.header.axis_count - of_actual, "<u4", None),
+            "ok": (<char *>&a.header.ok - of_actual, "?", None),
+            "dt": (<char *>&a.header.period - of_actual, "<f8", None),
+            "position": (<char *>a.position - of_actual, "<f8", n.axes),
+            "velocity": (<char *>a.velocity - of_actual, "<f8", n.axes),
+            "torque": (<char *>a.torque - of_actual, "<f8", n.axes),
+            "enabled": (<char *>a.enabled - of_actual, "u1", n.axes),
+            "reals": (<char *>a.input_reals - of_actual, "<f8", n.input_reals),
+            "integers": (<char *>a.input_integers - of_actual, "<i8", n.input_integers),
+            "bits": (<char *>a.input_bits - of_actual, "u1", n.input_bits),
+        }
+        target = {
+            "position": (<char *>t.position - of_target, "<f8", n.axes),
+            "velocity": (<char *>t.velocity - of_target, "<f8", n.axes),
+            "torque": (<char *>t.torque - of_target, "<f8", n.axes),
+            "reals": (<char *>t.output_reals - of_target, "<f8", n.output_reals),
+            "integers": (<char *>t.output_integers - of_target, "<i8", n.output_integers),
+            "bits": (<char *>t.output_bits - of_target, "u1", n.output_bits),
+        }
+        return actual, target
+
+    def blocks(self):
+        """Python's own blocks whole, (actual, target), as bytes."""
+        cdef actual_t *a = &self.c.actual[PRIVATE]
+        cdef target_t *t = &self.c.target[PRIVATE]
+        return (
+            self.field(a.header, self.c.actual_size, 1, b"B", False),
+            self.field(t.header, self.c.target_size, 1, b"B", True),
+        )
 
     cdef field(self, void *start, uint32_t count, size_t itemsize, bytes format, bint writable):
         cdef Field field = Field()

@@ -86,29 +86,18 @@ cdef extern from "triple_buffer.h" nogil:
 
 
 cdef extern from "law.h" nogil:
-    const char *CAT_LAW_CAPSULE
-    const uint32_t CAT_LAW_VERSION
+    const int CAT_LAW_GOES_ON
+    const int CAT_LAW_FINISHED
+    const int CAT_LAW_RAISED
+    const int CAT_LAW_ABORTED
 
-    ctypedef struct cat_law_frame:
-        uint32_t axis_count
-        uint32_t ok
-        double time
-        double period
-        const double *actual_position
-        const double *actual_velocity
-        const double *actual_torque
-        const uint8_t *axis_flags
-        double *target_position
-        double *target_velocity
-        double *target_torque
-        const double *input_reals
-        const int64_t *input_integers
-        const uint8_t *input_bits
-        double *output_reals
-        int64_t *output_integers
-        uint8_t *output_bits
+    ctypedef int (*cat_law_step)(const void *actual, void *target, double *memory,
+                                 const double *parameters, double time) noexcept nogil
 
-    ctypedef struct cat_law:
-        uint32_t version
-        void *self
-        int (*step)(void *self, const cat_law_frame *frame) noexcept nogil
+    ctypedef struct cat_law_guard:
+        pass
+
+    int cat_law_guard_start(cat_law_guard *guard, int64_t limit, int priority)
+    void cat_law_guard_stop(cat_law_guard *guard)
+    int cat_law_call(cat_law_guard *guard, cat_law_step step, const void *actual, void *target,
+                     double *memory, const double *parameters, double time)

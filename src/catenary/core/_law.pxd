@@ -1,0 +1,53 @@
+from libc.stdint cimport int64_t, uint32_t, uint64_t
+
+from catenary.core._axes cimport axes_t
+from catenary.core._handover cimport actual_t, target_t
+from catenary.core._native cimport cat_law_guard, cat_law_step, cat_triple
+
+cdef enum:  # how a law stands
+    WAITING = 0                # not taken over by the cycle yet
+    RUNNING = 1
+    FINISHED = 2
+    STOPPED_BY_APPLICATION = 3
+    RAISED = 4
+    NEVER_RETURNED = 5
+    NOT_FINITE = 6
+    OVERRUN = 7
+
+cdef struct exchange_t:        # numbers that change all at once
+    uint32_t count
+    cat_triple triple
+    double *slots[3]
+
+cdef struct law_t:
+    cat_law_step step
+    cat_law_guard guard
+    double *memory             # the law's own
+    double *parameters
+    exchange_t memory_in
+    exchange_t memory_out
+    exchange_t parameters_in
+    int64_t budget             # [ns] of one step; 0: none
+    uint32_t overrun_limit     # steps in a row over the budget
+    uint32_t overruns_in_row
+    uint64_t overruns
+    uint64_t steps
+    int64_t longest            # [ns]
+    int64_t begun              # its first instant
+    uint64_t ended_at          # cycle
+    uint32_t status            # futex word
+    uint32_t axis              # NOT_FINITE: whose target
+
+cdef class Law:
+    """Owns a law's numbers while it runs."""
+    cdef law_t c
+    cdef double *block
+    cdef allocate(self, exchange_t *numbers, double **place)
+    cdef fill(self, exchange_t *numbers, values)
+    cdef bint ended_before(self, uint64_t number) noexcept
+
+cdef void law_begin(law_t *law, int64_t instant) noexcept nogil
+cdef void law_end(law_t *law, uint32_t status, uint64_t number) noexcept nogil
+cdef bint law_run(law_t *law, const axes_t *axes, const actual_t *actual, target_t *target,
+                  int64_t instant, uint64_t number) noexcept nogil
+cdef bint law_took(law_t *law, int64_t duration, uint64_t number) noexcept nogil

@@ -1,0 +1,257 @@
+# cython: boundscheck=False, wraparound=False, cdivision=True
+"""A law in the cycle: its numbers, handed over all at once both ways, its budget, and what ends it.
+
+The law itself is a function of native/law.h. Budget: 30 ns beside it, without memory.
+"""
+
+from libc.math cimport isfinite
+from libc.stdint cimport int64_t, uint32_t, uint64_t, uintptr_t
+from libc.stdlib cimport calloc, free
+from libc.string cimport memcpy
+
+from catenary.core._axes cimport axes_t
+from catenary.core._guard cimport POSITION, TORQUE, VELOCITY, quantity_of
+from catenary.core._handover cimport actual_t, target_t
+from catenary.core._native cimport (
+    CAT_LAW_ABORTED,
+    CAT_LAW_FINISHED,
+    CAT_LAW_GOES_ON,
+    cat_futex_wait,
+    cat_futex_wake,
+    cat_law_call,
+    cat_law_guard_start,
+    cat_law_guard_stop,
+    cat_law_step,
+    cat_load_acquire32,
+    cat_store_release32,
+    cat_triple_init,
+    cat_triple_publish,
+    cat_triple_take,
+)
+
+LAW_RUNNING = RUNNING
+LAW_FINISHED = FINISHED
+LAW_STOPPED = STOPPED_BY_APPLICATION
+LAW_RAISED = RAISED
+LAW_NEVER_RETURNED = NEVER_RETURNED
+LAW_NOT_FINITE = NOT_FINITE
+LAW_OVERRUN = OVERRUN
+
+cdef enum:
+    NUMBERS_MAX = 4096         # copied in every cycle
+    STUCK_NS = 20_000_000      # of processor time in one call: it never returns
+    REHEARSALS = 3
+
+
+# ---- numbers that change all at once
+
+cdef inline void give(exchange_t *numbers, const double *values) noexcept nogil:
+    if numbers.count:
+        memcpy(numbers.slots[numbers.triple.back], values, numbers.count * sizeof(double))
+        cat_triple_publish(&numbers.triple)
+
+
+cdef inline bint take(exchange_t *numbers, double *values) noexcept nogil:
+    """False: nothing new."""
+    if numbers.count == 0 or not cat_triple_take(&numbers.triple):
+        return False
+    memcpy(values, numbers.slots[numbers.triple.front], numbers.count * sizeof(double))
+    return True
+
+
+# ---- in the cycle
+
+cdef void law_begin(law_t *law, int64_t instant) noexcept nogil:
+    law.begun = instant
+    cat_store_release32(&law.status, RUNNING)
+
+
+cdef void law_end(law_t *law, uint32_t status, uint64_t number) noexcept nogil:
+    law.ended_at = number
+    give(&law.memory_out, law.memory)
+    cat_store_release32(&law.status, status)
+    cat_futex_wake(&law.status)
+
+
+cdef int first_not_finite(const axes_t *axes, const target_t *target) noexcept nogil:
+    """The first axis whose set-point is NaN or infinite; -1: none."""
+    cdef uint32_t i
+    cdef double value
+    for i in range(axes.axis_count):
+        if quantity_of(target.mode[i]) == VELOCITY:
+            value = target.velocity[i]
+        elif quantity_of(target.mode[i]) == TORQUE:
+            value = target.torque[i]
+        else:
+            value = target.position[i]
+        if not isfinite(value):
+            return <int>i
+    return -1
+
+
+cdef bint law_run(law_t *law, const axes_t *axes, const actual_t *actual, target_t *target,
+                  int64_t instant, uint64_t number) noexcept nogil:
+    """One step; whether the law goes on afterwards. What a failed step left in `target` must not
+    be sent."""
+    cdef int rc, axis
+    take(&law.parameters_in, law.parameters)
+    take(&law.memory_in, law.memory)
+    rc = cat_law_call(&law.guard, law.step, actual.header, target.header, law.memory,
+                      law.parameters, <double>(instant - law.begun) * 1e-9)
+    law.steps += 1
+    if rc != CAT_LAW_GOES_ON and rc != CAT_LAW_FINISHED:
+        law_end(law, NEVER_RETURNED if rc == CAT_LAW_ABORTED else RAISED, number)
+        return False
+    axis = first_not_finite(axes, target)
+    if axis >= 0:
+        law.axis = <uint32_t>axis
+        law_end(law, NOT_FINITE, number)
+        return False
+    if rc == CAT_LAW_FINISHED:
+        law_end(law, FINISHED, number)
+        return False
+    give(&law.memory_out, law.memory)
+    return True
+
+
+cdef bint law_took(law_t *law, int64_t duration, uint64_t number) noexcept nogil:
+    """Notes how long the step took; whether it may go on."""
+    law.longest = max(law.longest, duration)
+    if law.budget == 0 or duration <= law.budget:
+        law.overruns_in_row = 0
+        return True
+    law.overruns += 1
+    law.overruns_in_row += 1
+    if law.overruns_in_row < law.overrun_limit:
+        return True
+    law_end(law, OVERRUN, number)
+    return False
+
+
+# ---- the edge
+
+cdef class Law:
+    def __cinit__(self, uintptr_t address, memory, parameters, *, int64_t budget_ns,
+                  uint32_t overrun_limit, int priority):
+        cdef double *place
+        if address == 0:
+            raise ValueError("address: no function")
+        if budget_ns < 0 or overrun_limit == 0:
+            raise ValueError(f"budget_ns: {budget_ns}, overrun_limit: {overrun_limit}")
+        if max(len(memory), len(parameters)) > NUMBERS_MAX:
+            raise ValueError(f"a law has at most {NUMBERS_MAX} numbers of memory or parameters")
+        self.c.step = <cat_law_step><void *>address
+        self.c.budget = budget_ns
+        self.c.overrun_limit = overrun_limit
+        self.c.memory_in.count = self.c.memory_out.count = len(memory)
+        self.c.parameters_in.count = len(parameters)
+        self.block = <double *>calloc(7 * len(memory) + 4 * len(parameters) + 1, sizeof(double))
+        if self.block == NULL:
+            raise MemoryError
+        place = self.block
+        self.c.memory = place
+        place += len(memory)
+        self.c.parameters = place
+        place += len(parameters)
+        self.allocate(&self.c.memory_in, &place)
+        self.allocate(&self.c.memory_out, &place)
+        self.allocate(&self.c.parameters_in, &place)
+        for i, value in enumerate(memory):
+            self.c.memory[i] = value
+        for i, value in enumerate(parameters):
+            self.c.parameters[i] = value
+        give(&self.c.memory_out, self.c.memory)
+        rc = cat_law_guard_start(&self.c.guard, max(STUCK_NS, 2 * budget_ns), priority)
+        if rc < 0:
+            raise OSError(-rc, "the thread that watches the law cannot be started")
+
+    cdef allocate(self, exchange_t *numbers, double **place):
+        cdef int slot
+        cat_triple_init(&numbers.triple)
+        for slot in range(3):
+            numbers.slots[slot] = place[0]
+            place[0] += numbers.count
+
+    cdef fill(self, exchange_t *numbers, values):
+        cdef double *slot = numbers.slots[numbers.triple.back]
+        if len(values) != numbers.count:
+            raise ValueError(f"{numbers.count} numbers, not {len(values)}")
+        checked = [float(value) for value in values]
+        for i, value in enumerate(checked):
+            slot[i] = value
+        if numbers.count:
+            cat_triple_publish(&numbers.triple)
+
+    def set_memory(self, values):
+        self.fill(&self.c.memory_in, values)
+
+    def set_parameters(self, values):
+        self.fill(&self.c.parameters_in, values)
+
+    @property
+    def memory(self):
+        cdef exchange_t *numbers = &self.c.memory_out
+        cdef uint32_t i
+        if numbers.count:
+            cat_triple_take(&numbers.triple)
+        return [numbers.slots[numbers.triple.front][i] for i in range(numbers.count)]
+
+    @property
+    def status(self):
+        return cat_load_acquire32(&self.c.status)
+
+    @property
+    def ended(self):
+        return cat_load_acquire32(&self.c.status) > RUNNING
+
+    cdef bint ended_before(self, uint64_t number) noexcept:
+        """That cycle has seen its end."""
+        return cat_load_acquire32(&self.c.status) > RUNNING and number >= self.c.ended_at
+
+    @property
+    def axis(self):
+        return self.c.axis
+
+    @property
+    def figures(self):
+        return {
+            "steps": self.c.steps,
+            "overruns": self.c.overruns,
+            "longest_ns": self.c.longest,
+        }
+
+    def wait(self, int64_t timeout_ns):
+        cdef uint32_t status = cat_load_acquire32(&self.c.status)
+        if status <= RUNNING:
+            with nogil:
+                cat_futex_wait(&self.c.status, status, timeout_ns)
+        return cat_load_acquire32(&self.c.status) > RUNNING
+
+    def rehearse(self, bytes actual not None, bytes target not None):
+        cdef int rc = CAT_LAW_GOES_ON
+        cdef int k
+        cdef const char *source = actual
+        cdef const char *wanted = target
+        cdef size_t size = len(target)
+        cdef size_t numbers = self.c.memory_in.count * sizeof(double)
+        cdef size_t behind = (size // sizeof(double) + 1) * sizeof(double)
+        cdef char *scratch = <char *>calloc(behind + numbers + 1, 1)
+        if scratch == NULL:
+            raise MemoryError
+        try:
+            for k in range(REHEARSALS):
+                memcpy(scratch, wanted, size)
+                memcpy(scratch + behind, self.c.memory, numbers)
+                with nogil:
+                    rc = cat_law_call(&self.c.guard, self.c.step, source, scratch,
+                                      <double *>(scratch + behind), self.c.parameters, 0.0)
+                if rc == CAT_LAW_ABORTED:
+                    break
+            return rc
+        finally:
+            free(scratch)
+
+    def __dealloc__(self):
+        with nogil:
+            cat_law_guard_stop(&self.c.guard)
+        free(self.block)

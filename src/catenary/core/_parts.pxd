@@ -1,0 +1,30 @@
+from libc.stdint cimport int64_t, uint32_t
+
+from catenary.core._axes cimport Axes
+from catenary.core._cycle cimport cycle_t
+from catenary.core._frames cimport Frames
+from catenary.core._handover cimport Handover, actual_header_t, handover_t
+from catenary.core._histogram cimport histogram_t
+from catenary.core._lane cimport Lane
+from catenary.core._thread cimport thread_t
+
+cdef struct engine_t:
+    cycle_t cycle
+    thread_t thread
+    int error                  # why the native thread ended by itself
+    uint32_t done              # it has ended
+
+cdef class Parts:
+    cdef engine_t e
+    cdef handover_t *h
+    cdef Frames frames
+    cdef Lane lane
+    cdef Axes axes
+    cdef Handover handover
+    cdef dict _buffers
+    cdef histogram_t *spare_histograms
+    cdef bint virtual          # the link's time is virtual: everything in the caller's thread
+
+    cdef connect(self, plan)
+    cdef int64_t now_ns(self) noexcept
+    cdef actual_header_t *actual_header(self) noexcept

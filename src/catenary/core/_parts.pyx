@@ -1,0 +1,212 @@
+# cython: boundscheck=False, wraparound=False, cdivision=True
+"""Parts: owns all parts of one cyclic exchange, lets them know each other, and tells their figures.
+"""
+
+from libc.stdint cimport int64_t, uint32_t, uint64_t
+from libc.stdlib cimport calloc, free
+
+from catenary.core._axes cimport Axes
+from catenary.core._cycle cimport LOG_LENGTH, PHASES, RECORDS, cycle_t, record_t
+from catenary.core._cycle import ORDERS, PHASE_NAMES
+from catenary.core._frames cimport Frames
+from catenary.core._handover cimport PRIVATE, TARGETS, Handover, actual_header_t
+from catenary.core._histogram cimport (
+    histogram_counts,
+    histogram_reset,
+    histogram_summary,
+    histogram_t,
+)
+from catenary.core._lane cimport Lane
+from catenary.core._native cimport CAT_LINK_VIRTUAL_TIME, cat_fence
+
+
+def columns_by_bank(columns):
+    """How many columns each bank has."""
+    return [sum(column.bank == bank for column in columns) for bank in range(3)]
+
+
+cdef class Parts:
+    def __cinit__(self, plan, link):
+        if plan.order not in ORDERS:
+            raise ValueError(f"order: {plan.order!r}, must be one of {', '.join(ORDERS)}")
+        if not 1000 <= plan.period_ns <= 1 << 40:
+            raise ValueError(f"period_ns: {plan.period_ns}")
+        if not 0 <= plan.collect_deadline_ns <= plan.period_ns:
+            raise ValueError(
+                f"collect_deadline_ns: {plan.collect_deadline_ns}, must lie in the period"
+                f" of {plan.period_ns}"
+            )
+        if plan.priority is not None and not 1 <= plan.priority <= 99:
+            raise ValueError(f"priority: {plan.priority}, must be 1 to 99 or None")
+        if plan.cpu is not None and not 0 <= plan.cpu < 1024:
+            raise ValueError(f"cpu: {plan.cpu}")
+        if not 0 <= plan.lead_ns < plan.period_ns:
+            raise ValueError(f"lead_ns: {plan.lead_ns}, must be less than the period")
+        self.e.thread.priority = plan.priority or 0
+        self.e.thread.cpu = -1 if plan.cpu is None else plan.cpu
+        self.frames = Frames(plan, link)
+        self.lane = Lane(plan.period_ns)
+        self.axes = Axes(plan)
+        self.handover = Handover(
+            len(plan.axes),
+            len(plan.sync_units),
+            columns_by_bank(plan.input_columns),
+            columns_by_bank(plan.output_columns),
+        )
+        self.connect(plan)
+        self._buffers = self.handover.fields()
+
+    cdef connect(self, plan):
+        """Lets the parts know each other."""
+        cdef cycle_t *c = &self.e.cycle
+        cdef uint32_t i
+        cdef int slot
+        c.records = <record_t *>calloc(RECORDS, sizeof(record_t))
+        c.histograms = <histogram_t *>calloc(PHASES, sizeof(histogram_t))
+        self.spare_histograms = <histogram_t *>calloc(PHASES, sizeof(histogram_t))
+        if not (c.records and c.histograms and self.spare_histograms):
+            raise MemoryError
+        self.frames.c.lane = &self.lane.c
+        self.axes.c.image = &self.frames.c.image
+        c.link = self.frames.c.link
+        c.image = &self.frames.c.image
+        c.axes = &self.axes.c
+        c.lane = &self.lane.c
+        c.handover = &self.handover.c
+        c.order = ORDERS[plan.order]
+        c.period = plan.period_ns
+        c.collect_deadline = plan.collect_deadline_ns
+        c.lost_limit = plan.lost_limit
+        self.h = &self.handover.c
+        self.virtual = c.link.flags & CAT_LINK_VIRTUAL_TIME != 0
+        for slot in range(4):
+            self.h.actual[slot].header.period = c.period * 1e-9
+        for slot in range(TARGETS):
+            for i in range(c.axes.axis_count):
+                self.h.target[slot].mode[i] = c.axes.axes[i].mode
+        for i in range(c.axes.axis_count):
+            self.h.actual[PRIVATE].position[i] = c.axes.axes[i].position
+            self.h.actual[PRIVATE].velocity[i] = c.axes.axes[i].velocity
+            self.h.actual[PRIVATE].torque[i] = c.axes.axes[i].torque
+
+    # ---- the cycle that `actual` belongs to
+
+    cdef actual_header_t *actual_header(self) noexcept:
+        """Of the cycle that Python's actual values belong to; lives as long as the engine."""
+        return self.h.actual[PRIVATE].header
+
+    cdef int64_t now_ns(self) noexcept:
+        return self.e.cycle.link.now(self.e.cycle.link.self)
+
+    def now(self):
+        return self.now_ns()
+
+    @property
+    def buffers(self):
+        return dict(self._buffers)
+
+    def blocks(self):
+        return self.handover.blocks()
+
+    def law_fields(self):
+        return self.handover.law_fields()
+
+    @property
+    def number(self):
+        return self.h.actual[PRIVATE].header.number
+
+    @property
+    def time_ns(self):
+        return self.h.actual[PRIVATE].header.time_ns
+
+    @property
+    def flags(self):
+        return self.h.actual[PRIVATE].header.flags
+
+    @property
+    def lost_in_row(self):
+        return self.h.actual[PRIVATE].header.lost_in_row
+
+    @property
+    def skipped(self):
+        return self.h.actual[PRIVATE].header.skipped
+
+    @property
+    def missing_frames(self):
+        return self.h.actual[PRIVATE].header.missing_frames
+
+    @property
+    def al_status(self):
+        return self.h.actual[PRIVATE].header.al_status
+
+    @property
+    def al_counter(self):
+        return self.h.actual[PRIVATE].header.al_counter
+
+    # ---- figures
+
+    @property
+    def counters(self):
+        frames = self.frames.c.counters
+        return {
+            "cycles": self.e.cycle.number,
+            "lost": self.e.cycle.lost,
+            "late": self.e.cycle.late,
+            "uncommitted": self.e.cycle.uncommitted,
+            "stale": frames.stale,
+            "alien": frames.alien,
+            "corrupt": frames.corrupt,
+            "duplicate": frames.duplicate,
+            "unprocessed": frames.unprocessed,
+            "lane_sent": self.lane.c.sent,
+            "lane_received": self.lane.c.received,
+            "lane_dropped": self.lane.c.dropped,
+            "send_errors": frames.send_errors,
+            "receive_errors": frames.receive_errors,
+        }
+
+    def histograms(self):
+        return {
+            name: histogram_summary(&self.e.cycle.histograms[phase])
+            for name, phase in PHASE_NAMES.items()
+        }
+
+    def histogram_counts(self, str phase not None):
+        if phase not in PHASE_NAMES:
+            raise ValueError(f"phase {phase!r}: must be one of {', '.join(PHASE_NAMES)}")
+        return histogram_counts(&self.e.cycle.histograms[<int>PHASE_NAMES[phase]])
+
+    def reset_histograms(self):
+        """By exchanging them: the native thread may be adding to the old ones this very moment."""
+        cdef histogram_t *old = self.e.cycle.histograms
+        cdef int phase
+        for phase in range(PHASES):
+            histogram_reset(&self.spare_histograms[phase])
+        cat_fence()
+        self.e.cycle.histograms = self.spare_histograms
+        self.spare_histograms = old
+
+    def log(self):
+        cdef uint64_t last = self.e.cycle.number
+        cdef uint64_t count = min(last, <uint64_t>LOG_LENGTH)
+        cdef uint64_t number
+        parts = []
+        for number in range(last - count + 1, last + 1):
+            parts.append((<char *>&self.e.cycle.records[number % RECORDS])[: sizeof(record_t)])
+        return b"".join(parts)
+
+    # ---- the acyclic lane
+
+    def lane_push(self, bytes frame not None):
+        return self.lane.push(frame)
+
+    def lane_pop(self):
+        return self.lane.pop()
+
+    def lane_wait(self, int64_t timeout_ns):
+        return self.lane.wait(timeout_ns)
+
+    def __dealloc__(self):
+        free(self.e.cycle.records)
+        free(self.e.cycle.histograms)
+        free(self.spare_histograms)

@@ -1,0 +1,346 @@
+"""Laws in the cycle: in every order, handed over, ended, and got out of. Virtual time throughout."""
+
+import ctypes
+import subprocess
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from catenary.core import (
+    CYCLE_LAW_DONE,
+    CYCLE_LAW_FAILED,
+    CYCLE_LIMITED,
+    GOAL_ENABLED,
+    LAW_FINISHED,
+    LAW_NEVER_RETURNED,
+    LAW_NOT_FINITE,
+    LAW_OVERRUN,
+    LAW_RAISED,
+    LAW_RUNNING,
+    LAW_STOPPED,
+    Law,
+)
+from catenary.plan.cycle import AxisLimits, Bank, Column
+from tests.core.rig import (
+    CST,
+    DRIVE_SIZE,
+    MS,
+    PERIOD,
+    Bench,
+    ScriptedDrive,
+    axis,
+    bench,
+    make_plan,
+    number,
+)
+
+ORDERS = ("threaded", "inline", "law")
+DOUBLES = ctypes.POINTER(ctypes.c_double)
+STEP = ctypes.CFUNCTYPE(
+    ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, DOUBLES, DOUBLES, ctypes.c_double
+)
+
+
+@dataclass
+class Frame:
+    """What a law sees."""
+
+    actual: np.ndarray
+    target: np.ndarray
+    memory: ctypes._Pointer
+    parameters: ctypes._Pointer
+    time: float
+
+
+def record(fields: dict, size: int) -> np.dtype:
+    return np.dtype(
+        {
+            "names": list(fields),
+            "offsets": [offset for offset, _, _ in fields.values()],
+            "formats": [f if count is None else (f, (count,)) for _, f, count in fields.values()],
+            "itemsize": size,
+        }
+    )
+
+
+def make_law(
+    b: Bench,
+    body: Callable[[Frame], int],
+    *,
+    memory: list[float] | None = None,
+    parameters: list[float] | None = None,
+    budget_ns: int = 0,
+    overrun_limit: int = 3,
+) -> Law:
+    actual, target = (
+        record(fields, len(block))
+        for fields, block in zip(b.engine.law_fields(), b.engine.blocks(), strict=True)
+    )
+
+    def step(a: int, t: int, m: ctypes._Pointer, p: ctypes._Pointer, time: float) -> int:
+        views = [
+            np.frombuffer((ctypes.c_char * dtype.itemsize).from_address(at), dtype)[0]
+            for at, dtype in ((a, actual), (t, target))
+        ]
+        return body(Frame(*views, m, p, time))
+
+    callback = STEP(step)
+    law = Law(
+        ctypes.cast(callback, ctypes.c_void_p).value,
+        memory or [],
+        parameters or [],
+        budget_ns=budget_ns,
+        overrun_limit=overrun_limit,
+        priority=0,
+    )
+    KEPT.append(callback)
+    return law
+
+
+KEPT: list[object] = []  # ctypes callbacks live as long as the tests
+
+
+def spring(frame: Frame) -> int:
+    frame.target["torque"][0] = -0.5 * frame.actual["position"][0]
+    return 0
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_a_law_acts_on_the_inputs_of_its_own_cycle_and_no_cycle_is_lost(order: str) -> None:
+    b = bench(axis(0, mode=CST), order=order)
+    b.ask(GOAL_ENABLED)
+    b.engine.run(10)
+    assert b.drives[0].state == 1  # a brake does not open before somebody holds the load
+    b.engine.start_law(make_law(b, spring))
+    b.steps(9)
+    assert b.axis_flags[0] & 1
+    b.drives[0].position = 2000
+    b.steps(2)  # one frame to see it, one to act
+    assert b.drives[0].target_torque == -1000
+    b.engine.stop_law()
+    b.steps(3)
+    assert b.engine.counters["lost"] == 0
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_a_law_sees_what_it_was_promised(order: str) -> None:
+    b = bench(axis(0), axis(1), order=order)
+    b.enable()
+    seen: list[tuple] = []
+
+    def look(frame: Frame) -> int:
+        a = frame.actual
+        seen.append((int(a["n"]), bool(a["ok"]), float(a["dt"]), list(a["enabled"]), frame.time))
+        return 0
+
+    b.engine.start_law(make_law(b, look))
+    b.steps(4)
+    times = [time for *_, time in seen]
+    assert times == pytest.approx([k * PERIOD * 1e-9 for k in range(len(times))])
+    assert {tuple(map(str, entry[:3])) for entry in seen} == {("2", "True", str(PERIOD * 1e-9))}
+    assert all(entry[3] == [1, 1] for entry in seen)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_the_limits_hold_for_laws_too(order: str) -> None:
+    def wild(frame: Frame) -> int:
+        frame.target["torque"][0] = 99.0
+        return 0
+
+    limits = AxisLimits(torque=2.0)
+    b = bench(axis(0, mode=CST, limits=limits, ramp_torque=100.0), order=order)
+    b.ask(GOAL_ENABLED)
+    b.engine.start_law(make_law(b, wild))
+    assert b.steps(20) & CYCLE_LIMITED
+    assert b.drives[0].target_torque == 2000
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_a_finished_law_leaves_the_axes_holding_and_python_where_it_ended(order: str) -> None:
+    def until_soon(frame: Frame) -> int:
+        frame.target["position"][0] += 0.001
+        return frame.time > 0.03
+
+    b = bench(axis(0), order=order)
+    b.enable()
+    b.target_position[0] = -0.5  # committed before: must not come back
+    b.engine.next()
+    law = make_law(b, until_soon)
+    b.engine.start_law(law)
+    for _ in range(60):
+        b.engine.next()
+        if law.ended:
+            break
+    assert law.status == LAW_FINISHED
+    held = b.drives[0].target_position
+    assert b.target_position[0] == pytest.approx(held * 1e-3)
+    b.steps(10)
+    assert b.drives[0].target_position == held
+    assert b.drives[0].state == 4
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_run_law_goes_on_until_its_end(order: str) -> None:
+    b = bench(axis(0), order=order)
+    b.enable()
+    law = make_law(b, lambda frame: frame.time > 0.02)
+    b.engine.start_law(law)
+    flags = 0
+    while not law.ended:
+        flags = b.engine.run_law(10 * MS, CYCLE_LAW_FAILED)
+    assert flags & CYCLE_LAW_DONE
+    assert law.figures["steps"] == pytest.approx(0.02 / (PERIOD * 1e-9), abs=2)
+
+
+def test_without_a_law_the_law_order_holds() -> None:
+    b = bench(axis(0), order="law")
+    b.enable()
+    b.target_position[0] = 1.0
+    b.steps(5)
+    assert b.drives[0].target_position == 0
+
+
+def failing(b: Bench, body: Callable[[Frame], int], **more: int) -> tuple[Law, int]:
+    """Runs a law until it has failed."""
+    b.enable()
+    law = make_law(b, body, **more)
+    b.engine.start_law(law)
+    for _ in range(50):
+        flags = b.engine.next()
+        if law.ended:
+            return law, flags
+    raise AssertionError("the law did not fail")
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
+def test_a_target_that_is_no_number_stops_the_drives(order: str, value: float) -> None:
+    def breaks(frame: Frame) -> int:
+        frame.target["position"][1] = value if frame.time > 0.01 else frame.target["position"][1]
+        return 0
+
+    b = bench(axis(0), axis(1), order=order)
+    law, flags = failing(b, breaks)
+    assert flags & CYCLE_LAW_FAILED
+    assert (law.status, law.axis) == (LAW_NOT_FINITE, 1)
+    b.steps(10)
+    assert [drive.state for drive in b.drives] != [4, 4]  # both: a law is one
+    assert all(np.isfinite(b.target_position))
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_what_a_failed_step_has_half_written_is_not_sent(order: str) -> None:
+    valve = Column("valve", number(DRIVE_SIZE, 8), Bank.INTEGER, 1, 0)
+    drives = [ScriptedDrive(), ScriptedDrive()]
+    plan = replace(make_plan([axis(0)], units=2, order=order), output_columns=(valve,))
+    b = Bench(plan, drives)
+
+    def breaks(frame: Frame) -> int:
+        frame.target["integers"][0] = 77 if frame.time > 0.01 else 5
+        return -1 if frame.time > 0.01 else 0
+
+    law, _flags = failing(b, breaks)
+    assert law.status == LAW_RAISED
+    assert drives[1].controlword == 5
+    b.steps(5)
+    assert drives[0].state != 4
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_one_long_step_is_counted_several_in_a_row_stop(order: str) -> None:
+    b = bench(axis(0), order=order)
+
+    def slow(frame: Frame) -> int:
+        if frame.time in (0.0, PERIOD * 1e-9) or frame.time > 0.01:
+            b.link.time += 200_000
+        return 0
+
+    law, flags = failing(b, slow, budget_ns=100_000, overrun_limit=3)
+    assert flags & CYCLE_LAW_FAILED
+    assert law.status == LAW_OVERRUN
+    assert law.figures["overruns"] == 5
+    assert law.figures["longest_ns"] == 200_000
+
+
+def test_memory_and_parameters_change_all_at_once_and_can_be_read_back() -> None:
+    b = bench(axis(0), order="threaded")
+    b.enable()
+
+    def count(frame: Frame) -> int:
+        frame.memory[0] += frame.parameters[0]
+        frame.memory[1] = frame.parameters[1]
+        return 0
+
+    law = make_law(b, count, memory=[10.0, 0.0], parameters=[1.0, -1.0])
+    assert law.memory == [10.0, 0.0]
+    b.engine.start_law(law)
+    b.steps(4)
+    before = law.memory
+    assert before[0] > 10.0
+    law.set_parameters([2.0, -2.0])
+    b.steps(1)
+    assert law.memory == [before[0] + 2.0, -2.0]
+    law.set_memory([0.5, 0.0])
+    b.steps(1)
+    assert law.memory == [2.5, -2.0]
+    with pytest.raises(ValueError, match="2 numbers, not 3"):
+        law.set_parameters([1.0, 2.0, 3.0])
+
+
+def test_a_law_can_be_stopped_and_another_started() -> None:
+    b = bench(axis(0), order="threaded")
+    b.enable()
+    first, second = make_law(b, lambda frame: 0), make_law(b, lambda frame: 0)
+    b.engine.start_law(first)
+    b.steps(3)
+    assert first.status == LAW_RUNNING
+    b.engine.start_law(second)
+    b.steps(3)
+    assert (first.status, second.status) == (LAW_STOPPED, LAW_RUNNING)
+    b.engine.stop_law()
+    b.steps(3)
+    assert second.status == LAW_STOPPED
+    b.target_position[0] = 0.002
+    b.steps(3)
+    assert b.drives[0].target_position == 2
+
+
+@pytest.fixture(scope="module")
+def endless(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
+    folder = Path(tmp_path_factory.mktemp("endless"))
+    source = folder / "endless.c"
+    source.write_text(
+        "int endless(const void *a, void *t, double *m, const double *p, double time) {\n"
+        "    volatile double x = 0;\n"
+        "    while (time >= 0.005) x += time;\n"
+        "    return 0;\n"
+        "}\n"
+    )
+    library = folder / "endless.so"
+    subprocess.run(["gcc", "-O1", "-shared", "-fPIC", "-o", library, source], check=True)
+    return ctypes.CDLL(str(library))
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_a_law_that_never_returns_is_given_up_and_the_bus_goes_on(
+    order: str, endless: ctypes.CDLL
+) -> None:
+    b = bench(axis(0), order=order)
+    b.enable()
+    address = ctypes.cast(endless.endless, ctypes.c_void_p).value
+    law = Law(address, [], [], budget_ns=0, overrun_limit=3, priority=0)
+    b.engine.start_law(law)
+    for _ in range(20):
+        flags = b.engine.next()
+        if law.ended:
+            break
+    assert flags & CYCLE_LAW_FAILED
+    assert law.status == LAW_NEVER_RETURNED
+    b.steps(5)
+    assert b.drives[0].state != 4
+    assert b.engine.counters["lost"] == 0
+    again = Law(address, [], [], budget_ns=0, overrun_limit=3, priority=0)
+    assert again.rehearse(b"\0" * 64, b"\0" * 64) == 0  # its first steps do return
