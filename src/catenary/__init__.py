@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from catenary.bus import SubDevice
     from catenary.drive import Drives, Inputs, Outputs
     from catenary.errors import CatenaryError
-    from catenary.loop import Cycle, Loop
+    from catenary.loop import Cycle, Loop, law
     from catenary.target import MainDevice
     from catenary.virtual import (
         AnalogInputs,
@@ -51,6 +51,7 @@ __all__ = [
     "Segment",
     "Servo",
     "SubDevice",
+    "law",
     "realtime",
     "types",
 ]
@@ -62,6 +63,7 @@ _HOMES = {
     "Drives": "catenary.drive",
     "Inputs": "catenary.drive",
     "Loop": "catenary.loop",
+    "law": "catenary.loop",
     "MainDevice": "catenary.target",
     "Outputs": "catenary.drive",
     "SubDevice": "catenary.bus",

@@ -131,3 +131,7 @@ class TaskError(RealtimeError):
         super().__init__(message, hint=hint)
         self.task = task
         self.exit_code = exit_code
+
+
+class LawError(LoopError):
+    """A control law that cannot be compiled, or that failed and stopped the drives."""

@@ -1,4 +1,4 @@
-"""Laws in the cycle: in every order, handed over, ended, and got out of. Virtual time throughout."""
+"""Laws in the cycle: in every order, handed over, ended, got out of. Virtual time throughout."""
 
 import ctypes
 import subprocess
@@ -40,7 +40,10 @@ from tests.core.rig import (
 ORDERS = ("threaded", "inline", "law")
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 STEP = ctypes.CFUNCTYPE(
-    ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, DOUBLES, DOUBLES, ctypes.c_double
+    ctypes.c_int,
+    *(ctypes.c_void_p, ctypes.c_void_p),
+    *(DOUBLES, ctypes.c_int64, DOUBLES, ctypes.c_int64),
+    ctypes.c_double,
 )
 
 
@@ -80,7 +83,7 @@ def make_law(
         for fields, block in zip(b.engine.law_fields(), b.engine.blocks(), strict=True)
     )
 
-    def step(a: int, t: int, m: ctypes._Pointer, p: ctypes._Pointer, time: float) -> int:
+    def step(a: int, t: int, m: ctypes._Pointer, nm: int, p: ctypes._Pointer, np_: int, time):
         views = [
             np.frombuffer((ctypes.c_char * dtype.itemsize).from_address(at), dtype)[0]
             for at, dtype in ((a, actual), (t, target))
@@ -313,7 +316,8 @@ def endless(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
     folder = Path(tmp_path_factory.mktemp("endless"))
     source = folder / "endless.c"
     source.write_text(
-        "int endless(const void *a, void *t, double *m, const double *p, double time) {\n"
+        "int endless(const void *a, void *t, double *m, long n, const double *p, long k,"
+        " double time) {\n"
         "    volatile double x = 0;\n"
         "    while (time >= 0.005) x += time;\n"
         "    return 0;\n"

@@ -6,6 +6,7 @@ import json
 import math
 import sys
 from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
 
 from catenary.bench.cost import Point, fit
@@ -25,6 +26,7 @@ from catenary.bench.segment import (
 from catenary.bench.statistics import Run, combine, ratios
 
 OURS = ("catenary-inline", "catenary-threaded")
+LAW = "catenary-law"  # where Numba is installed
 ROUND_CYCLES = 900  # less than the 1000 that the loop's log reaches back
 DRIVE_BYTES = 26  # both ways
 INPUT_BYTES = 4 * ANALOG_CHANNELS  # of one terminal
@@ -95,7 +97,8 @@ def peer_names(peers: Sequence[str]) -> list[str]:
         if name not in MODULES:
             known = ", ".join(name for name in MODULES if name not in OURS)
             raise ValueError(f"there is no peer {name!r}; known: {known}")
-    return [*OURS, *(name for name in peers if name not in OURS)]
+    ours = [*OURS, LAW] if find_spec("numba") else list(OURS)
+    return [*ours, *(name for name in peers if name not in ours)]
 
 
 def run_all(

@@ -62,7 +62,7 @@ def ratios(runs: Sequence[Run]) -> dict[str, float]:
     """Catenary's medians over its peers', as far as the peers ran."""
     median = {run.name: _medians(run) for run in runs}
     found: dict[str, float] = {}
-    for ours in ("catenary-inline", "catenary-threaded"):
+    for ours in ("catenary-inline", "catenary-threaded", "catenary-law"):
         for peer in ("c", "c-ring", "pysoem"):
             if ours in median and peer in median:
                 for phase in ("receive", "process", "in_controller", "in_controller+tail"):

@@ -33,6 +33,7 @@ from catenary.core._cycle import (
 from catenary.core._engine import Engine
 from catenary.core._iteration import Cycle, Iteration
 from catenary.core._law import (
+    LAW_ABORTED,
     LAW_FINISHED,
     LAW_NEVER_RETURNED,
     LAW_NOT_FINITE,
@@ -64,6 +65,7 @@ __all__ = [
     "GOAL_ENABLED",
     "GOAL_QUICK_STOP",
     "GOAL_RESET",
+    "LAW_ABORTED",
     "LAW_FINISHED",
     "LAW_NEVER_RETURNED",
     "LAW_NOT_FINITE",

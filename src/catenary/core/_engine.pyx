@@ -17,6 +17,8 @@ from catenary.core._axes cimport axes_follow
 from catenary.core._cycle cimport (
     INLINE,
     LATE,
+    LAW_DONE,
+    LAW_FAILED,
     NONE,
     STOPPED,
     cycle_inputs,
@@ -163,6 +165,8 @@ cdef class Engine(Parts):
             return
         self.take_commanded()
         if self.law.ended_before(actual.header.number):
+            # Python may have missed the cycle that said so.
+            actual.header.flags |= LAW_FAILED if self.law.failed() else LAW_DONE
             self.law = None
 
     cdef void inline_outputs(self, bint application) noexcept nogil:
@@ -240,11 +244,9 @@ cdef class Engine(Parts):
         flags = self.await_cycle(timeout_ns)
         self.follow()
         self.left = self.now_ns()
-        if flags:
-            return header.flags | flags
         if before > 0 and header.number > before + 1:
             header.flags |= LATE
-        return header.flags
+        return header.flags | flags
 
     cdef void commit(self, bint hold) noexcept:
         cdef target_t *target = &self.h.target[PRIVATE]
@@ -441,7 +443,7 @@ cdef class Engine(Parts):
                 cycles -= 1
         self.follow()
         self.left = -1
-        return flags
+        return flags | self.h.actual[PRIVATE].header.flags
 
     def __dealloc__(self):
         with nogil:

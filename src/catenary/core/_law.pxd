@@ -2,7 +2,7 @@ from libc.stdint cimport int64_t, uint32_t, uint64_t
 
 from catenary.core._axes cimport axes_t
 from catenary.core._handover cimport actual_t, target_t
-from catenary.core._native cimport cat_law_guard, cat_law_step, cat_triple
+from catenary.core._native cimport cat_law_guard, cat_law_numbers, cat_law_step, cat_triple
 
 cdef enum:  # how a law stands
     WAITING = 0                # not taken over by the cycle yet
@@ -22,8 +22,7 @@ cdef struct exchange_t:        # numbers that change all at once
 cdef struct law_t:
     cat_law_step step
     cat_law_guard guard
-    double *memory             # the law's own
-    double *parameters
+    cat_law_numbers numbers    # the law's own
     exchange_t memory_in
     exchange_t memory_out
     exchange_t parameters_in
@@ -45,6 +44,7 @@ cdef class Law:
     cdef allocate(self, exchange_t *numbers, double **place)
     cdef fill(self, exchange_t *numbers, values)
     cdef bint ended_before(self, uint64_t number) noexcept
+    cdef bint failed(self) noexcept
 
 cdef void law_begin(law_t *law, int64_t instant) noexcept nogil
 cdef void law_end(law_t *law, uint32_t status, uint64_t number) noexcept nogil

@@ -11,6 +11,7 @@ LAW_RAISED: Final[int]
 LAW_NEVER_RETURNED: Final[int]  # it was given up
 LAW_NOT_FINITE: Final[int]  # the set-point of `axis` was NaN or infinite
 LAW_OVERRUN: Final[int]  # `overrun_limit` steps in a row took longer than the budget
+LAW_ABORTED: Final[int]  # `Law.rehearse`: a step never returned
 
 class Law:
     """A function of native/law.h at `address`, with its numbers.

@@ -21,6 +21,7 @@ from catenary.core._native cimport (
     cat_law_call,
     cat_law_guard_start,
     cat_law_guard_stop,
+    cat_law_numbers,
     cat_law_step,
     cat_load_acquire32,
     cat_store_release32,
@@ -36,6 +37,7 @@ LAW_RAISED = RAISED
 LAW_NEVER_RETURNED = NEVER_RETURNED
 LAW_NOT_FINITE = NOT_FINITE
 LAW_OVERRUN = OVERRUN
+LAW_ABORTED = CAT_LAW_ABORTED
 
 cdef enum:
     NUMBERS_MAX = 4096         # copied in every cycle
@@ -68,7 +70,7 @@ cdef void law_begin(law_t *law, int64_t instant) noexcept nogil:
 
 cdef void law_end(law_t *law, uint32_t status, uint64_t number) noexcept nogil:
     law.ended_at = number
-    give(&law.memory_out, law.memory)
+    give(&law.memory_out, law.numbers.memory)
     cat_store_release32(&law.status, status)
     cat_futex_wake(&law.status)
 
@@ -94,10 +96,10 @@ cdef bint law_run(law_t *law, const axes_t *axes, const actual_t *actual, target
     """One step; whether the law goes on afterwards. What a failed step left in `target` must not
     be sent."""
     cdef int rc, axis
-    take(&law.parameters_in, law.parameters)
-    take(&law.memory_in, law.memory)
-    rc = cat_law_call(&law.guard, law.step, actual.header, target.header, law.memory,
-                      law.parameters, <double>(instant - law.begun) * 1e-9)
+    take(&law.parameters_in, law.numbers.parameters)
+    take(&law.memory_in, law.numbers.memory)
+    rc = cat_law_call(&law.guard, law.step, actual.header, target.header,
+                      &law.numbers, <double>(instant - law.begun) * 1e-9)
     law.steps += 1
     if rc != CAT_LAW_GOES_ON and rc != CAT_LAW_FINISHED:
         law_end(law, NEVER_RETURNED if rc == CAT_LAW_ABORTED else RAISED, number)
@@ -110,7 +112,7 @@ cdef bint law_run(law_t *law, const axes_t *axes, const actual_t *actual, target
     if rc == CAT_LAW_FINISHED:
         law_end(law, FINISHED, number)
         return False
-    give(&law.memory_out, law.memory)
+    give(&law.memory_out, law.numbers.memory)
     return True
 
 
@@ -149,18 +151,20 @@ cdef class Law:
         if self.block == NULL:
             raise MemoryError
         place = self.block
-        self.c.memory = place
+        self.c.numbers.memory = place
+        self.c.numbers.memory_count = len(memory)
         place += len(memory)
-        self.c.parameters = place
+        self.c.numbers.parameters = place
+        self.c.numbers.parameter_count = len(parameters)
         place += len(parameters)
         self.allocate(&self.c.memory_in, &place)
         self.allocate(&self.c.memory_out, &place)
         self.allocate(&self.c.parameters_in, &place)
         for i, value in enumerate(memory):
-            self.c.memory[i] = value
+            self.c.numbers.memory[i] = value
         for i, value in enumerate(parameters):
-            self.c.parameters[i] = value
-        give(&self.c.memory_out, self.c.memory)
+            self.c.numbers.parameters[i] = value
+        give(&self.c.memory_out, self.c.numbers.memory)
         rc = cat_law_guard_start(&self.c.guard, max(STUCK_NS, 2 * budget_ns), priority)
         if rc < 0:
             raise OSError(-rc, "the thread that watches the law cannot be started")
@@ -208,6 +212,9 @@ cdef class Law:
         """That cycle has seen its end."""
         return cat_load_acquire32(&self.c.status) > RUNNING and number >= self.c.ended_at
 
+    cdef bint failed(self) noexcept:
+        return cat_load_acquire32(&self.c.status) > STOPPED_BY_APPLICATION
+
     @property
     def axis(self):
         return self.c.axis
@@ -230,6 +237,7 @@ cdef class Law:
     def rehearse(self, bytes actual not None, bytes target not None):
         cdef int rc = CAT_LAW_GOES_ON
         cdef int k
+        cdef cat_law_numbers copied = self.c.numbers
         cdef const char *source = actual
         cdef const char *wanted = target
         cdef size_t size = len(target)
@@ -238,13 +246,13 @@ cdef class Law:
         cdef char *scratch = <char *>calloc(behind + numbers + 1, 1)
         if scratch == NULL:
             raise MemoryError
+        copied.memory = <double *>(scratch + behind)
         try:
             for k in range(REHEARSALS):
                 memcpy(scratch, wanted, size)
-                memcpy(scratch + behind, self.c.memory, numbers)
+                memcpy(copied.memory, self.c.numbers.memory, numbers)
                 with nogil:
-                    rc = cat_law_call(&self.c.guard, self.c.step, source, scratch,
-                                      <double *>(scratch + behind), self.c.parameters, 0.0)
+                    rc = cat_law_call(&self.c.guard, self.c.step, source, scratch, &copied, 0.0)
                 if rc == CAT_LAW_ABORTED:
                     break
             return rc

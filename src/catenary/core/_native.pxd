@@ -91,8 +91,15 @@ cdef extern from "law.h" nogil:
     const int CAT_LAW_RAISED
     const int CAT_LAW_ABORTED
 
+    ctypedef struct cat_law_numbers:
+        double *memory
+        int64_t memory_count
+        double *parameters
+        int64_t parameter_count
+
     ctypedef int (*cat_law_step)(const void *actual, void *target, double *memory,
-                                 const double *parameters, double time) noexcept nogil
+                                 int64_t memory_count, const double *parameters,
+                                 int64_t parameter_count, double time) noexcept nogil
 
     ctypedef struct cat_law_guard:
         pass
@@ -100,4 +107,4 @@ cdef extern from "law.h" nogil:
     int cat_law_guard_start(cat_law_guard *guard, int64_t limit, int priority)
     void cat_law_guard_stop(cat_law_guard *guard)
     int cat_law_call(cat_law_guard *guard, cat_law_step step, const void *actual, void *target,
-                     double *memory, const double *parameters, double time)
+                     const cat_law_numbers *numbers, double time)

@@ -113,6 +113,7 @@ class Axis:
             bank=column_bank(wanted),
             device=self.device,
             sync_unit=layout.sync_unit(self.device),
+            group=name,
         )
 
     def _required(self, layout: ImageLayout, wanted: AxisObject) -> Number:

@@ -1,6 +1,8 @@
-"""The cyclic loop: from wishes to `for cycle in loop`, and safely back."""
+"""The cyclic loop: from wishes to `for cycle in loop`, and safely back; laws that run in it."""
 
 from catenary.core import Cycle
+from catenary.loop.law import Law, law
+from catenary.loop.law_run import LawRun
 from catenary.loop.loop import Loop
 
-__all__ = ["Cycle", "Loop"]
+__all__ = ["Cycle", "Law", "LawRun", "Loop", "law"]

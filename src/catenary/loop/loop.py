@@ -6,19 +6,25 @@ Leaving, for whatever reason, stops the drives natively before the states go dow
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import partial
 from types import TracebackType
-from typing import Literal
+from typing import Any, Literal
 
 from catenary.core import (
     CYCLE_DROPPED,
+    CYCLE_LAW_FAILED,
     CYCLE_NONE,
     CYCLE_STOPPED,
     CYCLE_WORKING_COUNTER,
     Cycle,
     Iteration,
 )
+from catenary.errors import LawError
 from catenary.loop.devices import DeviceWish, main_device_of
+from catenary.loop.law import Law
+from catenary.loop.law import law as made_law
+from catenary.loop.law_run import LawRun, Numbers
 from catenary.loop.running import LogArray, Running, take_down
 from catenary.loop.signals import SignalGuard
 from catenary.loop.timing import Timing
@@ -26,7 +32,7 @@ from catenary.plan.cycle import ReceiveMode
 from catenary.plan.make import Plan, make_plan
 from catenary.wire.al import State
 
-TROUBLE = CYCLE_WORKING_COUNTER | CYCLE_DROPPED | CYCLE_STOPPED | CYCLE_NONE
+TROUBLE = CYCLE_WORKING_COUNTER | CYCLE_DROPPED | CYCLE_STOPPED | CYCLE_NONE | CYCLE_LAW_FAILED
 LATE_LIMIT_POSITION = 0.050  # [s], CSP
 LATE_LIMIT_VELOCITY = 0.010  # [s], CSV and CST
 LEAD = 80e-6  # [s]: what a wake-up is late on an ordinary kernel, and the time to use it
@@ -46,7 +52,8 @@ class Loop:
     devices' outputs. `lead` [s], inline only: how long before each instant the thread wakes, to
     take the GIL back and fetch what the body needs into the caches (costs that much processor time
     a cycle); None: 80 us, at most a tenth of the period; 0: off. `raise_faults`: a drive in fault
-    raises DriveError; else see `Drives.faults`. `cpu` and `priority` (SCHED_FIFO) of the native
+    raises DriveError; else see `Drives.faults`. `laws` are compiled on entry, before the devices go to
+    OP: others when they are started. `cpu` and `priority` (SCHED_FIFO) of the native
     thread; None: as they are.
     """
 
@@ -63,6 +70,7 @@ class Loop:
         watchdog: float | None = 0.1,
         lead: float | None = None,
         raise_faults: bool = True,
+        laws: Sequence[Law | Callable[..., Any]] = (),
         cpu: int | None = None,
         priority: int | None = 80,
     ) -> None:
@@ -86,6 +94,7 @@ class Loop:
         if run == "inline":
             self._lead = min(LEAD, LEAD_SHARE * period) if lead is None else lead
         self._raise_faults = raise_faults
+        self._laws = [made_law(law) for law in laws]
         self._cpu = cpu
         self._priority = priority
         self._guard = SignalGuard((Loop.__exit__.__code__, Loop._leave.__code__))
@@ -99,6 +108,8 @@ class Loop:
             plan = self._make_plan()
             self._main.configure(plan)
             self._running = Running(self._main, plan, self._wishes)
+            for law in self._laws:
+                self._running.laws.compile(law)
             self._running.open()
             if self._enable:
                 self._running.enable()
@@ -136,6 +147,68 @@ class Loop:
 
     def __next__(self) -> Cycle:
         return next(iter(self))
+
+    def start(
+        self,
+        law: Law | Callable[..., Any],
+        memory: Sequence[float] | Numbers = (),
+        parameters: Sequence[float] | Numbers = (),
+        *,
+        budget: float | None = None,
+        overruns: int = 3,
+    ) -> LawRun:
+        """Lets a law say the set-points from the next cycle on, natively; the loop can be iterated
+        beside it, to watch.
+
+        It begins from what is commanded. `memory`, `parameters`: float64, at most 4096 each.
+        `budget` [s] of one step (None: the period; 0: none); after `overruns` steps in a row over it,
+        an exception, a target that is NaN or infinite, or a step that never returns, the drives stop
+        and LawError is raised by the iteration. LawError also for a law that cannot be compiled.
+        """
+        return self._opened.laws.start(made_law(law), memory, parameters, budget, overruns)
+
+    def run(
+        self,
+        law: Law | Callable[..., Any],
+        memory: Sequence[float] | Numbers = (),
+        parameters: Sequence[float] | Numbers = (),
+        *,
+        budget: float | None = None,
+        overruns: int = 3,
+        compiled: bool = True,
+    ) -> Numbers:
+        """Runs a law until it has finished, as `start` says; the axes hold then. Returns its memory.
+
+        `compiled=False` runs it as Python, in the loop's own thread: slow, with Python's errors, to
+        find mistakes.
+        """
+        running = self._opened
+        if not compiled:
+            return self._run_as_python(made_law(law), memory, parameters)
+        run = running.laws.start(made_law(law), memory, parameters, budget, overruns)
+        running.laws.run(run, TROUBLE, self._judge)
+        return run.memory
+
+    def _run_as_python(
+        self,
+        law: Law,
+        memory: Sequence[float] | Numbers,
+        parameters: Sequence[float] | Numbers,
+    ) -> Numbers:
+        step, kept = self._opened.laws.python_step(law, memory, parameters)
+        start: float | None = None
+        for cycle in self:
+            start = cycle.time if start is None else start
+            if cycle.refused:
+                raise LawError(f"law {law} left NaN or infinity in a target")
+            if step(cycle.time - start):
+                break
+        return kept
+
+    def _judge(self, flags: int) -> None:
+        running = self._opened
+        if flags & TROUBLE or running.engine.al_status != State.OP:
+            running.judge(flags, faults=self._raise_faults)
 
     @property
     def plan(self) -> Plan:

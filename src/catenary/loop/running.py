@@ -11,6 +11,7 @@ import numpy.typing as npt
 from catenary.bus import MainDevice
 from catenary.core import (
     AXIS_FOLLOWED,
+    CYCLE_LAW_FAILED,
     CYCLE_NONE,
     CYCLE_OK,
     CYCLE_STOPPED,
@@ -22,6 +23,7 @@ from catenary.core import (
 from catenary.errors import CatenaryError, DriveError, LoopError
 from catenary.loop.buffers import bind_wishes
 from catenary.loop.diagnosis import IN_FAULT, AxisTrouble, drive_error, silence_error, state_error
+from catenary.loop.law_runner import LawRunner
 from catenary.loop.rehearsal import make_rehearsal
 from catenary.loop.service import Service
 from catenary.loop.signals import SignalGuard
@@ -52,6 +54,7 @@ class Running:
         self.views = bind_wishes(wishes, plan.tables, self.engine.buffers)
         if plan.cycle.lead_ns:
             self.engine.set_rehearsal(make_rehearsal(self.views))
+        self.laws = LawRunner(self.engine, plan)
         self.service = Service(self.engine)
         self._attached = ExitStack()
         self._stations = [sub.station for sub in main.subs]
@@ -101,6 +104,8 @@ class Running:
         self._raise_ended(flags)
         if flags & CYCLE_WORKING_COUNTER:
             raise self._silence_error()
+        if flags & CYCLE_LAW_FAILED:
+            self.laws.raise_failure(self.log())
         if self.engine.al_status != State.OP:
             self._raise_astray()
         states = [state_of(word) for word in self.views.statusword.tolist()]
@@ -142,6 +147,7 @@ class Running:
 
     def _stop_axes(self, guard: SignalGuard) -> None:
         """Quick stop as each drive's 0x605A says, exchanged until all stand."""
+        self.engine.stop_law()
         if not self.plan.cycle.axes:
             return
         self.engine.quick_stop_all()

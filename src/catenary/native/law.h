@@ -19,9 +19,17 @@
 #define CAT_LAW_RAISED (-1)   /* an exception, an index out of bounds among them */
 #define CAT_LAW_ABORTED (-2)  /* by the guard */
 
+/* Numbers of the law: `memory` is its own, `parameters` the application's. */
+typedef struct cat_law_numbers {
+    double *memory;
+    int64_t memory_count;
+    double *parameters;
+    int64_t parameter_count;
+} cat_law_numbers;
+
 /* `time` [s] since its first step. Must not block; CAT_LAW_GOES_ON, _FINISHED or _RAISED. */
-typedef int (*cat_law_step)(const void *actual, void *target, double *memory,
-                            const double *parameters, double time);
+typedef int (*cat_law_step)(const void *actual, void *target, double *memory, int64_t memory_count,
+                            const double *parameters, int64_t parameter_count, double time);
 
 typedef struct cat_law_guard {
     sigjmp_buf jump;
@@ -113,12 +121,13 @@ static __attribute__((noinline)) void cat_law_meet_runner(cat_law_guard *guard) 
 }
 
 static inline int cat_law_call(cat_law_guard *guard, cat_law_step step, const void *actual,
-                               void *target, double *memory, const double *parameters, double time) {
+                               void *target, const cat_law_numbers *n, double time) {
     int rc;
     if (!guard->known || !pthread_equal(guard->runner, pthread_self())) cat_law_meet_runner(guard);
     if (sigsetjmp(guard->jump, 0) == 0) {
         __atomic_store_n(&guard->under_way, ++guard->calls, __ATOMIC_RELEASE);
-        rc = step(actual, target, memory, parameters, time);
+        rc = step(actual, target, n->memory, n->memory_count, n->parameters, n->parameter_count,
+                  time);
     } else {
         rc = CAT_LAW_ABORTED;
     }

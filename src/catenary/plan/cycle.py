@@ -54,6 +54,7 @@ class Column:
     bank: Bank
     device: int  # position on the segment
     sync_unit: int
+    group: str = ""  # neighbours in a bank with the same group are one array of this name
 
 
 class DatagramKind(IntEnum):

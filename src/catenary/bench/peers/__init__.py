@@ -12,6 +12,7 @@ Peer = Callable[[Job], Round]
 MODULES = {
     "catenary-inline": "with_catenary",
     "catenary-threaded": "with_catenary",
+    "catenary-law": "with_catenary_law",
     "c": "with_c",
     "c-ring": "with_c",
     "pysoem": "with_pysoem",

@@ -1,4 +1,4 @@
-"""Catenary itself, as its users write it, in both orders."""
+"""Catenary itself, as its users write it, in its three orders."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ ORDER: dict[str, Literal["inline", "threaded"]] = {
 }
 # Like the peers, it counts lost and late cycles and goes on; by default it would stop the drives.
 LOST_LIMIT = 1000
+LATE_LIMIT = 0.0
 MODE = {Body.SINE: "csp", Body.PD: "cst"}
 
 
@@ -36,7 +37,7 @@ def run(job: Job) -> Round:
             cpu=job.cpu,
             priority=job.priority,
             lost_limit=LOST_LIMIT,
-            late_limit=0.0,
+            late_limit=LATE_LIMIT,
         ) as loop:
             return _measure(loop, arm, job)
 

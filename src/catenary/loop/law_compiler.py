@@ -1,0 +1,165 @@
+"""A law and the records it works on → a native function (native/law.h), by Numba.
+
+The law is compiled with bounds checks; division by zero gives infinity as in NumPy. Round it sits a
+function of C's calling convention that turns whatever it raises into a status: measured 14 ns a call
+for a PD law on 12 axes.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from catenary.errors import LawError
+from catenary.loop.law import Law
+from catenary.loop.law_checks import check_source
+from catenary.loop.law_layout import LawLayout
+
+SOURCES = {
+    "actual": "actual",
+    "target": "target",
+    "memory": "memory",
+    "parameters": "parameters",
+    "time": "time",
+    "enabled": "actual.enabled",
+    "dt": "actual.dt",
+    "ok": "actual.ok",
+    "n": "actual.n",
+}
+SHELL = """
+def shell(actual_at, target_at, memory_at, memory_count, parameters_at, parameter_count, time):
+    actual = carray(actual_at, 1, ACTUAL)[0]
+    target = carray(target_at, 1, TARGET)[0]
+    memory = carray(memory_at, memory_count, float64)
+    parameters = carray(parameters_at, parameter_count, float64)
+    try:
+        finished = law({arguments})
+    except Exception:
+        return -1
+    return {result}
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class CompiledLaw:
+    """Owns the machine code: keep it as long as the address is used."""
+
+    address: int
+    code: object
+
+
+def compile_law(law: Law, layout: LawLayout) -> CompiledLaw:
+    """Compiles, or takes from Numba's cache. LawError says what cannot be, and where."""
+    check_source(law.function)
+    numba = _numba(law)
+    inner = _inner(numba, law.function)
+    try:
+        returned = _returned(numba, law, inner, layout)
+        shell = _shell(numba, law, inner, layout, returned)
+    except KeyError as error:  # Numba's way to say that a record has no such field
+        raise LawError(
+            f"law {law}: `actual` or `target` has nothing named {error}",
+            hint=f"actual has {', '.join(layout.actual.names or ())}; "
+            f"target has {', '.join(layout.target.names or ())}",
+        ) from error
+    except numba.core.errors.NumbaError as error:
+        raise LawError(
+            f"law {law} cannot be compiled: {_readable(error)}",
+            hint="laws are compiled by Numba: numbers, arrays and loops of numbers; "
+            "loop.run(..., compiled=False) runs it as Python",
+        ) from error
+    return CompiledLaw(shell.address, (shell, inner))
+
+
+@contextmanager
+def counted_allocations() -> Iterator[Callable[[], int]]:
+    """Counts the arrays that compiled laws make while the block lasts."""
+    from numba.core.runtime import _nrt_python as memory
+    from numba.core.runtime import rtsys
+
+    memory.memsys_enable_stats()
+    try:
+        before = rtsys.get_allocation_stats().alloc
+        yield lambda: rtsys.get_allocation_stats().alloc - before
+    finally:
+        memory.memsys_disable_stats()
+
+
+def _numba(law: Law) -> Any:
+    try:
+        import numba
+        import numba.core.errors
+    except ImportError as error:
+        raise LawError(
+            f"law {law} cannot be compiled: Numba is not installed",
+            hint="pip install 'catenary[law]', or loop.run(..., compiled=False)",
+        ) from error
+    return numba
+
+
+def _inner(numba: Any, function: Callable[..., Any]) -> Any:
+    """The law itself; from the cache where its source is a file."""
+    options = {"boundscheck": True, "error_model": "numpy", "nogil": True}
+    try:
+        return numba.njit(cache=True, **options)(function)
+    except RuntimeError:  # no place for a cache: typed at a prompt, or a folder that is read-only
+        return numba.njit(**options)(function)
+
+
+def _returned(numba: Any, law: Law, inner: Any, layout: LawLayout) -> str:
+    """What the law returns: "none" or "number"."""
+    record = {name: numba.from_dtype(getattr(layout, name)) for name in ("actual", "target")}
+    vector = numba.types.Array(numba.float64, 1, "C")
+    enabled = numba.types.Array(numba.uint8, 1, "C")
+    types = {
+        **record,
+        **dict.fromkeys(("memory", "parameters"), vector),
+        "time": numba.float64,
+        "enabled": enabled,
+        "dt": numba.float64,
+        "ok": numba.boolean,
+        "n": numba.uint32,
+    }
+    signature = tuple(types[name] for name in law.arguments)
+    inner.compile(signature)
+    returned = inner.overloads[signature].signature.return_type
+    inside = returned.type if isinstance(returned, numba.types.Optional) else returned
+    if isinstance(inside, numba.types.NoneType):
+        return "none"
+    if isinstance(inside, numba.types.Boolean | numba.types.Integer):
+        return "number"
+    raise LawError(
+        f"law {law} returns {returned}",
+        hint="a law returns True when it has finished, else False, or nothing at all",
+    )
+
+
+def _shell(numba: Any, law: Law, inner: Any, layout: LawLayout, returned: str) -> Any:
+    source = SHELL.format(
+        arguments=", ".join(SOURCES[name] for name in law.arguments),
+        result="0" if returned == "none" else "1 if finished else 0",
+    )
+    names: dict[str, Any] = {
+        "carray": numba.carray,
+        "float64": numba.float64,
+        "law": inner,
+        "ACTUAL": layout.actual,
+        "TARGET": layout.target,
+    }
+    exec(source, names)
+    at, count = numba.types.voidptr, numba.int64
+    signature = numba.int32(at, at, at, count, at, count, numba.float64)
+    return numba.cfunc(signature, error_model="numpy", nopython=True)(names["shell"])
+
+
+def _readable(error: Exception) -> str:
+    """The first sentence of Numba's message, and the place it names."""
+    text = re.sub(r"\x1b\[[0-9;]*m", "", str(error))
+    said = [line.strip() for line in text.splitlines() if line.strip()]
+    reasons = [line for line in said if not line.startswith(("Failed in", "During", "File", ">>>"))]
+    places = re.findall(r'File "([^"]+)", line (\d+)', text)
+    where = f" ({places[-1][0]}:{places[-1][1]})" if places else ""
+    return f"{' '.join(reasons[:2])}{where}"

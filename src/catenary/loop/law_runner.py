@@ -1,0 +1,139 @@
+"""The laws of an open loop: compiled, rehearsed, started, run to their end, or run as Python."""
+
+from __future__ import annotations
+
+import traceback
+import warnings
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from catenary import core
+from catenary.errors import LawError
+from catenary.loop.law import Law
+from catenary.loop.law_compiler import SOURCES, CompiledLaw, compile_law, counted_allocations
+from catenary.loop.law_layout import law_layout, record_at
+from catenary.loop.law_run import LawRun, Numbers, numbers
+from catenary.plan.make import Plan
+
+SLICE_NS = 10_000_000  # between looks at signals while a law runs
+GUARD_ABOVE = 1  # the thread that watches a law has so much more priority
+PRIORITY_MAX = 99
+
+
+class LawRunner:
+    """Owns the compiled laws of a loop, and knows the one that runs."""
+
+    def __init__(self, engine: core.Engine, plan: Plan) -> None:
+        self._engine = engine
+        self._axes = [axis.name for axis in plan.cycle.axes]
+        self._period_ns = plan.cycle.period_ns
+        above = (plan.cycle.priority or -GUARD_ABOVE) + GUARD_ABOVE
+        self._priority = min(above, PRIORITY_MAX)
+        self._layout = law_layout(engine, plan.tables)
+        self._compiled: dict[Law, CompiledLaw] = {}
+        self._run: LawRun | None = None
+
+    def compile(self, law: Law) -> CompiledLaw:
+        """Once for each law."""
+        if law not in self._compiled:
+            self._compiled[law] = compile_law(law, self._layout)
+        return self._compiled[law]
+
+    def start(
+        self,
+        law: Law,
+        memory: Sequence[float] | Numbers,
+        parameters: Sequence[float] | Numbers,
+        budget: float | None,
+        overruns: int,
+    ) -> LawRun:
+        """Compiles it if need be, rehearses it on copies, and hands it to the cycle."""
+        if budget is not None and not 0 <= budget:
+            raise ValueError(f"budget={budget} s: must not be negative")
+        if overruns < 1:
+            raise ValueError(f"overruns={overruns}: at least 1")
+        compiled = self.compile(law)
+        given = numbers("parameters", parameters)
+        native = core.Law(
+            compiled.address,
+            numbers("memory", memory),
+            given,
+            budget_ns=self._period_ns if budget is None else round(budget * 1e9),
+            overrun_limit=overruns,
+            priority=self._priority,
+        )
+        run = LawRun(law, compiled, native, self._engine, np.array(given))
+        self._rehearse(law, native)
+        self._engine.start_law(native)
+        self._run = run
+        return run
+
+    def _rehearse(self, law: Law, native: core.Law) -> None:
+        """On copies of the present values: its pages are there when it matters, and what it would
+        do wrong in every step is found."""
+        actual, target = self._engine.blocks()
+        with counted_allocations() as allocated:
+            result = native.rehearse(bytes(actual), bytes(target))
+            if allocated():
+                warnings.warn(
+                    f"law {law} allocates memory in every step (an expression on whole arrays, most "
+                    "likely), which takes long now and then: a loop over the axes does not",
+                    stacklevel=4,
+                )
+        if result == core.LAW_ABORTED:
+            raise LawError(
+                f"law {law} did not return when it was tried on the present values",
+                hint="look for a loop whose end depends on the inputs",
+            )
+
+    def run(self, run: LawRun, trouble: int, judge: Callable[[int], None]) -> None:
+        """Waits for its end. `judge` raises for what happens meanwhile, the law's failure too."""
+        while run.running:
+            judge(self._engine.run_law(SLICE_NS, trouble))
+        self.raise_failure(None)
+
+    def raise_failure(self, log: object) -> None:
+        """The error of the law that has failed, if one has."""
+        run = self._run
+        error = run.error(self._axes, log, lambda: self._replay(run)) if run else None
+        if error is not None:
+            self._run = None
+            raise error
+
+    def _replay(self, run: LawRun) -> str:
+        """The last step again, as Python on copies: what it raises."""
+        try:
+            time = (run.steps - 1) * self._period_ns * 1e-9
+            self._step(run.law, run.memory, run.parameters, time, copies=True)
+        except Exception as error:  # whatever the law raises
+            line = traceback.extract_tb(error.__traceback__)[-1].lineno
+            return f" ({type(error).__name__}: {error}, line {line})"
+        return ""
+
+    def python_step(
+        self, law: Law, memory: Sequence[float] | Numbers, parameters: Sequence[float] | Numbers
+    ) -> tuple[Callable[[float], bool], Numbers]:
+        """(one step as Python: its time → whether it has finished, its memory)."""
+        kept = np.array(numbers("memory", memory))
+        given = np.array(numbers("parameters", parameters))
+        return lambda time: self._step(law, kept, given, time), kept
+
+    def _step(
+        self, law: Law, memory: Numbers, parameters: Numbers, time: float, *, copies: bool = False
+    ) -> bool:
+        actual, target = self._engine.blocks()
+        if copies:
+            actual, target = memoryview(bytes(actual)), memoryview(bytearray(target))
+        names: dict[str, Any] = {
+            "actual": record_at(actual, self._layout.actual),
+            "target": record_at(target, self._layout.target),
+            "memory": memory,
+            "parameters": parameters,
+            "time": time,
+        }
+        for name in law.arguments:
+            if name not in names:
+                names[name] = getattr(names["actual"], SOURCES[name].rpartition(".")[2])
+        return bool(law(*(names[name] for name in law.arguments)))
