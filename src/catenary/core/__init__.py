@@ -18,6 +18,7 @@ from catenary.core._cia402 import (
 )
 from catenary.core._cycle import (
     CYCLE_DROPPED,
+    CYCLE_DRY,
     CYCLE_LATE,
     CYCLE_LAW_DONE,
     CYCLE_LAW_FAILED,
@@ -43,6 +44,7 @@ from catenary.core._law import (
     LAW_STOPPED,
     Law,
 )
+from catenary.core._stream import Stream
 
 __all__ = [
     "AXIS_DROPPED",
@@ -51,6 +53,7 @@ __all__ = [
     "AXIS_LIMITED",
     "AXIS_REFUSED",
     "CYCLE_DROPPED",
+    "CYCLE_DRY",
     "CYCLE_LATE",
     "CYCLE_LAW_DONE",
     "CYCLE_LAW_FAILED",
@@ -78,6 +81,7 @@ __all__ = [
     "Engine",
     "Iteration",
     "Law",
+    "Stream",
     "controlword_towards",
     "state_of",
 ]

@@ -6,6 +6,7 @@ from catenary.core._histogram cimport histogram_t
 from catenary.core._lane cimport lane_t
 from catenary.core._law cimport law_t
 from catenary.core._native cimport cat_image, cat_link
+from catenary.core._stream cimport stream_t
 
 cdef enum:  # flags of a cycle
     OK = 1
@@ -19,6 +20,7 @@ cdef enum:  # flags of a cycle
     STOPPED = 256
     NONE = 512
     LAW_FAILED = 1024
+    DRY = 2048
 
 cdef enum:
     THREADED = 0
@@ -69,6 +71,7 @@ cdef struct cycle_t:
     law_t *law_asked           # NULL: none is to run
     uint32_t law_request       # counts what was asked
     uint32_t law_seen
+    stream_t *stream           # NULL: the application or the law says the set-points
     int order
     int64_t period
     int64_t collect_deadline
@@ -83,6 +86,7 @@ cdef struct cycle_t:
     uint32_t skipped           # instants before this cycle
     uint32_t lost_in_row
     uint32_t flags
+    uint32_t dry               # the stream had no row for the last set-points
     int missing
     uint64_t lost
     uint64_t late

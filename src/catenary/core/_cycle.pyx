@@ -43,6 +43,7 @@ from catenary.core._law cimport (
     law_took,
 )
 from catenary.core._native cimport cat_add32, cat_load_acquire32
+from catenary.core._stream cimport stream_t, stream_take
 
 CYCLE_OK = OK
 CYCLE_LATE = LATE
@@ -53,6 +54,7 @@ CYCLE_REFUSED = REFUSED_SOME
 CYCLE_UNCOMMITTED = UNCOMMITTED
 CYCLE_LAW_DONE = LAW_DONE
 CYCLE_LAW_FAILED = LAW_FAILED
+CYCLE_DRY = DRY
 CYCLE_STOPPED = STOPPED
 CYCLE_NONE = NONE
 
@@ -194,6 +196,8 @@ cdef void close_header(cycle_t *c, actual_t *actual) noexcept nogil:
         c.flags |= LIMITED_SOME
     if c.axes.refused:
         c.flags |= REFUSED_SOME
+    if c.dry:
+        c.flags |= DRY
     if c.axes.dropped:
         c.flags |= DROPPED_SOME
         c.axes.dropped = 0
@@ -222,6 +226,24 @@ cdef void emit(cycle_t *c, const target_t *target, bint fresh) noexcept nogil:
     sent is counted by the image and is missing at collect."""
     axes_write(c.axes, target, fresh)
     c.image.emit(c.image.self)
+
+
+cdef bint take_streamed(cycle_t *c, target_t *target, bint fresh) noexcept nogil:
+    """Set-points that were written ahead come before the application's. Whether there are fresh
+    ones; where the stream has run dry the axes hold."""
+    cdef stream_t *stream = c.stream
+    c.dry = 0
+    if stream == NULL:
+        return fresh
+    if stream_take(stream, target):
+        target.header.hold = 0
+        target.header.seen = c.number
+        return True
+    if stream.taken == 0:
+        return fresh
+    target.header.hold = 1
+    c.dry = 1
+    return False
 
 
 cdef void tail(cycle_t *c, int64_t since) noexcept nogil:
@@ -273,12 +295,13 @@ cdef void cycle_threaded(cycle_t *c) noexcept nogil:
     cdef actual_t *actual = &c.handover.actual[c.handover.actual_triple.back]
     cdef record_t *record = record_of(c)
     cdef int64_t sent, seen, published
+    if fresh:
+        c.process = target.header.process_ns
+    fresh = take_streamed(c, target, fresh)
     emit(c, target, fresh)
     sent = now(c)
     record.send_ns = short_ns(sent - c.wake)
-    if fresh:
-        c.process = target.header.process_ns
-    elif c.axes.running:
+    if not fresh and c.axes.running:
         c.flags |= UNCOMMITTED
         c.uncommitted += 1
     collect(c, actual, c.wake + c.collect_deadline)
@@ -352,6 +375,7 @@ cdef bint step_law(cycle_t *c, actual_t *actual, target_t *target, int64_t usabl
     cdef law_t *law = c.law
     cdef bint goes_on
     axes_follow(c.axes, actual, target)
+    take_streamed(c, target, False)
     target.header.hold = 0
     target.header.seen = c.number
     actual.header.ok = c.flags & OK
@@ -417,7 +441,7 @@ cdef void cycle_outputs(cycle_t *c, target_t *target, bint application) noexcept
     cdef int64_t sent
     target.header.seen = c.number
     target.header.hold = not application
-    emit(c, target, True)
+    emit(c, target, take_streamed(c, target, True))
     sent = now(c)
     if c.number > 0 and c.usable != 0:
         record_of(c).send_ns = short_ns(sent - done)

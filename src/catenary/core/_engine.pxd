@@ -2,11 +2,14 @@ from libc.stdint cimport int64_t, uint32_t
 
 from catenary.core._law cimport Law, law_t
 from catenary.core._parts cimport Parts
+from catenary.core._stream cimport Stream
 from catenary.core._thread cimport cat_scheduling
 
 cdef class Engine(Parts):
     cdef Law law               # runs, or its end has not been seen yet; None: Python says the targets
     cdef list laws             # those the cycle may know
+    cdef Stream stream         # says the set-points; None: Python or the law does
+    cdef list streams          # those the cycle may know
     cdef cat_scheduling scheduling_before
     cdef bint saved_scheduling
     cdef bint native           # the cycle runs in its own thread

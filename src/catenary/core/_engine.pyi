@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from catenary.core._law import Law
+from catenary.core._stream import Stream
 
 class Engine:
     """Owns one cyclic exchange: frames, buffers, lane, histograms and, where the plan's order is
@@ -160,3 +161,8 @@ class Engine:
         """Waits without the GIL while the law runs: until it has ended, for `duration_ns`, or (where
         the caller's thread does the cycles) until one of the flags of `trouble` comes. Returns the
         flags of the newest cycle."""
+
+    def set_stream(self, stream: Stream | None) -> None:
+        """One row of it a cycle becomes the set-points, before the law if one runs; None: the
+        application says them again, from what is commanded. While it has run dry the axes hold.
+        ValueError for another number of axes."""

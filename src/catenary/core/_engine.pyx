@@ -51,6 +51,7 @@ from catenary.core._native cimport (
     cat_store_release32,
 )
 from catenary.core._parts cimport Parts, engine_t
+from catenary.core._stream cimport Stream
 from catenary.core._thread cimport (
     cat_scheduling,
     scheduling_restore,
@@ -87,6 +88,7 @@ cdef class Engine(Parts):
     def __cinit__(self, plan, link):
         self.lead = plan.lead_ns
         self.laws = []
+        self.streams = []
         self.native = self.e.cycle.order != INLINE and not self.virtual
         self.left = -1
 
@@ -137,7 +139,7 @@ cdef class Engine(Parts):
         if self.native:
             return self.step_native(timeout_ns)
         if self.is_native_cycle(True):
-            self.commit(self.law is not None)
+            self.commit(self.law is not None or self.stream is not None)
             self.lockstep()
         else:
             self.inline_outputs(True)
@@ -160,11 +162,11 @@ cdef class Engine(Parts):
         """After new actual values: Python's targets where they follow by themselves. While a law
         runs that is all of them, and until the cycle of its end has been seen."""
         cdef actual_t *actual = &self.h.actual[PRIVATE]
-        if self.law is None:
+        if self.law is None and self.stream is None:
             axes_follow(&self.axes.c, actual, &self.h.target[PRIVATE])
             return
         self.take_commanded()
-        if self.law.ended_before(actual.header.number):
+        if self.law is not None and self.law.ended_before(actual.header.number):
             # Python may have missed the cycle that said so.
             actual.header.flags |= LAW_FAILED if self.law.failed() else LAW_DONE
             self.law = None
@@ -240,7 +242,7 @@ cdef class Engine(Parts):
         cdef actual_header_t *header = self.h.actual[PRIVATE].header
         cdef uint64_t before = header.number
         cdef uint32_t flags
-        self.commit(self.law is not None)
+        self.commit(self.law is not None or self.stream is not None)
         flags = self.await_cycle(timeout_ns)
         self.follow()
         self.left = self.now_ns()
@@ -444,6 +446,17 @@ cdef class Engine(Parts):
         self.follow()
         self.left = -1
         return flags | self.h.actual[PRIVATE].header.flags
+
+    # ---- streams
+
+    def set_stream(self, Stream stream):
+        if stream is not None and stream.c.axes != self.axes.c.axis_count:
+            raise ValueError(f"a stream for {stream.c.axes} axes, there are {self.axes.c.axis_count}")
+        self.streams = [*self.streams[-1:], stream]  # the cycle may still take from the one before
+        self.stream = stream
+        self.e.cycle.stream = NULL if stream is None else &stream.c
+        handover_swap(self.h)
+        self.take_commanded()
 
     def __dealloc__(self):
         with nogil:

@@ -38,6 +38,10 @@ class Cycle:
     def refused(self) -> bool:
         """Some target was NaN or infinite; its axis held instead."""
 
+    @property
+    def dry(self) -> bool:
+        """The stream of set-points had run dry: the axes hold."""
+
     def spend(self, seconds: float) -> None:
         """In virtual time: lets time pass as if the body took that long [s]. On a NIC time passes
         by itself, and this raises RuntimeError."""

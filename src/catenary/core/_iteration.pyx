@@ -5,7 +5,7 @@ whatever is not in the caches, and a Python generator and its properties are a l
 
 from libc.stdint cimport int64_t, uint32_t, uint64_t
 
-from catenary.core._cycle cimport LATE, LIMITED_SOME, OK, REFUSED_SOME, UNCOMMITTED
+from catenary.core._cycle cimport DRY, LATE, LIMITED_SOME, OK, REFUSED_SOME, UNCOMMITTED
 from catenary.core._engine cimport Engine
 
 
@@ -43,6 +43,10 @@ cdef class Cycle:
     @property
     def refused(self):
         return (self.header.flags & REFUSED_SOME) != 0
+
+    @property
+    def dry(self):
+        return (self.header.flags & DRY) != 0
 
     def spend(self, double seconds):
         self.engine.spend(round(seconds * 1e9))

@@ -4,5 +4,6 @@ from catenary.core import Cycle
 from catenary.loop.law import Law, law
 from catenary.loop.law_run import LawRun
 from catenary.loop.loop import Loop
+from catenary.loop.stream import Stream
 
-__all__ = ["Cycle", "Law", "LawRun", "Loop", "law"]
+__all__ = ["Cycle", "Law", "LawRun", "Loop", "Stream", "law"]

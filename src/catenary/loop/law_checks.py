@@ -30,9 +30,7 @@ def place(function: Callable[..., Any], line: int) -> str:
     return f"{inspect.getsourcefile(function) or '?'}:{line}"
 
 
-def forbidden(
-    tree: ast.AST, *, handled: bool
-) -> Iterator[tuple[ast.stmt | ast.expr, str, str]]:
+def forbidden(tree: ast.AST, *, handled: bool) -> Iterator[tuple[ast.stmt | ast.expr, str, str]]:
     """(node, what is wrong, hint), in the order of the source."""
     for node in ast.iter_child_nodes(tree):
         if isinstance(node, ast.Raise | ast.Assert) and not handled:

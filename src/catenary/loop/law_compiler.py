@@ -1,8 +1,8 @@
 """A law and the records it works on → a native function (native/law.h), by Numba.
 
 The law is compiled with bounds checks; division by zero gives infinity as in NumPy. Round it sits a
-function of C's calling convention that turns whatever it raises into a status: measured 14 ns a call
-for a PD law on 12 axes.
+function of C's calling convention that turns whatever it raises into a status: measured 14 ns a
+call for a PD law on 12 axes.
 """
 
 from __future__ import annotations

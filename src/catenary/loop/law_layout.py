@@ -59,8 +59,9 @@ def named(
     twice: set[str] = set()
     for of_wish in columns:
         for (group, bank), members in groupby(of_wish, key=lambda c: (c.group, c.bank)):
-            names = [group] if group else [column.name for column in members]
-            count = len(list(members)) if group else None
+            columns_here = list(members)
+            names = [group] if group else [column.name for column in columns_here]
+            count = len(columns_here) if group else None
             for name in names:
                 offset, code, _ = fields[BANKS[bank]]
                 at = offset + used[bank] * np.dtype(code).itemsize

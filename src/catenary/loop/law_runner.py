@@ -50,7 +50,7 @@ class LawRunner:
         overruns: int,
     ) -> LawRun:
         """Compiles it if need be, rehearses it on copies, and hands it to the cycle."""
-        if budget is not None and not 0 <= budget:
+        if budget is not None and not budget >= 0:
             raise ValueError(f"budget={budget} s: must not be negative")
         if overruns < 1:
             raise ValueError(f"overruns={overruns}: at least 1")
@@ -78,8 +78,8 @@ class LawRunner:
             result = native.rehearse(bytes(actual), bytes(target))
             if allocated():
                 warnings.warn(
-                    f"law {law} allocates memory in every step (an expression on whole arrays, most "
-                    "likely), which takes long now and then: a loop over the axes does not",
+                    f"law {law} allocates memory in every step (an expression on whole arrays, "
+                    "most likely), which takes long now and then: a loop over the axes does not",
                     stacklevel=4,
                 )
         if result == core.LAW_ABORTED:

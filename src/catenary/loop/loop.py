@@ -27,6 +27,7 @@ from catenary.loop.law import law as made_law
 from catenary.loop.law_run import LawRun, Numbers
 from catenary.loop.running import LogArray, Running, take_down
 from catenary.loop.signals import SignalGuard
+from catenary.loop.stream import Stream
 from catenary.loop.timing import Timing
 from catenary.plan.cycle import ReceiveMode
 from catenary.plan.make import Plan, make_plan
@@ -52,9 +53,9 @@ class Loop:
     devices' outputs. `lead` [s], inline only: how long before each instant the thread wakes, to
     take the GIL back and fetch what the body needs into the caches (costs that much processor time
     a cycle); None: 80 us, at most a tenth of the period; 0: off. `raise_faults`: a drive in fault
-    raises DriveError; else see `Drives.faults`. `laws` are compiled on entry, before the devices go to
-    OP: others when they are started. `cpu` and `priority` (SCHED_FIFO) of the native
-    thread; None: as they are.
+    raises DriveError; else see `Drives.faults`. `laws` are compiled on entry, before the devices go
+    to OP; others when they are started. `cpu` and `priority` (SCHED_FIFO) of the native thread;
+    None: as they are.
     """
 
     def __init__(
@@ -161,9 +162,9 @@ class Loop:
         beside it, to watch.
 
         It begins from what is commanded. `memory`, `parameters`: float64, at most 4096 each.
-        `budget` [s] of one step (None: the period; 0: none); after `overruns` steps in a row over it,
-        an exception, a target that is NaN or infinite, or a step that never returns, the drives stop
-        and LawError is raised by the iteration. LawError also for a law that cannot be compiled.
+        `budget` [s] of one step (None: the period; 0: none); after `overruns` steps in a row over
+        it, an exception, a target that is NaN or infinite, or a step that never returns, the drives
+        stop and LawError is raised by the iteration. LawError also for what cannot be compiled.
         """
         return self._opened.laws.start(made_law(law), memory, parameters, budget, overruns)
 
@@ -177,7 +178,7 @@ class Loop:
         overruns: int = 3,
         compiled: bool = True,
     ) -> Numbers:
-        """Runs a law until it has finished, as `start` says; the axes hold then. Returns its memory.
+        """Runs a law to its end, as `start` says; the axes hold then. Returns its memory.
 
         `compiled=False` runs it as Python, in the loop's own thread: slow, with Python's errors, to
         find mistakes.
@@ -204,6 +205,11 @@ class Loop:
             if step(cycle.time - start):
                 break
         return kept
+
+    def stream(self, capacity: int = 1000) -> Stream:
+        """A ring of at most `capacity` rows of set-points, one row a cycle, that a slower thread
+        fills ahead: see `Stream`."""
+        return Stream(self._opened.engine, self._opened.views, capacity)
 
     def _judge(self, flags: int) -> None:
         running = self._opened

@@ -29,9 +29,7 @@ def pd(actual: Any, target: Any, memory: Any, time: Any, parameters: Any) -> boo
     offset = parameters[AMPLITUDE] * math.sin(math.pi * time)
     for i in range(actual.n):
         error = memory[i] + offset - actual.position[i]
-        target.torque[i] = (
-            parameters[STIFFNESS] * error - parameters[DAMPING] * actual.velocity[i]
-        )
+        target.torque[i] = parameters[STIFFNESS] * error - parameters[DAMPING] * actual.velocity[i]
     return bool(time >= parameters[END])
 
 

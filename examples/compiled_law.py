@@ -1,0 +1,31 @@
+"""A torque law compiled into the real-time thread: `python compiled_law.py eth0`, or `virtual`.
+
+Needs Numba: pip install 'catenary[law]'. The gains can be changed while it runs.
+"""
+
+import sys
+
+import catenary as cat
+
+
+@cat.law
+def pd(actual, target, memory, time, parameters):  # plain Python here, compiled on the robot
+    for i in range(actual.n):
+        error = memory[i] - actual.position[i]
+        target.torque[i] = parameters[0] * error - parameters[1] * actual.velocity[i]
+    return time > 5.0
+
+
+with cat.MainDevice(sys.argv[1] if len(sys.argv) > 1 else "virtual") as main:
+    arm = cat.Drives(main.scan().drives, mode="cst", counts_per_turn=2**20)
+    with cat.Loop(arm, period=1e-3, laws=[pd]) as loop:  # compiled before the devices go to OP
+        goal = arm.actual.position + 0.5  # [rad]
+        run = loop.start(pd, memory=goal, parameters=[4.0, 0.2])  # N·m/rad, N·m/(rad/s)
+        for cycle in loop:  # only to watch: the law needs nobody
+            if cycle.number == 1000:
+                run.parameters = [8.0, 0.4]  # both at once
+            if not run.running:
+                break
+        print(f"{run.steps} steps, the longest {run.longest * 1e6:.1f} us")
+        print("error [rad]:", goal - arm.actual.position)
+    print(loop.timing)

@@ -1,0 +1,81 @@
+"""Stream: set-points written ahead of their instants."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from catenary import core
+from catenary.plan.wish import Views
+
+Rows = npt.ArrayLike
+
+
+class Stream:
+    """Set-points that wait for their instants: one row a cycle, in the order written, natively.
+
+    From the first row on the stream says the set-points, until `close`; a law that runs beside it
+    finds the row in its targets. When it runs dry the axes hold (velocity and torque go to zero),
+    `cycle.dry` is True and `dry` counts the cycles; it goes on with the next row. Any thread may
+    write, not two at a time.
+    """
+
+    def __init__(self, engine: core.Engine, views: Views, capacity: int) -> None:
+        self._engine = engine
+        self._views = views
+        self._axes = len(views.actual_position)
+        self._ring = core.Stream(self._axes, capacity)
+        engine.set_stream(self._ring)
+
+    def write(
+        self,
+        position: Rows | None = None,
+        *,
+        velocity: Rows | None = None,
+        torque: Rows | None = None,
+    ) -> int:
+        """Rows of set-points, each (k, n) or (n,) for one row: [rad], [rad/s], [N·m]. What is left
+        out stays: positions as commanded now, velocity and torque zero. Returns how many rows found
+        room. ValueError: another shape, NaN or infinity."""
+        rows = {
+            name: self._checked(name, values)
+            for name, values in (("position", position), ("velocity", velocity), ("torque", torque))
+            if values is not None
+        }
+        counts = {len(values) for values in rows.values()}
+        if len(counts) != 1:
+            raise ValueError(f"as many rows of each quantity, not {sorted(counts) or 'none'}")
+        [count] = counts
+        block = np.zeros((count, 3, self._axes))
+        block[:, 0] = self._views.target_position
+        for k, name in enumerate(("position", "velocity", "torque")):
+            if name in rows:
+                block[:, k] = rows[name]
+        return self._ring.write(block.tobytes())
+
+    def _checked(self, name: str, values: Rows) -> npt.NDArray[np.float64]:
+        array = np.atleast_2d(np.asarray(values, dtype=np.float64))
+        if array.ndim != 2 or array.shape[1] != self._axes:
+            raise ValueError(f"{name}: rows of {self._axes} axes, not the shape {array.shape}")
+        if not np.isfinite(array).all():
+            raise ValueError(f"{name}: NaN or infinity is no set-point")
+        return array
+
+    @property
+    def waiting(self) -> int:
+        """Rows that wait."""
+        return self._ring.waiting
+
+    @property
+    def free(self) -> int:
+        """Rows that find room now."""
+        return self._ring.capacity - self._ring.waiting
+
+    @property
+    def dry(self) -> int:
+        """Cycles without a row, since the first one was taken."""
+        return self._ring.dry
+
+    def close(self) -> None:
+        """The application, or the law, says the set-points again; rows left over are forgotten."""
+        self._engine.set_stream(None)

@@ -1,0 +1,135 @@
+"""Set-points written ahead: one row a cycle, dry, with a law, and back to the application."""
+
+import threading
+
+import numpy as np
+import pytest
+
+from catenary.core import CYCLE_DRY, Stream
+from tests.core.rig import CSV, Bench, axis, bench
+from tests.core.test_law import Frame, make_law
+
+ORDERS = ("threaded", "inline", "law")
+
+
+def rows(*positions: float) -> bytes:
+    """For one axis."""
+    return np.array([[p, 0.0, 0.0] for p in positions]).tobytes()
+
+
+def streaming(order: str, **more: object) -> tuple[Bench, Stream]:
+    b = bench(axis(0, **more), order=order)
+    b.enable()
+    stream = Stream(1, 8)
+    b.engine.set_stream(stream)
+    return b, stream
+
+
+@pytest.mark.parametrize("order", ["threaded", "inline"])
+def test_one_row_a_cycle_whatever_python_writes(order: str) -> None:
+    b, stream = streaming(order)
+    assert stream.write(rows(0.001, 0.002, 0.003)) == 3
+    seen = []
+    for _ in range(3):
+        b.target_position[:] = 9.0
+        b.engine.next()
+        seen.append(b.drives[0].target_position)
+    assert seen == [1, 2, 3]
+    assert stream.taken == 3
+    assert stream.dry == 0
+
+
+@pytest.mark.parametrize("order", ["threaded", "inline"])
+def test_dry_holds_says_so_and_goes_on(order: str) -> None:
+    b, stream = streaming(order)
+    b.steps(3)
+    assert stream.dry == 0  # not begun: nothing was promised yet
+    stream.write(rows(0.001))
+    b.steps(200)  # longer than any late limit
+    assert b.drives[0].target_position == 1
+    assert b.drives[0].state == 4
+    assert b.engine.next() & CYCLE_DRY
+    assert stream.dry > 190
+    stream.write(rows(0.002))
+    b.steps(1)
+    assert b.drives[0].target_position == 2
+
+
+def test_dry_velocity_goes_to_zero() -> None:
+    b = bench(axis(0, mode=CSV, ramp_velocity=10.0))
+    b.ask(1)
+    for _ in range(12):
+        b.target_velocity[:] = 0.0
+        b.engine.next()
+    stream = Stream(1, 4)
+    b.engine.set_stream(stream)
+    stream.write(np.array([[0.0, 0.03, 0.0]]).tobytes())
+    b.steps(1)
+    assert b.drives[0].target_velocity == 30
+    b.steps(5)
+    assert b.drives[0].target_velocity == 0
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_a_law_finds_the_row_in_its_targets(order: str) -> None:
+    b, stream = streaming(order)
+
+    def mirror(frame: Frame) -> int:
+        frame.target["position"][0] *= -1
+        return 0
+
+    b.engine.start_law(make_law(b, mirror))
+    b.steps(2)
+    stream.write(rows(0.005, 0.006))
+    b.steps(2)
+    assert b.drives[0].target_position == -6
+
+
+def test_after_it_the_application_goes_on_from_where_it_ended() -> None:
+    b, stream = streaming("threaded")
+    stream.write(rows(*np.linspace(0.001, 0.008, 8)))
+    b.engine.run(4)  # no application meanwhile: the stream goes on
+    b.engine.set_stream(None)
+    assert b.target_position[0] == pytest.approx(b.drives[0].target_position * 1e-3)
+    b.steps(3)
+    assert b.drives[0].state == 4
+
+
+def test_bounded_and_validated() -> None:
+    stream = Stream(2, 4)
+    six = np.zeros((6, 6)).tobytes()
+    assert stream.write(six) == 4
+    assert stream.write(six) == 0
+    assert stream.waiting == 4
+    with pytest.raises(ValueError, match="6 numbers"):
+        stream.write(b"\0" * 50)
+    with pytest.raises(ValueError, match="0 rows"):
+        Stream(2, 0)
+    b = bench(axis(0))
+    with pytest.raises(ValueError, match="2 axes"):
+        b.engine.set_stream(stream)
+
+
+def test_no_row_is_torn_lost_or_doubled_between_two_threads() -> None:
+    count = 5_000
+    b, _ = streaming("threaded")
+    stream = Stream(1, 500)
+    b.engine.set_stream(stream)
+    wanted = np.arange(1, count + 1) * 1e-6
+
+    def fill() -> None:
+        left = np.array([[p, p, p] for p in wanted])
+        while len(left):
+            left = left[stream.write(left[:50].tobytes()) :]
+
+    writer = threading.Thread(target=fill)
+    writer.start()
+    seen = []
+    while stream.taken < count:
+        before = stream.taken
+        b.engine.next()
+        if stream.taken != before:
+            seen.append(b.target_position[0])
+    writer.join()
+    assert np.allclose(seen, wanted[-len(seen) :])
+    assert len(seen) == count
