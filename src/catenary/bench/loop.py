@@ -95,7 +95,7 @@ def peer_names(peers: Sequence[str]) -> list[str]:
     """Ours and the chosen ones. ValueError names one that is unknown."""
     for name in peers:
         if name not in MODULES:
-            known = ", ".join(name for name in MODULES if name not in OURS)
+            known = ", ".join(name for name in MODULES if name not in (*OURS, LAW))
             raise ValueError(f"there is no peer {name!r}; known: {known}")
     ours = [*OURS, LAW] if find_spec("numba") else list(OURS)
     return [*ours, *(name for name in peers if name not in ours)]

@@ -1,8 +1,8 @@
 """The cyclic loop: from wishes to `for cycle in loop`, and safely back; laws that run in it."""
 
 from catenary.core import Cycle
-from catenary.loop.law import Law, law
-from catenary.loop.law_run import LawRun
+from catenary.loop.laws.law import Law, law
+from catenary.loop.laws.run import LawRun
 from catenary.loop.loop import Loop
 from catenary.loop.stream import Stream
 

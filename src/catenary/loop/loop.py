@@ -22,9 +22,9 @@ from catenary.core import (
 )
 from catenary.errors import LawError
 from catenary.loop.devices import DeviceWish, main_device_of
-from catenary.loop.law import Law
-from catenary.loop.law import law as made_law
-from catenary.loop.law_run import LawRun, Numbers
+from catenary.loop.laws.law import Law
+from catenary.loop.laws.law import law as made_law
+from catenary.loop.laws.run import LawRun, Numbers
 from catenary.loop.running import LogArray, Running, take_down
 from catenary.loop.signals import SignalGuard
 from catenary.loop.stream import Stream

@@ -23,7 +23,7 @@ from catenary.core import (
 from catenary.errors import CatenaryError, DriveError, LoopError
 from catenary.loop.buffers import bind_wishes
 from catenary.loop.diagnosis import IN_FAULT, AxisTrouble, drive_error, silence_error, state_error
-from catenary.loop.law_runner import LawRunner
+from catenary.loop.laws.runner import LawRunner
 from catenary.loop.rehearsal import make_rehearsal
 from catenary.loop.service import Service
 from catenary.loop.signals import SignalGuard

@@ -11,10 +11,10 @@ import numpy as np
 
 from catenary import core
 from catenary.errors import LawError
-from catenary.loop.law import Law
-from catenary.loop.law_compiler import SOURCES, CompiledLaw, compile_law, counted_allocations
-from catenary.loop.law_layout import law_layout, record_at
-from catenary.loop.law_run import LawRun, Numbers, numbers
+from catenary.loop.laws.compiler import SOURCES, CompiledLaw, compile_law, counted_allocations
+from catenary.loop.laws.law import Law
+from catenary.loop.laws.layout import law_layout, record_at
+from catenary.loop.laws.run import LawRun, Numbers, numbers
 from catenary.plan.make import Plan
 
 SLICE_NS = 10_000_000  # between looks at signals while a law runs

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from catenary import core
 from catenary.errors import LawError
-from catenary.loop.law import Law
-from catenary.loop.law_compiler import CompiledLaw
+from catenary.loop.laws.compiler import CompiledLaw
+from catenary.loop.laws.law import Law
 
 Numbers = npt.NDArray[np.float64]
 

@@ -11,12 +11,13 @@ import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any
 
 from catenary.errors import LawError
-from catenary.loop.law import Law
-from catenary.loop.law_checks import check_source
-from catenary.loop.law_layout import LawLayout
+from catenary.loop.laws.checks import check_source
+from catenary.loop.laws.law import Law
+from catenary.loop.laws.layout import LawLayout
 
 SOURCES = {
     "actual": "actual",
@@ -77,15 +78,13 @@ def compile_law(law: Law, layout: LawLayout) -> CompiledLaw:
 @contextmanager
 def counted_allocations() -> Iterator[Callable[[], int]]:
     """Counts the arrays that compiled laws make while the block lasts."""
-    from numba.core.runtime import _nrt_python as memory
-    from numba.core.runtime import rtsys
-
-    memory.memsys_enable_stats()
+    runtime: Any = import_module("numba.core.runtime")
+    runtime._nrt_python.memsys_enable_stats()
     try:
-        before = rtsys.get_allocation_stats().alloc
-        yield lambda: rtsys.get_allocation_stats().alloc - before
+        before = runtime.rtsys.get_allocation_stats().alloc
+        yield lambda: runtime.rtsys.get_allocation_stats().alloc - before
     finally:
-        memory.memsys_disable_stats()
+        runtime._nrt_python.memsys_disable_stats()
 
 
 def _numba(law: Law) -> Any:

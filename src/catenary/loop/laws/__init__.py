@@ -1,0 +1,1 @@
+"""Control laws: plain Python functions, checked, compiled, rehearsed, and run in the cycle."""
