@@ -32,7 +32,7 @@ class Law:
         functools.update_wrapper(self, function)
         self.arguments = arguments_of(function)
 
-    def __call__(self, *arguments: Any, **named: Any) -> object:
+    def __call__(self, *arguments: object, **named: object) -> object:
         return self.function(*arguments, **named)
 
     def __repr__(self) -> str:
