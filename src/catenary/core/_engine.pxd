@@ -37,5 +37,5 @@ cdef class Engine(Parts):
     cdef void take_commanded(self) noexcept
     cdef int interrupted(self, int rc) except -1
     cdef int spend_cycle(self) except -1
-    cdef int interrupted_wait(self, int64_t until) except -1
+    cdef int pass_time(self, int64_t duration) except -1
     cdef void ask_law(self, law_t *law) noexcept

@@ -43,10 +43,12 @@ from catenary.core._handover cimport (
 )
 from catenary.core._law cimport Law, law_t
 from catenary.core._native cimport (
+    CAT_LINK_SPENDS,
     cat_add32,
     cat_fence,
     cat_futex_wait,
     cat_futex_wake,
+    cat_link,
     cat_load_acquire32,
     cat_store_release32,
 )
@@ -86,7 +88,7 @@ cdef void thread_loop(void *argument) noexcept nogil:
 @cython.no_gc_clear  # its parts must outlive the native thread
 cdef class Engine(Parts):
     def __cinit__(self, plan, link):
-        self.lead = plan.lead_ns
+        self.lead = 0 if self.virtual else plan.lead_ns
         self.laws = []
         self.streams = []
         self.native = self.e.cycle.order != INLINE and not self.virtual
@@ -184,7 +186,7 @@ cdef class Engine(Parts):
         cdef cycle_t *c = &self.e.cycle
         cdef int rc
         while True:
-            if self.virtual:
+            if self.alone:
                 rc = cycle_sleep(c, 0)
             else:
                 with nogil:
@@ -206,7 +208,7 @@ cdef class Engine(Parts):
         cdef uint64_t before = header.number
         cdef int rc
         while True:
-            if self.virtual:
+            if self.alone:
                 rc = self.native_cycle_here()
             else:
                 with nogil:
@@ -363,31 +365,44 @@ cdef class Engine(Parts):
         raise OSError(-rc, f"link: {os.strerror(-rc)}")
 
     def spend(self, int64_t duration_ns):
-        cdef int64_t until
+        cdef cycle_t *c = &self.e.cycle
+        cdef int64_t slice, left = duration_ns
         if duration_ns < 0:
             raise ValueError(f"duration_ns: {duration_ns}")
         if not self.running:
             raise RuntimeError("the engine is not running: start it first")
         if not self.virtual:
             raise RuntimeError("on this link time passes by itself")
-        until = self.now_ns() + duration_ns
-        if self.e.cycle.order != INLINE:
-            while self.e.cycle.next <= until:
+        while left > 0:
+            slice = left
+            if c.order != INLINE:
+                slice = min(left, max(c.next - self.now_ns(), <int64_t>0))
+            self.pass_time(slice)
+            left -= slice
+            while c.order != INLINE and c.next <= self.now_ns():
                 self.spend_cycle()
-        self.interrupted_wait(until)
 
     cdef int spend_cycle(self) except -1:
         """A cycle that happens while the application computes: it does not see it yet."""
-        cdef int rc = cycle_wait(&self.e.cycle)
-        if rc == 0:
-            cycle_native(&self.e.cycle)
-            return 0
-        return self.interrupted(rc)
-
-    cdef int interrupted_wait(self, int64_t until) except -1:
         cdef int rc
+        with nogil:
+            rc = cycle_wait(&self.e.cycle)
+            if rc == 0:
+                cycle_native(&self.e.cycle)
+        return self.interrupted(rc) if rc < 0 else 0
+
+    cdef int pass_time(self, int64_t duration) except -1:
+        """Execution time, where the link knows of it; else simply time."""
+        cdef const cat_link *link = self.e.cycle.link
+        cdef int64_t until = self.now_ns() + duration
+        cdef int rc
+        if link.flags & CAT_LINK_SPENDS:
+            with nogil:
+                rc = link.spend(link.self, duration)
+            return self.interrupted(rc) if rc < 0 else 0
         while self.now_ns() < until:
-            rc = self.e.cycle.link.wait_until(self.e.cycle.link.self, until, 0)
+            with nogil:
+                rc = link.wait_until(link.self, until, 0)
             if rc < 0:
                 self.interrupted(rc)
         return 0

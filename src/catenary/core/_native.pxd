@@ -29,6 +29,8 @@ cdef extern from "link.h" nogil:
     const uint32_t CAT_FRAME_MAX
     const uint32_t CAT_FRAME_MIN
     const uint32_t CAT_LINK_VIRTUAL_TIME
+    const uint32_t CAT_LINK_SHARED_TIME
+    const uint32_t CAT_LINK_SPENDS
 
     ctypedef struct cat_link:
         uint32_t version
@@ -38,6 +40,7 @@ cdef extern from "link.h" nogil:
         int (*receive)(void *self, const uint8_t **frame) noexcept nogil
         int64_t (*now)(void *self) noexcept nogil
         int (*wait_until)(void *self, int64_t deadline, int wake_on_frame) noexcept nogil
+        int (*spend)(void *self, int64_t duration) noexcept nogil
 
 
 cdef extern from "image.h" nogil:

@@ -24,6 +24,7 @@ cdef class Parts:
     cdef dict _buffers
     cdef histogram_t *spare_histograms
     cdef bint virtual          # the link's time is virtual: everything in the caller's thread
+    cdef bint alone            # nobody else lives by that time: waits keep the GIL
 
     cdef connect(self, plan)
     cdef int64_t now_ns(self) noexcept

@@ -17,7 +17,7 @@ from catenary.core._histogram cimport (
     histogram_t,
 )
 from catenary.core._lane cimport Lane
-from catenary.core._native cimport CAT_LINK_VIRTUAL_TIME, cat_fence
+from catenary.core._native cimport CAT_LINK_SHARED_TIME, CAT_LINK_VIRTUAL_TIME, cat_fence
 
 
 def columns_by_bank(columns):
@@ -79,6 +79,7 @@ cdef class Parts:
         c.lost_limit = plan.lost_limit
         self.h = &self.handover.c
         self.virtual = c.link.flags & CAT_LINK_VIRTUAL_TIME != 0
+        self.alone = self.virtual and not c.link.flags & CAT_LINK_SHARED_TIME
         for slot in range(4):
             self.h.actual[slot].header.period = c.period * 1e-9
         for slot in range(TARGETS):

@@ -4,6 +4,7 @@ cdef extern from "link.h" nogil:
     const char *CAT_LINK_CAPSULE
     const uint32_t CAT_LINK_VERSION
     const uint32_t CAT_LINK_VIRTUAL_TIME
+    const uint32_t CAT_LINK_SPENDS
     enum:
         CAT_FRAME_MAX
         CAT_FRAME_MIN

@@ -143,7 +143,7 @@ cdef class WrapperLink(TableLink):
         self.inner = table_of(self.inner_capsule)
         self.link = opened
         self.name = opened.name
-        self.table.flags = self.inner.flags
+        self.table.flags = self.inner.flags & ~CAT_LINK_SPENDS
         return 0
 
     cdef int close_table(self) except -1:

@@ -67,6 +67,11 @@ class Stream:
         return self._ring.waiting
 
     @property
+    def taken(self) -> int:
+        """Rows whose instant has come."""
+        return self._ring.taken
+
+    @property
     def free(self) -> int:
         """Rows that find room now."""
         return self._ring.capacity - self._ring.waiting

@@ -18,6 +18,8 @@
 
 /* flags */
 #define CAT_LINK_VIRTUAL_TIME 1u      /* `now` advances only in `wait_until`: run in the caller's thread */
+#define CAT_LINK_SHARED_TIME 2u       /* virtual, and others live by it: wait without the GIL */
+#define CAT_LINK_SPENDS 4u            /* `spend` is there */
 
 typedef struct cat_link {
     uint32_t version;                 /* CAT_LINK_VERSION */
@@ -39,6 +41,10 @@ typedef struct cat_link {
      * 1: a frame is there (only with wake_on_frame); 0: the deadline has passed; or -errno
      * (-EINTR: a signal came first; the caller decides). */
     int (*wait_until)(void *self, int64_t deadline, int wake_on_frame);
+
+    /* Only with CAT_LINK_SPENDS. Lets execution time [ns] pass; whoever precedes on the same
+     * virtual processor preempts it, so that more time may have passed. 0, or -errno as above. */
+    int (*spend)(void *self, int64_t duration);
 } cat_link;
 
 #endif

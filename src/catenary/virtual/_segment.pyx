@@ -4,7 +4,7 @@ under the GIL.
 """
 
 from cpython.bytes cimport PyBytes_FromStringAndSize
-from cpython.pycapsule cimport PyCapsule_New
+from cpython.pycapsule cimport PyCapsule_GetPointer, PyCapsule_IsValid, PyCapsule_New
 from cpython.exc cimport PyErr_SetInterrupt
 from libc.errno cimport EINTR, EIO
 from libc.stdint cimport int64_t, uint8_t, uint16_t, uint32_t, uint64_t
@@ -12,7 +12,8 @@ from libc.string cimport memcpy
 
 cdef extern from "link.h":
     const char *CAT_LINK_CAPSULE
-    uint32_t CAT_LINK_VERSION, CAT_LINK_VIRTUAL_TIME, CAT_FRAME_MAX
+    uint32_t CAT_LINK_VERSION, CAT_LINK_VIRTUAL_TIME, CAT_LINK_SHARED_TIME, CAT_LINK_SPENDS
+    uint32_t CAT_FRAME_MAX
     ctypedef struct cat_link:
         uint32_t version, flags
         void *self
@@ -20,6 +21,15 @@ cdef extern from "link.h":
         int (*receive)(void *, const uint8_t **) noexcept nogil
         int64_t (*now)(void *) noexcept nogil
         int (*wait_until)(void *, int64_t, int) noexcept nogil
+        int (*spend)(void *, int64_t) noexcept nogil
+
+cdef extern from "clock.h":
+    const char *CAT_CLOCK_CAPSULE
+    uint32_t CAT_CLOCK_VERSION, CAT_CLOCK_VIRTUAL
+    ctypedef struct cat_clock:
+        uint32_t version, flags
+        void *self
+        int64_t (*now)(void *) noexcept nogil
 
 cdef extern from "packet_loop.h" nogil:
     int packet_loop(cat_segment *s, int fd, int stop_fd)
@@ -70,6 +80,7 @@ cdef extern from "segment_memory.h" nogil:
     ctypedef struct cat_segment:
         controller *controllers
         int count, reachable, pending, event_fd, is_virtual, connected
+        const cat_clock *clock
         int64_t now, next_due, service_due
         frame_counters counters
         uint32_t head, tail
@@ -98,6 +109,7 @@ cdef extern from "segment_memory.h" nogil:
     int line_receive(void *, const uint8_t **)
     int64_t line_now(void *)
     int line_wait_until(void *, int64_t, int)
+    int line_spend(void *, int64_t)
     enum:
         REG_AL_CONTROL, REG_RX_ERRORS, REG_LOST_LINKS, SM_PDI_DEACTIVATE, SM_PDI_REPEAT_ACK
         SM_ACTIVATE_REPEAT, ETHERNET_HEADER
@@ -136,6 +148,7 @@ cdef class Core:
 
     cdef cat_segment *_segment
     cdef object _service
+    cdef object _clock
     cdef readonly object failure
     cdef readonly int count
 
@@ -202,6 +215,19 @@ cdef class Core:
     @property
     def is_virtual(self) -> bool:
         return bool(self._segment.is_virtual)
+
+    def use_clock(self, clock):
+        """Lives by the virtual time of `clock.capsule` (native/clock.h), beside others."""
+        cdef const cat_clock *table
+        capsule = clock.capsule
+        if not PyCapsule_IsValid(capsule, CAT_CLOCK_CAPSULE):
+            raise ValueError("clock.capsule is no capsule of a clock")
+        table = <const cat_clock *>PyCapsule_GetPointer(capsule, CAT_CLOCK_CAPSULE)
+        if table.version != CAT_CLOCK_VERSION or not table.flags & CAT_CLOCK_VIRTUAL:
+            raise ValueError("the clock is not virtual, or of another version")
+        self._clock = clock, capsule       # own the table
+        self._segment.clock = table
+        self._segment.now = table.now(table.self)
 
     def use_service(self, service):
         """`service()` runs the application side and returns when it is due again [ns]."""
@@ -526,6 +552,9 @@ cdef class SegmentLink:
         self.name = name
         self._table.version = CAT_LINK_VERSION
         self._table.flags = CAT_LINK_VIRTUAL_TIME if core._segment.is_virtual else 0
+        if core._segment.clock != NULL:
+            self._table.flags |= CAT_LINK_SHARED_TIME | CAT_LINK_SPENDS
+            self._table.spend = line_spend
         self._table.self = <void *>core._segment
         self._table.send = line_send
         self._table.receive = line_receive

@@ -13,6 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "clock.h"
 #include "link.h"
 #include "registers.h"
 
@@ -150,6 +151,7 @@ typedef struct cat_segment {
     int64_t service_due;             /* of the application, Python */
     int pending;                     /* some controller has events */
     int event_fd;                    /* wakes the service thread, -1: none */
+    const cat_clock *clock;          /* virtual time is shared: whose; NULL: it is ours alone */
     int is_virtual;
     int connected;                   /* the cable between MainDevice and first device */
     uint8_t scratch[2048], incoming[2048];

@@ -175,10 +175,26 @@ static int wait_in_virtual_time(cat_segment *s, int64_t deadline, int wake_on_fr
             return 1;
         if (deadline <= s->now)
             return 0;
+        int64_t until = earlier(line_wake_time(s, deadline, wake_on_frame), s->service_due);
+        if (s->clock && until > s->now) {
+            int result = s->clock->wait_until(s->clock->self, until);
+            if (result < 0)
+                return result;
+            until = earlier(until, s->clock->now(s->clock->self));
+        }
         lock(s);
-        segment_advance(s, earlier(line_wake_time(s, deadline, wake_on_frame), s->service_due));
+        segment_advance(s, until);
         unlock(s);
     }
+}
+
+/* Execution time of the thread that uses the link; then what has come due meanwhile. */
+static int line_spend(void *self, int64_t duration) {
+    cat_segment *s = self;
+    int result = s->clock->spend(s->clock->self, duration);
+    int64_t present = s->clock->now(s->clock->self);
+    int passed = present > s->now ? wait_in_virtual_time(s, present, 0) : 0;
+    return result < 0 ? result : passed;
 }
 
 static int wait_in_real_time(cat_segment *s, int64_t deadline, int wake_on_frame) {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, Protocol, runtime_checkable
 
 from catenary.virtual._segment import Core, SegmentLink
 from catenary.virtual.devices.coupler import Coupler
@@ -14,6 +14,15 @@ from catenary.virtual.devices.servo import Servo
 from catenary.virtual.service import Service, ServiceThread
 
 ClockKind = Literal["virtual", "monotonic"]
+
+
+@runtime_checkable
+class SharedClock(Protocol):
+    """What a segment needs of a virtual clock that others live by too."""
+
+    @property
+    def capsule(self) -> object:
+        """The C table of native/clock.h."""
 
 
 class FrameCounters(NamedTuple):
@@ -29,14 +38,20 @@ class Segment:
 
     clock="virtual": a discrete-event clock; time advances only while the link waits.
     clock="monotonic": the machine's, for real time in this process and for `serve`.
+    A `realtime.VirtualClock`, or a place on one (`clock.participate()`): virtual time shared with
+    tasks; the loop on this segment takes that place, in the thread that the place is for.
     """
 
-    def __init__(self, devices: Sequence[Device], *, clock: ClockKind = "virtual") -> None:
-        if clock not in ("virtual", "monotonic"):
-            raise ValueError(f'clock is "virtual" or "monotonic", not {clock!r}')
+    def __init__(
+        self, devices: Sequence[Device], *, clock: ClockKind | SharedClock = "virtual"
+    ) -> None:
+        if clock not in ("virtual", "monotonic") and not isinstance(clock, SharedClock):
+            raise ValueError(f'clock is "virtual", "monotonic" or a VirtualClock, not {clock!r}')
         self._devices = tuple(devices)
-        self.clock: ClockKind = clock
-        self._core = Core(len(self._devices), clock == "virtual")
+        self.clock: ClockKind = "monotonic" if clock == "monotonic" else "virtual"
+        self._core = Core(len(self._devices), self.clock == "virtual")
+        if isinstance(clock, SharedClock):
+            self._core.use_clock(clock)
         self._service = Service(self._core, self._devices)
         self._thread: ServiceThread | None = None
         self._link: SegmentLink | None = None
