@@ -366,7 +366,7 @@ cdef class Engine(Parts):
 
     def spend(self, int64_t duration_ns):
         cdef cycle_t *c = &self.e.cycle
-        cdef int64_t slice, left = duration_ns
+        cdef int64_t since, slice, left = duration_ns
         if duration_ns < 0:
             raise ValueError(f"duration_ns: {duration_ns}")
         if not self.running:
@@ -378,9 +378,10 @@ cdef class Engine(Parts):
             if c.order != INLINE:
                 slice = min(left, max(c.next - self.now_ns(), <int64_t>0))
             self.pass_time(slice)
-            left -= slice
+            since = self.now_ns()
             while c.order != INLINE and c.next <= self.now_ns():
                 self.spend_cycle()
+            left -= slice + self.now_ns() - since  # the cycles take none of the application's time
 
     cdef int spend_cycle(self) except -1:
         """A cycle that happens while the application computes: it does not see it yet."""
