@@ -74,6 +74,7 @@ cdef struct cycle_t:
     stream_t *stream           # NULL: the application or the law says the set-points
     int order
     int64_t period
+    int64_t lead               # inline, law: awake that long before the instant
     int64_t collect_deadline
     uint32_t lost_limit
     int64_t origin             # the first instant
@@ -98,6 +99,7 @@ cdef struct cycle_t:
 cdef void cycle_start(cycle_t *c) noexcept nogil
 cdef int cycle_wait(cycle_t *c) noexcept nogil
 cdef int cycle_sleep(cycle_t *c, int64_t lead) noexcept nogil
+cdef void cycle_prepare(cycle_t *c) noexcept nogil
 cdef void cycle_open(cycle_t *c) noexcept nogil
 cdef void cycle_native(cycle_t *c) noexcept nogil
 cdef void cycle_take_law(cycle_t *c, const target_t *orders) noexcept nogil

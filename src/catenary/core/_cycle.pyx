@@ -38,6 +38,7 @@ from catenary.core._law cimport (
     STOPPED_BY_APPLICATION,
     law_begin,
     law_end,
+    law_rehearse,
     law_run,
     law_t,
     law_took,
@@ -128,6 +129,18 @@ cdef int cycle_sleep(cycle_t *c, int64_t lead) noexcept nogil:
     if rc < 0:
         return rc
     return 0 if now(c) >= c.next - lead else -EINTR
+
+
+cdef void cycle_prepare(cycle_t *c) noexcept nogil:
+    """In the lead: takes the frames that have come back, so that only late ones are left for the
+    instant, and lets the law make a step that counts for nothing: caches."""
+    cdef target_t *scratch = &c.handover.target[BEFORE_LAW]
+    cdef actual_t *actual = &c.handover.actual[c.handover.actual_triple.back]
+    c.image.collect(c.image.self, 0)
+    if c.law != NULL and 3 * (c.next - now(c)) > c.lead:
+        memcpy(scratch.header, c.handover.target[OF_LAW].header, c.handover.target_size)
+        law_rehearse(c.law, actual, scratch, c.next)
+        c.image.collect(c.image.self, 0)
 
 
 cdef void cycle_open(cycle_t *c) noexcept nogil:

@@ -15,7 +15,6 @@ cdef class Engine(Parts):
     cdef bint native           # the cycle runs in its own thread
     cdef bint running
     cdef bint emitted          # inline: the frames of this cycle are on their way
-    cdef int64_t lead          # inline: how long before the instant Python's thread wakes [ns]
     cdef object rehearsal      # called in the lead
     cdef int64_t left          # when `next` returned [ns]; -1: no application since
 

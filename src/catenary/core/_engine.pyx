@@ -25,6 +25,7 @@ from catenary.core._cycle cimport (
     cycle_native,
     cycle_open,
     cycle_outputs,
+    cycle_prepare,
     cycle_sleep,
     cycle_start,
     cycle_t,
@@ -74,7 +75,7 @@ cdef void thread_loop(void *argument) noexcept nogil:
     cdef engine_t *e = <engine_t *>argument
     cdef int rc
     while not cat_load_acquire32(&e.thread.stop):
-        rc = cycle_wait(&e.cycle)
+        rc = wait_native(&e.cycle)
         if rc == 0:
             cycle_native(&e.cycle)
         elif rc != -EINTR:
@@ -85,10 +86,21 @@ cdef void thread_loop(void *argument) noexcept nogil:
     cat_futex_wake(&e.cycle.handover.published)
 
 
+cdef inline int wait_native(cycle_t *c) noexcept nogil:
+    """A law has a lead."""
+    cdef int rc
+    if c.law == NULL or c.lead == 0:
+        return cycle_wait(c)
+    rc = cycle_sleep(c, c.lead)
+    if rc == 0:
+        cycle_prepare(c)
+        cycle_open(c)
+    return rc
+
+
 @cython.no_gc_clear  # its parts must outlive the native thread
 cdef class Engine(Parts):
     def __cinit__(self, plan, link):
-        self.lead = 0 if self.virtual else plan.lead_ns
         self.laws = []
         self.streams = []
         self.native = self.e.cycle.order != INLINE and not self.virtual
@@ -190,12 +202,14 @@ cdef class Engine(Parts):
                 rc = cycle_sleep(c, 0)
             else:
                 with nogil:
-                    rc = cycle_sleep(c, self.lead)
+                    rc = cycle_sleep(c, c.lead)
             if rc == 0:
                 break
             self.interrupted(rc)
-        if self.rehearsal is not None and 3 * (c.next - self.now_ns()) > self.lead > 0:
-            self.rehearsal()
+        if c.lead > 0:
+            if self.rehearsal is not None and 3 * (c.next - self.now_ns()) > c.lead:
+                self.rehearsal()
+            cycle_prepare(c)
         cycle_open(c)
         cycle_inputs(c, &self.h.actual[PRIVATE])
         cycle_usable(c)

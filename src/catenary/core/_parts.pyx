@@ -73,13 +73,14 @@ cdef class Parts:
         c.axes = &self.axes.c
         c.lane = &self.lane.c
         c.handover = &self.handover.c
+        self.virtual = c.link.flags & CAT_LINK_VIRTUAL_TIME != 0
+        self.alone = self.virtual and not c.link.flags & CAT_LINK_SHARED_TIME
         c.order = ORDERS[plan.order]
         c.period = plan.period_ns
+        c.lead = 0 if self.virtual else plan.lead_ns
         c.collect_deadline = plan.collect_deadline_ns
         c.lost_limit = plan.lost_limit
         self.h = &self.handover.c
-        self.virtual = c.link.flags & CAT_LINK_VIRTUAL_TIME != 0
-        self.alone = self.virtual and not c.link.flags & CAT_LINK_SHARED_TIME
         for slot in range(4):
             self.h.actual[slot].header.period = c.period * 1e-9
         for slot in range(TARGETS):

@@ -36,7 +36,7 @@ from catenary.wire.al import State
 TROUBLE = CYCLE_WORKING_COUNTER | CYCLE_DROPPED | CYCLE_STOPPED | CYCLE_NONE | CYCLE_LAW_FAILED
 LATE_LIMIT_POSITION = 0.050  # [s], CSP
 LATE_LIMIT_VELOCITY = 0.010  # [s], CSV and CST
-LEAD = 80e-6  # [s]: what a wake-up is late on an ordinary kernel, and the time to use it
+LEAD = 50e-6  # [s]: what a wake-up is late on an ordinary kernel, and the time to use it
 LEAD_SHARE = 0.1  # of the period, at most
 
 
@@ -50,9 +50,10 @@ class Loop:
     `late_limit` [s] after which drives are stopped quickly when no targets come; None: 50 ms in
     CSP, 10 ms in CSV and CST; 0: never. `lost_limit`: cycles in a row without all answers before
     WorkingCounterError. `stop_deadline` [s] for standing still when leaving. `watchdog` [s] of the
-    devices' outputs. `lead` [s], inline only: how long before each instant the thread wakes, to
-    take the GIL back and fetch what the body needs into the caches (costs that much processor time
-    a cycle); None: 80 us, at most a tenth of the period; 0: off. `raise_faults`: a drive in fault
+    devices' outputs. `lead` [s], of an inline loop and of laws: how long before each instant the
+    thread wakes, to take what has come back and fetch what is needed next into the caches (costs
+    that much processor time a cycle); None: 50 us, at most a tenth of the period, when inline, and
+    none for laws. `raise_faults`: a drive in fault
     raises DriveError; else see `Drives.faults`. `laws` are compiled on entry, before the devices go
     to OP; others when they are started. `cpu` and `priority` (SCHED_FIFO) of the native thread;
     None: as they are.
@@ -77,8 +78,6 @@ class Loop:
     ) -> None:
         if run not in ("threaded", "inline"):
             raise ValueError(f'run={run!r}: "threaded" or "inline"')
-        if lead and run != "inline":
-            raise ValueError(f"lead={lead}: only an inline loop has one, not run={run!r}")
         if lead is not None and not 0 <= lead < period:
             raise ValueError(f"lead={lead} s: must be less than the period of {period} s")
         self._wishes = wishes
@@ -91,9 +90,9 @@ class Loop:
         self._lost_limit = lost_limit
         self._stop_deadline = stop_deadline
         self._watchdog = watchdog
-        self._lead = 0.0
-        if run == "inline":
-            self._lead = min(LEAD, LEAD_SHARE * period) if lead is None else lead
+        self._lead = lead or 0.0
+        if lead is None and run == "inline":
+            self._lead = min(LEAD, LEAD_SHARE * period)
         self._raise_faults = raise_faults
         self._laws = [made_law(law) for law in laws]
         self._cpu = cpu

@@ -52,7 +52,7 @@ class Running:
         self.plan = plan
         self.engine = Engine(plan.cycle, main.link.capsule)
         self.views = bind_wishes(wishes, plan.tables, self.engine.buffers)
-        if plan.cycle.lead_ns:
+        if plan.cycle.lead_ns and plan.cycle.order == "inline":
             self.engine.set_rehearsal(make_rehearsal(self.views))
         self.laws = LawRunner(self.engine, plan)
         self.service = Service(self.engine)

@@ -154,6 +154,6 @@ class CyclePlan:
     late_limit_position_ns: int = 50_000_000  # CSP; 0: off
     late_limit_velocity_ns: int = 10_000_000  # CSV and CST; 0: off
     stop_deadline_ns: int = 2_000_000_000  # quick stop to standstill, at most
-    lead_ns: int = 0  # inline: awake that long before the instant
+    lead_ns: int = 0  # inline, law: awake that long before the instant
     cpu: int | None = None  # of the native thread
     priority: int | None = 80  # SCHED_FIFO; None: leave the scheduling as it is

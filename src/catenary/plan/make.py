@@ -57,7 +57,7 @@ def make_plan(
 
     `period` [s]; `watchdog` [s] of process data, None: off; `collect_share`: when threaded,
     the part of the period in which frames may come back; `late_limit_*`, `stop_deadline` [s];
-    `lead` [s]: when inline, awake that long before the instant.
+    `lead` [s]: inline and with a law, awake that long before the instant.
     """
     period_ns = round(period * 1e9)
     if period_ns <= 0:
