@@ -39,6 +39,7 @@ class Job:
     counts_per_turn: float
     rated_torque: float  # of every drive [N·m]
     spin: bool = False  # a Python thread spins beside the loop
+    storm: bool = False  # and makes garbage that is collected again and again
     amplitude: float = 3.0  # of the sine [rad]
     stiffness: float = 0.5  # PD [N·m/rad]
     damping: float = 0.02  # PD [N·m/(rad/s)]

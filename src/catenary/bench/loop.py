@@ -27,6 +27,7 @@ from catenary.bench.statistics import Run, combine, ratios
 
 OURS = ("catenary-inline", "catenary-threaded")
 LAW = "catenary-law"  # where Numba is installed
+STORM = "catenary-law-storm"  # beside a thread that spins and makes garbage
 ROUND_CYCLES = 900  # less than the 1000 that the loop's log reaches back
 DRIVE_BYTES = 26  # both ways
 INPUT_BYTES = 4 * ANALOG_CHANNELS  # of one terminal
@@ -128,7 +129,8 @@ def make_jobs(
             priority=PRIORITY,
             counts_per_turn=COUNTS_PER_TURN,
             rated_torque=RATED_TORQUE,
-            spin=spin,
+            spin=spin or name == STORM,
+            storm=name == STORM,
         )
         for name in names
     ]

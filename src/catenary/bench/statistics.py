@@ -58,6 +58,9 @@ def summarise(values: npt.NDArray[np.float64]) -> dict[str, float]:
     return {name: round(float(figure), 3) for name, figure in figures.items()}
 
 
+LAW_AND_STORM = ("catenary-law", "catenary-law-storm")
+
+
 def ratios(runs: Sequence[Run]) -> dict[str, float]:
     """Catenary's medians over its peers', as far as the peers ran."""
     median = {run.name: _medians(run) for run in runs}
@@ -68,6 +71,10 @@ def ratios(runs: Sequence[Run]) -> dict[str, float]:
                 for phase in ("receive", "process", "in_controller", "in_controller+tail"):
                     quotient = median[ours][phase] / max(median[peer][phase], 1e-3)
                     found[f"{phase}: {ours} / {peer}"] = round(quotient, 3)
+    law, storm = (next((r for r in runs if r.name == name), None) for name in LAW_AND_STORM)
+    if law and storm:
+        quotient = storm.timing_us["in_controller"]["p999"] / law.timing_us["in_controller"]["p999"]
+        found["in_controller p99.9: catenary-law-storm / catenary-law"] = round(quotient, 3)
     return found
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 import time
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal
 
@@ -20,7 +21,9 @@ ORDERS: tuple[Order, ...] = ("inline", "threaded")
 
 
 def measure(*, drives: int, seconds: float, file: Path | None) -> None:
-    found = {order: run(drives, seconds, order) for order in ORDERS}
+    found: dict[str, float] = {order: run(drives, seconds, order) for order in ORDERS}
+    if find_spec("numba"):
+        found["law"] = run_law(drives, seconds)
     print(f"{machine()}\n{drives} drives, {seconds:g} s of virtual time at {1 / PERIOD:.0f} Hz")
     for order, took in found.items():
         print(f"  {order:10} {took:7.3f} s: {seconds / took:6.0f} times real time")
@@ -33,6 +36,25 @@ def measure(*, drives: int, seconds: float, file: Path | None) -> None:
             "times_real_time": {order: round(seconds / took, 1) for order, took in found.items()},
         },
     )
+
+
+@cat.law
+def sine(actual, target, memory, time, parameters):  # type: ignore[no-untyped-def]
+    for i in range(actual.n):
+        target.position[i] = memory[i] + 0.1 * math.sin(time)
+    return time >= parameters[0]
+
+
+def run_law(drives: int, seconds: float) -> float:
+    """The same for a law, without compiling it."""
+    with cat.MainDevice(make_segment(drives, clock="virtual")) as main:
+        arm = cat.Drives(main.scan().drives, mode="csp", counts_per_turn=COUNTS_PER_TURN)
+        with cat.Loop(arm, period=PERIOD, laws=[sine]) as loop:
+            home = arm.actual.position.copy()
+            loop.run(sine, memory=home, parameters=[PERIOD])
+            start = time.perf_counter()
+            loop.run(sine, memory=home, parameters=[seconds])
+            return time.perf_counter() - start
 
 
 def run(drives: int, seconds: float, order: Order) -> float:

@@ -6,6 +6,7 @@ them start from the same state, and keeps one peer's memory from another's timin
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 import sys
 import threading
@@ -47,6 +48,8 @@ def spinning(job: Job) -> Iterator[None]:
             os.sched_setaffinity(0, {job.cpu})
         while not stop.is_set():
             sum(range(100))
+            if job.storm:
+                make_garbage()
 
     thread = threading.Thread(target=spin, name="spin", daemon=True)
     thread.start()
@@ -55,6 +58,14 @@ def spinning(job: Job) -> Iterator[None]:
     finally:
         stop.set()
         thread.join()
+
+
+def make_garbage() -> None:
+    """A thousand objects that know each other, and a full collection."""
+    ring: list[object] = []
+    ring.extend([ring] for _ in range(1000))
+    del ring
+    gc.collect()
 
 
 if __name__ == "__main__":

@@ -30,8 +30,9 @@ def _add_loop(group: Commands) -> None:
         group,
         "loop",
         help="the cyclic exchange, phase by phase",
-        description="Runs catenary-inline, catenary-threaded and the peers in short rounds, one "
-        "after the other, on the same segment with the same scheduling.",
+        description="Runs catenary-inline, catenary-threaded, catenary-law (where Numba is "
+        "installed) and the peers in short rounds, one after the other, on the same segment with "
+        "the same scheduling.",
         example="catenary bench loop --seconds 10 --peers c,c-ring,pysoem --json loop.json\n"
         "catenary bench loop --drives 33 --body pd --peers pysoem",
     )
@@ -41,7 +42,10 @@ def _add_loop(group: Commands) -> None:
         "--seconds", type=positive_seconds, default=10.0, metavar="S", help="of every peer (10)"
     )
     parser.add_argument(
-        "--peers", default="c,pysoem", metavar="A,B", help="of c, c-ring, pysoem (c,pysoem)"
+        "--peers",
+        default="c,pysoem",
+        metavar="A,B",
+        help="of c, c-ring, pysoem, catenary-law-storm (c,pysoem)",
     )
     parser.add_argument(
         "--body", choices=("sine", "pd"), default="sine", help="what the user computes (sine)"

@@ -13,6 +13,7 @@ MODULES = {
     "catenary-inline": "with_catenary",
     "catenary-threaded": "with_catenary",
     "catenary-law": "with_catenary_law",
+    "catenary-law-storm": "with_catenary_law",
     "c": "with_c",
     "c-ring": "with_c",
     "pysoem": "with_pysoem",
