@@ -34,7 +34,8 @@ def image(shared_data: Path, request: pytest.FixtureRequest) -> bytes:
 @pytest.mark.parametrize("image", ["beckhoff_ek1100"], indirect=True)
 def test_a_coupler_has_neither_mailbox_nor_process_data(image: bytes) -> None:
     device = described(image)
-    assert device.name == "EK1100"
+    assert device.order == "EK1100"
+    assert device.name.startswith("EK1100 EtherCAT")
     assert device.identity == Identity(2, 0x044C_2C52, 0x0012_0000, 0)
     assert device.mailbox is None
     assert device.outputs == device.inputs == ()
@@ -97,7 +98,7 @@ def test_an_unprogrammed_eeprom_is_a_device_of_which_nothing_is_known(image: byt
 @pytest.mark.parametrize("image", ["beckhoff_el2004"], indirect=True)
 def test_a_wrong_checksum_alone_is_noted_not_fatal(image: bytes) -> None:
     device = described(image[:14] + bytes([image[14] ^ 0xFF]) + image[15:])
-    assert device.name == "EL2004"
+    assert device.order == "EL2004"
     assert any("checksum" in note for note in device.notes)
 
 

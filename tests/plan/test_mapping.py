@@ -7,7 +7,14 @@ from dataclasses import replace
 import pytest
 
 from catenary.errors import MappingError
-from catenary.model.device import DeviceDescription, Direction, Entry, ObjectInformation, Pdo
+from catenary.model.device import (
+    DeviceDescription,
+    Direction,
+    Entry,
+    ObjectInformation,
+    Pdo,
+    mapped_entries,
+)
 from catenary.plan import make_plan
 from catenary.plan.mapping import make_mapping
 from catenary.plan.start_up import Download, mapping_downloads
@@ -120,3 +127,14 @@ def offering(device: DeviceDescription) -> DeviceDescription:
     """With a second TxPDO that is not assigned."""
     extra = Pdo(0x1A01, (Entry(0x60F4, 0, 32),), None, fixed=True)
     return replace(device, input_pdos=(*device.input_pdos, extra))
+
+
+def test_what_is_not_required_is_added_one_by_one() -> None:
+    """One optional object that cannot be mapped does not take the others with it."""
+    missing = ObjectReference(0x6FFF, 0, 16, required=False)
+    wanted = replace(FOLLOWING_ERROR, required=False)
+    device = replace(servo(0), objects=(ObjectInformation(0x6FFF, 0, 0),))
+    mapping = make_mapping(device, Direction.INPUT, [POSITION, missing, wanted])
+    mapped = [(entry.index, entry.subindex) for entry in mapped_entries(mapping.assignments)]
+    assert (0x60F4, 0) in mapped
+    assert (0x6FFF, 0) not in mapped

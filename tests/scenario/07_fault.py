@@ -22,7 +22,7 @@ def test_a_fault_ends_the_loop_with_the_drives_own_code(cell: Cell) -> None:
             if cycle.number == 100:
                 cell.servos[1].inject_fault(OVER_CURRENT)
             assert cycle.number < 120
-    assert "3 CVS001" in str(caught.value)
+    assert "3 Catenary virtual servo" in str(caught.value)
     assert "0x2310 (continuous over-current)" in str(caught.value)
     assert caught.value.log is not None
     assert len(caught.value.log) > 100  # type: ignore[arg-type]

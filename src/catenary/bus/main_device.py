@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator, Sequence
 from typing import TYPE_CHECKING, Self, TypeVar, overload
 
 from catenary.bus.runner import BlockingRunner, FrameCounts, Runner
-from catenary.bus.segment_scan import Found, bring_to_pre_op, check_identity, with_places
+from catenary.bus.segment_scan import Found, check_identity, find, with_places
 from catenary.bus.sub_device import SubDevice
 from catenary.errors import CatenaryError, SegmentError
 from catenary.link import Link, LinkSource
@@ -107,19 +107,25 @@ class MainDevice:
             link.close()
 
     def scan(
-        self, *, expected: Sequence[Identity | tuple[int, int] | None] | None = None
+        self,
+        *,
+        expected: Sequence[Identity | tuple[int, int] | None] | None = None,
+        strict: bool = True,
     ) -> SubDevices:
         """Finds all devices and brings them to PRE-OP. The handles of devices that are still
         there stay the same objects.
 
         `expected`: by position, an identity or (vendor, product); None: whatever it is.
+        A device that cannot be read or brought there does not keep the others from it. `strict`:
+        its error is raised then, with those of further ones as notes, and `subs` has all handles;
+        else it is in `SubDevice.error`, and raised when the device is used.
         """
         runner = self._runner
         runner.flush()
         device_count = runner.run(count())
         runner.run(reset(device_count))
         registers = runner.run(assign(device_count))
-        found = runner.run_all([bring_to_pre_op(each) for each in registers])
+        found = runner.run_all([find(each) for each in registers])
         descriptions = with_places([each.description for each in found])
         self.subs = SubDevices(
             [
@@ -131,6 +137,9 @@ class MainDevice:
             f"devices {positions} have the same alias {alias}"
             for alias, positions in duplicate_aliases(registers).items()
         )
+        self._note_further_errors()
+        if strict:
+            self._raise_errors()
         if expected is not None:
             self._check_expected(expected)
         return self.subs
@@ -164,7 +173,8 @@ class MainDevice:
 
     def read_mappings(self, *wishes: Wish, period: float = 1e-3) -> None:
         """Brings the descriptions up to date: what is mapped, and what the dictionaries say of
-        objects wished for that are not."""
+        objects wished for that are not. Raises the error of a device that is not in PRE-OP."""
+        self._raise_errors()
         from catenary.bus.bring_up import describe_mappings
 
         describe_mappings(self._runner, self.subs, wishes, round(period * 1e9))
@@ -211,8 +221,20 @@ class MainDevice:
         if known is None or known.identity != found.description.identity:
             known = SubDevice(self, found.description, found.channel)
         known.description, known.channel = found.description, found.channel
-        known.state = State.PRE_OP
+        known.error = found.error
+        known.state = State.PRE_OP if found.error is None else None
         return known
+
+    def _raise_errors(self) -> None:
+        """The first error that the scan has met."""
+        for sub in self.subs:
+            if sub.error is not None:
+                raise sub.error
+
+    def _note_further_errors(self) -> None:
+        errors = [sub.error for sub in self.subs if sub.error is not None]
+        for other in errors[1:]:
+            errors[0].add_note(f"also: {other}")
 
     def _check_expected(self, expected: Sequence[Identity | tuple[int, int] | None]) -> None:
         if len(expected) != len(self.subs):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from catenary.errors import IdentityError
+from catenary.errors import CatenaryError, IdentityError
 from catenary.model.describe import describe
 from catenary.model.device import DeviceDescription, Identity
 from catenary.model.topology import tree
@@ -23,19 +23,29 @@ from catenary.wire.al import State
 
 
 class Found(NamedTuple):
-    """One device in PRE-OP, with the mailbox that brought it there."""
+    """One device in PRE-OP, with the mailbox that brought it there; or what kept it from there."""
 
     description: DeviceDescription
-    channel: MailboxChannel | None
+    channel: MailboxChannel | None = None
+    error: CatenaryError | None = None
 
 
-def bring_to_pre_op(registers: StationRegisters) -> Procedure[Found]:
-    """Reads the SII, opens the mailbox, asks for PRE-OP and reads the profile."""
-    device = yield from identify(registers)
+def find(registers: StationRegisters) -> Procedure[Found]:
+    """Brings one device to PRE-OP, or tells what is wrong with it: the others go on."""
+    device = unread(registers)
+    try:
+        device = yield from identify(registers)
+        return (yield from bring_to_pre_op(device))
+    except CatenaryError as error:
+        return Found(device, error=error)
+
+
+def bring_to_pre_op(device: DeviceDescription) -> Procedure[Found]:
+    """Opens the mailbox, asks for PRE-OP and reads the profile."""
     station = Station(device.position, device.station_address, device.name)
     if device.mailbox is None:
         yield from request_state(station, State.PRE_OP)
-        return Found(device, None)
+        return Found(device)
     channel = MailboxChannel(station, device.mailbox)
     yield from configure_mailbox(channel)
     yield from request_state(station, State.PRE_OP)
@@ -46,10 +56,19 @@ def bring_to_pre_op(registers: StationRegisters) -> Procedure[Found]:
     return Found(device, channel)
 
 
+def unread(registers: StationRegisters) -> DeviceDescription:
+    """What its registers alone say."""
+    device = described(registers, b"")
+    return replace(device, notes=())
+
+
 def identify(registers: StationRegisters) -> Procedure[DeviceDescription]:
     """What registers and SII say."""
     station = Station(registers.position, registers.station_address)
-    image = yield from read_image(station)
+    return described(registers, (yield from read_image(station)))
+
+
+def described(registers: StationRegisters, image: bytes) -> DeviceDescription:
     return describe(
         registers.position,
         station_address=registers.station_address,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, TypeVar, overload
 
-from catenary.errors import MailboxError
+from catenary.errors import CatenaryError, MailboxError
 from catenary.model.device import DeviceDescription, Identity
 from catenary.procedure.al_state import DeviceState, read_state
 from catenary.procedure.mailbox import MailboxChannel
@@ -30,6 +30,7 @@ class SubDevice:
         self.description = description
         self.channel = channel  # None: it has no mailbox
         self.state: State | None = None  # last known; None: unknown
+        self.error: CatenaryError | None = None  # why the last scan could not bring it to PRE-OP
         self.sdo = Sdo(self)
 
     @property
@@ -39,6 +40,11 @@ class SubDevice:
     @property
     def name(self) -> str:
         return self.description.name
+
+    @property
+    def order(self) -> str:
+        """The manufacturer's order code; empty where its SII has none."""
+        return self.description.order
 
     @property
     def identity(self) -> Identity:
@@ -112,6 +118,8 @@ class Sdo:
         if not 0 <= index <= 0xFFFF or not 0 <= subindex <= 0xFF:
             raise ValueError(f"object 0x{index:X}:{subindex:X}: an index has 16 bits, a subindex 8")
         channel = self._sub.channel
+        if self._sub.error is not None:
+            raise self._sub.error
         if channel is None or not channel.layout.coe:
             what = "has no mailbox" if channel is None else "does not speak CoE"
             raise MailboxError(

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from catenary.bus import SubDevice
 from catenary.cli.failure import UsageError
 
-HEADINGS = ("pos", "name", "vendor", "product", "revision", "serial", "state")
+HEADINGS = ("pos", "name", "order", "vendor", "product", "revision", "serial", "state")
 
 
 def as_table(devices: Sequence[SubDevice]) -> str:
@@ -25,6 +25,7 @@ def _row(device: SubDevice) -> tuple[str, ...]:
     return (
         str(device.position),
         device.name,
+        device.order,
         f"0x{identity.vendor:08X}",
         f"0x{identity.product:08X}",
         f"0x{identity.revision:08X}",
@@ -34,6 +35,8 @@ def _row(device: SubDevice) -> tuple[str, ...]:
 
 
 def state_name(device: SubDevice) -> str:
+    if device.error is not None:
+        return "failed"
     return str(device.state) if device.state is not None else "unknown"
 
 
@@ -43,11 +46,13 @@ def as_json(devices: Sequence[SubDevice]) -> str:
             {
                 "position": device.position,
                 "name": device.name,
+                "order": device.order,
                 "vendor": device.identity.vendor,
                 "product": device.identity.product,
                 "revision": device.identity.revision,
                 "serial": device.identity.serial,
                 "state": state_name(device),
+                "error": None if device.error is None else str(device.error),
             }
             for device in devices
         ],

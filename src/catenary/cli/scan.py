@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 
 from catenary.cli.parsers import Commands, add_command, add_json
 
@@ -25,6 +26,9 @@ def run(arguments: argparse.Namespace) -> int:
     from catenary.target import MainDevice
 
     with MainDevice(arguments.target) as main:
-        devices = main.scan()
+        devices = main.scan(strict=False)
         print(as_json(devices) if arguments.json else as_table(devices))
-    return 0
+    failed = [device for device in devices if device.error is not None]
+    for device in failed:
+        print(f"error: {device.error}", file=sys.stderr)
+    return 1 if failed else 0

@@ -102,7 +102,7 @@ def _filled(bare: DeviceDescription, sii: Sii, notes: list[str]) -> DeviceDescri
     return replace(
         bare,
         identity=Identity(header.vendor, header.product, header.revision, header.serial),
-        name=order or name or nameless,
+        name=name or order or nameless,  # as SOEM and IgH show it
         mailbox=_mailbox(sii),
         sync_managers=managers,
         outputs=assignments(outputs),

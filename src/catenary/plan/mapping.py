@@ -8,6 +8,7 @@ new entries at the end of a PDO that may be changed; such a PDO with the wished 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NoReturn
 
@@ -44,15 +45,21 @@ class Mapping:
 def make_mapping(
     device: DeviceDescription, direction: Direction, wished: Sequence[ObjectReference]
 ) -> Mapping:
-    """The mapping that carries all objects wished for, or at least the required ones;
-    MappingError says which of those cannot be."""
-    required = tuple(reference for reference in wished if reference.required)
+    """The mapping that carries all objects wished for, or the required ones and as many others as
+    can be; MappingError says which of the required cannot."""
+    kept = [reference for reference in wished if reference.required]
     try:
         return _carrying(device, direction, wished)
     except MappingError:
-        if len(required) == len(wished):
+        if len(kept) == len(wished):
             raise
-    return _carrying(device, direction, required)
+    mapping = _carrying(device, direction, kept)
+    for reference in wished:
+        if not reference.required:
+            with suppress(MappingError):
+                mapping = _carrying(device, direction, [*kept, reference])
+                kept.append(reference)
+    return mapping
 
 
 def _carrying(

@@ -57,6 +57,7 @@ cdef extern from "segment_memory.h" nogil:
     ctypedef struct servo_axis:
         double inertia, viscous, coulomb, load, rated_torque, velocity_limit
         double counts_per_radian, velocity_per_radian, position_gain, velocity_gain, integral_gain
+        double radian_per_count, radian_per_velocity, per_inertia, per_torque
         double position, velocity, torque, boot
         int state
         uint16_t injected
@@ -71,6 +72,7 @@ cdef extern from "segment_memory.h" nogil:
         sii_access sii
         dc_clock clock
         int64_t step_period, step_due
+        double step_seconds, step_rate
         mapping outputs, inputs
         int64_t *slots
         int slot_count, axis_count
@@ -437,6 +439,8 @@ cdef class Core:
         if period_ns < 1000:
             raise ValueError(f"a device cycle of {period_ns} ns is shorter than 1 us")
         c.step_period = period_ns
+        c.step_seconds = period_ns * 1e-9
+        c.step_rate = 1e9 / period_ns
         c.step_due = self._segment.now + period_ns
         if c.step_due < self._segment.next_due:
             self._segment.next_due = c.step_due
@@ -467,6 +471,8 @@ cdef class Core:
         a.inertia, a.viscous, a.coulomb = inertia, viscous, coulomb
         a.rated_torque, a.velocity_limit = rated_torque, velocity_limit
         a.counts_per_radian, a.velocity_per_radian = counts_per_radian, velocity_per_radian
+        a.radian_per_count, a.radian_per_velocity = 1 / counts_per_radian, 1 / velocity_per_radian
+        a.per_inertia, a.per_torque = 1 / inertia, 1 / rated_torque
         a.position_gain, a.velocity_gain = position_gain, velocity_gain
         a.integral_gain, a.boot = integral_gain, boot
 

@@ -117,6 +117,7 @@ typedef struct controller {
     /* model */
     int model;
     int64_t step_period, step_due;   /* [ns] */
+    double step_seconds, step_rate;  /* [s], [Hz]: the period once more */
     mapping outputs, inputs;
     int64_t *slots;
     int slot_count;

@@ -49,9 +49,9 @@ static void model_step(controller *c) {
         *status = (uint8_t)((*status & ~SM_STATUS_WRITTEN) | SM_STATUS_READ);
         outputs_take(c);
     }
-    double dt = (double)c->step_period * 1e-9;
     for (int k = 0; k < c->axis_count; k++)
-        servo_step(c, &c->axes[k], c->slots + k * AXIS_SLOTS, c->outputs_valid, fresh, dt);
+        servo_step(c, &c->axes[k], c->slots + k * AXIS_SLOTS, c->outputs_valid, fresh,
+                   c->step_seconds, c->step_rate);
     inputs_put(c);
     watchdog_trigger_pdi(c);
 }

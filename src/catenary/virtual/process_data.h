@@ -12,8 +12,14 @@
 static inline uint64_t bits_load(const uint8_t *p, uint32_t bit, uint32_t count) {
     uint64_t value = 0;
     if ((bit & 7) == 0 && (count & 7) == 0) {
+        p += bit / 8;
+        switch (count) {                                     /* what nearly all objects are */
+        case 8: return p[0];
+        case 16: return load16(p);
+        case 32: return load32(p);
+        }
         for (uint32_t k = 0; k < count / 8; k++)
-            value |= (uint64_t)p[bit / 8 + k] << (8 * k);
+            value |= (uint64_t)p[k] << (8 * k);
         return value;
     }
     for (uint32_t k = 0; k < count; k++)
@@ -23,8 +29,14 @@ static inline uint64_t bits_load(const uint8_t *p, uint32_t bit, uint32_t count)
 
 static inline void bits_store(uint8_t *p, uint32_t bit, uint32_t count, uint64_t value) {
     if ((bit & 7) == 0 && (count & 7) == 0) {
+        p += bit / 8;
+        switch (count) {
+        case 8: p[0] = (uint8_t)value; return;
+        case 16: store16(p, (uint16_t)value); return;
+        case 32: store32(p, (uint32_t)value); return;
+        }
         for (uint32_t k = 0; k < count / 8; k++)
-            p[bit / 8 + k] = (uint8_t)(value >> (8 * k));
+            p[k] = (uint8_t)(value >> (8 * k));
         return;
     }
     for (uint32_t k = 0; k < count; k++) {

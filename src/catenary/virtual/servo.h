@@ -43,6 +43,7 @@ typedef struct servo_axis {
     double inertia, viscous, coulomb, load;           /* kg m2, N m s/rad, N m, N m */
     double rated_torque, velocity_limit;              /* N m, rad/s */
     double counts_per_radian, velocity_per_radian;    /* units of 0x6064 a rad; of 0x606C a rad/s */
+    double radian_per_count, radian_per_velocity, per_inertia, per_torque;  /* dividing takes long */
     double position_gain, velocity_gain, integral_gain;
     /* its state */
     double position, velocity, torque, integral;      /* rad, rad/s, N m, N m */
@@ -70,7 +71,7 @@ static inline int servo_powered(const servo_axis *a) {
 }
 
 static inline int64_t servo_counts(const servo_axis *a) {
-    return llround(a->position * a->counts_per_radian);
+    return llrint(a->position * a->counts_per_radian);
 }
 
 /* Loops restart from where the motor is: nothing commanded earlier counts. */
@@ -208,18 +209,25 @@ static void servo_supervise(controller *c, servo_axis *a, int64_t *slots, double
         servo_fault(c, a, slots, ERROR_FOLLOWING);
 }
 
-static double clamp(double value, double limit) { return fmax(-limit, fmin(limit, value)); }
+static inline double smaller(double a, double b) { return a < b ? a : b; }
+static inline double larger(double a, double b) { return a > b ? a : b; }
+static inline double clamp(double value, double limit) { return larger(-limit, smaller(limit, value)); }
+
+static inline double power_of_ten(int64_t exponent) {
+    static const double small[] = {1, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9};
+    return exponent <= 0 && exponent > -10 ? small[-exponent] : pow(10.0, (double)exponent);
+}
 
 /* A new target position is approached linearly within the interpolation period, 0x60C2. */
-static void servo_interpolate(servo_axis *a, const int64_t *slots, int fresh, double dt) {
+static void servo_interpolate(servo_axis *a, const int64_t *slots, int fresh, double dt, double rate) {
     int64_t goal = slots[SLOT_TARGET_POSITION] + slots[SLOT_POSITION_OFFSET];
     int64_t unwrapped = a->target + wrap32(goal - a->target);
     int64_t least = slots[SLOT_LIMIT_MIN], most = slots[SLOT_LIMIT_MAX];
     if (least < most)
         unwrapped = unwrapped < least ? least : unwrapped > most ? most : unwrapped;
     if (fresh || unwrapped != a->target) {
-        double period = (double)slots[SLOT_INTERPOLATION_PERIOD] * pow(10.0, (double)slots[SLOT_INTERPOLATION_EXPONENT]);
-        a->interpolated = fmin(fmax(period, dt), 1.0);
+        double period = (double)slots[SLOT_INTERPOLATION_PERIOD] * power_of_ten(slots[SLOT_INTERPOLATION_EXPONENT]);
+        a->interpolated = smaller(larger(period, dt), 1.0);
         a->target = unwrapped;
     }
     double before = a->command;
@@ -230,7 +238,7 @@ static void servo_interpolate(servo_axis *a, const int64_t *slots, int fresh, do
         a->command = (double)a->target;
         a->interpolated = 0;
     }
-    a->command_velocity = (a->command - before) / dt / a->counts_per_radian;
+    a->command_velocity = (a->command - before) * rate * a->radian_per_count;
 }
 
 static double servo_velocity_loop(servo_axis *a, double velocity, double feed_forward, double limit, double dt) {
@@ -246,24 +254,24 @@ static double servo_velocity_loop(servo_axis *a, double velocity, double feed_fo
 static double servo_ramp(servo_axis *a, const int64_t *slots, double limit, double dt) {
     int quick = a->state == QUICK_STOP_ACTIVE || a->state == FAULT_REACTION_ACTIVE;
     int64_t raw = slots[quick ? SLOT_QUICK_STOP_DECELERATION : SLOT_DECELERATION];
-    double step = fmax(1e-3, (double)raw / a->velocity_per_radian) * dt;
+    double step = larger(1e-3, (double)raw * a->radian_per_velocity) * dt;
     a->ramp = fabs(a->ramp) <= step ? 0 : a->ramp - copysign(step, a->ramp);
     return servo_velocity_loop(a, a->ramp, 0, limit, dt);
 }
 
-static double servo_drive(servo_axis *a, const int64_t *slots, int fresh, double dt) {
+static double servo_drive(servo_axis *a, const int64_t *slots, int fresh, double dt, double rate) {
     double limit = a->rated_torque * (double)slots[SLOT_MAX_TORQUE] * 1e-3;
     double feed_forward = (double)slots[SLOT_TORQUE_OFFSET] * 1e-3 * a->rated_torque;
     double torque;
     if (a->ramping != RAMP_NONE)
         torque = servo_ramp(a, slots, limit, dt);
     else if (a->mode == CSP) {
-        servo_interpolate(a, slots, fresh, dt);
-        double offset = (double)slots[SLOT_VELOCITY_OFFSET] / a->velocity_per_radian;
-        double error = a->command / a->counts_per_radian - a->position;
+        servo_interpolate(a, slots, fresh, dt, rate);
+        double offset = (double)slots[SLOT_VELOCITY_OFFSET] * a->radian_per_velocity;
+        double error = a->command * a->radian_per_count - a->position;
         torque = servo_velocity_loop(a, a->position_gain * error + a->command_velocity + offset, feed_forward, limit, dt);
     } else if (a->mode == CSV) {
-        a->command_velocity = (double)(slots[SLOT_TARGET_VELOCITY] + slots[SLOT_VELOCITY_OFFSET]) / a->velocity_per_radian;
+        a->command_velocity = (double)(slots[SLOT_TARGET_VELOCITY] + slots[SLOT_VELOCITY_OFFSET]) * a->radian_per_velocity;
         torque = servo_velocity_loop(a, a->command_velocity, feed_forward, limit, dt);
     } else if (a->mode == CST) {
         torque = (double)slots[SLOT_TARGET_TORQUE] * 1e-3 * a->rated_torque + feed_forward;
@@ -276,8 +284,8 @@ static double servo_drive(servo_axis *a, const int64_t *slots, int fresh, double
 
 static void servo_motor(servo_axis *a, double dt) {
     double net = a->torque + a->load - a->viscous * a->velocity;
-    double friction = a->coulomb * dt / a->inertia;
-    double velocity = a->velocity + net * dt / a->inertia;
+    double friction = a->coulomb * dt * a->per_inertia;
+    double velocity = a->velocity + net * dt * a->per_inertia;
     /* dry friction stops a motor; it never turns it round */
     velocity = fabs(velocity) <= friction ? 0 : velocity - copysign(friction, velocity);
     a->velocity = velocity;
@@ -307,11 +315,11 @@ static uint16_t servo_statusword(const servo_axis *a, const int64_t *slots) {
 static void servo_show(servo_axis *a, int64_t *slots) {
     int64_t counts = servo_counts(a);
     slots[SLOT_POSITION] = wrap32(counts);
-    slots[SLOT_VELOCITY] = wrap32(llround(a->velocity * a->velocity_per_radian));
-    slots[SLOT_TORQUE] = llround(1e3 * a->torque / a->rated_torque);
+    slots[SLOT_VELOCITY] = wrap32(llrint(a->velocity * a->velocity_per_radian));
+    slots[SLOT_TORQUE] = llrint(1e3 * a->torque * a->per_torque);
     slots[SLOT_TORQUE_DEMAND] = slots[SLOT_TORQUE];
-    slots[SLOT_POSITION_DEMAND] = wrap32(a->mode == CSP && servo_powered(a) ? llround(a->command) : counts);
-    slots[SLOT_VELOCITY_DEMAND] = wrap32(llround(a->command_velocity * a->velocity_per_radian));
+    slots[SLOT_POSITION_DEMAND] = wrap32(a->mode == CSP && servo_powered(a) ? llrint(a->command) : counts);
+    slots[SLOT_VELOCITY_DEMAND] = wrap32(llrint(a->command_velocity * a->velocity_per_radian));
     slots[SLOT_FOLLOWING_ERROR] = wrap32(slots[SLOT_POSITION_DEMAND] - slots[SLOT_POSITION]);
     slots[SLOT_DIGITAL_INPUTS] = (slots[SLOT_DIGITAL_INPUTS] & ~8ll) | (a->sto ? 8 : 0);
     slots[SLOT_MODE_DISPLAY] = a->mode;
@@ -330,7 +338,7 @@ static void servo_change_mode(servo_axis *a, const int64_t *slots) {
 }
 
 /* `fed`: the process data is valid (OPERATIONAL, watchdog content); `fresh`: it came since the last step. */
-static void servo_step(controller *c, servo_axis *a, int64_t *slots, int fed, int fresh, double dt) {
+static void servo_step(controller *c, servo_axis *a, int64_t *slots, int fed, int fresh, double dt, double rate) {
     if (a->state == NOT_READY && (a->boot -= dt) <= 0)
         a->state = SWITCH_ON_DISABLED;                       /* 0, 1 */
     if (a->fed && !fed && a->state == OPERATION_ENABLED)
@@ -339,7 +347,7 @@ static void servo_step(controller *c, servo_axis *a, int64_t *slots, int fed, in
     servo_change_mode(a, slots);
     servo_command(c, a, slots);
     servo_supervise(c, a, slots, dt);
-    a->torque = servo_powered(a) ? servo_drive(a, slots, fresh, dt) : 0;
+    a->torque = servo_powered(a) ? servo_drive(a, slots, fresh, dt, rate) : 0;
     servo_motor(a, dt);
     servo_standstill(a);
     servo_show(a, slots);
