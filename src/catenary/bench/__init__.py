@@ -67,3 +67,10 @@ def measure_tasks(*, seconds: float, file: Path | None = None) -> None:
     from catenary.bench import tasks
 
     tasks.measure(seconds=seconds, file=file)
+
+
+def measure_law(*, axes: int, file: Path | None = None) -> None:
+    """Prints what one call of a compiled law on so many axes takes."""
+    from catenary.bench import law_call
+
+    law_call.measure(axes=axes, file=file)

@@ -23,6 +23,7 @@ def add_parser(commands: Commands) -> None:
     _add_scan(group)
     _add_virtual(group)
     _add_tasks(group)
+    _add_law(group)
 
 
 def _add_loop(group: Commands) -> None:
@@ -100,6 +101,19 @@ def _add_virtual(group: Commands) -> None:
     parser.set_defaults(run=run_virtual)
 
 
+def _add_law(group: Commands) -> None:
+    parser = add_command(
+        group,
+        "law",
+        help="what a call of a compiled law takes",
+        description="Calls a compiled PD law again and again from native code (needs Numba).",
+        example="catenary bench law --axes 12",
+    )
+    parser.add_argument("--axes", type=positive_number, default=12, metavar="N")
+    _add_file(parser)
+    parser.set_defaults(run=run_law)
+
+
 def _add_tasks(group: Commands) -> None:
     parser = add_command(
         group,
@@ -163,4 +177,11 @@ def run_tasks(arguments: argparse.Namespace) -> int:
     from catenary import bench
 
     bench.measure_tasks(seconds=arguments.seconds, file=arguments.json)
+    return 0
+
+
+def run_law(arguments: argparse.Namespace) -> int:
+    from catenary import bench
+
+    bench.measure_law(axes=arguments.axes, file=arguments.json)
     return 0

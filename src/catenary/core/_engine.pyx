@@ -67,6 +67,7 @@ from catenary.core._thread cimport (
 
 cdef enum:
     SIGNALS_NS = 10_000_000    # native cycles in a row, before signal handlers get their turn
+    STREAMS_KEPT = 8           # replaced ones: more than can be made while a row is taken
     SILENCE_NS = 1_000_000_000 # and periods: longest wait for a cycle of a thread that lives
 
 
@@ -445,7 +446,8 @@ cdef class Engine(Parts):
     def start_law(self, Law law not None):
         if not self.running:
             raise RuntimeError("the engine is not running: start it first")
-        self.laws = [*self.laws[-1:], law]  # the cycle may still be in the one before
+        kept = [known for known in self.laws[:-1] if not known.ended]
+        self.laws = [*kept, *self.laws[-1:], law]  # the cycle may still be in one of them
         self.law = law
         self.ask_law(&law.c)
 
@@ -482,7 +484,7 @@ cdef class Engine(Parts):
     def set_stream(self, Stream stream):
         if stream is not None and stream.c.axes != self.axes.c.axis_count:
             raise ValueError(f"a stream for {stream.c.axes} axes, there are {self.axes.c.axis_count}")
-        self.streams = [*self.streams[-1:], stream]  # the cycle may still take from the one before
+        self.streams = [*self.streams[-STREAMS_KEPT:], stream]  # the cycle may be in an old one
         self.stream = stream
         self.e.cycle.stream = NULL if stream is None else &stream.c
         handover_swap(self.h)
