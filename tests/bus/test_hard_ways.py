@@ -1,0 +1,197 @@
+"""Devices that are slow, odd or answered for twice: they come up, or the error names them."""
+
+from __future__ import annotations
+
+import struct
+import threading
+from collections.abc import Callable, Iterator
+
+import pytest
+
+import catenary as cat
+from catenary.errors import CatenaryError, EepromError, MappingError, ResponseTimeout
+from catenary.link import Fault, FaultInjector
+from catenary.types import UDINT
+from catenary.virtual.devices import device as virtual_device
+from catenary.virtual.sii_image import (
+    FMMU,
+    GENERAL,
+    HEADER_BYTES,
+    RX_PDO,
+    STRINGS,
+    SYNC_MANAGER,
+    TX_PDO,
+)
+from catenary.wire.al import State
+
+MS = 1_000_000
+MAILBOX_WRITTEN = 2  # event of the controller
+
+
+def segment() -> cat.Segment:
+    return cat.Segment([cat.Coupler(), cat.Servo(), cat.DigitalOutputs()])
+
+
+# ---- EEPROM
+
+
+def test_a_slow_eeprom_is_waited_for() -> None:
+    slow = segment()
+    slow.core.time_sii(1, 20 * MS, 20 * MS, False)
+    with cat.MainDevice(slow) as main:
+        assert main.scan()[1].is_drive
+        assert slow.now_ns > 1_000 * MS  # some hundred words, 20 ms each
+
+
+def test_one_that_stays_busy_is_named() -> None:
+    slow = segment()
+    slow.core.time_sii(1, 5_000 * MS, 5_000 * MS, False)
+    with cat.MainDevice(slow) as main:
+        with pytest.raises(EepromError, match=r"device 1.*busy") as caught:
+            main.scan()
+        assert caught.value.hint
+        assert main.subs[2].state == State.PRE_OP
+
+
+# ---- mailbox
+
+
+def answering_late(device: cat.Servo, segment: cat.Segment, delay_ns: int) -> None:
+    handle = device.handle
+
+    def later(events: int) -> None:
+        segment.service.scheduler.after(delay_ns, lambda: handle(events))
+
+    device.handle = later  # type: ignore[method-assign]
+
+
+def test_a_reply_after_half_a_second_is_waited_for() -> None:
+    late = segment()
+    with cat.MainDevice(late) as main:
+        servo = main.scan()[1]
+        answering_late(late[1], late, 500 * MS)
+        before = late.now_ns
+        assert servo.sdo.read(0x1018, 1, type=UDINT) == servo.identity.vendor
+        assert late.now_ns - before > 500 * MS
+
+
+def test_one_that_never_comes_has_a_deadline_and_the_mailbox_goes_on() -> None:
+    late = segment()
+    with cat.MainDevice(late) as main:
+        servo = main.scan()[1]
+        answer = late[1].handle
+        late[1].handle = lambda events: None  # type: ignore[method-assign]
+        before = late.now_ns
+        with pytest.raises(ResponseTimeout, match="device 1"):
+            servo.sdo.read(0x1018, 1)
+        assert late.now_ns - before < 10_000 * MS
+        late[1].handle = answer  # type: ignore[method-assign]
+        answer(MAILBOX_WRITTEN)
+        assert servo.sdo.read(0x1018, 2, type=UDINT) == servo.identity.product
+
+
+# ---- SII
+
+
+def categories(image: bytes) -> Iterator[tuple[int, bytes]]:
+    at = HEADER_BYTES
+    while True:
+        kind, words = struct.unpack_from("<HH", image, at)
+        if kind == 0xFFFF:
+            return
+        yield kind, image[at : at + 4 + 2 * words]
+        at += 4 + 2 * words
+
+
+def changed(monkeypatch: pytest.MonkeyPatch, change: Callable[[bytes], bytes]) -> cat.Segment:
+    """A segment whose servo has another SII image."""
+    make = virtual_device.make_sii_image
+
+    def made(description: object) -> bytes:
+        image = make(description)
+        return change(image) if description.axes else image
+
+    monkeypatch.setattr(virtual_device, "make_sii_image", made)
+    return segment()
+
+
+@pytest.mark.parametrize("missing", [STRINGS, GENERAL, FMMU, SYNC_MANAGER, TX_PDO, RX_PDO])
+def test_an_sii_without_one_of_its_categories(
+    monkeypatch: pytest.MonkeyPatch, missing: int
+) -> None:
+    """It comes to PRE-OP and answers; without SyncManagers it cannot exchange process data."""
+
+    def without(image: bytes) -> bytes:
+        rest = b"".join(part for kind, part in categories(image) if kind != missing)
+        return (image[:HEADER_BYTES] + rest + b"\xff\xff\xff\xff").ljust(len(image), b"\xff")
+
+    with cat.MainDevice(changed(monkeypatch, without)) as main:
+        servo = main.scan()[1]
+        assert main.subs[2].state == State.PRE_OP
+        assert servo.state == State.PRE_OP
+        assert servo.name
+        assert servo.sdo.read(0x1018, 1, type=UDINT) == servo.identity.vendor
+        arm = cat.Drives([servo], counts_per_turn=2**20)
+        if missing == SYNC_MANAGER:  # there is no place to put process data
+            with pytest.raises(MappingError, match=r"device 1.*SyncManager"), cat.Loop(arm):
+                pass
+            return
+        with cat.Loop(arm) as loop:
+            assert next(loop).ok
+
+
+def test_coe_is_said_but_there_is_no_mailbox(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The header's standard mailbox of no size."""
+
+    def without_mailbox(image: bytes) -> bytes:
+        return image[:48] + b"\0" * 8 + image[56:]
+
+    with cat.MainDevice(changed(monkeypatch, without_mailbox)) as main:
+        servo = main.scan(strict=False)[1]
+        with pytest.raises(CatenaryError, match="device 1"):
+            servo.sdo.read(0x1018, 1)
+
+
+# ---- frames
+
+
+def test_every_answer_comes_twice() -> None:
+    link = FaultInjector(segment(), seed=1)
+    link.inject(Fault(kind="duplicate"))
+    with cat.MainDevice(link) as main:
+        subs = main.scan()
+        assert [sub.state for sub in subs] == [State.PRE_OP] * 3
+        assert subs[1].sdo.read(0x1018, 1, type=UDINT) == subs[1].identity.vendor
+        arm = cat.Drives(subs.drives, counts_per_turn=2**20)
+        with cat.Loop(arm) as loop:
+            for cycle in loop:
+                assert cycle.ok
+                if cycle.number == 50:
+                    break
+            assert loop.timing.counters["duplicate"] > 40
+
+
+# ---- while a loop runs
+
+
+@pytest.mark.parametrize("run", ["threaded", "inline"])
+def test_sdo_from_another_thread_while_the_loop_runs_and_never_from_its_own(run: str) -> None:
+    devices = [cat.Coupler(), cat.Servo()]
+    found: list[int] = []
+    with cat.MainDevice(cat.Segment(devices, clock="monotonic")) as main:
+        servo = main.scan()[1]
+        arm = cat.Drives([servo], counts_per_turn=2**20)
+
+        def ask() -> None:
+            servo.sdo.write(0x6065, 0, 12345, type=UDINT)
+            found.append(servo.sdo.read(0x6065, 0, type=UDINT))
+
+        with cat.Loop(arm, period=2e-3, run=run, lost_limit=1000, late_limit=0) as loop:
+            asking = threading.Thread(target=ask)
+            asking.start()
+            while asking.is_alive():
+                next(loop)
+            asking.join()
+            with pytest.raises(RuntimeError, match="another thread"):
+                servo.sdo.read(0x6065, 0)
+    assert found == [12345]
