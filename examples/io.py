@@ -1,4 +1,4 @@
-"""A running light on the first digital output terminal; the inputs switch its direction."""
+"""A running light on the first digital output terminal: `python io.py eth0`, or `virtual`."""
 
 import sys
 

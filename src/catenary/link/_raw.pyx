@@ -54,6 +54,7 @@ cdef extern from "<time.h>" nogil:
 
 cdef enum:
     SECOND = 1_000_000_000
+    ODD_FRAMES = 16                   # too long or too short, skipped in one call
 
 ctypedef struct raw_state:
     int fd
@@ -116,13 +117,15 @@ cdef int receive_from_ring(void *self, const uint8_t **frame) noexcept nogil:
 cdef int receive_by_recv(void *self, const uint8_t **frame) noexcept nogil:
     cdef raw_state *raw = <raw_state *> self
     cdef ssize_t length
-    while True:
+    cdef int k
+    for k in range(ODD_FRAMES):
         length = c_recv(raw.fd, raw.buffer, sizeof(raw.buffer), MSG_DONTWAIT | MSG_TRUNC)
         if length < 0:
             return 0 if errno == EAGAIN else -errno
         if 14 <= length <= <ssize_t> sizeof(raw.buffer):
             frame[0] = raw.buffer
             return <int> length
+    return 0
 
 
 cdef int64_t raw_now(void *self) noexcept nogil:

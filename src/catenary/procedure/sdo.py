@@ -62,6 +62,7 @@ def _upload(
         )
         if segment.toggle != toggle:
             raise (yield from _break_off(channel, index, subindex, ABORT_TOGGLE))
+        # More than was announced is refused, less is not: as in IgH (fsm_coe.c). SOEM takes both.
         if not (segment.data or segment.last) or len(data) + len(segment.data) > first.size:
             raise (yield from _break_off(channel, index, subindex, ABORT_LENGTH))
         data += segment.data

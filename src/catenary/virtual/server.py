@@ -6,9 +6,11 @@ import ctypes
 import errno
 import fcntl
 import os
+import shlex
 import signal
 import socket
 import struct
+import sys
 import threading
 from collections.abc import Callable
 from types import FrameType
@@ -22,7 +24,10 @@ SOL_PACKET, PACKET_IGNORE_OUTGOING, PACKET_QDISC_BYPASS = 263, 23, 20
 IFF_UP = 1
 PR_SET_PDEATHSIG = 1
 SIOCGIFFLAGS = 0x8913
-PERMISSION = "sudo setcap cap_net_raw,cap_sys_nice,cap_ipc_lock=ep .venv/bin/python"
+PERMISSION = (
+    "sudo setcap cap_net_raw,cap_sys_nice,cap_ipc_lock=ep "
+    f"{shlex.quote(os.path.realpath(sys.executable))}"
+)
 
 
 def _interface_flags(interface: str) -> int:
