@@ -283,3 +283,18 @@ def test_one_that_never_returns_from_the_start_is_not_started() -> None:
 def test_impossible_budgets(more: dict, named: str) -> None:
     with opened() as (_, loop), pytest.raises(ValueError, match=named):
         loop.run(sine, **more)
+
+
+def test_a_law_without_axes() -> None:
+    @cat.law
+    def blink(actual, target, memory, time):
+        target["Channel 1 Output"] = 1
+        memory[0] += 1.0
+        return time > 0.02
+
+    segment = cat.Segment([cat.DigitalOutputs()])
+    with cat.MainDevice(segment) as main:
+        lamps = cat.Outputs(main.scan()[0])
+        with cat.Loop(lamps) as loop:
+            assert loop.run(blink, memory=[0.0])[0] == 22.0
+            assert segment[0].outputs == 1
