@@ -58,7 +58,10 @@ def test_on_this_machine():
             found = run(None, 2.0)
         except RealtimeError as error:
             pytest.skip(f"needs real-time scheduling: {error.message}")
-        assert [one.response.min for one in found] >= RESPONSES
+        least = [execution for _name, _period, execution, _priority in TASKS]
+        assert all(
+            one.response.min > 0.99 * execution for one, execution in zip(found, least, strict=True)
+        )
         medians = [one.response.p50 for one in found]
         if medians == pytest.approx(RESPONSES, rel=0.1):
             return

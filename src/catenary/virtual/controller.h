@@ -102,7 +102,7 @@ typedef struct controller {
     uint8_t al_unread;               /* the PDI has not yet fetched AL control */
     uint8_t frozen;                  /* injected: the application stands still */
     uint8_t outputs_valid;           /* the application takes the outputs: OP and fed */
-    uint8_t outputs_seen;            /* EVENT_OUTPUTS was raised since the last arming */
+    uint8_t outputs_seen, outputs_taken;            /* EVENT_OUTPUTS was raised since the last arming */
     uint8_t linked;                  /* the segment's line reaches this device */
     uint16_t identification;         /* explicit device ID, 0: none */
     sync_manager sm[MAX_SM];

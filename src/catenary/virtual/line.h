@@ -46,9 +46,12 @@ static void model_step(controller *c) {
     if (sm >= 0 && c->outputs_valid) {
         uint8_t *status = sm_registers(c, sm) + 5;
         fresh = (*status & SM_STATUS_WRITTEN) != 0;
-        *status = (uint8_t)((*status & ~SM_STATUS_WRITTEN) | SM_STATUS_READ);
-        outputs_take(c);
+        if (fresh || !c->outputs_taken) {
+            *status = (uint8_t)((*status & ~SM_STATUS_WRITTEN) | SM_STATUS_READ);
+            outputs_take(c);
+        }
     }
+    c->outputs_taken = c->outputs_valid;
     for (int k = 0; k < c->axis_count; k++)
         servo_step(c, &c->axes[k], c->slots + k * AXIS_SLOTS, c->outputs_valid, fresh,
                    c->step_seconds, c->step_rate);

@@ -73,16 +73,19 @@ static void inputs_put(controller *c) {
     if (m->sm < 0 || m->sm >= c->sm_count)
         return;
     const sync_manager *sm = &c->sm[m->sm];
-    if (!sm->enabled || sm->blocked || sm->mailbox || sm->length > PROCESS_DATA_MAX)
+    uint8_t which;
+    if (sm->mailbox || sm->length > PROCESS_DATA_MAX)
         return;
-    uint8_t *buffer = c->segment->incoming;
+    uint8_t *buffer = sm_pdi_buffer(c, m->sm, &which);
+    if (buffer == NULL)
+        return;
     memset(buffer, 0, sm->length);
     for (int k = 0; k < m->count; k++) {
         const mapped *e = &m->entries[k];
         if (e->bit + e->bits <= 8u * sm->length && e->slot < c->slot_count)
             bits_store(buffer, e->bit, e->bits, (uint64_t)c->slots[e->slot]);
     }
-    sm_pdi_write(c, m->sm, buffer, sm->length);
+    sm_pdi_written(c, m->sm, which);
 }
 
 #endif

@@ -153,14 +153,17 @@ static inline int sm_pdi_read(controller *c, int n, uint8_t *data, uint32_t room
     return sm->length;
 }
 
-static inline int sm_pdi_write(controller *c, int n, const uint8_t *data, uint32_t size) {
+/* Where the application may write now; NULL: nowhere. `sm_pdi_written` offers it. */
+static inline uint8_t *sm_pdi_buffer(controller *c, int n, uint8_t *which) {
     sync_manager *sm = &c->sm[n];
-    if (!sm->enabled || sm->blocked || sm->ecat_writes || size > sm->length || (sm->mailbox && sm->full))
-        return -1;
-    uint8_t which = sm_free_buffer(sm->latest, sm->open ? sm->using : sm->latest);
-    uint8_t *buffer = sm_buffer(c, sm, which);
-    memcpy(buffer, data, size);
-    memset(buffer + size, 0, sm->length - size);
+    if (!sm->enabled || sm->blocked || sm->ecat_writes || (sm->mailbox && sm->full))
+        return NULL;
+    *which = sm_free_buffer(sm->latest, sm->open ? sm->using : sm->latest);
+    return sm_buffer(c, sm, *which);
+}
+
+static inline void sm_pdi_written(controller *c, int n, uint8_t which) {
+    sync_manager *sm = &c->sm[n];
     uint8_t *status = sm_registers(c, n) + 5;
     sm->latest = which;
     sm->written = 1;
@@ -168,6 +171,16 @@ static inline int sm_pdi_write(controller *c, int n, const uint8_t *data, uint32
     sm->full = sm->mailbox;
     *status = (uint8_t)((*status | SM_STATUS_WRITTEN) & ~SM_STATUS_READ);
     sm_show_status(c, n);
+}
+
+static inline int sm_pdi_write(controller *c, int n, const uint8_t *data, uint32_t size) {
+    uint8_t which;
+    uint8_t *buffer = size <= c->sm[n].length ? sm_pdi_buffer(c, n, &which) : NULL;
+    if (buffer == NULL)
+        return -1;
+    memcpy(buffer, data, size);
+    memset(buffer + size, 0, c->sm[n].length - size);
+    sm_pdi_written(c, n, which);
     return (int)size;
 }
 
