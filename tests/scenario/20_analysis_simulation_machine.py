@@ -10,14 +10,23 @@ import os
 import pytest
 
 from catenary.errors import RealtimeError
-from catenary.realtime import Demand, Statistics, Task, Tasks, VirtualClock, analyse, session
+from catenary.realtime import (
+    Demand,
+    Statistics,
+    Task,
+    Tasks,
+    Verdict,
+    VirtualClock,
+    analyse,
+    session,
+)
 from tests.realtime.bodies import spend
 
 TASKS = (("tau1", 10e-3, 3e-3, 30), ("tau2", 20e-3, 5e-3, 20), ("tau3", 40e-3, 10e-3, 10))
 RESPONSES = [3e-3, 8e-3, 29e-3]
 
 
-def run(clock: VirtualClock | None, seconds: float) -> list[Statistics]:
+def run(clock: VirtualClock | None, seconds: float) -> tuple[Verdict, list[Statistics]]:
     cpu = max(os.sched_getaffinity(0))
     tasks = [
         Task(spend, (execution,), name=name, period=period, priority=priority, cpu=cpu)
@@ -26,8 +35,7 @@ def run(clock: VirtualClock | None, seconds: float) -> list[Statistics]:
     with Tasks(*tasks, clock=clock, session=session(best_effort=True)) as running:
         running.join(seconds)
         running.stop()
-        assert running.verdict().utilisation == pytest.approx(0.8, rel=0.2)
-        return [handle.statistics for handle in running]
+        return running.verdict(), [handle.statistics for handle in running]
 
 
 def test_by_analysis():
@@ -41,9 +49,10 @@ def test_by_analysis():
 
 def test_on_a_virtual_clock_twice_the_same():
     with VirtualClock() as clock:
-        first = run(clock, 4.0)
+        verdict, first = run(clock, 4.0)
     with VirtualClock() as clock:
-        second = run(clock, 4.0)
+        _same, second = run(clock, 4.0)
+    assert verdict.utilisation == pytest.approx(0.8)
     assert [one.response.max for one in first] == pytest.approx(RESPONSES, abs=1e-12)
     assert [one.jobs for one in first] == [400, 200, 100]
     times = [(one.period, one.jitter, one.response, one.execution) for one in first]
@@ -51,11 +60,11 @@ def test_on_a_virtual_clock_twice_the_same():
 
 
 def test_on_this_machine():
-    """The medians agree. What else the machine does may delay a job, never hasten it: where it does
-    so in three runs, nothing is said."""
+    """The medians agree, and so does the verdict on what was measured. What else the machine does may
+    delay a job, never hasten it: where it does so in three runs, nothing is said."""
     for _ in range(3):
         try:
-            found = run(None, 2.0)
+            verdict, found = run(None, 2.0)
         except RealtimeError as error:
             pytest.skip(f"needs real-time scheduling: {error.message}")
         least = [execution for _name, _period, execution, _priority in TASKS]
@@ -64,5 +73,6 @@ def test_on_this_machine():
         )
         medians = [one.response.p50 for one in found]
         if medians == pytest.approx(RESPONSES, rel=0.1):
+            assert verdict.utilisation > 0.99 * 0.8
             return
     pytest.skip(f"the machine is too busy: median responses of {medians} s")
