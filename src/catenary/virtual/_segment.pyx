@@ -102,6 +102,7 @@ cdef extern from "segment_memory.h" nogil:
     int sm_pdi_read(controller *, int n, uint8_t *data, uint32_t room)
     int sm_pdi_write(controller *, int n, const uint8_t *data, uint32_t size)
     void inputs_put(controller *)
+    void inputs_flush(cat_segment *)
     void lock(cat_segment *)
     void unlock(cat_segment *)
     int64_t monotonic_now()
@@ -293,6 +294,9 @@ cdef class Core:
         cdef controller *c = self._at(position)
         if address < 0 or size < 0 or address + size > <int64_t>c.memory_size:
             raise ValueError(f"no memory at 0x{address:04X}, {size} bytes")
+        lock(self._segment)
+        inputs_flush(self._segment)
+        unlock(self._segment)
         return PyBytes_FromStringAndSize(<char *>c.memory + address, size)
 
     def poke(self, int position, int address, bytes data):

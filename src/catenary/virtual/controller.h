@@ -103,6 +103,7 @@ typedef struct controller {
     uint8_t frozen;                  /* injected: the application stands still */
     uint8_t outputs_valid;           /* the application takes the outputs: OP and fed */
     uint8_t outputs_seen, outputs_taken;            /* EVENT_OUTPUTS was raised since the last arming */
+    uint8_t inputs_stale;            /* the model stepped; its inputs are not in memory yet */
     uint8_t linked;                  /* the segment's line reaches this device */
     uint16_t identification;         /* explicit device ID, 0: none */
     sync_manager sm[MAX_SM];
@@ -150,6 +151,7 @@ typedef struct cat_segment {
     int64_t next_due;                /* of compiled work */
     int64_t sii_due;                 /* of the earliest EEPROM access, for the packet loop */
     int64_t service_due;             /* of the application, Python */
+    int inputs_stale;                /* some controller's inputs are */
     int pending;                     /* some controller has events */
     int event_fd;                    /* wakes the service thread, -1: none */
     const cat_clock *clock;          /* virtual time is shared: whose; NULL: it is ours alone */

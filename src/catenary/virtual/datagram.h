@@ -9,6 +9,7 @@
 #include "controller.h"
 #include "distributed_clock.h"
 #include "fmmu.h"
+#include "process_data.h"
 #include "sii_access.h"
 #include "sync_manager.h"
 #include "watchdog.h"
@@ -294,6 +295,7 @@ static int frame_through(cat_segment *s, uint8_t *frame, uint32_t length) {
         return 0;
     }
     s->counters.frames++;
+    inputs_flush(s);
     uint16_t head = load16(frame + ETHERNET_HEADER);
     uint32_t at = ETHERNET_HEADER + ETHERCAT_HEADER;
     uint32_t end = at + (head & 0x07FF);

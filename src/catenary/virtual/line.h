@@ -55,7 +55,8 @@ static void model_step(controller *c) {
     for (int k = 0; k < c->axis_count; k++)
         servo_step(c, &c->axes[k], c->slots + k * AXIS_SLOTS, c->outputs_valid, fresh,
                    c->step_seconds, c->step_rate);
-    inputs_put(c);
+    c->inputs_stale = 1;
+    c->segment->inputs_stale = 1;
     watchdog_trigger_pdi(c);
 }
 

@@ -88,4 +88,17 @@ static void inputs_put(controller *c) {
     sm_pdi_written(c, m->sm, which);
 }
 
+/* What models made since the last frame goes where the next one reads it: a model that steps four
+ * times between two frames is written out once. */
+static inline void inputs_flush(cat_segment *s) {
+    if (!s->inputs_stale)
+        return;
+    s->inputs_stale = 0;
+    for (int n = 0; n < s->count; n++)
+        if (s->controllers[n].inputs_stale) {
+            s->controllers[n].inputs_stale = 0;
+            inputs_put(&s->controllers[n]);
+        }
+}
+
 #endif
