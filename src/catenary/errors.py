@@ -112,6 +112,11 @@ class LoopError(CatenaryError):
         self.log = log
 
 
+class ClockError(LoopError):
+    """Distributed clocks that cannot be set up, do not come together, or have lost their
+    reference."""
+
+
 class WorkingCounterError(LoopError):
     """Devices stopped answering in the cyclic exchange: names the silent ones."""
 

@@ -165,6 +165,13 @@ TARGETS = (
     Target("features.decode_information", features.decode_information, _method, (b"\x11" * 10,)),
     Target("clock.decode_clock", clock.decode_clock, _method, (bytes(range(56)),)),
     Target(
+        "clock.decode_receive_times",
+        clock.decode_receive_times,
+        clock.encode_receive_times,
+        (bytes(range(16)),),
+        exact=True,
+    ),
+    Target(
         "clock.decode_difference",
         lambda data: clock.decode_difference(int.from_bytes(data[:4], "little")),
         lambda value: clock.encode_difference(value).to_bytes(4, "little"),

@@ -36,7 +36,11 @@ LAYOUT = MailboxLayout(0x1000, 128, 0x1080, 128, MailboxProtocol.COE)
 def play(procedure: Procedure[T], answer: Callable[[Request], Reply], *, steps: int = 100_000) -> T:
     """Runs a procedure against a function that answers datagrams."""
     now = 0
-    step = next(procedure)
+    try:
+        step = next(procedure)
+    except StopIteration as stop:
+        at_once: T = stop.value
+        return at_once
     for _ in range(steps):
         if isinstance(step, After):
             now += round(step.seconds * 1e9)

@@ -50,7 +50,14 @@ def test_sits_where_the_data_sheet_says(each, first, last):
 def test_single_values_do_not_overlap_unless_one_is_a_half_of_the_other():
     ranges = sorted((each.address, each.address + each.size, each.name) for each in INTEGERS)
     overlaps = [(low[2], high[2]) for low, high in itertools.pairwise(ranges) if high[0] < low[1]]
-    assert overlaps == [("system time, low half", "system time")]
+    assert overlaps == [
+        ("system time, low half", "system time"),
+        ("system time offset, low half", "system time offset"),
+        (
+            "start time cyclic operation, low half",
+            "start time cyclic operation, next SYNC0 pulse",
+        ),
+    ]
 
 
 @pytest.mark.parametrize("each", INTEGERS, ids=str)

@@ -44,11 +44,11 @@ def batches(requests: Sequence[Request]) -> list[list[int]]:
                 f"a datagram of {len(request.data)} bytes fits no frame: at most {MAXIMUM_DATA}"
             )
         size = OVERHEAD + len(request.data)
-        if size > room:
+        if size > room or request.alone:
             found.append([])
             room = MAXIMUM_PAYLOAD
         found[-1].append(rank)
-        room -= size
+        room = 0 if request.alone else room - size
     return found
 
 

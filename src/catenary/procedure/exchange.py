@@ -31,6 +31,7 @@ class Request(NamedTuple):
     address: int  # 32 bits as on the wire: ADP | ADO << 16, or the logical address
     data: bytes
     repeatable: bool
+    alone: bool = False
 
 
 class Reply(NamedTuple):

@@ -11,6 +11,7 @@ from catenary.errors import DecodeError
 
 SIZE = 56  # 0x0900 to 0x0937
 _BLOCK = struct.Struct("<4IQQQIIHhBBBx")
+_RECEIVE_TIMES = struct.Struct("<4I")
 _SIGN = 1 << 31
 
 
@@ -76,6 +77,22 @@ def decode_clock(data: bytes) -> Clock:
         *(system_time, processing_unit, offset, delay, decode_difference(difference)),
         *filters,
     )
+
+
+def decode_receive_times(data: bytes) -> tuple[int, int, int, int]:
+    """When the latching write arrived at each of the four ports [ns, local time, 32 bits]."""
+    if len(data) != _RECEIVE_TIMES.size:
+        raise DecodeError(f"receive times: needs {_RECEIVE_TIMES.size} bytes, received {len(data)}")
+    port_0, port_1, port_2, port_3 = _RECEIVE_TIMES.unpack(data)
+    return port_0, port_1, port_2, port_3
+
+
+def encode_receive_times(times: tuple[int, int, int, int]) -> bytes:
+    """The reverse. ValueError if one does not fit."""
+    try:
+        return _RECEIVE_TIMES.pack(*times)
+    except struct.error as error:
+        raise ValueError(f"receive times: {error}") from None
 
 
 def decode_difference(raw: int) -> int:

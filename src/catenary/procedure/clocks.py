@@ -1,0 +1,234 @@
+"""Distributed clocks before the cycle: delays measured, offsets written, filters reset, drift taken
+out, SYNC signals started. ETG.1000.4 §6.8, ETG.1020 §"Distributed clocks"; Beckhoff, ESC data sheet
+I, §9.1.2 to §9.1.5. All in PRE-OP.
+
+The system time of a device is its local time plus its offset; its time loop follows the time that a
+frame brings from the reference clock, less the delay of the way. A device may stamp receive times
+and yet have no system time (an EL2828 does: ethercrab's capture replay-dc.pcapng); delays are then
+measured through it, and it is left alone, as IgH does (`has_dc_system_time`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from catenary.errors import ClockError
+from catenary.model.delays import ClockPlace, PortTimes, delays_ns
+from catenary.model.device import DeviceDescription
+from catenary.procedure.exchange import Procedure, Reply, Request, read, write
+from catenary.procedure.station import Station, answered
+from catenary.wire.clock import decode_receive_times
+from catenary.wire.datagram import Command
+from catenary.wire.register import (
+    RECEIVE_TIME_LATCH,
+    RECEIVE_TIME_PROCESSING_UNIT,
+    RECEIVE_TIMES,
+    SPEED_COUNTER_FILTER,
+    SPEED_COUNTER_START,
+    SYSTEM_TIME,
+    SYSTEM_TIME_DELAY,
+    SYSTEM_TIME_DIFFERENCE_FILTER,
+    SYSTEM_TIME_LOW,
+    SYSTEM_TIME_OFFSET,
+    SYSTEM_TIME_OFFSET_LOW,
+)
+
+LATCHES = 16  # a mean of so many: stamps jitter by a tick of 10 ns each, those of slow PHYs by more
+BURST = 15_000  # frames: ESC data sheet I §9.1.5; KickCAT sends as many, ethercrab 10 000
+BURST_STEP = 512  # frames under way in one step of the procedure
+# The reset values, which SOEM (`ecx_set_slaves_to_default`), KickCAT (`enableDC`) and ethercrab
+# write: no filter on the difference, 2^12 on the speed, and the bandwidth of the loop.
+DIFFERENCE_FILTER, SPEED_FILTER, SPEED_START = 0, 12, 0x1000
+SPAN_64, SPAN_32 = 1 << 64, 1 << 32
+
+
+@dataclass(frozen=True, slots=True)
+class ClockMeasurement:
+    """What one measurement of a segment's clocks says; tuples by position."""
+
+    delays_ns: tuple[int | None, ...]  # behind the first clock; None: no clock
+    local_times_ns: tuple[int | None, ...]  # when the last latch passed; None: no system time
+    latched_ns: int  # the same moment, on the link's clock: within half a round trip
+
+    @property
+    def first(self) -> int | None:
+        """Position of the first device with a system time: the reference, unless one is given."""
+        for position, local in enumerate(self.local_times_ns):
+            if local is not None:
+                return position
+        return None
+
+    def runs(self, position: int) -> bool:
+        """Whether the device has a system time that can follow."""
+        return self.local_times_ns[position] is not None
+
+
+def measure(
+    devices: Sequence[DeviceDescription], *, latches: int = LATCHES
+) -> Procedure[ClockMeasurement]:
+    """Latches all receive times, several times, and makes delays of them."""
+    clocks = [device for device in devices if device.controller.supports_clocks]
+    if not clocks:
+        return ClockMeasurement((None,) * len(devices), (None,) * len(devices), 0)
+    running = yield from _with_system_time(clocks)
+    measured: list[list[ClockPlace]] = []
+    for _ in range(latches):
+        latched_ns = yield from _latch(clocks)
+        replies = yield [request for device in clocks for request in _questions(device)]
+        answers = dict(zip((d.position for d in clocks), _pairs(replies), strict=True))
+        times = {d.position: _port_times(d, answers[d.position][0]) for d in clocks}
+        measured.append([_place(device, times.get(device.position)) for device in devices])
+    local = {d.position: _local_time(d, answers[d.position]) for d in clocks}
+    return ClockMeasurement(
+        delays_ns(measured),
+        tuple(local[d.position] if d.position in running else None for d in devices),
+        latched_ns,
+    )
+
+
+def align(
+    devices: Sequence[DeviceDescription],
+    measured: ClockMeasurement,
+    reference: int,
+    epoch_ns: int,
+) -> Procedure[None]:
+    """Offsets and delays behind the reference clock, and filters that begin anew.
+
+    The reference then says the link's time + `epoch_ns`, and all behind it what the reference says.
+    ClockError where the reference has no system time.
+    """
+    origin, nearest = measured.local_times_ns[reference], measured.delays_ns[reference]
+    if origin is None or nearest is None:
+        raise no_system_time(devices[reference])
+    requests: list[Request] = []
+    for device in devices[reference:]:
+        local, delay = measured.local_times_ns[device.position], measured.delays_ns[device.position]
+        if local is None or delay is None:
+            continue
+        behind = max(0, delay - nearest)
+        offset = measured.latched_ns + epoch_ns + behind - local
+        requests += _alignment(device, offset, behind)
+    for filtered in _filters():
+        requests.append(filtered)
+    for reply, request in zip((yield requests), requests, strict=True):
+        if request.command is Command.FPWR:
+            answered(reply, _station_at(devices, request), "offset and delay of its clock")
+
+
+def compensate(device: DeviceDescription, count: int = BURST) -> Procedure[None]:
+    """Static drift compensation: the reference's time carried to all, `count` frames in a row.
+
+    One datagram a frame: a controller compares against the time at which the *frame* began, so a
+    second one in it says nothing new (ESC data sheet I §9.1.5; KickCAT, ethercrab send one each).
+    """
+    station = _station(device)
+    request = distribute(device)
+    while count > 0:
+        replies = yield [request] * min(count, BURST_STEP)
+        count -= len(replies)
+        if all(reply.lost or reply.working_counter == 0 for reply in replies):
+            raise ClockError(
+                f"{station}: the reference clock does not answer",
+                hint="it was switched off, reset or unplugged: scan again",
+            )
+
+
+def distribute(device: DeviceDescription) -> Request:
+    """FRMW of the system time's low half, which is all that a time loop compares."""
+    request = read(Command.FRMW, device.station_address, SYSTEM_TIME_LOW)
+    return request._replace(repeatable=False, alone=True)
+
+
+def read_system_time(device: DeviceDescription) -> Procedure[int]:
+    """What its clock says now [ns]; of a 32-bit clock, the low half."""
+    register = SYSTEM_TIME if device.controller.clock_bits == 64 else SYSTEM_TIME_LOW
+    [reply] = yield [read(Command.FPRD, device.station_address, register)]
+    return register.unpack(answered(reply, _station(device), "its system time"))
+
+
+def no_system_time(device: DeviceDescription) -> ClockError:
+    """The error for a device that a clock was asked of."""
+    what = "only stamps receive times" if device.controller.supports_clocks else "has none"
+    return ClockError(
+        f"{device}: a clock is asked of it, but it {what}",
+        hint="leave it out of dc=, and choose another reference clock",
+    )
+
+
+def _with_system_time(clocks: Sequence[DeviceDescription]) -> Procedure[frozenset[int]]:
+    replies = yield [read(Command.FPRD, d.station_address, SYSTEM_TIME_LOW) for d in clocks]
+    return frozenset(
+        device.position
+        for device, reply in zip(clocks, replies, strict=True)
+        if not reply.lost and reply.working_counter == 1
+    )
+
+
+def _latch(clocks: Sequence[DeviceDescription]) -> Procedure[int]:
+    """One broadcast that stamps all ports; when that was."""
+    [before] = yield [read(Command.FPRD, clocks[0].station_address, RECEIVE_TIME_LATCH)]
+    [reply] = yield [write(Command.BWR, 0, RECEIVE_TIME_LATCH, 0)]
+    if reply.lost or reply.working_counter < len(clocks):
+        raise ClockError(
+            f"{reply.working_counter} of {len(clocks)} devices with clocks took the broadcast that "
+            "measures delays",
+            hint="devices come and go: look for a loose contact, then scan again",
+        )
+    return (before.time_ns + reply.time_ns) // 2
+
+
+def _questions(device: DeviceDescription) -> tuple[Request, Request]:
+    """Port times, and the local time at the processing unit: of a 32-bit clock that is port 0's."""
+    station = device.station_address
+    if device.controller.clock_bits == 64:
+        unit = read(Command.FPRD, station, RECEIVE_TIME_PROCESSING_UNIT)
+    else:
+        unit = read(Command.FPRD, station, RECEIVE_TIME_LATCH)
+    return read(Command.FPRD, station, RECEIVE_TIMES), unit
+
+
+def _pairs(replies: Sequence[Reply]) -> Iterator[tuple[Reply, Reply]]:
+    return zip(replies[::2], replies[1::2], strict=True)
+
+
+def _port_times(device: DeviceDescription, reply: Reply) -> PortTimes:
+    return decode_receive_times(answered(reply, _station(device), "receive times"))
+
+
+def _local_time(device: DeviceDescription, answers: tuple[Reply, Reply]) -> int:
+    ports, unit = answers
+    if unit.working_counter != 1:  # no such register: port 0 says it, without the upper half
+        return _port_times(device, ports)[0]
+    return int.from_bytes(unit.data, "little")
+
+
+def _place(device: DeviceDescription, times: PortTimes | None) -> ClockPlace:
+    return ClockPlace(device.parent, device.parent_port, device.open_ports, times)
+
+
+def _alignment(device: DeviceDescription, offset: int, delay: int) -> tuple[Request, ...]:
+    station = device.station_address
+    if device.controller.clock_bits == 64:
+        written = write(Command.FPWR, station, SYSTEM_TIME_OFFSET, offset % SPAN_64)
+    else:  # ethercrab #322: eight bytes to a 32-bit clock are refused
+        written = write(Command.FPWR, station, SYSTEM_TIME_OFFSET_LOW, offset % SPAN_32)
+    return written, write(Command.FPWR, station, SYSTEM_TIME_DELAY, delay)
+
+
+def _filters() -> tuple[Request, ...]:
+    """Depths first: several controllers take them over with the write that resets the loop."""
+    return (
+        write(Command.BWR, 0, SYSTEM_TIME_DIFFERENCE_FILTER, DIFFERENCE_FILTER),
+        write(Command.BWR, 0, SPEED_COUNTER_FILTER, SPEED_FILTER),
+        write(Command.BWR, 0, SPEED_COUNTER_START, SPEED_START),
+    )
+
+
+def _station(device: DeviceDescription) -> Station:
+    return Station(device.position, device.station_address, device.name)
+
+
+def _station_at(devices: Sequence[DeviceDescription], request: Request) -> Station:
+    address = request.address & 0xFFFF
+    return _station(next(d for d in devices if d.station_address == address))

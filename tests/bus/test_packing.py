@@ -1,0 +1,19 @@
+"""Requests and the frames they share."""
+
+from __future__ import annotations
+
+from catenary.bus.packing import batches
+from catenary.procedure.exchange import read
+from catenary.wire.datagram import Command
+from catenary.wire.register import AL_STATUS
+
+SHARES = read(Command.FPRD, 0x1001, AL_STATUS)
+ALONE = SHARES._replace(alone=True)
+
+
+def test_small_requests_share_a_frame() -> None:
+    assert batches([SHARES] * 5) == [[0, 1, 2, 3, 4]]
+
+
+def test_one_that_is_to_be_alone_is_alone() -> None:
+    assert batches([SHARES, ALONE, ALONE, SHARES, SHARES]) == [[0], [1], [2], [3, 4]]

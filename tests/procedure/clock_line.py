@@ -1,0 +1,120 @@
+"""A line of clocks for procedures fed by hand: registers of the time loop, and nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from catenary.model.device import DeviceDescription, Identity
+from catenary.procedure.exchange import Reply, Request
+from catenary.wire.datagram import Command
+from catenary.wire.features import Feature, Information, PortKind
+
+STATION = 0x1001
+HOP_NS = 300
+NONE, STAMPS, SHORT, LONG = "none", "stamps", "short", "long"  # what clock a device has
+FEATURES = {
+    NONE: Feature(0),
+    STAMPS: Feature.DISTRIBUTED_CLOCKS | Feature.DISTRIBUTED_CLOCKS_64_BIT,
+    SHORT: Feature.DISTRIBUTED_CLOCKS,
+    LONG: Feature.DISTRIBUTED_CLOCKS | Feature.DISTRIBUTED_CLOCKS_64_BIT,
+}
+
+
+@dataclass
+class ClockModel:
+    """One device: local time = the time at the master + `zero`, at the frame's arrival."""
+
+    kind: str
+    zero: int = 0
+    registers: bytearray = field(default_factory=lambda: bytearray(0x1000))
+    written: list[tuple[int, bytes]] = field(default_factory=list)
+
+    @property
+    def offset(self) -> int:
+        return int.from_bytes(self.registers[0x920:0x928], "little")
+
+    @property
+    def delay(self) -> int:
+        return int.from_bytes(self.registers[0x928:0x92C], "little")
+
+
+class ClockLine:
+    """Answers datagrams for devices on a line; `now` moves a microsecond with each."""
+
+    def __init__(self, *clocks: ClockModel) -> None:
+        self.clocks = clocks
+        self.now = 5_000_000_000  # beyond what 32 bits hold
+        self.dead: set[int] = set()  # positions that do not answer
+
+    def descriptions(self) -> list[DeviceDescription]:
+        count = len(self.clocks)
+        return [
+            DeviceDescription(
+                position=position,
+                station_address=STATION + position,
+                alias=0,
+                identity=Identity(1, 2, 3, position),
+                name=f"Clock {position}",
+                controller=Information(
+                    *(0x11, 0, 0, 8, 8, 8), (PortKind.MII,) * 4, FEATURES[clock.kind]
+                ),
+                mailbox=None,
+                sync_managers=(),
+                outputs=(),
+                inputs=(),
+                output_pdos=(),
+                input_pdos=(),
+                open_ports=(True, position + 1 < count, False, False),
+                parent=position - 1 if position else None,
+                parent_port=1 if position else None,
+            )
+            for position, clock in enumerate(self.clocks)
+        ]
+
+    def __call__(self, request: Request) -> Reply:
+        self.now += 1000
+        address, station = request.address >> 16, request.address & 0xFFFF
+        if request.command is Command.BWR:
+            return self._broadcast(address, request)
+        position = station - STATION
+        clock = self.clocks[position]
+        if position in self.dead or not self._has(clock, address):
+            return Reply(request.data, 0)
+        if request.command is Command.FPWR:
+            size = len(request.data)
+            if clock.kind == SHORT and size == 8:
+                return Reply(request.data, 0)
+            clock.registers[address : address + size] = request.data
+            clock.written.append((address, request.data))
+            return Reply(request.data, 1)
+        self._refresh(position, clock)
+        data = bytes(clock.registers[address : address + len(request.data)])
+        return Reply(data, 1)
+
+    def _has(self, clock: ClockModel, address: int) -> bool:
+        if clock.kind == NONE:
+            return False
+        if clock.kind == STAMPS:
+            return 0x900 <= address < 0x910
+        return not (clock.kind == SHORT and address == 0x918)
+
+    def _broadcast(self, address: int, request: Request) -> Reply:
+        if address == 0x900:
+            for position, clock in enumerate(self.clocks):
+                self._latch(position, clock)
+        for clock in self.clocks:
+            if clock.kind != NONE:
+                clock.written.append((address, request.data))
+        return Reply(request.data, sum(clock.kind != NONE for clock in self.clocks))
+
+    def _latch(self, position: int, clock: ClockModel) -> None:
+        local = self.now + HOP_NS * position + clock.zero
+        back = local + 2 * HOP_NS * (len(self.clocks) - 1 - position)
+        clock.registers[0x900:0x904] = (local % 2**32).to_bytes(4, "little")
+        clock.registers[0x904:0x908] = (back % 2**32).to_bytes(4, "little")
+        clock.registers[0x918:0x920] = local.to_bytes(8, "little")
+
+    def _refresh(self, position: int, clock: ClockModel) -> None:
+        """0x0910 as frames read it: when they passed the reference clock."""
+        system = self.now + HOP_NS * position + clock.zero + clock.offset - clock.delay
+        clock.registers[0x910:0x918] = (system % 2**64).to_bytes(8, "little")
