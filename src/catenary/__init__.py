@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from catenary import realtime, types
     from catenary.bus import SubDevice
+    from catenary.bus import event as events
     from catenary.drive import Drives, Inputs, Outputs
     from catenary.errors import CatenaryError
     from catenary.loop import Cycle, Loop, law
@@ -51,6 +52,7 @@ __all__ = [
     "Segment",
     "Servo",
     "SubDevice",
+    "events",
     "law",
     "realtime",
     "types",
@@ -74,6 +76,8 @@ _HOMES = {
 def __getattr__(name: str) -> object:
     if name in ("errors", "realtime", "types"):
         return import_module(f"catenary.{name}")
+    if name == "events":
+        return import_module("catenary.bus.event")
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(_HOMES[name]), name)

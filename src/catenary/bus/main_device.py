@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Collection, Iterator, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Self, TypeVar, overload
 
+from catenary.bus import event
+from catenary.bus.events import Callback, Callbacks, Events
 from catenary.bus.runner import BlockingRunner, FrameCounts, Runner
 from catenary.bus.segment_scan import Found, check_identity, find, with_places
 from catenary.bus.sub_device import SubDevice
 from catenary.errors import CatenaryError, SegmentError
-from catenary.link import Link, LinkSource
+from catenary.link import Link, LinkSource, lives_in_virtual_time
 from catenary.model.device import Identity
 from catenary.procedure.exchange import Procedure
+from catenary.procedure.mailbox import Heard
 from catenary.procedure.stations import assign, bring_all_down, count, duplicate_aliases, reset
 from catenary.wire.al import State
 
@@ -67,6 +71,9 @@ class MainDevice:
     def __init__(self, source: LinkSource) -> None:
         self.subs = SubDevices()
         self.notes: tuple[str, ...] = ()  # what the last scan found odd
+        self.events = Events()  # what happened: iterate, or get(timeout=)
+        self._callbacks = Callbacks()
+        self.events.listen(self._callbacks.tell)
         self._source = source
         self._link: Link | None = None
         self._blocking: BlockingRunner | None = None
@@ -92,6 +99,7 @@ class MainDevice:
         """Opens the link. LinkError if it cannot be used. Nothing is sent."""
         if self._link is None:
             self._link = self._source.open_link()
+            self._callbacks.in_thread = not lives_in_virtual_time(self._link)
             self._blocking = BlockingRunner(self._link)
 
     def close(self) -> None:
@@ -105,6 +113,17 @@ class MainDevice:
         finally:
             link, self._link, self._blocking, self._attached = self._link, None, None, None
             link.close()
+            self._callbacks.close()
+
+    def on_event(self, callback: Callback) -> None:
+        """Lets `callback(event)` be called for every event from now on, beside `events`: in a
+        thread of its own, which may read and write objects; in virtual time in the thread that
+        spends the time, between two steps. What it raises is logged."""
+        self._callbacks.add(callback)
+
+    def deliver_events(self) -> None:
+        """In virtual time: calls the callbacks with what has happened. Else a thread does."""
+        self._callbacks.deliver()
 
     def scan(
         self,
@@ -138,6 +157,7 @@ class MainDevice:
             for alias, positions in duplicate_aliases(registers).items()
         )
         self._note_further_errors()
+        self.deliver_events()
         if strict:
             self._raise_errors()
         if expected is not None:
@@ -193,7 +213,10 @@ class MainDevice:
     def converse(self, procedure: Procedure[T]) -> T:
         """Runs a procedure, alone or beside the running loop."""
         runner: Runner = self._attached or self._runner
-        return runner.run(procedure)
+        try:
+            return runner.run(procedure)
+        finally:
+            self.deliver_events()
 
     @contextlib.contextmanager
     def attached(self, runner: Runner) -> Iterator[None]:
@@ -221,9 +244,14 @@ class MainDevice:
         if known is None or known.identity != found.description.identity:
             known = SubDevice(self, found.description, found.channel)
         known.description, known.channel = found.description, found.channel
+        if known.channel is not None:
+            known.channel.listen(partial(self._hear, known))
         known.error = found.error
         known.state = State.PRE_OP if found.error is None else None
         return known
+
+    def _hear(self, sub: SubDevice, heard: Heard) -> None:
+        self.events.put(event.emergency(heard.time_ns * 1e-9, sub, heard.emergency))
 
     def _raise_errors(self) -> None:
         """The first error that the scan has met."""

@@ -68,7 +68,8 @@ class SubDevice:
     @property
     def emergencies(self) -> tuple[Emergency, ...]:
         """The last emergencies it sent, whoever read them; oldest first."""
-        return tuple(self.channel.emergencies) if self.channel is not None else ()
+        heard = self.channel.emergencies if self.channel is not None else ()
+        return tuple(each.emergency for each in heard)
 
     @property
     def station(self) -> Station:

@@ -7,8 +7,24 @@ with Recorder(Interface("eth0"), "run.pcapng") as link:
 from catenary.link._fault_injector import FaultInjector
 from catenary.link._recorder import Recorder
 from catenary.link._replay import Replay
+from catenary.link._table import capsule_in_virtual_time
 from catenary.link.fault import Fault
 from catenary.link.interface import Interface
 from catenary.link.protocol import Link, LinkSource
 
-__all__ = ["Fault", "FaultInjector", "Interface", "Link", "LinkSource", "Recorder", "Replay"]
+__all__ = [
+    "Fault",
+    "FaultInjector",
+    "Interface",
+    "Link",
+    "LinkSource",
+    "Recorder",
+    "Replay",
+    "lives_in_virtual_time",
+]
+
+
+def lives_in_virtual_time(link: Link) -> bool:
+    """Whether the link's clock advances only while its user waits. A link in Python without a table
+    is taken for one of the machine's time."""
+    return link.capsule is not None and capsule_in_virtual_time(link.capsule)

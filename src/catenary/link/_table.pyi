@@ -2,6 +2,9 @@ from typing import Self
 
 from catenary.link.protocol import Link
 
+def capsule_in_virtual_time(capsule: object) -> bool:
+    """Whether the clock of this table advances only while its user waits."""
+
 class TableLink:
     @property
     def name(self) -> str: ...

@@ -27,6 +27,10 @@ cdef cat_link *table_of(object capsule) except NULL:
     return table
 
 
+def capsule_in_virtual_time(object capsule):
+    return table_of(capsule).flags & CAT_LINK_VIRTUAL_TIME != 0
+
+
 cdef void release_owner(object capsule) noexcept:
     cdef void *owner = PyCapsule_GetContext(capsule)
     if owner != NULL:

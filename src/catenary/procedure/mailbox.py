@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import NamedTuple, TypeAlias, TypeVar
 
 from catenary.errors import DecodeError, MailboxError, ResponseTimeout
 from catenary.model.device import MailboxLayout
@@ -53,18 +53,32 @@ RECOVERIES = 5  # of one message, then the cable is to blame
 EMERGENCIES_KEPT = 64
 
 
+class Heard(NamedTuple):
+    """An emergency and when it was read [ns, the link's clock]."""
+
+    emergency: coe.Emergency
+    time_ns: int
+
+
+Listener: TypeAlias = Callable[[Heard], None]
+
+
 @dataclass(slots=True)
 class MailboxChannel:
-    """Owns the state of one SubDevice's mailbox: counters, repeat toggle, emergencies."""
+    """Owns the state of one SubDevice's mailbox: counters, repeat toggle, emergencies.
+
+    Emergencies come between the answers to anybody's questions: `listener` is told of each, whoever
+    read it; those of before there was one are told by `listen`.
+    """
 
     station: Station
     layout: MailboxLayout
     counter: int = 0  # of what was written last
     received_counter: int = 0  # of what was read last
+    received_ns: int = 0  # when that was
     repeat_requested: bool = False  # state of the toggle bit
-    emergencies: deque[coe.Emergency] = field(
-        default_factory=lambda: deque(maxlen=EMERGENCIES_KEPT)
-    )
+    emergencies: deque[Heard] = field(default_factory=lambda: deque(maxlen=EMERGENCIES_KEPT))
+    listener: Listener | None = None
     dropped: int = 0  # messages nobody waited for, duplicates
     busy: bool = False  # a conversation holds it
 
@@ -72,6 +86,13 @@ class MailboxChannel:
         """After the SyncManagers were configured anew."""
         self.counter = self.received_counter = 0
         self.repeat_requested = False
+
+    def listen(self, listener: Listener) -> None:
+        """From now on; what was heard before is told at once."""
+        if self.listener is None:
+            for heard in tuple(self.emergencies):
+                listener(heard)
+        self.listener = listener
 
 
 def exclusively(channel: MailboxChannel, conversation: Procedure[T]) -> Procedure[T]:
@@ -204,6 +225,7 @@ def _take(channel: MailboxChannel) -> Procedure[Mailbox | None]:
             )
         ]
         if not reply.lost:
+            channel.received_ns = reply.time_ns
             return _decoded(channel, reply.data) if reply.working_counter else None
         if not (yield from _ask_again(channel)):
             return None
@@ -268,7 +290,10 @@ def _sorted(
         )
     emergency = _emergency(message)
     if emergency is not None:
-        channel.emergencies.append(emergency)
+        heard = Heard(emergency, channel.received_ns)
+        channel.emergencies.append(heard)
+        if channel.listener is not None:
+            channel.listener(heard)
         return None
     answer = accept(message)
     if answer is None:

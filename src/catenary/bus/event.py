@@ -1,0 +1,127 @@
+"""What can happen on a segment beside the cycle, as frozen values.
+
+`time` is the link's clock [s] (`time.monotonic()` on a NIC); `sub` the device it is about, None
+where it is about the segment; `message` says it in words, the device included. The rest is for
+programs:
+
+    for event in main.events:
+        match event:
+            case events.Emergency(sub=sub, error_code=0x8611):
+                ...
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from catenary.model.device import Identity
+from catenary.wire import coe
+from catenary.wire.drive_error import error_text
+
+if TYPE_CHECKING:
+    from catenary.bus.sub_device import SubDevice
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something happened."""
+
+    time: float
+    sub: SubDevice | None
+    message: str
+
+    def __str__(self) -> str:
+        return f"{self.time:.3f} s: {self.message}"
+
+
+@dataclass(frozen=True, slots=True)
+class Emergency(Event):
+    """A device reports a fault, or with error code 0 that it is gone: ETG.1000.6 §5.6.4."""
+
+    error_code: int
+    error_register: int  # object 0x1001
+    data: bytes  # 5 bytes: its maker's
+
+    @property
+    def text(self) -> str:
+        """What the error code means, by IEC 61800-7-201 and CiA 301."""
+        return error_text(self.error_code)
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceLost(Event):
+    """A device does not answer any more."""
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceReturned(Event):
+    """A device that was lost answers again; the same one, by its identity."""
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceReplaced(Event):
+    """Another device stands where one was lost."""
+
+    expected: Identity
+    found: Identity
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceHeld(Event):
+    """A device that returned is not let into OP: by policy, or because bringing it there failed."""
+
+    state: int  # AL state it is held in
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class StateLost(Event):
+    """A device left the state it was brought to, without being asked."""
+
+    expected: int  # AL state
+    state: int
+    code: int  # AL status code
+
+
+@dataclass(frozen=True, slots=True)
+class LinkLost(Event):
+    """A cable does not carry any more. `between`: the positions at its ends; None: the
+    MainDevice."""
+
+    between: tuple[int | None, int | None]
+
+
+@dataclass(frozen=True, slots=True)
+class LinkRestored(Event):
+    """A cable carries again."""
+
+    between: tuple[int | None, int | None]
+
+
+@dataclass(frozen=True, slots=True)
+class ClockUnlocked(Event):
+    """A device's clock left the bound it was held in."""
+
+    difference: float  # from the reference clock [s]
+    bound: float  # [s]
+
+
+@dataclass(frozen=True, slots=True)
+class ClockLocked(Event):
+    """A device's clock is within the bound; `sub` None: all are."""
+
+    difference: float  # from the reference clock, the largest where it is about all [s]
+    bound: float  # [s]
+
+
+def emergency(time: float, sub: SubDevice, message: coe.Emergency) -> Emergency:
+    """The event for a device's emergency message."""
+    code, register = message.error_code, message.error_register
+    what = (
+        f"emergency 0x{code:04X} ({error_text(code)}), error register 0x{register:02X}"
+        if code
+        else "emergency gone (error code 0)"
+    )
+    rest = f", data {message.data.hex(' ')}" if any(message.data) else ""
+    return Emergency(time, sub, f"{sub.station}: {what}{rest}", code, register, message.data)

@@ -1,0 +1,160 @@
+"""The events of a segment: a bounded queue for those who ask, callbacks for those who wait."""
+
+from __future__ import annotations
+
+import contextlib
+import queue
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+from catenary.bus.event import Event
+
+if TYPE_CHECKING:
+    import logging
+
+CAPACITY = 1000  # events kept for nobody
+CLOSE_TIMEOUT = 1.0  # [s] for a callback that is under way
+
+Callback = Callable[[Event], object]
+
+
+class Events:
+    """Owns the events that nobody has fetched yet; any thread may put and get.
+
+        for event in main.events:                 # what is pending; never waits
+            print(event)
+        event = main.events.get(timeout=1.0)      # the next one, or None
+
+    Where nobody fetches, the oldest are dropped beyond `capacity`, and counted in `dropped`.
+    """
+
+    def __init__(self, capacity: int = CAPACITY) -> None:
+        self.dropped = 0
+        self._pending: deque[Event] = deque()
+        self._capacity = capacity
+        self._changed = threading.Condition()
+        self._listener: Callable[[Event], None] | None = None
+
+    def put(self, event: Event) -> None:
+        """Adds one. Never waits."""
+        with self._changed:
+            if len(self._pending) >= self._capacity:
+                self._pending.popleft()
+                self.dropped += 1
+            self._pending.append(event)
+            self._changed.notify()
+            listener = self._listener
+        if listener is not None:
+            listener(event)
+
+    def get(self, timeout: float = 0.0) -> Event | None:
+        """Takes the oldest, after waiting for one at most `timeout` [s, of the machine's clock,
+        also where the segment lives in virtual time]; None: none came."""
+        deadline = time.monotonic() + timeout
+        with self._changed:
+            while not self._pending:
+                left = deadline - time.monotonic()
+                if left <= 0:
+                    return None
+                self._changed.wait(left)
+            return self._pending.popleft()
+
+    def __iter__(self) -> Iterator[Event]:
+        """Takes what is pending, oldest first."""
+        while self._pending:
+            try:
+                yield self._pending.popleft()
+            except IndexError:  # another thread was quicker
+                return
+
+    def __len__(self) -> int:
+        return len(self._pending)
+
+    def listen(self, listener: Callable[[Event], None] | None) -> None:
+        """Who is told of every event, in the thread that puts it."""
+        self._listener = listener
+
+
+class Callbacks:
+    """Owns the callbacks of a MainDevice and, in real time, the thread that calls them.
+
+    In virtual time `deliver` calls them, in the thread that spends the time: the same order in
+    every run. What a callback raises is logged, and the others are called all the same.
+    """
+
+    def __init__(self, capacity: int = CAPACITY) -> None:
+        self.in_thread = True
+        self.dropped = 0  # events that slow callbacks have not been told
+        self._callbacks: list[Callback] = []
+        self._untold: queue.Queue[Event | None] = queue.Queue(capacity)  # None: the end
+        self._lock = threading.Lock()
+        self._thread: threading.Thread | None = None
+        self._delivering = False
+
+    def add(self, callback: Callback) -> None:
+        self._callbacks.append(callback)
+
+    def tell(self, event: Event) -> None:
+        """Lets all be called with the event, soon. Never waits for them."""
+        if not self._callbacks:
+            return
+        with self._lock:
+            self._queue(event)
+            if self.in_thread and self._thread is None:
+                self._thread = threading.Thread(
+                    target=self._serve, name="catenary events", daemon=True
+                )
+                self._thread.start()
+
+    def deliver(self) -> None:
+        """Calls them with what is pending, unless a thread does; harmless inside a callback."""
+        if self.in_thread or self._delivering:
+            return
+        self._delivering = True
+        try:
+            while not self._untold.empty():
+                self._call(self._untold.get_nowait())
+        finally:
+            self._delivering = False
+
+    def close(self) -> None:
+        """Ends the thread behind what is pending; waits a moment for a slow callback."""
+        self.deliver()
+        with self._lock:
+            thread, self._thread = self._thread, None
+            if thread is not None:
+                self._queue(None)
+        if thread is not None and thread is not threading.current_thread():
+            thread.join(CLOSE_TIMEOUT)
+
+    def _queue(self, event: Event | None) -> None:
+        while True:
+            try:
+                self._untold.put_nowait(event)
+                return
+            except queue.Full:
+                self.dropped += 1
+                with contextlib.suppress(queue.Empty):  # the thread was quicker
+                    self._untold.get_nowait()
+
+    def _serve(self) -> None:
+        while (event := self._untold.get()) is not None:
+            self._call(event)
+
+    def _call(self, event: Event | None) -> None:
+        if event is None:
+            return
+        for callback in tuple(self._callbacks):
+            try:
+                callback(event)
+            except Exception:  # a user's mistake must not end the service of the others
+                _logger().exception("%r raised at the event %s", callback, event)
+
+
+def _logger() -> logging.Logger:
+    import logging  # only a mistake needs it
+
+    return logging.getLogger("catenary")

@@ -1,0 +1,172 @@
+"""The queue of events, and callbacks beside it."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+import threading
+
+import pytest
+
+import catenary as cat
+from catenary.bus.event import DeviceLost, Emergency, Event
+from catenary.bus.events import Callbacks, Events
+from catenary.procedure.mailbox import Heard
+from catenary.virtual import Servo, demo_segment
+from catenary.wire import coe
+
+
+def numbered(count: int) -> list[Event]:
+    return [Event(float(number), None, f"number {number}") for number in range(count)]
+
+
+def test_iterating_takes_what_is_pending() -> None:
+    events = Events()
+    first, second = numbered(2)
+    events.put(first)
+    events.put(second)
+    assert list(events) == [first, second]
+    assert list(events) == []
+
+
+def test_getting_takes_the_oldest_or_none() -> None:
+    events = Events()
+    first, second = numbered(2)
+    events.put(first)
+    events.put(second)
+    assert [events.get(), events.get(), events.get()] == [first, second, None]
+
+
+def test_getting_waits_for_another_thread() -> None:
+    events = Events()
+    [event] = numbered(1)
+    thread = threading.Thread(target=events.put, args=(event,))
+    thread.start()
+    assert events.get(timeout=60.0) is event
+    thread.join()
+
+
+def test_an_event_put_while_iterating_is_taken_too() -> None:
+    events = Events()
+    first, second = numbered(2)
+    events.put(first)
+    seen = []
+    for event in events:
+        seen.append(event)
+        if event is first:
+            events.put(second)
+    assert seen == [first, second]
+
+
+def test_the_oldest_are_dropped_and_counted() -> None:
+    events = Events(capacity=3)
+    for event in numbered(5):
+        events.put(event)
+    assert [event.time for event in events] == [2.0, 3.0, 4.0]
+    assert events.dropped == 2
+
+
+def test_an_event_is_frozen_and_reads_well() -> None:
+    event = DeviceLost(1.5, None, "device 3 (Servo) does not answer")
+    assert str(event) == "1.500 s: device 3 (Servo) does not answer"
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        event.time = 2.0  # type: ignore[misc]
+
+
+def test_callbacks_are_called_in_a_thread_and_in_order() -> None:
+    callbacks = Callbacks()
+    told: list[tuple[float, bool]] = []
+    main = threading.current_thread()
+    callbacks.add(lambda event: told.append((event.time, threading.current_thread() is main)))
+    for event in numbered(100):
+        callbacks.tell(event)
+    callbacks.close()
+    assert told == [(float(number), False) for number in range(100)]
+
+
+def test_a_callback_that_raises_is_logged_and_the_others_are_called(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    callbacks = Callbacks()
+    callbacks.in_thread = False
+    told: list[Event] = []
+
+    def fails(event: Event) -> None:
+        raise RuntimeError("a mistake of the user's")
+
+    callbacks.add(fails)
+    callbacks.add(told.append)
+    [event] = numbered(1)
+    callbacks.tell(event)
+    with caplog.at_level(logging.ERROR, logger="catenary"):
+        callbacks.deliver()
+    assert told == [event]
+    assert "number 0" in caplog.text
+    assert "a mistake of the user's" in caplog.text
+
+
+def test_slow_callbacks_lose_the_oldest_and_nobody_waits() -> None:
+    callbacks = Callbacks(capacity=2)
+    callbacks.in_thread = False
+    told: list[float] = []
+    callbacks.add(lambda event: told.append(event.time))
+    for event in numbered(5):
+        callbacks.tell(event)
+    callbacks.deliver()
+    assert told == [3.0, 4.0]
+    assert callbacks.dropped == 3
+
+
+def test_an_event_told_by_a_callback_comes_after_the_one_before() -> None:
+    callbacks = Callbacks()
+    callbacks.in_thread = False
+    first, second = numbered(2)
+    told: list[Event] = []
+
+    def callback(event: Event) -> None:
+        told.append(event)
+        if event is first:
+            callbacks.tell(second)
+            callbacks.deliver()
+
+    callbacks.add(callback)
+    callbacks.tell(first)
+    callbacks.deliver()
+    assert told == [first, second]
+
+
+def test_an_emergency_is_an_event_with_its_text() -> None:
+    with cat.MainDevice(demo_segment()) as main:
+        drive = main.scan().drives[0]
+        assert drive.channel is not None
+        assert drive.channel.listener is not None
+        told: list[Event] = []
+        main.on_event(told.append)
+        heard = Heard(coe.Emergency(0x8611, 0x21, b"\x01\x00\x00\x00\x00"), 1_500_000_000)
+        drive.channel.listener(heard)
+        [event] = main.events
+        assert isinstance(event, cat.events.Emergency)
+        assert (event.sub, event.time, event.error_code) == (drive, 1.5, 0x8611)
+        assert event.text == "following error"
+        assert "device 2" in event.message
+        assert "0x8611 (following error), error register 0x21, data 01 00 00 00 00" in event.message
+        assert told == []  # in virtual time: between two steps
+        main.deliver_events()
+        assert told == [event]
+
+
+def test_a_drive_that_faults_tells_by_the_next_reading_of_its_mailbox() -> None:
+    segment = demo_segment()
+    with cat.MainDevice(segment) as main:
+        drive = main.scan().drives[0]
+        told: list[Event] = []
+        main.on_event(told.append)
+        servo = segment[drive.position]
+        assert isinstance(servo, Servo)
+        servo.inject_fault(0x7305)
+        main.link.wait_until(main.link.now() + 1_000_000, False)
+        drive.sdo.read(0x1000)
+        [event] = main.events
+        assert isinstance(event, Emergency)
+        assert event.error_code == 0x7305
+        assert told == [event]
