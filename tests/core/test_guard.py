@@ -200,6 +200,26 @@ def test_a_mode_may_change_while_running() -> None:
     assert b.drives[0].target_velocity == 800
 
 
+@pytest.mark.parametrize("order", ORDERS)
+def test_a_change_of_mode_does_not_send_the_position_written_long_ago(order: str) -> None:
+    b = driving(CSV, order=order)
+    b.target_position[0] = 5.0  # nobody follows it
+    b.steps(2)
+    sent = []
+    exchange = b.drives[0].exchange
+
+    def watched(outputs: bytes) -> bytes:
+        answer = exchange(outputs)
+        sent.append((b.drives[0].mode, b.drives[0].target_position))
+        return answer
+
+    b.drives[0].exchange = watched  # type: ignore[method-assign]
+    b.mode_target[0] = CSP
+    b.steps(3)
+    assert sent[-1][0] == CSP
+    assert {position for _, position in sent} == {0}
+
+
 def test_a_mode_without_its_target_mapped_is_never_followed() -> None:
     b = bench(axis(0, mode=CST, target_torque=None))
     b.ask(GOAL_ENABLED)
@@ -328,6 +348,22 @@ def test_quick_stop_waits_for_standstill_before_the_voltage_goes() -> None:
     b.steps(10)
     assert b.drives[0].state == 1
     assert goal_in_force(b) == GOAL_DISABLED
+
+
+@pytest.mark.parametrize("goal", [GOAL_ENABLED, GOAL_RESET])
+def test_a_request_during_a_quick_stop_waits_for_standstill(goal: int) -> None:
+    b = driving(CSP)
+    b.drives[0].stays_in_quick_stop = True
+    b.drives[0].velocity = 900
+    b.steps(2)
+    b.ask(GOAL_QUICK_STOP)
+    b.steps(5)
+    b.ask(goal)
+    b.steps(30)
+    assert b.drives[0].state == QUICK_STOPPED
+    b.drives[0].velocity = 0
+    b.steps(20)
+    assert b.drives[0].state == (OE if goal == GOAL_ENABLED else 1)
 
 
 def test_disabling_goes_by_disable_operation() -> None:

@@ -18,6 +18,7 @@ from catenary.core._cia402 cimport (
 )
 from catenary.core._guard cimport (
     guard_controlword,
+    guard_mode,
     guard_observe,
     guard_request,
     guard_setpoints,
@@ -187,7 +188,7 @@ cdef void axes_write(axes_t *x, const target_t *target, bint fresh) noexcept nog
     else:
         x.uncommitted += 1
     for i in range(x.axis_count):
-        x.axes[i].mode = target.mode[i]
+        guard_mode(&x.axes[i], target.mode[i])
         guard_request(x, &x.axes[i], target, i)
     if asked != x.stop_seen:
         x.stop_seen = asked

@@ -28,6 +28,7 @@ cdef inline uint8_t quantity_of(int8_t mode) noexcept nogil:
 
 cdef void guard_observe(axes_t *x, axis_t *a, bint valid, uint8_t state_before,
                         uint64_t number) noexcept nogil
+cdef void guard_mode(axis_t *a, int8_t mode) noexcept nogil
 cdef void guard_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nogil
 cdef void guard_stop(axes_t *x) noexcept nogil
 cdef uint16_t guard_controlword(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil

@@ -126,6 +126,14 @@ cdef void guard_observe(axes_t *x, axis_t *a, bint valid, uint8_t state_before,
         a.followed_since = number
 
 
+cdef void guard_mode(axis_t *a, int8_t mode) noexcept nogil:
+    """Takes the mode asked for over. Another one: what was written for the former counts no longer,
+    and the new one is not followed before the drive shows it."""
+    if mode != a.mode:
+        a.mode = mode
+        a.followed = 0
+
+
 cdef void guard_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nogil:
     """Takes a new request over; counts how long it has been waiting."""
     cdef uint8_t goal
@@ -163,11 +171,10 @@ cdef uint16_t guard_controlword(axes_t *x, axis_t *a, uint16_t bits) noexcept no
         # A brake must not open before there is somebody to hold the load.
         if not a.followed:
             goal = DISABLED
-    if goal == DISABLED:
-        if a.state == OPERATION_ENABLED and a.stopping:
-            goal = QUICK_STOP
-        elif a.state == QUICK_STOP_ACTIVE and a.still_cycles < x.still_limit:
-            goal = QUICK_STOP  # disabling now would let the axis coast
+    if a.state == QUICK_STOP_ACTIVE and a.still_cycles < x.still_limit:
+        goal = QUICK_STOP  # every way out leads through disabling, which would let the axis coast
+    elif goal == DISABLED and a.state == OPERATION_ENABLED and a.stopping:
+        goal = QUICK_STOP
     command = cia402_command(a.state, goal, a.command)
     if a.clear_reset:
         command &= ~FAULT_RESET
