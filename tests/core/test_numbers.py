@@ -49,15 +49,26 @@ def placed(draw: st.DrawFn) -> tuple[int, int]:
 @settings(max_examples=150, deadline=None)
 @given(placed(), st.booleans(), st.integers(-(2**63), 2**63 - 1))
 def test_integers_at_any_place(place: tuple[int, int], signed: bool, value: int) -> None:
+    """What is out of range is cut to it; 64 bits take everything."""
     offset, bits = place
     kind = NumberKind.SIGNED if signed else NumberKind.UNSIGNED
     b = echo(Number(offset, bits, kind), Bank.INTEGER)
     b.output_integers[0] = value
-    b.engine.run(1)
-    raw = value % 2**bits
-    assert int.from_bytes(b.outputs, "little") == raw << offset
-    expected = raw - 2**bits if signed and raw >> (bits - 1) else raw
-    assert b.input_integers[0] == np.uint64(expected % 2**64).astype(np.int64)
+    flags = b.engine.run(1)
+    expected = value
+    if bits < 64:
+        low, high = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if signed else (0, 2**bits - 1)
+        expected = min(max(value, low), high)
+    assert int.from_bytes(b.outputs, "little") == expected % 2**bits << offset
+    assert b.input_integers[0] == expected
+    assert bool(flags & CYCLE_LIMITED) == (value != expected)
+
+
+def test_an_integer_out_of_range_does_not_go_round() -> None:
+    b = echo(Number(0, 16, NumberKind.SIGNED), Bank.INTEGER)
+    b.output_integers[0] = 40_000
+    assert b.engine.run(1) & CYCLE_LIMITED
+    assert b.input_integers[0] == 32_767
 
 
 def test_the_neighbours_of_a_field_stay() -> None:

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from catenary.core import state_of
 from catenary.drive import Drives
 from catenary.drive.objects import AxisObject
 from catenary.errors import ConfigurationError, MappingError
@@ -208,3 +209,11 @@ def test_states_and_faults_are_read_from_the_cycle() -> None:
     assert drives.faults == (1, 2)
     assert drives.enabled.tolist() == [True, False, False]
     assert drives.limited.tolist() == [False, False, True]
+
+
+def test_a_statusword_that_codes_no_state_is_none() -> None:
+    drives = opened(Drives([fake_sub(1), fake_sub(2)], counts_per_turn=1))
+    assert drives._views is not None
+    drives._views.axis_state[:] = [state_of(0x0022), State.FAULT]  # core: 255
+    assert drives.state == (None, State.FAULT)
+    assert drives.faults == (1,)

@@ -31,6 +31,7 @@ from catenary.core._numbers cimport (
     number_bits,
     number_integer,
     number_put_bits,
+    number_put_integer,
     number_put_value,
     number_put_wrapped,
     number_value,
@@ -165,7 +166,8 @@ cdef void write_columns(axes_t *x, const target_t *t) noexcept nogil:
             elif number_put_value(&c.number, x.image.outputs, t.output_reals[c.rank]):
                 x.limited = 1
         elif c.bank == BANK_INTEGER:
-            number_put_bits(&c.number, x.image.outputs, <uint64_t>t.output_integers[c.rank])
+            if number_put_integer(&c.number, x.image.outputs, t.output_integers[c.rank]):
+                x.limited = 1
         else:
             number_put_bits(&c.number, x.image.outputs, t.output_bits[c.rank] != 0)
 

@@ -50,6 +50,18 @@ cdef inline int64_t number_integer(const number_t *n, const uint8_t *image) noex
         return (<int64_t>(raw << (64 - n.bits))) >> (64 - n.bits)
     return <int64_t>raw
 
+cdef inline bint number_put_integer(const number_t *n, uint8_t *image, int64_t value) noexcept nogil:
+    """Writes a raw value; whether it had to be cut to the type's range. 64 bits take all there is."""
+    cdef int64_t low = 0, high, kept = value
+    if n.bits < 64:
+        high = <int64_t>n.mask
+        if n.kind == SIGNED:
+            high >>= 1
+            low = -high - 1
+        kept = min(max(value, low), high)
+    number_put_bits(n, image, <uint64_t>kept)
+    return kept != value
+
 cdef inline double number_value(const number_t *n, const uint8_t *image) noexcept nogil:
     """In SI units."""
     cdef uint64_t raw

@@ -33,6 +33,7 @@ V = TypeVar("V")
 PerAxis: TypeAlias = V | Sequence[V]
 Axes: TypeAlias = int | Sequence[int] | slice
 
+STATES = {int(state): state for state in State}
 IN_FAULT = (State.FAULT_REACTION_ACTIVE, State.FAULT)
 ALL = slice(None)
 
@@ -128,9 +129,10 @@ class Drives:
         return tuple(axis.name for axis in self._axes)
 
     @property
-    def state(self) -> tuple[State, ...]:
-        """The CiA 402 state of every axis, as of the last `next(loop)`."""
-        return tuple(State(value) for value in self._bound().axis_state.tolist())
+    def state(self) -> tuple[State | None, ...]:
+        """The CiA 402 state of every axis, as of the last `next(loop)`; None: its statusword codes
+        none."""
+        return tuple(STATES.get(value) for value in self._bound().axis_state.tolist())
 
     @property
     def enabled(self) -> npt.NDArray[np.bool_]:
