@@ -293,6 +293,22 @@ def test_memory_and_parameters_change_all_at_once_and_can_be_read_back() -> None
         law.set_parameters([1.0, 2.0, 3.0])
 
 
+def test_numbers_given_while_others_are_converted_come_whole() -> None:
+    b = bench(axis(0), order="threaded")
+    b.enable()
+    law = make_law(b, lambda frame: 0, memory=[1.0])
+
+    class Meddler:
+        def __float__(self) -> float:
+            law.set_memory([2.0])
+            return 3.0
+
+    b.engine.start_law(law)
+    law.set_memory([Meddler()])
+    b.steps(3)
+    assert law.memory == [3.0]
+
+
 def test_a_law_can_be_stopped_and_another_started() -> None:
     b = bench(axis(0), order="threaded")
     b.enable()

@@ -57,6 +57,21 @@ def test_a_lost_frame_does_not_wake():
     assert link.now() == 50_000
 
 
+class Flood(PythonLink):
+    """Every wait ends 1 us later with another frame."""
+
+    def table_wait_until(self, _, deadline, wake_on_frame) -> int:
+        self.time += 1000
+        self.under_way.append((self.time, frame(bytes(4))))
+        return 1 if self.time < 1_000_000 else -1
+
+
+def test_a_flood_of_lost_frames_does_not_outlast_the_deadline():
+    link = FaultInjector(Flood(), Fault(kind="lose"))
+    assert link.wait_until(50_000, True) is False
+    assert link.now() == 51_000
+
+
 def test_duplicates():
     link = FaultInjector(PythonLink(), Fault(kind="duplicate", frames=range(1, 2)))
     frames = numbered(3)

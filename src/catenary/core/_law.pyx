@@ -188,10 +188,11 @@ cdef class Law:
             place[0] += numbers.count
 
     cdef fill(self, exchange_t *numbers, values):
-        cdef double *slot = numbers.slots[numbers.triple.back]
+        cdef double *slot
         if len(values) != numbers.count:
             raise ValueError(f"{numbers.count} numbers, not {len(values)}")
         checked = [float(value) for value in values]
+        slot = numbers.slots[numbers.triple.back]  # not before: float() may run anything
         for i, value in enumerate(checked):
             slot[i] = value
         if numbers.count:
