@@ -121,8 +121,8 @@ class Inputs(_Channels):
 
 class Outputs(_Channels):
     """The outputs of SubDevices, all 0 at the start: write `.bits[:]`, `.integers[:]`, `.reals[:]`,
-    or one by name: `lamps["Output 1"] = 1`. `scale` as for `Inputs`. What is out of a channel's range
-    is cut to it, and `cycle.limited` says so."""
+    or one by name: `lamps["Output 1"] = 1`. `scale` as for `Inputs`. What is out of its range is
+    cut, and `cycle.limited` says so."""
 
     direction = Direction.OUTPUT
 
