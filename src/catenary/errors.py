@@ -56,6 +56,10 @@ class IdentityError(CatenaryError):
         self.found = found
 
 
+class RegisterError(CatenaryError):
+    """A device answers, but not to this access of its registers or memory."""
+
+
 class EepromError(CatenaryError):
     """The SII could not be read or written."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -55,7 +56,7 @@ def test_every_help_has_an_example_that_parses(name: str) -> None:
     calls = [line.strip() for line in examples.splitlines() if line.strip().startswith("catenary")]
     assert calls
     for call in calls:
-        make_parser().parse_args(call.removesuffix("&").split()[1:])
+        make_parser().parse_args(shlex.split(call.removesuffix("&"))[1:])
 
 
 @pytest.mark.parametrize(

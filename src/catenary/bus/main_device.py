@@ -21,6 +21,7 @@ from catenary.procedure.stations import assign, bring_all_down, count, duplicate
 from catenary.wire.al import State
 
 if TYPE_CHECKING:  # plan needs NumPy, a scan does not
+    from catenary.bus.states import Outcome
     from catenary.plan.cycle import Order, ReceiveMode
     from catenary.plan.make import Plan
     from catenary.plan.wish import Wish
@@ -163,6 +164,26 @@ class MainDevice:
         if expected is not None:
             self._check_expected(expected)
         return self.subs
+
+    def look(self, *, names: bool = True) -> SubDevices:
+        """The devices as they are: unlike `scan` it changes no state and no mapping, and leaves
+        `subs` alone, so that closing brings nobody down. For diagnosis.
+
+        `names`: also what their EEPROMs say, without which a device has neither name nor identity.
+        """
+        from catenary.bus.look import look
+
+        descriptions = look(self._runner, names)
+        return SubDevices([SubDevice(self, each, None) for each in descriptions])
+
+    def request_states(
+        self, subs: Sequence[SubDevice], positions: Sequence[int], state: State
+    ) -> dict[int, Outcome]:
+        """Brings devices of a `look` to a state and leaves them there: where each is then, or the
+        error that kept it from it. Not while a loop runs."""
+        from catenary.bus.states import request_states
+
+        return request_states(self._runner, [sub.description for sub in subs], positions, state)
 
     def plan(
         self,

@@ -7,17 +7,13 @@ from collections.abc import Sequence
 
 from catenary.bus import SubDevice
 from catenary.cli.failure import UsageError
+from catenary.cli.tables import table
 
 HEADINGS = ("pos", "name", "order", "vendor", "product", "revision", "serial", "state")
 
 
 def as_table(devices: Sequence[SubDevice]) -> str:
-    rows = [HEADINGS, *(_row(device) for device in devices)]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return "\n".join(
-        "  ".join(word.ljust(width) for word, width in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    )
+    return table([HEADINGS, *(_row(device) for device in devices)])
 
 
 def _row(device: SubDevice) -> tuple[str, ...]:

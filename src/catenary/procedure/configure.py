@@ -14,6 +14,7 @@ from catenary.procedure.mailbox import IN, OUT, MailboxChannel
 from catenary.procedure.station import Station, answered
 from catenary.wire import fmmu, register
 from catenary.wire.datagram import Command
+from catenary.wire.sii import MailboxArea
 from catenary.wire.sync_manager import (
     MAILBOX_IN,
     MAILBOX_OUT,
@@ -25,15 +26,26 @@ from catenary.wire.sync_manager import (
 
 def configure_mailbox(channel: MailboxChannel) -> Procedure[None]:
     """SyncManagers 0 and 1, and the counters from the beginning. In INIT."""
-    layout, station = channel.layout, channel.station
-    out = SyncManager(layout.receive_offset, layout.receive_size, MAILBOX_OUT)
-    back = SyncManager(layout.send_offset, layout.send_size, MAILBOX_IN)
+    layout = channel.layout
+    yield from configure_mailbox_areas(
+        channel.station,
+        MailboxArea(layout.receive_offset, layout.receive_size),
+        MailboxArea(layout.send_offset, layout.send_size),
+    )
+    channel.reset()
+
+
+def configure_mailbox_areas(
+    station: Station, receive: MailboxArea, send: MailboxArea
+) -> Procedure[None]:
+    """SyncManagers 0 and 1: the standard mailbox, or in INIT on the way to BOOT the other one."""
+    out = SyncManager(receive.offset, receive.size, MAILBOX_OUT)
+    back = SyncManager(send.offset, send.size, MAILBOX_IN)
     yield from _write_all(
         station,
         [_sync_manager(station, OUT, out), _sync_manager(station, IN, back)],
         "mailbox SyncManagers",
     )
-    channel.reset()
 
 
 def configure_process_data(

@@ -60,6 +60,11 @@ def read_image(station: Station, *, wanted: Collection[int] = WANTED) -> Procedu
     return bytes(image + struct.pack("<H", END))
 
 
+def read_words(station: Station, first: int, count: int) -> Procedure[bytes]:
+    """`count` words from word address `first`, as they are."""
+    return (yield from _Reader(station).words(first, count))
+
+
 class _Reader:
     """Owns the bytes read last: a read brings two or four words, also those asked for next; and
     how long reads take, so that the first look comes when the EEPROM is ready."""

@@ -134,6 +134,11 @@ def assign(device_count: int) -> Procedure[tuple[StationRegisters, ...]]:
     ]
     for position, reply in enumerate(replies):
         answered(reply, Station(position, addresses[position]), "station address")
+    return (yield from read_registers(addresses))
+
+
+def read_registers(addresses: Sequence[int]) -> Procedure[tuple[StationRegisters, ...]]:
+    """What every device's registers say, asked by station addresses, in the order of positions."""
     per_device = 3
     replies = yield [request for address in addresses for request in _questions(address)]
     registers = []

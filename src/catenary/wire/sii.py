@@ -37,16 +37,18 @@ MAXIMUM_CATEGORIES = 512
 END_OF_CATEGORIES = 0xFFFF
 
 # Addresses in words, for single reads and writes
+CONFIGURATION_WORDS = 0x0008  # what a controller loads at power-up; the last is the checksum
 STATION_ALIAS_WORD = 0x0004
 CHECKSUM_WORD = 0x0007
 IDENTITY_WORD = 0x0008
+BOOTSTRAP_WORD = 0x0014
 MAILBOX_WORD = 0x0018
 CATEGORIES_WORD = 0x0040
 
 _HEADER = struct.Struct("<5H4sH4I8s8HH66sHH")
 _CATEGORY = struct.Struct("<HH")
 _CHECKSUM_SIZE = 14  # bytes that the checksum covers
-_CHECKSUM_DISABLED = 0x88A4  # controllers accept it in place of a checksum, for debugging
+CHECKSUM_DISABLED = 0x88A4  # controllers accept it in place of a checksum, for debugging
 
 
 class CategoryType(IntEnum):
@@ -161,7 +163,7 @@ def decode_header(data: bytes) -> Header:
 
 
 def _verify(checksum: int, expected: int) -> None:
-    if checksum & 0xFF != expected and checksum != _CHECKSUM_DISABLED:
+    if checksum & 0xFF != expected and checksum != CHECKSUM_DISABLED:
         raise DecodeError(
             f"SII: checksum 0x{checksum:04X}, expected 0x{expected:04X}",
             hint="the EEPROM is empty or was written in part: write the vendor's image again",

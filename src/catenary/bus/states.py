@@ -1,0 +1,97 @@
+"""Single devices brought to a state and left there, outside a loop."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TypeAlias, TypeVar
+
+from catenary.bus.runner import BlockingRunner
+from catenary.errors import CatenaryError
+from catenary.model.device import DeviceDescription
+from catenary.plan.make import make_plan
+from catenary.procedure.al_state import DeviceState, read_state, request_state
+from catenary.procedure.exchange import Procedure
+from catenary.procedure.state_path import bring_to_safe_op, climb, restart
+from catenary.procedure.station import Station
+from catenary.wire.al import State
+
+T = TypeVar("T")
+Outcome: TypeAlias = DeviceState | CatenaryError
+
+
+def request_states(
+    runner: BlockingRunner,
+    devices: Sequence[DeviceDescription],
+    positions: Iterable[int],
+    target: State,
+) -> dict[int, Outcome]:
+    """Brings the devices at `positions` to a state: where each is then, or why it is not there.
+    One that fails does not keep the others from it.
+
+    For SAFE-OP a device gets the mapping it has, as if all devices took part; OP is asked for
+    without process data, which devices with outputs refuse.
+    """
+    chosen = {position: devices[position] for position in positions}
+    if target in (State.INIT, State.PRE_OP, State.BOOT):
+        return _run(runner, {p: _climb(device, target) for p, device in chosen.items()})
+    failed = _configure(runner, devices, _below_safe_op(runner, chosen))
+    asked = {p: request_state(_station(d), target) for p, d in chosen.items() if p not in failed}
+    return {**failed, **_run(runner, asked)}
+
+
+def _below_safe_op(runner: BlockingRunner, chosen: Mapping[int, DeviceDescription]) -> list[int]:
+    states = _run(runner, {p: read_state(_station(device)) for p, device in chosen.items()})
+    above = (State.SAFE_OP, State.OP)
+    return [p for p, now in states.items() if isinstance(now, Exception) or now.state not in above]
+
+
+def _configure(
+    runner: BlockingRunner, devices: Sequence[DeviceDescription], positions: Iterable[int]
+) -> dict[int, CatenaryError]:
+    """Brings devices to SAFE-OP, from INIT on; the errors of those that failed."""
+    started = {p: restart(_station(devices[p]), devices[p]) for p in positions}
+    ready, failed = _parted(_run(runner, started))
+    plan = make_plan([ready.get(device.position, device) for device in devices])
+    climbing = {
+        p: bring_to_safe_op(_station(device), device, plan.devices[p])
+        for p, device in ready.items()
+    }
+    return failed | _parted(_run(runner, climbing))[1]
+
+
+def _run(
+    runner: BlockingRunner, procedures: Mapping[int, Procedure[T]]
+) -> dict[int, T | CatenaryError]:
+    """All at once; an error is a result."""
+    outcomes = runner.run_all([_attempt(each) for each in procedures.values()])
+    return dict(zip(procedures, outcomes, strict=True))
+
+
+def _attempt(procedure: Procedure[T]) -> Procedure[T | CatenaryError]:
+    try:
+        return (yield from procedure)
+    except CatenaryError as error:
+        return error
+
+
+def _parted(
+    outcomes: Mapping[int, T | CatenaryError],
+) -> tuple[dict[int, T], dict[int, CatenaryError]]:
+    good: dict[int, T] = {}
+    bad: dict[int, CatenaryError] = {}
+    for position, outcome in outcomes.items():
+        if isinstance(outcome, CatenaryError):
+            bad[position] = outcome
+        else:
+            good[position] = outcome
+    return good, bad
+
+
+def _climb(device: DeviceDescription, target: State) -> Procedure[DeviceState]:
+    station = _station(device)
+    yield from climb(station, device, target)
+    return (yield from read_state(station))
+
+
+def _station(device: DeviceDescription) -> Station:
+    return Station(device.position, device.station_address, device.name)

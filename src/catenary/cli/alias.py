@@ -1,0 +1,81 @@
+"""`catenary alias TARGET POSITION [VALUE]`: the station alias in a device's EEPROM."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from catenary.cli.arguments import number
+from catenary.cli.parsers import Commands, add_command, add_json, add_position, add_target
+
+if TYPE_CHECKING:
+    from catenary.bus import SubDevice
+
+
+def add_parser(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "alias",
+        help="show or write the station alias of a device",
+        description="Shows the station alias, by which a program finds a device wherever it is "
+        "plugged in. With VALUE: writes it into the EEPROM; the device takes it over when it is "
+        "switched off and on.",
+        example="catenary alias eth0 2\ncatenary alias eth0 2 10\ncatenary alias eth0 2 0",
+    )
+    add_target(parser)
+    add_position(parser)
+    parser.add_argument("value", metavar="VALUE", nargs="?", type=alias, help="1 to 65535; 0: none")
+    parser.add_argument("--force", action="store_true", help="though another device has it")
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def alias(text: str) -> int:
+    value = number(text)
+    if not 0 <= value <= 0xFFFF:
+        raise argparse.ArgumentTypeError(f"alias {value} is outside 0 to 65535")
+    return value
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from catenary.cli.devices import device_at
+    from catenary.procedure.alias import read_alias, write_alias
+    from catenary.procedure.sii_owner import with_eeprom
+    from catenary.target import MainDevice
+
+    with MainDevice(arguments.target) as main:
+        devices = main.look()
+        device = device_at(devices, arguments.position)
+        if arguments.value is not None:
+            if arguments.value and not arguments.force:
+                refuse_twins(devices, device, arguments.value)
+            main.converse(with_eeprom(device.station, write_alias(device.station, arguments.value)))
+        stored = main.converse(with_eeprom(device.station, read_alias(device.station)))
+    if arguments.json:
+        found = {"position": device.position, "alias": device.alias, "eeprom": stored}
+        print(json.dumps(found | {"name": device.name}))
+    else:
+        print(show(device, stored))
+    return 0
+
+
+def refuse_twins(devices: Sequence[SubDevice], device: SubDevice, value: int) -> None:
+    """ConfigurationError where another device has the alias: it would name neither."""
+    from catenary.errors import ConfigurationError
+
+    twins = [other for other in devices if other is not device and other.alias == value]
+    if twins:
+        raise ConfigurationError(
+            f"alias {value} is that of {twins[0].station} already",
+            hint="take another, or --force when that one is to get a new alias too",
+        )
+
+
+def show(device: SubDevice, stored: int) -> str:
+    now = f"alias {device.alias}" if device.alias else "no alias"
+    if stored == device.alias:
+        return f"{device.station}: {now}"
+    then = f"alias {stored}" if stored else "no alias"
+    return f"{device.station}: {now}, after its next power-up {then}"

@@ -1,0 +1,192 @@
+"""`catenary reg read|write`: registers and memory of a device, as they are."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from typing import TYPE_CHECKING
+
+from catenary.cli.arguments import number, positive_number
+from catenary.cli.failure import UsageError
+from catenary.cli.parsers import Commands, add_command, add_json, add_position, add_target
+
+if TYPE_CHECKING:
+    from catenary.wire.register_names import AnyRegister
+
+LARGEST = 1024  # bytes of one access: what fits a frame with room to spare
+SHOWN_AS_NUMBER = (1, 2, 4, 8)
+DUMP_WIDTH = 16
+
+
+def add_parser(commands: Commands) -> None:
+    group = add_command(
+        commands,
+        "reg",
+        help="read or write registers of a device",
+        description="Reads or writes registers and memory of a device. Its state stays as it is.",
+        example="catenary reg read eth0 2 AL_STATUS\ncatenary reg write eth0 2 0x0310 0 --size 4",
+    ).add_subparsers(title="commands", metavar="COMMAND", required=True)
+    reading = add_command(
+        group,
+        "read",
+        help="read a register",
+        description="Reads a register and says what it means. ADDRESS is a number or a name "
+        "(AL_STATUS, dl-status, fmmu0, 'SyncManager 2'); SIZE in bytes may be left out where a "
+        "register is known.",
+        example="catenary reg read eth0 2 AL_STATUS\n"
+        "catenary reg read eth0 2 0x0300 20\n"
+        "catenary reg read virtual 2 fmmu0 --json",
+    )
+    _add_place(reading)
+    reading.add_argument("size", metavar="SIZE", nargs="?", type=positive_number, help="in bytes")
+    add_json(reading)
+    reading.set_defaults(run=run_read)
+    writing = add_command(
+        group,
+        "write",
+        help="write a register",
+        description="Writes a register. VALUE is a number, as wide as the register or --size, "
+        "or bytes as pairs of hexadecimal digits with spaces ('01 02 0a').",
+        example="catenary reg write eth0 2 watchdog-divider 2498\n"
+        "catenary reg write eth0 2 0x0300 0 --size 1\n"
+        "catenary reg write eth0 2 0x1000 '01 02 0a'",
+    )
+    _add_place(writing)
+    writing.add_argument("value", metavar="VALUE", help="2498, 0x9C2 or '01 02 0a'")
+    writing.add_argument("--size", metavar="BYTES", type=positive_number, help="of a number")
+    add_json(writing)
+    writing.set_defaults(run=run_write)
+
+
+def _add_place(parser: argparse.ArgumentParser) -> None:
+    add_target(parser)
+    add_position(parser)
+    parser.add_argument("address", metavar="ADDRESS", help="0x0130 or AL_STATUS")
+
+
+def run_read(arguments: argparse.Namespace) -> int:
+    from catenary.cli.devices import device_at
+    from catenary.procedure.registers import read_register
+    from catenary.target import MainDevice
+
+    address, size, register = place(arguments.address, arguments.size)
+    if size is None:
+        raise UsageError(
+            f"no register is known to begin at 0x{address:04X}", hint="say how many bytes: SIZE"
+        )
+    _check(address, size)
+    with MainDevice(arguments.target) as main:
+        device = device_at(main.look(names=False), arguments.position)
+        data = main.converse(read_register(device.station, address, size))
+    print(as_json(arguments, address, register, data) if arguments.json else show(register, data))
+    return 0
+
+
+def run_write(arguments: argparse.Namespace) -> int:
+    from catenary.cli.devices import device_at
+    from catenary.procedure.registers import write_register
+    from catenary.target import MainDevice
+
+    address, size, register = place(arguments.address, arguments.size)
+    data = value_bytes(arguments.value, size, address)
+    _check(address, len(data))
+    with MainDevice(arguments.target) as main:
+        device = device_at(main.look(names=False), arguments.position)
+        main.converse(write_register(device.station, address, data))
+    if arguments.json:
+        print(as_json(arguments, address, register, data))
+    return 0
+
+
+def place(text: str, size: int | None) -> tuple[int, int | None, AnyRegister | None]:
+    """Address, size (None: unknown) and the register that is meant, where one is known."""
+    from catenary.wire.register_names import at_address, by_name
+
+    if text[:1].isdigit():
+        try:
+            address = number(text)
+        except argparse.ArgumentTypeError as error:
+            raise UsageError(str(error), hint=f"write 0x{text}" if _is_hex(text) else "") from error
+        register = at_address(address, size)
+        return address, size or (register.size if register else None), register
+    try:
+        register = by_name(text)
+    except ValueError as error:
+        raise UsageError(str(error), hint="docs/commands.md lists the names") from error
+    if size not in (None, register.size):
+        raise UsageError(f"{register} has {register.size} bytes, not {size}", hint="leave SIZE out")
+    return register.address, register.size, register
+
+
+def value_bytes(text: str, size: int | None, address: int) -> bytes:
+    """A number of `size` bytes, or the bytes themselves."""
+    if " " in text.strip():
+        try:
+            data = bytes.fromhex(text)
+        except ValueError:
+            raise UsageError(f"{text!r} are no pairs of hexadecimal digits") from None
+        if size not in (None, len(data)):
+            raise UsageError(f"{len(data)} bytes given for {size} at 0x{address:04X}")
+        return data
+    try:
+        value = number(text)
+    except argparse.ArgumentTypeError as error:
+        raise UsageError(str(error)) from error
+    if size is None:
+        raise UsageError(
+            f"no register is known to begin at 0x{address:04X}: how many bytes has {text}?",
+            hint="say --size BYTES, or give the bytes: '01 02'",
+        )
+    try:
+        return value.to_bytes(size, "little", signed=value < 0)
+    except OverflowError:
+        raise UsageError(f"{text} does not fit into {size} bytes") from None
+
+
+def _check(address: int, size: int) -> None:
+    if not 0 <= address <= 0xFFFF or address + size > 0x10000:
+        raise UsageError(f"0x{address:04X} + {size} bytes is outside 0x0000 to 0xFFFF")
+    if size > LARGEST:
+        raise UsageError(f"{size} bytes at once are too many: at most {LARGEST}")
+
+
+def _is_hex(text: str) -> bool:
+    return all(letter in "0123456789abcdefABCDEF" for letter in text)
+
+
+def show(register: AnyRegister | None, data: bytes) -> str:
+    """What was read, for people."""
+    from catenary.wire.register_text import explain
+
+    name = f"{register}:" if register else ""
+    if len(data) in SHOWN_AS_NUMBER:
+        value = int.from_bytes(data, "little")
+        content = f"{data.hex(' ')}  (0x{value:0{2 * len(data)}X}, {value})"
+    elif len(data) <= DUMP_WIDTH:
+        content = data.hex(" ")
+    else:
+        content = "".join(
+            f"\n  {start:04x}  {data[start : start + DUMP_WIDTH].hex(' ')}"
+            for start in range(0, len(data), DUMP_WIDTH)
+        )
+    meaning = explain(register, data) if register else None
+    lines = [f"{name} {content}".strip(" ").removeprefix("\n")]
+    return "\n".join([*lines, f"  {meaning}"] if meaning else lines)
+
+
+def as_json(
+    arguments: argparse.Namespace, address: int, register: AnyRegister | None, data: bytes
+) -> str:
+    from catenary.wire.register_text import explain
+
+    return json.dumps(
+        {
+            "position": arguments.position,
+            "address": address,
+            "size": len(data),
+            "name": register.name if register else None,
+            "data": data.hex(),
+            "value": int.from_bytes(data, "little") if len(data) in SHOWN_AS_NUMBER else None,
+            "meaning": explain(register, data) if register else None,
+        }
+    )

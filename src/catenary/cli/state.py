@@ -1,0 +1,117 @@
+"""`catenary state TARGET [STATE]`: the EtherCAT states of devices, read or asked for."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from catenary.cli.arguments import position
+from catenary.cli.parsers import Commands, add_command, add_json, add_target
+
+if TYPE_CHECKING:
+    from catenary.bus import SubDevice
+    from catenary.errors import CatenaryError
+    from catenary.procedure.al_state import DeviceState
+
+STATES = "INIT, PREOP, SAFEOP, OP, BOOT"
+
+
+def add_parser(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "state",
+        help="show or change the states of devices",
+        description="Shows in which state each device is, and why. Nothing is changed by that. "
+        "With STATE: brings the devices there and leaves them there. OP is asked for without "
+        "process data, which a device with outputs refuses: a program's Loop brings it to OP.",
+        example="catenary state eth0\n"
+        "catenary state eth0 PREOP\n"
+        "catenary state eth0 SAFEOP --position 2",
+    )
+    add_target(parser)
+    parser.add_argument("state", metavar="STATE", nargs="?", type=state_name, help=STATES)
+    parser.add_argument(
+        "--position", "-p", metavar="N", type=position, help="this device alone; 0 is the first"
+    )
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def state_name(text: str) -> str:
+    """The name of a state in `wire.al.State`, from what people write."""
+    key = "".join(letter for letter in text.upper() if letter.isalpha())
+    names = {"INIT": "INIT", "PREOP": "PRE_OP", "SAFEOP": "SAFE_OP", "OP": "OP", "BOOT": "BOOT"}
+    names |= {"BOOTSTRAP": "BOOT", "OPERATIONAL": "OP"}
+    if key not in names:
+        raise argparse.ArgumentTypeError(f"{text!r} is no state: {STATES}")
+    return names[key]
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from catenary.cli.devices import device_at
+    from catenary.target import MainDevice
+    from catenary.wire.al import State
+
+    with MainDevice(arguments.target) as main:
+        devices = main.look()
+        if arguments.position is not None:
+            device_at(devices, arguments.position)
+        chosen = range(len(devices)) if arguments.position is None else [arguments.position]
+        errors: dict[int, CatenaryError] = {}
+        if arguments.state is not None:
+            outcomes = main.request_states(devices, chosen, State[arguments.state])
+            errors = {p: each for p, each in outcomes.items() if isinstance(each, Exception)}
+        rows = [(devices[p], devices[p].read_state()) for p in chosen]
+    print(as_json(rows, errors) if arguments.json else as_table(rows))
+    return complain(rows, errors)
+
+
+def as_table(rows: Iterable[tuple[SubDevice, DeviceState]]) -> str:
+    from catenary.cli.tables import table
+
+    lines = [
+        (str(device.position), device.name, now.name + " + ERROR" * now.error, reason(now))
+        for device, now in rows
+    ]
+    return table([("pos", "name", "state", ""), *lines])
+
+
+def reason(now: DeviceState) -> str:
+    from catenary.wire.al import status_code
+
+    return f"0x{now.code:04X}: {status_code(now.code).text}" if now.error or now.code else ""
+
+
+def as_json(rows: Iterable[tuple[SubDevice, DeviceState]], errors: dict[int, CatenaryError]) -> str:
+    from catenary.wire.al import status_code
+
+    return json.dumps(
+        [
+            {
+                "position": device.position,
+                "name": device.name,
+                "state": now.name,
+                "error": now.error,
+                "code": now.code,
+                "text": status_code(now.code).text,
+                "refused": str(errors[device.position].message)
+                if device.position in errors
+                else None,
+            }
+            for device, now in rows
+        ],
+        indent=2,
+    )
+
+
+def complain(
+    rows: Iterable[tuple[SubDevice, DeviceState]], errors: dict[int, CatenaryError]
+) -> int:
+    """Says what went wrong to stderr; the exit status."""
+    import sys
+
+    for error in errors.values():
+        print(f"catenary: {error}", file=sys.stderr)
+    return int(bool(errors) or any(now.error for _, now in rows))

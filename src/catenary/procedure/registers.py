@@ -1,0 +1,40 @@
+"""Reading and writing any part of a device's memory, for diagnosis."""
+
+from __future__ import annotations
+
+from catenary.errors import RegisterError
+from catenary.procedure.exchange import Procedure, read_memory, write_memory
+from catenary.procedure.station import Station, answered
+
+
+def read_register(station: Station, address: int, size: int) -> Procedure[bytes]:
+    """`size` bytes from `address`. RegisterError where the device has nothing to read there."""
+    [reply] = yield [read_memory(station.address, address, size, repeatable=True)]
+    if not reply.lost and reply.working_counter == 0 and (yield from _is_there(station)):
+        raise RegisterError(
+            f"{station} does not let {_span(address, size)} be read (working counter 0)",
+            hint="past the end of its memory, or the buffer of a SyncManager that is empty or "
+            "must be read as a whole",
+        )
+    return answered(reply, station, _span(address, size))
+
+
+def write_register(station: Station, address: int, data: bytes) -> Procedure[None]:
+    """Writes `data` from `address`. RegisterError where the device takes nothing there."""
+    [reply] = yield [write_memory(station.address, address, data, repeatable=False)]
+    if not reply.lost and reply.working_counter == 0 and (yield from _is_there(station)):
+        raise RegisterError(
+            f"{station} does not let {_span(address, len(data))} be written (working counter 0)",
+            hint="it is read only, locked (AL control, until its application has read the request "
+            "before), past the end of its memory, or the buffer of a SyncManager",
+        )
+    answered(reply, station, _span(address, len(data)))
+
+
+def _is_there(station: Station) -> Procedure[bool]:
+    [reply] = yield [read_memory(station.address, 0, 1, repeatable=True)]
+    return not reply.lost and reply.working_counter == 1
+
+
+def _span(address: int, size: int) -> str:
+    return f"0x{address:04X}" if size == 1 else f"0x{address:04X} to 0x{address + size - 1:04X}"

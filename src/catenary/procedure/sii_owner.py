@@ -1,0 +1,61 @@
+"""Whose the EEPROM is: the MainDevice's or the device's processor's (PDI), registers 0x0500 and
+0x0501, ETG.1000.4 §6.4.2."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+from catenary.errors import CatenaryError, EepromError
+from catenary.procedure.exchange import Procedure, read, write
+from catenary.procedure.station import Station, answered
+from catenary.wire.datagram import Command
+from catenary.wire.register import SII_CONFIGURATION, SII_PDI_ACCESS
+from catenary.wire.sii_interface import (
+    CONFIGURATION_FORCE,
+    CONFIGURATION_TO_PDI,
+    PDI_ACCESS_ACTIVE,
+)
+
+T = TypeVar("T")
+
+
+def with_eeprom(station: Station, procedure: Procedure[T], *, force: bool = False) -> Procedure[T]:
+    """Runs `procedure` with the EEPROM in our hands; afterwards it is whose it was.
+
+    EepromError where the device's processor is at it just now; `force` takes it all the same.
+    """
+    was_theirs = yield from _take(station, force)
+    try:
+        result = yield from procedure
+    except CatenaryError:
+        if was_theirs:
+            yield from _configure(station, CONFIGURATION_TO_PDI)
+        raise
+    if was_theirs:
+        yield from _configure(station, CONFIGURATION_TO_PDI)
+    return result
+
+
+def _take(station: Station, force: bool) -> Procedure[bool]:
+    """Whether it was the processor's before."""
+    owner, access = yield [
+        read(Command.FPRD, station.address, SII_CONFIGURATION),
+        read(Command.FPRD, station.address, SII_PDI_ACCESS),
+    ]
+    was_theirs = bool(answered(owner, station, "EEPROM owner")[0] & CONFIGURATION_TO_PDI)
+    in_use = bool(answered(access, station, "EEPROM access")[0] & PDI_ACCESS_ACTIVE)
+    if in_use and not force:
+        raise EepromError(
+            f"{station}: its processor is using the EEPROM (register 0x0501)",
+            hint="bring it to INIT, or try again in a moment",
+        )
+    if in_use:
+        yield from _configure(station, CONFIGURATION_FORCE)
+    if in_use or was_theirs:
+        yield from _configure(station, 0)
+    return was_theirs
+
+
+def _configure(station: Station, value: int) -> Procedure[None]:
+    [reply] = yield [write(Command.FPWR, station.address, SII_CONFIGURATION, value)]
+    answered(reply, station, "EEPROM owner")

@@ -1,0 +1,99 @@
+"""Writing the SII, word by word, ETG.1000.4 §6.4.5: each word is read back before the next."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from catenary.errors import EepromError
+from catenary.procedure.exchange import Procedure, after, read, write_memory
+from catenary.procedure.sii import read_words
+from catenary.procedure.station import Deadline, Pace, Station, answered
+from catenary.wire.datagram import Command as Datagram
+from catenary.wire.register import SII_CONTROL_STATUS
+from catenary.wire.sii import CONFIGURATION_WORDS
+from catenary.wire.sii_interface import Command, ControlStatus
+
+WRITE_TIMEOUT = 0.5  # [s] for a word; EEPROMs need 3 to 10 ms
+ATTEMPTS = 4  # of a word: an EEPROM behind a busy processor misses an acknowledge now and then
+REST = 5e-3  # [s] before the next attempt; some devices never show busy while they write (IgH)
+
+_COMMAND = struct.Struct("<HIH")  # control, address and data in one datagram: the enable bit
+# holds for the frame it comes in alone (ESC data sheet, register 0x0502)
+_WRITE = ControlStatus(command=Command.WRITE, write_enable=True).word
+_ADDRESSES = 0x10000
+
+
+class Change(NamedTuple):
+    """One word to be written."""
+
+    word: int  # address
+    value: int
+
+
+def changes(old: bytes, new: bytes) -> tuple[Change, ...]:
+    """The words in which two images differ, the checksum's last: while a write is under way, or
+    where it broke off, the controller can tell that its configuration is not whole."""
+    if len(old) != len(new) or len(new) % 2:
+        raise ValueError(f"images of {len(old)} and {len(new)} bytes cannot be compared by words")
+    differing = [
+        Change(word, int.from_bytes(new[2 * word : 2 * word + 2], "little"))
+        for word in range(len(new) // 2)
+        if old[2 * word : 2 * word + 2] != new[2 * word : 2 * word + 2]
+    ]
+    return tuple(sorted(differing, key=lambda each: (each.word < CONFIGURATION_WORDS, each.word)))
+
+
+def write_words(station: Station, wanted: Sequence[Change]) -> Procedure[None]:
+    """Writes words in their order. EepromError names the first that could not be."""
+    for each in wanted:
+        yield from write_word(station, each)
+
+
+def write_word(station: Station, wanted: Change) -> Procedure[None]:
+    """Writes one word and reads it back."""
+    if not 0 <= wanted.word < _ADDRESSES or not 0 <= wanted.value <= 0xFFFF:
+        raise ValueError(f"SII: {wanted} is no word")
+    data = _COMMAND.pack(_WRITE, wanted.word, wanted.value)
+    found, status = b"", ControlStatus()
+    for _ in range(ATTEMPTS):
+        yield from _until_idle(station, wanted.word)
+        # Not repeated blindly: a controller that is busy with the first would refuse the second.
+        yield [write_memory(station.address, SII_CONTROL_STATUS.address, data, repeatable=False)]
+        status = yield from _until_idle(station, wanted.word)
+        if not status.failed:
+            found = yield from read_words(station, wanted.word, 1)
+            if int.from_bytes(found, "little") == wanted.value:
+                return
+        yield after(REST)
+    raise _refused(station, wanted, found, status)
+
+
+def _until_idle(station: Station, word: int) -> Procedure[ControlStatus]:
+    deadline, pace = Deadline(WRITE_TIMEOUT), Pace()
+    while True:
+        [reply] = yield [read(Datagram.FPRD, station.address, SII_CONTROL_STATUS)]
+        data = answered(reply, station, "SII status")
+        status = ControlStatus.from_word(SII_CONTROL_STATUS.unpack(data))
+        if not status.busy:
+            return status
+        if deadline.passed(reply):
+            raise EepromError(
+                f"{station}: its EEPROM is busy with word 0x{word:04X} for {WRITE_TIMEOUT:g} s",
+                hint="power-cycle the device, then read its EEPROM",
+            )
+        yield after(pace.pause())
+
+
+def _refused(station: Station, wanted: Change, found: bytes, status: ControlStatus) -> EepromError:
+    if status.failed:
+        why = f"the EEPROM does not acknowledge (control/status 0x{status.word:04X})"
+        hint = "it is write protected, or smaller than its header says"
+    else:
+        why = f"reads back as 0x{int.from_bytes(found, 'little'):04X}"
+        hint = "it is write protected (a pin, or the device's processor emulates it), or worn out"
+    return EepromError(
+        f"{station}: SII word 0x{wanted.word:04X} cannot be written to 0x{wanted.value:04X}: {why}",
+        hint=hint,
+    )

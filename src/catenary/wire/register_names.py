@@ -1,0 +1,70 @@
+"""Registers by what people call them: `AL_STATUS`, "al status", "fmmu0", "SyncManager 2"."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from difflib import get_close_matches
+from functools import cache
+from typing import Any, TypeAlias
+
+from catenary.wire import register
+from catenary.wire.register import Register
+
+AnyRegister: TypeAlias = Register[Any]
+
+_INDEXED = (
+    (register.rx_error_counter, register.PORT_COUNT),
+    (register.forwarded_rx_error_counter, register.PORT_COUNT),
+    (register.lost_link_counter, register.PORT_COUNT),
+    (register.phy_port_status, register.PORT_COUNT),
+    (register.receive_time, register.PORT_COUNT),
+    (register.fmmu, register.FMMU_COUNT),
+    (register.sync_manager, register.SYNC_MANAGER_COUNT),
+    (register.sync_manager_status, register.SYNC_MANAGER_COUNT),
+    (register.sync_manager_activation, register.SYNC_MANAGER_COUNT),
+    (register.sync_manager_pdi_control, register.SYNC_MANAGER_COUNT),
+)
+
+
+def by_name(name: str) -> AnyRegister:
+    """The register of that name, whatever its capitals, spaces and underscores. ValueError for a
+    name that is none, with the nearest ones."""
+    known = _by_key()
+    found = known.get(_key(name))
+    if found is not None:
+        return found
+    near = [known[key] for key in get_close_matches(_key(name), known, n=3, cutoff=0.6)]
+    guesses = ", ".join(dict.fromkeys(each.name for each in near))
+    raise ValueError(f"no register {name!r}" + (f"; near it: {guesses}" if guesses else ""))
+
+
+def at_address(address: int, size: int | None = None) -> AnyRegister | None:
+    """The register that begins at an address, of that size where one is given. Of several the
+    shortest number: what a read without a size means."""
+    found = [
+        each for each in _by_key().values() if each.address == address and size in (None, each.size)
+    ]
+    return min(found, key=lambda each: (each.format.endswith("s"), each.size), default=None)
+
+
+@cache
+def _by_key() -> dict[str, AnyRegister]:
+    found: dict[str, AnyRegister] = {}
+    for constant, each in _all():
+        found.setdefault(_key(each.name), each)
+        if constant:
+            found[_key(constant)] = each
+    return found
+
+
+def _all() -> Iterator[tuple[str, AnyRegister]]:
+    for constant, value in vars(register).items():
+        if isinstance(value, Register):
+            yield constant, value
+    for make, count in _INDEXED:
+        for number in range(count):
+            yield "", make(number)
+
+
+def _key(name: str) -> str:
+    return "".join(letter for letter in name.casefold() if letter.isalnum())

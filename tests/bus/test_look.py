@@ -1,0 +1,82 @@
+"""Devices looked at and brought to states outside a loop."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+import catenary as cat
+from catenary.errors import EepromError, StateError
+from catenary.procedure.al_state import DeviceState
+from catenary.wire.al import State
+
+OUTPUTS, SERVO = 2, 1
+
+
+@pytest.fixture
+def segment() -> cat.Segment:
+    return cat.Segment([cat.Coupler(), cat.Servo(alias=10), cat.DigitalOutputs()])
+
+
+@pytest.fixture
+def main(segment: cat.Segment) -> Iterator[cat.MainDevice]:
+    with cat.MainDevice(segment) as main:
+        yield main
+
+
+def states(segment: cat.Segment) -> list[State]:
+    return [State(segment.core.peek(n, 0x0130, 1)[0] & 15) for n in range(len(segment))]
+
+
+def test_a_look_finds_what_a_scan_finds(main: cat.MainDevice) -> None:
+    looked = [(sub.name, sub.identity, sub.alias) for sub in main.look()]
+    assert looked == [(sub.name, sub.identity, sub.alias) for sub in main.scan()]
+
+
+def test_a_look_changes_no_state_and_closing_brings_nobody_down(segment: cat.Segment) -> None:
+    with cat.MainDevice(segment) as main:
+        main.request_states(main.look(), range(3), State.PRE_OP)
+    assert states(segment) == [State.PRE_OP] * 3
+    with cat.MainDevice(segment) as main:
+        main.look()
+    assert states(segment) == [State.PRE_OP] * 3
+
+
+def test_without_names_nothing_is_read_from_the_eeproms(main: cat.MainDevice) -> None:
+    main.look(names=False)
+    few = main.counts.datagrams
+    main.look()
+    assert main.counts.datagrams > 10 * few
+
+
+def test_safe_op_is_reached_from_every_state(segment: cat.Segment, main: cat.MainDevice) -> None:
+    subs = main.look()
+    for before in (State.INIT, State.PRE_OP, State.SAFE_OP):
+        main.request_states(subs, range(3), before)
+        found = main.request_states(subs, range(3), State.SAFE_OP)
+        assert [each.state for each in found.values() if isinstance(each, DeviceState)] == [
+            State.SAFE_OP
+        ] * 3
+    assert states(segment) == [State.SAFE_OP] * 3
+
+
+def test_one_device_alone(segment: cat.Segment, main: cat.MainDevice) -> None:
+    main.request_states(main.look(), [SERVO], State.PRE_OP)
+    assert states(segment) == [State.INIT, State.PRE_OP, State.INIT]
+
+
+def test_who_refuses_says_why_and_the_others_go_on(
+    segment: cat.Segment, main: cat.MainDevice
+) -> None:
+    found = main.request_states(main.look(), range(3), State.OP)
+    error = found[SERVO]
+    assert isinstance(error, StateError)
+    assert error.code == 0x0019
+    assert states(segment) == [State.OP, State.SAFE_OP, State.OP]
+
+
+def test_boot_needs_a_bootstrap_mailbox(main: cat.MainDevice) -> None:
+    error = main.request_states(main.look(), [SERVO], State.BOOT)[SERVO]
+    assert isinstance(error, EepromError)
+    assert "no bootstrap mailbox" in error.message

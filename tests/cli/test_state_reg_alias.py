@@ -1,0 +1,153 @@
+"""`state`, `reg` and `alias` on a virtual segment: what people and programs read, and mistakes."""
+
+from __future__ import annotations
+
+import json
+import shlex
+
+import pytest
+
+from catenary.cli.main import main
+
+
+def call(line: str, capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    status = main(shlex.split(line))
+    printed = capsys.readouterr()
+    return status, printed.out, printed.err
+
+
+def test_state_shows_every_device_where_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = call("state virtual", capsys)
+    heading, *lines = out.splitlines()
+    assert status == 0
+    assert heading.split() == ["pos", "name", "state"]
+    assert [line.split()[-1] for line in lines] == ["INIT"] * 6
+
+
+@pytest.mark.parametrize("word", ["PREOP", "pre-op", "PRE_OP"])
+def test_state_asks_for_one(word: str, capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = call(f"state virtual {word} --position 2", capsys)
+    assert (status, out.splitlines()[1].split()[-1]) == (0, "PRE-OP")
+
+
+def test_state_tells_who_refuses(capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, err = call("state virtual OP", capsys)
+    assert status == 1
+    assert "SAFE-OP + ERROR  0x0019: No valid outputs" in out
+    assert "device 3 (Catenary virtual servo 2) refused OP" in err
+    assert "is the loop running?" in err
+
+
+def test_state_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = call("state virtual OP --json", capsys)
+    devices = json.loads(out)
+    assert status == 1
+    assert [each["state"] for each in devices] == ["OP", "OP", *["SAFE-OP"] * 3, "OP"]
+    assert devices[2]["code"] == 0x0019
+    assert "refused OP" in devices[2]["refused"]
+    assert devices[0]["refused"] is None
+
+
+def test_reg_read_explains_a_register(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("reg read virtual 2 AL_STATUS", capsys)[1] == (
+        "AL status (0x0130): 01 00  (0x0001, 1)\n  INIT\n"
+    )
+    assert call("reg read virtual 2 0x0130", capsys)[1].endswith("INIT\n")
+
+
+def test_reg_read_of_many_bytes_is_a_dump(capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = call("reg read virtual 2 0x0300 20", capsys)
+    assert out.splitlines() == ["  0000 " + " 00" * 16, "  0010 " + " 00" * 4]
+
+
+def test_reg_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = call("reg read virtual 2 watchdog-divider --json", capsys)
+    assert json.loads(out) == {
+        "position": 2,
+        "address": 0x0400,
+        "size": 2,
+        "name": "watchdog divider",
+        "data": "c209",
+        "value": 2498,
+        "meaning": None,
+    }
+
+
+@pytest.mark.parametrize(
+    "value", ["watchdog-divider 1000", "0x0400 0x3E8", "0x0400 'e8 03'", "0x0400 1000 --size 2"]
+)
+def test_reg_write_takes_numbers_and_bytes(value: str, capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = call(f"reg write virtual 2 {value} --json", capsys)
+    assert (status, json.loads(out)["data"]) == (0, "e803")
+
+
+def test_alias_now_and_after_the_next_power_up(capsys: pytest.CaptureFixture[str]) -> None:
+    name = "device 2 (Catenary virtual servo 1)"
+    assert call("alias virtual 2", capsys) == (0, f"{name}: no alias\n", "")
+    assert call("alias virtual 2 17", capsys)[1] == (
+        f"{name}: no alias, after its next power-up alias 17\n"
+    )
+    _, out, _ = call("alias virtual 2 17 --json", capsys)
+    assert json.loads(out)["eeprom"] == 17
+
+
+def test_an_alias_that_another_device_has_is_refused(
+    tmp_path: object, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = f"{tmp_path}/two.toml"
+    with open(path, "w") as file:
+        file.write('[[device]]\nkind = "servo"\nalias = 7\n[[device]]\nkind = "servo"\n')
+    status, _, err = call(f"alias virtual:{path} 1 7", capsys)
+    assert status == 1
+    assert "alias 7 is that of device 0" in err
+    assert call(f"alias virtual:{path} 1 7 --force", capsys)[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("line", "status", "message"),
+    [
+        ("state virtual OP -p 6", 2, "the segment has 6"),
+        ("reg read virtual 6 AL_STATUS", 2, "the segment has 6"),
+        ("reg read virtual 2 alstatis", 2, "near it: AL status"),
+        ("reg read virtual 2 0x0131", 2, "say how many bytes"),
+        ("reg read virtual 2 013A", 2, "write 0x013A"),
+        ("reg read virtual 2 AL_STATUS 4", 2, "has 2 bytes, not 4"),
+        ("reg read virtual 2 0xFFFF 2", 2, "outside 0x0000 to 0xFFFF"),
+        ("reg read virtual 2 0xF000 8", 1, "does not let 0xF000 to 0xF007 be read"),
+        ("reg write virtual 2 AL_STATUS 4", 1, "does not let 0x0130 to 0x0131 be written"),
+        ("reg write virtual 2 watchdog-divider 100000", 2, "does not fit into 2 bytes"),
+        ("reg write virtual 2 0x0131 4", 2, "say --size"),
+        ("reg write virtual 2 0x0131 '4 xy'", 2, "no pairs of hexadecimal digits"),
+        ("alias virtual 6 1", 2, "the segment has 6"),
+    ],
+)
+def test_mistakes_name_the_thing(
+    line: str, status: int, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found, out, err = call(line, capsys)
+    assert (found, out) == (status, "")
+    assert message in err
+    assert err.startswith("catenary: ")
+    assert len(err.splitlines()) <= 2
+    assert "internal error" not in err
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("state virtual RUN", "'RUN' is no state: INIT, PREOP, SAFEOP, OP, BOOT"),
+        ("reg read virtual 2", "the following arguments are required: ADDRESS"),
+        ("reg read virtual two AL_STATUS", "'two' is no number"),
+        ("alias virtual 2 100000", "alias 100000 is outside 0 to 65535"),
+        ("alias virtual 2 abc", "'abc' is no number"),
+    ],
+)
+def test_a_wrong_command_line_says_where_the_help_is(
+    line: str, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main(shlex.split(line))
+    assert stop.value.code == 2
+    printed = capsys.readouterr().err
+    assert message in printed
+    assert "--help" in printed

@@ -1,0 +1,45 @@
+"""Any part of a device's memory, and what is refused there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+import catenary as cat
+from catenary.errors import RegisterError, ResponseTimeout
+from catenary.procedure.registers import read_register, write_register
+
+
+@pytest.fixture
+def segment() -> cat.Segment:
+    return cat.Segment([cat.Coupler(), cat.Servo()])
+
+
+@pytest.fixture
+def main(segment: cat.Segment) -> Iterator[cat.MainDevice]:
+    with cat.MainDevice(segment) as main:
+        yield main
+
+
+def test_what_is_written_is_read(main: cat.MainDevice) -> None:
+    station = main.look(names=False)[1].station
+    main.converse(write_register(station, 0x0400, b"\x34\x12"))
+    assert main.converse(read_register(station, 0x0400, 2)) == b"\x34\x12"
+
+
+def test_a_read_only_register_is_told_from_a_silent_device(
+    segment: cat.Segment, main: cat.MainDevice
+) -> None:
+    station = main.look(names=False)[1].station
+    with pytest.raises(RegisterError, match="does not let 0x0130 to 0x0131 be written"):
+        main.converse(write_register(station, 0x0130, b"\x08\x00"))
+    segment.plug(devices=1)
+    with pytest.raises(ResponseTimeout, match="no answer"):
+        main.converse(write_register(station, 0x0130, b"\x08\x00"))
+
+
+def test_past_the_end_of_memory(main: cat.MainDevice) -> None:
+    station = main.look(names=False)[1].station
+    with pytest.raises(RegisterError, match="does not let 0xFFFF be read"):
+        main.converse(read_register(station, 0xFFFF, 1))
