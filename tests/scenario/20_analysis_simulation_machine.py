@@ -60,8 +60,8 @@ def test_on_a_virtual_clock_twice_the_same():
 
 
 def test_on_this_machine():
-    """The medians agree, and so does the verdict on what was measured. What else the machine does may
-    delay a job, never hasten it: where it does so in three runs, nothing is said."""
+    """The medians agree, and so does the verdict on what was measured. What else the machine does
+    may delay a job, never hasten it: where it does so in three runs, nothing is said."""
     for _ in range(3):
         try:
             verdict, found = run(None, 2.0)
