@@ -67,6 +67,7 @@ class ClockLine:
                 open_ports=(True, position + 1 < count, False, False),
                 parent=position - 1 if position else None,
                 parent_port=1 if position else None,
+                system_time=clock.kind in (SHORT, LONG),
             )
             for position, clock in enumerate(self.clocks)
         ]

@@ -74,6 +74,7 @@ def described(registers: StationRegisters, image: bytes) -> DeviceDescription:
         station_address=registers.station_address,
         alias=registers.alias,
         dl_status=registers.dl_status,
+        system_time=registers.system_time,
         information=registers.information,
         image=image,
     )

@@ -16,7 +16,9 @@ from catenary.core._cia402 import (
     controlword_towards,
     state_of,
 )
+from catenary.core._clocks import Clock, PhaseController
 from catenary.core._cycle import (
+    CYCLE_CLOCKS,
     CYCLE_DROPPED,
     CYCLE_DRY,
     CYCLE_LATE,
@@ -52,6 +54,7 @@ __all__ = [
     "AXIS_FOLLOWED",
     "AXIS_LIMITED",
     "AXIS_REFUSED",
+    "CYCLE_CLOCKS",
     "CYCLE_DROPPED",
     "CYCLE_DRY",
     "CYCLE_LATE",
@@ -77,10 +80,12 @@ __all__ = [
     "LAW_RUNNING",
     "LAW_STOPPED",
     "RECORD_FIELDS",
+    "Clock",
     "Cycle",
     "Engine",
     "Iteration",
     "Law",
+    "PhaseController",
     "Stream",
     "controlword_towards",
     "state_of",

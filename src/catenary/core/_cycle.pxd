@@ -1,6 +1,7 @@
 from libc.stdint cimport int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 
 from catenary.core._axes cimport axes_t
+from catenary.core._clocks cimport clock_t
 from catenary.core._handover cimport actual_t, handover_t, target_t
 from catenary.core._histogram cimport histogram_t
 from catenary.core._lane cimport lane_t
@@ -21,6 +22,7 @@ cdef enum:  # flags of a cycle
     NONE = 512
     LAW_FAILED = 1024
     DRY = 2048
+    CLOCKS = 4096
 
 cdef enum:
     THREADED = 0
@@ -67,6 +69,7 @@ cdef struct cycle_t:
     axes_t *axes
     lane_t *lane
     handover_t *handover
+    clock_t *clock             # NULL: no distributed clocks
     law_t *law                 # NULL: none runs
     law_t *law_asked           # NULL: none is to run
     uint32_t law_request       # counts what was asked

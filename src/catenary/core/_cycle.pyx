@@ -21,6 +21,7 @@ from libc.stdint cimport int32_t, int64_t, uint8_t, uint32_t, uint64_t
 from libc.string cimport memcpy, memset
 
 from catenary.core._axes cimport axes_follow, axes_read, axes_tell, axes_write
+from catenary.core._clocks cimport clock_close
 from catenary.core._handover cimport (
     BEFORE_LAW,
     OF_LAW,
@@ -56,6 +57,7 @@ CYCLE_UNCOMMITTED = UNCOMMITTED
 CYCLE_LAW_DONE = LAW_DONE
 CYCLE_LAW_FAILED = LAW_FAILED
 CYCLE_DRY = DRY
+CYCLE_CLOCKS = CLOCKS
 CYCLE_STOPPED = STOPPED
 CYCLE_NONE = NONE
 
@@ -190,6 +192,10 @@ cdef void collect(cycle_t *c, actual_t *actual, int64_t deadline) noexcept nogil
     cdef int rc = c.image.collect(c.image.self, deadline)
     c.missing = rc if rc >= 0 else -1
     axes_read(c.axes, actual, c.number)
+    if c.clock != NULL:
+        c.next += clock_close(c.clock)
+        if c.clock.changes != c.clock.acknowledged:
+            c.flags |= CLOCKS
     if c.image.ok[0]:
         c.lost_in_row = 0
         c.flags |= OK
@@ -238,6 +244,8 @@ cdef void emit(cycle_t *c, const target_t *target, bint fresh) noexcept nogil:
     """The compiled half before the wire: targets → images → frames. A frame that could not be
     sent is counted by the image and is missing at collect."""
     axes_write(c.axes, target, fresh)
+    if c.clock != NULL:
+        c.clock.scheduled = c.scheduled
     c.image.emit(c.image.self)
 
 

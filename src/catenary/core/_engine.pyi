@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from catenary.core._clocks import Clock
 from catenary.core._law import Law
 from catenary.core._stream import Stream
 
@@ -136,6 +137,10 @@ class Engine:
     def set_rehearsal(self, rehearsal: Callable[[], object] | None) -> None:
         """inline with a lead (`lead_ns` of the plan): called between waking and the instant, when at
         least a third of the lead is left; what it raises comes out of `next`."""
+
+    @property
+    def clock(self) -> Clock | None:
+        """The distributed clocks; None where the plan has none."""
 
     # Laws.
     def law_fields(

@@ -1,5 +1,6 @@
 from libc.stdint cimport int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 
+from catenary.core._clocks cimport clock_t
 from catenary.core._native cimport cat_image, cat_link
 from catenary.core._lane cimport lane_t
 
@@ -56,6 +57,7 @@ cdef struct frames_t:
     cat_image image
     const cat_link *link
     lane_t *lane
+    clock_t *clock             # NULL: no distributed clocks
     int receive_mode
     uint32_t frame_count
     uint32_t datagram_count
@@ -83,5 +85,6 @@ cdef class Frames:
     cdef frames_t c
     cdef object link_owner
     cdef make_table(self)
+    cdef carry_time(self, clock_t *clock)
 
 cdef void frames_flush(frames_t *f) noexcept nogil

@@ -12,6 +12,7 @@ from libc.stdint cimport int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 from libc.stdlib cimport calloc, free
 from libc.string cimport memcmp, memcpy
 
+from catenary.core._clocks cimport FPRD, FPWR, FRMW, clock_emit, clock_t, clock_take
 from catenary.core._lane cimport lane_received
 from catenary.core._native cimport (
     CAT_FRAME_MAX,
@@ -30,6 +31,7 @@ cdef enum:
     ETHERCAT_HEADER = 14
     DATAGRAMS = 16
     HEADER = 10                # of a datagram
+    ADP = 2
     COUNTER = 2
     LENGTH_AND_MORE = 0x87FF   # of its length word: not the circulating bit, not the reserved ones
     CYCLE_INDICES = 0x80
@@ -65,6 +67,8 @@ cdef int frames_emit(void *self) noexcept nogil:
     cdef uint32_t i, k, m
     cdef int rc, first_error = 0
     f.serial += 1
+    if f.clock != NULL:  # its datagrams are in the frame that goes first
+        clock_emit(f.clock, f.link.now(f.link.self))
     f.missing = f.frame_count
     for i in range(f.frame_count):
         frame = &f.frames[i]
@@ -236,6 +240,8 @@ cdef void judge_units(frames_t *f) noexcept nogil:
         if d.kind == AL_STATUS and f.frames[d.frame].back and d.counter > 0:
             al_counter += d.counter
             al |= f.frames[d.frame].returned[d.offset + HEADER] & 0x1F
+        if d.kind == CLOCK and f.clock != NULL and f.frames[d.frame].back:
+            clock_take(f.clock, d.command, f.frames[d.frame].returned + d.offset + HEADER, d.counter)
     f.al_counter = al_counter
     if al_counter > 0:
         f.al_status = al
@@ -405,6 +411,31 @@ cdef class Frames:
         c.image_offset = copy.image_offset
         c.size = copy.size
         return place + 1
+
+    cdef carry_time(self, clock_t *clock):
+        """Shows the clock where its data sits in the templates."""
+        cdef uint32_t k
+        cdef datagram_t *d
+        cdef uint8_t *header
+        for k in range(self.c.datagram_count):
+            d = &self.c.datagrams[k]
+            if d.kind != CLOCK:
+                continue
+            check(d.frame == 0 and d.length == 4, "clock: four bytes each, in the first frame")
+            header = self.c.frames[0].template + d.offset
+            if d.command == FRMW:
+                clock.time_field = header + HEADER
+                clock.listeners = d.expected_counter
+            elif d.command == FPWR:
+                clock.main_field = header + HEADER
+            elif d.command == FPRD:
+                clock.station_field = header + ADP
+        check(clock.time_field != NULL, "clock: no frame carries the reference's time")
+        check((clock.main_field != NULL) == (clock.follows_main != 0),
+              "clock: our time is sent when the reference follows us, and only then")
+        check((clock.station_field != NULL) == (clock.follower_count > 0),
+              "clock: differences are read of followers, and only of them")
+        self.c.clock = clock
 
     cdef make_table(self):
         self.c.image.version = CAT_IMAGE_VERSION

@@ -1,6 +1,7 @@
 from libc.stdint cimport int64_t, uint32_t
 
 from catenary.core._axes cimport Axes
+from catenary.core._clocks cimport Clock
 from catenary.core._cycle cimport cycle_t
 from catenary.core._frames cimport Frames
 from catenary.core._handover cimport Handover, actual_header_t, handover_t
@@ -20,6 +21,7 @@ cdef class Parts:
     cdef Frames frames
     cdef Lane lane
     cdef Axes axes
+    cdef readonly Clock clock  # None: no distributed clocks
     cdef Handover handover
     cdef dict _buffers
     cdef histogram_t *spare_histograms

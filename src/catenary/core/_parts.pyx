@@ -6,6 +6,7 @@ from libc.stdint cimport int64_t, uint32_t, uint64_t
 from libc.stdlib cimport calloc, free
 
 from catenary.core._axes cimport Axes
+from catenary.core._clocks cimport Clock
 from catenary.core._cycle cimport LOG_LENGTH, PHASES, RECORDS, cycle_t, record_t
 from catenary.core._cycle import ORDERS, PHASE_NAMES
 from catenary.core._frames cimport Frames
@@ -47,6 +48,8 @@ cdef class Parts:
         self.frames = Frames(plan, link)
         self.lane = Lane(plan.period_ns)
         self.axes = Axes(plan)
+        if plan.clock is not None:
+            self.clock = Clock(plan.clock, plan.period_ns)
         self.handover = Handover(
             len(plan.axes),
             len(plan.sync_units),
@@ -68,6 +71,9 @@ cdef class Parts:
             raise MemoryError
         self.frames.c.lane = &self.lane.c
         self.axes.c.image = &self.frames.c.image
+        if self.clock is not None:
+            self.frames.carry_time(&self.clock.c)
+            c.clock = &self.clock.c
         c.link = self.frames.c.link
         c.image = &self.frames.c.image
         c.axes = &self.axes.c

@@ -49,6 +49,7 @@ def describe(
     dl_status: int,
     information: bytes,
     image: bytes,
+    system_time: bool = False,
 ) -> DeviceDescription:
     """The description of one device. DecodeError only for `information` of the wrong size."""
     bare = DeviceDescription(
@@ -65,6 +66,7 @@ def describe(
         output_pdos=(),
         input_pdos=(),
         open_ports=open_ports(dl_status),
+        system_time=system_time,
     )
     notes: list[str] = []
     sii = _decoded(image, notes)
@@ -109,6 +111,7 @@ def _filled(bare: DeviceDescription, sii: Sii, notes: list[str]) -> DeviceDescri
         inputs=assignments(inputs),
         output_pdos=outputs,
         input_pdos=inputs,
+        clock_modes=sii.clock_modes,
         group=texts[general.group],
         order=order,
     )

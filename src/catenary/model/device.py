@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from catenary.wire.features import Information
 from catenary.wire.sii import MailboxProtocol
-from catenary.wire.sii_categories import SyncManagerUse
+from catenary.wire.sii_categories import ClockMode, SyncManagerUse
 
 
 class Identity(NamedTuple):
@@ -161,6 +161,8 @@ class DeviceDescription:
     open_ports: tuple[bool, bool, bool, bool] = (True, False, False, False)
     parent: int | None = None  # position of the device before it in the tree
     parent_port: int | None = None
+    system_time: bool = False  # it has a clock that can follow: a system time (0x0910)
+    clock_modes: tuple[ClockMode, ...] = ()  # ways to use it, the first is the default
     group: str = ""
     order: str = ""
     device_type: int | None = None  # object 0x1000
@@ -177,6 +179,11 @@ class DeviceDescription:
     @property
     def is_drive(self) -> bool:
         return bool(self.slots)
+
+    @property
+    def clock_bits(self) -> int:
+        """Width of its system time, 64 or 32; 0: it has none."""
+        return self.controller.clock_bits if self.system_time else 0
 
     @property
     def coe(self) -> bool:

@@ -12,6 +12,7 @@ from typing import Literal
 
 Order = Literal["threaded", "inline", "law"]
 ReceiveMode = Literal["look", "wait", "spin"]
+FollowedClock = Literal["reference", "main"]
 
 
 class NumberKind(IntEnum):
@@ -60,7 +61,7 @@ class Column:
 class DatagramKind(IntEnum):
     PROCESS_DATA = 0
     AL_STATUS = 1  # the BRD that rides in every cycle
-    CLOCK = 2  # distributed clocks
+    CLOCK = 2  # distributed clocks: FPWR our time, FRMW the reference's, FPRD a difference
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,6 +138,28 @@ class AxisPlan:
 
 
 @dataclass(frozen=True, slots=True)
+class ClockPlan:
+    """How the cycle and the distributed clocks keep together (plan/clocks.py, docs/clocks.md).
+
+    `follow`: "reference", the instants follow the reference clock; "main", it follows the link's.
+    """
+
+    follow: FollowedClock
+    reference: int  # position
+    reference_station: int
+    followers: tuple[int, ...]  # positions of those with SYNC signals, the reference left out
+    stations: tuple[int, ...]  # the same, by station address
+    phase_ns: int  # of the instants in the reference's time, modulo the period
+    wire_ns: int  # the frames on the wire and through all devices
+    allowance_ns: int  # from the instant to the frames, at most
+    bandwidth: float  # of the phase controller, in the end [1 / cycle]
+    rate_limit_ns: float  # by which a period may differ, in all
+    drift_limit_ns: float  # and the part of it that stays
+    step_ns: int  # a phase error beyond is no drift
+    bound_ns: int  # of a difference to the reference, and of the phase
+
+
+@dataclass(frozen=True, slots=True)
 class CyclePlan:
     period_ns: int
     order: Order
@@ -157,3 +180,4 @@ class CyclePlan:
     lead_ns: int = 0  # inline, law: awake that long before the instant
     cpu: int | None = None  # of the native thread
     priority: int | None = 80  # SCHED_FIFO; None: leave the scheduling as it is
+    clock: ClockPlan | None = None  # None: no distributed clocks

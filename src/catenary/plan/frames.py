@@ -9,12 +9,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from catenary.plan.clocks import ClockChoice
 from catenary.plan.cycle import Copy, DatagramKind, DatagramPlan, FramePlan
 from catenary.plan.layout import UnitLayout
 from catenary.wire.datagram import HEADER_SIZE as DATAGRAM_HEADER
 from catenary.wire.datagram import OVERHEAD, Command, Datagram
 from catenary.wire.frame import HEADER_SIZE, MAXIMUM_PAYLOAD, encode_frame
-from catenary.wire.register import AL_STATUS
+from catenary.wire.register import (
+    AL_STATUS,
+    SYSTEM_TIME_DIFFERENCE,
+    SYSTEM_TIME_LOW,
+    Register,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,10 +41,12 @@ class _Piece:
         return OVERHEAD + self.length
 
 
-def make_frames(units: Sequence[UnitLayout], device_count: int) -> tuple[FramePlan, ...]:
+def make_frames(
+    units: Sequence[UnitLayout], device_count: int, clocks: ClockChoice | None = None
+) -> tuple[FramePlan, ...]:
     """The frames of one cycle, in the order they are sent. Frame 0 begins with the BRD of AL
-    status, which every device answers."""
-    pieces = [_al_status(device_count)]
+    status, which every device answers, and carries the time."""
+    pieces = [_al_status(device_count), *_of_clocks(clocks)]
     for number, unit in enumerate(units):
         pieces.extend(_of_unit(unit, number))
     return tuple(_frame(batch) for batch in _batches(pieces))
@@ -48,6 +56,34 @@ def _al_status(device_count: int) -> _Piece:
     address = AL_STATUS.address << 16
     return _Piece(
         DatagramKind.AL_STATUS, Command.BRD, address, AL_STATUS.size, device_count, sync_unit=-1
+    )
+
+
+def _of_clocks(clocks: ClockChoice | None) -> list[_Piece]:
+    """Our time to the reference clock, if it follows us; its time to all others; and one device's
+    difference, another one's each cycle: the core turns the address.
+
+    Four bytes of time are what the loop of a controller compares, and what IgH sends; a 32-bit
+    clock would refuse eight. A broadcast read of all differences would or sign-magnitude numbers.
+    """
+    if clocks is None:
+        return []
+    station = clocks.reference.station_address
+    pieces = [_clock_piece(Command.FRMW, station, SYSTEM_TIME_LOW, clocks.listeners)]
+    if clocks.follow == "main":
+        pieces.insert(0, _clock_piece(Command.FPWR, station, SYSTEM_TIME_LOW, 1))
+    if clocks.followers:
+        first = clocks.followers[0].station_address
+        pieces.append(_clock_piece(Command.FPRD, first, SYSTEM_TIME_DIFFERENCE, 1))
+    return pieces
+
+
+def _clock_piece(
+    command: Command, station: int, register: Register[int], expected_counter: int
+) -> _Piece:
+    address = station | register.address << 16
+    return _Piece(
+        DatagramKind.CLOCK, command, address, register.size, expected_counter, sync_unit=-1
     )
 
 

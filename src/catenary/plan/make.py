@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 from catenary.errors import ConfigurationError
 from catenary.model.device import DeviceDescription, Direction
-from catenary.plan.cycle import CyclePlan, Order, ReceiveMode, SyncUnit
+from catenary.plan.clocks import SyncPlan, choose_clocks, make_clock_plan, make_sync
+from catenary.plan.cycle import CyclePlan, FollowedClock, Order, ReceiveMode, SyncUnit
 from catenary.plan.frames import make_frames
 from catenary.plan.layout import DeviceData, Layout, make_layout
 from catenary.plan.mapping import Mapping, make_mapping
 from catenary.plan.report import report
 from catenary.plan.start_up import WATCHDOG_UNIT_NS, DevicePlan, make_device_plan
-from catenary.plan.wish import ObjectReference, PdoWish, Wish, WishTables
+from catenary.plan.wish import DC, ObjectReference, PdoWish, Wish, WishTables
 
 WATCHDOG_PERIODS = 3  # the watchdog must outlive that many lost cycles
 WATCHDOG_COUNT_MAX = 0xFFFF
@@ -52,12 +53,18 @@ def make_plan(
     lead: float = 0.0,
     cpu: int | None = None,
     priority: int | None = 80,
+    clock: FollowedClock = "reference",
+    reference: int | None = None,
+    margin: float | None = None,
 ) -> Plan:
     """The plan that fulfils all wishes, or an error that names the object that cannot be.
 
     `period` [s]; `watchdog` [s] of process data, None: off; `collect_share`: when threaded,
     the part of the period in which frames may come back; `late_limit_*`, `stop_deadline` [s];
-    `lead` [s]: inline and with a law, awake that long before the instant.
+    `lead` [s]: inline and with a law, awake that long before the instant. Where a wish asks for
+    distributed clocks: `clock`, whom the others follow; `reference`, position of the reference
+    clock (None: the first there is); `margin` [s] between the instant and the frames (None: by the
+    order).
     """
     period_ns = round(period * 1e9)
     if period_ns <= 0:
@@ -70,6 +77,9 @@ def make_plan(
         for device, (outputs, inputs) in zip(devices, mappings, strict=True)
     ]
     layout = make_layout(data, optional=optional)
+    syncs = _syncs(devices, asked, period_ns)
+    choice = choose_clocks(devices, _clock_wishes(asked), clock, reference)
+    frames = make_frames(layout.units, len(devices), choice)
     tables = tuple(wish.tables(layout) for wish in wishes)
     cycle = CyclePlan(
         period_ns=period_ns,
@@ -78,7 +88,7 @@ def make_plan(
         collect_deadline_ns=round(period_ns * collect_share),
         output_size=layout.output_size,
         input_size=layout.input_size,
-        frames=make_frames(layout.units, len(devices)),
+        frames=frames,
         sync_units=tuple(SyncUnit(u.name, u.devices, u.optional) for u in layout.units),
         device_count=len(devices),
         axes=tuple(axis for table in tables for axis in table.axes),
@@ -91,6 +101,9 @@ def make_plan(
         lead_ns=round(lead * 1e9),
         cpu=cpu,
         priority=priority,
+        clock=None
+        if choice is None
+        else make_clock_plan(choice, frames, len(devices), period_ns, order, margin),
     )
     plans = tuple(
         make_device_plan(
@@ -100,6 +113,7 @@ def make_plan(
             place,
             asked.get(device.position, PdoWish()).start_up,
             watchdog_ns if place.output_size else 0,
+            syncs.get(device.position),
         )
         for device, (outputs, inputs), place in zip(devices, mappings, layout.devices, strict=True)
     )
@@ -116,6 +130,7 @@ def gather_wishes(wishes: Sequence[Wish], period_ns: int) -> dict[int, PdoWish]:
                 _merged(before.outputs, pdos.outputs),
                 _merged(before.inputs, pdos.inputs),
                 before.start_up + tuple(d for d in pdos.start_up if d not in before.start_up),
+                _one_clock(position, before.clock, pdos.clock),
             )
     return gathered
 
@@ -134,6 +149,28 @@ def _asked(
                 hint="scan again, or correct the position",
             )
     return asked
+
+
+def _one_clock(position: int, first: DC | None, second: DC | None) -> DC | None:
+    if first is not None and second is not None and first != second:
+        raise ConfigurationError(
+            f"device {position}: two wishes ask for different clocks: {first} and {second}",
+            hint="give both the same dc=",
+        )
+    return first if second is None else second
+
+
+def _clock_wishes(asked: dict[int, PdoWish]) -> dict[int, DC]:
+    return {position: wish.clock for position, wish in asked.items() if wish.clock is not None}
+
+
+def _syncs(
+    devices: Sequence[DeviceDescription], asked: dict[int, PdoWish], period_ns: int
+) -> dict[int, SyncPlan]:
+    return {
+        position: make_sync(devices[position], wish, period_ns)
+        for position, wish in _clock_wishes(asked).items()
+    }
 
 
 def _merged(

@@ -6,10 +6,12 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 
 from catenary.model.device import Assignment, Direction
-from catenary.plan.cycle import CyclePlan, DatagramPlan
+from catenary.plan.clocks import SyncPlan
+from catenary.plan.cycle import ClockPlan, CyclePlan, DatagramPlan
 from catenary.plan.layout import Layout
 from catenary.plan.numbers import entry_places
 from catenary.plan.start_up import DevicePlan
+from catenary.wire.clock import Activation
 from catenary.wire.datagram import Command
 
 _ARROW = {Direction.OUTPUT: "out", Direction.INPUT: "in "}
@@ -17,7 +19,9 @@ _ARROW = {Direction.OUTPUT: "out", Direction.INPUT: "in "}
 
 def report(cycle: CyclePlan, devices: Sequence[DevicePlan], layout: Layout) -> str:
     """The lines of `print(plan)`."""
-    return "\n".join([*_heading(cycle), *_devices(devices), *_frames(cycle), *_units(layout)])
+    clocks = [] if cycle.clock is None else _clocks(cycle.clock, cycle.period_ns, devices)
+    lines = [*_heading(cycle), *_devices(devices), *clocks, *_frames(cycle), *_units(layout)]
+    return "\n".join(lines)
 
 
 def _heading(cycle: CyclePlan) -> Iterator[str]:
@@ -47,10 +51,38 @@ def _devices(devices: Sequence[DevicePlan]) -> Iterator[str]:
                 f"logical 0x{fmmu.logical_start:08X} + {fmmu.length}  "
                 f"→ 0x{fmmu.physical_start:04X}"
             )
+        if device.sync is not None:
+            yield f"    {_sync(device.sync)}"
         yield from _entries(Direction.OUTPUT, device.outputs, place.output_offset)
         yield from _entries(Direction.INPUT, device.inputs, place.input_offset)
         if device.downloads:
             yield f"    {len(device.downloads)} SDO downloads before SAFE-OP"
+
+
+def _sync(sync: SyncPlan) -> str:
+    """One device's SYNC signals, and what its application is told of them."""
+    second = f", SYNC1 {sync.sync1_ns / 1e3:g} us later" * (Activation.SYNC1 in sync.activation)
+    return (
+        f"SYNC0 every {sync.cycle_ns / 1e3:g} us, {sync.shift_ns / 1e3:+g} us to the beat{second}, "
+        f"AssignActivate 0x{sync.assign_activate:04X}"
+    )
+
+
+def _clocks(clock: ClockPlan, period_ns: int, devices: Sequence[DevicePlan]) -> Iterator[str]:
+    name = devices[clock.reference].name
+    follows = {
+        "reference": "the wake-up follows it",
+        "main": "it follows the MainDevice",
+    }[clock.follow]
+    yield f"reference clock: device {clock.reference} ({name}); {follows}"
+    yield (
+        f"    instants {(period_ns - clock.phase_ns) / 1e3:g} us before the beat: "
+        f"{clock.allowance_ns / 1e3:g} us until the frames, {clock.wire_ns / 1e3:g} us of frames"
+    )
+    yield (
+        f"    phase controller: time constant {period_ns / clock.bandwidth / 1e6:g} ms, at most "
+        f"{clock.rate_limit_ns / period_ns * 1e6:g} ppm of the period"
+    )
 
 
 def _entries(direction: Direction, assignments: Sequence[Assignment], offset: int) -> Iterator[str]:

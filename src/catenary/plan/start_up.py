@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from catenary.model.device import Assignment, DeviceDescription, Direction, Entry, Identity, Pdo
+from catenary.plan.clocks import SyncPlan
 from catenary.plan.layout import DeviceLayout
 from catenary.plan.mapping import Mapping
 
@@ -27,6 +28,7 @@ class Download:
     subindex: int
     data: bytes
     entry: Entry | None = None
+    optional: bool = False  # a device that has no such object, or one that is fixed, is left alone
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +45,7 @@ class DevicePlan:
     downloads: tuple[Download, ...]
     mapping_changed: bool  # the downloads begin with a new mapping
     watchdog_ns: int  # of process data; 0: off
+    sync: SyncPlan | None = None  # None: no SYNC signals
 
     @property
     def watchdog_count(self) -> int:
@@ -60,8 +63,11 @@ def make_device_plan(
     layout: DeviceLayout,
     start_up: Sequence[tuple[int, int, bytes]],
     watchdog_ns: int,
+    sync: SyncPlan | None = None,
 ) -> DevicePlan:
     wished = tuple(Download(index, subindex, data) for index, subindex, data in start_up)
+    told = sync.objects if sync is not None and device.coe else ()
+    clocks = tuple(Download(*each, optional=True) for each in told)
     return DevicePlan(
         position=device.position,
         name=device.name,
@@ -70,9 +76,10 @@ def make_device_plan(
         outputs=outputs.assignments,
         inputs=inputs.assignments,
         layout=layout,
-        downloads=(*mapping_downloads(outputs), *mapping_downloads(inputs), *wished),
+        downloads=(*mapping_downloads(outputs), *mapping_downloads(inputs), *wished, *clocks),
         mapping_changed=outputs.changed or inputs.changed,
         watchdog_ns=watchdog_ns,
+        sync=sync,
     )
 
 

@@ -34,6 +34,20 @@ class ObjectReference:
 
 
 @dataclass(frozen=True, slots=True)
+class DC:
+    """Distributed clocks for a device: SYNC0 every period, at the beat all devices share.
+
+    `shift` [s] of its SYNC0 behind the beat (negative: before), less than a cycle; `sync1` [s]: a
+    SYNC1 so long after its SYNC0; `assign_activate`: registers 0x0980 and 0x0981 as its ESI file
+    has them. None: as its SII says; where that says nothing, 0, no SYNC1 and 0x0300.
+    """
+
+    shift: float | None = None
+    sync1: float | None = None
+    assign_activate: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class PdoWish:
     """The objects one device must exchange every cycle. What is mapped already stays as it is;
     the mapping is changed only where something wished for is missing."""
@@ -43,6 +57,7 @@ class PdoWish:
     start_up: tuple[
         tuple[int, int, bytes], ...
     ] = ()  # SDO downloads in PRE-OP: index, subindex, data
+    clock: DC | None = None
 
 
 class ImageLayout(Protocol):

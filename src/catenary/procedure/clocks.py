@@ -71,7 +71,6 @@ def measure(
     clocks = [device for device in devices if device.controller.supports_clocks]
     if not clocks:
         return ClockMeasurement((None,) * len(devices), (None,) * len(devices), 0)
-    running = yield from _with_system_time(clocks)
     measured: list[list[ClockPlace]] = []
     for _ in range(latches):
         latched_ns = yield from _latch(clocks)
@@ -82,7 +81,7 @@ def measure(
     local = {d.position: _local_time(d, answers[d.position]) for d in clocks}
     return ClockMeasurement(
         delays_ns(measured),
-        tuple(local[d.position] if d.position in running else None for d in devices),
+        tuple(local[d.position] if d.clock_bits else None for d in devices),
         latched_ns,
     )
 
@@ -142,7 +141,7 @@ def distribute(device: DeviceDescription) -> Request:
 
 def read_system_time(device: DeviceDescription) -> Procedure[int]:
     """What its clock says now [ns]; of a 32-bit clock, the low half."""
-    register = SYSTEM_TIME if device.controller.clock_bits == 64 else SYSTEM_TIME_LOW
+    register = SYSTEM_TIME if device.clock_bits == 64 else SYSTEM_TIME_LOW
     [reply] = yield [read(Command.FPRD, device.station_address, register)]
     return register.unpack(answered(reply, _station(device), "its system time"))
 
@@ -153,15 +152,6 @@ def no_system_time(device: DeviceDescription) -> ClockError:
     return ClockError(
         f"{device}: a clock is asked of it, but it {what}",
         hint="leave it out of dc=, and choose another reference clock",
-    )
-
-
-def _with_system_time(clocks: Sequence[DeviceDescription]) -> Procedure[frozenset[int]]:
-    replies = yield [read(Command.FPRD, d.station_address, SYSTEM_TIME_LOW) for d in clocks]
-    return frozenset(
-        device.position
-        for device, reply in zip(clocks, replies, strict=True)
-        if not reply.lost and reply.working_counter == 1
     )
 
 
@@ -181,7 +171,7 @@ def _latch(clocks: Sequence[DeviceDescription]) -> Procedure[int]:
 def _questions(device: DeviceDescription) -> tuple[Request, Request]:
     """Port times, and the local time at the processing unit: of a 32-bit clock that is port 0's."""
     station = device.station_address
-    if device.controller.clock_bits == 64:
+    if device.clock_bits == 64:
         unit = read(Command.FPRD, station, RECEIVE_TIME_PROCESSING_UNIT)
     else:
         unit = read(Command.FPRD, station, RECEIVE_TIME_LATCH)
@@ -209,7 +199,7 @@ def _place(device: DeviceDescription, times: PortTimes | None) -> ClockPlace:
 
 def _alignment(device: DeviceDescription, offset: int, delay: int) -> tuple[Request, ...]:
     station = device.station_address
-    if device.controller.clock_bits == 64:
+    if device.clock_bits == 64:
         written = write(Command.FPWR, station, SYSTEM_TIME_OFFSET, offset % SPAN_64)
     else:  # ethercrab #322: eight bytes to a 32-bit clock are refused
         written = write(Command.FPWR, station, SYSTEM_TIME_OFFSET_LOW, offset % SPAN_32)

@@ -19,6 +19,8 @@ from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.sdo import download, upload
 
 NOT_THERE = frozenset((0x0602_0000, 0x0609_0011))  # no such object, no such subindex
+# ... or it cannot be written at all, or not now, or not with this value: it says what holds
+LEFT_ALONE = NOT_THERE | {0x0601_0000, 0x0601_0002, 0x0609_0030, 0x0800_0020, 0x0800_0022}
 
 
 def read_mapping(
@@ -43,6 +45,8 @@ def write_downloads(channel: MailboxChannel, plan: DevicePlan) -> Procedure[None
         try:
             yield from download(channel, step.index, step.subindex, step.data)
         except SdoAbort as abort:
+            if step.optional and abort.code in LEFT_ALONE:
+                continue
             if step.entry is None:
                 raise
             raise MappingError(

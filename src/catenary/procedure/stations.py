@@ -20,6 +20,7 @@ from catenary.wire.register import (
     SII_CONFIGURATION,
     STATION_ADDRESS,
     STATION_ALIAS,
+    SYSTEM_TIME_LOW,
 )
 from catenary.wire.sii_interface import CONFIGURATION_FORCE
 
@@ -38,6 +39,7 @@ class StationRegisters:
     alias: int
     dl_status: int
     information: bytes  # 0x0000 to 0x0009
+    system_time: bool = False  # answers to 0x0910: some clocks only stamp receive times
 
 
 def count() -> Procedure[int]:
@@ -139,13 +141,13 @@ def assign(device_count: int) -> Procedure[tuple[StationRegisters, ...]]:
 
 def read_registers(addresses: Sequence[int]) -> Procedure[tuple[StationRegisters, ...]]:
     """What every device's registers say, asked by station addresses, in the order of positions."""
-    per_device = 3
+    per_device = 4
     replies = yield [request for address in addresses for request in _questions(address)]
     registers = []
     for position, address in enumerate(addresses):
         station = Station(position, address)
         mine = replies[position * per_device : (position + 1) * per_device]
-        information, alias, dl_status = (answered(r, station, "registers") for r in mine)
+        information, alias, dl_status = (answered(r, station, "registers") for r in mine[:3])
         registers.append(
             StationRegisters(
                 position,
@@ -153,6 +155,7 @@ def read_registers(addresses: Sequence[int]) -> Procedure[tuple[StationRegisters
                 STATION_ALIAS.unpack(alias),
                 DL_STATUS.unpack(dl_status),
                 information,
+                system_time=mine[3].working_counter == 1,
             )
         )
     return tuple(registers)
@@ -172,6 +175,7 @@ def _questions(address: int) -> list[Request]:
         read(Command.FPRD, address, INFORMATION),
         read(Command.FPRD, address, STATION_ALIAS),
         read(Command.FPRD, address, DL_STATUS),
+        read(Command.FPRD, address, SYSTEM_TIME_LOW),
     ]
 
 

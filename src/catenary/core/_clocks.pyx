@@ -1,0 +1,341 @@
+# cython: boundscheck=False, wraparound=False, cdivision=True
+"""The cycle and the distributed clocks: the time in the frame, the phase of the instants, the watch.
+
+Every frame that leaves is stamped; what the reference clock said as it passed gives the phase of the
+instant it belonged to. A PI controller of rising inertia turns phase errors into longer or shorter
+periods (docs/clocks.md explains its gains); plan/clocks.py has the numbers. Where the clocks follow
+the MainDevice, the instants are set into phase once and stay on their grid.
+Its twin in Python: tests/core/phase_twin.py. Budget: 60 ns a cycle.
+"""
+
+from libc.math cimport fabs
+from libc.stdint cimport int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
+from libc.stdlib cimport calloc, free
+
+cdef enum:
+    HOLD = 2                   # an answer tells of an instant that was fixed two cycles before
+    REJECTED_MAX = 8           # errors beyond `step` in a row: the clock has jumped
+    SILENT_MAX = 16            # cycles without the reference before the clocks count as unlocked
+    SETTLE = 16                # cycles within the bound, besides a round of all followers
+
+cdef double FIRST_BANDWIDTH = 1.0 / 16
+cdef double SLOWING = 0.25     # the time constant grows by so many cycles a cycle
+cdef double MEAN_SHARE = 1.0 / 16
+cdef double DIFFERENCE_SHARE = 1.0 / 8
+
+
+# ---- the phase controller
+
+cdef inline double bounded(double value, double limit) noexcept nogil:
+    return limit if value > limit else -limit if value < -limit else value
+
+
+cdef inline int64_t wrapped(int64_t value, int64_t period) noexcept nogil:
+    """Into ± half a period."""
+    value %= period
+    if value >= period - period // 2:
+        value -= period
+    elif value < -(period // 2):
+        value += period
+    return value
+
+
+cdef int64_t moved(phase_t *p, double by) noexcept nogil:
+    """Whole nanoseconds of a correction; the rest waits."""
+    cdef int64_t whole
+    by += p.residue
+    whole = <int64_t>by
+    p.residue = by - whole
+    return whole
+
+
+cdef int64_t phase_coast(phase_t *p) noexcept nogil:
+    """A cycle without an answer: the drift found so far goes on."""
+    return moved(p, p.drift) if p.state == FOLLOWING else 0
+
+
+cdef int64_t phase_seek(phase_t *p, int64_t error) noexcept nogil:
+    """Sets the instants into phase at once, forward: none comes early."""
+    p.state = FOLLOWING
+    p.hold = HOLD
+    p.rejected = 0
+    p.bandwidth = FIRST_BANDWIDTH if FIRST_BANDWIDTH > p.bandwidth_end else p.bandwidth_end
+    p.mean = 0
+    p.steps += 1
+    return -error if error <= 0 else p.period - error
+
+
+cdef int64_t phase_step(phase_t *p, int64_t error) noexcept nogil:
+    """What to move the next instant by, for an error within ± half a period (positive: late)."""
+    cdef double wanted, applied, gain
+    if p.state == SEEKING:
+        return phase_seek(p, error)
+    if p.hold:
+        p.hold -= 1
+        return phase_coast(p)
+    if error > p.step or error < -p.step:
+        p.ignored += 1
+        p.rejected += 1
+        if p.rejected >= REJECTED_MAX:
+            p.state = SEEKING
+        return phase_coast(p)
+    p.rejected = 0
+    p.mean += (error - p.mean) * MEAN_SHARE
+    wanted = p.drift - 2 * p.bandwidth * error
+    applied = bounded(wanted, p.rate_limit)
+    if applied == wanted or (wanted > 0) == (error > 0):  # no wind-up: nothing further outwards
+        gain = p.bandwidth * p.bandwidth
+        p.drift = bounded(p.drift - gain * error, p.drift_limit)
+    p.bandwidth = p.bandwidth / (1 + SLOWING * p.bandwidth)
+    if p.bandwidth < p.bandwidth_end:
+        p.bandwidth = p.bandwidth_end
+    return moved(p, applied)
+
+
+# ---- the time in the frame
+
+cdef inline void put32(uint8_t *field, uint32_t value) noexcept nogil:
+    field[0] = value & 0xFF
+    field[1] = (value >> 8) & 0xFF
+    field[2] = (value >> 16) & 0xFF
+    field[3] = value >> 24
+
+
+cdef inline uint32_t word32(const uint8_t *data) noexcept nogil:
+    return data[0] | <uint32_t>data[1] << 8 | <uint32_t>data[2] << 16 | <uint32_t>data[3] << 24
+
+
+cdef inline int64_t expected_time(const clock_t *k, int64_t now) noexcept nogil:
+    """What the reference will say to a frame that leaves now."""
+    if k.follows_main or k.samples == 0:
+        return now + k.epoch
+    return k.time + (now - k.time_sent)
+
+
+cdef void clock_emit(clock_t *k, int64_t now) noexcept nogil:
+    """Right before the frame leaves. For devices that find no reference before them it carries
+    what the reference is expected to say: they go on as they are."""
+    k.payload = <uint32_t>expected_time(k, now)
+    put32(k.time_field, k.payload)
+    if k.main_field != NULL:
+        put32(k.main_field, <uint32_t>(now + k.epoch))
+    k.sent = now
+    k.sent_scheduled = k.scheduled
+    k.awaited = 1
+    if k.station_field != NULL:
+        k.turn = k.turn + 1 if k.turn + 1 < k.follower_count else 0
+        k.asked = k.turn
+        k.station_field[0] = k.followers[k.turn].station & 0xFF
+        k.station_field[1] = k.followers[k.turn].station >> 8
+
+
+cdef void take_time(clock_t *k, const uint8_t *data, uint16_t counter) noexcept nogil:
+    cdef uint32_t low = word32(data)
+    cdef int64_t expected = expected_time(k, k.sent)
+    if counter == 0 or (low == k.payload and counter != k.listeners):
+        return  # untouched: others took what we sent
+    k.time = expected + <int32_t>(low - <uint32_t>expected)
+    k.time_sent = k.sent
+    k.samples += 1
+    k.sampled = 1
+
+
+cdef void take_difference(clock_t *k, const uint8_t *data, uint16_t counter) noexcept nogil:
+    """0x092C is sign-magnitude. A device that does not answer keeps its last one: its process data
+    tells of it."""
+    cdef follower_t *f = &k.followers[k.asked]
+    cdef uint32_t raw = word32(data)
+    cdef int32_t value = <int32_t>(raw & 0x7FFFFFFF)
+    cdef int32_t magnitude = value
+    cdef uint8_t outside
+    if counter != 1:
+        return
+    if raw >> 31:
+        value = -value
+    f.last = value
+    f.mean = <double>value if f.reads == 0 else f.mean + (value - f.mean) * DIFFERENCE_SHARE
+    f.reads += 1
+    if magnitude > f.worst:
+        f.worst = magnitude
+    outside = fabs(f.mean) > k.bound
+    k.outside += outside
+    k.outside -= f.outside
+    f.outside = outside
+
+
+cdef void clock_take(clock_t *k, uint8_t command, const uint8_t *data,
+                     uint16_t counter) noexcept nogil:
+    """One datagram of the frame that came back; the frame may be shown again."""
+    if not k.awaited:
+        return
+    if command == FRMW:
+        take_time(k, data, counter)
+    elif command == FPRD:
+        take_difference(k, data, counter)
+
+
+# ---- the end of a cycle's input
+
+cdef int64_t follow_reference(clock_t *k) noexcept nogil:
+    """The error of the instant, not of the frame: how late it left after its instant is known."""
+    cdef int64_t at_instant
+    if not k.sampled:
+        return phase_coast(&k.phase)
+    at_instant = k.time - (k.time_sent - k.sent_scheduled)
+    k.error = wrapped(at_instant - k.target, k.phase.period)
+    return phase_step(&k.phase, k.error)
+
+
+cdef int64_t lead_reference(clock_t *k) noexcept nogil:
+    """The instants are set into phase with our own time; the error is the reference's."""
+    if k.sampled:
+        k.error = k.time - (k.time_sent + k.epoch)
+        k.phase.mean += (k.error - k.phase.mean) * MEAN_SHARE
+    if k.phase.state == SEEKING:
+        return phase_seek(&k.phase,
+                          wrapped(k.scheduled + k.epoch - k.target, k.phase.period))
+    return 0
+
+
+cdef void watch(clock_t *k) noexcept nogil:
+    """Whether all is within the bound: for a while, before it counts; at once, when it is left."""
+    cdef bint good = (k.phase.state == FOLLOWING and k.phase.hold == 0 and k.samples > 0
+                      and k.silent < SILENT_MAX and k.outside == 0
+                      and fabs(k.phase.mean) <= k.bound)
+    if not good:
+        k.good = 0
+        if k.locked:
+            k.locked = 0
+            k.changes += 1
+    elif not k.locked:
+        k.good += 1
+        if k.good > SETTLE + k.follower_count:
+            k.locked = 1
+            k.changes += 1
+
+
+cdef int64_t clock_close(clock_t *k) noexcept nogil:
+    """After the frames of a cycle have been looked for: what to move the next instant by [ns]."""
+    cdef int64_t move, magnitude
+    if k.sent == 0:
+        return 0
+    move = lead_reference(k) if k.follows_main else follow_reference(k)
+    if k.sampled:
+        k.silent = 0
+        magnitude = -k.error if k.error < 0 else k.error
+        if magnitude > k.worst_error:
+            k.worst_error = magnitude
+    else:
+        k.silent += 1
+        k.missed += 1
+    watch(k)
+    k.awaited = 0
+    k.sampled = 0
+    return move
+
+
+# ---- the edge
+
+cdef set_phase(phase_t *p, plan, int64_t period_ns):
+    if not (0 < plan.bandwidth <= 0.25 and 0 <= plan.rate_limit_ns <= 0.1 * period_ns
+            and 0 <= plan.drift_limit_ns <= plan.rate_limit_ns and 0 < plan.step_ns < period_ns):
+        raise ValueError(f"clock: impossible phase controller in {plan}")
+    p.period = period_ns
+    p.bandwidth_end = plan.bandwidth
+    p.rate_limit = plan.rate_limit_ns
+    p.drift_limit = plan.drift_limit_ns
+    p.step = plan.step_ns
+
+
+cdef class PhaseController:
+    """The controller alone, for tests beside its twin."""
+    cdef phase_t c
+
+    def __cinit__(self, plan, int64_t period_ns):
+        set_phase(&self.c, plan, period_ns)
+
+    def step(self, error_ns):
+        """What the next instant moves by [ns]; None: a cycle without an answer."""
+        return phase_coast(&self.c) if error_ns is None else phase_step(&self.c, error_ns)
+
+    @property
+    def drift(self):
+        return self.c.drift
+
+    @property
+    def bandwidth(self):
+        return self.c.bandwidth
+
+    @property
+    def steps(self):
+        return self.c.steps
+
+
+cdef class Clock:
+    def __cinit__(self, plan, int64_t period_ns):
+        set_phase(&self.c.phase, plan, period_ns)
+        if plan.follow not in ("reference", "main"):
+            raise ValueError(f"clock: follow {plan.follow!r}")
+        if len(plan.stations) > 0xFFFF or not 0 <= plan.phase_ns < period_ns:
+            raise ValueError(f"clock: {len(plan.stations)} followers, phase {plan.phase_ns}")
+        self.c.follows_main = plan.follow == "main"
+        self.c.target = plan.phase_ns
+        self.c.bound = plan.bound_ns
+        self.c.follower_count = len(plan.stations)
+        self.c.followers = <follower_t *>calloc(len(plan.stations) + 1, sizeof(follower_t))
+        if self.c.followers == NULL:
+            raise MemoryError
+        for number, station in enumerate(plan.stations):
+            self.c.followers[<uint32_t>number].station = station
+            self.c.followers[<uint32_t>number].outside = 1
+        self.c.outside = self.c.follower_count
+
+    def figures(self):
+        """The state, as numbers; times in ns."""
+        cdef clock_t *k = &self.c
+        return {
+            "locked": bool(k.locked),
+            "following": k.phase.state == FOLLOWING,
+            "time": k.time,
+            "error": k.error,
+            "mean_error": k.phase.mean,
+            "worst_error": k.worst_error,
+            "rate": -k.phase.drift / k.phase.period,
+            "samples": k.samples,
+            "missed": k.missed,
+            "silent": k.silent,
+            "ignored": k.phase.ignored,
+            "steps": k.phase.steps,
+        }
+
+    def differences(self):
+        """(mean, last, largest magnitude, reads) of every follower [ns]."""
+        cdef uint32_t i
+        return [
+            (self.c.followers[i].mean, self.c.followers[i].last, self.c.followers[i].worst,
+             self.c.followers[i].reads)
+            for i in range(self.c.follower_count)
+        ]
+
+    def reset_figures(self):
+        cdef uint32_t i
+        self.c.worst_error = 0
+        for i in range(self.c.follower_count):
+            self.c.followers[i].worst = 0
+
+    def keep_within(self, int64_t bound_ns):
+        if bound_ns <= 0:
+            raise ValueError(f"clock: a bound of {bound_ns} ns")
+        self.c.bound = bound_ns
+
+    def set_epoch(self, int64_t epoch_ns):
+        self.c.epoch = epoch_ns
+
+    @property
+    def changes(self):
+        """How often the clocks were locked or unlocked; reading it acknowledges them."""
+        self.c.acknowledged = self.c.changes
+        return self.c.changes
+
+    def __dealloc__(self):
+        free(self.c.followers)

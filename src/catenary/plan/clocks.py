@@ -1,0 +1,241 @@
+"""Which clocks run, who follows whom, when SYNC signals fire and where the frame sits before them.
+
+The beat: SYNC0 of all devices fires at multiples of the period of the reference clock's time, moved
+by each device's own shift. Frames leave so long before the beat that all devices have them by then:
+
+    instant ──allowance── frames on the wire ──hops── beat (SYNC0, shift 0)
+
+ETG.1020 §"Distributed clocks"; registers 0x0980 to 0x09A7: ETG.1000.4 §6.8.5. Start times and
+alignment as SOEM's `ecx_dcsync01` and IgH's `ec_fsm_slave_config_state_dc_sync_check`.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from catenary.errors import ConfigurationError
+from catenary.model.device import DeviceDescription
+from catenary.plan.cycle import ClockPlan, FollowedClock, FramePlan, Order
+from catenary.wire.clock import Activation
+from catenary.wire.frame import wire_time_ns
+
+if TYPE_CHECKING:  # needs NumPy, a scan does not
+    from catenary.plan.wish import DC
+
+SYNC_BY_ECAT = 0x0300  # AssignActivate: cyclic operation and SYNC0, controlled by EtherCAT
+START_DELAY_NS = 100_000_000  # to the first SYNC pulse: as SOEM (`SyncDelay`) and IgH
+HOP_NS = 1000  # through a device and its cable: 0.3 µs by E-bus, up to 1 µs by Ethernet PHYs
+# What of the period is left between the instant and the frames: threaded, the wake-up's lateness;
+# inline and with a law, the calculation too, which comes before the frames.
+ALLOWANCE: dict[Order, float] = {"threaded": 0.2, "inline": 0.5, "law": 0.5}
+
+# The phase controller (docs/clocks.md): a critically damped loop of this time constant, which
+# begins quick and slows down, and what it may do to the period.
+TIME_CONSTANT = 0.1  # [s]
+CYCLES_MIN = 16  # of a time constant, at least: the answer of a cycle comes one or two cycles later
+RATE_LIMIT = 1e-3  # of the period: a servo's interpolation sees no more
+DRIFT_LIMIT = 8e-4  # of the period, the part that stays: crystals 2 · 100 ppm, NTP slews by 500 ppm
+STEP_SHARE = 1 / 8  # of the period: a phase error beyond is no drift
+BOUND_NS = 1000
+
+SYNC_TYPE_SYNC0, SYNC_TYPE_SYNC1 = 2, 3  # 0x1C32:01 and 0x1C33:01, ETG.1020 §"Synchronization"
+SYNC_OBJECTS = (0x1C32, 0x1C33)
+
+
+@dataclass(frozen=True, slots=True)
+class SyncPlan:
+    """The SYNC unit of one device."""
+
+    assign_activate: int  # registers 0x0980 (low byte) and 0x0981
+    cycle_ns: int  # of SYNC0
+    sync1_ns: int  # SYNC1 so long after SYNC0
+    shift_ns: int  # of SYNC0 behind the beat
+
+    @property
+    def activation(self) -> Activation:
+        return Activation(self.assign_activate >> 8)
+
+    @property
+    def span_ns(self) -> int:
+        """After which the same signals come again: SYNC1 may come less often than SYNC0."""
+        return (self.sync1_ns // self.cycle_ns + 1) * self.cycle_ns
+
+    @property
+    def objects(self) -> tuple[tuple[int, int, bytes], ...]:
+        """What the application is told in PRE-OP: index, subindex, data."""
+        on_sync1 = Activation.SYNC1 in self.activation
+        kind = struct.pack("<H", SYNC_TYPE_SYNC1 if on_sync1 else SYNC_TYPE_SYNC0)
+        cycle = struct.pack("<I", self.span_ns)
+        return tuple(
+            (index, subindex, data)
+            for index in SYNC_OBJECTS
+            for subindex, data in ((1, kind), (2, cycle))
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class ClockChoice:
+    """Who takes part, before the frames are made."""
+
+    reference: DeviceDescription
+    followers: tuple[DeviceDescription, ...]  # with a SYNC signal, the reference left out
+    listeners: int  # devices that count a broadcast of the time, the reference too
+    follow: FollowedClock
+
+
+def choose_clocks(
+    devices: Sequence[DeviceDescription],
+    wishes: Mapping[int, DC],
+    follow: FollowedClock,
+    reference: int | None = None,
+) -> ClockChoice | None:
+    """The reference clock and who follows it; None where nobody wishes for clocks.
+
+    `reference`: a position; None: the first device with a system time, as every master does.
+    ConfigurationError for a device that has none, or that lies before its reference.
+    """
+    if not wishes:
+        return None
+    running = [device for device in devices if device.clock_bits]
+    chosen = running[0] if reference is None and running else None
+    if reference is not None:
+        chosen = _existing(devices, reference)
+    for position in sorted(wishes):
+        _check_follower(_existing(devices, position), chosen)
+    assert chosen is not None  # at least one wish has passed the check
+    if not chosen.clock_bits:
+        raise _no_clock(chosen, "it was given as the reference clock")
+    return ClockChoice(
+        chosen,
+        tuple(d for d in running if d.position in wishes and d is not chosen),
+        len(running),
+        follow,
+    )
+
+
+def make_sync(device: DeviceDescription, wish: DC, period_ns: int) -> SyncPlan:
+    """The SYNC unit of a device: what is wished for, else what its SII says, else SYNC0 alone."""
+    mode = next((m for m in device.clock_modes if _starts_sync0(m.assign_activate)), None)
+    cycle_ns = sync1_ns = shift_ns = 0
+    if mode is not None:
+        cycle_ns = mode.cycle_time_ns or _multiple(period_ns, mode.sync0_factor)
+        sync1_ns = max(mode.sync1_factor - 1, 0) * cycle_ns + mode.shift_time_1_ns
+        shift_ns = mode.shift_time_ns
+    assign = wish.assign_activate
+    if assign is None:
+        assign = mode.assign_activate if mode is not None else SYNC_BY_ECAT
+    if wish.sync1 is not None:
+        sync1_ns = round(wish.sync1 * 1e9)
+        assign |= Activation.SYNC1 << 8
+    if wish.shift is not None:
+        shift_ns = round(wish.shift * 1e9)
+    cycle_ns = cycle_ns or period_ns
+    plan = SyncPlan(assign, cycle_ns, max(0, sync1_ns), shift_ns)
+    _check_sync(device, plan, period_ns)
+    return plan
+
+
+def make_clock_plan(
+    choice: ClockChoice,
+    frames: Sequence[FramePlan],
+    device_count: int,
+    period_ns: int,
+    order: Order,
+    margin: float | None = None,
+) -> ClockPlan:
+    """Everything the cycle needs to know of clocks. `margin` [s]: between the instant and the
+    frames; None: by the order. ConfigurationError where the frames do not fit into the period."""
+    wire_ns = sum(wire_time_ns(len(frame.template)) for frame in frames) + HOP_NS * device_count
+    allowance_ns = round(ALLOWANCE[order] * period_ns if margin is None else margin * 1e9)
+    if allowance_ns < 0 or wire_ns + allowance_ns > period_ns:
+        raise ConfigurationError(
+            f"{wire_ns / 1e3:g} us of frames and {allowance_ns / 1e3:g} us before them do not fit "
+            f"into a period of {period_ns / 1e3:g} us",
+            hint="a longer period, or a smaller margin before the frames",
+        )
+    cycles = max(TIME_CONSTANT * 1e9 / period_ns, CYCLES_MIN)
+    return ClockPlan(
+        follow=choice.follow,
+        reference=choice.reference.position,
+        reference_station=choice.reference.station_address,
+        followers=tuple(device.position for device in choice.followers),
+        stations=tuple(device.station_address for device in choice.followers),
+        phase_ns=-(wire_ns + allowance_ns) % period_ns,
+        wire_ns=wire_ns,
+        allowance_ns=allowance_ns,
+        bandwidth=1 / cycles,
+        rate_limit_ns=RATE_LIMIT * period_ns,
+        drift_limit_ns=DRIFT_LIMIT * period_ns,
+        step_ns=round(STEP_SHARE * period_ns),
+        bound_ns=BOUND_NS,
+    )
+
+
+def start_time_ns(now_ns: int, syncs: Sequence[SyncPlan]) -> int:
+    """The first beat: far enough ahead to tell everybody, and where all SYNC signals coincide."""
+    span = math.lcm(*(sync.span_ns for sync in syncs))
+    return -(-(now_ns + START_DELAY_NS) // span) * span
+
+
+def _existing(devices: Sequence[DeviceDescription], position: int) -> DeviceDescription:
+    if not 0 <= position < len(devices):
+        raise ConfigurationError(
+            f"clocks: there is no device {position}, the segment has {len(devices)}",
+            hint="scan again, or correct the position",
+        )
+    return devices[position]
+
+
+def _check_follower(device: DeviceDescription, reference: DeviceDescription | None) -> None:
+    if not device.clock_bits:
+        raise _no_clock(device, "dc= was wished for it")
+    if reference is not None and device.position < reference.position:
+        raise ConfigurationError(
+            f"{device} lies before {reference}, the reference clock: frames pass it before they "
+            "carry the time",
+            hint="take a reference clock that lies before all devices with dc=",
+        )
+
+
+def _no_clock(device: DeviceDescription, why: str) -> ConfigurationError:
+    what = "only stamps receive times" if device.controller.supports_clocks else "has none"
+    return ConfigurationError(
+        f"{device}: {why}, but as a distributed clock it {what}",
+        hint="leave dc= out for this device, or look for a variant of it with distributed clocks",
+    )
+
+
+def _check_sync(device: DeviceDescription, plan: SyncPlan, period_ns: int) -> None:
+    if not _starts_sync0(plan.assign_activate):
+        raise ConfigurationError(
+            f"{device}: AssignActivate 0x{plan.assign_activate:04X} starts no SYNC0",
+            hint="its ESI file says the right one (Dc/OpMode/AssignActivate), often 0x0300",
+        )
+    if plan.cycle_ns % period_ns and period_ns % plan.cycle_ns:
+        raise ConfigurationError(
+            f"{device}: its SYNC0 comes every {plan.cycle_ns / 1e3:g} us, which does not go with a "
+            f"period of {period_ns / 1e3:g} us",
+            hint="one must be a multiple of the other",
+        )
+    if abs(plan.shift_ns) >= plan.span_ns:
+        raise ConfigurationError(
+            f"{device}: a shift of {plan.shift_ns / 1e3:g} us is no less than its cycle of "
+            f"{plan.span_ns / 1e3:g} us",
+            hint="shifts lie within one cycle, before or behind the beat",
+        )
+
+
+def _starts_sync0(assign_activate: int) -> bool:
+    """Free running modes have none; their shifts mean nothing (pollen_Orbita2d.bin: 1.9 s)."""
+    return assign_activate & SYNC_BY_ECAT == SYNC_BY_ECAT
+
+
+def _multiple(period_ns: int, factor: int) -> int:
+    """ETG.2000, Dc/OpMode/CycleTimeSync0@Factor: so many periods, or a part of one."""
+    if factor < 0:
+        return period_ns // -factor
+    return period_ns * (factor or 1)

@@ -1,0 +1,218 @@
+"""Who runs by whose clock, and when."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import replace
+
+import pytest
+
+from catenary.errors import ConfigurationError
+from catenary.model.device import DeviceDescription
+from catenary.plan.clocks import SyncPlan, make_sync, start_time_ns
+from catenary.plan.cycle import DatagramKind
+from catenary.plan.make import Plan, make_plan
+from catenary.plan.wish import DC, PdoWish
+from catenary.wire.datagram import Command, decode_datagram
+from catenary.wire.features import Feature
+from catenary.wire.sii_categories import ClockMode
+from tests.plan.devices import Asking, coupler, lamps, servo
+
+PERIOD_NS = 1_000_000
+LONG = Feature.DISTRIBUTED_CLOCKS | Feature.DISTRIBUTED_CLOCKS_64_BIT
+
+
+def clocked(device: DeviceDescription, *modes: ClockMode) -> DeviceDescription:
+    controller = replace(device.controller, features=device.controller.features | LONG)
+    return replace(device, controller=controller, system_time=True, clock_modes=modes)
+
+
+def cell() -> list[DeviceDescription]:
+    """A coupler with a clock, lamps without, two servos with."""
+    return [clocked(coupler(0)), lamps(1), clocked(servo(2)), clocked(servo(3))]
+
+
+def wishing(*positions: int, clock: DC | None = None) -> Asking:
+    return Asking({position: PdoWish(clock=clock or DC()) for position in positions})
+
+
+def planned(devices: list[DeviceDescription], *positions: int, **options: object) -> Plan:
+    return make_plan(devices, [wishing(*positions)], **options)  # type: ignore[arg-type]
+
+
+def clock_datagrams(plan: Plan) -> list[tuple[Command, int, int, int]]:
+    """Command, station, register and expected counter, in the order of the frame."""
+    frame = plan.cycle.frames[0]
+    found = []
+    for each in frame.datagrams:
+        if each.kind is DatagramKind.CLOCK:
+            datagram, _ = decode_datagram(frame.template, each.offset)
+            found.append((datagram.command, datagram.adp, datagram.ado, each.expected_counter))
+    return found
+
+
+def test_nobody_wishes_for_clocks() -> None:
+    plan = make_plan(cell())
+    assert plan.cycle.clock is None
+    assert clock_datagrams(plan) == []
+    assert all(device.sync is None for device in plan.devices)
+
+
+def test_the_first_clock_is_the_reference() -> None:
+    plan = planned(cell(), 2, 3)
+    assert plan.cycle.clock is not None
+    assert plan.cycle.clock.reference == 0
+    assert plan.cycle.clock.followers == (2, 3)
+    assert clock_datagrams(plan) == [
+        (Command.FRMW, 0x1001, 0x0910, 3),
+        (Command.FPRD, 0x1003, 0x092C, 1),
+    ]
+
+
+def test_a_reference_that_is_given() -> None:
+    plan = planned(cell(), 2, 3, reference=2)
+    assert plan.cycle.clock is not None
+    assert (plan.cycle.clock.reference, plan.cycle.clock.followers) == (2, (3,))
+
+
+def test_the_reference_follows_us() -> None:
+    plan = planned(cell(), 2, clock="main")
+    assert clock_datagrams(plan)[:2] == [
+        (Command.FPWR, 0x1001, 0x0910, 1),
+        (Command.FRMW, 0x1001, 0x0910, 3),
+    ]
+
+
+def test_a_reference_alone_has_nobody_to_watch() -> None:
+    plan = planned([clocked(servo(0))], 0)
+    assert clock_datagrams(plan) == [(Command.FRMW, 0x1001, 0x0910, 1)]
+
+
+def test_frames_are_through_before_the_beat() -> None:
+    plan = planned(cell(), 2, 3)
+    clock = plan.cycle.clock
+    assert clock is not None
+    size = len(plan.cycle.frames[0].template)
+    assert clock.wire_ns == (size + 24) * 80 + 4 * 1000  # 100 Mbit/s; a microsecond a device
+    assert clock.allowance_ns == 0.2 * PERIOD_NS
+    assert clock.phase_ns == PERIOD_NS - clock.wire_ns - clock.allowance_ns
+    inline = planned(cell(), 2, 3, order="inline").cycle.clock
+    assert inline is not None
+    assert inline.allowance_ns == 0.5 * PERIOD_NS
+    given = planned(cell(), 2, 3, margin=10e-6).cycle.clock
+    assert given is not None
+    assert given.allowance_ns == 10_000
+
+
+def test_frames_that_do_not_fit() -> None:
+    with pytest.raises(ConfigurationError, match="do not fit into a period of 1000 us"):
+        planned(cell(), 2, margin=0.99e-3)
+
+
+def test_the_controller_slows_down_to_the_same_time_at_any_period() -> None:
+    for period, bandwidth in ((1e-3, 0.01), (250e-6, 0.0025), (20e-3, 1 / 16)):
+        clock = planned(cell(), 2, period=period).cycle.clock
+        assert clock is not None
+        assert clock.bandwidth == pytest.approx(bandwidth)
+        assert clock.rate_limit_ns == pytest.approx(period * 1e6)
+
+
+@pytest.mark.parametrize(
+    ("positions", "options", "message"),
+    [
+        ((1,), {}, r"device 1 \(Lamps\): dc= was wished for it, but .* has none"),
+        ((2,), {"reference": 1}, "given as the reference clock, but .* has none"),
+        ((2,), {"reference": 3}, r"device 2 \(Servo\) lies before device 3 \(Servo\)"),
+        ((2,), {"reference": 4}, "there is no device 4, the segment has 4"),
+    ],
+)
+def test_what_cannot_be(
+    positions: tuple[int, ...], options: dict[str, object], message: str
+) -> None:
+    with pytest.raises(ConfigurationError, match=message):
+        planned(cell(), *positions, **options)
+
+
+def test_a_clock_that_only_stamps() -> None:
+    devices = cell()
+    devices[2] = replace(devices[2], system_time=False)
+    with pytest.raises(ConfigurationError, match="only stamps receive times"):
+        planned(devices, 2)
+
+
+def test_two_wishes_for_one_clock() -> None:
+    one, other = wishing(2), wishing(2, clock=DC(shift=1e-4))
+    with pytest.raises(ConfigurationError, match="device 2: two wishes"):
+        make_plan(cell(), [one, other])
+    assert make_plan(cell(), [one, one, Asking({2: PdoWish()})]).devices[2].sync is not None
+
+
+def sync(wish: DC, *modes: ClockMode) -> SyncPlan:
+    return make_sync(clocked(servo(0), *modes), wish, PERIOD_NS)
+
+
+def test_sync_without_any_knowledge_is_sync0_at_the_beat() -> None:
+    assert sync(DC()) == SyncPlan(0x0300, PERIOD_NS, 0, 0)
+
+
+def test_sync_as_the_sii_says() -> None:
+    free = ClockMode(shift_time_ns=1_882_234_944)  # of a real image: pollen_Orbita2d.bin
+    mode = ClockMode(shift_time_ns=-20_000, shift_time_1_ns=5_000, assign_activate=0x0700)
+    assert sync(DC(), free, mode) == SyncPlan(0x0700, PERIOD_NS, 5_000, -20_000)
+
+
+def test_sync_of_parts_and_multiples_of_the_period() -> None:
+    part = ClockMode(sync0_factor=-4, sync1_factor=4, assign_activate=0x0700)
+    assert sync(DC(), part) == SyncPlan(0x0700, 250_000, 750_000, 0)
+    assert sync(DC(), part).span_ns == PERIOD_NS
+    double = ClockMode(sync0_factor=2, assign_activate=0x0300)
+    assert sync(DC(), double).cycle_ns == 2 * PERIOD_NS
+
+
+def test_sync_as_wished() -> None:
+    mode = ClockMode(shift_time_ns=-20_000, assign_activate=0x0300)
+    assert sync(DC(shift=1e-4, sync1=2e-5), mode) == SyncPlan(0x0700, PERIOD_NS, 20_000, 100_000)
+    assert sync(DC(assign_activate=0x0320), mode).assign_activate == 0x0320
+
+
+@pytest.mark.parametrize(
+    ("wish", "mode", "message"),
+    [
+        (DC(assign_activate=0x0100), ClockMode(), "0x0100 starts no SYNC0"),
+        (DC(shift=1e-3), ClockMode(), "a shift of 1000 us"),
+        (DC(), ClockMode(cycle_time_ns=300_000, assign_activate=0x0300), "every 300 us"),
+    ],
+)
+def test_sync_that_cannot_be(wish: DC, mode: ClockMode, message: str) -> None:
+    with pytest.raises(ConfigurationError, match=message):
+        sync(wish, mode)
+
+
+def test_what_the_application_is_told_may_be_refused() -> None:
+    """0x1C32 and 0x1C33: type and cycle time; who has no mailbox is told nothing."""
+    plan = planned([clocked(coupler(0)), clocked(servo(1))], 0, 1)
+    told = [(d.index, d.subindex, d.data) for d in plan.devices[1].downloads if d.optional]
+    cycle = struct.pack("<I", PERIOD_NS)
+    assert told == [
+        (index, subindex, data)
+        for index in (0x1C32, 0x1C33)
+        for subindex, data in ((1, b"\x02\x00"), (2, cycle))
+    ]
+    assert plan.devices[0].downloads == ()
+
+
+def test_all_start_at_a_common_beat_far_enough_ahead() -> None:
+    every_third = SyncPlan(0x0700, PERIOD_NS, 2 * PERIOD_NS, 0)
+    every = SyncPlan(0x0300, PERIOD_NS, 0, 0)
+    for now in (0, 1, 123_456_789, 10**18 + 1):
+        start = start_time_ns(now, [every, every_third])
+        assert start % (3 * PERIOD_NS) == 0
+        assert 100_000_000 <= start - now < 103_000_000
+
+
+def test_it_prints() -> None:
+    text = str(planned(cell(), 2, 3))
+    assert "reference clock: device 0 (Coupler); the wake-up follows it" in text
+    assert "SYNC0 every 1000 us, +0 us to the beat, AssignActivate 0x0300" in text
+    assert "us before the beat: 200 us until the frames" in text
+    assert "time constant 100 ms, at most 1000 ppm of the period" in text
