@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from catenary.cli import alias, bench, demo, realtime, reg, scan, sdo, state, virtual
+from catenary.cli import alias, bench, demo, realtime, reg, scan, sdo, sii, state, virtual
 from catenary.cli.failure import INTERRUPTED, USAGE, report, silence_stdout
 
 DESCRIPTION = "Real-time EtherCAT for Python."
@@ -47,7 +47,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action=ShowVersion, nargs=0, help="print the version")
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for command in (scan, state, sdo, reg, alias, demo, bench, virtual, realtime):
+    for command in (scan, state, sdo, reg, alias, sii, demo, bench, virtual, realtime):
         command.add_parser(commands)
     return parser
 

@@ -1,0 +1,76 @@
+"""Whole EEPROMs, in parts: they take seconds, so somebody may want to see how far it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Protocol, TypeAlias, TypeVar
+
+from catenary.errors import CatenaryError, EepromError
+from catenary.procedure.exchange import Procedure
+from catenary.procedure.sii import read_words
+from catenary.procedure.sii_owner import with_eeprom
+from catenary.procedure.sii_write import Change, write_words
+from catenary.procedure.station import Station
+from catenary.wire.sii import CHECKSUM_WORD, CONFIGURATION_WORDS
+
+T = TypeVar("T")
+Progress: TypeAlias = Callable[[int, int], None]  # words done, of how many
+
+WORDS_READ = 256  # between two reports
+WORDS_WRITTEN = 16
+
+
+class Conversing(Protocol):
+    """A MainDevice, as far as it is needed."""
+
+    def converse(self, procedure: Procedure[T]) -> T: ...
+
+
+def silent(done: int, total: int) -> None:
+    """Reports nothing."""
+
+
+def read_eeprom(
+    main: Conversing, station: Station, size: int, *, progress: Progress = silent
+) -> bytes:
+    """The first `size` bytes, as they are."""
+    total = size // 2
+    data = b""
+    for first in range(0, total, WORDS_READ):
+        count = min(WORDS_READ, total - first)
+        data += main.converse(with_eeprom(station, read_words(station, first, count)))
+        progress(first + count, total)
+    return data
+
+
+def write_eeprom(
+    main: Conversing, station: Station, wanted: Sequence[Change], *, progress: Progress = silent
+) -> None:
+    """Writes words in their order, each read back. EepromError says how far it got, and what the
+    device is now."""
+    for first in range(0, len(wanted), WORDS_WRITTEN):
+        part = wanted[first : first + WORDS_WRITTEN]
+        try:
+            main.converse(with_eeprom(station, write_words(station, part)))
+        except CatenaryError as error:
+            raise EepromError(
+                f"{error.message}; {aftermath(wanted, first, first + len(part))}",
+                hint=f"{error.hint}. Write the same file again when that is done"
+                if error.hint
+                else "write the same file again",
+            ) from error
+        progress(first + len(part), len(wanted))
+
+
+def aftermath(wanted: Sequence[Change], done: int, begun: int) -> str:
+    """What a device is after a write that broke off: `done` words are written, and perhaps some of
+    those up to `begun`."""
+    touched = any(each.word < CONFIGURATION_WORDS for each in wanted[:begun])
+    sealed = all(each.word != CHECKSUM_WORD for each in wanted[done:])
+    how = f"of {len(wanted)} words {done} are written, perhaps a few more"
+    if touched and not sealed:
+        return (
+            f"{how}, and the checksum may not fit: after its next power-up the controller may not "
+            "load its configuration, but its EEPROM can be written"
+        )
+    return f"{how}: it starts as before, but its description is a mixture of old and new"

@@ -1,0 +1,25 @@
+"""How far a long conversation is: one line on the terminal, nothing where nobody looks."""
+
+from __future__ import annotations
+
+import sys
+from typing import Self
+
+
+class Progress:
+    """Owns one line of stderr."""
+
+    def __init__(self, verb: str) -> None:
+        self._verb = verb
+        self._shown = sys.stderr.isatty()
+
+    def __call__(self, done: int, total: int) -> None:
+        if self._shown:
+            print(f"\r{self._verb}: {done} of {total} words", end="", file=sys.stderr, flush=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc_info: object) -> None:
+        if self._shown:
+            print("\r\033[K", end="", file=sys.stderr, flush=True)

@@ -1,0 +1,223 @@
+"""`catenary sii read|write`: the EEPROM of a device."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from catenary.cli.arguments import positive_number
+from catenary.cli.parsers import Commands, add_command, add_position, add_target
+
+if TYPE_CHECKING:
+    from catenary.bus import MainDevice, SubDevice
+    from catenary.procedure.sii_size import Extent
+
+DUMP_WIDTH = 16
+
+
+def add_parser(commands: Commands) -> None:
+    group = add_command(
+        commands,
+        "sii",
+        help="read or write the EEPROM of a device",
+        description="Reads or writes the EEPROM (SII) in which a device keeps its identity, "
+        "mailbox and process data.",
+        example="catenary sii read eth0 2 --text\ncatenary sii write eth0 2 drive.bin --dry-run",
+    ).add_subparsers(title="commands", metavar="COMMAND", required=True)
+    reading = add_command(
+        group,
+        "read",
+        help="read the whole EEPROM",
+        description="Reads the whole EEPROM, whatever is in it, and checks it. Without options it "
+        "is shown in hexadecimal.",
+        example="catenary sii read eth0 2 -o drive.bin\ncatenary sii read eth0 2 --text",
+    )
+    add_target(reading)
+    add_position(reading)
+    reading.add_argument("-o", "--output", metavar="FILE", help="store the bytes; - is stdout")
+    reading.add_argument("--text", action="store_true", help="say what it means")
+    reading.add_argument(
+        "--bytes", metavar="N", type=positive_number, help="so many, instead of the size it claims"
+    )
+    reading.set_defaults(run=run_read)
+    writing = add_command(
+        group,
+        "write",
+        help="write an image into the EEPROM",
+        description="Checks FILE (length, checksum, categories, size of the EEPROM, identity), "
+        "shows what differs, writes the words that differ and reads them back. The device takes "
+        "them over when it is switched off and on.",
+        example="catenary sii read eth0 2 -o before.bin\n"
+        "catenary sii write eth0 2 drive.bin --dry-run\n"
+        "catenary sii write eth0 2 drive.bin",
+    )
+    add_target(writing)
+    add_position(writing)
+    writing.add_argument("file", metavar="FILE", type=Path, help="the image, as its bytes")
+    writing.add_argument("--dry-run", action="store_true", help="show what differs, write nothing")
+    writing.add_argument("--force", action="store_true", help="write though an objection allows it")
+    writing.set_defaults(run=run_write)
+
+
+def run_read(arguments: argparse.Namespace) -> int:
+    from catenary.bus.eeprom import read_eeprom
+    from catenary.cli.devices import device_at
+    from catenary.cli.progress import Progress
+    from catenary.procedure.sii_owner import with_eeprom
+    from catenary.procedure.sii_size import read_extent
+    from catenary.target import MainDevice
+    from catenary.wire.sii_check import objections
+
+    with MainDevice(arguments.target) as main:
+        station = device_at(main.look(names=False), arguments.position).station
+        extent = main.converse(with_eeprom(station, read_extent(station)))
+        size = min(arguments.bytes or extent.size, extent.limit) // 2 * 2
+        with Progress("read") as progress:
+            image = read_eeprom(main, station, size, progress=progress)
+    deliver(arguments, image)
+    notes = [extent.note] if extent.note else [each.text for each in objections(image)]
+    if arguments.bytes is None:
+        for note in notes:
+            print(f"catenary: {station}: {note}", file=sys.stderr)
+    return int(bool(notes) and arguments.bytes is None)
+
+
+def deliver(arguments: argparse.Namespace, image: bytes) -> None:
+    """Into a file, as text, or as a dump."""
+    if arguments.output == "-":
+        sys.stdout.buffer.write(image)
+    elif arguments.output is not None:
+        Path(arguments.output).write_bytes(image)
+    if arguments.text:
+        print("\n".join(as_text(image)))
+    elif arguments.output is None:
+        print("\n".join(dump(image)))
+
+
+def as_text(image: bytes) -> list[str]:
+    from catenary.cli.sii_text import text_lines, tolerant
+    from catenary.errors import DecodeError
+
+    try:
+        return text_lines(tolerant(image))
+    except DecodeError as error:
+        return [f"cannot be read as an image: {error.message}"]
+
+
+def dump(image: bytes) -> list[str]:
+    """In hexadecimal with texts; lines that repeat are left out, as hexdump does."""
+    lines: list[str] = []
+    before = None
+    for start in range(0, len(image), DUMP_WIDTH):
+        row = image[start : start + DUMP_WIDTH]
+        if row == before and lines[-1] != "*":
+            lines.append("*")
+        elif row != before:
+            text = "".join(chr(byte) if 0x20 <= byte < 0x7F else "." for byte in row)
+            lines.append(f"{start:06x}  {row.hex(' '):<47}  {text}")
+        before = row
+    return [*lines, f"{len(image):06x}"]
+
+
+def run_write(arguments: argparse.Namespace) -> int:
+    from catenary.bus.eeprom import read_eeprom, write_eeprom
+    from catenary.cli.devices import device_at
+    from catenary.cli.progress import Progress
+    from catenary.procedure.sii_owner import with_eeprom
+    from catenary.procedure.sii_size import read_extent
+    from catenary.procedure.sii_write import changes
+    from catenary.target import MainDevice
+
+    image = arguments.file.read_bytes()
+    refuse_bad(image, arguments)
+    with MainDevice(arguments.target) as main:
+        device = device_at(main.look(), arguments.position)
+        station = device.station
+        extent = main.converse(with_eeprom(station, read_extent(station)))
+        refuse_unfit(image, device, extent, arguments.force)
+        with Progress("read") as progress:
+            old = read_eeprom(main, station, len(image), progress=progress)
+        wanted = changes(old, image)
+        print("\n".join(report(device, old, image, len(wanted))))
+        if arguments.dry_run or not wanted:
+            return 0
+        with Progress("write") as progress:
+            write_eeprom(main, station, wanted, progress=progress)
+        verify(main, device, image)
+    print(f"{len(wanted)} words written and read back; switch the device off and on")
+    return 0
+
+
+def refuse_bad(image: bytes, arguments: argparse.Namespace) -> None:
+    """EepromError where the image is none."""
+    from catenary.errors import EepromError
+    from catenary.wire.sii_check import objections
+
+    for each in objections(image):
+        if each.insist and arguments.force:
+            print(f"catenary: {arguments.file}: {each.text}: --force", file=sys.stderr)
+            continue
+        more = "; --force writes it all the same" if each.insist else ""
+        raise EepromError(f"{arguments.file}: {each.text}", hint=each.hint + more)
+
+
+def refuse_unfit(image: bytes, device: SubDevice, extent: Extent, force: bool) -> None:
+    """EepromError where the image is not for this device."""
+    from catenary.cli.sii_text import tolerant
+    from catenary.errors import EepromError
+
+    if len(image) > extent.limit:
+        raise EepromError(
+            f"{device.station}: the image has {len(image)} bytes, its controller addresses "
+            f"{extent.limit} of its EEPROM",
+            hint="it is an image for another device",
+        )
+    if force:
+        return
+    if len(image) > extent.size and not extent.note:
+        raise EepromError(
+            f"{device.station}: the image has {len(image)} bytes, its EEPROM {extent.size}",
+            hint="an image for another device? --force if the size in its header is wrong",
+        )
+    new, now = tolerant(image).header, device.identity
+    if now.vendor and (new.vendor, new.product) != (now.vendor, now.product) and not extent.note:
+        raise EepromError(
+            f"{device.station}: the image is of vendor 0x{new.vendor:08X} product "
+            f"0x{new.product:08X}, the device is vendor 0x{now.vendor:08X} product "
+            f"0x{now.product:08X}",
+            hint="the right POSITION? --force makes it another product",
+        )
+
+
+def report(device: SubDevice, old: bytes, new: bytes, words: int) -> list[str]:
+    """What will be different."""
+    from catenary.cli.sii_text import differences, tolerant
+    from catenary.errors import DecodeError
+
+    if not words:
+        return [f"{device.station}: its EEPROM holds that already"]
+    lines = [f"{device.station}: {words} of {len(new) // 2} words differ"]
+    try:
+        return lines + differences(tolerant(old), tolerant(new))
+    except DecodeError as error:
+        return [*lines, f"not comparable in words: {error.message}"]
+
+
+def verify(main: MainDevice, device: SubDevice, image: bytes) -> None:
+    """Reads all of it once more. EepromError where it is not what was written."""
+    from catenary.bus.eeprom import read_eeprom
+    from catenary.cli.progress import Progress
+    from catenary.errors import EepromError
+    from catenary.procedure.sii_write import changes
+
+    with Progress("verify") as progress:
+        found = read_eeprom(main, device.station, len(image), progress=progress)
+    wrong = changes(found, image)
+    if wrong:
+        raise EepromError(
+            f"{device.station}: {len(wrong)} words read back differently, the first is "
+            f"0x{wrong[0].word:04X}",
+            hint="write once more; a worn EEPROM must be replaced",
+        )

@@ -1,0 +1,62 @@
+"""How large an EEPROM is: what its image says, where that can be believed."""
+
+from __future__ import annotations
+
+import struct
+from typing import NamedTuple
+
+from catenary.errors import DecodeError
+from catenary.procedure.exchange import Procedure, read
+from catenary.procedure.sii import CATEGORIES_MAX, END, HEADER_WORDS, read_words
+from catenary.procedure.station import Station, answered
+from catenary.wire.datagram import Command
+from catenary.wire.register import SII_CONTROL_STATUS
+from catenary.wire.sii import MAXIMUM_SIZE, decode_header
+from catenary.wire.sii_check import BYTES_PER_KBIT
+from catenary.wire.sii_interface import ControlStatus
+
+SMALL = 2048  # bytes: what one address byte reaches, 16 kbit
+CAUTIOUS = 4096  # bytes: the smallest EEPROM with two address bytes
+
+
+class Extent(NamedTuple):
+    """The size of an EEPROM, and what there is to say about it."""
+
+    size: int  # bytes
+    limit: int  # bytes that its controller can address
+    note: str = ""
+
+
+def read_extent(station: Station) -> Procedure[Extent]:
+    """The size by the header; where that is damaged, up to the end mark; where there is none, a
+    small bound. An image that goes on for ever, as an unprogrammed one, ends here."""
+    [reply] = yield [read(Command.FPRD, station.address, SII_CONTROL_STATUS)]
+    word = SII_CONTROL_STATUS.unpack(answered(reply, station, "SII status"))
+    limit = MAXIMUM_SIZE if ControlStatus.from_word(word).two_byte_address else SMALL
+    data = yield from read_words(station, 0, HEADER_WORDS)
+    try:
+        size = decode_header(data).size_kbit * BYTES_PER_KBIT
+    except DecodeError as error:
+        end = yield from _end_of_categories(station, limit)
+        if end is None:
+            bound = min(limit, CAUTIOUS)
+            return Extent(bound, limit, f"{error.message}; no end mark: {bound} bytes are shown")
+        return Extent(end, limit, f"{error.message}; {end} bytes up to the end mark")
+    if size <= limit:
+        return Extent(size, limit)
+    return Extent(
+        limit, limit, f"its header says {size} bytes, its controller addresses {limit} of them"
+    )
+
+
+def _end_of_categories(station: Station, limit: int) -> Procedure[int | None]:
+    """Bytes up to and with the end mark; None: there is none within reason."""
+    word = HEADER_WORDS
+    for _ in range(CATEGORIES_MAX):
+        kind, length = struct.unpack("<HH", (yield from read_words(station, word, 2)))
+        if kind == END:
+            return 2 * (word + 1)
+        word += 2 + length
+        if 2 * word >= limit:
+            break
+    return None

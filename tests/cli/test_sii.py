@@ -1,0 +1,161 @@
+"""`sii read` and `sii write` on one virtual segment that lives through several commands."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+import pytest
+
+import catenary as cat
+from catenary.cli.main import main
+from catenary.cli.sii import dump
+from catenary.wire.sii import checksum_of
+
+
+@pytest.fixture
+def segment(monkeypatch: pytest.MonkeyPatch) -> cat.Segment:
+    segment = cat.Segment([cat.Coupler(), cat.Servo(), cat.Servo(name="wrist", serial=7)])
+    monkeypatch.setattr("catenary.target.main_device.parse", lambda _: segment)
+    return segment
+
+
+def call(line: str, capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    status = main(shlex.split(line))
+    printed = capsys.readouterr()
+    return status, printed.out, printed.err
+
+
+def spoil(segment: cat.Segment, position: int, *words: tuple[int, int]) -> None:
+    from catenary.procedure.sii_write import Change, write_words
+
+    with cat.MainDevice(segment) as opened:
+        station = opened.look(names=False)[position].station
+        opened.converse(write_words(station, [Change(*each) for each in words]))
+
+
+def test_what_is_read_is_what_is_there(
+    segment: cat.Segment, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "servo.bin"
+    assert call(f"sii read eth9 1 -o {path}", capsys) == (0, "", "")
+    assert path.read_bytes() == segment.core.sii_image(1)
+
+
+def test_text_says_what_it_means(segment: cat.Segment, capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = call("sii read eth9 2 --text", capsys)
+    lines = out.splitlines()
+    assert status == 0
+    assert "serial 7" in lines
+    assert "name 'wrist'" in lines
+    assert "SyncManager 2: 13 bytes at 0x1100, control 0x64, enable 0x01, use 3" in lines
+    assert "RxPDO 0x1600   0x6040:00 16 bits 'Controlword'" in lines
+
+
+def test_the_dump_leaves_out_lines_that_repeat() -> None:
+    assert dump(b"EtherCAT" * 2 + bytes(64)) == [
+        "000000  45 74 68 65 72 43 41 54 45 74 68 65 72 43 41 54  EtherCATEtherCAT",
+        "000010  00 00 00 00 00 00 00 00 00 00 00 00 00 00 00 00  ................",
+        "*",
+        "000050",
+    ]
+
+
+def test_a_write_shows_what_differs_writes_it_and_reads_it_back(
+    segment: cat.Segment, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "wrist.bin"
+    call(f"sii read eth9 2 -o {path}", capsys)
+    status, out, _ = call(f"sii write eth9 1 {path} --dry-run", capsys)
+    assert status == 0
+    assert "-serial 0\n+serial 7\n" in out
+    assert "-name 'Catenary virtual servo'\n+name 'wrist'\n" in out
+    assert segment.core.sii_image(1) != path.read_bytes()
+    status, out, _ = call(f"sii write eth9 1 {path}", capsys)
+    assert status == 0
+    assert out.endswith("words written and read back; switch the device off and on\n")
+    assert segment.core.sii_image(1) == path.read_bytes()
+    assert call(f"sii write eth9 1 {path}", capsys)[1].endswith("holds that already\n")
+
+
+def test_a_broken_checksum_is_named_and_can_be_repaired(
+    segment: cat.Segment, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "servo.bin"
+    call(f"sii read eth9 1 -o {path}", capsys)
+    spoil(segment, 1, (7, 0))
+    status, out, err = call("sii read eth9 1 --text", capsys)
+    assert status == 1
+    assert "serial 0" in out
+    assert "device 1: SII: checksum 0x0000, expected 0x" in err
+    assert call(f"sii write eth9 1 {path}", capsys)[0] == 0
+    assert call("sii read eth9 1 --text", capsys)[0] == 0
+
+
+def test_categories_without_an_end_are_bounded_and_named(
+    segment: cat.Segment, capsys: pytest.CaptureFixture[str]
+) -> None:
+    spoil(segment, 1, *((word, 0) for word in range(8)), *((w, 0) for w in range(0x40, 0xC0)))
+    status, out, err = call("sii read eth9 1", capsys)
+    assert status == 1
+    assert out.splitlines()[-1] == "001000"
+    assert "no end mark: 4096 bytes are shown" in err
+
+
+def test_another_products_image_needs_insisting(
+    segment: cat.Segment, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "coupler.bin"
+    call(f"sii read eth9 0 -o {path}", capsys)
+    before = segment.core.sii_image(1)
+    status, _, err = call(f"sii write eth9 1 {path}", capsys)
+    assert status == 1
+    assert "the right POSITION? --force makes it another product" in err
+    assert segment.core.sii_image(1) == before
+    assert call(f"sii write eth9 1 {path} --force", capsys)[0] == 0
+    assert segment.core.sii_image(1) == path.read_bytes()
+
+
+def test_a_wrong_checksum_is_refused_whoever_insists(
+    segment: cat.Segment, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "edited.bin"
+    image = bytearray(segment.core.sii_image(1))
+    image[8] = 5  # the alias, by hand
+    path.write_bytes(image)
+    status, _, err = call(f"sii write eth9 1 {path} --force", capsys)
+    assert status == 1
+    assert f"put 0x{checksum_of(bytes(image)):02X} into byte 14" in err
+
+
+def test_an_image_larger_than_the_eeprom_is_refused(
+    segment: cat.Segment, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "large.bin"
+    image = bytearray(segment.core.sii_image(1).ljust(4096, b"\x55"))
+    image[0x7C] = 31  # 32 kbit
+    path.write_bytes(image)
+    status, _, err = call(f"sii write eth9 1 {path}", capsys)
+    assert status == 1
+    assert "the image has 4096 bytes, its EEPROM 2048" in err
+    status, _, err = call(f"sii write eth9 1 {path} --force", capsys)
+    assert status == 1
+    assert "SII word 0x0400 cannot be written to 0x5555: the EEPROM does not acknowledge" in err
+    assert "mixture of old and new" in err
+
+
+@pytest.mark.parametrize(
+    ("line", "status", "message"),
+    [
+        ("sii read virtual 6", 2, "the segment has 6"),
+        ("sii write virtual 1 /nowhere.bin", 1, "/nowhere.bin: No such file"),
+        ("sii write virtual 1 /dev/null", 1, "0 bytes are less than a header"),
+    ],
+)
+def test_mistakes_name_the_thing(
+    line: str, status: int, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found, out, err = call(line, capsys)
+    assert (found, out) == (status, "")
+    assert message in err
+    assert "internal error" not in err
