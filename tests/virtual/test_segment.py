@@ -115,39 +115,3 @@ def test_an_exception_in_the_service_reaches_the_caller() -> None:
         segment.service.scheduler.after(1_000, fail)
         with pytest.raises(RuntimeError, match="application"):
             link.wait_until(1_000_000, False)
-
-
-def test_clocks_run_and_latch_with_the_delay_of_the_line() -> None:
-    main = MainDevice(Segment([Coupler(), Coupler(), Coupler()]))
-    main.number_stations()
-    main.exchange(Command.BWR, 0, 0x0900, bytes(4))
-    times = [struct.unpack("<II", main.read(STATION + k, 0x0900, 8)) for k in range(3)]
-    assert times[0][1] - times[0][0] == 2 * 2 * 600
-    assert times[1][0] - times[0][0] == 600
-    assert times[2][1] == 0  # nothing behind the last
-    before = struct.unpack("<Q", main.read(STATION, 0x0910, 8))[0]
-    main.let_pass(1)
-    assert struct.unpack("<Q", main.read(STATION, 0x0910, 8))[0] - before > 1_000_000
-    offset = struct.pack("<Q", 10**15)
-    main.write(STATION, 0x0920, offset)
-    assert struct.unpack("<Q", main.read(STATION, 0x0910, 8))[0] > 10**15
-
-
-def test_a_drifting_clock_is_steered_by_the_reference() -> None:
-    segment = Segment([Coupler(), Coupler()])
-    segment.core.tune_clock(1, 1.00002, 600)
-    main = MainDevice(segment)
-    main.number_stations()
-    main.write(STATION + 1, 0x0928, struct.pack("<I", 600))
-
-    def difference() -> int:
-        [raw] = struct.unpack("<I", main.read(STATION + 1, 0x092C, 4))
-        return -(raw & 0x7FFFFFFF) if raw >> 31 else raw
-
-    main.let_pass(100)
-    main.exchange(Command.FRMW, STATION, 0x0910, bytes(8))
-    assert difference() != 0
-    for _ in range(5000):
-        main.exchange(Command.FRMW, STATION, 0x0910, bytes(8))
-        main.let_pass(1)
-    assert abs(difference()) < 100

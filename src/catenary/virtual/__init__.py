@@ -1,5 +1,6 @@
 """A virtual EtherCAT segment at register level: in this process, in virtual time, or on a NIC."""
 
+from catenary.virtual.crystal import Crystal
 from catenary.virtual.devices import (
     AnalogInputs,
     Coupler,
@@ -14,6 +15,7 @@ from catenary.virtual.server import Server, serve
 __all__ = [
     "AnalogInputs",
     "Coupler",
+    "Crystal",
     "Device",
     "DigitalInputs",
     "DigitalOutputs",

@@ -7,6 +7,7 @@ from cpython.bytes cimport PyBytes_FromStringAndSize
 from cpython.pycapsule cimport PyCapsule_GetPointer, PyCapsule_IsValid, PyCapsule_New
 from cpython.exc cimport PyErr_SetInterrupt
 from libc.errno cimport EINTR, EIO
+from libc.math cimport M_PI as pi
 from libc.stdint cimport int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 from libc.string cimport memcpy
 
@@ -51,9 +52,12 @@ cdef extern from "segment_memory.h" nogil:
         uint8_t *image
         uint32_t words
         int64_t read_time, write_time
-    ctypedef struct dc_clock:
-        double rate
-        uint32_t hop
+    ctypedef struct sync_unit:
+        uint32_t pulses0, pulses1
+    ctypedef struct synchronous_cycle:
+        int64_t cycle, minimum, copy_time
+        uint16_t limit, missed, exceeded, shift_short
+        uint8_t active, seen, error
     ctypedef struct servo_axis:
         double inertia, viscous, coulomb, load, rated_torque, velocity_limit
         double counts_per_radian, velocity_per_radian, position_gain, velocity_gain, integral_gain
@@ -70,9 +74,8 @@ cdef extern from "segment_memory.h" nogil:
         sync_manager *sm
         int sm_count
         sii_access sii
-        dc_clock clock
-        int64_t step_period, step_due
-        double step_seconds, step_rate
+        sync_unit sync
+        synchronous_cycle synchronous
         mapping outputs, inputs
         int64_t *slots
         int slot_count, axis_count
@@ -91,7 +94,7 @@ cdef extern from "segment_memory.h" nogil:
     cat_segment *segment_make(int count, int is_virtual)
     void segment_free(cat_segment *)
     int controller_make(controller *, uint32_t ram, uint32_t sii_words, int slots, int axes)
-    void controller_power_on(controller *, int fmmus, int sms, int has_dc, int no_lrw)
+    void controller_power_on(controller *, int fmmus, int sms, int clock_bits, int no_lrw)
     void segment_connect(cat_segment *, int connected, int reachable)
     void segment_advance(cat_segment *, int64_t until)
     void sii_load(controller *)
@@ -103,6 +106,11 @@ cdef extern from "segment_memory.h" nogil:
     int sm_pdi_write(controller *, int n, const uint8_t *data, uint32_t size)
     void inputs_put(controller *)
     void inputs_flush(cat_segment *)
+    void dc_tune(controller *, double error, double swing, double turn, double scatter, int64_t when)
+    void model_period(controller *, int64_t period)
+    void synchronous_begin(controller *, int64_t cycle, int steps)
+    void synchronous_end(controller *)
+    void sync_schedule(controller *)
     void lock(cat_segment *)
     void unlock(cat_segment *)
     int64_t monotonic_now()
@@ -134,7 +142,7 @@ cdef extern from "segment_memory.h":
     cpdef enum:
         EVENT_AL_CONTROL, EVENT_MAILBOX_WRITTEN, EVENT_MAILBOX_READ
         EVENT_REPEAT_REQUEST, EVENT_WATCHDOG, EVENT_OUTPUTS
-        EVENT_EMERGENCY
+        EVENT_EMERGENCY, EVENT_SYNC_SEEN, EVENT_SYNC_MISSED, EVENT_SYNC_LOST
 
 FOREVER = NEVER
 SLOTS_PER_AXIS = AXIS_SLOTS
@@ -182,16 +190,16 @@ cdef class Core:
     # -- making ---------------------------------------------------------------------------------
 
     def make_controller(self, int position, *, int ram, bytes sii, int slots, int axes, int fmmus,
-                        int sync_managers, bint clock, bint lrw, int identification):
+                        int sync_managers, int clock_bits, bint lrw, int identification):
         cdef controller *c = self._at(position)
         if c.memory != NULL:
             raise ValueError(f"the controller at position {position} is made already")
         if not (0 < ram <= 61440 and 0 <= axes <= 8 and 0 <= slots <= 65535 and len(sii) % 2 == 0
-                and 0 < fmmus <= 8 and 0 < sync_managers <= 8 and slots >= axes * AXIS_SLOTS):
+                and clock_bits in (0, 32, 64) and 0 < fmmus <= 8 and 0 < sync_managers <= 8 and slots >= axes * AXIS_SLOTS):
             raise ValueError(f"impossible controller at position {position}")
         if not controller_make(c, ram, len(sii) // 2, slots, axes):
             raise MemoryError(f"no memory for the controller at position {position}")
-        controller_power_on(c, fmmus, sync_managers, clock, not lrw)
+        controller_power_on(c, fmmus, sync_managers, clock_bits, not lrw)
         c.identification = identification
         memcpy(c.sii.image, <const char *>sii, len(sii))
         sii_load(c)
@@ -442,12 +450,42 @@ cdef class Core:
         cdef controller *c = self._at(position)
         if period_ns < 1000:
             raise ValueError(f"a device cycle of {period_ns} ns is shorter than 1 us")
-        c.step_period = period_ns
-        c.step_seconds = period_ns * 1e-9
-        c.step_rate = 1e9 / period_ns
-        c.step_due = self._segment.now + period_ns
-        if c.step_due < self._segment.next_due:
-            self._segment.next_due = c.step_due
+        lock(self._segment)
+        synchronous_end(c)
+        model_period(c, period_ns)
+        unlock(self._segment)
+
+    def run_model_by_sync0(self, int position, int64_t cycle_ns, int64_t longest_step_ns):
+        """Steps the device's model at SYNC0 pulses, `cycle_ns` apart, and between them in equal
+        steps of at most `longest_step_ns`."""
+        cdef controller *c = self._at(position)
+        cdef int64_t steps
+        if not 1000 <= cycle_ns < 1 << 32 or longest_step_ns < 1000:
+            raise ValueError(f"a device cycle of {cycle_ns} ns is shorter than 1 us, or no SYNC0 cycle")
+        steps = (cycle_ns + longest_step_ns - 1) // longest_step_ns
+        lock(self._segment)
+        synchronous_begin(c, cycle_ns, steps)
+        model_period(c, cycle_ns // steps)
+        unlock(self._segment)
+
+    def tune_synchronous(self, int position, *, int64_t minimum_ns, int64_t copy_ns, int limit):
+        """The shortest SYNC0 cycle; how long before a pulse outputs have to be there; how many
+        pulses in a row without new outputs are an error."""
+        cdef controller *c = self._at(position)
+        if not (0 <= minimum_ns and 0 <= copy_ns and 1 <= limit <= 0xFFFF):
+            raise ValueError(f"impossible synchronisation at position {position}")
+        c.synchronous.minimum, c.synchronous.copy_time = minimum_ns, copy_ns
+        c.synchronous.limit = limit
+
+    def synchronous(self, int position):
+        """(keeps time by SYNC0, pulses come, missed, exceeded, shift too short, error)"""
+        cdef synchronous_cycle *d = &self._at(position).synchronous
+        return bool(d.active), bool(d.seen), d.missed, d.exceeded, d.shift_short, bool(d.error)
+
+    def pulses(self, int position):
+        """SYNC0 and SYNC1 pulses since power-on."""
+        cdef controller *c = self._at(position)
+        return c.sync.pulses0, c.sync.pulses1
 
     def slot(self, int position, int number):
         cdef controller *c = self._at(position)
@@ -503,10 +541,15 @@ cdef class Core:
     def freeze(self, int position, bint frozen):
         self._at(position).frozen = frozen
 
-    def tune_clock(self, int position, double rate, int hop_ns):
+    def tune_crystal(self, int position, double error, double swing, double period_s, double scatter_ns):
+        """From now on: the error of the frequency and its slow swing, as shares; how far time stamps
+        scatter."""
         cdef controller *c = self._at(position)
-        c.clock.rate = rate
-        c.clock.hop = hop_ns
+        cdef double turn = 2e-9 * pi / period_s if swing != 0 else 0
+        lock(self._segment)
+        dc_tune(c, error, swing, turn, scatter_ns, self._segment.now)
+        sync_schedule(c)
+        unlock(self._segment)
 
     def time_sii(self, int position, int64_t read_ns, int64_t write_ns, bint read_eight):
         cdef controller *c = self._at(position)

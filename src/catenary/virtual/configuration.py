@@ -5,6 +5,7 @@ kind = "servo"
 name = "shoulder"
 alias = 10
 counts_per_turn = 1048576
+crystal = { ppm = 40.0, jitter = 20e-9 }
 """
 
 from __future__ import annotations
@@ -14,12 +15,28 @@ from pathlib import Path
 import msgspec
 
 from catenary.errors import ConfigurationError
+from catenary.virtual.crystal import ClockBits, Crystal
 from catenary.virtual.devices.analog_inputs import AnalogInputs
 from catenary.virtual.devices.coupler import Coupler
 from catenary.virtual.devices.device import Device
 from catenary.virtual.devices.digital_inputs import DigitalInputs
 from catenary.virtual.devices.digital_outputs import DigitalOutputs
 from catenary.virtual.devices.servo import Servo
+
+
+class CrystalTable(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
+    ppm: float = 0.0
+    drift_ppm: float = 0.0
+    drift_period: float = 600.0
+    jitter: float = 0.0
+
+    def crystal(self) -> Crystal:
+        return Crystal(
+            ppm=self.ppm,
+            drift_ppm=self.drift_ppm,
+            drift_period=self.drift_period,
+            jitter=self.jitter,
+        )
 
 
 class _Table(
@@ -30,10 +47,19 @@ class _Table(
     serial: int = 0
 
 
-class CouplerTable(_Table, tag="coupler", frozen=True, kw_only=True):
+class _ClockedTable(_Table, frozen=True, kw_only=True):
+    crystal: CrystalTable = CrystalTable()
+    clock_bits: ClockBits = 64
+
+
+class CouplerTable(_ClockedTable, tag="coupler", frozen=True, kw_only=True):
     def device(self) -> Device:
         return Coupler(
-            name=self.name or "Catenary virtual coupler", alias=self.alias, serial=self.serial
+            name=self.name or "Catenary virtual coupler",
+            alias=self.alias,
+            serial=self.serial,
+            crystal=self.crystal.crystal(),
+            clock_bits=self.clock_bits,
         )
 
 
@@ -57,7 +83,7 @@ class DigitalInputsTable(_Table, tag="digital_inputs", frozen=True, kw_only=True
         )
 
 
-class AnalogInputsTable(_Table, tag="analog_inputs", frozen=True, kw_only=True):
+class AnalogInputsTable(_ClockedTable, tag="analog_inputs", frozen=True, kw_only=True):
     channels: int = 2
     mailbox_bytes: int = 128
     mailbox_delay: float = 300e-6
@@ -72,10 +98,12 @@ class AnalogInputsTable(_Table, tag="analog_inputs", frozen=True, kw_only=True):
             mailbox_bytes=self.mailbox_bytes,
             mailbox_delay=self.mailbox_delay,
             lrw=self.lrw,
+            crystal=self.crystal.crystal(),
+            clock_bits=self.clock_bits,
         )
 
 
-class ServoTable(_Table, tag="servo", frozen=True, kw_only=True):
+class ServoTable(_ClockedTable, tag="servo", frozen=True, kw_only=True):
     axes: int = 1
     counts_per_turn: int = 1 << 20
     velocity_counts_per_turn: int | None = None
@@ -90,6 +118,7 @@ class ServoTable(_Table, tag="servo", frozen=True, kw_only=True):
     mailbox_bytes: int = 128
     mailbox_delay: float = 300e-6
     lrw: bool = True
+    sync_missed_limit: int = 3
 
     def device(self) -> Device:
         return Servo(
@@ -110,6 +139,9 @@ class ServoTable(_Table, tag="servo", frozen=True, kw_only=True):
             mailbox_bytes=self.mailbox_bytes,
             mailbox_delay=self.mailbox_delay,
             lrw=self.lrw,
+            crystal=self.crystal.crystal(),
+            clock_bits=self.clock_bits,
+            sync_missed_limit=self.sync_missed_limit,
         )
 
 

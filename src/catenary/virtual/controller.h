@@ -14,6 +14,7 @@
 #include <string.h>
 
 #include "clock.h"
+#include "crystal.h"
 #include "link.h"
 #include "registers.h"
 
@@ -31,7 +32,10 @@ enum controller_event {
     EVENT_REPEAT_REQUEST = 8,
     EVENT_WATCHDOG = 16,             /* the process data watchdog expired */
     EVENT_OUTPUTS = 32,              /* the first process data since the SyncManager was enabled */
-    EVENT_EMERGENCY = 64             /* a device model has a new error code */
+    EVENT_EMERGENCY = 64,            /* a device model has a new error code */
+    EVENT_SYNC_SEEN = 128,           /* the first SYNC0 pulse since the device waits for them */
+    EVENT_SYNC_MISSED = 256,         /* too many pulses in a row without new outputs */
+    EVENT_SYNC_LOST = 512            /* no pulses any more */
 };
 
 /* A SyncManager as the frame path sees it; its registers stay the truth. */
@@ -45,6 +49,7 @@ typedef struct {
     uint8_t latest, using;           /* three buffers: last complete one; the one EtherCAT holds */
     uint8_t written;                 /* buffers: something complete is there */
     uint32_t writes;                 /* complete writes from the producer */
+    int64_t completed;               /* when the frame of the last one has passed */
 } sync_manager;
 
 typedef struct {
@@ -65,12 +70,30 @@ typedef struct {
 } sii_access;
 
 typedef struct {
+    crystal crystal;
     int64_t anchor, local;           /* at segment time `anchor` the local time was `local` [ns] */
-    double rate;                     /* nominal, with the oscillator's error */
-    double correction;               /* of the control loop */
-    double mean;                     /* filtered difference [ns] */
+    double fraction;                 /* and this part of a nanosecond */
+    double correction;               /* of the rate, by the time control loop */
+    double mean, speed;              /* its filters: difference [ns], speed counter difference */
     uint32_t hop;                    /* cable and forwarding, one way, to the next device [ns] */
 } dc_clock;
+
+typedef struct {
+    int64_t next0, next1;            /* system times of the next pulses [ns], NEVER: none */
+    int64_t due;                     /* of the earlier one, on the segment's clock */
+    uint32_t pulses0, pulses1;
+    uint8_t active;
+} sync_unit;
+
+/* A device that keeps time by SYNC0, and the counters of 0x1C32 and 0x1C33. */
+typedef struct {
+    int64_t cycle, minimum, copy_time;            /* [ns] */
+    int64_t last;                    /* segment time of the last pulse */
+    int steps, left;                 /* of its own cycle in one of SYNC0; before the next pulse */
+    uint16_t limit, missed_in_a_row;
+    uint16_t missed, exceeded, shift_short;       /* 0x0B, 0x0C, 0x0D */
+    uint8_t active, seen, error;     /* seen: pulses come */
+} synchronous_cycle;
 
 /* One object of a device in its process data: bits of a SyncManager buffer <-> a slot. */
 typedef struct {
@@ -98,7 +121,8 @@ typedef struct controller {
     int position;
     uint32_t events;
     uint8_t emulation;               /* AL status follows AL control; no microcontroller */
-    uint8_t has_dc, no_lrw;
+    uint8_t has_dc;                  /* bits of its clock: 0, 32 or 64 */
+    uint8_t no_lrw;
     uint8_t al_unread;               /* the PDI has not yet fetched AL control */
     uint8_t frozen;                  /* injected: the application stands still */
     uint8_t outputs_valid;           /* the application takes the outputs: OP and fed */
@@ -113,10 +137,14 @@ typedef struct controller {
     uint64_t logical_first, logical_end;  /* hull of the active FMMUs, bits */
     sii_access sii;
     dc_clock clock;
+    sync_unit sync;
+    int64_t passage;                 /* when the frame in work reached this device */
+    int64_t due;                     /* of any work of this controller */
     int64_t watchdog_due, pdi_watchdog_due;
     uint8_t watchdog_armed, watchdog_expired;
     /* model */
     int model;
+    synchronous_cycle synchronous;
     int64_t step_period, step_due;   /* [ns] */
     double step_seconds, step_rate;  /* [s], [Hz]: the period once more */
     mapping outputs, inputs;
@@ -147,10 +175,12 @@ typedef struct cat_segment {
     uint8_t write_mask[REG_END];
     int64_t now, power_on;
     int64_t passage;                 /* when the frame in work reaches the first device */
+    int64_t frame_end;               /* and when its last byte does */
     int64_t busy_until;              /* the wire towards the segment is occupied */
     int64_t next_due;                /* of compiled work */
     int64_t sii_due;                 /* of the earliest EEPROM access, for the packet loop */
     int64_t service_due;             /* of the application, Python */
+    int synchronous;                 /* how many devices keep time by SYNC0 */
     int inputs_stale;                /* some controller's inputs are */
     int pending;                     /* some controller has events */
     int event_fd;                    /* wakes the service thread, -1: none */
@@ -191,6 +221,8 @@ static inline void raise_event(controller *c, uint32_t event) {
 
 /* Something of this controller is due at `when`: the segment looks no later than that. */
 static inline void due_at(controller *c, int64_t when) {
+    if (when < c->due)
+        c->due = when;
     if (when < c->segment->next_due)
         c->segment->next_due = when;
 }

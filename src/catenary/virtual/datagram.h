@@ -7,11 +7,11 @@
 
 #include "al_state.h"
 #include "controller.h"
-#include "distributed_clock.h"
 #include "fmmu.h"
 #include "process_data.h"
 #include "sii_access.h"
 #include "sync_manager.h"
+#include "sync_unit.h"
 #include "watchdog.h"
 
 enum { NOP, APRD, APWR, APRW, FPRD, FPWR, FPRW, BRD, BWR, BRW, LRD, LWR, LRW, ARMW, FRMW };
@@ -61,7 +61,7 @@ static void make_write_mask(uint8_t *mask) {
     fill_mask(mask, REG_DC_SPEED_START, 2, 0xFF);
     fill_mask(mask, REG_DC_FILTER_DIFFERENCE, 2, 0x0F);
     fill_mask(mask, REG_SYNC_CONTROL, 1, 0x31);
-    fill_mask(mask, REG_SYNC_ACTIVATION, 1, 0x7F);
+    fill_mask(mask, REG_SYNC_ACTIVATION, 1, 0x07);
     fill_mask(mask, REG_SYNC_START, 8, 0xFF);
     fill_mask(mask, REG_SYNC0_CYCLE, 8, 0xFF);
     fill_mask(mask, REG_LATCH_CONTROL, 2, 0x03);
@@ -82,7 +82,7 @@ static inline int register_open(const controller *c, uint32_t address) {
     if (address >= REG_FMMU && address < REG_FMMU + MAX_FMMU * FMMU_SIZE)
         return (int)(address - REG_FMMU) / FMMU_SIZE < c->fmmu_count;
     if (address >= REG_DC_RECEIVE && address < REG_USER_RAM)
-        return c->has_dc;
+        return c->has_dc && clock_register_open(c, address);
     return 1;
 }
 
@@ -131,7 +131,7 @@ static void registers_written(controller *c, uint32_t first, uint32_t end, const
                 fmmu_configured(c, n);
     if (touches(first, end, REG_SM, MAX_SM * SM_SIZE))
         sync_managers_written(c, first, end, activate_before);
-    if (!c->has_dc || first >= REG_DC_END || end <= REG_DC_RECEIVE)
+    if (!c->has_dc || first >= REG_LATCH_CONTROL || end <= REG_DC_RECEIVE)
         return;
     if (touches(first, end, REG_DC_RECEIVE, 1)) {
         int behind = c->segment->reachable - 1 - c->position;
@@ -140,13 +140,7 @@ static void registers_written(controller *c, uint32_t first, uint32_t end, const
             there += c->segment->controllers[k].clock.hop;
         dc_latch(c, passage, passage + 2 * there, behind > 0);
     }
-    if (first <= REG_DC_SYSTEM_TIME && end >= REG_DC_SYSTEM_TIME + 4) {
-        const uint8_t *time = data + (REG_DC_SYSTEM_TIME - first);
-        int wide = end >= REG_DC_SYSTEM_TIME + 8;
-        dc_receive_time(c, wide ? load64(time) : load32(time), wide, passage);
-    }
-    if (touches(first, end, REG_DC_SPEED_START, 2))
-        dc_reset_filter(c);
+    clock_registers_written(c, first, end, data, passage);
 }
 
 /* The SII command bits show what was commanded only after the write was judged: the control word
@@ -280,6 +274,7 @@ static void datagram_through(cat_segment *s, uint8_t *header, uint32_t size) {
         return;
     for (int n = 0; n < s->reachable; n++) {
         controller *c = &s->controllers[n];
+        c->passage = passage;
         counter = (uint16_t)(counter + datagram_at(c, header, size, data, passage));
         interrupts |= load16(c->memory + REG_ECAT_EVENT) & load16(c->memory + REG_ECAT_EVENT_MASK);
         passage += c->clock.hop;

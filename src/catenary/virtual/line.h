@@ -11,13 +11,11 @@
 
 #include "controller.h"
 #include "datagram.h"
-#include "process_data.h"
-#include "servo.h"
+#include "device_cycle.h"
 
 enum {
     BYTE_NS = 80,                     /* 100 Mbit/s */
-    FRAME_OVERHEAD = 8 + 4 + 12,      /* preamble, check sequence, gap */
-    CATCH_UP_STEPS = 4000             /* a clock that jumped further is not caught up with */
+    FRAME_OVERHEAD = 8 + 4 + 12       /* preamble, check sequence, gap */
 };
 
 static int64_t monotonic_now(void) {
@@ -37,44 +35,21 @@ static void wake_service(cat_segment *s) {
 static inline void lock(cat_segment *s) { pthread_mutex_lock(&s->mutex); }
 static inline void unlock(cat_segment *s) { pthread_mutex_unlock(&s->mutex); }
 
-/* One step of a device model at its own cycle. */
-static void model_step(controller *c) {
-    if (c->frozen)
-        return;
-    int sm = c->outputs.sm;
-    int fresh = 0;
-    if (sm >= 0 && c->outputs_valid) {
-        uint8_t *status = sm_registers(c, sm) + 5;
-        fresh = (*status & SM_STATUS_WRITTEN) != 0;
-        if (fresh || !c->outputs_taken) {
-            *status = (uint8_t)((*status & ~SM_STATUS_WRITTEN) | SM_STATUS_READ);
-            outputs_take(c);
-        }
-    }
-    c->outputs_taken = c->outputs_valid;
-    for (int k = 0; k < c->axis_count; k++)
-        servo_step(c, &c->axes[k], c->slots + k * AXIS_SLOTS, c->outputs_valid, fresh,
-                   c->step_seconds, c->step_rate);
-    c->inputs_stale = 1;
-    c->segment->inputs_stale = 1;
-    watchdog_trigger_pdi(c);
-}
-
 /* All compiled work of one controller that is due at `now`; when the next is. */
 static int64_t controller_advance(controller *c) {
     int64_t now = c->segment->now;
-    if (c->step_due <= now) {
-        model_step(c);
-        c->step_due += c->step_period;
-        if (c->step_due <= now - CATCH_UP_STEPS * c->step_period)
-            c->step_due = now + c->step_period;
-    }
+    if (c->due > now)
+        return c->due;
+    c->due = NEVER;
+    device_advance(c);
     watchdog_check(c);
     sii_check(c);
-    int64_t next = c->step_due;
+    int64_t next = c->step_due < c->sync.due ? c->step_due : c->sync.due;
     next = c->watchdog_due < next ? c->watchdog_due : next;
     next = c->pdi_watchdog_due < next ? c->pdi_watchdog_due : next;
-    return c->sii.due < next ? c->sii.due : next;
+    next = c->sii.due < next ? c->sii.due : next;
+    c->due = next;
+    return next;
 }
 
 /* Runs compiled work up to `until`, in the order of its times; in virtual time it stops where an
@@ -125,7 +100,7 @@ static int line_send(void *self, const uint8_t *frame, uint32_t length) {
         memset(q->bytes + length, 0, CAT_FRAME_MIN - length);
     q->length = on_wire;
     s->passage = start;
-    s->busy_until = start + duration;
+    s->busy_until = s->frame_end = start + duration;
     int keeps = frame_through(s, q->bytes, on_wire) && s->connected && s->reachable > 0;
     if (keeps) {
         q->arrival = start + duration + line_delay(s);

@@ -38,6 +38,8 @@ static int packet_answer(cat_segment *s, int fd) {
     }
     lock(s);
     s->passage = monotonic_now();
+    if (s->synchronous)               /* what SYNC0 latches was latched before this frame came */
+        segment_advance(s, s->passage);
     if (s->passage > s->now)
         s->now = s->passage;
     if (s->sii_due <= s->now)

@@ -33,9 +33,8 @@ static int controller_make(controller *c, uint32_t ram, uint32_t sii_words, int 
 }
 
 /* Everything as after power-on. */
-static void controller_power_on(controller *c, int fmmus, int sms, int has_dc, int no_lrw) {
+static void controller_power_on(controller *c, int fmmus, int sms, int clock_bits, int no_lrw) {
     uint8_t *m = c->memory;
-    c->has_dc = (uint8_t)has_dc;
     c->no_lrw = (uint8_t)no_lrw;
     c->fmmu_count = fmmus;
     c->sm_count = sms;
@@ -45,7 +44,8 @@ static void controller_power_on(controller *c, int fmmus, int sms, int has_dc, i
     m[REG_SM_COUNT] = (uint8_t)sms;
     m[REG_RAM_SIZE] = (uint8_t)((c->memory_size - REG_END) / 1024);
     m[REG_PORTS] = 0x0F;                      /* ports 0 and 1 MII, 2 and 3 not there */
-    store16(m + REG_FEATURES, (uint16_t)((has_dc ? FEATURE_DC | FEATURE_DC_64 | FEATURE_SYNC_ENHANCED : 0)
+    store16(m + REG_FEATURES, (uint16_t)((clock_bits ? FEATURE_DC : 0)
+                                         | (clock_bits == 64 ? FEATURE_DC_64 : 0)
                                          | (no_lrw ? FEATURE_NO_LRW : 0)));
     m[REG_DL_CONTROL] = 0x01;
     m[REG_DL_CONTROL + 2] = 0x07;
@@ -55,15 +55,13 @@ static void controller_power_on(controller *c, int fmmus, int sms, int has_dc, i
     store16(m + REG_WATCHDOG_PDI, 1000);
     store16(m + REG_WATCHDOG_PROCESS_DATA, 1000);
     m[REG_SII_CONTROL] = SII_ADDRESS_2;
-    store16(m + REG_DC_SPEED_START, 0x1000);
-    m[REG_DC_FILTER_DIFFERENCE] = 4;
-    m[REG_DC_FILTER_SPEED] = 12;
+    dc_power_on(c, clock_bits);
+    sync_stop(c);
+    c->due = NEVER;
     c->outputs.sm = c->inputs.sm = -1;
     c->step_period = c->step_due = c->watchdog_due = c->pdi_watchdog_due = c->sii.due = NEVER;
     c->sii.read_time = 200000;
     c->sii.write_time = 3000000;
-    c->clock.rate = 1.0;
-    c->clock.anchor = c->segment->power_on;
     c->clock.hop = 2 * FORWARDING_NS;
     c->logical_first = UINT64_MAX;
     for (int n = 0; n < sms; n++)

@@ -100,7 +100,7 @@ def _pdos(pdos: Sequence[Pdo], strings: _Strings) -> bytes:
 
 def _clock(strings: _Strings) -> bytes:
     free = struct.pack("<IIIhHhBB4x", 0, 0, 0, 0, 0, 0, strings.number("FreeRun"), 0)
-    return free + struct.pack("<IIIhHhBB4x", 0, 0, 0, 1, 0x0300, 1, strings.number("DC Sync0"), 0)
+    return free + struct.pack("<IIIhHhBB4x", 0, 0, 0, 0, 0x0300, 1, strings.number("DC Sync0"), 0)
 
 
 def _category(kind: int, content: bytes) -> bytes:

@@ -20,13 +20,21 @@ UNKNOWN_STATE = 0x0012
 BOOTSTRAP_NOT_SUPPORTED = 0x0013
 INVALID_MAILBOX_CONFIGURATION = 0x0016
 NO_VALID_OUTPUTS = 0x0019
+SYNCHRONISATION_ERROR = 0x001A
 SYNC_MANAGER_WATCHDOG = 0x001B
 INVALID_OUTPUT_CONFIGURATION = 0x001D
 INVALID_INPUT_CONFIGURATION = 0x001E
+FATAL_SYNC_ERROR = 0x002C
+NO_SYNC_ERROR = 0x002D
+INVALID_DC_CONFIGURATION = 0x0030
+DC_CYCLE_TIME = 0x0035
+DC_SYNC0_CYCLE_TIME = 0x0036
 
 UPWARDS = {(INIT, PRE_OP), (PRE_OP, SAFE_OP), (SAFE_OP, OP)}
 MILLISECOND = 1_000_000
-OUTPUTS_TIMEOUT_NS = 200 * MILLISECOND
+# How long SAFE-OP → OP waits for what it lacks, by the AL status code that ends the wait. SYNC
+# pulses start 100 ms after they are switched on with SOEM and IgH, and later with others.
+TIMEOUTS_NS = {NO_VALID_OUTPUTS: 200 * MILLISECOND, NO_SYNC_ERROR: 1000 * MILLISECOND}
 
 
 class Controlled(Protocol):
@@ -42,7 +50,9 @@ class Controlled(Protocol):
 
     def enter_state(self, before: int, state: int) -> None: ...
 
-    def awaits_outputs(self) -> bool: ...
+    def lacks_for_op(self) -> int:
+        """0, or the AL status code of what OP cannot be entered without."""
+        ...
 
 
 class StateMachine:
@@ -53,6 +63,7 @@ class StateMachine:
         self._scheduler = scheduler
         self._identification = identification
         self._request = 0  # counts requests: a later one overtakes an earlier
+        self._waiting: tuple[bool, int] | None = None  # for OP: identify, request
         self.state = INIT
         self.code = 0
         self.transition_ns = MILLISECOND
@@ -93,20 +104,20 @@ class StateMachine:
         return self._device.check_state(requested)
 
     def _enter(self, state: int, identify: bool) -> None:
-        if state == OP and self.state == SAFE_OP and self._device.awaits_outputs():
-            # nothing came yet: the first process data takes it up, or the time runs out
-            self._later(OUTPUTS_TIMEOUT_NS, lambda: self.fail(SAFE_OP, NO_VALID_OUTPUTS))
-            self.waiting_for_outputs = identify, self._request
+        lack = self._device.lacks_for_op() if (self.state, state) == (SAFE_OP, OP) else 0
+        if lack:
+            # process data or pulses did not come yet: they take it up, or the time runs out
+            self._waiting = identify, self._request
+            self._later(TIMEOUTS_NS[lack], lambda: self.fail(SAFE_OP, lack))
             return
         before, self.state = self.state, state
         self._device.enter_state(before, state)
         shown = IDENTIFICATION if identify and self._identification else 0
         self._device.show_al_status(state | shown, self._identification if shown else 0)
 
-    waiting_for_outputs: tuple[bool, int] | None = None
-
-    def outputs_arrived(self) -> None:
-        waiting, self.waiting_for_outputs = self.waiting_for_outputs, None
+    def something_arrived(self) -> None:
+        """The first process data, or the first SYNC pulse."""
+        waiting, self._waiting = self._waiting, None
         if waiting is not None and waiting[1] == self._request:
             self._request += 1
             self._enter(OP, waiting[0])

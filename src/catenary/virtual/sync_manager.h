@@ -83,7 +83,9 @@ static inline void sm_write_completed(controller *c, int n) {
         if (n == 0)
             raise_event(c, EVENT_MAILBOX_WRITTEN);
     } else {
+        const cat_segment *s = c->segment;
         sm->latest = sm->using;
+        sm->completed = s->frame_end > s->now ? s->frame_end + c->passage - s->passage : s->now;
         if (!c->outputs_seen) {
             c->outputs_seen = 1;
             if (!c->emulation)

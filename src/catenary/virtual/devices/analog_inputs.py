@@ -12,6 +12,7 @@ from catenary.virtual.coe.dictionary import (
     number,
     stored,
 )
+from catenary.virtual.crystal import EXACT, ClockBits, Crystal
 from catenary.virtual.description import Description, MappedEntry, Pdo
 from catenary.virtual.devices.application import Application, mailbox_of, sync_managers_of
 from catenary.virtual.devices.applied import AppliedDevice
@@ -38,6 +39,8 @@ class AnalogInputs(AppliedDevice):
         lrw: bool = True,
         mailbox_bytes: int = 128,
         mailbox_delay: float = 300e-6,
+        crystal: Crystal = EXACT,
+        clock_bits: ClockBits = 64,
     ) -> None:
         if not 1 <= channels <= 8:
             raise ValueError(f"analogue inputs have 1 to 8 channels, not {channels}")
@@ -48,6 +51,8 @@ class AnalogInputs(AppliedDevice):
             lrw=lrw,
             mailbox_bytes=mailbox_bytes,
             mailbox_delay=mailbox_delay,
+            crystal=crystal,
+            clock_bits=clock_bits,
         )
         self.channels = channels
 

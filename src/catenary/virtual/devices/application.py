@@ -37,17 +37,22 @@ from catenary.virtual.description import (
     Pdo,
     SyncManagerDefault,
 )
+from catenary.virtual.devices.synchronisation import Synchronisation
 from catenary.virtual.mailbox import HEADER, Mailbox
 from catenary.virtual.scheduler import Scheduler
 from catenary.virtual.state_machine import (
+    FATAL_SYNC_ERROR,
     INIT,
     INVALID_INPUT_CONFIGURATION,
     INVALID_MAILBOX_CONFIGURATION,
     INVALID_OUTPUT_CONFIGURATION,
+    NO_SYNC_ERROR,
+    NO_VALID_OUTPUTS,
     OP,
     PRE_OP,
     SAFE_OP,
     SYNC_MANAGER_WATCHDOG,
+    SYNCHRONISATION_ERROR,
     StateMachine,
 )
 
@@ -101,6 +106,7 @@ class Application:
         self._core = core
         self._position = position
         self._box = box
+        self.synchronisation: Synchronisation | None = None  # a device that can keep time by SYNC0
         self.states = StateMachine(self, scheduler, description.identification)
         self.dictionary = Dictionary(lambda: self.states.state)
         self._add_communication_objects(description)
@@ -146,8 +152,12 @@ class Application:
             self._outputs_stayed_away()
         if events & _segment.EVENT_AL_CONTROL:
             self.states.obey()
-        if events & _segment.EVENT_OUTPUTS:
-            self.states.outputs_arrived()
+        if events & _segment.EVENT_SYNC_MISSED:
+            self._synchrony_failed(SYNCHRONISATION_ERROR)
+        if events & _segment.EVENT_SYNC_LOST:
+            self._synchrony_failed(FATAL_SYNC_ERROR)
+        if events & (_segment.EVENT_OUTPUTS | _segment.EVENT_SYNC_SEEN):
+            self.states.something_arrived()
         if events & _segment.EVENT_MAILBOX_READ:
             self.mailbox.answer_read()
         if events & _segment.EVENT_REPEAT_REQUEST:
@@ -161,6 +171,10 @@ class Application:
         self._core.expect_outputs(self._position)
         if self.states.state == OP:
             self.states.fail(SAFE_OP, SYNC_MANAGER_WATCHDOG)
+
+    def _synchrony_failed(self, code: int) -> None:
+        if self.states.state == OP:
+            self.states.fail(SAFE_OP, code)
 
     def send_emergency(self, code: int, data: bytes = b"") -> None:
         """An emergency message, ETG.1000.6 §5.6.4; code 0: the error is gone."""
@@ -209,6 +223,8 @@ class Application:
                 return INVALID_OUTPUT_CONFIGURATION
             if not self._buffer_is_configured(3, TX_ASSIGNMENT, 0x00):
                 return INVALID_INPUT_CONFIGURATION
+            if self.synchronisation is not None:
+                return self.synchronisation.check()
         return 0
 
     def _mailbox_is_configured(self) -> bool:
@@ -231,15 +247,23 @@ class Application:
         area = self._areas[n - 2]
         return (start, length, found & ENABLE_AND_MODE, enabled) == (area, size, control, True)
 
-    def awaits_outputs(self) -> bool:
+    def lacks_for_op(self) -> int:
         has_outputs = self.pdos.size(RX_ASSIGNMENT) > 0
-        return has_outputs and not self._core.outputs_seen(self._position)
+        if has_outputs and not self._core.outputs_seen(self._position):
+            return NO_VALID_OUTPUTS
+        if self.synchronisation is not None and self.synchronisation.awaits_pulses():
+            return NO_SYNC_ERROR
+        return 0
 
     def enter_state(self, before: int, state: int) -> None:
         if before == INIT and state == PRE_OP:
             self.mailbox.reset()
         if before < SAFE_OP <= state:
             self._map_process_data()
+            if self.synchronisation is not None:
+                self.synchronisation.begin()
+        if state < SAFE_OP <= before and self.synchronisation is not None:
+            self.synchronisation.end()
         if before != state:
             self._gate(mailbox=state >= PRE_OP, process_data=state >= SAFE_OP)
         if before != state == SAFE_OP:

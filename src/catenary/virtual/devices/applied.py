@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from catenary.virtual.crystal import ClockBits, Crystal
 from catenary.virtual.devices.application import Application
 from catenary.virtual.devices.device import Device
 from catenary.virtual.scheduler import Scheduler
@@ -19,8 +20,17 @@ class AppliedDevice(Device):
         lrw: bool,
         mailbox_bytes: int,
         mailbox_delay: float,
+        crystal: Crystal,
+        clock_bits: ClockBits,
     ) -> None:
-        super().__init__(name=name, alias=alias, serial=serial, lrw=lrw)
+        super().__init__(
+            name=name,
+            alias=alias,
+            serial=serial,
+            lrw=lrw,
+            crystal=crystal,
+            clock_bits=clock_bits,
+        )
         if not 32 <= mailbox_bytes <= 1024 or mailbox_bytes % 2:
             raise ValueError(f"a mailbox has 32 to 1024 bytes, an even number, not {mailbox_bytes}")
         if not 0 <= mailbox_delay <= 10:

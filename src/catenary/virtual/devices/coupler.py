@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from catenary.virtual.crystal import EXACT, ClockBits, Crystal
 from catenary.virtual.description import Description
 from catenary.virtual.devices.device import Device
 
@@ -12,9 +13,22 @@ class Coupler(Device):
     kind = "coupler"
 
     def __init__(
-        self, *, name: str = "Catenary virtual coupler", alias: int = 0, serial: int = 0
+        self,
+        *,
+        name: str = "Catenary virtual coupler",
+        alias: int = 0,
+        serial: int = 0,
+        crystal: Crystal = EXACT,
+        clock_bits: ClockBits = 64,
     ) -> None:
-        super().__init__(name=name, alias=alias, serial=serial, lrw=True)
+        super().__init__(
+            name=name,
+            alias=alias,
+            serial=serial,
+            lrw=True,
+            crystal=crystal,
+            clock_bits=clock_bits,
+        )
 
     def description(self) -> Description:
         return Description(

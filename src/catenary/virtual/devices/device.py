@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from catenary.virtual._segment import Core
+from catenary.virtual.crystal import EXACT, ClockBits, Crystal
 from catenary.virtual.description import Description
 from catenary.virtual.scheduler import Scheduler
 from catenary.virtual.sii_image import make_sii_image
@@ -22,13 +23,26 @@ class Device:
 
     kind: ClassVar[str]
 
-    def __init__(self, *, name: str, alias: int, serial: int, lrw: bool) -> None:
+    def __init__(
+        self,
+        *,
+        name: str,
+        alias: int,
+        serial: int,
+        lrw: bool,
+        crystal: Crystal = EXACT,
+        clock_bits: ClockBits = 64,
+    ) -> None:
         if not 0 <= alias <= 0xFFFF:
             raise ValueError(f"alias {alias} is no 16-bit number")
+        if clock_bits not in (32, 64):
+            raise ValueError(f"a clock has 32 or 64 bits, not {clock_bits}")
         self.name = name
         self.alias = alias
         self.serial = serial
         self.lrw = lrw
+        self.clock_bits = clock_bits
+        self._crystal = crystal
         self._core: Core | None = None
         self.position = -1
 
@@ -53,11 +67,12 @@ class Device:
             axes=description.axes,
             fmmus=8,
             sync_managers=8,
-            clock=description.clock,
+            clock_bits=self.clock_bits if description.clock else 0,
             lrw=self.lrw,
             identification=description.identification,
         )
         self._core, self.position = core, position
+        self.crystal = self._crystal
         self.started(scheduler)
 
     def started(self, scheduler: Scheduler) -> None:
@@ -70,6 +85,19 @@ class Device:
     def state(self) -> int:
         """The AL state shown: 1 INIT, 2 PRE-OP, 4 SAFE-OP, 8 OP; bit 4 is the error flag."""
         return self.core.peek(self.position, AL_STATUS, 1)[0] & 0x1F
+
+    @property
+    def crystal(self) -> Crystal:
+        """What its clock counts by; it may be changed while the segment runs."""
+        return self._crystal
+
+    @crystal.setter
+    def crystal(self, crystal: Crystal) -> None:
+        self._crystal = crystal
+        error, swing = crystal.ppm * 1e-6, crystal.drift_ppm * 1e-6
+        period, scatter = crystal.drift_period, crystal.jitter * 1e9
+        if self._core is not None:
+            self._core.tune_crystal(self.position, error, swing, period, scatter)
 
     def freeze(self, frozen: bool = True) -> None:
         """The device's model stands still; its controller goes on answering frames."""

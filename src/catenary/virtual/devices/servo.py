@@ -21,6 +21,7 @@ from catenary.virtual.coe.dictionary import (
     Entry,
     number,
 )
+from catenary.virtual.crystal import EXACT, ClockBits, Crystal
 from catenary.virtual.description import Description, MappedEntry, Pdo
 from catenary.virtual.devices.application import Application, mailbox_of, sync_managers_of
 from catenary.virtual.devices.applied import AppliedDevice
@@ -33,9 +34,12 @@ from catenary.virtual.devices.servo_objects import (
     RW,
     RX,
 )
+from catenary.virtual.devices.synchronisation import Synchronisation
 from catenary.virtual.scheduler import Scheduler
 
 STEP_NS = 250_000
+MINIMUM_CYCLE_NS = 62_500  # of SYNC0
+COPY_NS = 20_000  # outputs have to be there so long before SYNC0
 BOOT_SECONDS = 0.02
 SUPPORTED_MODES = {0, 8, 9, 10}
 SUPPORTED_MODES_MASK = 1 << 7 | 1 << 8 | 1 << 9  # 0x6502: CSP, CSV, CST
@@ -92,10 +96,14 @@ class Servo(AppliedDevice):
         position_limits: tuple[float, float] | None = None,
         mailbox_bytes: int = 128,
         mailbox_delay: float = 300e-6,
+        crystal: Crystal = EXACT,
+        clock_bits: ClockBits = 64,
         lrw: bool = True,
+        sync_missed_limit: int = 3,
     ) -> None:
         """Units: kg·m², N·m·s/rad, N·m, rad/s, rad; `max_torque_ratio` of the rated torque;
-        `velocity_counts_per_turn`: the unit of 0x606C and 0x60FF, a turn a second."""
+        `velocity_counts_per_turn`: the unit of 0x606C and 0x60FF, a turn a second;
+        `sync_missed_limit`: SYNC0 pulses in a row without new outputs that are an error."""
         super().__init__(
             name=name,
             alias=alias,
@@ -103,6 +111,8 @@ class Servo(AppliedDevice):
             lrw=lrw,
             mailbox_bytes=mailbox_bytes,
             mailbox_delay=mailbox_delay,
+            crystal=crystal,
+            clock_bits=clock_bits,
         )
         positive = {
             "counts_per_turn": counts_per_turn,
@@ -116,6 +126,8 @@ class Servo(AppliedDevice):
                 raise ValueError(f"{field} must be positive, not {value}")
         if not 1 <= axes <= _segment.AXES_MAX:
             raise ValueError(f"a servo has 1 to {_segment.AXES_MAX} axes, not {axes}")
+        if not 1 <= sync_missed_limit <= 0xFFFF:
+            raise ValueError(f"sync_missed_limit is 1 to 65535, not {sync_missed_limit}")
         if viscous_friction < 0 or coulomb_friction < 0:
             raise ValueError("friction cannot be negative")
         self.axes = axes
@@ -129,6 +141,7 @@ class Servo(AppliedDevice):
         self.max_velocity = max_velocity
         self.following_error_turns = following_error_turns
         self.position_limits = position_limits
+        self.sync_missed_limit = sync_missed_limit
 
     def _pdos(
         self, base: int, default: tuple[int, ...], others: tuple[tuple[int, ...], ...]
@@ -213,6 +226,15 @@ class Servo(AppliedDevice):
             self.core.put_slot(self.position, _segment.SLOTS_PER_AXIS * axis + slot, value)
 
     def add_objects(self, application: Application) -> None:
+        application.synchronisation = Synchronisation(
+            self.core,
+            self.position,
+            application.dictionary,
+            step_ns=STEP_NS,
+            minimum_cycle_ns=MINIMUM_CYCLE_NS,
+            copy_ns=COPY_NS,
+            missed_limit=self.sync_missed_limit,
+        )
         for axis in range(self.axes):
             self._add_axis(application, axis)
 

@@ -1,0 +1,177 @@
+/* When a device's model steps, and when its process data changes hands: at its own cycle ("free
+ * run"), or by SYNC0 pulses ("DC Sync0", ETG.1020 §0x1C32).
+ *
+ * With SYNC0 the device latches its inputs and takes over its outputs at the pulse, and its own cycle
+ * is a part of SYNC0's, locked to it: a pulse restarts the count. Where pulses stay away the own
+ * cycle goes on, half a step later than expected, until the device gives them up. */
+#ifndef CATENARY_VIRTUAL_DEVICE_CYCLE_H
+#define CATENARY_VIRTUAL_DEVICE_CYCLE_H
+
+#include "process_data.h"
+#include "servo.h"
+#include "sync_unit.h"
+
+enum { CATCH_UP_STEPS = 4000 };       /* a clock that jumped further is not caught up with */
+
+static void model_axes(controller *c, int fresh) {
+    for (int k = 0; k < c->axis_count; k++)
+        servo_step(c, &c->axes[k], c->slots + k * AXIS_SLOTS, c->outputs_valid, fresh,
+                   c->step_seconds, c->step_rate);
+    watchdog_trigger_pdi(c);
+}
+
+static inline void model_inputs(controller *c) {
+    c->inputs_stale = 1;
+    c->segment->inputs_stale = 1;
+}
+
+static inline void model_fault(controller *c, uint16_t code) {
+    for (int k = 0; k < c->axis_count; k++)
+        servo_fault(c, &c->axes[k], c->slots + k * AXIS_SLOTS, code);
+}
+
+static inline uint8_t *outputs_status(controller *c) { return sm_registers(c, c->outputs.sm) + 5; }
+
+static inline void outputs_accept(controller *c) {
+    uint8_t *status = outputs_status(c);
+    *status = (uint8_t)((*status & ~SM_STATUS_WRITTEN) | SM_STATUS_READ);
+    outputs_take(c);
+}
+
+/* One step at the device's own cycle. */
+static void model_step_free(controller *c) {
+    int fresh = 0;
+    if (c->outputs.sm >= 0 && c->outputs_valid) {
+        fresh = (*outputs_status(c) & SM_STATUS_WRITTEN) != 0;
+        if (fresh || !c->outputs_taken)
+            outputs_accept(c);
+    }
+    c->outputs_taken = c->outputs_valid;
+    model_axes(c, fresh);
+    model_inputs(c);
+}
+
+/* The pulses have stopped: nobody holds the device to the bus any more. */
+static void pulses_lost(controller *c) {
+    synchronous_cycle *d = &c->synchronous;
+    if (!d->seen || c->segment->now - d->last <= (int64_t)(d->limit + 1) * d->cycle)
+        return;
+    d->seen = 0;
+    d->error = 1;
+    if (!c->outputs_valid)
+        return;
+    model_fault(c, ERROR_SYNCHRONISATION);
+    raise_event(c, EVENT_SYNC_LOST);
+}
+
+/* One step between two pulses, or after the last one. */
+static void model_step_between(controller *c) {
+    synchronous_cycle *d = &c->synchronous;
+    model_axes(c, 0);
+    if (d->left >= 0)
+        d->left--;
+    if (d->left == 0)
+        c->step_due += c->step_period / 2;                   /* the next pulse is to come first */
+    if (d->left >= 0)
+        return;
+    pulses_lost(c);
+    if (!d->seen)
+        model_inputs(c);
+}
+
+static void model_step(controller *c) {
+    if (c->frozen)
+        return;
+    if (c->synchronous.active)
+        model_step_between(c);
+    else
+        model_step_free(c);
+}
+
+/* 1: there are outputs that came since the last pulse, early enough to be copied for this one. */
+static int outputs_in_time(controller *c) {
+    synchronous_cycle *d = &c->synchronous;
+    if (c->outputs.sm < 0 || !(*outputs_status(c) & SM_STATUS_WRITTEN))
+        return 0;
+    if (c->sm[c->outputs.sm].completed + d->copy_time <= c->segment->now)
+        return 1;
+    d->shift_short++;
+    return 0;
+}
+
+static void outputs_missed(controller *c) {
+    synchronous_cycle *d = &c->synchronous;
+    d->missed++;
+    d->missed_in_a_row++;
+    d->error = 1;
+    if (d->missed_in_a_row != d->limit)
+        return;
+    model_fault(c, ERROR_SYNCHRONISATION);
+    raise_event(c, EVENT_SYNC_MISSED);
+}
+
+/* A SYNC0 pulse, now. */
+static void model_sync0(controller *c) {
+    synchronous_cycle *d = &c->synchronous;
+    int64_t now = c->segment->now;
+    if (!d->active || c->frozen)
+        return;
+    d->exceeded += d->seen && now - d->last < d->minimum;
+    d->last = now;
+    d->error = 0;
+    if (!d->seen) {
+        d->seen = 1;
+        raise_event(c, EVENT_SYNC_SEEN);
+    }
+    inputs_put(c);
+    int fresh = c->outputs_valid && outputs_in_time(c);
+    if (fresh || (c->outputs_valid && !c->outputs_taken))
+        outputs_accept(c);
+    if (!c->outputs_valid || fresh)
+        d->missed_in_a_row = 0;
+    else
+        outputs_missed(c);
+    c->outputs_taken = c->outputs_valid;
+    model_axes(c, fresh);
+    d->left = d->steps - 1;
+    c->step_due = now + c->step_period + (d->left == 0 ? c->step_period / 2 : 0);
+}
+
+/* From now on the device keeps time by SYNC0, `cycle` apart, in `steps` steps of its own. */
+static void synchronous_begin(controller *c, int64_t cycle, int steps) {
+    synchronous_cycle *d = &c->synchronous;
+    d->cycle = cycle;
+    d->steps = steps;
+    d->left = d->seen = d->error = 0;
+    d->missed_in_a_row = 0;
+    c->segment->synchronous += !d->active;
+    d->active = 1;
+}
+
+static void synchronous_end(controller *c) {
+    c->segment->synchronous -= c->synchronous.active;
+    c->synchronous.active = 0;
+}
+
+static inline void model_period(controller *c, int64_t period) {
+    c->step_period = period;
+    c->step_seconds = (double)period * 1e-9;
+    c->step_rate = 1e9 / (double)period;
+    c->step_due = c->segment->now + period;
+    due_at(c, c->step_due);
+}
+
+/* All work of the model that is due now: a pulse comes before a step. */
+static inline void device_advance(controller *c) {
+    int64_t now = c->segment->now;
+    if (c->sync.due <= now && sync_advance(c))
+        model_sync0(c);
+    if (c->step_due > now)
+        return;
+    model_step(c);
+    c->step_due += c->step_period;
+    if (c->step_due <= now - CATCH_UP_STEPS * c->step_period)
+        c->step_due = now + c->step_period;
+}
+
+#endif

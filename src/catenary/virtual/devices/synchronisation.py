@@ -1,0 +1,189 @@
+"""How a device keeps time with the bus: 0x1C32 outputs, 0x1C33 inputs (ETG.1020 §5.2.1, "sync
+manager parameters"), 0x10F1 the limit of missed events; and what it demands of the SYNC unit.
+
+Two types: 0 free run, 2 DC Sync0. Unless 0x1C32:01 was written, the SYNC unit decides: a device
+whose SYNC0 is switched on when it goes to SAFE-OP keeps time by it, as common device stacks do.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+
+from catenary.virtual._segment import Core
+from catenary.virtual.coe.dictionary import (
+    BOOLEAN,
+    FORMATS,
+    OUT_OF_RANGE,
+    READ_ANY,
+    UNSIGNED8,
+    UNSIGNED16,
+    UNSIGNED32,
+    WRITE_PRE_OP,
+    Abort,
+    Dictionary,
+    Entry,
+    number,
+)
+from catenary.virtual.state_machine import (
+    DC_CYCLE_TIME,
+    DC_SYNC0_CYCLE_TIME,
+    INVALID_DC_CONFIGURATION,
+)
+
+FREE_RUN, DC_SYNC0 = 0, 2
+SUPPORTED = 0x0001 | 0x0004  # 0x1C32:04: free run; bits 2 and 3: DC, SYNC0
+OUTPUTS, INPUTS, ERROR_SETTINGS = 0x1C32, 0x1C33, 0x10F1
+SYNC_CONTROL, ACTIVATION, SYNC0_CYCLE = 0x0980, 0x0981, 0x09A0
+ACTIVE, PULSES = 0x01, 0x02
+_, _, MISSED, EXCEEDED, SHIFT_SHORT, ERROR = range(6)  # of Core.synchronous
+
+
+class Synchronisation:
+    """Owns a device's type of synchronisation and the objects that show it."""
+
+    def __init__(
+        self,
+        core: Core,
+        position: int,
+        dictionary: Dictionary,
+        *,
+        step_ns: int,
+        minimum_cycle_ns: int,
+        copy_ns: int,
+        missed_limit: int,
+    ) -> None:
+        """`step_ns`: the device's own cycle; `minimum_cycle_ns` of SYNC0; `copy_ns`: how long
+        before SYNC0 outputs have to be there; `missed_limit`: pulses in a row without new ones."""
+        self._core = core
+        self._position = position
+        self._step_ns = step_ns
+        self._minimum_ns = minimum_cycle_ns
+        self._copy_ns = copy_ns
+        self._limit = missed_limit
+        self._written: int | None = None  # 0x1C32:01
+        self._cycle_written = 0  # 0x1C32:02
+        self._tune()
+        for index, name, copy in (
+            (OUTPUTS, "SM output parameter", copy_ns),
+            (INPUTS, "SM input parameter", 0),  # latched at the pulse itself
+        ):
+            dictionary.add(index, name, self._parameters(copy))
+        dictionary.add_record(
+            ERROR_SETTINGS,
+            "Error settings",
+            [
+                number("Local error reaction", UNSIGNED32, 1),  # 1: to SAFE-OP with an error
+                self._entry(
+                    "Sync error counter limit", UNSIGNED16, lambda: self._limit, self._limit_to
+                ),
+            ],
+        )
+
+    # -- what the state machine asks -----------------------------------------------------------
+
+    def check(self) -> int:
+        """PRE-OP → SAFE-OP: 0, or the AL status code why the clocks do not allow it."""
+        by_pdi, activation = self._core.peek(self._position, SYNC_CONTROL, 2)
+        switched_on = bool(activation & ACTIVE)
+        if not switched_on:
+            return INVALID_DC_CONFIGURATION if self._written == DC_SYNC0 else 0
+        if self._written == FREE_RUN or not activation & PULSES or by_pdi & 1:
+            return INVALID_DC_CONFIGURATION
+        if self.sync0_cycle_ns < self._minimum_ns:
+            return DC_SYNC0_CYCLE_TIME
+        if self._cycle_written not in (0, self.sync0_cycle_ns):
+            return DC_CYCLE_TIME
+        return 0
+
+    def begin(self) -> None:
+        """SAFE-OP is entered: by its pulses from now on, if there are to be any."""
+        if self._core.peek(self._position, ACTIVATION, 1)[0] & ACTIVE:
+            self._core.run_model_by_sync0(self._position, self.sync0_cycle_ns, self._step_ns)
+
+    def end(self) -> None:
+        if self._is_synchronous:
+            self._core.run_model(self._position, self._step_ns)
+
+    def awaits_pulses(self) -> bool:
+        """It keeps time by SYNC0, and no pulse has come."""
+        active, seen = self._core.synchronous(self._position)[:2]
+        return active and not seen
+
+    # -- what the objects show -----------------------------------------------------------------
+
+    @property
+    def sync0_cycle_ns(self) -> int:
+        return int.from_bytes(self._core.peek(self._position, SYNC0_CYCLE, 4), "little")
+
+    @property
+    def _is_synchronous(self) -> bool:
+        return self._core.synchronous(self._position)[0]
+
+    def _type(self) -> int:
+        if self._is_synchronous:
+            return DC_SYNC0
+        return FREE_RUN if self._written is None else self._written
+
+    def _type_to(self, wanted: int) -> None:
+        if wanted not in (FREE_RUN, DC_SYNC0):
+            raise Abort(OUT_OF_RANGE)
+        self._written = wanted
+
+    def _cycle(self) -> int:
+        return self.sync0_cycle_ns if self._is_synchronous else self._cycle_written or self._step_ns
+
+    def _cycle_to(self, cycle_ns: int) -> None:
+        self._cycle_written = cycle_ns
+
+    def _limit_to(self, limit: int) -> None:
+        if limit == 0:
+            raise Abort(OUT_OF_RANGE)
+        self._limit = limit
+        self._tune()
+
+    def _tune(self) -> None:
+        self._core.tune_synchronous(
+            self._position, minimum_ns=self._minimum_ns, copy_ns=self._copy_ns, limit=self._limit
+        )
+
+    def _counter(self, which: int) -> Callable[[], int]:
+        return lambda: int(self._core.synchronous(self._position)[which])
+
+    def _parameters(self, copy_ns: int) -> dict[int, Entry]:
+        entry = self._entry
+        return {
+            0x00: number("Number of entries", UNSIGNED8, 0x20),
+            0x01: entry("Sync mode", UNSIGNED16, self._type, self._type_to),
+            0x02: entry("Cycle time", UNSIGNED32, self._cycle, self._cycle_to),
+            0x03: number("Shift time", UNSIGNED32, 0),  # outputs are valid at the pulse
+            0x04: number("Sync modes supported", UNSIGNED16, SUPPORTED),
+            0x05: number("Minimum cycle time", UNSIGNED32, self._minimum_ns),
+            0x06: number("Calc and copy time", UNSIGNED32, copy_ns),
+            0x07: number("Minimum delay time", UNSIGNED32, 0),
+            0x09: number("Delay time", UNSIGNED32, 0),
+            0x0A: entry("Sync0 cycle time", UNSIGNED32, lambda: self.sync0_cycle_ns),
+            0x0B: entry("SM event missed counter", UNSIGNED16, self._counter(MISSED)),
+            0x0C: entry("Cycle exceeded counter", UNSIGNED16, self._counter(EXCEEDED)),
+            0x0D: entry("Shift too short counter", UNSIGNED16, self._counter(SHIFT_SHORT)),
+            0x20: entry("Sync error", BOOLEAN, self._counter(ERROR)),
+        }
+
+    @staticmethod
+    def _entry(
+        name: str,
+        data_type: int,
+        read: Callable[[], int],
+        write: Callable[[int], None] | None = None,
+    ) -> Entry:
+        bits, form = FORMATS[data_type]
+
+        def pack() -> bytes:
+            return struct.pack(form, read())
+
+        def unpack(data: bytes) -> None:
+            if write is not None:
+                write(int.from_bytes(data, "little"))
+
+        access = READ_ANY | (WRITE_PRE_OP if write else 0)
+        return Entry(name, data_type, bits, access, pack, unpack if write else None)

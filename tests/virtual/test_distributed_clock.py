@@ -1,0 +1,273 @@
+"""Local and system times, latches and the time control loop, register by register.
+
+Golden behaviours: Beckhoff, EtherCAT Slave Controller, section I §9.1 and section II §3.49."""
+
+from __future__ import annotations
+
+import random
+import struct
+
+import pytest
+
+from catenary.virtual import Coupler, Crystal, Segment
+from catenary.wire.datagram import Command
+from tests.virtual.clocks import (
+    ACTIVATION,
+    DELAY,
+    DIFFERENCE,
+    FILTERS,
+    OFFSET,
+    RECEIVE_TIMES,
+    SPEED_DIFFERENCE,
+    SPEED_START,
+    SYSTEM_TIME,
+    UNIT_TIME,
+    Clocks,
+)
+from tests.virtual.main_device import STATION
+
+HOP = 600  # [ns] from one coupler to the next
+
+
+def couplers(*crystals: Crystal) -> Clocks:
+    return Clocks(Segment([Coupler(crystal=crystal) for crystal in crystals]))
+
+
+@pytest.fixture
+def pair() -> Clocks:
+    return couplers(Crystal(), Crystal())
+
+
+def test_reset_values(pair: Clocks) -> None:
+    assert pair.number(1, SPEED_START, "<H") == 0x1000
+    assert pair.read(STATION + 1, FILTERS, 2) == bytes([4, 12])
+    for address, form in ((OFFSET, "<Q"), (DELAY, "<I"), (DIFFERENCE, "<I")):
+        assert pair.number(1, address, form) == 0
+    assert pair.number(1, ACTIVATION, "<B") == 0
+
+
+def test_a_write_latches_the_times_at_the_ports() -> None:
+    main = couplers(*[Crystal()] * 3)
+    times = main.latch()
+    assert [(port1 - port0) % 2**32 for port0, port1, _ in times[:2]] == [4 * HOP, 2 * HOP]
+    assert times[2][1] == 0  # nothing behind the last: the register is not touched
+    assert all(port0 == unit % 2**32 for port0, _, unit in times)
+    again = main.latch()
+    assert again[0][0] > times[0][0]
+
+
+def test_local_times_begin_apart_and_are_not_moved_by_offsets(pair: Clocks) -> None:
+    first = pair.latch()
+    assert first[0][2] != first[1][2] - HOP  # no one starts them at the same moment
+    pair.put_number(1, OFFSET, "<Q", 10**15)
+    second = pair.latch()
+    assert second[1][2] - first[1][2] == second[0][2] - first[0][2]
+
+
+def test_the_system_time_is_local_time_and_offset_less_the_delay(pair: Clocks) -> None:
+    """A frame reads when it passed the reference clock: section I, table 30."""
+    pair.latch()
+    before = pair.system_time(1)
+    pair.put_number(1, OFFSET, "<Q", 10**15)
+    plain = pair.system_time(1)
+    assert 10**15 < plain - before < 10**15 + 1_000_000
+    pair.put_number(1, DELAY, "<I", 400_000_000)
+    assert plain - 400_000_000 < pair.system_time(1) < plain
+
+
+def test_a_negative_offset_is_one_modulo_the_width(pair: Clocks) -> None:
+    before = pair.system_time(1)
+    pair.put_number(1, OFFSET, "<q", -1_000_000)
+    assert -1_000_000 < pair.system_time(1) - before < 0
+
+
+def test_a_received_time_is_compared_at_the_beginning_of_the_frame(pair: Clocks) -> None:
+    pair.put_number(1, FILTERS, "<B", 0)
+    pair.align()
+    pair.distribute()
+    assert abs(pair.difference(1)) <= 1
+
+
+@pytest.mark.parametrize(("ahead", "sign"), [(5_000, 0), (-5_000, 1)])
+def test_the_difference_is_sign_and_magnitude(pair: Clocks, ahead: int, sign: int) -> None:
+    pair.put_number(1, FILTERS, "<B", 0)
+    pair.align()
+    offset = pair.number(1, OFFSET, "<q")
+    pair.put_number(1, OFFSET, "<q", offset + ahead)
+    pair.distribute()
+    raw = pair.number(1, DIFFERENCE, "<I")
+    assert (raw >> 31, abs((raw & 0x7FFF_FFFF) - 5_000) <= 1) == (sign, True)
+
+
+def test_only_the_low_half_is_compared(pair: Clocks) -> None:
+    pair.put_number(1, FILTERS, "<B", 0)
+    pair.align()
+    offset = pair.number(1, OFFSET, "<q")
+    pair.put_number(1, OFFSET, "<q", offset + 7 * 2**32)
+    pair.distribute()
+    assert abs(pair.difference(1)) <= 1
+
+
+def test_the_difference_is_a_mean_of_its_depth(pair: Clocks) -> None:
+    """One of 16 at depth 4; a bandwidth so small that the loop does not move it meanwhile."""
+    pair.align()
+    pair.put_number(1, SPEED_START, "<H", 0x3FFF)
+    offset = pair.number(1, OFFSET, "<q")
+    pair.put_number(1, OFFSET, "<q", offset + 16_000)
+    pair.distribute()
+    assert pair.difference(1) == pytest.approx(1_000, abs=2)
+    pair.distribute()
+    assert pair.difference(1) == pytest.approx(1_000 + 15_000 / 16, abs=60)
+
+
+def test_writing_the_speed_start_resets_the_filters(pair: Clocks) -> None:
+    pair.align()
+    pair.put_number(1, OFFSET, "<q", pair.number(1, OFFSET, "<q") + 20_000)
+    pair.burst(100)
+    assert pair.difference(1) > 1_000
+    assert pair.number(1, SPEED_DIFFERENCE, "<h") != 0
+    pair.put_number(1, SPEED_START, "<H", 0x1000)
+    assert (pair.difference(1), pair.number(1, SPEED_DIFFERENCE, "<h")) == (0, 0)
+
+
+@pytest.mark.parametrize("start", [0x0080, 0x0400, 0x1000, 0x3FFF])
+def test_the_speed_difference_is_bounded_and_says_the_deviation(start: int) -> None:
+    """±(start - 0x7F), section II table 105; and the formula of its note, the rate."""
+    main = couplers(Crystal(), Crystal())
+    main.align()
+    main.put_number(1, SPEED_START, "<H", start)
+    main.put_number(1, FILTERS, "<B", 0)
+    main.put_number(1, OFFSET, "<q", main.number(1, OFFSET, "<q") + 300_000_000)  # far ahead
+    main.distribute()
+    counted = main.number(1, SPEED_DIFFERENCE, "<h")
+    assert counted == -(start - 0x7F)  # ahead: slower
+    first = main.latch()
+    main.let_pass(100)
+    second = main.latch()
+    slope = (second[1][2] - first[1][2]) / (second[0][2] - first[0][2]) - 1
+    deviation = counted / (5 * (start + counted + 2) * (start - counted + 2))
+    assert slope == pytest.approx(deviation, rel=1e-4)
+
+
+@pytest.mark.parametrize("ppm", [-100.0, -7.0, 40.0])
+def test_a_clock_is_caught_and_the_speed_difference_is_its_deviation(ppm: float) -> None:
+    main = couplers(Crystal(), Crystal(ppm=ppm))
+    main.align()
+    main.burst(10_000)
+    main.run(500)
+    assert abs(main.difference(1)) < 100
+    counted = main.number(1, SPEED_DIFFERENCE, "<h")
+    deviation = counted / (5 * (0x1000 + counted + 2) * (0x1000 - counted + 2))
+    assert deviation == pytest.approx(-ppm * 1e-6, rel=0.02)
+
+
+def test_a_plain_cycle_catches_a_clock_too() -> None:
+    main = couplers(Crystal(), Crystal(ppm=50))
+    main.align()
+    main.run(200)
+    assert abs(main.difference(1)) < 1_000
+
+
+def test_thirty_three_clocks_hold_together_within_two_seconds() -> None:
+    """±100 ppm, time stamps scattered over 1 us, temperature drifting: the speed to reach."""
+    numbers = random.Random(4)
+    crystals = [
+        Crystal(ppm=numbers.uniform(-100, 100), drift_ppm=2, jitter=1e-6) for _ in range(33)
+    ]
+    main = couplers(*crystals)
+    start = main.link.now()
+    main.align()
+    main.burst(10_000)
+    main.run(1_000)
+    assert main.link.now() - start < 2_000_000_000
+    for _ in range(10):
+        main.run(50)
+        assert max(abs(main.difference(k)) for k in range(1, 33)) < 1_000
+
+
+def test_a_clock_of_32_bits() -> None:
+    main = Clocks(Segment([Coupler(), Coupler(clock_bits=32)]))
+    assert main.number(1, 0x0008, "<H") & 0x000C == 0x0004
+    main.put_number(1, OFFSET, "<Q", 0xFFFF_FFFF_FFFF_0000)
+    assert main.number(1, OFFSET, "<Q") == 0xFFFF_0000
+    before = main.system_time(1)
+    assert before < 2**32
+    main.latch()
+    assert main.number(1, UNIT_TIME, "<Q") < 2**32
+    main.let_pass(4_500)
+    assert main.system_time(1) < 2**32  # round it goes, every 4.3 s
+    main.put_number(1, OFFSET, "<I", 0)
+    main.put_number(1, FILTERS, "<B", 0)
+    [low] = struct.unpack("<I", main.read(STATION, SYSTEM_TIME, 4))
+    main.put_number(1, OFFSET, "<I", (low - main.number(1, SYSTEM_TIME, "<I")) % 2**32)
+    main.distribute()
+    assert abs(main.difference(1)) < 100_000
+
+
+def test_a_device_without_a_clock_has_none_of_it() -> None:
+    from catenary.virtual import DigitalInputs
+
+    main = Clocks(Segment([Coupler(), DigitalInputs()]))
+    assert main.number(1, 0x0008, "<H") & 0x000C == 0
+    assert main.put_number(1, OFFSET, "<Q", 1) == 0
+    main.exchange(Command.BWR, 0, RECEIVE_TIMES, bytes(4))
+    assert main.read(STATION + 1, RECEIVE_TIMES, 16) == bytes(16)
+    assert main.exchange(Command.FRMW, STATION, SYSTEM_TIME, bytes(4)).working_counter == 1
+
+
+def test_a_crystal_counts_too_fast_by_its_error() -> None:
+    main = couplers(Crystal(), Crystal(ppm=80))
+    first = main.latch()
+    main.let_pass(1_000)
+    second = main.latch()
+    assert second[1][2] - first[1][2] - (second[0][2] - first[0][2]) == pytest.approx(80_000, abs=5)
+
+
+def test_a_crystal_drifts_with_the_temperature_and_comes_back() -> None:
+    main = couplers(Crystal(), Crystal(drift_ppm=10, drift_period=8))
+    start = main.latch()
+
+    def gone() -> int:
+        now = main.latch()
+        return now[1][2] - start[1][2] - (now[0][2] - start[0][2])
+
+    main.let_pass(4_000)
+    assert gone() == pytest.approx(10e-6 * 8e9 / 3.14159, rel=0.02)  # half a sine
+    main.let_pass(4_000)
+    assert abs(gone()) < 500
+
+
+def test_a_crystal_may_change_while_it_counts() -> None:
+    main = couplers(Crystal(), Crystal())
+    before = main.latch()
+    main.segment[1].crystal = Crystal(ppm=100)
+    assert main.segment[1].crystal.ppm == 100
+    after = main.latch()
+    assert after[1][2] - before[1][2] == pytest.approx(after[0][2] - before[0][2], abs=100)
+
+
+def test_time_stamps_scatter_over_their_jitter_the_same_in_every_run() -> None:
+    def stamps() -> list[int]:
+        main = couplers(Crystal(), Crystal(jitter=1e-6))
+        times = [main.latch() for _ in range(200)]
+        first = times[0][1][2] - times[0][0][2]
+        return [time[1][2] - time[0][2] - first for time in times]
+
+    found = stamps()
+    assert found == stamps()
+    assert 900 < max(found) - min(found) <= 1_000
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"ppm": 600.0}, "at most 500 ppm"),
+        ({"ppm": 400.0, "drift_ppm": -200.0}, "drift included"),
+        ({"drift_period": 0.1}, "at least 1 s"),
+        ({"jitter": -1e-9}, "jitter"),
+        ({"ppm": float("nan")}, "ppm must be a number"),
+    ],
+)
+def test_a_crystal_of_no_use_is_refused(fields: dict[str, float], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Crystal(**fields)
