@@ -191,3 +191,47 @@ def test_what_a_person_cannot_mean_is_refused(entry, text):
 
 def test_infinity_is_a_value_of_the_type():
     assert math.isinf(REAL.decode(REAL.encode(math.inf)))
+
+
+def test_an_array_is_a_tuple() -> None:
+    kind = types.Array(types.UINT, 3)
+    assert kind.encode((1, 2, 0xFFFF)) == b"\x01\x00\x02\x00\xff\xff"
+    assert kind.decode(b"\x01\x00\x02\x00\xff\xff") == (1, 2, 0xFFFF)
+    assert str(kind) == "ARRAY [1..3] OF UINT"
+    with pytest.raises(DecodeError, match="needs 6 bytes, received 5"):
+        kind.decode(bytes(5))
+    with pytest.raises(ValueError, match="got 2 values"):
+        kind.encode((1, 2))
+
+
+def test_an_array_of_bits_is_packed() -> None:
+    kind = types.Array(types.BIT2, 5)
+    assert kind.encode((1, 2, 3, 0, 1)) == bytes([0b00_11_10_01, 0b01])
+    assert kind.decode(bytes([0b00_11_10_01, 0b01])) == (1, 2, 3, 0, 1)
+
+
+def test_a_record_is_a_dict() -> None:
+    kind = types.Record(
+        {
+            "vendor": types.UDINT,
+            "ready": types.BOOL,
+            "gap": types.BIT7,
+            "speed": types.REAL,
+            "name": types.sized(types.VISIBLE_STRING, 4),
+        }
+    )
+    value = {"vendor": 2, "ready": True, "gap": 0, "speed": 0.5, "name": "abc"}
+    data = b"\x02\x00\x00\x00\x01\x00\x00\x00\x3fabc\x00"
+    assert kind.encode(value) == data
+    assert kind.decode(data) == value
+    with pytest.raises(ValueError, match="got values for vendor"):
+        kind.encode({"vendor": 2})
+
+
+def test_what_has_no_size_stands_in_no_record() -> None:
+    with pytest.raises(ValueError, match=r"sized\(VISIBLE_STRING, 32\)"):
+        types.Record({"name": types.VISIBLE_STRING})
+    with pytest.raises(ValueError, match="longer than 4 bytes"):
+        types.sized(types.VISIBLE_STRING, 4).encode("abcde")
+    with pytest.raises(ValueError, match="UDINT of 4 bytes"):
+        types.sized(types.UDINT, 4)

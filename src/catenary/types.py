@@ -11,7 +11,8 @@ from __future__ import annotations
 import math
 import operator
 import struct
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Generic, TypeAlias, TypeVar, cast
 
 from catenary.errors import DecodeError
@@ -152,11 +153,15 @@ class Text(DataType[str]):
         if "\x00" in value:
             raise ValueError(f"{self.name}: {value!r} holds a NUL character")
         try:
-            return value.encode(self.encoding)
+            data = value.encode(self.encoding)
+            if self.size and len(data) > self.size:
+                raise ValueError(f"{self.name}: {value!r} is longer than {self.size} bytes")
+            return data.ljust(self.size, b"\x00")
         except UnicodeEncodeError as error:
             raise ValueError(f"{self.name}: {value!r} cannot be written: {error.reason}") from None
 
     def decode(self, data: bytes) -> str:
+        self._check_size(data)
         try:
             return data.decode(self.encoding).split("\x00", 1)[0]
         except UnicodeDecodeError as error:
@@ -184,6 +189,100 @@ class Octets(DataType[bytes]):
             return self.encode(bytes.fromhex(text.removeprefix("0x")))
         except ValueError as error:
             raise ValueError(f"{self.name}: {text!r}: {error}") from None
+
+
+# What complete access reads or writes at once: its entries, as they stand in the object.
+Scalar: TypeAlias = (
+    DataType[bool] | DataType[int] | DataType[float] | DataType[str] | DataType[bytes]
+)
+
+
+class Array(DataType[tuple[T, ...]]):
+    """`count` values of one type behind one another: `Array(UDINT, 4)`, decoded to a tuple."""
+
+    element: DataType[T]
+    count: int
+
+    def __init__(self, element: DataType[T], count: int) -> None:
+        _check_sized(element)
+        if count < 1:
+            raise ValueError(f"an array of {count} values")
+        super().__init__(f"ARRAY [1..{count}] OF {element}", 0, count * element.bit_length)
+        object.__setattr__(self, "element", element)
+        object.__setattr__(self, "count", count)
+
+    def encode(self, value: tuple[T, ...]) -> bytes:
+        if len(value) != self.count:
+            raise ValueError(f"{self.name}: got {len(value)} values")
+        width = self.element.bit_length
+        return _packed([(width, self.element.encode(each)) for each in value])
+
+    def decode(self, data: bytes) -> tuple[T, ...]:
+        self._check_size(data)
+        return tuple(
+            self.element.decode(part)
+            for part in _unpacked(data, [self.element.bit_length] * self.count)
+        )
+
+
+class Record(DataType[Mapping[str, Value]]):
+    """Named values behind one another: `Record({"vendor": UDINT, "product": UDINT})`, decoded to a
+    dict. Entries of some bits are packed as in the object; a gap is a field nobody reads."""
+
+    fields: Mapping[str, Scalar]
+
+    def __init__(self, fields: Mapping[str, Scalar]) -> None:
+        if not fields:
+            raise ValueError("a record without fields")
+        for kind in cast(Iterable[DataType[Value]], fields.values()):
+            _check_sized(kind)
+        name = f"STRUCT ({', '.join(f'{name}: {kind}' for name, kind in fields.items())})"
+        super().__init__(name, 0, sum(kind.bit_length for kind in fields.values()))
+        object.__setattr__(self, "fields", dict(fields))
+
+    def encode(self, value: Mapping[str, Value]) -> bytes:
+        if value.keys() != self.fields.keys():
+            raise ValueError(f"{self.name}: got values for {', '.join(value) or 'nothing'}")
+        kinds = cast(Mapping[str, DataType[Value]], self.fields)
+        return _packed(
+            [(kind.bit_length, kind.encode(value[name])) for name, kind in kinds.items()]
+        )
+
+    def decode(self, data: bytes) -> dict[str, Value]:
+        self._check_size(data)
+        parts = _unpacked(data, [kind.bit_length for kind in self.fields.values()])
+        return {
+            name: kind.decode(part)
+            for (name, kind), part in zip(self.fields.items(), parts, strict=True)
+        }
+
+
+def sized(kind: DataType[T], size: int) -> DataType[T]:
+    """A type of any length as one of `size` bytes: `sized(VISIBLE_STRING, 32)`."""
+    if kind.bit_length or size < 1:
+        raise ValueError(f"{kind} of {size} bytes")
+    return replace(kind, name=f"{kind}({size})", bit_length=8 * size)
+
+
+def _check_sized(kind: DataType[T]) -> None:
+    if not kind.bit_length:
+        raise ValueError(f"{kind} has no size of its own: give it one, sized({kind}, 32)")
+
+
+def _packed(parts: Sequence[tuple[int, bytes]]) -> bytes:
+    """Values of some bits each, the first in the lowest bits."""
+    number = bit = 0
+    for width, data in parts:
+        number |= int.from_bytes(data, "little") << bit
+        bit += width
+    return number.to_bytes((bit + 7) // 8, "little")
+
+
+def _unpacked(data: bytes, widths: Sequence[int]) -> Iterator[bytes]:
+    number = int.from_bytes(data, "little")
+    for width in widths:
+        yield (number & (1 << width) - 1).to_bytes((width + 7) // 8, "little")
+        number >>= width
 
 
 BOOL = Boolean("BOOL", 0x0001, 1, ("BOOLEAN", "BIT"))

@@ -59,11 +59,39 @@ def test_sdo_write(capsys: pytest.CaptureFixture[str]) -> None:
     assert call("sdo write virtual 2 0x6065 0x1388 --type UDINT", capsys) == (0, "", "")
 
 
+def test_sdo_list_names_every_entry(capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = call("sdo list virtual 2", capsys)
+    lines = [line.split(maxsplit=3) for line in out.splitlines()]
+    assert ["0x1018:01", "UDINT", "r", "Vendor ID"] in lines
+    assert ["0x1018", "RECORD", "Identity"] in lines
+    assert ["0x6040:00", "UINT", "rw", "R       Controlword"] in lines
+    assert ["0x1C12:01", "UINT", "rwP", "Subindex 001"] in lines
+
+
+def test_sdo_list_with_values_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = call("sdo list virtual 2 --values --json", capsys)
+    rows = {(row["index"], row["subindex"]): row for row in json.loads(out)}
+    assert rows[0x1018, 1] == {
+        "index": 0x1018,
+        "subindex": 1,
+        "name": "Vendor ID",
+        "type": "UDINT",
+        "bits": 32,
+        "access": "r",
+        "value": VENDOR_ID,
+        "problem": None,
+    }
+    assert rows[0x1008, 0]["value"] == "Catenary virtual servo 1"
+    assert rows[0x1018, None]["type"] == "RECORD"
+    assert rows[0x2100, 0]["value"] == bytes(k * 7 & 0xFF for k in range(2048)).hex()
+
+
 @pytest.mark.parametrize(
     ("line", "status", "message"),
     [
         ("sdo read virtual 2 0x5FFF", 1, "0x06020000"),
         ("sdo read virtual 0 0x1018:1", 1, "no mailbox"),
+        ("sdo list virtual 0", 1, "no mailbox"),
         ("sdo read virtual 6 0x1018:1", 2, "the segment has 6"),
         ("sdo read virtual 2 0x1018:1 --type UNIT", 2, "did you mean UINT?"),
         ("sdo read virtual 2 0x1018:1 --type UINT", 1, "needs 2 bytes, received 4"),

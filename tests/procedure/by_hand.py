@@ -69,6 +69,8 @@ class MailboxDevice:
         self.lose_back: set[int] = set()
         self.deduplicates = True
         self.deaf = False  # does not read its mailbox
+        self.next_counter: Callable[[], int] | None = None  # instead of 1 to 7 and again
+        self.spoil: Callable[[bytes], bytes] = lambda data: data  # what it does to its messages
         self.received: list[Mailbox] = []
         self._queue: deque[bytes] = deque()
         self._in_buffer: bytes | None = None
@@ -119,8 +121,9 @@ class MailboxDevice:
     def send(self, message: Mailbox) -> None:
         """Puts a message into the device's queue, with its next counter."""
         self._counter = next_counter(self._counter)
-        counted = Mailbox(message.type, message.data, self._counter)
-        self._queue.append(counted.encode(LAYOUT.send_size))
+        counter = self._counter if self.next_counter is None else self.next_counter()
+        counted = Mailbox(message.type, message.data, counter)
+        self._queue.append(self.spoil(counted.encode(LAYOUT.send_size)))
         self._refill()
 
     def _refill(self) -> None:

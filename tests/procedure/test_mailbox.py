@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from catenary.errors import MailboxError, ResponseTimeout
+from catenary.procedure.exchange import After, Procedure, Reply
 from catenary.procedure.mailbox import drain
 from catenary.procedure.sdo import download, upload
 from catenary.wire.coe import UploadRequest
@@ -108,3 +109,109 @@ def _longest_run(numbers: set[int]) -> int:
         run = run + 1 if number in numbers else 0
         longest = max(longest, run)
     return longest
+
+
+# What devices do against the protocol.
+
+
+def test_a_device_that_answers_twice_stays_in_step() -> None:
+    values = iter(range(100))
+
+    def twice(message: Mailbox) -> list[Mailbox]:
+        answer = Dictionary({(0x2000, 0): bytes([next(values)])})(message)
+        return [*answer, *answer]
+
+    lane = channel()
+    device = MailboxDevice(twice)
+    assert [play(upload(lane, 0x2000, 0), device) for _ in range(5)] == [
+        bytes([k]) for k in range(5)
+    ]
+    assert lane.dropped == 4
+
+
+def test_an_answer_of_another_kind_is_no_answer_and_is_told() -> None:
+    device = MailboxDevice(lambda _: [Mailbox(Type.EOE, bytes(20))])
+    lane = channel()
+    with pytest.raises(ResponseTimeout, match="1 messages of another kind instead"):
+        play(upload(lane, 0x2000, 0), device)
+    assert lane.dropped == 1
+
+
+def test_a_device_that_babbles_is_an_error_soon() -> None:
+    device = MailboxDevice(lambda _: [Mailbox(Type.EOE, bytes(20))] * 500)
+    with pytest.raises(MailboxError, match="one message after the other that nobody asked for"):
+        play(upload(channel(), 0x2000, 0), device)
+
+
+def test_draining_one_that_babbles_ends_too() -> None:
+    device = MailboxDevice(lambda _: [])
+    for _ in range(500):
+        device.send(Mailbox(Type.EOE, bytes(20)))
+    assert len(play(drain(channel(), lambda message: message), device)) < 100
+
+
+def test_counters_that_stand_still_or_jump_mean_nothing() -> None:
+    for counters in ([0, 0, 0, 0], [5, 1, 7, 2]):
+        device = MailboxDevice(Dictionary(OBJECT))
+        given = iter(counters)
+        device.next_counter = lambda given=given: next(given)  # type: ignore[misc]
+        lane = channel()
+        for _ in counters:
+            assert play(upload(lane, 0x2000, 0), device) == OBJECT[0x2000, 0]
+
+
+def test_a_length_beyond_the_mailbox_is_the_devices_fault() -> None:
+    device = MailboxDevice(Dictionary(OBJECT))
+    device.spoil = lambda data: (60000).to_bytes(2, "little") + data[2:]
+    with pytest.raises(MailboxError, match=r"device 3 \(Probe\): a mailbox message that is none"):
+        play(upload(channel(), 0x2000, 0), device)
+
+
+def test_an_answer_that_came_too_late_is_not_the_next_ones() -> None:
+    lane = channel()
+    answers = Dictionary({(0x2000, 0): b"\x01"})
+    device = MailboxDevice(lambda _: [])
+    with pytest.raises(ResponseTimeout):
+        play(upload(lane, 0x2000, 0), device)
+    for answer in answers(device.received[-1]):
+        device.send(answer)  # after the deadline
+    device.respond = Dictionary({(0x2000, 0): b"\x02"})
+    assert play(upload(lane, 0x2000, 0), device) == b"\x02"
+
+
+def test_a_question_given_up_owes_its_answer_to_nobody() -> None:
+    lane = channel()
+    device = MailboxDevice(Dictionary({(0x2000, 0): b"\x01"}))
+    broken_off = upload(lane, 0x2000, 0)
+    device(next(broken_off)[1])  # type: ignore[index]
+    broken_off.close()  # Ctrl-C
+    device.respond = Dictionary({(0x2000, 0): b"\x02"})
+    assert play(upload(lane, 0x2000, 0), device) == b"\x02"
+
+
+def test_conversations_take_place_in_the_order_they_were_begun() -> None:
+    lane = channel()
+    device = MailboxDevice(Dictionary(OBJECT))
+    first, second = upload(lane, 0x2000, 0), upload(lane, 0x2000, 0)
+    next(first)
+    next(second)
+    third = upload(lane, 0x2000, 0)
+    first.close()
+    assert isinstance(next(third), After)  # the second one's turn
+    assert play_on(second, device) == OBJECT[0x2000, 0]
+    assert play_on(third, device) == OBJECT[0x2000, 0]
+
+
+def play_on(procedure: Procedure[bytes], device: MailboxDevice) -> bytes:
+    """From a pause on."""
+
+    def rest() -> Procedure[bytes]:
+        replies: list[Reply] = []
+        while True:
+            try:
+                step = procedure.send(replies)
+            except StopIteration as stop:
+                return stop.value
+            replies = yield step
+
+    return play(rest(), device)

@@ -95,3 +95,56 @@ def test_segments_beyond_the_size_told_are_aborted() -> None:
 
     with pytest.raises(MailboxError, match="against the protocol"):
         play(upload(channel(), 0x2000, 0), MailboxDevice(respond))
+
+
+def test_an_object_beyond_the_limit_is_broken_off_at_once() -> None:
+    dictionary = Dictionary({(0x2000, 0): bytes(5000)})
+    device = MailboxDevice(dictionary)
+    with pytest.raises(MailboxError, match="announces 5000 bytes, the limit is 4999"):
+        play(upload(channel(), 0x2000, 0, limit=4999), device)
+    assert decode_coe(device.received[-1].data) == Abort(0x2000, 0, 0x0504_0005)
+    assert len(device.received) == 2
+    assert play(upload(channel(), 0x2000, 0, limit=5000), device) == bytes(5000)
+
+
+def test_an_upload_that_never_ends_is_bounded_by_its_own_size() -> None:
+    dictionary = Dictionary({(0x2000, 0): bytes(1000)})
+
+    def drip(message: Mailbox) -> list[Mailbox]:
+        request = decode_coe(message.data)
+        if isinstance(request, UploadSegmentRequest):
+            return [coe(UploadSegment(request.toggle, False, b"x"))]
+        return dictionary(message)
+
+    device = MailboxDevice(drip)
+    with pytest.raises(MailboxError, match="against the protocol"):
+        play(upload(channel(), 0x2000, 0), device)
+    assert len(device.received) <= 1000
+
+
+def test_segments_of_nothing_are_no_transfer() -> None:
+    dictionary = Dictionary({(0x2000, 0): bytes(1000)})
+
+    def nothing(message: Mailbox) -> list[Mailbox]:
+        request = decode_coe(message.data)
+        if isinstance(request, UploadSegmentRequest):
+            return [coe(UploadSegment(request.toggle, False, b""))]
+        return dictionary(message)
+
+    with pytest.raises(MailboxError, match="against the protocol"):
+        play(upload(channel(), 0x2000, 0), MailboxDevice(nothing))
+
+
+def test_complete_access_both_ways() -> None:
+    seen: list[object] = []
+    dictionary = Dictionary({(0x1C12, 0): b"\x02\x00\x00\x16\x01\x16"})
+
+    def watched(message: Mailbox) -> list[Mailbox]:
+        seen.append(decode_coe(message.data))
+        return dictionary(message)
+
+    device, lane = MailboxDevice(watched), channel()
+    data = play(upload(lane, 0x1C12, 0, complete_access=True), device)
+    play(download(lane, 0x1C12, 0, data, complete_access=True), device)
+    assert dictionary.written == [(0x1C12, 0, data)]
+    assert [message.complete_access for message in seen] == [True, True]  # type: ignore[attr-defined]

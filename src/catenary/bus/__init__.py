@@ -2,15 +2,20 @@
 
 from catenary.bus.lane_runner import Lane, LaneRunner
 from catenary.bus.main_device import MainDevice, SubDevices
+from catenary.bus.pending import Pending
 from catenary.bus.runner import BlockingRunner, FrameCounts, Runner
-from catenary.bus.sub_device import Sdo, SubDevice
+from catenary.bus.sdo import Sdo
+from catenary.bus.sub_device import SubDevice
+from catenary.wire.sdo_information import ListType
 
 __all__ = [
     "BlockingRunner",
     "FrameCounts",
     "Lane",
     "LaneRunner",
+    "ListType",
     "MainDevice",
+    "Pending",
     "Runner",
     "Sdo",
     "SubDevice",

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
 from catenary.bus.packing import Parcel, batches, indices, make_parcel, replies_of
+from catenary.bus.pending import Pending
 from catenary.bus.runner import ATTEMPTS, FRAME_TIMEOUT, FrameCounts
 from catenary.bus.task import Task
 from catenary.errors import DecodeError, LoopError
@@ -56,36 +57,50 @@ class _UnderWay:
     deadline_ns: int
 
 
-@dataclass(slots=True, eq=False)
-class _Waiting:
-    task: Task[Any]
-    finished: threading.Event = field(default_factory=threading.Event)
-
-
 class LaneRunner:
-    """Owns the procedures beside one cycle. One thread steps; `submit` and `run` are for any."""
+    """Owns the procedures beside one cycle. One thread steps; `submit` and `run` are for any.
+
+    `grain_ns`: a pause that ends within it has ended: frames go out with the next cycle only, so a
+    pause much shorter than the period passes while they wait for it.
+    """
 
     def __init__(
-        self, lane: Lane, *, frame_timeout: float = FRAME_TIMEOUT, attempts: int = ATTEMPTS
+        self,
+        lane: Lane,
+        *,
+        frame_timeout: float = FRAME_TIMEOUT,
+        attempts: int = ATTEMPTS,
+        grain_ns: int = 0,
     ) -> None:
         self.counts = FrameCounts()
+        self.asked = threading.Event()  # something was submitted since this was cleared
         self._lane = lane
         self._timeout_ns = round(frame_timeout * 1e9)
         self._attempts = attempts
+        self._grain_ns = grain_ns
         self._indices = indices()
         self._lock = threading.Lock()  # of the two below
-        self._submitted: deque[_Waiting] = deque()
+        self._submitted: deque[Pending[Any]] = deque()
         self._closed = False
         self._owner = threading.get_ident()
-        self._active: list[_Waiting] = []
+        self._active: list[Pending[Any]] = []
         self._outbox: deque[_Item] = deque()
         self._under_way: dict[int, _UnderWay] = {}
 
-    def submit(self, procedure: Procedure[T]) -> Task[T]:
-        """Lets a procedure begin at the next step; `task.done`, `task.result()` tell the rest."""
-        task = Task(procedure)
-        self._submit(_Waiting(task))
-        return task
+    def adopt(self) -> None:
+        """The thread that calls this is the loop's: it must not wait for itself."""
+        self._owner = threading.get_ident()
+
+    def submit(self, procedure: Procedure[T]) -> Pending[T]:
+        """Lets a procedure begin at the next step."""
+        pending = Pending(Task(procedure))
+        with self._lock:
+            if self._closed:
+                procedure.close()
+                raise _ended()
+            self._submitted.append(pending)
+        self.asked.set()
+        return pending
 
     def run(self, procedure: Procedure[T]) -> T:
         """Waits for the result, in another thread than the loop's. RuntimeError in the loop's
@@ -93,14 +108,13 @@ class LaneRunner:
         if threading.get_ident() == self._owner:
             procedure.close()
             raise RuntimeError(
-                "a blocking call inside the loop's own thread would stop the loop: "
-                "make it from another thread, or before the loop"
+                "a blocking call inside the loop's own thread would stop the loop: use "
+                "sub.sdo.request() and look at its `done`, make the call from another thread, or "
+                "before the loop"
             )
-        waiting = _Waiting(Task(procedure))
-        self._submit(waiting)
-        waiting.finished.wait()  # the procedure's own deadlines, or close(), end this
-        result: T = waiting.task.result()
-        return result
+        pending = self.submit(procedure)
+        pending.wait()
+        return pending.result()
 
     @property
     def busy(self) -> bool:
@@ -124,17 +138,8 @@ class LaneRunner:
             left = [*self._active, *self._submitted]
             self._submitted.clear()
         self._active.clear()
-        for waiting in left:
-            if not waiting.task.done:
-                waiting.task.cancel()
-                waiting.task.error = _ended()
-            waiting.finished.set()
-
-    def _submit(self, waiting: _Waiting) -> None:
-        with self._lock:
-            if self._closed:
-                raise _ended()
-            self._submitted.append(waiting)
+        for pending in left:
+            pending.finish(_ended())
 
     def _receive(self, now: int) -> None:
         while (raw := self._lane.lane_pop()) is not None:
@@ -172,16 +177,22 @@ class LaneRunner:
 
     def _begin(self, now: int) -> None:
         with self._lock:
-            begun, self._submitted = self._submitted, deque()
+            begun = [pending for pending in self._submitted if not pending.cancelled]
+            unwanted = [pending for pending in self._submitted if pending.cancelled]
+            self._submitted.clear()
             self._active.extend(begun)
-        for waiting in begun:
-            waiting.task.start(now)
-            self._enqueue(waiting.task)
+        for pending in unwanted:
+            pending.task.cancel()
+            pending.finish()
+        for pending in begun:
+            pending.task.start(now)
+            self._enqueue(pending.task)
 
     def _wake(self, now: int) -> None:
-        for waiting in self._active:
-            task = waiting.task
-            if not task.done and task.wake_ns is not None and task.wake_ns <= now:
+        due = now + self._grain_ns
+        for pending in self._active:
+            task = pending.task
+            if not task.done and task.wake_ns is not None and task.wake_ns <= due:
                 task.resume([], now)
                 self._enqueue(task)
 
@@ -194,10 +205,10 @@ class LaneRunner:
         )
 
     def _finish(self) -> None:
-        for waiting in self._active:
-            if waiting.task.done:
-                waiting.finished.set()
-        self._active = [waiting for waiting in self._active if not waiting.task.done]
+        for pending in self._active:
+            if pending.task.done:
+                pending.finish()
+        self._active = [pending for pending in self._active if not pending.task.done]
 
     def _send(self, now: int) -> None:
         items = list(self._outbox)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Self, TypeVar, overload
 
 from catenary.bus import event
 from catenary.bus.events import Callback, Callbacks, Events
+from catenary.bus.pending import Pending
 from catenary.bus.runner import BlockingRunner, FrameCounts, Runner
 from catenary.bus.segment_scan import Found, check_identity, find, with_places
 from catenary.bus.sub_device import SubDevice
@@ -238,6 +239,12 @@ class MainDevice:
             return runner.run(procedure)
         finally:
             self.deliver_events()
+
+    def request(self, procedure: Procedure[T]) -> Pending[T]:
+        """Lets a procedure go on beside the running loop. Without one it has ended when this
+        returns."""
+        runner: Runner = self._attached or self._runner
+        return runner.submit(procedure)
 
     @contextlib.contextmanager
     def attached(self, runner: Runner) -> Iterator[None]:

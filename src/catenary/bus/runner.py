@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
 from catenary.bus.packing import Parcel, batches, indices, make_parcel, replies_of
+from catenary.bus.pending import Pending
 from catenary.bus.task import Task
 from catenary.errors import DecodeError
 from catenary.link import Link
@@ -28,9 +29,11 @@ WINDOW = 16  # frames under way at once: less than any receive ring holds
 
 
 class Runner(Protocol):
-    """Runs a procedure to its end."""
+    """Runs procedures: to their end, or so that one can look at them."""
 
     def run(self, procedure: Procedure[T]) -> T: ...
+
+    def submit(self, procedure: Procedure[T]) -> Pending[T]: ...
 
 
 @dataclass(slots=True)
@@ -61,6 +64,17 @@ class BlockingRunner:
     def run(self, procedure: Procedure[T]) -> T:
         """Runs one to its end."""
         return self.run_all([procedure])[0]
+
+    def submit(self, procedure: Procedure[T]) -> Pending[T]:
+        """The same: nobody else would step it, so it has ended when this returns."""
+        pending = Pending(Task(procedure))
+        with self._lock:
+            try:
+                self._run([pending.task])
+            finally:
+                pending.task.cancel()
+                pending.finish()
+        return pending
 
     def run_all(self, procedures: Sequence[Procedure[T]]) -> list[T]:
         """Runs all at once. When some fail, the others are finished first; then the first error

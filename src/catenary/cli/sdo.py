@@ -1,4 +1,4 @@
-"""`catenary sdo read|write`: entries of a device's object dictionary."""
+"""`catenary sdo read|write|list`: a device's object dictionary."""
 
 from __future__ import annotations
 
@@ -20,10 +20,12 @@ def add_parser(commands: Commands) -> None:
     group = add_command(
         commands,
         "sdo",
-        help="read or write an object of a device",
-        description="Reads or writes one entry of a device's object dictionary (CoE SDO).",
+        help="read, write or list the objects of a device",
+        description="Reads or writes one entry of a device's object dictionary (CoE SDO), or lists "
+        "them all.",
         example="catenary sdo read eth0 2 0x1018:1 --type UDINT\n"
-        "catenary sdo write eth0 2 0x6065 5000 --type UDINT",
+        "catenary sdo write eth0 2 0x6065 5000 --type UDINT\n"
+        "catenary sdo list eth0 2 --values",
     ).add_subparsers(title="commands", metavar="COMMAND", required=True)
     reading = add_command(
         group,
@@ -50,11 +52,28 @@ def add_parser(commands: Commands) -> None:
     _add_type(writing)
     add_json(writing)
     writing.set_defaults(run=run_write)
+    listing = add_command(
+        group,
+        "list",
+        help="list all objects",
+        description="Lists the entries of a device's object dictionary as the device itself "
+        "describes them: index, type, access, name. Access: r and w, with the states where it is "
+        "not all (P: PRE-OP, S: SAFE-OP, O: OP); R, T: can be mapped into RxPDOs, TxPDOs.",
+        example="catenary sdo list eth0 2\ncatenary sdo list virtual 2 --values --json",
+    )
+    _add_device(listing)
+    listing.add_argument("--values", action="store_true", help="read every entry that can be read")
+    add_json(listing)
+    listing.set_defaults(run=run_list)
+
+
+def _add_device(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("target", metavar="TARGET", help="eth0, virtual or virtual:FILE.toml")
+    parser.add_argument("position", metavar="POSITION", type=position, help="0 is the first device")
 
 
 def _add_place(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("target", metavar="TARGET", help="eth0, virtual or virtual:FILE.toml")
-    parser.add_argument("position", metavar="POSITION", type=position, help="0 is the first device")
+    _add_device(parser)
     parser.add_argument("entry", metavar="INDEX[:SUB]", type=entry, help="0x6041, 0x1018:1")
 
 
@@ -96,6 +115,21 @@ def run_write(arguments: argparse.Namespace) -> int:
         device_at(main.scan(), arguments.position).sdo.write(at.index, at.subindex, data)
     if arguments.json:
         print(_as_json(arguments, data, value))
+    return 0
+
+
+def run_list(arguments: argparse.Namespace) -> int:
+    from catenary.cli.devices import device_at
+    from catenary.cli.dictionary import as_json, as_lines, rows_of
+    from catenary.target import MainDevice
+
+    with MainDevice(arguments.target) as main:
+        rows = rows_of(device_at(main.scan(), arguments.position), values=arguments.values)
+        if arguments.json:
+            print(as_json(rows))
+        else:
+            for line in as_lines(rows):  # as they come: a large dictionary takes seconds
+                print(line)
     return 0
 
 

@@ -102,6 +102,7 @@ cdef struct cycle_t:
 cdef void cycle_start(cycle_t *c) noexcept nogil
 cdef int cycle_wait(cycle_t *c) noexcept nogil
 cdef int cycle_sleep(cycle_t *c, int64_t lead) noexcept nogil
+cdef void cycle_await_lane(cycle_t *c, int64_t until) noexcept nogil
 cdef void cycle_prepare(cycle_t *c) noexcept nogil
 cdef void cycle_open(cycle_t *c) noexcept nogil
 cdef void cycle_native(cycle_t *c) noexcept nogil

@@ -127,10 +127,23 @@ cdef int cycle_sleep(cycle_t *c, int64_t lead) noexcept nogil:
     cdef int rc
     if present > c.next:
         skip(c, (present - c.next + c.period - 1) // c.period)
+    cycle_await_lane(c, c.next - lead)
     rc = c.link.wait_until(c.link.self, c.next - lead, 0)
     if rc < 0:
         return rc
     return 0 if now(c) >= c.next - lead else -EINTR
+
+
+cdef void cycle_await_lane(cycle_t *c, int64_t until) noexcept nogil:
+    """threaded: takes acyclic frames when they come, so that the next question goes out with the
+    next cycle and not the one after. The other orders collect them at the next instant, before
+    the next frames are sent."""
+    if c.order != THREADED or c.law != NULL:
+        return
+    while c.lane.under_way > 0 and now(c) < until:
+        if c.link.wait_until(c.link.self, until, 1) <= 0:
+            return
+        c.image.drain(c.image.self)
 
 
 cdef void cycle_prepare(cycle_t *c) noexcept nogil:

@@ -132,7 +132,9 @@ class Engine:
         """The oldest acyclic frame that came back, or None."""
 
     def lane_wait(self, timeout_ns: int) -> bool:
-        """Waits, without the GIL, until a frame can be popped: True; or `timeout_ns`: False."""
+        """Waits, without the GIL, until a frame can be popped: True; or `timeout_ns`: False. In
+        virtual time the thread that iterates calls it, and lets time pass no further than the next
+        instant; in an order that collects at the instant itself it passes none."""
 
     def set_rehearsal(self, rehearsal: Callable[[], object] | None) -> None:
         """inline with a lead (`lead_ns` of the plan): called between waking and the instant, when at

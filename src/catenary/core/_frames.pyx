@@ -263,6 +263,10 @@ cdef void judge_units(frames_t *f) noexcept nogil:
                    f.frames[d.frame].returned + copy.frame_offset, copy.size)
 
 
+cdef void frames_drain(void *self) noexcept nogil:
+    drain(<frames_t *>self, DRAIN_MAX)
+
+
 cdef int frames_collect(void *self, int64_t deadline) noexcept nogil:
     cdef frames_t *f = <frames_t *>self
     cdef int rc = 0, budget
@@ -450,6 +454,7 @@ cdef class Frames:
         self.c.image.frame_stamp = &self.c.frame_stamp
         self.c.image.emit = frames_emit
         self.c.image.collect = frames_collect
+        self.c.image.drain = frames_drain
 
     def __dealloc__(self):
         free(self.c.frames)

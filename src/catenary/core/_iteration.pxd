@@ -13,5 +13,6 @@ cdef class Iteration:
     cdef Engine engine
     cdef Cycle cycle
     cdef object judge
+    cdef object beside
     cdef uint32_t trouble
     cdef int al_status

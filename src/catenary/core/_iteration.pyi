@@ -51,10 +51,17 @@ class Iteration:
 
     Calls `judge(flags)` when one of the CYCLE_* flags of `trouble` is set, or the devices' AL states
     together are not `al_status`; what it raises ends the iteration. The first step commits nothing.
+    `beside` is called before every step.
     """
 
     def __init__(
-        self, engine: Engine, judge: Callable[[int], None], *, trouble: int, al_status: int
+        self,
+        engine: Engine,
+        judge: Callable[[int], None],
+        *,
+        trouble: int,
+        al_status: int,
+        beside: Callable[[], object] | None = None,
     ) -> None: ...
     def __iter__(self) -> Self: ...
     def __next__(self) -> Cycle: ...

@@ -56,17 +56,21 @@ cdef class Cycle:
 
 
 cdef class Iteration:
-    def __init__(self, Engine engine not None, judge, *, uint32_t trouble, int al_status):
+    def __init__(self, Engine engine not None, judge, *, uint32_t trouble, int al_status,
+                 beside=None):
         self.engine = engine
         self.judge = judge
         self.trouble = trouble
         self.al_status = al_status
+        self.beside = beside
 
     def __iter__(self):
         return self
 
     def __next__(self):
         cdef uint32_t flags
+        if self.beside is not None:
+            self.beside()
         if self.cycle is None:
             # The first cycle commits nothing: the body has not said anything yet.
             flags = self.engine.run(1)

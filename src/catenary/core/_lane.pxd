@@ -7,6 +7,7 @@ cdef struct lane_t:
     cat_packet_ring *back      # those that came back
     uint32_t bytes_per_cycle
     uint32_t arrived           # futex word: counts arrivals
+    uint32_t under_way         # sent in the last cycle and not back yet
     uint32_t waiting           # the service thread sleeps on it
     uint64_t sent
     uint64_t received

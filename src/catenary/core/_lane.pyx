@@ -37,6 +37,7 @@ cdef void lane_send(lane_t *lane, const cat_link *link) noexcept nogil:
     """At most four frames and a quarter of the period's wire time (one frame in any case)."""
     cdef const cat_packet *packet
     cdef uint32_t count, bytes = 0
+    lane.under_way = 0
     for count in range(FRAMES_PER_CYCLE):
         packet = cat_ring_peek(lane.out)
         if packet == NULL or (count > 0 and bytes + packet.length > lane.bytes_per_cycle):
@@ -46,11 +47,14 @@ cdef void lane_send(lane_t *lane, const cat_link *link) noexcept nogil:
             lane.dropped += 1
         else:
             lane.sent += 1
+            lane.under_way += 1
         cat_ring_drop(lane.out)
 
 
 cdef void lane_received(lane_t *lane, const uint8_t *bytes, uint32_t length,
                         int64_t stamp) noexcept nogil:
+    if lane.under_way > 0:
+        lane.under_way -= 1
     if cat_ring_push(lane.back, bytes, length, stamp) != 0:
         lane.dropped += 1
         return

@@ -62,6 +62,7 @@ cdef extern from "image.h" nogil:
         const int64_t *frame_stamp
         int (*emit)(void *self) noexcept nogil
         int (*collect)(void *self, int64_t deadline) noexcept nogil
+        void (*drain)(void *self) noexcept nogil
 
 
 cdef extern from "packet_ring.h" nogil:

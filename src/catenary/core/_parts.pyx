@@ -7,7 +7,14 @@ from libc.stdlib cimport calloc, free
 
 from catenary.core._axes cimport Axes
 from catenary.core._clocks cimport Clock
-from catenary.core._cycle cimport LOG_LENGTH, PHASES, RECORDS, cycle_t, record_t
+from catenary.core._cycle cimport (
+    LOG_LENGTH,
+    PHASES,
+    RECORDS,
+    cycle_await_lane,
+    cycle_t,
+    record_t,
+)
 from catenary.core._cycle import ORDERS, PHASE_NAMES
 from catenary.core._frames cimport Frames
 from catenary.core._handover cimport PRIVATE, TARGETS, Handover, actual_header_t
@@ -212,7 +219,13 @@ cdef class Parts:
         return self.lane.pop()
 
     def lane_wait(self, int64_t timeout_ns):
-        return self.lane.wait(timeout_ns)
+        cdef int64_t until
+        if not self.virtual:
+            return self.lane.wait(timeout_ns)
+        until = min(self.e.cycle.next, self.e.cycle.link.now(self.e.cycle.link.self) + timeout_ns)
+        with nogil:
+            cycle_await_lane(&self.e.cycle, until)
+        return self.lane.wait(0)
 
     def __dealloc__(self):
         free(self.e.cycle.records)

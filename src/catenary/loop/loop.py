@@ -142,7 +142,9 @@ class Loop:
                 partial(running.judge, faults=self._raise_faults),
                 trouble=TROUBLE,
                 al_status=State.OP,
+                beside=running.service.beside,
             )
+            running.service.runner.adopt()
         return self._iteration
 
     def __next__(self) -> Cycle:
@@ -212,6 +214,8 @@ class Loop:
 
     def _judge(self, flags: int) -> None:
         running = self._opened
+        if running.service.beside is not None:
+            running.service.step()
         if flags & TROUBLE or running.engine.al_status != State.OP:
             running.judge(flags, faults=self._raise_faults)
 

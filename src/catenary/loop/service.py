@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from typing import TypeVar
 
-from catenary.bus import LaneRunner
+from catenary.bus import LaneRunner, MainDevice
 from catenary.core import Engine
 from catenary.errors import LoopError
 from catenary.procedure.exchange import Procedure
@@ -13,7 +14,7 @@ from catenary.procedure.exchange import Procedure
 T = TypeVar("T")
 
 BUSY_NS = 1_000_000  # between two steps, at most, while something is asked
-IDLE = 0.010  # [s]; a new question waits at most so long for its first step
+IDLE = 0.010  # [s] between two looks at what nobody asks for
 
 
 class Service:
@@ -22,11 +23,11 @@ class Service:
     In virtual time nobody else may run: the caller steps, between two cycles.
     """
 
-    def __init__(self, engine: Engine) -> None:
-        self.runner = LaneRunner(engine)
+    def __init__(self, main: MainDevice, engine: Engine, period_ns: int) -> None:
+        self.runner = LaneRunner(engine, grain_ns=period_ns // 2)
+        self._main = main
         self._engine = engine
         self._ended = threading.Event()
-        self._asked = threading.Event()
         self._failure: Exception | None = None
         self._thread: threading.Thread | None = None
         if engine.scheduling != "virtual time":
@@ -36,15 +37,26 @@ class Service:
         if self._thread is not None:
             self._thread.start()
 
+    @property
+    def beside(self) -> Callable[[], None] | None:
+        """What the thread that iterates does before every cycle; None: nothing, a thread does."""
+        return self.step if self._thread is None else None
+
+    def step(self) -> None:
+        """In virtual time: what the thread of real time does between two cycles."""
+        if self.runner.busy:
+            self._engine.lane_wait(BUSY_NS)
+            self.runner.step()
+        self._main.deliver_events()
+
     def converse(self, *procedures: Procedure[T]) -> list[T]:
         """Runs conversations beside the cycle, all at once, from the thread that iterates: it
         keeps cycling without an application until the last one is answered."""
         tasks = [self.runner.submit(procedure) for procedure in procedures]
-        self._asked.set()
         while not all(task.done for task in tasks):
             self._engine.run(1)
             if self._thread is None:
-                self.runner.step()
+                self.step()
             elif not self._thread.is_alive():
                 raise LoopError("the conversations beside the cycle have ended") from self._failure
         return [task.result() for task in tasks]
@@ -52,7 +64,7 @@ class Service:
     def end(self) -> None:
         """Ends the thread; conversations left over get LoopError."""
         self._ended.set()
-        self._asked.set()
+        self.runner.asked.set()
         if self._thread is not None and self._thread.is_alive():
             self._thread.join()
         self.runner.close()
@@ -60,12 +72,12 @@ class Service:
     def _serve(self) -> None:
         try:
             while not self._ended.is_set():
-                self._asked.clear()
+                self.runner.asked.clear()
                 self.runner.step()
                 if self.runner.busy:
                     self._engine.lane_wait(BUSY_NS)
                 else:
-                    self._asked.wait(IDLE)
+                    self.runner.asked.wait(IDLE)
         except Exception as failure:  # told by the next conversation: a thread has no caller
             self._failure = failure
             self.runner.close()

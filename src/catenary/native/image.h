@@ -36,6 +36,9 @@ typedef struct cat_image {
      * the rest of the frames of the last emit. Number of its frames still missing (0: all back),
      * or -errno. */
     int (*collect)(void *self, int64_t deadline);
+
+    /* Takes what has arrived, between two cycles: judges nothing, waits for nothing. */
+    void (*drain)(void *self);
 } cat_image;
 
 #endif

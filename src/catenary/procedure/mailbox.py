@@ -51,6 +51,7 @@ TURN = 0.5e-3  # [s] between two looks whether the mailbox is free
 GRACE = 0.1  # [s] for an answer to a message whose frame was lost
 RECOVERIES = 5  # of one message, then the cable is to blame
 EMERGENCIES_KEPT = 64
+STRANGERS = 64  # messages in a row that nobody can use; queues of devices are shorter
 
 
 class Heard(NamedTuple):
@@ -80,12 +81,13 @@ class MailboxChannel:
     emergencies: deque[Heard] = field(default_factory=lambda: deque(maxlen=EMERGENCIES_KEPT))
     listener: Listener | None = None
     dropped: int = 0  # messages nobody waited for, duplicates
-    busy: bool = False  # a conversation holds it
+    turns: deque[object] = field(default_factory=deque)  # conversations: the first one holds it
+    owed: bool = False  # a question was given up; its answer may still come
 
     def reset(self) -> None:
         """After the SyncManagers were configured anew."""
         self.counter = self.received_counter = 0
-        self.repeat_requested = False
+        self.repeat_requested = self.owed = False
 
     def listen(self, listener: Listener) -> None:
         """From now on; what was heard before is told at once."""
@@ -97,14 +99,16 @@ class MailboxChannel:
 
 def exclusively(channel: MailboxChannel, conversation: Procedure[T]) -> Procedure[T]:
     """The conversation, once nobody else talks to this device: whoever runs it, transfers never
-    mix. The wait ends, because every conversation does."""
-    while channel.busy:
-        yield after(TURN)
-    channel.busy = True
+    mix, and take place in the order they were begun. The wait ends, because every conversation
+    does."""
+    ticket = object()
+    channel.turns.append(ticket)
     try:
+        while channel.turns[0] is not ticket:
+            yield after(TURN)
         return (yield from conversation)
     finally:
-        channel.busy = False
+        channel.turns.remove(ticket)
 
 
 def converse(
@@ -116,45 +120,84 @@ def converse(
     timeout: float = READ_TIMEOUT,
 ) -> Procedure[T]:
     """Sends one message and returns what `accept` makes of the answer. `accept` returns None for
-    a message that is none (an emergency it has put aside, a late answer to something else)."""
+    a message that is none (a late answer to something else)."""
+    if channel.owed:
+        yield from _settle(channel)
     channel.counter = next_counter(channel.counter)
     message = Mailbox(kind, data, channel.counter).encode(channel.layout.receive_size)
+    channel.owed = True
     for _ in range(RECOVERIES):
-        sent = yield from _post(channel, message)
-        patience = timeout if sent else GRACE
-        deadline = Deadline(patience)
-        while True:
-            received = yield from _fetch(channel, deadline)
-            if received is None:
-                break
-            answer = _sorted(channel, received, accept)
-            if answer is not None:
-                return answer
+        sent, stale = yield from _post(channel, message)
+        if stale and (older := (yield from _take(channel))) is not None:
+            _put_aside(channel, older)
+        before = channel.dropped
+        answer = yield from _await(channel, accept, Deadline(timeout if sent else GRACE))
+        if answer is not None:
+            return answer
         if sent:
-            raise ResponseTimeout(
-                f"{channel.station}: no answer to a {kind.name} message within {timeout:g} s",
-                hint="the device's application may hang: read its state; power-cycle it",
-            )
+            raise _no_answer(channel, kind, timeout, channel.dropped - before)
     raise ResponseTimeout(
         f"{channel.station}: {RECOVERIES} frames with the same mailbox message were lost",
         hint="look at the cable: the error counters at 0x0300 tell which",
     )
 
 
+def further(
+    channel: MailboxChannel, accept: Callable[[Mailbox], T | None], *, timeout: float = READ_TIMEOUT
+) -> Procedure[T]:
+    """The next part of an answer that comes in several messages."""
+    channel.owed = True
+    before = channel.dropped
+    answer = yield from _await(channel, accept, Deadline(timeout))
+    if answer is None:
+        raise _no_answer(channel, Type.COE, timeout, channel.dropped - before)
+    return answer
+
+
+def _await(
+    channel: MailboxChannel, accept: Callable[[Mailbox], T | None], deadline: Deadline
+) -> Procedure[T | None]:
+    """What `accept` takes of the messages that come until the deadline."""
+    for _ in range(STRANGERS):
+        received = yield from _fetch(channel, deadline)
+        if received is None:
+            return None
+        channel.owed = False  # also where it is an error, or cannot be read
+        answer = _sorted(channel, received, accept)
+        if answer is not None:
+            return answer
+        channel.owed = True
+    raise MailboxError(
+        f"{channel.station} sends one message after the other that nobody asked for",
+        hint="its firmware is at fault, or two masters talk to it",
+    )
+
+
+def _no_answer(
+    channel: MailboxChannel, kind: Type, timeout: float, strangers: int
+) -> ResponseTimeout:
+    instead = f"; {strangers} messages of another kind instead" if strangers else ""
+    return ResponseTimeout(
+        f"{channel.station}: no answer to a {kind.name} message within {timeout:g} s{instead}",
+        hint="its firmware is at fault, or two masters talk to it"
+        if strangers
+        else "the device's application may hang: read its state; power-cycle it",
+    )
+
+
 def tell(channel: MailboxChannel, kind: Type, data: bytes) -> Procedure[bool]:
     """Sends one message that has no answer. False: its frame was lost, it may have arrived."""
     channel.counter = next_counter(channel.counter)
-    return (
-        yield from _post(
-            channel, Mailbox(kind, data, channel.counter).encode(channel.layout.receive_size)
-        )
-    )
+    message = Mailbox(kind, data, channel.counter).encode(channel.layout.receive_size)
+    return (yield from _post(channel, message))[0]
 
 
 def drain(channel: MailboxChannel, accept: Callable[[Mailbox], T | None]) -> Procedure[list[T]]:
     """Reads what lies in the mailbox without asking for anything: late answers, emergencies."""
     found: list[T] = []
-    while (yield from _is_full(channel, IN))[0]:
+    for _ in range(STRANGERS):  # who sends on and on is heard again later
+        if not (yield from _is_full(channel, IN))[0]:
+            break
         received = yield from _take(channel)
         answer = _sorted(channel, received, accept) if received is not None else None
         if answer is not None:
@@ -162,23 +205,43 @@ def drain(channel: MailboxChannel, accept: Callable[[Mailbox], T | None]) -> Pro
     return found
 
 
-def _post(channel: MailboxChannel, message: bytes) -> Procedure[bool]:
-    """Writes the message once the mailbox is empty. False: its frame was lost."""
+def _post(channel: MailboxChannel, message: bytes) -> Procedure[tuple[bool, bool]]:
+    """Writes the message once the mailbox is empty: (whether its frame came back, whether an older
+    message of the device waited then). SOEM looks for one too before it sends, in a frame of its
+    own (ec_main.c); without that a device that answers twice would be one answer behind for good.
+    """
     deadline, pace = Deadline(WRITE_TIMEOUT), Pace()
+    station, layout = channel.station.address, channel.layout
+    look = read(Command.FPRD, station, sync_manager_status(IN))._replace(repeatable=False)
     while True:
-        request = write_memory(
-            channel.station.address, channel.layout.receive_offset, message, repeatable=False
-        )
-        [reply] = yield [request]
+        request = write_memory(station, layout.receive_offset, message, repeatable=False)
+        seen, reply = yield [look, request]
         if reply.lost:
-            return False
+            return False, False
         if reply.working_counter:
             answered(reply, channel.station, "mailbox write")
-            return True
+            waiting = seen.working_counter == 1 and bool(seen.data[0] & Status.MAILBOX_FULL)
+            return True, waiting
         full, status = yield from _is_full(channel, OUT)
         if deadline.passed(status):
             raise _stuck(channel, full)
         yield after(pace.pause())
+
+
+def _settle(channel: MailboxChannel) -> Procedure[None]:
+    """Gives a late answer its last chance: it is not the next question's."""
+    received = yield from _fetch(channel, Deadline(GRACE))
+    if received is not None:
+        _put_aside(channel, received)
+
+
+def _put_aside(channel: MailboxChannel, message: Mailbox) -> None:
+    """A message that nobody waits for any more; an emergency is heard."""
+    emergency = _emergency(message)
+    if emergency is not None:
+        _hear(channel, emergency)
+    else:
+        channel.dropped += 1
 
 
 def _stuck(channel: MailboxChannel, full: bool) -> MailboxError:
@@ -199,11 +262,12 @@ def _fetch(channel: MailboxChannel, deadline: Deadline) -> Procedure[Mailbox | N
     pace = Pace()
     while True:
         full, status = yield from _is_full(channel, IN)
+        late = deadline.passed(status)
         if full:
             received = yield from _take(channel)
             if received is not None:
                 return received
-        if deadline.passed(status):
+        if late:
             return None
         yield after(pace.pause())
 
@@ -290,15 +354,19 @@ def _sorted(
         )
     emergency = _emergency(message)
     if emergency is not None:
-        heard = Heard(emergency, channel.received_ns)
-        channel.emergencies.append(heard)
-        if channel.listener is not None:
-            channel.listener(heard)
+        _hear(channel, emergency)
         return None
     answer = accept(message)
     if answer is None:
         channel.dropped += 1
     return answer
+
+
+def _hear(channel: MailboxChannel, emergency: coe.Emergency) -> None:
+    heard = Heard(emergency, channel.received_ns)
+    channel.emergencies.append(heard)
+    if channel.listener is not None:
+        channel.listener(heard)
 
 
 def _emergency(message: Mailbox) -> coe.Emergency | None:

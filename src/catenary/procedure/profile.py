@@ -11,17 +11,10 @@ from dataclasses import replace
 from catenary.errors import SdoAbort
 from catenary.model.device import DeviceDescription, ObjectInformation
 from catenary.procedure.exchange import Procedure
-from catenary.procedure.mailbox import MailboxChannel, converse, exclusively
+from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.sdo import upload
-from catenary.wire.coe import decode_coe
-from catenary.wire.mailbox import Mailbox, Type
-from catenary.wire.sdo_information import (
-    Access,
-    Opcode,
-    SdoInformation,
-    decode_entry_description,
-    entry_request,
-)
+from catenary.procedure.sdo_information import read_entry_description
+from catenary.wire.sdo_information import Access
 
 DEVICE_TYPE = 0x1000
 STATUSWORD = 0x6041
@@ -68,18 +61,10 @@ def _describe(
 ) -> Procedure[ObjectInformation | None]:
     """By SDO information; None where the device answers with an error."""
 
-    def accept(mailbox: Mailbox) -> SdoInformation | None:
-        if mailbox.type is not Type.COE:
-            return None
-        message = decode_coe(mailbox.data)
-        return message if isinstance(message, SdoInformation) else None
-
-    request = entry_request(index, subindex)
-    talk = converse(channel, Type.COE, request.encode(), accept)
-    answer = yield from exclusively(channel, talk)
-    if answer.opcode is not Opcode.ENTRY_RESPONSE:
+    try:
+        entry = yield from read_entry_description(channel, index, subindex)
+    except SdoAbort:
         return None
-    entry = decode_entry_description(answer.data)
     return ObjectInformation(
         index,
         subindex,

@@ -33,17 +33,25 @@ INITIATE_OVERHEAD = HEADER_SIZE + SDO_SIZE
 ABORT_PROTOCOL = 0x0504_0001  # command specifier not valid or unknown
 ABORT_TOGGLE = 0x0503_0000
 ABORT_LENGTH = 0x0607_0012  # data type does not match, length too high
+ABORT_MEMORY = 0x0504_0005  # out of memory
+UPLOAD_LIMIT = 1 << 20  # bytes: more than any object of a device we know
 
 
 def upload(
-    channel: MailboxChannel, index: int, subindex: int, *, complete_access: bool = False
+    channel: MailboxChannel,
+    index: int,
+    subindex: int,
+    *,
+    complete_access: bool = False,
+    limit: int = UPLOAD_LIMIT,
 ) -> Procedure[bytes]:
-    """Reads one object. SdoAbort if the device refuses."""
-    return exclusively(channel, _upload(channel, index, subindex, complete_access))
+    """Reads one object. SdoAbort if the device refuses; MailboxError if it announces more than
+    `limit` bytes, or sends more than it has announced."""
+    return exclusively(channel, _upload(channel, index, subindex, complete_access, limit))
 
 
 def _upload(
-    channel: MailboxChannel, index: int, subindex: int, complete_access: bool
+    channel: MailboxChannel, index: int, subindex: int, complete_access: bool, limit: int
 ) -> Procedure[bytes]:
     first = yield from _ask(
         channel,
@@ -54,6 +62,13 @@ def _upload(
     )
     if first.expedited or len(first.data) >= first.size:
         return first.data
+    if first.size > limit:
+        yield from tell(channel, Type.COE, Abort(index, subindex, ABORT_MEMORY).encode())
+        raise MailboxError(
+            f"{channel.station}: SDO 0x{index:04X}:{subindex:02X} announces {first.size} bytes, "
+            f"the limit is {limit}",
+            hint="if it is, ask with a larger limit; else its firmware is at fault",
+        )
     data = bytearray(first.data)
     toggle, last = False, False
     while not last:
@@ -121,7 +136,7 @@ def _ask(
     """Sends one SDO request and returns its answer; an abort is raised."""
 
     def accept(mailbox: Mailbox) -> T | Abort | None:
-        message = _decoded(channel, mailbox)
+        message = decoded(channel, mailbox)
         if isinstance(message, Abort):
             # Some devices name no object, or another one; one service runs at a time, so it is
             # ours. SOEM (ecx_SDOread) and IgH (fsm_coe.c) do not compare it either.
@@ -135,7 +150,8 @@ def _ask(
     return answer
 
 
-def _decoded(channel: MailboxChannel, mailbox: Mailbox) -> Message | None:
+def decoded(channel: MailboxChannel, mailbox: Mailbox) -> Message | None:
+    """The CoE message in a mailbox; None: it is of another protocol."""
     if mailbox.type is not Type.COE:
         return None
     try:
@@ -160,11 +176,13 @@ def _break_off(
     )
 
 
-def refused(channel: MailboxChannel, index: int, subindex: int, code: int) -> SdoAbort:
-    """The error for an abort code."""
+def refused(
+    channel: MailboxChannel, index: int, subindex: int, code: int, *, what: str = ""
+) -> SdoAbort:
+    """The error for an abort code. `what` was refused: an SDO to the object, if not said."""
     known = abort_code(code)
     return SdoAbort(
-        f"{channel.station}: SDO 0x{index:04X}:{subindex:02X} refused with "
+        f"{channel.station}: {what or f'SDO 0x{index:04X}:{subindex:02X}'} refused with "
         f"0x{code:08X}: {known.text}",
         position=channel.station.position,
         index=index,

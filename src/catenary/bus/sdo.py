@@ -1,0 +1,174 @@
+"""Sdo: the object dictionary of one device, before the loop, beside it and inside it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeVar, overload
+
+from catenary.bus.pending import Pending
+from catenary.errors import MailboxError
+from catenary.procedure.exchange import Procedure
+from catenary.procedure.mailbox import MailboxChannel
+from catenary.procedure.sdo import UPLOAD_LIMIT, download, upload
+from catenary.procedure.sdo_information import DescribedObject, describe_object, list_objects
+from catenary.types import DataType
+from catenary.wire.sdo_information import ListType, ObjectDescription
+
+if TYPE_CHECKING:
+    from catenary.bus.sub_device import SubDevice
+
+T = TypeVar("T")
+
+
+class Sdo:
+    """Owns the way to the object dictionary of one device: `sub.sdo.read(0x1018, 1, type=UDINT)`.
+
+    `read` and `write` wait for the answer; while a loop runs they may be called from any thread but
+    the one that iterates, where `request` and `request_write` ask without waiting.
+
+    `type`: of `catenary.types`; without one, bytes. `complete`: all subindices at once, from
+    `subindex` 1 or 0 on (the latter takes 16 bits then): see `types.Array` and `types.Record`.
+    """
+
+    def __init__(self, sub: SubDevice) -> None:
+        self._sub = sub
+
+    @overload
+    def read(
+        self, index: int, subindex: int = 0, *, complete: bool = False, limit: int = UPLOAD_LIMIT
+    ) -> bytes: ...
+    @overload
+    def read(
+        self,
+        index: int,
+        subindex: int = 0,
+        *,
+        type: DataType[T],
+        complete: bool = False,
+        limit: int = UPLOAD_LIMIT,
+    ) -> T: ...
+    def read(
+        self,
+        index: int,
+        subindex: int = 0,
+        *,
+        type: DataType[T] | None = None,
+        complete: bool = False,
+        limit: int = UPLOAD_LIMIT,
+    ) -> T | bytes:
+        """Reads an object: bytes, or with a `type` its value. SdoAbort if the device refuses,
+        DecodeError if it is not of the type, MailboxError if it is to be longer than `limit`
+        bytes."""
+        asked = self._upload(index, subindex, complete, limit)
+        if type is None:
+            return self._sub.main.converse(asked)
+        return self._sub.main.converse(_decoded(asked, type))
+
+    @overload
+    def write(self, index: int, subindex: int, value: bytes, *, complete: bool = False) -> None: ...
+    @overload
+    def write(
+        self, index: int, subindex: int, value: T, *, type: DataType[T], complete: bool = False
+    ) -> None: ...
+    def write(
+        self,
+        index: int,
+        subindex: int,
+        value: object,
+        *,
+        type: DataType[T] | None = None,
+        complete: bool = False,
+    ) -> None:
+        """Writes an object: bytes, or with a `type` a value. SdoAbort if the device refuses."""
+        self._sub.main.converse(self._download(index, subindex, value, type, complete))
+
+    @overload
+    def request(
+        self, index: int, subindex: int = 0, *, complete: bool = False, limit: int = UPLOAD_LIMIT
+    ) -> Pending[bytes]: ...
+    @overload
+    def request(
+        self,
+        index: int,
+        subindex: int = 0,
+        *,
+        type: DataType[T],
+        complete: bool = False,
+        limit: int = UPLOAD_LIMIT,
+    ) -> Pending[T]: ...
+    def request(
+        self,
+        index: int,
+        subindex: int = 0,
+        *,
+        type: DataType[T] | None = None,
+        complete: bool = False,
+        limit: int = UPLOAD_LIMIT,
+    ) -> Pending[T] | Pending[bytes]:
+        """As `read`, without waiting: look at `done`, then take `result()`. Where no loop runs, the
+        answer is there already."""
+        asked = self._upload(index, subindex, complete, limit)
+        if type is None:
+            return self._sub.main.request(asked)
+        return self._sub.main.request(_decoded(asked, type))
+
+    @overload
+    def request_write(
+        self, index: int, subindex: int, value: bytes, *, complete: bool = False
+    ) -> Pending[None]: ...
+    @overload
+    def request_write(
+        self, index: int, subindex: int, value: T, *, type: DataType[T], complete: bool = False
+    ) -> Pending[None]: ...
+    def request_write(
+        self,
+        index: int,
+        subindex: int,
+        value: object,
+        *,
+        type: DataType[T] | None = None,
+        complete: bool = False,
+    ) -> Pending[None]:
+        """As `write`, without waiting: once `done`, `result()` raises what went wrong."""
+        return self._sub.main.request(self._download(index, subindex, value, type, complete))
+
+    def list(self, kind: ListType = ListType.ALL) -> tuple[ObjectDescription, ...]:
+        """The objects of a kind, by index, as the device itself describes them (SDO information):
+        one question an object. SdoAbort or MailboxError where it offers no such service."""
+        return self._sub.main.converse(list_objects(self._channel(), kind))
+
+    def describe(self, index: int) -> DescribedObject:
+        """One object with its entries: types, lengths, access, names."""
+        return self._sub.main.converse(describe_object(self._channel(index), index))
+
+    def _upload(self, index: int, subindex: int, complete: bool, limit: int) -> Procedure[bytes]:
+        channel = self._channel(index, subindex, complete)
+        return upload(channel, index, subindex, complete_access=complete, limit=limit)
+
+    def _download(
+        self, index: int, subindex: int, value: object, type: DataType[T] | None, complete: bool
+    ) -> Procedure[None]:
+        channel = self._channel(index, subindex, complete)
+        data = value if type is None else type.encode(value)  # type: ignore[arg-type]
+        if not isinstance(data, bytes):
+            raise TypeError(f"give a type for {value!r}, or bytes: type=catenary.types.UDINT")
+        return download(channel, index, subindex, data, complete_access=complete)
+
+    def _channel(self, index: int = 0, subindex: int = 0, complete: bool = False) -> MailboxChannel:
+        if not 0 <= index <= 0xFFFF or not 0 <= subindex <= 0xFF:
+            raise ValueError(f"object 0x{index:X}:{subindex:X}: an index has 16 bits, a subindex 8")
+        if complete and subindex > 1:
+            raise ValueError(f"complete access begins with subindex 0 or 1, not {subindex}")
+        channel = self._sub.channel
+        if self._sub.error is not None:
+            raise self._sub.error
+        if channel is None or not channel.layout.coe:
+            what = "has no mailbox" if channel is None else "does not speak CoE"
+            raise MailboxError(
+                f"{self._sub.station} {what}: object 0x{index:04X}:{subindex:02X} is out of reach",
+                hint="couplers and simple terminals have no object dictionary",
+            )
+        return channel
+
+
+def _decoded(asked: Procedure[bytes], type: DataType[T]) -> Procedure[T]:
+    return type.decode((yield from asked))
