@@ -232,6 +232,66 @@ def test_a_lost_second_frame(optional: bool) -> None:
     assert b.engine.missing_frames == 1
 
 
+# ---- units that are exchanged every few cycles
+
+
+def slow_second(every: int, phase: int = 0, **options: object) -> Bench:
+    """The second of two drives rides in a frame of its own, every so many cycles."""
+    plan = make_plan([axis(0), axis(1)], **options)
+    units = (plan.sync_units[0], SyncUnit("second", (1,), every=every))
+    slow = replace(frame_plan([lrw(1)]), every=every, phase=phase)
+    return Bench(
+        replace(plan, frames=(frame_plan([al_status(2), lrw(0)]), slow), sync_units=units)
+    )
+
+
+def test_a_slow_unit_goes_out_in_its_own_cycles_only() -> None:
+    b = slow_second(every=4, phase=1)
+    b.engine.run(12)
+    assert [len(decode_frame(f).datagrams) for f in b.link.sent] == [2, 1, 2, 2, 2] * 3
+    assert b.ok
+    assert b.engine.counters["lost"] == 0
+
+
+def test_between_its_exchanges_a_slow_unit_keeps_its_inputs() -> None:
+    b = slow_second(every=3)
+    b.engine.run(3)
+    b.drives[1].position = 1000
+    b.engine.run(2)
+    assert (b.actual_position[1], b.unit_valid.tolist()) == (0.0, [1, 1])
+    b.engine.run(1)
+    assert b.actual_position[1] == 1.0
+
+
+def test_a_silent_slow_unit_counts_its_own_exchanges_in_a_row() -> None:
+    """Good cycles between them do not make it forgotten, nor are they counted as lost."""
+    b = slow_second(every=3, lost_limit=3)
+    b.engine.run(3)
+    b.segment.silent = {1}
+    b.engine.run(3)
+    assert (b.engine.lost_in_row, b.engine.counters["lost"]) == (1, 1)
+    assert not b.engine.flags & CYCLE_WORKING_COUNTER
+    b.engine.run(6)
+    assert (b.engine.lost_in_row, b.engine.counters["lost"]) == (3, 3)
+    assert b.engine.flags & CYCLE_WORKING_COUNTER
+    b.segment.silent = set()
+    b.engine.run(3)
+    assert (b.engine.lost_in_row, b.unit_valid.tolist()) == (0, [1, 1])
+
+
+@pytest.mark.parametrize("every, phase", [(0, 0), (3, 3), (3, -1), (20_000, 0)])
+def test_a_divisor_that_makes_no_sense_is_refused(every: int, phase: int) -> None:
+    with pytest.raises((ValueError, OverflowError), match="every|negative"):
+        slow_second(every, phase)
+
+
+def test_a_unit_in_frames_of_different_cycles_is_refused() -> None:
+    plan = make_plan([axis(0)])
+    again = replace(frame_plan([lrw(0)]), every=2)
+    with pytest.raises(ValueError, match="other cycles"):
+        Bench(replace(plan, frames=(frame_plan([al_status(1), lrw(0)]), again)))
+
+
 def test_a_unit_of_lrd_and_lwr_needs_both_before_its_inputs_count() -> None:
     lrd = Datagram(Command.LRD, LOGICAL, bytes(DRIVE_SIZE))
     lwr = Datagram(Command.LWR, LOGICAL, bytes(DRIVE_SIZE))

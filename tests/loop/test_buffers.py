@@ -33,6 +33,7 @@ def buffers_of(tables: list[WishTables]) -> dict[str, memoryview]:
     for (output, bank), name in COLUMN_BUFFERS.items():
         columns = [c for t in tables for c in (t.output_columns if output else t.input_columns)]
         sizes[name] = sum(c.bank is bank for c in columns)
+    sizes["unit_valid"] = 2
     return {name: memoryview(np.arange(size, dtype=np.float64)) for name, size in sizes.items()}
 
 

@@ -10,6 +10,7 @@ from catenary.errors import ConfigurationError
 from catenary.model.device import Direction
 from catenary.plan import Number, NumberKind, make_plan
 from catenary.plan.cycle import Copy, DatagramKind, DatagramPlan
+from catenary.plan.wish import PdoWish, WishTables
 from catenary.wire.datagram import Command
 from catenary.wire.frame import decode_frame
 from tests.plan.devices import asks, coupler, demo, lamps, servo
@@ -121,6 +122,52 @@ def test_an_optional_device_is_a_unit_of_its_own() -> None:
     ]
     counters = [d.expected_counter for d in cycle.frames[0].datagrams[1:]]
     assert counters == [2 * 4 + 2, 3]
+
+
+class Slow:
+    """A wish that only says how often."""
+
+    def __init__(self, every: int, *positions: int, required: bool = True) -> None:
+        self.wish = PdoWish(every=every, required=required)
+        self.positions = positions
+
+    def pdos(self, period_ns: int) -> dict[int, PdoWish]:
+        return dict.fromkeys(self.positions, self.wish)
+
+    def tables(self, layout: object) -> WishTables:
+        return WishTables()
+
+    def bind(self, views: object) -> None:
+        raise NotImplementedError
+
+
+def test_devices_of_a_divisor_ride_in_frames_of_their_own() -> None:
+    cycle = make_plan(demo(), [Slow(4, 2, 3)]).cycle
+    assert [(u.devices, u.every) for u in cycle.sync_units] == [((1, 4, 5), 1), ((2, 3), 4)]
+    assert [(f.every, f.phase) for f in cycle.frames] == [(1, 0), (4, 0)]
+    assert "every 4 cycles" in str(make_plan(demo(), [Slow(4, 2, 3)]))
+
+
+def test_units_of_a_divisor_take_turns() -> None:
+    """Three that are optional, so units of their own: never two of them in one cycle."""
+    cycle = make_plan(demo(), [Slow(4, 2, 3, 4, required=False)]).cycle
+    assert [(f.every, f.phase) for f in cycle.frames] == [(1, 0), (4, 0), (4, 1), (4, 2)]
+
+
+def test_wishes_for_one_device_meet_in_the_greatest_common_divisor() -> None:
+    units = make_plan(demo(), [Slow(4, 2), Slow(6, 2, 3)]).cycle.sync_units
+    assert [(u.devices, u.every) for u in units] == [((1, 4, 5), 1), ((2,), 2), ((3,), 6)]
+
+
+def test_one_wish_that_requires_a_device_is_enough() -> None:
+    wishes = [Slow(1, 2, 3, required=False), Slow(1, 3)]
+    units = make_plan(demo(), wishes).cycle.sync_units
+    assert [(u.devices, u.optional) for u in units] == [((1, 3, 4, 5), False), ((2,), True)]
+
+
+def test_a_divisor_that_starves_the_watchdog_is_refused() -> None:
+    with pytest.raises(ValueError, match="every 50 cycles"):
+        make_plan(demo(), [Slow(50, 2)])
 
 
 @pytest.mark.parametrize("count", [40, 56, 57, 120, 200])

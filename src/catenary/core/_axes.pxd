@@ -43,7 +43,8 @@ cdef struct axis_t:
     uint8_t state
     int8_t mode_shown
     uint16_t status
-    uint32_t invalid_in_row
+    uint32_t invalid_in_row    # exchanges of its unit
+    uint64_t read_at           # cycle of its last valid inputs
     uint32_t still_cycles      # in a row, at rest
     uint64_t last_raw
     int64_t counts             # last_raw without going round

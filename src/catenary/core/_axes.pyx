@@ -53,7 +53,8 @@ MUTE_NS = 1_000_000_000                # without bit 12: longer than a brake tak
 
 # ---- inputs
 
-cdef void read_position(axis_t *a, const uint8_t *inputs, double period) noexcept nogil:
+cdef void read_position(axis_t *a, const uint8_t *inputs, double elapsed) noexcept nogil:
+    """`elapsed` [s]: since it was read last."""
     cdef number_t *n = &a.actual_position
     cdef uint64_t raw
     cdef double before = a.position
@@ -68,11 +69,10 @@ cdef void read_position(axis_t *a, const uint8_t *inputs, double period) noexcep
         a.last_raw = raw
         a.position = a.counts * n.scale + n.offset
     if not a.actual_velocity.present:
-        # over the cycles since it was read last
-        a.velocity = (a.position - before) / (period * (a.invalid_in_row + 1)) if a.known else 0.0
+        a.velocity = (a.position - before) / elapsed if a.known else 0.0
 
 
-cdef void read_axis(axes_t *x, axis_t *a) noexcept nogil:
+cdef void read_axis(axes_t *x, axis_t *a, uint64_t number) noexcept nogil:
     cdef const uint8_t *inputs = x.image.inputs
     a.status = <uint16_t>number_bits(&a.statusword, inputs)
     a.state = cia402_state(a.status)
@@ -82,10 +82,11 @@ cdef void read_axis(axes_t *x, axis_t *a) noexcept nogil:
     if a.actual_velocity.present:
         a.velocity = number_value(&a.actual_velocity, inputs)
     if a.actual_position.present:
-        read_position(a, inputs, x.period)
+        read_position(a, inputs, x.period * (number - a.read_at))
     if a.actual_torque.present:
         a.torque = number_value(&a.actual_torque, inputs)
     a.known = 1
+    a.read_at = number
     if -a.standstill <= a.velocity <= a.standstill:
         if a.still_cycles < x.still_limit:
             a.still_cycles += 1
@@ -115,9 +116,10 @@ cdef void axes_read(axes_t *x, actual_t *out, uint64_t number) noexcept nogil:
     for i in range(x.axis_count):
         a = &x.axes[i]
         before = a.state
-        if x.image.unit_valid[a.unit]:
-            read_axis(x, a)
-        guard_observe(x, a, x.image.unit_valid[a.unit], before, number)
+        if x.image.unit_fresh[a.unit]:
+            read_axis(x, a, number)
+        a.invalid_in_row = x.image.unit_missed[a.unit]
+        guard_observe(x, a, before, number)
         if not a.lost and (a.state == OPERATION_ENABLED or a.state == QUICK_STOP_ACTIVE
                            or a.state == FAULT_REACTION_ACTIVE):
             x.moving += 1

@@ -210,8 +210,9 @@ cdef void collect(cycle_t *c, actual_t *actual, int64_t deadline) noexcept nogil
         if c.clock.changes != c.clock.acknowledged:
             c.flags |= CLOCKS
     if c.image.ok[0]:
-        c.lost_in_row = 0
         c.flags |= OK
+        if c.image.whole[0]:
+            c.lost_in_row = 0
     else:
         c.lost += 1
         c.lost_in_row += 1

@@ -38,6 +38,9 @@ cdef struct frame_t:
     uint32_t used              # up to the end of the last datagram; padding follows
     uint32_t first_datagram
     uint32_t datagram_count
+    uint32_t every             # goes out in cycles whose serial is `phase` modulo `every`
+    uint32_t phase
+    uint8_t due                # in this cycle
     uint8_t index
     uint8_t needed             # its loss makes the cycle bad
     uint8_t back
@@ -67,7 +70,10 @@ cdef struct frames_t:
     uint8_t *outputs
     uint8_t *inputs
     uint8_t *unit_valid
+    uint8_t *unit_fresh
     uint8_t *unit_optional
+    uint32_t *unit_missed
+    uint32_t *unit_frame       # one of those that carry it: all are due together
     uint16_t *unit_counter
     uint8_t al_status
     uint16_t al_counter
@@ -75,7 +81,8 @@ cdef struct frames_t:
     uint32_t next_index
     uint32_t serial            # of the emit
     uint32_t missing
-    uint8_t ok                 # every needed unit valid, every needed frame back
+    uint8_t ok                 # every needed unit that was due valid, every needed frame back
+    uint8_t whole              # every needed unit valid
     uint8_t frame_of_index[128]
     uint32_t serial_of_index[128]   # 0: never sent
     frame_counters_t counters

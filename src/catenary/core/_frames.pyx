@@ -36,6 +36,8 @@ cdef enum:
     LENGTH_AND_MORE = 0x87FF   # of its length word: not the circulating bit, not the reserved ones
     CYCLE_INDICES = 0x80
     DRAIN_MAX = 256            # frames looked at in one collect: a flood cannot hold the cycle up
+    EVERY_MAX = 10000
+    MISSED_MAX = 1000000000
     IMAGE_PADDING = 16         # numbers are read and written as whole words
 
 cdef enum:
@@ -69,10 +71,14 @@ cdef int frames_emit(void *self) noexcept nogil:
     f.serial += 1
     if f.clock != NULL:  # its datagrams are in the frame that goes first
         clock_emit(f.clock, f.link.now(f.link.self))
-    f.missing = f.frame_count
+    f.missing = 0
     for i in range(f.frame_count):
         frame = &f.frames[i]
         frame.back = 0
+        frame.due = frame.every == 1 or f.serial % frame.every == frame.phase
+        if not frame.due:
+            continue
+        f.missing += 1
         frame.index = <uint8_t>f.next_index
         f.frame_of_index[f.next_index] = <uint8_t>i
         f.serial_of_index[f.next_index] = f.serial
@@ -214,6 +220,18 @@ cdef int await_frames(frames_t *f, int64_t deadline, int budget) noexcept nogil:
     return 0
 
 
+cdef inline void judge_unit(frames_t *f, uint32_t unit) noexcept nogil:
+    """A unit that was due."""
+    if f.unit_valid[unit]:
+        f.unit_missed[unit] = 0
+        return
+    f.unit_fresh[unit] = 0
+    if f.unit_missed[unit] < MISSED_MAX:
+        f.unit_missed[unit] += 1
+    if not f.unit_optional[unit]:
+        f.ok = 0
+
+
 cdef void judge_units(frames_t *f) noexcept nogil:
     """Which sync units are valid; copies their inputs; AL status; whether the cycle was good."""
     cdef datagram_t *d
@@ -223,14 +241,19 @@ cdef void judge_units(frames_t *f) noexcept nogil:
     cdef uint16_t al_counter = 0
     cdef bint good
     f.ok = 1
+    f.whole = 1
     for unit in range(f.image.unit_count):
-        f.unit_valid[unit] = 1
-        f.unit_counter[unit] = 0
+        f.unit_fresh[unit] = f.frames[f.unit_frame[unit]].due
+        if f.unit_fresh[unit]:
+            f.unit_valid[unit] = 1
+            f.unit_counter[unit] = 0
     for k in range(f.frame_count):
-        if f.frames[k].needed and not f.frames[k].back:
+        if f.frames[k].needed and f.frames[k].due and not f.frames[k].back:
             f.ok = 0
     for k in range(f.datagram_count):
         d = &f.datagrams[k]
+        if not f.frames[d.frame].due:
+            continue
         good = f.frames[d.frame].back and d.counter == d.expected_counter
         if d.unit >= 0:
             if f.frames[d.frame].back:
@@ -246,8 +269,10 @@ cdef void judge_units(frames_t *f) noexcept nogil:
     if al_counter > 0:
         f.al_status = al
     for unit in range(f.image.unit_count):
+        if f.unit_fresh[unit]:
+            judge_unit(f, unit)
         if not f.unit_valid[unit] and not f.unit_optional[unit]:
-            f.ok = 0
+            f.whole = 0
     for k in range(f.datagram_count):
         d = &f.datagrams[k]
         if d.input_count == 0 or not f.frames[d.frame].back:
@@ -320,10 +345,14 @@ cdef class Frames:
         self.c.outputs = <uint8_t *>calloc(plan.output_size + IMAGE_PADDING, 1)
         self.c.inputs = <uint8_t *>calloc(plan.input_size + IMAGE_PADDING, 1)
         self.c.unit_valid = <uint8_t *>calloc(len(units) + 1, 1)
+        self.c.unit_fresh = <uint8_t *>calloc(len(units) + 1, 1)
+        self.c.unit_missed = <uint32_t *>calloc(len(units) + 1, sizeof(uint32_t))
+        self.c.unit_frame = <uint32_t *>calloc(len(units) + 1, sizeof(uint32_t))
         self.c.unit_optional = <uint8_t *>calloc(len(units) + 1, 1)
         self.c.unit_counter = <uint16_t *>calloc(len(units) + 1, sizeof(uint16_t))
         if not (self.c.outputs and self.c.inputs and self.c.unit_valid and self.c.unit_optional
-                and self.c.unit_counter):
+                and self.c.unit_counter and self.c.unit_fresh and self.c.unit_missed
+                and self.c.unit_frame):
             raise MemoryError
         for k, unit in enumerate(units):
             self.c.unit_optional[k] = 1 if unit.optional else 0
@@ -351,6 +380,9 @@ cdef class Frames:
               f"frame {number}: {len(template)} bytes, must be {CAT_FRAME_MIN} to {CAT_FRAME_MAX}")
         check(template[12:14] == b"\x88\xa4", f"frame {number}: EtherType is not 0x88A4")
         check(len(frame.datagrams) > 0, f"frame {number}: no datagrams")
+        check(1 <= frame.every <= EVERY_MAX and 0 <= frame.phase < frame.every,
+              f"frame {number}: every {frame.every} cycles, phase {frame.phase}")
+        check(number > 0 or frame.every == 1, "frame 0 goes out in every cycle")
         payload = int.from_bytes(template[14:16], "little")
         end = DATAGRAMS + sum(HEADER + d.length + COUNTER for d in frame.datagrams)
         check(payload >> 12 == 1 and DATAGRAMS + (payload & 0x7FF) == end and end <= len(template),
@@ -360,6 +392,8 @@ cdef class Frames:
         c.used = end
         c.first_datagram = self.c.datagram_count
         c.datagram_count = len(frame.datagrams)
+        c.every = frame.every
+        c.phase = frame.phase
         memcpy(c.template, <const uint8_t *>template, len(template))
         check(is_ours(c, self.c.frames[0].template), f"frame {number}: another source than frame 0")
 
@@ -382,6 +416,8 @@ cdef class Frames:
               f"{where}: sync unit {plan.sync_unit} of {self.c.image.unit_count}")
         check(plan.kind in (PROCESS_DATA, AL_STATUS, CLOCK), f"{where}: kind {plan.kind}")
         check(plan.kind != AL_STATUS or plan.length >= 2, f"{where}: AL status has two bytes")
+        if plan.sync_unit >= 0:
+            self.place_unit(where, plan.sync_unit, number)
         d.kind = plan.kind
         d.command = plan.command
         d.address_moves = plan.command in ADDRESS_MOVES
@@ -402,6 +438,16 @@ cdef class Frames:
             self.c.frames[number].needed = 1
         self.c.datagram_count += 1
         return copies
+
+    def place_unit(self, where, uint32_t unit, uint32_t number):
+        """All frames of a unit are due in the same cycles."""
+        cdef frame_t *first
+        if not self.c.unit_valid[unit]:  # used as a mark until the first cycle
+            self.c.unit_valid[unit] = 1
+            self.c.unit_frame[unit] = number
+        first = &self.c.frames[self.c.unit_frame[unit]]
+        check((first.every, first.phase) == (self.c.frames[number].every, self.c.frames[number].phase),
+              f"{where}: its sync unit rides in frames of other cycles too")
 
     def make_copy(self, where, plan, copy, uint32_t image_size, uint32_t place):
         start = plan.offset + HEADER
@@ -446,7 +492,13 @@ cdef class Frames:
         self.c.image.self = &self.c
         self.c.image.outputs = self.c.outputs
         self.c.image.inputs = self.c.inputs
+        for unit in range(self.c.image.unit_count):
+            check(self.c.unit_valid[unit], f"sync unit {unit} is in no frame")
+            self.c.unit_valid[unit] = 0
         self.c.image.unit_valid = self.c.unit_valid
+        self.c.image.unit_fresh = self.c.unit_fresh
+        self.c.image.unit_missed = self.c.unit_missed
+        self.c.image.whole = &self.c.whole
         self.c.image.unit_counter = self.c.unit_counter
         self.c.image.ok = &self.c.ok
         self.c.image.al_status = &self.c.al_status
@@ -463,5 +515,8 @@ cdef class Frames:
         free(self.c.outputs)
         free(self.c.inputs)
         free(self.c.unit_valid)
+        free(self.c.unit_fresh)
+        free(self.c.unit_missed)
+        free(self.c.unit_frame)
         free(self.c.unit_optional)
         free(self.c.unit_counter)

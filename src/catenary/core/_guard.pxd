@@ -26,7 +26,7 @@ cdef inline uint8_t quantity_of(int8_t mode) noexcept nogil:
         return TORQUE
     return NO_QUANTITY
 
-cdef void guard_observe(axes_t *x, axis_t *a, bint valid, uint8_t state_before,
+cdef void guard_observe(axes_t *x, axis_t *a, uint8_t state_before,
                         uint64_t number) noexcept nogil
 cdef void guard_mode(axis_t *a, int8_t mode) noexcept nogil
 cdef void guard_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nogil

@@ -94,17 +94,14 @@ cdef bint is_trusted(axes_t *x, axis_t *a) noexcept nogil:
     return not a.tells and a.mute_cycles >= x.mute_limit
 
 
-cdef void guard_observe(axes_t *x, axis_t *a, bint valid, uint8_t state_before,
+cdef void guard_observe(axes_t *x, axis_t *a, uint8_t state_before,
                         uint64_t number) noexcept nogil:
     """After the inputs of a cycle: does the goal still stand, is the axis followed?"""
-    if not valid:
-        if a.invalid_in_row < x.lost_limit:
-            a.invalid_in_row += 1
+    if a.invalid_in_row > 0:
         if a.invalid_in_row >= x.lost_limit and not a.lost:
             a.lost = 1
             drop(x, a)
         return
-    a.invalid_in_row = 0
     a.lost = 0
     if a.goal == ENABLED:
         if state_before == OPERATION_ENABLED and a.state != OPERATION_ENABLED:

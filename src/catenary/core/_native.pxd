@@ -55,8 +55,11 @@ cdef extern from "image.h" nogil:
         uint8_t *outputs
         const uint8_t *inputs
         const uint8_t *unit_valid
+        const uint8_t *unit_fresh
+        const uint32_t *unit_missed
         const uint16_t *unit_counter
         const uint8_t *ok
+        const uint8_t *whole
         const uint8_t *al_status
         const uint16_t *al_counter
         const int64_t *frame_stamp

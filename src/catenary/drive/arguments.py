@@ -13,6 +13,7 @@ from catenary.wire.cia402 import Mode
 
 AxisSource: TypeAlias = SubDevice | tuple[SubDevice, int]
 
+EVERY_MAX = 10_000  # cycles: beyond, ask by SDO
 MODES: dict[str, Mode] = {"csp": Mode.CSP, "csv": Mode.CSV, "cst": Mode.CST}
 
 
@@ -60,6 +61,13 @@ def axis_limits(
         if value is not None and not value > 0:
             raise ValueError(f"{name} must be positive, not {value}")
     return AxisLimits(position_min, position_max, velocity, torque)
+
+
+def cycles_between(name: str, every: int) -> int:
+    """`every` as a number of cycles."""
+    if not isinstance(every, int) or not 1 <= every <= EVERY_MAX:
+        raise ValueError(f"{name}={every!r}: a whole number of cycles, 1 to {EVERY_MAX}")
+    return every
 
 
 def known(measured: Sequence[str]) -> tuple[str, ...]:

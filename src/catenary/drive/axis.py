@@ -38,6 +38,8 @@ class Axis:
     measured: tuple[str, ...] = tuple(MEASURED)
     measured_required: bool = False  # else what the drive cannot map reads NaN
     columns: Mapping[str, AxisObject] = field(default_factory=dict)
+    every: int = 1  # cycles between two exchanges
+    required: bool = True  # the cycle is not good without its device
 
     def index(self, base: int) -> int:
         """The number of slot 0's object `base` in this slot."""
@@ -73,6 +75,8 @@ class Axis:
                 o.reference(self.slot, required=o not in optional) for o in dict.fromkeys(given)
             ),
             start_up=start_up,
+            every=self.every,
+            required=self.required,
         )
 
     def _optional(self) -> set[AxisObject]:

@@ -16,6 +16,7 @@ from catenary.drive.arguments import (
     axis_modes,
     axis_name,
     axis_sources,
+    cycles_between,
     known,
     mode_of,
     named_columns,
@@ -56,6 +57,10 @@ class Drives:
     a drive cannot give velocity or torque it reads NaN (velocity: estimated). `columns`: further
     objects, by a name of `NAMED_COLUMNS` or as `(name, AxisObject)`:
     `arm.actual["following_error"]`.
+
+    `required=False`: the loop goes on without a drive that vanishes; what is not `present` holds
+    its last values and follows nothing, and must be enabled again when it is back. `every`: the
+    drives are exchanged every so many cycles of the loop.
     """
 
     def __init__(
@@ -76,6 +81,8 @@ class Drives:
         torque_limit: PerAxis[float | None] = None,
         measured: Sequence[str] | None = None,
         columns: Sequence[str | tuple[str, AxisObject]] = (),
+        required: bool = True,
+        every: int = 1,
     ) -> None:
         sources = axis_sources(subs)
         n = len(sources)
@@ -109,6 +116,8 @@ class Drives:
                 measured=known(tuple(MEASURED) if measured is None else measured),
                 measured_required=measured is not None,
                 columns=self._columns,
+                every=cycles_between("every", every),
+                required=required,
             )
             for (sub, slot), first, unit, limit in zip(
                 sources, first_modes, units, limits, strict=True
@@ -117,6 +126,7 @@ class Drives:
         self.actual = AxisValues("actual")
         self.target = AxisValues("target")
         self._views: Views | None = None
+        self._units: list[int] = []
 
     def __len__(self) -> int:
         return len(self._axes)
@@ -143,6 +153,11 @@ class Drives:
     def limited(self) -> npt.NDArray[np.bool_]:
         """(n,) whose set-points the core had to limit in the last cycle."""
         return (self._bound().axis_flags & 2).astype(np.bool_)
+
+    @property
+    def present(self) -> npt.NDArray[np.bool_]:
+        """(n,) whose devices answered in their last exchange."""
+        return self._bound().unit_valid[self._units].astype(np.bool_)
 
     @property
     def faults(self) -> tuple[int, ...]:
@@ -187,7 +202,7 @@ class Drives:
         )
         wishes: dict[int, PdoWish] = {}
         for axis, sub in zip(self._axes, self.subs, strict=True):
-            wish = axis.pdo_wish(start_up.downloads(axis, sub, period_ns))
+            wish = axis.pdo_wish(start_up.downloads(axis, sub, period_ns * axis.every))
             wishes[axis.device] = (
                 joined(wishes[axis.device], wish) if axis.device in wishes else wish
             )
@@ -195,6 +210,7 @@ class Drives:
 
     def tables(self, layout: ImageLayout) -> WishTables:
         """Axes in their order; columns by name, then by axis, so that a name is one array."""
+        self._units = [layout.sync_unit(axis.device) for axis in self._axes]
         return WishTables(
             axes=tuple(axis.plan(layout) for axis in self._axes),
             output_columns=tuple(

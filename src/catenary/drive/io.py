@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from catenary.bus import SubDevice
+from catenary.drive.arguments import cycles_between
 from catenary.errors import MappingError
 from catenary.model.device import Assignment, DeviceDescription, Direction, Entry
 from catenary.plan.cycle import Bank, Column, NumberKind
@@ -52,8 +53,18 @@ class _Channels:
 
     direction: Direction
 
-    def __init__(self, *subs: SubDevice, scale: Mapping[str, float] | None = None) -> None:
+    def __init__(
+        self,
+        *subs: SubDevice,
+        scale: Mapping[str, float] | None = None,
+        required: bool = True,
+        every: int = 1,
+    ) -> None:
         self.subs = subs
+        self._required = required
+        self._every = cycles_between("every", every)
+        self._units: list[int] = []
+        self._unit_valid: Bytes | None = None
         self._channels = channels([sub.description for sub in subs], self.direction, scale or {})
         self._places: dict[str, tuple[Reals | Integers | Bytes, int]] = {}
 
@@ -74,17 +85,31 @@ class _Channels:
         for sub in self.subs:
             mine = tuple(reference(c.entry) for c in self._channels if c.device == sub.position)
             output = self.direction is Direction.OUTPUT
-            wishes[sub.position] = PdoWish(outputs=mine) if output else PdoWish(inputs=mine)
+            wishes[sub.position] = PdoWish(
+                outputs=mine if output else (),
+                inputs=() if output else mine,
+                every=self._every,
+                required=self._required,
+            )
         return wishes
 
     def tables(self, layout: ImageLayout) -> WishTables:
         """One column per channel."""
         columns = tuple(column(channel, layout, self.direction) for channel in self._channels)
+        self._units = [layout.sync_unit(sub.position) for sub in self.subs]
         if self.direction is Direction.OUTPUT:
             return WishTables(output_columns=columns)
         return WishTables(input_columns=columns)
 
-    def _bind(self, reals: Reals, integers: Integers, bits: Bytes) -> None:
+    @property
+    def present(self) -> tuple[bool, ...]:
+        """Which of the SubDevices answered in their last exchange."""
+        if self._unit_valid is None:
+            raise RuntimeError("nothing is exchanged before a Loop is open")
+        return tuple(bool(self._unit_valid[unit]) for unit in self._units)
+
+    def _bind(self, reals: Reals, integers: Integers, bits: Bytes, unit_valid: Bytes) -> None:
+        self._unit_valid = unit_valid
         self.reals, self.integers, self.bits = reals, integers, bits
         arrays: dict[Bank, Reals | Integers | Bytes] = {
             Bank.REAL: reals,
@@ -110,19 +135,21 @@ class Inputs(_Channels):
     in the order of the process data, or one by name: `buttons["Input 1"]`.
 
     `scale` turns raw numbers into floats: `Inputs(sub, scale={"Value": 10 / 0x7FFF})`.
+    `required=False`: the loop goes on without a device that vanishes; its channels keep their last
+    values, `present` tells. `every`: exchanged every so many cycles of the loop.
     """
 
     direction = Direction.INPUT
 
     def bind(self, views: Views) -> None:
         """Receives the arrays of the loop that opens."""
-        self._bind(views.input_reals, views.input_integers, views.input_bits)
+        self._bind(views.input_reals, views.input_integers, views.input_bits, views.unit_valid)
 
 
 class Outputs(_Channels):
     """The outputs of SubDevices, all 0 at the start: write `.bits[:]`, `.integers[:]`, `.reals[:]`,
-    or one by name: `lamps["Output 1"] = 1`. `scale` as for `Inputs`. What is out of its range is
-    cut, and `cycle.limited` says so."""
+    or one by name: `lamps["Output 1"] = 1`. `scale`, `required`, `every` as for `Inputs`. What is
+    out of its range is cut, and `cycle.limited` says so."""
 
     direction = Direction.OUTPUT
 
@@ -132,7 +159,7 @@ class Outputs(_Channels):
 
     def bind(self, views: Views) -> None:
         """Receives the arrays of the loop that opens."""
-        self._bind(views.output_reals, views.output_integers, views.output_bits)
+        self._bind(views.output_reals, views.output_integers, views.output_bits, views.unit_valid)
 
 
 def channels(

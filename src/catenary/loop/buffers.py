@@ -40,16 +40,17 @@ def bind_wishes(
 ) -> Views:
     """Binds every wish to its part of the buffers, in the order of the plan. Returns the whole."""
     arrays = {name: np.asarray(buffers[name]) for name in (*AXIS_BUFFERS, *COLUMN_BUFFERS.values())}
+    unit_valid = np.asarray(buffers["unit_valid"])
     used = dict.fromkeys(("axes", *COLUMN_BUFFERS.values()), 0)
     for wish, table in zip(wishes, tables, strict=True):
         sizes = dict.fromkeys(AXIS_BUFFERS, len(table.axes)) | column_sizes(table)
         starts = {name: used.get(name, used["axes"]) for name in sizes}
         parts = {name: arrays[name][starts[name] :][: sizes[name]] for name in sizes}
-        wish.bind(Views(**parts))
+        wish.bind(Views(**parts, unit_valid=unit_valid))
         used["axes"] += len(table.axes)
         for name in COLUMN_BUFFERS.values():
             used[name] += sizes[name]
-    return Views(**arrays)
+    return Views(**arrays, unit_valid=unit_valid)
 
 
 def column_sizes(table: WishTables) -> dict[str, int]:

@@ -3,7 +3,8 @@
  *
  * `emit` sends the output image, `collect` fills the input image. A sync unit is valid in this
  * cycle when all of its datagrams came back with the expected working counter; the inputs of an
- * invalid unit keep their last good values.
+ * invalid unit keep their last good values. A unit may be exchanged every few cycles only; in the
+ * others it stays as it was.
  */
 #ifndef CATENARY_IMAGE_H
 #define CATENARY_IMAGE_H
@@ -11,7 +12,7 @@
 #include <stdint.h>
 
 #define CAT_IMAGE_CAPSULE "catenary.image"
-#define CAT_IMAGE_VERSION 1u
+#define CAT_IMAGE_VERSION 2u
 
 typedef struct cat_image {
     uint32_t version;                 /* CAT_IMAGE_VERSION */
@@ -21,10 +22,13 @@ typedef struct cat_image {
     void *self;
     uint8_t *outputs;                 /* output_size bytes, written by the cycle before emit */
     const uint8_t *inputs;            /* input_size bytes, valid after collect */
-    const uint8_t *unit_valid;        /* unit_count flags, of the last collect */
-    const uint16_t *unit_counter;     /* unit_count sums of working counters, of the last collect */
-    const uint8_t *ok;                /* one flag, of the last collect: every unit that is not optional is
-                                       * valid and no frame that others need is missing */
+    const uint8_t *unit_valid;        /* unit_count flags, of each unit's last exchange */
+    const uint8_t *unit_fresh;        /* unit_count flags: exchanged in the last collect, and valid */
+    const uint32_t *unit_missed;      /* unit_count numbers: exchanges in a row that were not valid */
+    const uint16_t *unit_counter;     /* unit_count sums of working counters, of the last exchange */
+    const uint8_t *ok;                /* one flag, of the last collect: every unit exchanged that is not
+                                       * optional is valid and no frame that others need is missing */
+    const uint8_t *whole;             /* one flag: every unit that is not optional is valid */
     const uint8_t *al_status;         /* one byte: OR of all AL states, bit 4: some device signals an error */
     const uint16_t *al_counter;       /* one value: devices that answered for it in the last collect */
     const int64_t *frame_stamp;       /* one value: when the last cyclic frame was seen [ns]; 0: none */

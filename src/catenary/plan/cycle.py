@@ -92,6 +92,8 @@ class FramePlan:
 
     template: bytes
     datagrams: tuple[DatagramPlan, ...]
+    every: int = 1  # goes out every so many cycles
+    phase: int = 0  # in those whose number is this, modulo `every`
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +103,7 @@ class SyncUnit:
     name: str
     devices: tuple[int, ...]  # positions
     optional: bool = False  # its loss does not make the cycle bad
+    every: int = 1  # exchanged every so many cycles
 
 
 @dataclass(frozen=True, slots=True)

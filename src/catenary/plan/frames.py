@@ -7,7 +7,7 @@ a write (ETG.1000.4 table 14), once per datagram however many FMMUs it has.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from catenary.plan.clocks import ClockChoice
 from catenary.plan.cycle import Copy, DatagramKind, DatagramPlan, FramePlan
@@ -35,6 +35,8 @@ class _Piece:
     sync_unit: int
     outputs: tuple[Copy, ...] = ()
     inputs: tuple[Copy, ...] = ()
+    every: int = 1
+    phase: int = 0
 
     @property
     def size(self) -> int:
@@ -45,10 +47,12 @@ def make_frames(
     units: Sequence[UnitLayout], device_count: int, clocks: ClockChoice | None = None
 ) -> tuple[FramePlan, ...]:
     """The frames of one cycle, in the order they are sent. Frame 0 begins with the BRD of AL
-    status, which every device answers, and carries the time."""
+    status, which every device answers, and carries the time. What is not exchanged in every cycle
+    rides in frames of its own, so that the other cycles do not carry it."""
     pieces = [_al_status(device_count), *_of_clocks(clocks)]
     for number, unit in enumerate(units):
-        pieces.extend(_of_unit(unit, number))
+        for piece in _of_unit(unit, number):
+            pieces.append(replace(piece, every=unit.every, phase=unit.phase))
     return tuple(_frame(batch) for batch in _batches(pieces))
 
 
@@ -133,11 +137,12 @@ def _of_unit(unit: UnitLayout, number: int) -> list[_Piece]:
 
 
 def _batches(pieces: Sequence[_Piece]) -> list[list[_Piece]]:
-    """Pieces by frame: each goes into the first frame with room."""
+    """Pieces by frame: each goes into the first frame of its cycles with room."""
     batches: list[list[_Piece]] = []
     for piece in pieces:
         for batch in batches:
-            if sum(other.size for other in batch) + piece.size <= MAXIMUM_PAYLOAD:
+            together = (piece.every, piece.phase) == (batch[0].every, batch[0].phase)
+            if together and sum(p.size for p in batch) + piece.size <= MAXIMUM_PAYLOAD:
                 batch.append(piece)
                 break
         else:
@@ -152,7 +157,7 @@ def _frame(batch: Sequence[_Piece]) -> FramePlan:
         plans.append(_placed(piece, offset))
         offset += piece.size
     datagrams = [Datagram(piece.command, piece.address, bytes(piece.length)) for piece in batch]
-    return FramePlan(encode_frame(datagrams), tuple(plans))
+    return FramePlan(encode_frame(datagrams), tuple(plans), batch[0].every, batch[0].phase)
 
 
 def _placed(piece: _Piece, offset: int) -> DatagramPlan:

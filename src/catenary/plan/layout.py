@@ -2,6 +2,8 @@
 
 - A unit is what one datagram carries (LRW; or LRD and LWR where a device has no LRW). A device
   never straddles units; an optional device is a unit of its own, so its loss spoils no other.
+  Devices that are exchanged every few cycles share units with their like; the units of a divisor
+  take turns, so that a cycle carries as little as can be.
 - Inside a unit: the outputs of its devices, then their inputs, both by position.
 - Every device starts at a byte of its own and fills whole bytes, also a terminal of four bits.
   Sharing bytes by bit-wise FMMUs would save some bytes, but writes would need the neighbour's
@@ -11,7 +13,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from catenary.errors import ConfigurationError, MappingError
@@ -67,6 +69,8 @@ class UnitLayout:
     name: str
     devices: tuple[int, ...]
     optional: bool
+    every: int  # exchanged every so many cycles
+    phase: int
     logical_read_write: bool
     logical_start: int
     output_offset: int  # in the image
@@ -84,6 +88,8 @@ class DeviceData:
     description: DeviceDescription
     outputs: tuple[Assignment, ...]
     inputs: tuple[Assignment, ...]
+    every: int = 1  # cycles between two exchanges
+    optional: bool = False
 
     @property
     def position(self) -> int:
@@ -123,15 +129,18 @@ class Layout:
         return self.devices[device].sync_unit
 
 
-def make_layout(devices: Sequence[DeviceData], *, optional: Collection[int] = ()) -> Layout:
+def make_layout(devices: Sequence[DeviceData]) -> Layout:
     """Lays out all devices, given in the order of their positions."""
     units: list[UnitLayout] = []
     places: dict[int, DeviceLayout] = {}
     output_offset = input_offset = 0
     logical_start = LOGICAL_BASE
-    for members in _grouped(devices, optional):
+    turns: dict[int, int] = {}  # divisor → units that have it
+    for members in _grouped(devices):
         number = len(units)
-        unit = _unit(members, optional, logical_start, output_offset, input_offset)
+        every = members[0].every
+        turn = turns[every] = turns.get(every, -1) + 1
+        unit = _unit(members, turn % every, logical_start, output_offset, input_offset)
         units.append(unit)
         places.update(_places(members, unit, number))
         output_offset += unit.output_size
@@ -152,10 +161,10 @@ def make_layout(devices: Sequence[DeviceData], *, optional: Collection[int] = ()
     )
 
 
-def _grouped(devices: Sequence[DeviceData], optional: Collection[int]) -> list[list[DeviceData]]:
+def _grouped(devices: Sequence[DeviceData]) -> list[list[DeviceData]]:
     """Devices by unit, in the order of their first member."""
     groups: list[list[DeviceData]] = []
-    room: dict[bool, int] = {}  # LRW or not → rank of the group that is being filled
+    room: dict[tuple[bool, int], int] = {}  # LRW or not, divisor → rank of the group being filled
     for data in devices:
         if data.size == 0:
             continue
@@ -165,10 +174,10 @@ def _grouped(devices: Sequence[DeviceData], optional: Collection[int]) -> list[l
                 f"of {UNIT_MAX} bytes",
                 hint="map fewer objects",
             )
-        if data.position in optional:
+        if data.optional:
             groups.append([data])
             continue
-        kind = data.description.controller.supports_lrw
+        kind = (data.description.controller.supports_lrw, data.every)
         rank = room.get(kind)
         if rank is not None and _fits(groups[rank], data):
             groups[rank].append(data)
@@ -184,7 +193,7 @@ def _fits(group: Sequence[DeviceData], data: DeviceData) -> bool:
 
 def _unit(
     members: Sequence[DeviceData],
-    optional: Collection[int],
+    phase: int,
     logical_start: int,
     output_offset: int,
     input_offset: int,
@@ -195,7 +204,9 @@ def _unit(
     return UnitLayout(
         name=name,
         devices=positions,
-        optional=first in optional,
+        optional=members[0].optional,
+        every=members[0].every,
+        phase=phase,
         logical_read_write=members[0].description.controller.supports_lrw,
         logical_start=logical_start,
         output_offset=output_offset,

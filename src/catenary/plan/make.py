@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from catenary.errors import ConfigurationError
 from catenary.model.device import DeviceDescription, Direction
@@ -64,7 +65,8 @@ def make_plan(
     `lead` [s]: inline and with a law, awake that long before the instant. Where a wish asks for
     distributed clocks: `clock`, whom the others follow; `reference`, position of the reference
     clock (None: the first there is); `margin` [s] between the instant and the frames (None: by the
-    order).
+    order). `optional`: positions without which the cycle is good, beside those that no wish
+    requires.
     """
     period_ns = round(period * 1e9)
     if period_ns <= 0:
@@ -73,10 +75,11 @@ def make_plan(
     asked = _asked(devices, wishes, period_ns)
     mappings = [_mappings(device, asked.get(device.position, PdoWish())) for device in devices]
     data = [
-        DeviceData(device, outputs.assignments, inputs.assignments)
-        for device, (outputs, inputs) in zip(devices, mappings, strict=True)
+        _device_data(device, mapping, asked.get(device.position), watchdog_ns, period_ns)
+        for device, mapping in zip(devices, mappings, strict=True)
     ]
-    layout = make_layout(data, optional=optional)
+    data = [replace(d, optional=d.optional or d.position in optional) for d in data]
+    layout = make_layout(data)
     syncs = _syncs(devices, asked, period_ns)
     choice = choose_clocks(devices, _clock_wishes(asked), clock, reference)
     frames = make_frames(layout.units, len(devices), choice)
@@ -89,7 +92,7 @@ def make_plan(
         output_size=layout.output_size,
         input_size=layout.input_size,
         frames=frames,
-        sync_units=tuple(SyncUnit(u.name, u.devices, u.optional) for u in layout.units),
+        sync_units=tuple(SyncUnit(u.name, u.devices, u.optional, u.every) for u in layout.units),
         device_count=len(devices),
         axes=tuple(axis for table in tables for axis in table.axes),
         output_columns=tuple(c for table in tables for c in table.output_columns),
@@ -125,12 +128,14 @@ def gather_wishes(wishes: Sequence[Wish], period_ns: int) -> dict[int, PdoWish]:
     gathered: dict[int, PdoWish] = {}
     for wish in wishes:
         for position, pdos in wish.pdos(period_ns).items():
-            before = gathered.get(position, PdoWish())
+            before = gathered.get(position, PdoWish(every=pdos.every, required=False))
             gathered[position] = PdoWish(
                 _merged(before.outputs, pdos.outputs),
                 _merged(before.inputs, pdos.inputs),
                 before.start_up + tuple(d for d in pdos.start_up if d not in before.start_up),
                 _one_clock(position, before.clock, pdos.clock),
+                math.gcd(before.every, pdos.every),
+                before.required or pdos.required,
             )
     return gathered
 
@@ -184,6 +189,24 @@ def _mappings(device: DeviceDescription, wish: PdoWish) -> tuple[Mapping, Mappin
         make_mapping(device, Direction.OUTPUT, wish.outputs),
         make_mapping(device, Direction.INPUT, wish.inputs),
     )
+
+
+def _device_data(
+    device: DeviceDescription,
+    mapping: tuple[Mapping, Mapping],
+    wish: PdoWish | None,
+    watchdog_ns: int,
+    period_ns: int,
+) -> DeviceData:
+    outputs, inputs = (direction.assignments for direction in mapping)
+    every, required = (wish.every, wish.required) if wish is not None else (1, True)
+    if watchdog_ns and watchdog_ns < WATCHDOG_PERIODS * period_ns * every:
+        raise ValueError(
+            f"{device}: exchanged every {every} cycles of {period_ns * 1e-9} s, less than "
+            f"{WATCHDOG_PERIODS} times within the watchdog of {watchdog_ns * 1e-9:.4f} s: ask for a "
+            "smaller divisor, or a longer watchdog=... of the Loop"
+        )
+    return DeviceData(device, outputs, inputs, every, optional=not required)
 
 
 def _watchdog_ns(watchdog: float | None, period_ns: int) -> int:

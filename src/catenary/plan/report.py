@@ -95,7 +95,8 @@ def _entries(direction: Direction, assignments: Sequence[Assignment], offset: in
 
 def _frames(cycle: CyclePlan) -> Iterator[str]:
     for number, frame in enumerate(cycle.frames):
-        yield f"frame {number}: {len(frame.template)} bytes"
+        when = f", every {frame.every} cycles" if frame.every > 1 else ""
+        yield f"frame {number}: {len(frame.template)} bytes{when}"
         for datagram in frame.datagrams:
             yield f"    {_datagram(datagram)}"
 
@@ -111,5 +112,6 @@ def _datagram(datagram: DatagramPlan) -> str:
 def _units(layout: Layout) -> Iterator[str]:
     for number, unit in enumerate(layout.units):
         optional = ", optional" if unit.optional else ""
+        every = f", every {unit.every} cycles" if unit.every > 1 else ""
         how = "LRW" if unit.logical_read_write else "LRD + LWR"
-        yield f"sync unit {number}: {unit.name}, {how}{optional}"
+        yield f"sync unit {number}: {unit.name}, {how}{optional}{every}"

@@ -50,7 +50,11 @@ class DC:
 @dataclass(frozen=True, slots=True)
 class PdoWish:
     """The objects one device must exchange every cycle. What is mapped already stays as it is;
-    the mapping is changed only where something wished for is missing."""
+    the mapping is changed only where something wished for is missing.
+
+    A device that several wishes name is exchanged as often as any of them asks, and is required
+    when any of them requires it.
+    """
 
     outputs: tuple[ObjectReference, ...] = ()  # MainDevice → device (RxPDO)
     inputs: tuple[ObjectReference, ...] = ()  # device → MainDevice (TxPDO)
@@ -58,6 +62,8 @@ class PdoWish:
         tuple[int, int, bytes], ...
     ] = ()  # SDO downloads in PRE-OP: index, subindex, data
     clock: DC | None = None
+    every: int = 1  # exchanged every so many cycles
+    required: bool = True  # the cycle is not good without it
 
 
 class ImageLayout(Protocol):
@@ -108,6 +114,7 @@ class Views:
     output_reals: Reals
     output_integers: Integers
     output_bits: Bytes
+    unit_valid: Bytes  # (units of the whole plan,) whether each one's last exchange was valid
 
 
 class Wish(Protocol):
