@@ -27,6 +27,7 @@ from catenary.plan.cycle import (
 )
 from catenary.wire.datagram import Command, Datagram
 from catenary.wire.frame import decode_frame, encode_frame
+from tests.link_table import NOW, RECEIVE, SEND, WAIT_UNTIL, Table, capsule_of
 
 MS = 1_000_000
 PERIOD = MS
@@ -36,34 +37,8 @@ COUNTS = 1000.0  # per radian
 NM = 0.001  # of one count of torque
 LOGICAL = 0x10000
 
-SEND = ctypes.CFUNCTYPE(
-    ctypes.c_int, ctypes.c_void_p, ctypes.POINTER(ctypes.c_uint8), ctypes.c_uint32
-)
-RECEIVE = ctypes.CFUNCTYPE(
-    ctypes.c_int, ctypes.c_void_p, ctypes.POINTER(ctypes.POINTER(ctypes.c_uint8))
-)
-NOW = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
-WAIT_UNTIL = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int)
-
-capsule_new = ctypes.pythonapi.PyCapsule_New
-capsule_new.restype = ctypes.py_object
-capsule_new.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p]
 LINK_NAME = b"catenary.link"
 LAW_NAME = b"catenary.law"
-
-
-class Table(ctypes.Structure):
-    """`cat_link` of native/link.h."""
-
-    _fields_ = (
-        ("version", ctypes.c_uint32),
-        ("flags", ctypes.c_uint32),
-        ("self", ctypes.c_void_p),
-        ("send", SEND),
-        ("receive", RECEIVE),
-        ("now", NOW),
-        ("wait_until", WAIT_UNTIL),
-    )
 
 
 class ScriptedLink:
@@ -87,7 +62,7 @@ class ScriptedLink:
             NOW(lambda _: self.time),
             WAIT_UNTIL(self.table_wait_until),
         )
-        self.capsule = capsule_new(ctypes.addressof(self.table), LINK_NAME, None)
+        self.capsule = capsule_of(self.table, LINK_NAME)
 
     def table_send(self, _, frame, length) -> int:
         if self.send_result < 0:

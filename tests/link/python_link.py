@@ -8,29 +8,15 @@ from __future__ import annotations
 
 import ctypes
 
-SEND = ctypes.CFUNCTYPE(
-    ctypes.c_int, ctypes.c_void_p, ctypes.POINTER(ctypes.c_uint8), ctypes.c_uint32
+from tests.link_table import (
+    NOW,
+    RECEIVE,
+    SEND,
+    VIRTUAL_TIME,
+    WAIT_UNTIL,
+    Table,
+    capsule_of,
 )
-RECEIVE = ctypes.CFUNCTYPE(
-    ctypes.c_int, ctypes.c_void_p, ctypes.POINTER(ctypes.POINTER(ctypes.c_uint8))
-)
-NOW = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
-WAIT_UNTIL = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int)
-VIRTUAL_TIME = 1
-
-
-class Table(ctypes.Structure):
-    """`cat_link` of native/link.h."""
-
-    _fields_ = (
-        ("version", ctypes.c_uint32),
-        ("flags", ctypes.c_uint32),
-        ("self", ctypes.c_void_p),
-        ("send", SEND),
-        ("receive", RECEIVE),
-        ("now", NOW),
-        ("wait_until", WAIT_UNTIL),
-    )
 
 
 class PythonLink:
@@ -54,11 +40,8 @@ class PythonLink:
             NOW(lambda _: self.time),
             WAIT_UNTIL(self.table_wait_until),
         )
-        new = ctypes.pythonapi.PyCapsule_New
-        new.restype = ctypes.py_object
-        new.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p]
         self.capsule_name = b"catenary.link"
-        self.capsule = new(ctypes.addressof(self.table), self.capsule_name, None)
+        self.capsule = capsule_of(self.table, self.capsule_name)
 
     def table_send(self, _, frame, length) -> int:
         self.sent.append(bytes(frame[:length]))

@@ -97,6 +97,11 @@ class Engine:
     def al_counter(self) -> int:
         """How many devices answered the AL status datagram in this cycle."""
 
+    @property
+    def disturbed(self) -> bool:
+        """Whether, at the last collect, somebody did not answer or was not in OP without an error.
+        From any thread."""
+
     # Figures. Exact after `stop`; while the native thread runs they may be one cycle apart.
     @property
     def counters(self) -> dict[str, int]:

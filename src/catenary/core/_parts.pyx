@@ -28,6 +28,10 @@ from catenary.core._lane cimport Lane
 from catenary.core._native cimport CAT_LINK_SHARED_TIME, CAT_LINK_VIRTUAL_TIME, cat_fence
 
 
+cdef enum:
+    AL_OP = 8                  # AL status of a device in OP without an error
+
+
 def columns_by_bank(columns):
     """How many columns each bank has."""
     return [sum(column.bank == bank for column in columns) for bank in range(3)]
@@ -52,6 +56,7 @@ cdef class Parts:
             raise ValueError(f"lead_ns: {plan.lead_ns}, must be less than the period")
         self.e.thread.priority = plan.priority or 0
         self.e.thread.cpu = -1 if plan.cpu is None else plan.cpu
+        self.device_count = plan.device_count
         self.frames = Frames(plan, link)
         self.lane = Lane(plan.period_ns)
         self.axes = Axes(plan)
@@ -157,6 +162,15 @@ cdef class Parts:
     @property
     def al_counter(self):
         return self.h.actual[PRIVATE].header.al_counter
+
+    @property
+    def disturbed(self):
+        cdef uint32_t unit
+        image = &self.frames.c.image
+        for unit in range(image.unit_count):
+            if not image.unit_valid[unit]:
+                return True
+        return image.al_counter[0] != self.device_count or image.al_status[0] != AL_OP
 
     # ---- figures
 

@@ -11,6 +11,7 @@ from catenary.link._table import capsule_in_virtual_time
 from catenary.link.fault import Fault
 from catenary.link.interface import Interface
 from catenary.link.protocol import Link, LinkSource
+from catenary.link.ring import Ring
 
 __all__ = [
     "Fault",
@@ -20,6 +21,7 @@ __all__ = [
     "LinkSource",
     "Recorder",
     "Replay",
+    "Ring",
     "lives_in_virtual_time",
 ]
 

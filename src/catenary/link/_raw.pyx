@@ -12,7 +12,7 @@ from libc.string cimport memcpy, memset
 from posix.time cimport CLOCK_MONOTONIC, clock_gettime, timespec
 
 from catenary.link._table cimport (
-    CAT_FRAME_MAX, CAT_FRAME_MIN, TableLink,
+    CAT_FRAME_MAX, CAT_FRAME_MIN, CAT_LINK_POLLS, TableLink,
 )
 
 cdef extern from "atomics.h" nogil:
@@ -203,6 +203,8 @@ cdef class RawLink(TableLink):
             self.raw.slot_size = slot_size
             self.raw.slot_count = <uint32_t> (self.view.len // slot_size)
         self.table.self = &self.raw
+        self.table.flags = CAT_LINK_POLLS
+        self.table.fd = self.raw.fd
         self.table.send = raw_send
         self.table.receive = receive_by_recv if ring is None else receive_from_ring
         self.table.now = raw_now

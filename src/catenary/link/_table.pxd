@@ -4,7 +4,10 @@ cdef extern from "link.h" nogil:
     const char *CAT_LINK_CAPSULE
     const uint32_t CAT_LINK_VERSION
     const uint32_t CAT_LINK_VIRTUAL_TIME
+    const uint32_t CAT_LINK_SHARED_TIME
     const uint32_t CAT_LINK_SPENDS
+    const uint32_t CAT_LINK_POLLS
+    const uint32_t CAT_LINK_FORETELLS
     enum:
         CAT_FRAME_MAX
         CAT_FRAME_MIN
@@ -16,6 +19,8 @@ cdef extern from "link.h" nogil:
         int (*receive)(void *self, const uint8_t **frame) noexcept nogil
         int64_t (*now)(void *self) noexcept nogil
         int (*wait_until)(void *self, int64_t deadline, int wake_on_frame) noexcept nogil
+        int64_t (*due)(void *self) noexcept nogil
+        int fd
 
 
 cdef class TableLink:

@@ -147,7 +147,9 @@ cdef class WrapperLink(TableLink):
         self.inner = table_of(self.inner_capsule)
         self.link = opened
         self.name = opened.name
-        self.table.flags = self.inner.flags & ~CAT_LINK_SPENDS
+        self.table.flags = self.inner.flags & ~(
+            CAT_LINK_SPENDS | CAT_LINK_POLLS | CAT_LINK_FORETELLS
+        )
         return 0
 
     cdef int close_table(self) except -1:

@@ -20,6 +20,8 @@
 #define CAT_LINK_VIRTUAL_TIME 1u      /* `now` advances only in `wait_until`: run in the caller's thread */
 #define CAT_LINK_SHARED_TIME 2u       /* virtual, and others live by it: wait without the GIL */
 #define CAT_LINK_SPENDS 4u            /* `spend` is there */
+#define CAT_LINK_POLLS 8u             /* `fd` is there: readable when a frame can be received */
+#define CAT_LINK_FORETELLS 16u        /* `due` is there */
 
 typedef struct cat_link {
     uint32_t version;                 /* CAT_LINK_VERSION */
@@ -45,6 +47,13 @@ typedef struct cat_link {
     /* Only with CAT_LINK_SPENDS. Lets execution time [ns] pass; whoever precedes on the same
      * virtual processor preempts it, so that more time may have passed. 0, or -errno as above. */
     int (*spend)(void *self, int64_t duration);
+
+    /* Only with CAT_LINK_FORETELLS (virtual time). When the next frame can be received [ns];
+     * INT64_MAX: none is under way. */
+    int64_t (*due)(void *self);
+
+    /* Only with CAT_LINK_POLLS. */
+    int fd;
 } cat_link;
 
 #endif

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from catenary.model.device import Assignment, DeviceDescription, Direction, Entry, Identity, Pdo
 from catenary.plan.clocks import SyncPlan
@@ -43,6 +43,7 @@ class DevicePlan:
     inputs: tuple[Assignment, ...]
     layout: DeviceLayout
     downloads: tuple[Download, ...]
+    start_up: tuple[Download, ...]  # the last of the downloads: what wishes asked for
     mapping_changed: bool  # the downloads begin with a new mapping
     watchdog_ns: int  # of process data; 0: off
     sync: SyncPlan | None = None  # None: no SYNC signals
@@ -77,10 +78,51 @@ def make_device_plan(
         inputs=inputs.assignments,
         layout=layout,
         downloads=(*mapping_downloads(outputs), *mapping_downloads(inputs), *wished, *clocks),
+        start_up=(*wished, *clocks),
         mapping_changed=outputs.changed or inputs.changed,
         watchdog_ns=watchdog_ns,
         sync=sync,
     )
+
+
+def renewed(plan: DevicePlan, device: DeviceDescription) -> DevicePlan:
+    """The plan for a device that begins again: the mapping is written where what it has now
+    (`device`) differs."""
+    mappings = [
+        _difference(device, each, plan.assignments(each)) for each in Direction
+    ]
+    written = tuple(step for mapping in mappings for step in mapping_downloads(mapping))
+    return replace(
+        plan,
+        downloads=(*written, *plan.start_up),
+        mapping_changed=any(mapping.changed for mapping in mappings),
+    )
+
+
+def _difference(
+    device: DeviceDescription, direction: Direction, wanted: tuple[Assignment, ...]
+) -> Mapping:
+    entries = {pdo.index: _shape(pdo) for pdo in device.pdos(direction)}
+    now = device.assignments(direction)
+    lists = {each.sync_manager: [pdo.index for pdo in each.pdos] for each in now}
+    return Mapping(
+        wanted,
+        rewritten=tuple(
+            pdo
+            for each in wanted
+            for pdo in each.pdos
+            if entries.get(pdo.index) != _shape(pdo)
+        ),
+        reassigned=tuple(
+            each.sync_manager
+            for each in wanted
+            if lists.get(each.sync_manager, []) != [pdo.index for pdo in each.pdos]
+        ),
+    )
+
+
+def _shape(pdo: Pdo) -> tuple[tuple[int, int, int], ...]:
+    return tuple((entry.index, entry.subindex, entry.bit_length) for entry in pdo.entries)
 
 
 def mapping_downloads(mapping: Mapping) -> tuple[Download, ...]:

@@ -11,6 +11,7 @@ import struct
 from collections.abc import Collection
 
 from catenary.errors import EepromError
+from catenary.model.device import Identity
 from catenary.procedure.exchange import Procedure, after, read_memory, write_memory
 from catenary.procedure.station import Deadline, Pace, Station, answered
 from catenary.wire.register import SII_CONTROL_STATUS, SII_DATA
@@ -22,6 +23,7 @@ NOT_WORTH_WAITING = 50e-6  # [s]; a frame takes as long
 ERRORS_FORGIVEN = 3  # an EEPROM behind a busy processor may miss an acknowledge (SOEM, IgH retry)
 
 HEADER_WORDS = 0x40
+IDENTITY_WORD, IDENTITY_WORDS = 0x08, 8
 END = 0xFFFF
 ADDRESSES = 0x10000  # words that a 16-bit count can reach
 CATEGORIES_MAX = 64  # of a sane image; an unprogrammed one goes on for ever
@@ -63,6 +65,12 @@ def read_image(station: Station, *, wanted: Collection[int] = WANTED) -> Procedu
 def read_words(station: Station, first: int, count: int) -> Procedure[bytes]:
     """`count` words from word address `first`, as they are."""
     return (yield from _Reader(station).words(first, count))
+
+
+def read_identity(station: Station) -> Procedure[Identity]:
+    """Vendor, product, revision and serial number: words 0x08 to 0x0F."""
+    data = yield from read_words(station, IDENTITY_WORD, IDENTITY_WORDS)
+    return Identity(*struct.unpack("<4I", data))
 
 
 class _Reader:

@@ -26,8 +26,8 @@ from catenary.wire.sii_interface import CONFIGURATION_FORCE
 
 RESET_TIMEOUT = 2.0  # [s]; who is not in INIT then is asked by name
 STATION_BASE = 0x1001  # of position 0; 0 would answer nothing, small numbers are likely aliases
-_FMMU_BLOCK = (0x0600, 256)  # all 16 FMMUs
-_SYNC_MANAGER_BLOCK = (0x0800, 128)  # all 16 SyncManagers
+FMMU_BLOCK = (0x0600, 256)  # all 16 FMMUs
+SYNC_MANAGER_BLOCK = (0x0800, 128)  # all 16 SyncManagers
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +63,8 @@ def reset(device_count: int) -> Procedure[None]:
     their EEPROM taken from the process data interface."""
     yield from _all_to(State.INIT, RESET_TIMEOUT)
     replies = yield [
-        _clear(*_FMMU_BLOCK),
-        _clear(*_SYNC_MANAGER_BLOCK),
+        _clear(*FMMU_BLOCK),
+        _clear(*SYNC_MANAGER_BLOCK),
         write(Command.BWR, 0, ACTIVATION, 0),
         write(Command.BWR, 0, SII_CONFIGURATION, CONFIGURATION_FORCE),
         write(Command.BWR, 0, SII_CONFIGURATION, 0),

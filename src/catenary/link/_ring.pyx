@@ -1,0 +1,414 @@
+"""A ring of devices on two links: every frame goes out on both, and comes back as one.
+
+In a closed ring the copy sent on the first link is worked on by all devices and arrives on the
+second; the other copy passes unprocessed. Where the ring is cut both turn round at the cut and come
+back where they were sent. The receiver sees one frame either way (native/ring_merge.h).
+
+A copy is waited for `pair_wait` after the other has come, and not at all once it has failed to
+come several times in a row. Costs a copy of each frame on its way, and 2 system calls to send.
+"""
+
+from libc.errno cimport EINTR, EMSGSIZE, errno
+from libc.stdint cimport int64_t, uint8_t, uint32_t, uint64_t
+from libc.stdlib cimport calloc, free
+from libc.string cimport memcpy
+from posix.time cimport timespec
+
+from catenary.link._table cimport (
+    CAT_FRAME_MAX,
+    CAT_LINK_FORETELLS,
+    CAT_LINK_POLLS,
+    CAT_LINK_SHARED_TIME,
+    CAT_LINK_VIRTUAL_TIME,
+    TableLink,
+    cat_link,
+    table_of,
+)
+
+from catenary.link.protocol import open_link
+from catenary.link.ring_state import ROUTES, RingState
+
+cdef extern from "ring_merge.h" nogil:
+    int cat_ring_merge(uint8_t *frame, uint32_t length, const uint8_t *other, uint32_t other_length)
+    void cat_ring_second(uint8_t *frame, uint32_t length)
+
+cdef extern from "<poll.h>" nogil:
+    enum:
+        POLLIN
+    struct pollfd:
+        int fd
+        short events
+        short revents
+    int ppoll(pollfd *fds, unsigned long count, const timespec *timeout, const void *mask)
+
+cdef enum:
+    FIRST = 0
+    SECOND = 1
+    BOTH = 2
+    SLOTS = 256                       # one for each index of a datagram
+    MARK = 11                         # last byte of the source address: of which copy it is
+    SECOND_BIT = 0x80
+    SOURCE = 6
+    PROCESSED = 0x02                  # of the source address's first byte: a controller was passed
+    INDEX = 17                        # of the first datagram
+    HEADERS = 28                      # to the end of the first datagram's header, and its counter
+    GIVEN_UP = 3                      # copies in a row that did not come
+    BURST = 512                       # frames taken in at once
+    SECOND_NS = 1_000_000_000
+    BRD = 7
+
+cdef int64_t NEVER = 0x7FFFFFFFFFFFFFFF
+
+ctypedef struct slot_t:
+    uint32_t length
+    uint8_t expected                  # copies sent: bit 0 first, bit 1 second
+    uint8_t back                      # copies that came
+    uint8_t delivered
+    int64_t since                     # when the first copy came
+    uint64_t order                    # of its becoming complete
+    uint8_t sent[CAT_FRAME_MAX]
+    uint8_t copies[2][CAT_FRAME_MAX]
+
+ctypedef struct ring_t:
+    cat_link *links[2]
+    int route                         # FIRST, SECOND or BOTH
+    int64_t pair_wait
+    uint32_t missed[2]                # copies in a row that did not come
+    uint32_t waiting                  # slots with a copy that is not delivered
+    uint32_t arrived_on[2]            # where the last copy of each came back; BOTH: nowhere yet
+    uint32_t counted[2]               # devices that answered the last broadcast of each copy
+    uint64_t unpaired                 # frames delivered of one copy, the other being late
+    uint64_t alien                    # frames of others, or of earlier times
+    uint64_t send_errors[2]
+    uint8_t pending[SLOTS]            # indices with a copy, in no order
+    slot_t *slots
+    uint8_t out[CAT_FRAME_MAX]
+
+
+cdef inline int64_t ring_now(void *self) noexcept nogil:
+    cdef ring_t *ring = <ring_t *> self
+    return ring.links[0].now(ring.links[0].self)
+
+
+cdef void forget(ring_t *ring, uint8_t index) noexcept nogil:
+    """Takes an index out of those that are waited with."""
+    cdef uint32_t i
+    for i in range(ring.waiting):
+        if ring.pending[i] == index:
+            ring.waiting -= 1
+            ring.pending[i] = ring.pending[ring.waiting]
+            return
+
+
+cdef int ring_send(void *self, const uint8_t *frame, uint32_t length) noexcept nogil:
+    cdef ring_t *ring = <ring_t *> self
+    cdef slot_t *slot
+    cdef const uint8_t *copy
+    cdef int status, worst = 0, side
+    if length > CAT_FRAME_MAX:
+        return -EMSGSIZE
+    if length < HEADERS:
+        return ring.links[0].send(ring.links[0].self, frame, length)
+    slot = &ring.slots[frame[INDEX]]
+    forget(ring, frame[INDEX])
+    slot.length = length
+    slot.back = 0
+    slot.delivered = 0
+    slot.expected = 0
+    memcpy(slot.sent, frame, length)
+    memcpy(ring.out, frame, length)
+    ring.out[MARK] |= SECOND_BIT
+    if ring.route == BOTH:
+        cat_ring_second(ring.out, length)
+    for side in range(2):
+        if ring.route != BOTH and ring.route != side:
+            continue
+        copy = slot.sent
+        if side == SECOND:
+            copy = ring.out
+        status = ring.links[side].send(ring.links[side].self, copy, length)
+        if status < 0:
+            ring.send_errors[side] += 1
+            worst = status
+        else:
+            slot.expected |= 1 << side
+    return 0 if slot.expected else worst
+
+
+cdef void take_in(ring_t *ring) noexcept nogil:
+    """Everything that has come back on either link."""
+    cdef const uint8_t *frame = NULL
+    cdef int arrived, length, k
+    for arrived in range(2):
+        for k in range(BURST):
+            length = ring.links[arrived].receive(ring.links[arrived].self, &frame)
+            if length <= 0:
+                break
+            take(ring, arrived, frame, <uint32_t> length)
+
+
+cdef void take(ring_t *ring, int arrived, const uint8_t *frame, uint32_t length) noexcept nogil:
+    cdef slot_t *slot
+    cdef int side
+    if length < HEADERS or length > CAT_FRAME_MAX:
+        ring.alien += 1
+        return
+    slot = &ring.slots[frame[INDEX]]
+    side = SECOND if frame[MARK] & SECOND_BIT else FIRST
+    if not slot.expected >> side & 1 or slot.back >> side & 1 or not is_copy(slot, frame, length):
+        ring.alien += 1
+        return
+    slot.back |= 1 << side
+    ring.missed[side] = 0
+    ring.arrived_on[side] = arrived
+    if frame[16] == BRD:
+        ring.counted[side] = first_counter(frame, length)
+    if slot.delivered:
+        return
+    memcpy(slot.copies[side], frame, min(length, slot.length))  # padding may be cut off
+    slot.copies[side][MARK] &= ~SECOND_BIT
+    if slot.back == 1 << side:
+        slot.since = ring_now(ring)
+        ring.pending[ring.waiting] = frame[INDEX]
+        ring.waiting += 1
+
+
+cdef bint is_copy(const slot_t *slot, const uint8_t *frame, uint32_t length) noexcept nogil:
+    """As far as can be told cheaply: the same EtherCAT header, and all its datagrams."""
+    return (
+        frame[14] == slot.sent[14]
+        and frame[15] == slot.sent[15]
+        and length >= 16 + <uint32_t> (frame[14] | (frame[15] & 7) << 8)
+    )
+
+
+cdef uint32_t first_counter(const uint8_t *frame, uint32_t length) noexcept nogil:
+    cdef uint32_t at = 26 + ((frame[22] | frame[23] << 8) & 0x7FF)
+    return frame[at] | frame[at + 1] << 8 if at + 2 <= length else 0
+
+
+cdef inline bint is_processed(const uint8_t *frame) noexcept nogil:
+    return frame[SOURCE] & PROCESSED != 0
+
+
+cdef int64_t due_at(ring_t *ring, const slot_t *slot) noexcept nogil:
+    """When a frame of which something has come is to be delivered."""
+    cdef int missing
+    if slot.back == slot.expected:
+        return slot.since
+    missing = SECOND if slot.back == 1 else FIRST
+    if not is_processed(slot.copies[1 - missing]) and not is_processed(slot.sent):
+        return NEVER                  # it has seen no device: there is nothing in it
+    if ring.missed[missing] >= GIVEN_UP:
+        return slot.since
+    return slot.since + ring.pair_wait
+
+
+cdef int next_due(ring_t *ring, int64_t *when) noexcept nogil:
+    """The pending frame that is due first: its place in `pending`; -1: none."""
+    cdef int best = -1
+    cdef uint32_t i
+    cdef int64_t due
+    when[0] = NEVER
+    for i in range(ring.waiting):
+        due = due_at(ring, &ring.slots[ring.pending[i]])
+        if due < when[0]:
+            when[0] = due
+            best = <int> i
+    return best
+
+
+cdef int ring_receive(void *self, const uint8_t **frame) noexcept nogil:
+    cdef ring_t *ring = <ring_t *> self
+    cdef slot_t *slot
+    cdef int64_t due
+    cdef int place
+    cdef bint whole
+    take_in(ring)
+    place = next_due(ring, &due)
+    if place < 0 or due > ring_now(ring):
+        return 0
+    slot = &ring.slots[ring.pending[place]]
+    ring.waiting -= 1
+    ring.pending[place] = ring.pending[ring.waiting]
+    slot.delivered = 1
+    whole = slot.back == slot.expected
+    if not whole:
+        ring.unpaired += 1
+        if ring.missed[SECOND if slot.back == 1 else FIRST] < GIVEN_UP:
+            ring.missed[SECOND if slot.back == 1 else FIRST] += 1
+    if slot.back & 1:
+        memcpy(ring.out, slot.copies[FIRST], slot.length)
+    else:
+        memcpy(ring.out, slot.sent, slot.length)
+        ring.out[SOURCE] = slot.copies[SECOND][SOURCE]
+    if slot.back & 2:
+        ring.out[SOURCE] |= slot.copies[SECOND][SOURCE] & PROCESSED
+        cat_ring_merge(ring.out, slot.length, slot.copies[SECOND], slot.length)
+    frame[0] = ring.out
+    return <int> slot.length
+
+
+cdef int ring_wait_until(void *self, int64_t deadline, int wake_on_frame) noexcept nogil:
+    cdef ring_t *ring = <ring_t *> self
+    cdef cat_link *first = ring.links[0]
+    cdef int64_t due
+    cdef int status
+    if not wake_on_frame:
+        return first.wait_until(first.self, deadline, 0)
+    while True:
+        take_in(ring)
+        next_due(ring, &due)
+        if due <= ring_now(ring):
+            return 1
+        status = wait_for_either(ring, min(deadline, due))
+        if status < 0:
+            return status
+        if status == 0 and ring_now(ring) >= deadline:
+            take_in(ring)
+            next_due(ring, &due)
+            return 1 if due <= ring_now(ring) else 0
+
+
+cdef int wait_for_either(ring_t *ring, int64_t deadline) noexcept nogil:
+    """1: something may have come; 0: the deadline has passed; or -errno."""
+    cdef cat_link *a = ring.links[0]
+    cdef cat_link *b = ring.links[1]
+    cdef pollfd fds[2]
+    cdef timespec rest
+    cdef int64_t left, until
+    cdef int ready
+    if a.flags & CAT_LINK_FORETELLS:
+        until = min(deadline, a.due(a.self), b.due(b.self))
+        ready = a.wait_until(a.self, until, 0)
+        return ready if ready < 0 else (1 if until < deadline else 0)
+    left = max(deadline - ring_now(ring), <int64_t> 0)
+    rest.tv_sec = left // SECOND_NS
+    rest.tv_nsec = left % SECOND_NS
+    fds[0].fd = a.fd
+    fds[1].fd = b.fd
+    fds[0].events = fds[1].events = POLLIN
+    fds[0].revents = fds[1].revents = 0
+    ready = ppoll(fds, 2, &rest, NULL)
+    if ready < 0:
+        return -errno
+    if ready > 0 and not (fds[0].revents & POLLIN or fds[1].revents & POLLIN):
+        # A NIC that went down says so until it is asked; the other carries on.
+        silence(a, &fds[0])
+        silence(b, &fds[1])
+    return 1 if ready > 0 else 0
+
+
+cdef void silence(cat_link *link, const pollfd *fd) noexcept nogil:
+    """Takes the error of a socket by asking its link for a frame with no time to wait."""
+    if fd.revents and not fd.revents & POLLIN:
+        link.wait_until(link.self, 0, 1)
+
+
+cdef class RingLink(TableLink):
+    """Owns the two links of a ring: closing closes both. `pair_wait` [s]: how long one copy of a
+    frame waits for the other."""
+    cdef ring_t ring
+    cdef readonly tuple links
+    cdef tuple capsules
+
+    def __init__(self, first, second, double pair_wait=100e-6):
+        if not 0 <= pair_wait <= 1:
+            raise ValueError(f"pair_wait={pair_wait} s: from 0 to 1 s")
+        self.ring.slots = <slot_t *> calloc(SLOTS, sizeof(slot_t))
+        if self.ring.slots == NULL:
+            raise MemoryError
+        self.open_both(first, second)
+        self.ring.route = BOTH
+        self.ring.pair_wait = round(pair_wait * 1e9)
+        self.ring.arrived_on[0] = self.ring.arrived_on[1] = BOTH
+        self.table.self = &self.ring
+        self.table.flags = self.ring.links[0].flags & (CAT_LINK_VIRTUAL_TIME | CAT_LINK_SHARED_TIME)
+        self.table.send = ring_send
+        self.table.receive = ring_receive
+        self.table.now = ring_now
+        self.table.wait_until = ring_wait_until
+
+    cdef int open_both(self, first, second) except -1:
+        opened = []
+        try:
+            for source in (first, second):
+                opened.append(open_link(source))
+            self.links = tuple(opened)
+            self.capsules = tuple(link.capsule for link in opened)
+            for side in range(2):
+                self.ring.links[side] = table_of(self.capsules[side])
+            self.name = ",".join(link.name for link in opened)
+            self.check_kind()
+        except BaseException:
+            for link in opened:
+                link.close()
+            raise
+        return 0
+
+    cdef int check_kind(self) except -1:
+        cdef uint32_t wanted = CAT_LINK_POLLS | CAT_LINK_FORETELLS
+        cdef uint32_t both = self.ring.links[0].flags & self.ring.links[1].flags & wanted
+        if both == 0:
+            raise ValueError(
+                f"{self.name}: a ring needs two network interfaces, or the two ends of one virtual"
+                " segment; put recorders and fault injectors round the ring"
+            )
+        return 0
+
+    @property
+    def route(self):
+        """Which links frames go out on: "both", "first" or "second"."""
+        return ROUTES[self.ring.route]
+
+    @route.setter
+    def route(self, str value not None):
+        if value not in ROUTES:
+            raise ValueError(f"route {value!r}: must be one of {', '.join(ROUTES)}")
+        self.ring.route = ROUTES.index(value)
+
+    @property
+    def state(self):
+        """How the last frames came back."""
+        return RingState.of(
+            [self.ring.arrived_on[side] for side in range(2)],
+            [self.ring.missed[side] >= GIVEN_UP for side in range(2)],
+            [self.ring.counted[side] for side in range(2)],
+        )
+
+    @property
+    def counts(self):
+        """unpaired: frames of which one copy alone came in time; alien; send_errors of each link."""
+        return {
+            "unpaired": self.ring.unpaired,
+            "alien": self.ring.alien,
+            "send_errors_first": self.ring.send_errors[0],
+            "send_errors_second": self.ring.send_errors[1],
+        }
+
+    cdef int close_table(self) except -1:
+        try:
+            self.links[0].close()
+        finally:
+            self.links[1].close()
+        return 0
+
+    def __dealloc__(self):
+        free(self.ring.slots)
+
+
+def merge(bytes first not None, bytes second not None):
+    """The one frame that two copies make. ValueError where they are not copies of one frame."""
+    cdef bytearray merged = bytearray(first)
+    cdef uint8_t *out = merged
+    if cat_ring_merge(out, <uint32_t> len(first), <const uint8_t *> second, <uint32_t> len(second)):
+        raise ValueError("not two copies of one frame")
+    return bytes(merged)
+
+
+def second_copy(bytes frame not None):
+    """What goes out on the second link."""
+    cdef bytearray copy = bytearray(frame)
+    cdef uint8_t *out = copy
+    cat_ring_second(out, <uint32_t> len(frame))
+    return bytes(copy)

@@ -1,0 +1,27 @@
+"""Two links as one ring, as a link source."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from catenary.link._ring import RingLink
+from catenary.link.protocol import Link, LinkSource
+
+PAIR_WAIT = 100e-6  # [s]: the two ways round a hundred devices differ by less
+
+
+@dataclass(frozen=True, slots=True)
+class Ring:
+    """A ring of devices between two ports: `Ring(Interface("eth0"), Interface("eth1"))`.
+
+    One cut cable costs the frames that were on their way. `pair_wait` [s]: how long one copy of a
+    frame waits for the other.
+    """
+
+    first: Link | LinkSource
+    second: Link | LinkSource
+    pair_wait: float = PAIR_WAIT
+
+    def open_link(self) -> RingLink:
+        """Opens both."""
+        return RingLink(self.first, self.second, self.pair_wait)

@@ -1,0 +1,297 @@
+"""The watch over the devices of a running loop: who is gone, who is astray, who comes back.
+
+One endless conversation in the acyclic lane. While the cycle finds everybody in OP it only looks at
+a flag of the core; else it asks everybody, tells what it finds as events, and leads devices that
+are not required back to OP. What befalls a required device ends the loop (docs/safety.md); here it
+is only told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, Literal
+
+from catenary.bus import MainDevice, SubDevice
+from catenary.bus.event import (
+    DeviceHeld,
+    DeviceLost,
+    DeviceReplaced,
+    DeviceReturned,
+    Event,
+    StateLost,
+)
+from catenary.bus.task import Task
+from catenary.errors import CatenaryError
+from catenary.loop.diagnosis import ERROR_BIT, STATE_BITS, described
+from catenary.model.device import Identity
+from catenary.model.returning import vacancies
+from catenary.plan.make import Plan
+from catenary.plan.start_up import DevicePlan
+from catenary.procedure import restore
+from catenary.procedure.al_state import request_state
+from catenary.procedure.exchange import Procedure, after
+from catenary.procedure.survey import Answer, survey
+from catenary.wire.al import State
+
+Policy = Literal["restore", "hold"]
+Submit = Callable[[Procedure[None]], Task[None]]
+
+LOOK = 0.010  # [s] between two looks at the core's flag, and between two surveys
+STRANGERS_MAX = 16  # devices more than were scanned that are still told apart
+FAILURES_MAX = 3  # tries to bring a device back in one presence
+
+
+class Standing(Enum):
+    """How a device stands to the loop."""
+
+    RUNNING = "running"
+    LOST = "lost"  # does not answer
+    ASTRAY = "astray"  # answers, out of OP, its station address kept
+    RETURNING = "returning"  # a conversation leads it back
+    HELD = "held"  # waits for `release`
+
+
+@dataclass(slots=True)
+class Charge:
+    """Owns what the watch knows of one device."""
+
+    sub: SubDevice
+    plan: DevicePlan
+    required: bool
+    standing: Standing = Standing.RUNNING
+    task: Task[None] | None = None
+    failures: int = 0
+    released: bool = False
+
+
+class Watch:
+    """Owns the standing of every device of one network."""
+
+    def __init__(
+        self,
+        main: MainDevice,
+        plan: Plan,
+        *,
+        disturbed: Callable[[], bool],
+        submit: Submit,
+        tell: Callable[[Event], None],
+        now: Callable[[], float],
+        on_return: Policy = "restore",
+        on_replacement: Policy = "hold",
+    ) -> None:
+        optional = {
+            position
+            for unit in plan.cycle.sync_units
+            if unit.optional
+            for position in unit.devices
+        }
+        self._charges = [
+            Charge(sub, device, device.position not in optional)
+            for sub, device in zip(main.subs, plan.devices, strict=True)
+        ]
+        self._disturbed = disturbed
+        self._submit = submit
+        self._tell = tell
+        self._now = now
+        self._on_return = on_return
+        self._on_replacement = on_replacement
+        self._strangers: set[tuple[int, Identity]] = set()
+
+    def run(self) -> Procedure[None]:
+        """Goes on until it is cancelled."""
+        while True:
+            if self._disturbed() or any(c.standing is not Standing.RUNNING for c in self._charges):
+                yield from self._look()
+            yield after(LOOK)
+
+    def excuses(self, answers: Sequence[Answer]) -> bool:
+        """Whether all who are silent or astray are devices that are not required."""
+        return all(
+            not self._charges[answer.station.position].required
+            for answer in answers
+            if answer.word is None or answer.word & (STATE_BITS | ERROR_BIT) != State.OP
+        )
+
+    @property
+    def all_running(self) -> bool:
+        return all(charge.standing is Standing.RUNNING for charge in self._charges)
+
+    def release(self, sub: SubDevice) -> None:
+        """Lets a device that is held go to OP."""
+        charge = self._charges[sub.position]
+        charge.released, charge.failures = True, 0
+
+    # One look
+
+    def _look(self) -> Procedure[None]:
+        answers = yield from survey([charge.sub.station for charge in self._charges])
+        for charge, answer in zip(self._charges, answers, strict=True):
+            self._judge(charge, answer)
+        if any(charge.standing is Standing.LOST for charge in self._optional()):
+            yield from self._look_for_returned()
+        for charge in self._optional():
+            if charge.standing is Standing.ASTRAY:
+                self._lead(charge, self._back_to_op(charge))
+            elif charge.standing is Standing.HELD and charge.released:
+                charge.released = False
+                self._lead(charge, self._restored(charge, checked=True))
+
+    def _optional(self) -> Iterator[Charge]:
+        return (charge for charge in self._charges if not charge.required)
+
+    def _judge(self, charge: Charge, answer: Answer) -> None:
+        """What one answer means for a device."""
+        task = charge.task
+        if charge.standing is Standing.RETURNING and task is not None:
+            if not task.done:
+                return
+            self._conclude(charge, task)
+        if answer.word is None:
+            self._lose(charge)
+        elif answer.word & (STATE_BITS | ERROR_BIT) == State.OP:
+            if charge.standing is not Standing.HELD:
+                self._is_back(charge)
+        elif charge.standing is Standing.RUNNING:
+            charge.standing = Standing.ASTRAY
+            charge.sub.state = None
+            state = answer.word & STATE_BITS
+            message = f"{described(answer)}, out of OP"
+            self._tell(
+                StateLost(self._now(), charge.sub, message, int(State.OP), state, answer.code)
+            )
+        elif charge.standing is Standing.LOST:
+            # The cable was pulled, not the plug: it kept its address and stopped by its watchdog.
+            self._welcome(charge)
+
+    def _lose(self, charge: Charge) -> None:
+        if charge.standing in (Standing.RUNNING, Standing.ASTRAY, Standing.HELD):
+            self._tell(
+                DeviceLost(self._now(), charge.sub, f"{charge.sub.station} does not answer any more")
+            )
+        charge.standing, charge.failures, charge.sub.state = Standing.LOST, 0, None
+
+    def _is_back(self, charge: Charge) -> None:
+        if charge.standing is Standing.LOST:
+            self._tell(DeviceReturned(self._now(), charge.sub, f"{charge.sub.station} answers again"))
+        charge.standing, charge.failures, charge.sub.state = Standing.RUNNING, 0, State.OP
+
+    def _conclude(self, charge: Charge, task: Task[None]) -> None:
+        """A conversation that should have led a device back has ended."""
+        charge.task = None
+        charge.standing = Standing.ASTRAY
+        if task.error is None:
+            return
+        if not isinstance(task.error, CatenaryError):
+            raise task.error
+        charge.failures += 1
+        if charge.failures >= FAILURES_MAX:
+            self._hold(charge, f"it could not be brought back: {task.error.message}")
+
+    def _hold(self, charge: Charge, reason: str) -> None:
+        charge.standing = Standing.HELD
+        state = int(charge.sub.state) if charge.sub.state is not None else 0
+        message = f"{charge.sub.station} is held: {reason}"
+        self._tell(DeviceHeld(self._now(), charge.sub, message, state, reason))
+
+    def _lead(self, charge: Charge, conversation: Procedure[None]) -> None:
+        charge.standing = Standing.RETURNING
+        charge.task = self._submit(conversation)
+
+    # Coming back
+
+    def _look_for_returned(self) -> Procedure[None]:
+        """Devices without an address, or with one of elsewhere, in places of ours that are free."""
+        present = yield from restore.look_around(len(self._charges) + STRANGERS_MAX)
+        known = [charge.plan.station_address for charge in self._charges]
+        free = vacancies([presence.station_address for presence in present], known)
+        taken: set[int] = set()
+        for rank, places in free.items():
+            lost = [
+                self._charges[place]
+                for place in places
+                if place not in taken and self._charges[place].standing is Standing.LOST
+            ]
+            charge = yield from self._recognise(present[rank], lost)
+            if charge is not None:
+                taken.add(charge.plan.position)
+                self._welcome(charge)
+
+    def _recognise(
+        self, presence: restore.Presence, lost: Sequence[Charge]
+    ) -> Procedure[Charge | None]:
+        """Gives a device the address of the place it belongs to, if it belongs to one."""
+        found: Identity | None = None
+        for charge in lost:
+            if charge.sub.alias and charge.sub.alias != presence.alias:
+                continue
+            station = charge.sub.station
+            try:
+                if found is None:
+                    yield from restore.give_address(presence, station)
+                    found = yield from restore.identify(station)
+                elif found.same_kind(charge.plan.identity):
+                    yield from restore.give_address(presence, station)
+            except CatenaryError:
+                return None  # it is gone again: the next look tells
+            if found.same_kind(charge.plan.identity):
+                if found.serial == charge.plan.identity.serial:
+                    return charge
+                return (yield from self._exchanged(charge, presence, found))
+        yield from restore.forget_address(presence)
+        if lost and found is not None:
+            self._tell_replaced(lost[0], presence, found)
+        return None
+
+    def _exchanged(
+        self, charge: Charge, presence: restore.Presence, found: Identity
+    ) -> Procedure[Charge | None]:
+        """The same product with another serial number."""
+        self._tell_replaced(charge, presence, found)
+        if self._on_replacement == "restore" or charge.released:
+            return charge
+        yield from restore.forget_address(presence)
+        return None
+
+    def _tell_replaced(
+        self, charge: Charge, presence: restore.Presence, found: Identity
+    ) -> None:
+        """Once for each device that stands in a place that is not its own."""
+        if (charge.plan.position, found) in self._strangers:
+            return
+        self._strangers.add((charge.plan.position, found))
+        expected = charge.plan.identity
+        message = f"{charge.sub.station}: another device stands there: {found} instead of {expected}"
+        self._tell(DeviceReplaced(self._now(), charge.sub, message, expected, found))
+
+    def _welcome(self, charge: Charge) -> None:
+        """A device that was lost has its address (again)."""
+        self._tell(DeviceReturned(self._now(), charge.sub, f"{charge.sub.station} answers again"))
+        if self._on_return == "restore" or charge.released:
+            charge.released = False
+            self._lead(charge, self._restored(charge))
+        else:
+            self._lead(charge, self._waiting(charge))
+
+    def _back_to_op(self, charge: Charge) -> Procedure[None]:
+        """It kept its configuration, mostly: its error is acknowledged. Else all from INIT."""
+        if charge.failures == 0:
+            yield from request_state(charge.sub.station, State.OP)
+        else:
+            yield from self._restored(charge)
+
+    def _restored(self, charge: Charge, checked: bool = False) -> Procedure[None]:
+        sub, plan = charge.sub, charge.plan
+        if not checked:
+            yield from restore.bring_to_pre_op(sub.station, sub.channel)
+        sub.state = State.PRE_OP
+        yield from restore.bring_to_safe_op(sub.station, sub.channel, sub.description, plan)
+        sub.state = State.SAFE_OP
+        yield from request_state(sub.station, State.OP)
+
+    def _waiting(self, charge: Charge) -> Procedure[Any]:
+        """To PRE-OP, and no further."""
+        yield from restore.bring_to_pre_op(charge.sub.station, charge.sub.channel)
+        charge.sub.state = State.PRE_OP
+        self._hold(charge, 'on_return="hold"')
