@@ -240,9 +240,7 @@ def slow_second(every: int, phase: int = 0, **options: object) -> Bench:
     plan = make_plan([axis(0), axis(1)], **options)
     units = (plan.sync_units[0], SyncUnit("second", (1,), every=every))
     slow = replace(frame_plan([lrw(1)]), every=every, phase=phase)
-    return Bench(
-        replace(plan, frames=(frame_plan([al_status(2), lrw(0)]), slow), sync_units=units)
-    )
+    return Bench(replace(plan, frames=(frame_plan([al_status(2), lrw(0)]), slow), sync_units=units))
 
 
 def test_a_slow_unit_goes_out_in_its_own_cycles_only() -> None:
@@ -279,9 +277,9 @@ def test_a_silent_slow_unit_counts_its_own_exchanges_in_a_row() -> None:
     assert (b.engine.lost_in_row, b.unit_valid.tolist()) == (0, [1, 1])
 
 
-@pytest.mark.parametrize("every, phase", [(0, 0), (3, 3), (3, -1), (20_000, 0)])
+@pytest.mark.parametrize(("every", "phase"), [(0, 0), (3, 3), (3, -1), (20_000, 0)])
 def test_a_divisor_that_makes_no_sense_is_refused(every: int, phase: int) -> None:
-    with pytest.raises((ValueError, OverflowError), match="every|negative"):
+    with pytest.raises((ValueError, OverflowError), match=r"every|negative"):
         slow_second(every, phase)
 
 

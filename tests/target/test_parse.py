@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from catenary.errors import CatenaryError, ConfigurationError
-from catenary.link import Interface
+from catenary.link import Interface, Ring
 from catenary.target import MainDevice, parse
 from catenary.virtual import Coupler, Segment
 
@@ -44,10 +44,18 @@ def test_what_is_no_target(target: str) -> None:
 
 
 def test_what_this_version_cannot_do_says_so() -> None:
-    with pytest.raises(ConfigurationError, match="ring of two ports"):
-        parse("eth0,eth1")
     with pytest.raises(ConfigurationError, match="IgH"):
         parse("igh:0")
+
+
+def test_a_ring_of_two_interfaces() -> None:
+    assert parse("eth0,eth1") == Ring(Interface("eth0"), Interface("eth1"))
+
+
+@pytest.mark.parametrize("target", ["eth0,eth0", "eth0,eth1,eth2", "eth0,virtual:x.toml"])
+def test_what_is_no_ring(target: str) -> None:
+    with pytest.raises(CatenaryError, match=r"ring|x\.toml"):
+        parse(target)
 
 
 def test_a_main_device_takes_a_name_or_a_source() -> None:

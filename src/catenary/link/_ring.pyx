@@ -5,7 +5,7 @@ second; the other copy passes unprocessed. Where the ring is cut both turn round
 back where they were sent. The receiver sees one frame either way (native/ring_merge.h).
 
 A copy is waited for `pair_wait` after the other has come, and not at all once it has failed to
-come several times in a row. Costs a copy of each frame on its way, and 2 system calls to send.
+come several times in a row and the other has met all devices. Costs a copy of each frame on its way, and 2 system calls to send.
 """
 
 from libc.errno cimport EINTR, EMSGSIZE, errno
@@ -77,6 +77,7 @@ ctypedef struct ring_t:
     uint32_t waiting                  # slots with a copy that is not delivered
     uint32_t arrived_on[2]            # where the last copy of each came back; BOTH: nowhere yet
     uint32_t counted[2]               # devices that answered the last broadcast of each copy
+    uint32_t total                    # devices that answered the last broadcast that was delivered
     uint64_t unpaired                 # frames delivered of one copy, the other being late
     uint64_t alien                    # frames of others, or of earlier times
     uint64_t send_errors[2]
@@ -191,6 +192,11 @@ cdef inline bint is_processed(const uint8_t *frame) noexcept nogil:
     return frame[SOURCE] & PROCESSED != 0
 
 
+cdef inline bint lacks_devices(ring_t *ring, const slot_t *slot, int side) noexcept nogil:
+    """A broadcast that met fewer devices than the last: they may be on the other side now."""
+    return slot.sent[16] == BRD and first_counter(slot.copies[side], slot.length) < ring.total
+
+
 cdef int64_t due_at(ring_t *ring, const slot_t *slot) noexcept nogil:
     """When a frame of which something has come is to be delivered."""
     cdef int missing
@@ -199,7 +205,7 @@ cdef int64_t due_at(ring_t *ring, const slot_t *slot) noexcept nogil:
     missing = SECOND if slot.back == 1 else FIRST
     if not is_processed(slot.copies[1 - missing]) and not is_processed(slot.sent):
         return NEVER                  # it has seen no device: there is nothing in it
-    if ring.missed[missing] >= GIVEN_UP:
+    if ring.missed[missing] >= GIVEN_UP and not lacks_devices(ring, slot, 1 - missing):
         return slot.since
     return slot.since + ring.pair_wait
 
@@ -222,7 +228,7 @@ cdef int ring_receive(void *self, const uint8_t **frame) noexcept nogil:
     cdef ring_t *ring = <ring_t *> self
     cdef slot_t *slot
     cdef int64_t due
-    cdef int place
+    cdef int place, side
     cdef bint whole
     take_in(ring)
     place = next_due(ring, &due)
@@ -237,6 +243,11 @@ cdef int ring_receive(void *self, const uint8_t **frame) noexcept nogil:
         ring.unpaired += 1
         if ring.missed[SECOND if slot.back == 1 else FIRST] < GIVEN_UP:
             ring.missed[SECOND if slot.back == 1 else FIRST] += 1
+    if slot.sent[16] == BRD:
+        ring.total = 0
+        for side in range(2):
+            if slot.back >> side & 1:
+                ring.total += first_counter(slot.copies[side], slot.length)
     if slot.back & 1:
         memcpy(ring.out, slot.copies[FIRST], slot.length)
     else:

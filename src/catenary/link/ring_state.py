@@ -33,9 +33,7 @@ class RingState(NamedTuple):
     ) -> RingState:
         """From, for each copy, the link it came back on last, whether it has stopped coming, and
         the devices it met."""
-        there = [
-            on != NOWHERE and not gone for on, gone in zip(arrived_on, given_up, strict=True)
-        ]
+        there = [on != NOWHERE and not gone for on, gone in zip(arrived_on, given_up, strict=True)]
         met = [count if here else 0 for count, here in zip(counted, there, strict=True)]
         return cls(_shape(arrived_on, there), *met)
 

@@ -82,10 +82,7 @@ class Watch:
         on_replacement: Policy = "hold",
     ) -> None:
         optional = {
-            position
-            for unit in plan.cycle.sync_units
-            if unit.optional
-            for position in unit.devices
+            position for unit in plan.cycle.sync_units if unit.optional for position in unit.devices
         }
         self._charges = [
             Charge(sub, device, device.position not in optional)
@@ -168,14 +165,20 @@ class Watch:
     def _lose(self, charge: Charge) -> None:
         if charge.standing in (Standing.RUNNING, Standing.ASTRAY, Standing.HELD):
             self._tell(
-                DeviceLost(self._now(), charge.sub, f"{charge.sub.station} does not answer any more")
+                DeviceLost(
+                    self._now(), charge.sub, f"{charge.sub.station} does not answer any more"
+                )
             )
         charge.standing, charge.failures, charge.sub.state = Standing.LOST, 0, None
 
     def _is_back(self, charge: Charge) -> None:
         if charge.standing is Standing.LOST:
-            self._tell(DeviceReturned(self._now(), charge.sub, f"{charge.sub.station} answers again"))
+            self._tell_returned(charge)
         charge.standing, charge.failures, charge.sub.state = Standing.RUNNING, 0, State.OP
+
+    def _tell_returned(self, charge: Charge) -> None:
+        message = f"{charge.sub.station} answers again"
+        self._tell(DeviceReturned(self._now(), charge.sub, message))
 
     def _conclude(self, charge: Charge, task: Task[None]) -> None:
         """A conversation that should have led a device back has ended."""
@@ -254,20 +257,18 @@ class Watch:
         yield from restore.forget_address(presence)
         return None
 
-    def _tell_replaced(
-        self, charge: Charge, presence: restore.Presence, found: Identity
-    ) -> None:
+    def _tell_replaced(self, charge: Charge, presence: restore.Presence, found: Identity) -> None:
         """Once for each device that stands in a place that is not its own."""
         if (charge.plan.position, found) in self._strangers:
             return
         self._strangers.add((charge.plan.position, found))
         expected = charge.plan.identity
-        message = f"{charge.sub.station}: another device stands there: {found} instead of {expected}"
+        message = f"{charge.sub.station}: another device is there: {found} instead of {expected}"
         self._tell(DeviceReplaced(self._now(), charge.sub, message, expected, found))
 
     def _welcome(self, charge: Charge) -> None:
         """A device that was lost has its address (again)."""
-        self._tell(DeviceReturned(self._now(), charge.sub, f"{charge.sub.station} answers again"))
+        self._tell_returned(charge)
         if self._on_return == "restore" or charge.released:
             charge.released = False
             self._lead(charge, self._restored(charge))

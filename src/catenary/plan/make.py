@@ -203,8 +203,8 @@ def _device_data(
     if watchdog_ns and watchdog_ns < WATCHDOG_PERIODS * period_ns * every:
         raise ValueError(
             f"{device}: exchanged every {every} cycles of {period_ns * 1e-9} s, less than "
-            f"{WATCHDOG_PERIODS} times within the watchdog of {watchdog_ns * 1e-9:.4f} s: ask for a "
-            "smaller divisor, or a longer watchdog=... of the Loop"
+            f"{WATCHDOG_PERIODS} times within the watchdog of {watchdog_ns * 1e-9:.4f} s: ask for "
+            "a smaller divisor, or a longer watchdog=... of the Loop"
         )
     return DeviceData(device, outputs, inputs, every, optional=not required)
 

@@ -88,9 +88,7 @@ def make_device_plan(
 def renewed(plan: DevicePlan, device: DeviceDescription) -> DevicePlan:
     """The plan for a device that begins again: the mapping is written where what it has now
     (`device`) differs."""
-    mappings = [
-        _difference(device, each, plan.assignments(each)) for each in Direction
-    ]
+    mappings = [_difference(device, each, plan.assignments(each)) for each in Direction]
     written = tuple(step for mapping in mappings for step in mapping_downloads(mapping))
     return replace(
         plan,
@@ -108,10 +106,7 @@ def _difference(
     return Mapping(
         wanted,
         rewritten=tuple(
-            pdo
-            for each in wanted
-            for pdo in each.pdos
-            if entries.get(pdo.index) != _shape(pdo)
+            pdo for each in wanted for pdo in each.pdos if entries.get(pdo.index) != _shape(pdo)
         ),
         reassigned=tuple(
             each.sync_manager

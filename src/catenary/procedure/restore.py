@@ -6,14 +6,13 @@ FMMUs, and what was mapped. IgH's and TwinCAT's way: back to INIT, then everythi
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 from catenary.model.device import DeviceDescription, Identity
 from catenary.plan.start_up import DevicePlan, renewed
 from catenary.procedure.al_state import request_state
 from catenary.procedure.configure import configure_mailbox, configure_process_data
-from catenary.procedure.exchange import Procedure, Request, physical, read, write, write_memory
+from catenary.procedure.exchange import Procedure, Request, read, write, write_memory
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.pdo import read_mapping, verify_mapping, write_downloads
 from catenary.procedure.sii import read_identity
@@ -82,9 +81,7 @@ def identify(station: Station) -> Procedure[Identity]:
     return (yield from read_identity(station))
 
 
-def bring_to_pre_op(
-    station: Station, channel: MailboxChannel | None
-) -> Procedure[None]:
+def bring_to_pre_op(station: Station, channel: MailboxChannel | None) -> Procedure[None]:
     """From whatever state to PRE-OP by way of INIT, with nothing left of before."""
     yield from request_state(station, State.INIT)
     requests = [

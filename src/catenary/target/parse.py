@@ -1,9 +1,9 @@
-"""Names of segments: "eth0", "virtual", "virtual:FILE.toml"."""
+"""Names of segments: "eth0", "eth0,eth1" (a ring), "virtual", "virtual:FILE.toml"."""
 
 from __future__ import annotations
 
 from catenary.errors import ConfigurationError
-from catenary.link import Interface, LinkSource
+from catenary.link import Interface, LinkSource, Ring
 
 VIRTUAL = "virtual"
 IGH = "igh"
@@ -16,10 +16,7 @@ def parse(target: str) -> LinkSource:
     if kind == VIRTUAL and (rest or not colon):
         return _virtual(rest)
     if "," in target:
-        raise ConfigurationError(
-            f"{target!r} names a ring of two ports: this version drives one port",
-            hint="give the first port alone; the segment then runs as a line",
-        )
+        return _ring(target)
     if kind == IGH:
         raise ConfigurationError(
             f"{target!r} names a master of the IgH kernel module, which this version cannot use",
@@ -31,6 +28,21 @@ def parse(target: str) -> LinkSource:
             hint="give a network interface (eth0), virtual, or virtual:FILE.toml",
         )
     return Interface(kind)
+
+
+def _ring(target: str) -> LinkSource:
+    names = target.split(",")
+    if len(names) != 2 or names[0].strip() == names[1].strip():
+        raise ConfigurationError(
+            f"{target!r} is no ring", hint="give two different network interfaces: eth0,eth1"
+        )
+    first, second = (parse(name) for name in names)
+    if not isinstance(first, Interface) or not isinstance(second, Interface):
+        raise ConfigurationError(
+            f"{target!r}: a ring is made of two network interfaces",
+            hint="a virtual ring is made in Python: MainDevice(segment.first, segment.second)",
+        )
+    return Ring(first, second)
 
 
 def _virtual(path: str) -> LinkSource:
