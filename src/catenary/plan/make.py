@@ -173,7 +173,7 @@ def _syncs(
     devices: Sequence[DeviceDescription], asked: dict[int, PdoWish], period_ns: int
 ) -> dict[int, SyncPlan]:
     return {
-        position: make_sync(devices[position], wish, period_ns)
+        position: make_sync(devices[position], wish, period_ns * asked[position].every)
         for position, wish in _clock_wishes(asked).items()
     }
 
