@@ -60,7 +60,7 @@ def answering_late(device: cat.Servo, segment: cat.Segment, delay_ns: int) -> No
     handle = device.handle
 
     def later(events: int) -> None:
-        segment.service.scheduler.after(delay_ns, lambda: handle(events))
+        segment.service.agenda.after(delay_ns, lambda: handle(events))
 
     device.handle = later  # type: ignore[method-assign]
 

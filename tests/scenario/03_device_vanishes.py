@@ -43,7 +43,9 @@ def test_nobody_left_is_the_cable(cell: Cell) -> None:
                 cell.segment.unplug()
             assert cycle.number < 30
     cell.let_pass(0.5)
-    cell.assert_safe()
+    # simple terminals show the state they were told last: their watchdogs took the outputs
+    assert all(servo.state & 0x0F < OP for servo in cell.servos)
+    assert "OPERATION ENABLED" not in cell.drive_states
     cell.segment.plug()
 
 

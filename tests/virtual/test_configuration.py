@@ -66,3 +66,104 @@ def test_errors_name_the_file_and_the_field(tmp_path: Path, text: str, says: str
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError, match="No such file"):
         Segment.from_toml(tmp_path / "none.toml")
+
+
+FAULTS = """
+ring = true
+link_loss_detection = "standard"
+
+[[device]]
+kind = "coupler"
+
+[[device]]
+kind = "junction"
+
+[[device]]
+kind = "servo"
+behind = [1, 3]
+
+[[device]]
+kind = "servo"
+behind = [1, 1]
+
+[[fault]]
+kind = "power_cycle"
+device = 2
+at = 1.5
+for = 0.8
+
+[[fault]]
+kind = "cut"
+between = ["main", 0]
+at = 2.0
+
+[[fault]]
+kind = "refuse_state"
+device = 3
+state = "OP"
+code = 0x001B
+times = 2
+
+[[fault]]
+kind = "swap"
+device = 3
+at = 3.0
+with = {kind = "servo", serial = 7}
+"""
+
+
+def test_faults_and_wiring_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text(FAULTS)
+    segment = Segment.from_toml(path)
+    assert segment.ring
+    assert [event.fault.kind for event in segment.fault_log] == ["refuse_state"]
+    with segment.open_link() as link:
+        link.wait_until(4_000_000_000, False)
+    events = [(event.time, event.fault.kind, event.what) for event in segment.fault_log[1:]]
+    assert events == [
+        (1.5, "power_cycle", "begins"),
+        (2.0, "cut", "begins"),
+        (2.3, "power_cycle", "ends"),
+        (3.0, "swap", "begins"),
+        (3.0, "swap", "ends"),
+    ]
+    assert segment[3].serial == 7
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ('kind = "explode"', "explode"),
+        ('kind = "power_cycle"', "device"),
+        ('kind = "power_cycle"\ndevice = 1', r"fault\[0\].*there is no device 1"),
+        ('kind = "power_cycle"\ndevice = 0\nfor = -1.0', "for must be above 0"),
+        ('kind = "power_cycle"\ndevice = 0\nfor_ = 1.0', "for_"),
+        ('kind = "cut"\nbetween = [0, 2]', "not neighbours"),
+        ('kind = "cut"\nbetween = [0, "you"]', "between"),
+        ('kind = "lose_frames"\nn = "two"', r"fault\[0\].n"),
+        ('kind = "swap"\ndevice = 0\nwith = {kind = "robot"}', "robot"),
+        ('kind = "refuse_state"\ndevice = 0\nstate = "OP"\ncode = 1', "has no application"),
+    ],
+)
+def test_errors_of_faults_name_the_field(tmp_path: Path, text: str, says: str) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text(f'[[device]]\nkind = "coupler"\n\n[[fault]]\n{text}')
+    with pytest.raises(ConfigurationError, match=says) as caught:
+        Segment.from_toml(path)
+    assert "cell.toml" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ('kind = "servo"\nbehind = [0, 3]', "device 0 has no port 3"),
+        ('kind = "servo"\nbehind = [1, 1]', "can hang behind one of 0 to 0"),
+        ('kind = "junction"\nport_count = 5', "port_count"),
+    ],
+)
+def test_errors_of_wiring_name_the_field(tmp_path: Path, text: str, says: str) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text(f'[[device]]\nkind = "coupler"\n\n[[device]]\n{text}')
+    with pytest.raises(ConfigurationError, match=says):
+        Segment.from_toml(path)

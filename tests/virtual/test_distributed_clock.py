@@ -26,7 +26,7 @@ from tests.virtual.clocks import (
 )
 from tests.virtual.main_device import STATION
 
-HOP = 600  # [ns] from one coupler to the next
+HOP, RETURN = 390, 350  # [ns] from one coupler to the next, processed; and back
 
 
 def couplers(*crystals: Crystal) -> Clocks:
@@ -49,7 +49,8 @@ def test_reset_values(pair: Clocks) -> None:
 def test_a_write_latches_the_times_at_the_ports() -> None:
     main = couplers(*[Crystal()] * 3)
     times = main.latch()
-    assert [(port1 - port0) % 2**32 for port0, port1, _ in times[:2]] == [4 * HOP, 2 * HOP]
+    spans = [(port1 - port0) % 2**32 for port0, port1, _ in times[:2]]
+    assert spans == [3 * HOP + RETURN, 2 * HOP]  # the last one processes too, and turns it round
     assert times[2][1] == 0  # nothing behind the last: the register is not touched
     assert all(port0 == unit % 2**32 for port0, _, unit in times)
     again = main.latch()

@@ -26,6 +26,11 @@ def test_any_bytes_after_the_ethernet_header(body: bytes) -> None:
     assert returned is None or len(returned) == len(HEADER) + len(body)
 
 
+def loops_are_set(line: Segment) -> bool:
+    """A MainDevice that closes or opens loops by hand may lose its frames to that."""
+    return any(line.core.peek(k, 0x0101, 1) != b"\0" for k in range(len(line)))
+
+
 DATAGRAM = st.tuples(
     st.integers(0, 16),
     st.integers(0, 0xFFFF_FFFF) | st.integers(0, 0x3200).map(lambda ado: ado << 16),
@@ -47,7 +52,7 @@ def test_any_datagrams_into_any_register_in_any_order(
             body += struct.pack("<BBIHH", command, n, address, len(data) | more, 0) + data + b"\0\0"
         link.send(HEADER + struct.pack("<H", len(body) | 0x1000) + body)
         link.wait_until(link.now() + 2_000_000, True)
-        assert link.receive() is not None
+        assert link.receive() is not None or loops_are_set(line)
     link.wait_until(link.now() + 20_000_000, False)
 
 

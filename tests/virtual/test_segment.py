@@ -29,8 +29,8 @@ def test_a_frame_wakes_at_its_arrival() -> None:
     with demo_segment().open_link() as link:
         link.send(BRD)
         assert link.wait_until(10_000_000, True)
-        # 60 + 24 bytes at 100 Mbit/s, six devices there and back
-        assert link.now() == 84 * 80 + 2 * 6 * 600
+        # 60 + 24 bytes at 100 Mbit/s; six devices there, five back, twelve cables
+        assert link.now() == 84 * 80 + 6 * 340 + 5 * 300 + 12 * 50
         assert link.receive() is not None
         assert not link.wait_until(10_000_000, True)
 
@@ -112,6 +112,6 @@ def test_an_exception_in_the_service_reaches_the_caller() -> None:
         raise RuntimeError("application")
 
     with segment.open_link() as link:
-        segment.service.scheduler.after(1_000, fail)
+        segment.service.agenda.after(1_000, fail)
         with pytest.raises(RuntimeError, match="application"):
             link.wait_until(1_000_000, False)

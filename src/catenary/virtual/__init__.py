@@ -1,5 +1,6 @@
 """A virtual EtherCAT segment at register level: in this process, in virtual time, or on a NIC."""
 
+from catenary.virtual import faults
 from catenary.virtual.crystal import Crystal
 from catenary.virtual.devices import (
     AnalogInputs,
@@ -7,8 +8,11 @@ from catenary.virtual.devices import (
     Device,
     DigitalInputs,
     DigitalOutputs,
+    Junction,
     Servo,
 )
+from catenary.virtual.fault_player import FaultEvent, Loss
+from catenary.virtual.faults import Fault
 from catenary.virtual.segment import FrameCounters, Segment, demo_segment
 from catenary.virtual.server import Server, serve
 
@@ -19,10 +23,15 @@ __all__ = [
     "Device",
     "DigitalInputs",
     "DigitalOutputs",
+    "Fault",
+    "FaultEvent",
     "FrameCounters",
+    "Junction",
+    "Loss",
     "Segment",
     "Server",
     "Servo",
     "demo_segment",
+    "faults",
     "serve",
 ]

@@ -33,10 +33,11 @@ cdef extern from "clock.h":
         int64_t (*now)(void *) noexcept nogil
 
 cdef extern from "packet_loop.h" nogil:
-    int packet_loop(cat_segment *s, int fd, int stop_fd)
+    int packet_loop(cat_segment *s, int fd, int second_fd, int stop_fd)
 
 cdef extern from "segment_memory.h" nogil:
-    int MAX_AXES, MAX_MAPPED, AXIS_SLOTS, MODEL_SERVO, MODEL_SLOTS
+    int MAX_AXES, MAX_MAPPED, AXIS_SLOTS, MODEL_SERVO, MODEL_SLOTS, PORTS, MAX_FRAME_FAULTS
+    int LOSS_LOG
     int64_t NEVER
     ctypedef struct sync_manager:
         uint16_t start, length
@@ -58,6 +59,28 @@ cdef extern from "segment_memory.h" nogil:
         int64_t cycle, minimum, copy_time
         uint16_t limit, missed, exceeded, shift_short
         uint8_t active, seen, error
+    ctypedef struct port:
+        uint8_t exists
+    ctypedef struct cable_end:
+        int device, port
+    ctypedef struct cable:
+        int64_t delay
+        uint8_t plugged, light
+    ctypedef struct loss:
+        int64_t sent
+        int cause, end
+    ctypedef struct frame_fault:
+        int kind, used
+        int64_t left, delay
+        uint32_t every, seen
+        int cable, offset
+    ctypedef struct stop:
+        controller *controller
+    ctypedef struct route:
+        stop *stops
+        uint32_t stop_count
+    ctypedef struct segment_end:
+        uint32_t head, tail
     ctypedef struct servo_axis:
         double inertia, viscous, coulomb, load, rated_torque, velocity_limit
         double counts_per_radian, velocity_per_radian, position_gain, velocity_gain, integral_gain
@@ -69,7 +92,10 @@ cdef extern from "segment_memory.h" nogil:
     ctypedef struct controller:
         uint8_t *memory
         uint32_t memory_size, events
-        uint8_t emulation, al_unread, frozen, outputs_valid, outputs_seen
+        uint8_t emulation, al_unread, frozen, outputs_valid, outputs_seen, powered, mute
+        uint8_t has_dc, no_lrw
+        int fmmu_count
+        port *ports
         uint16_t identification, emergency
         sync_manager *sm
         int sm_count
@@ -82,22 +108,34 @@ cdef extern from "segment_memory.h" nogil:
         servo_axis *axes
     ctypedef struct frame_counters:
         uint64_t frames, malformed, foreign, lost, datagrams
+    ctypedef struct fate:
+        pass
+    const fate NO_FATE
     ctypedef struct cat_segment:
         controller *controllers
-        int count, reachable, pending, event_fd, is_virtual, connected
+        int count, pending, event_fd, is_virtual, ring, cable_count, fault_count
+        cable *cables
+        route *routes
+        segment_end *ends
+        frame_fault *faults
+        loss *losses
+        uint64_t loss_count, random
         const cat_clock *clock
-        int64_t now, next_due, service_due
+        int64_t now, epoch, next_due, service_due, passage
         frame_counters counters
-        uint32_t head, tail
         int (*service)(void *) noexcept
         void *owner
-    cat_segment *segment_make(int count, int is_virtual)
+    cat_segment *segment_make(int count, int is_virtual, int ring, int64_t detection)
     void segment_free(cat_segment *)
     int controller_make(controller *, uint32_t ram, uint32_t sii_words, int slots, int axes)
-    void controller_power_on(controller *, int fmmus, int sms, int clock_bits, int no_lrw)
-    void segment_connect(cat_segment *, int connected, int reachable)
+    void controller_power_on(controller *)
+    void controller_power_off(controller *)
+    void controller_remove(controller *)
+    void controllers_exchange(controller *, controller *)
+    void cable_lay(cat_segment *, int n, cable_end up, cable_end down)
+    void segment_light(cat_segment *, int at_once)
+    void routes_refresh(cat_segment *)
     void segment_advance(cat_segment *, int64_t until)
-    void sii_load(controller *)
     void al_show(controller *, uint16_t status, uint16_t code)
     void sm_configured(controller *, int n)
     uint8_t *sm_registers(controller *, int n)
@@ -115,7 +153,8 @@ cdef extern from "segment_memory.h" nogil:
     void unlock(cat_segment *)
     int64_t monotonic_now()
     int64_t register_number(const controller *, uint32_t address, int size)
-    int frame_through(cat_segment *, uint8_t *frame, uint32_t length)
+    int frame_through(cat_segment *, const route *, const fate *, uint8_t *frame, uint32_t length)
+    int frame_is_ours(const uint8_t *frame, uint32_t length)
     int line_send(void *, const uint8_t *, uint32_t)
     int line_receive(void *, const uint8_t **)
     int64_t line_now(void *)
@@ -123,7 +162,7 @@ cdef extern from "segment_memory.h" nogil:
     int line_spend(void *, int64_t)
     enum:
         REG_AL_CONTROL, REG_RX_ERRORS, REG_LOST_LINKS, SM_PDI_DEACTIVATE, SM_PDI_REPEAT_ACK
-        SM_ACTIVATE_REPEAT, ETHERNET_HEADER
+        SM_ACTIVATE_REPEAT, ETHERNET_HEADER, LOSS_NO_LIGHT
 
 cdef extern from "segment_memory.h":
     cpdef enum:
@@ -163,10 +202,10 @@ cdef class Core:
     cdef readonly object failure
     cdef readonly int count
 
-    def __cinit__(self, int count, bint is_virtual):
+    def __cinit__(self, int count, bint is_virtual, *, bint ring=False, int64_t detection_ns=0):
         if not 0 <= count <= 65535:
             raise ValueError(f"a segment has 0 to 65535 devices, not {count}")
-        self._segment = segment_make(count, is_virtual)
+        self._segment = segment_make(count, is_virtual, ring, detection_ns)
         if self._segment == NULL:
             raise MemoryError("no memory for the segment")
         self.count = count
@@ -190,38 +229,174 @@ cdef class Core:
     # -- making ---------------------------------------------------------------------------------
 
     def make_controller(self, int position, *, int ram, bytes sii, int slots, int axes, int fmmus,
-                        int sync_managers, int clock_bits, bint lrw, int identification):
+                        int sync_managers, int clock_bits, bint lrw, int identification, ports):
+        """Has no power yet. `ports`: the numbers of those it has."""
         cdef controller *c = self._at(position)
+        cdef int made
         if c.memory != NULL:
             raise ValueError(f"the controller at position {position} is made already")
         if not (0 < ram <= 61440 and 0 <= axes <= 8 and 0 <= slots <= 65535 and len(sii) % 2 == 0
-                and clock_bits in (0, 32, 64) and 0 < fmmus <= 8 and 0 < sync_managers <= 8 and slots >= axes * AXIS_SLOTS):
+                and clock_bits in (0, 32, 64) and 0 < fmmus <= 8 and 0 < sync_managers <= 8
+                and slots >= axes * AXIS_SLOTS and all(0 <= p < PORTS for p in ports)):
             raise ValueError(f"impossible controller at position {position}")
-        if not controller_make(c, ram, len(sii) // 2, slots, axes):
+        lock(self._segment)
+        made = controller_make(c, ram, len(sii) // 2, slots, axes)
+        unlock(self._segment)
+        if not made:
             raise MemoryError(f"no memory for the controller at position {position}")
-        controller_power_on(c, fmmus, sync_managers, clock_bits, not lrw)
+        for p in range(PORTS):
+            c.ports[<int>p].exists = p in ports
+        c.fmmu_count, c.sm_count, c.has_dc, c.no_lrw = fmmus, sync_managers, clock_bits, not lrw
         c.identification = identification
         memcpy(c.sii.image, <const char *>sii, len(sii))
-        sii_load(c)
 
-    def start(self):
-        """All controllers are made: links up."""
-        cdef int k
-        for k in range(self.count):
-            if self._segment.controllers[k].memory == NULL:
-                raise ValueError(f"no controller at position {k}")
-        segment_connect(self._segment, True, self.count)
-
-    def connect(self, bint connected, int reachable):
+    def remove_controller(self, int position):
+        """The device is taken out; its place and cables stay."""
+        cdef controller *c = self._at(position)
         lock(self._segment)
-        segment_connect(self._segment, connected, reachable)
+        controller_remove(c)
+        segment_light(self._segment, False)
         unlock(self._segment)
+
+    def exchange_controllers(self, int one, int other):
+        """Two devices change places, with all they remember; neither has power."""
+        cdef controller *a = self._at(one)
+        cdef controller *b = self._at(other)
+        lock(self._segment)
+        if a != b and not a.powered and not b.powered:
+            controllers_exchange(a, b)
+        unlock(self._segment)
+
+    def switch_power(self, int position, bint on):
+        """Off: all but EEPROM, crystal and shafts is lost, and the neighbours' light with it."""
+        cdef controller *c = self._at(position)
+        if c.memory == NULL:
+            raise ValueError(f"no controller at position {position}")
+        lock(self._segment)
+        if on:
+            controller_power_on(c)
+        else:
+            controller_power_off(c)
+        segment_light(self._segment, False)
+        unlock(self._segment)
+
+    def powered(self, int position):
+        return bool(self._at(position).powered)
+
+    def ports(self, int position):
+        """The numbers of the ports the device has."""
+        cdef controller *c = self._at(position)
+        return tuple([p for p in range(PORTS) if c.ports[<int>p].exists])
+
+    # -- cables ---------------------------------------------------------------------------------
+
+    def lay_cable(self, int n, tuple up, tuple down):
+        """Cable n between two (device, port); device -1 and -2: the MainDevice's interfaces."""
+        cdef cable_end above, below
+        above.device, above.port = up
+        below.device, below.port = down
+        for end in (above, below):
+            if not (0 <= n < self._segment.cable_count and -2 <= end.device < self.count
+                    and 0 <= end.port < PORTS):
+                raise ValueError(f"impossible cable {n}")
+        lock(self._segment)
+        cable_lay(self._segment, n, above, below)
+        unlock(self._segment)
+
+    cdef cable *_cable(self, int n) except NULL:
+        if not 0 <= n < self._segment.cable_count:
+            raise IndexError(f"no cable {n}")
+        return &self._segment.cables[n]
+
+    def plug_cable(self, int n, bint plugged, bint at_once=False):
+        """`at_once`: the controllers see it without their time of detection."""
+        cdef cable *k = self._cable(n)
+        lock(self._segment)
+        if not self._segment.is_virtual:
+            segment_advance(self._segment, monotonic_now())
+        k.plugged = plugged
+        segment_light(self._segment, at_once)
+        unlock(self._segment)
+
+    def cable_light(self, int n):
+        return bool(self._cable(n).light)
+
+    def delay_cable(self, int n, int64_t delay_ns):
+        """One way."""
+        lock(self._segment)
+        self._cable(n).delay = delay_ns
+        segment_light(self._segment, False)
+        unlock(self._segment)
+
+    def processed(self, int end):
+        """The positions of the devices that process a frame from an interface, in order."""
+        cdef uint32_t k
+        cdef route *r = &self._segment.routes[end]
+        lock(self._segment)
+        routes_refresh(self._segment)
+        positions = [r.stops[k].controller - self._segment.controllers
+                     for k in range(r.stop_count)]
+        unlock(self._segment)
+        return positions
+
+    # -- faults that hit frames -----------------------------------------------------------------
+
+    def add_frame_fault(self, int kind, *, int64_t frames, uint32_t every, int64_t delay_ns,
+                        int cable, int offset):
+        """Its number; `frames` -1: no end. The order of kinds is frame_faults.h's."""
+        cdef int n
+        cdef frame_fault *f
+        for n in range(MAX_FRAME_FAULTS):
+            f = &self._segment.faults[n]
+            if f.used:
+                continue
+            lock(self._segment)
+            f.kind, f.left, f.every, f.delay = kind, frames, every, delay_ns
+            f.cable, f.offset, f.seen, f.used = cable, offset, 0, 1
+            self._segment.fault_count += 1
+            unlock(self._segment)
+            return n
+        raise ValueError(f"at most {MAX_FRAME_FAULTS} faults can hit frames at a time")
+
+    def frame_fault_left(self, int n):
+        return self._segment.faults[n].left if self._segment.faults[n].used else 0
+
+    def remove_frame_fault(self, int n):
+        lock(self._segment)
+        if self._segment.faults[n].used:
+            self._segment.faults[n].used = 0
+            self._segment.fault_count -= 1
+        unlock(self._segment)
+
+    def losses(self, uint64_t since):
+        """[(sent [ns], cause, interface)] of the frames lost from number `since` on, as far as the
+        log of LOSS_LOG goes back; and how many there were in all."""
+        cdef uint64_t k
+        cdef loss *x
+        lock(self._segment)
+        total = self._segment.loss_count
+        first = max(since, total - min(total, <uint64_t>LOSS_LOG))
+        found = []
+        for k in range(first, total):
+            x = &self._segment.losses[k % <uint64_t>LOSS_LOG]
+            found.append((x.sent, x.cause, x.end))
+        unlock(self._segment)
+        return found, total
+
+    def mute(self, int position, bint muted):
+        """Logical datagrams pass the device by: they are neither answered nor counted."""
+        self._at(position).mute = muted
 
     # -- time and service -----------------------------------------------------------------------
 
     @property
     def now(self) -> int:
-        return line_now(self._segment)
+        return line_now(&self._segment.ends[0])
+
+    @property
+    def epoch(self) -> int:
+        """From here faults count their time [ns]; -1: real time, and no frame came yet."""
+        return self._segment.epoch
 
     @property
     def is_virtual(self) -> bool:
@@ -238,7 +413,7 @@ cdef class Core:
             raise ValueError("the clock is not virtual, or of another version")
         self._clock = clock, capsule       # own the table
         self._segment.clock = table
-        self._segment.now = table.now(table.self)
+        self._segment.now = self._segment.epoch = table.now(table.self)
 
     def use_service(self, service):
         """`service()` runs the application side and returns when it is due again [ns]."""
@@ -570,21 +745,27 @@ cdef class Core:
     def pass_frame(self, bytes frame):
         """One frame through the line at once, as it comes back; None: it does not."""
         cdef uint8_t buffer[2048]
-        cdef int back
+        cdef int exit = -LOSS_NO_LIGHT
         cdef int size = len(frame)
         if size > <int>CAT_FRAME_MAX:
             raise ValueError(f"a frame has at most {CAT_FRAME_MAX} bytes")
         memcpy(buffer, <const char *>frame, size)
         lock(self._segment)
-        back = frame_through(self._segment, buffer, size)
+        routes_refresh(self._segment)
+        self._segment.passage = self._segment.now
+        if frame_is_ours(buffer, size):
+            exit = frame_through(self._segment, &self._segment.routes[0], &NO_FATE, buffer, size)
+        else:
+            self._segment.counters.foreign += 1
         unlock(self._segment)
-        return PyBytes_FromStringAndSize(<char *>buffer, size) if back else None
+        return PyBytes_FromStringAndSize(<char *>buffer, size) if exit >= 0 else None
 
-    def answer_packets(self, int fd, int stop_fd):
-        """The packet loop on an AF_PACKET socket, until `stop_fd` can be read. 0 or -errno."""
+    def answer_packets(self, int fd, int second_fd, int stop_fd):
+        """The packet loop on AF_PACKET sockets, until `stop_fd` can be read; `second_fd` -1: no
+        ring. 0 or -errno."""
         cdef int result
         with nogil:
-            result = packet_loop(self._segment, fd, stop_fd)
+            result = packet_loop(self._segment, fd, second_fd, stop_fd)
         return result
 
 
@@ -593,13 +774,17 @@ cdef class SegmentLink:
 
     cdef cat_link _table
     cdef Core _core
+    cdef segment_end *_end
     cdef object _ended
     cdef readonly object capsule
     cdef readonly str name
     cdef bint _open
 
-    def __init__(self, Core core, str name, ended):
+    def __init__(self, Core core, str name, ended, *, bint second=False):
+        if second and not core._segment.ring:
+            raise ValueError("only a ring has a second link")
         self._core = core
+        self._end = &core._segment.ends[1 if second else 0]
         self._ended = ended
         self._open = True
         self.name = name
@@ -608,7 +793,7 @@ cdef class SegmentLink:
         if core._segment.clock != NULL:
             self._table.flags |= CAT_LINK_SHARED_TIME | CAT_LINK_SPENDS
             self._table.spend = line_spend
-        self._table.self = <void *>core._segment
+        self._table.self = <void *>self._end
         self._table.send = line_send
         self._table.receive = line_receive
         self._table.now = line_now
@@ -626,21 +811,21 @@ cdef class SegmentLink:
         cdef uint32_t size = len(frame)
         cdef int result
         with nogil:
-            result = line_send(self._core._segment, data, size)
+            result = line_send(self._end, data, size)
         self._check(result)
 
     def receive(self):
         cdef const uint8_t *data = NULL
-        cdef int size = line_receive(self._core._segment, &data)
+        cdef int size = line_receive(self._end, &data)
         return PyBytes_FromStringAndSize(<const char *>data, size) if self._check(size) else None
 
     def now(self):
-        return line_now(self._core._segment)
+        return line_now(self._end)
 
     def wait_until(self, int64_t deadline_ns, bint wake_on_frame):
         cdef int result
         with nogil:
-            result = line_wait_until(self._core._segment, deadline_ns, wake_on_frame)
+            result = line_wait_until(self._end, deadline_ns, wake_on_frame)
         if result == -EINTR:
             return False                   # a signal came first: Python handles it on return
         return bool(self._check(result))
@@ -648,7 +833,7 @@ cdef class SegmentLink:
     def close(self):
         if self._open:
             self._open = False
-            self._core._segment.head = self._core._segment.tail
+            self._end.head = self._end.tail
             self._ended()
 
     def __enter__(self):

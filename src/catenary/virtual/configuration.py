@@ -1,4 +1,6 @@
-"""A segment as a TOML file: `[[device]]` tables in the order of the line.
+"""A segment as a TOML file: `[[device]]` tables in the order of the line, `[[fault]]` tables.
+
+ring = true
 
 [[device]]
 kind = "servo"
@@ -6,11 +8,18 @@ name = "shoulder"
 alias = 10
 counts_per_turn = 1048576
 crystal = { ppm = 40.0, jitter = 20e-9 }
+
+[[fault]]
+kind = "power_cycle"
+device = 2
+at = 1.5
+for = 0.8
 """
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any, Literal
 
 import msgspec
 
@@ -21,7 +30,11 @@ from catenary.virtual.devices.coupler import Coupler
 from catenary.virtual.devices.device import Device
 from catenary.virtual.devices.digital_inputs import DigitalInputs
 from catenary.virtual.devices.digital_outputs import DigitalOutputs
+from catenary.virtual.devices.junction import Junction
 from catenary.virtual.devices.servo import Servo
+from catenary.virtual.faults import Fault
+from catenary.virtual.segment import ClockKind, Segment
+from catenary.virtual.wiring import Place
 
 
 class CrystalTable(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
@@ -45,6 +58,7 @@ class _Table(
     name: str = ""
     alias: int = 0
     serial: int = 0
+    behind: tuple[int, int] | None = None
 
 
 class _ClockedTable(_Table, frozen=True, kw_only=True):
@@ -60,6 +74,15 @@ class CouplerTable(_ClockedTable, tag="coupler", frozen=True, kw_only=True):
             serial=self.serial,
             crystal=self.crystal.crystal(),
             clock_bits=self.clock_bits,
+        )
+
+
+class JunctionTable(_Table, tag="junction", frozen=True, kw_only=True):
+    port_count: int = 4
+
+    def device(self) -> Device:
+        return Junction(
+            name=self.name, alias=self.alias, serial=self.serial, port_count=self.port_count
         )
 
 
@@ -146,35 +169,75 @@ class ServoTable(_ClockedTable, tag="servo", frozen=True, kw_only=True):
 
 
 DeviceTable = (
-    CouplerTable | DigitalOutputsTable | DigitalInputsTable | AnalogInputsTable | ServoTable
+    CouplerTable
+    | JunctionTable
+    | DigitalOutputsTable
+    | DigitalInputsTable
+    | AnalogInputsTable
+    | ServoTable
 )
 
 
 class SegmentFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     device: tuple[DeviceTable, ...]
+    fault: tuple[Fault, ...] = ()
+    ring: bool = False
+    link_loss_detection: float | Literal["enhanced", "standard"] = "enhanced"
+
+
+HINT = "docs/virtual.md lists the fields of devices, docs/faults.md those of faults"
 
 
 def _made(table: DeviceTable, position: int, path: str | Path) -> Device:
     try:
         return table.device()
     except ValueError as error:
-        raise ConfigurationError(
-            f"{path}: device[{position}]: {error}", hint="docs/virtual.md lists the fields"
-        ) from error
+        raise ConfigurationError(f"{path}: device[{position}]: {error}", hint=HINT) from error
 
 
-def read_devices(path: str | Path) -> list[Device]:
-    """The devices of a file. ConfigurationError names the file and the field."""
+def _device_in_fault(kind: type, given: Any) -> Any:
+    """`with = {kind = "servo", ...}` of a fault."""
+    if kind is not Device:
+        raise NotImplementedError
+    return msgspec.convert(given, DeviceTable).device()
+
+
+def _read(path: str | Path) -> SegmentFile:
     try:
         content = Path(path).read_bytes()
     except OSError as error:
         raise ConfigurationError(f"{path}: {error.strerror}") from error
     try:
-        file = msgspec.toml.decode(content, type=SegmentFile)
+        file = msgspec.toml.decode(content, type=SegmentFile, dec_hook=_device_in_fault)
     except (msgspec.MsgspecError, UnicodeDecodeError) as error:
-        raise ConfigurationError(
-            f"{path}: {error}", hint="docs/virtual.md lists the fields"
-        ) from error
+        raise ConfigurationError(f"{path}: {error}", hint=HINT) from error
     if not file.device:
         raise ConfigurationError(f"{path}: a segment needs at least one [[device]]")
-    return [_made(table, position, path) for position, table in enumerate(file.device)]
+    return file
+
+
+def read_segment(path: str | Path, *, clock: ClockKind = "virtual") -> Segment:
+    """The segment of a file, with its faults. ConfigurationError names the file and the field."""
+    file = _read(path)
+    devices = [_made(table, position, path) for position, table in enumerate(file.device)]
+    behind: dict[int, Place] = {
+        position: table.behind
+        for position, table in enumerate(file.device)
+        if table.behind is not None
+    }
+    try:
+        segment = Segment(
+            devices,
+            clock=clock,
+            behind=behind,
+            ring=file.ring,
+            link_loss_detection=file.link_loss_detection,
+        )
+    except ValueError as error:
+        raise ConfigurationError(f"{path}: {error}", hint=HINT) from error
+    for number, fault in enumerate(file.fault):
+        try:
+            segment.inject(fault)
+        except ValueError as error:
+            raise ConfigurationError(f"{path}: fault[{number}]: {error}", hint=HINT) from error
+    return segment

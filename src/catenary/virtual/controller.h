@@ -22,6 +22,7 @@
 #define MAX_FMMU 8
 #define MAX_AXES 8
 #define MAX_MAPPED 256
+#define PORTS 4
 #define NEVER INT64_MAX
 
 /* events for the application, kept until it fetches them */
@@ -69,13 +70,21 @@ typedef struct {
     int loaded;                      /* the first load after power-on has taken the alias */
 } sii_access;
 
+/* One of a controller's four ports; its loop's mode is in DL control. */
+typedef struct {
+    int32_t cable;                   /* which hangs here, -1: none */
+    uint8_t exists;                  /* the controller has this port */
+    uint8_t link;                    /* as the controller sees it */
+    uint8_t closed;                  /* its loop */
+    int64_t loss_due;                /* the light went out; when that will have been seen */
+} port;
+
 typedef struct {
     crystal crystal;
     int64_t anchor, local;           /* at segment time `anchor` the local time was `local` [ns] */
     double fraction;                 /* and this part of a nanosecond */
     double correction;               /* of the rate, by the time control loop */
     double mean, speed;              /* its filters: difference [ns], speed counter difference */
-    uint32_t hop;                    /* cable and forwarding, one way, to the next device [ns] */
 } dc_clock;
 
 typedef struct {
@@ -128,7 +137,11 @@ typedef struct controller {
     uint8_t outputs_valid;           /* the application takes the outputs: OP and fed */
     uint8_t outputs_seen, outputs_taken;            /* EVENT_OUTPUTS was raised since the last arming */
     uint8_t inputs_stale;            /* the model stepped; its inputs are not in memory yet */
-    uint8_t linked;                  /* the segment's line reaches this device */
+    uint8_t powered;
+    uint8_t mute;                    /* injected: logical datagrams pass it by */
+    port ports[PORTS];
+    uint8_t loops_before;            /* 0x0101 under temporary use: what comes back at loops_due */
+    int64_t loops_due;
     uint16_t identification;         /* explicit device ID, 0: none */
     sync_manager sm[MAX_SM];
     int sm_count, sm_top;
@@ -155,13 +168,73 @@ typedef struct controller {
     uint16_t emergency;              /* last new error code for the application */
 } controller;
 
+#define QUEUE_SIZE 256u               /* a power of two */
+#define LOSS_LOG 4096u                /* a power of two */
+#define MAX_FRAME_FAULTS 32
+
+/* Where a cable ends: a device's position, or one of the MainDevice's network interfaces. */
+enum { END_FIRST = -1, END_SECOND = -2 };
+
 typedef struct {
-    int64_t arrival;
+    int32_t device;                  /* or END_FIRST, END_SECOND */
+    int32_t port;
+} cable_end;
+
+typedef struct {
+    cable_end up, down;              /* `down` is farther from the MainDevice's first interface */
+    int64_t delay;                   /* one way [ns] */
+    uint8_t plugged, light;          /* light: both sides have power too */
+} cable;
+
+/* Why a frame did not come back. */
+enum loss_cause { LOSS_NO_LIGHT = 1, LOSS_CLOSED_PORT, LOSS_CIRCULATING, LOSS_IN_FLIGHT, LOSS_INJECTED, LOSS_CORRUPT };
+
+typedef struct {
+    int64_t sent;
+    int cause, end;
+} loss;
+
+/* The way of a frame from one interface, as the loops stand now (route.h makes it). */
+typedef struct { struct controller *controller; int64_t offset; } stop;
+typedef struct { int32_t device, port, cable; uint32_t stops; int64_t offset; } arrival;
+
+typedef struct {
+    stop *stops;                     /* where it is processed, in order */
+    arrival *arrivals;               /* where it comes in, the interface at the end included */
+    int64_t *times;                  /* 4 a device: when it comes in there, NEVER: it does not */
+    uint32_t stop_count, arrival_count;
+    uint32_t circulates;             /* stop behind an automatically closed port 0, counted from 1 */
+    int64_t delay;
+    int exit;                        /* 0, 1: the interface it leaves at; -cause */
+    int32_t opens;                   /* device and port an auto-closed loop opens at, 4·n + port; -1 */
+} route;
+
+/* Faults that hit frames: which, and what becomes of them (frame_faults.h). */
+typedef struct {
+    int kind, used;
+    int64_t left;                    /* frames still to be hit, -1: no end */
+    uint32_t every, seen;
+    int64_t delay;
+    int32_t cable, offset;           /* corrupt; garble, -1: anywhere */
+} frame_fault;
+
+typedef struct {
+    int64_t sent, arrival;
     uint32_t length;
+    int from;                        /* the interface it came in at */
     uint8_t bytes[CAT_FRAME_MAX + 2];
 } queued_frame;
 
-#define QUEUE_SIZE 256u               /* a power of two */
+/* One network interface of the MainDevice on the segment: frames on their way to it. */
+typedef struct {
+    struct cat_segment *segment;
+    queued_frame *queue;
+    uint16_t order[QUEUE_SIZE];      /* of the queue's places, by arrival */
+    uint32_t head, tail;             /* take at head, put at tail */
+    int64_t busy_until;              /* the wire towards the segment is occupied */
+    int number;
+    uint8_t taken[CAT_FRAME_MAX + 2];
+} segment_end;
 
 typedef struct {
     uint64_t frames, malformed, foreign, lost, datagrams;
@@ -170,13 +243,18 @@ typedef struct {
 typedef struct cat_segment {
     pthread_mutex_t mutex;
     controller *controllers;
-    int count, reachable;
-    uint16_t *stations;              /* contiguous, for the search of FPxx */
+    int count;
+    cable *cables;                   /* cable n leads up from device n; the last one closes the ring */
+    int cable_count, ring;
+    route routes[2];
+    const route *route;              /* of the frame in work */
+    int routes_stale;
+    int64_t detection;               /* from light out to loop closed [ns] */
+    int64_t link_due;                /* of the next loss of a link */
     uint8_t write_mask[REG_END];
-    int64_t now, power_on;
-    int64_t passage;                 /* when the frame in work reaches the first device */
-    int64_t frame_end;               /* and when its last byte does */
-    int64_t busy_until;              /* the wire towards the segment is occupied */
+    int64_t now, epoch;              /* epoch: faults count their time from here, -1: not yet */
+    int64_t passage;                 /* when the frame in work starts */
+    int64_t frame_end;               /* and when its last byte has */
     int64_t next_due;                /* of compiled work */
     int64_t sii_due;                 /* of the earliest EEPROM access, for the packet loop */
     int64_t service_due;             /* of the application, Python */
@@ -186,12 +264,14 @@ typedef struct cat_segment {
     int event_fd;                    /* wakes the service thread, -1: none */
     const cat_clock *clock;          /* virtual time is shared: whose; NULL: it is ours alone */
     int is_virtual;
-    int connected;                   /* the cable between MainDevice and first device */
     uint8_t scratch[2048], incoming[2048];
     frame_counters counters;
-    queued_frame *queue;
-    uint32_t head, tail;             /* take at head, put at tail */
-    uint8_t taken[CAT_FRAME_MAX + 2];
+    frame_fault faults[MAX_FRAME_FAULTS];
+    int fault_count;                 /* in use */
+    uint64_t random;
+    loss losses[LOSS_LOG];
+    uint64_t loss_count;
+    segment_end ends[2];
     int (*service)(void *owner);      /* virtual time: the application side, takes the GIL; 0 or -errno */
     void *owner;
 } cat_segment;

@@ -8,6 +8,7 @@
 #include "al_state.h"
 #include "controller.h"
 #include "fmmu.h"
+#include "frame_faults.h"
 #include "process_data.h"
 #include "sii_access.h"
 #include "sync_manager.h"
@@ -20,7 +21,7 @@ enum {
     ETHERNET_HEADER = 14,
     ETHERCAT_HEADER = 2,
     DATAGRAM_HEADER = 10,
-    FORWARDING_NS = 300               /* one way through a controller, MII to MII */
+    CIRCULATING = 0x40                /* of a datagram's second length byte */
 };
 
 static void fill_mask(uint8_t *mask, uint32_t address, uint32_t size, uint8_t bits) {
@@ -114,8 +115,6 @@ static void clear_error_counters(controller *c, uint32_t first, uint32_t end) {
 /* What a write of registers [first, end) sets going. */
 static void registers_written(controller *c, uint32_t first, uint32_t end, const uint8_t *data,
                               const uint8_t *activate_before, int64_t passage) {
-    if (first < REG_STATION + 2 && end > REG_STATION)
-        c->segment->stations[c->position] = load16(c->memory + REG_STATION);
     if (touches(first, end, REG_AL_CONTROL, 1))
         al_control_written(c);
     if (touches(first, end, REG_RX_ERRORS, REG_LOST_LINKS + 4 - REG_RX_ERRORS)
@@ -134,11 +133,8 @@ static void registers_written(controller *c, uint32_t first, uint32_t end, const
     if (!c->has_dc || first >= REG_LATCH_CONTROL || end <= REG_DC_RECEIVE)
         return;
     if (touches(first, end, REG_DC_RECEIVE, 1)) {
-        int behind = c->segment->reachable - 1 - c->position;
-        int64_t there = 0;
-        for (int k = c->position; k < c->segment->reachable - 1; k++)
-            there += c->segment->controllers[k].clock.hop;
-        dc_latch(c, passage, passage + 2 * there, behind > 0);
+        const cat_segment *s = c->segment;
+        dc_latch(c, s->passage, s->route->times + PORTS * c->position, passage);
     }
     clock_registers_written(c, first, end, data, passage);
 }
@@ -146,7 +142,7 @@ static void registers_written(controller *c, uint32_t first, uint32_t end, const
 /* The SII command bits show what was commanded only after the write was judged: the control word
  * keeps its status bits through the mask. */
 static int register_write(controller *c, uint32_t address, uint32_t size, const uint8_t *data, int64_t passage) {
-    uint8_t activate[MAX_SM];
+    uint8_t activate[MAX_SM], loops = c->memory[REG_DL_CONTROL + 1];
     int done = 0;
     for (int n = 0; n < MAX_SM; n++)
         activate[n] = sm_registers(c, n)[6];
@@ -161,9 +157,12 @@ static int register_write(controller *c, uint32_t address, uint32_t size, const 
         changed_first = min32(changed_first, a);
         changed_end = a + 1;
     }
-    if (done)
-        registers_written(c, changed_first, changed_end, data + (changed_first - address), activate, passage);
-    return done;
+    if (!done)
+        return 0;
+    if (touches(changed_first, changed_end, REG_DL_CONTROL + 1, 1))
+        loop_control_written(c, loops);
+    registers_written(c, changed_first, changed_end, data + (changed_first - address), activate, passage);
+    return 1;
 }
 
 static void register_read(controller *c, uint32_t address, uint32_t size, uint8_t *data, int64_t passage) {
@@ -250,7 +249,7 @@ static int datagram_at(controller *c, uint8_t *header, uint32_t size, uint8_t *d
     uint16_t adp = load16(header + 2);
     uint32_t ado = load16(header + 4);
     if (command == LRD || command == LWR || command == LRW)
-        return fmmu_datagram(c, load32(header + 2), size, data, command != LWR, command != LRD);
+        return c->mute ? 0 : fmmu_datagram(c, load32(header + 2), size, data, command != LWR, command != LRD);
     if (command == FPRD || command == FPWR || command == FPRW)
         return station_matches(c, adp) ? physical_command(c, command - FPRD + APRD, ado, size, data, passage) : 0;
     if (command == FRMW)
@@ -264,41 +263,43 @@ static int datagram_at(controller *c, uint8_t *header, uint32_t size, uint8_t *d
     return adp == 0 ? physical_command(c, command, ado, size, data, passage) : 0;
 }
 
-/* One datagram through the line. */
-static void datagram_through(cat_segment *s, uint8_t *header, uint32_t size) {
+/* One datagram through the first `stops` processing units of a route. */
+static void datagram_through(cat_segment *s, const route *r, uint32_t stops, uint8_t *header, uint32_t size) {
     uint8_t *data = header + DATAGRAM_HEADER;
     uint16_t counter = load16(data + size), interrupts = load16(header + 8);
-    int64_t passage = s->passage;
     int command = header[0];
     if (command == NOP || command > FRMW)
         return;
-    for (int n = 0; n < s->reachable; n++) {
-        controller *c = &s->controllers[n];
-        c->passage = passage;
-        counter = (uint16_t)(counter + datagram_at(c, header, size, data, passage));
+    for (const stop *at = r->stops, *end = r->stops + stops; at < end; at++) {
+        controller *c = at->controller;
+        c->passage = s->passage + at->offset;
+        counter = (uint16_t)(counter + datagram_at(c, header, size, data, c->passage));
         interrupts |= load16(c->memory + REG_ECAT_EVENT) & load16(c->memory + REG_ECAT_EVENT_MASK);
-        passage += c->clock.hop;
     }
     store16(header + 8, interrupts);
     store16(data + size, counter);
 }
 
-/* A whole Ethernet frame, in place. 1: it is an EtherCAT frame of ours, 0: foreign. */
-static int frame_through(cat_segment *s, uint8_t *frame, uint32_t length) {
-    if (length < ETHERNET_HEADER + ETHERCAT_HEADER || frame[12] != 0x88 || frame[13] != 0xA4) {
-        s->counters.foreign++;
-        return 0;
-    }
-    s->counters.frames++;
-    inputs_flush(s);
+/* Which datagrams there are: a frame whose lengths do not fit is an error of every processing unit. */
+static void frame_malformed(cat_segment *s, const route *r, uint32_t stops) {
+    s->counters.malformed++;
+    for (uint32_t k = 0; k < stops; k++)
+        count_up(r->stops[k].controller->memory + REG_PROCESSING_UNIT_ERRORS);
+}
+
+/* A whole Ethernet frame, in place, through the first `stops` processing units of a route.
+ * `mark`: a closed port 0 on its way marks its datagrams as circulating. */
+static void frame_process(cat_segment *s, const route *r, uint32_t stops, int mark, uint8_t *frame, uint32_t length) {
     uint16_t head = load16(frame + ETHERNET_HEADER);
     uint32_t at = ETHERNET_HEADER + ETHERCAT_HEADER;
     uint32_t end = at + (head & 0x07FF);
-    if (s->reachable > 0)
+    s->route = r;
+    inputs_flush(s);
+    if (stops > 0)
         frame[6] |= 0x02;             /* controllers mark what they processed as locally administered */
     if (head >> 12 != 1 || end > length) {
-        s->counters.malformed++;
-        return 1;
+        frame_malformed(s, r, stops);
+        return;
     }
     while (at + DATAGRAM_HEADER + 2 <= end) {
         uint8_t *header = frame + at;
@@ -306,14 +307,54 @@ static int frame_through(cat_segment *s, uint8_t *frame, uint32_t length) {
         uint32_t size = field & 0x07FF;
         if (at + DATAGRAM_HEADER + size + 2 > end)
             break;
-        datagram_through(s, header, size);
+        datagram_through(s, r, stops, header, size);
+        if (mark)
+            header[7] |= CIRCULATING;
         s->counters.datagrams++;
         at += DATAGRAM_HEADER + size + 2;
         if (!(field & 0x8000))
-            return 1;
+            return;
     }
-    s->counters.malformed++;
-    return 1;
+    frame_malformed(s, r, stops);
+}
+
+static inline int frame_is_ours(const uint8_t *frame, uint32_t length) {
+    return length >= ETHERNET_HEADER + ETHERCAT_HEADER && frame[12] == 0x88 && frame[13] == 0xA4;
+}
+
+static inline int frame_is_marked(const uint8_t *frame, uint32_t length) {
+    uint32_t at = ETHERNET_HEADER + ETHERCAT_HEADER + 7;
+    return length > at && (frame[at] & CIRCULATING);
+}
+
+/* A frame that came in at an interface, worked through all it reaches. The interface it leaves at,
+ * or -cause: it is lost. */
+static int frame_through(cat_segment *s, const route *r, const fate *fate, uint8_t *frame, uint32_t length) {
+    uint32_t stops = r->stop_count;
+    int exit = r->exit, mark = r->circulates > 0;
+    s->counters.frames++;
+    if (s->epoch < 0) {
+        s->epoch = s->now;
+        s->pending = 1;
+        wake_service(s);
+    }
+    if (fate->lose_out)
+        return -LOSS_INJECTED;
+    if (mark && frame_is_marked(frame, length)) {
+        stops = r->circulates - 1;
+        exit = -LOSS_CIRCULATING;
+    }
+    if (fate->corrupt && fate->corrupt->stops <= stops) {
+        stops = fate->corrupt->stops;
+        exit = -LOSS_CORRUPT;
+        frame_corrupted(s, r, fate->corrupt);
+    }
+    frame_process(s, r, stops, mark, frame, length);
+    if (r->opens >= 0)
+        loop_opened_by_frame(&s->controllers[r->opens / PORTS], r->opens % PORTS);
+    if (exit < 0)
+        return exit;
+    return fate->lose_back ? -LOSS_INJECTED : exit;
 }
 
 #endif

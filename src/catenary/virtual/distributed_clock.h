@@ -66,16 +66,19 @@ static inline void dc_store(const controller *c, uint32_t address, int64_t time)
         store32(c->memory + address, (uint32_t)time);
 }
 
-/* Port 0's time is when the frame comes in; port 1's when it comes back from the devices behind. */
-static void dc_latch(controller *c, int64_t in, int64_t back, int behind) {
+/* A frame that started at `start` comes in at each port after times[port] (NEVER: not there) and
+ * at the processing unit at `unit`. */
+static void dc_latch(controller *c, int64_t start, const int64_t *times, int64_t unit) {
     if (!c->has_dc)
         return;
-    int64_t unit = dc_local(c, in) + crystal_scatter(&c->clock.crystal);
-    store32(c->memory + REG_DC_RECEIVE, (uint32_t)unit);
-    if (behind)
-        store32(c->memory + REG_DC_RECEIVE + 4,
-                (uint32_t)(dc_local(c, back) + crystal_scatter(&c->clock.crystal)));
-    dc_store(c, REG_DC_RECEIVE_UNIT, unit);
+    int64_t processed = dc_local(c, unit) + crystal_scatter(&c->clock.crystal);
+    for (int p = 0; p < PORTS; p++) {
+        if (times[p] == NEVER)
+            continue;
+        int64_t at = p == 0 ? processed : dc_local(c, start + times[p]) + crystal_scatter(&c->clock.crystal);
+        store32(c->memory + REG_DC_RECEIVE + 4 * p, (uint32_t)at);
+    }
+    dc_store(c, REG_DC_RECEIVE_UNIT, processed);
 }
 
 /* The share by which speed counters run the local clock faster than its crystal. */

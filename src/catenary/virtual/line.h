@@ -1,7 +1,7 @@
 /* The line: frames on their way, due work, and the two clocks.
  *
  * A frame is worked through all controllers when it is sent and comes back after its own length
- * on the wire and the delay of the line. In virtual time `now` advances in `wait_until` only. */
+ * on the wire and the delay of its route, unless a cable on it goes dark before. In virtual time `now` advances in `wait_until` only. */
 #ifndef CATENARY_VIRTUAL_LINE_H
 #define CATENARY_VIRTUAL_LINE_H
 
@@ -52,6 +52,42 @@ static int64_t controller_advance(controller *c) {
     return next;
 }
 
+/* Frames that a dark cable catches on their way are lost, though the controllers behind have had
+ * them already: at most the frames of some microseconds. */
+static void lose_in_flight(cat_segment *s, segment_end *e) {
+    uint32_t kept = e->head;
+    for (uint32_t k = e->head; k != e->tail; k++) {
+        uint16_t place = e->order[k & (QUEUE_SIZE - 1)];
+        const queued_frame *q = &e->queue[place];
+        const route *r = &s->routes[q->from];
+        int64_t duration = (int64_t)(q->length + FRAME_OVERHEAD) * BYTE_NS;
+        int hit = 0;
+        for (uint32_t a = 0; a < r->arrival_count && q->arrival > s->now; a++)
+            hit |= !s->cables[r->arrivals[a].cable].light && q->sent + r->arrivals[a].offset + duration > s->now;
+        if (hit)
+            frame_lost(s, LOSS_IN_FLIGHT, q->from, q->sent);
+        else {
+            e->order[k & (QUEUE_SIZE - 1)] = e->order[kept & (QUEUE_SIZE - 1)];
+            e->order[kept++ & (QUEUE_SIZE - 1)] = place;
+        }
+    }
+    e->tail = kept;
+}
+
+/* Cables or power changed. `at_once`: the controllers need no time to see it. */
+static void segment_light(cat_segment *s, int at_once) {
+    int64_t detection = s->detection;
+    routes_refresh(s);
+    if (at_once)
+        s->detection = 0;
+    if (light_update(s) && s->is_virtual)
+        for (int n = 0; n <= s->ring; n++)
+            lose_in_flight(s, &s->ends[n]);
+    s->detection = detection;
+    if (at_once)
+        links_check(s);
+}
+
 /* Runs compiled work up to `until`, in the order of its times; in virtual time it stops where an
  * event wants the application. */
 static void segment_advance(cat_segment *s, int64_t until) {
@@ -60,6 +96,9 @@ static void segment_advance(cat_segment *s, int64_t until) {
             s->now = s->next_due;
         int64_t next = NEVER;
         s->next_due = NEVER;
+        if (s->link_due <= s->now)
+            links_check(s);
+        next = s->link_due;
         for (int n = 0; n < s->count; n++) {
             int64_t due = controller_advance(&s->controllers[n]);
             next = due < next ? due : next;
@@ -72,89 +111,134 @@ static void segment_advance(cat_segment *s, int64_t until) {
         s->now = until;
 }
 
-/* How long the line holds a frame, there and back [ns]. */
-static int64_t line_delay(const cat_segment *s) {
-    int64_t delay = 0;
-    for (int n = 0; n < s->reachable; n++)
-        delay += s->controllers[n].clock.hop;
-    return 2 * delay;
+/* The next place in the queue of frames towards an interface. */
+static inline queued_frame *queue_place(segment_end *e) {
+    return &e->queue[e->order[e->tail & (QUEUE_SIZE - 1)]];
+}
+
+/* The frame in the next place is complete: it stands behind those that arrive before it. */
+static void queue_put(segment_end *e) {
+    uint32_t k = e->tail++;
+    uint16_t place = e->order[k & (QUEUE_SIZE - 1)];
+    int64_t arrival = e->queue[place].arrival;
+    for (; k != e->head; k--) {
+        uint16_t before = e->order[(k - 1) & (QUEUE_SIZE - 1)];
+        if (e->queue[before].arrival <= arrival)
+            break;
+        e->order[k & (QUEUE_SIZE - 1)] = before;
+    }
+    e->order[k & (QUEUE_SIZE - 1)] = place;
+}
+
+static inline int queue_full(const segment_end *e) { return e->tail - e->head >= QUEUE_SIZE; }
+
+/* The frame is put down a second time, right behind the first. */
+static void queue_twice(segment_end *e, const queued_frame *first) {
+    if (queue_full(e))
+        return;
+    queued_frame *second = queue_place(e);
+    *second = *first;
+    second->arrival += (int64_t)(first->length + FRAME_OVERHEAD) * BYTE_NS;
+    queue_put(e);
+}
+
+/* A frame of `length` in `q` starts at q->sent: worked through, and on its way back or lost. */
+static void line_take(cat_segment *s, queued_frame *q, const route *r) {
+    fate fate = s->fault_count ? fate_of(s, r) : NO_FATE;
+    s->passage = q->sent;
+    int exit = frame_through(s, r, &fate, q->bytes, q->length);
+    if (exit < 0) {
+        frame_lost(s, -exit, q->from, q->sent);
+        return;
+    }
+    if (fate.garble)
+        frame_garble(s, q->bytes, q->length, fate.offset);
+    q->arrival = q->sent + (int64_t)(q->length + FRAME_OVERHEAD) * BYTE_NS + r->delay + fate.delay;
+    queue_put(&s->ends[exit]);
+    if (fate.duplicate)
+        queue_twice(&s->ends[exit], q);
 }
 
 static int line_send(void *self, const uint8_t *frame, uint32_t length) {
-    cat_segment *s = self;
+    segment_end *e = self;
+    cat_segment *s = e->segment;
     if (length < ETHERNET_HEADER || length > CAT_FRAME_MAX)
         return -EMSGSIZE;
     lock(s);
     if (!s->is_virtual)
         segment_advance(s, monotonic_now());
-    if (s->tail - s->head >= QUEUE_SIZE) {
+    routes_refresh(s);
+    const route *r = &s->routes[e->number];
+    segment_end *back = &s->ends[r->exit < 0 ? e->number : r->exit];
+    if (queue_full(back)) {
         unlock(s);
         return -ENOBUFS;
     }
-    int64_t start = s->busy_until > s->now ? s->busy_until : s->now;
-    uint32_t on_wire = length < CAT_FRAME_MIN ? CAT_FRAME_MIN : length;
-    int64_t duration = (int64_t)(on_wire + FRAME_OVERHEAD) * BYTE_NS;
-    queued_frame *q = &s->queue[s->tail & (QUEUE_SIZE - 1)];
+    queued_frame *q = queue_place(back);
     memcpy(q->bytes, frame, length);
     if (length < CAT_FRAME_MIN)
         memset(q->bytes + length, 0, CAT_FRAME_MIN - length);
-    q->length = on_wire;
-    s->passage = start;
-    s->busy_until = s->frame_end = start + duration;
-    int keeps = frame_through(s, q->bytes, on_wire) && s->connected && s->reachable > 0;
-    if (keeps) {
-        q->arrival = start + duration + line_delay(s);
-        s->tail++;
-    } else
-        s->counters.lost++;
+    q->length = length < CAT_FRAME_MIN ? CAT_FRAME_MIN : length;
+    q->from = e->number;
+    q->sent = e->busy_until > s->now ? e->busy_until : s->now;
+    e->busy_until = s->frame_end = q->sent + (int64_t)(q->length + FRAME_OVERHEAD) * BYTE_NS;
+    if (frame_is_ours(q->bytes, q->length))
+        line_take(s, q, r);
+    else
+        s->counters.foreign++;
     unlock(s);
     return 0;
 }
 
 static int64_t line_now(void *self) {
-    cat_segment *s = self;
+    const cat_segment *s = ((segment_end *)self)->segment;
     return s->is_virtual ? s->now : monotonic_now();
 }
 
-static inline int line_ready(const cat_segment *s, int64_t now) {
-    return s->head != s->tail && s->queue[s->head & (QUEUE_SIZE - 1)].arrival <= now;
+static inline const queued_frame *queue_first(const segment_end *e) {
+    return e->head == e->tail ? NULL : &e->queue[e->order[e->head & (QUEUE_SIZE - 1)]];
+}
+
+static inline int line_ready(const segment_end *e, int64_t now) {
+    const queued_frame *q = queue_first(e);
+    return q && q->arrival <= now;
 }
 
 static int line_receive(void *self, const uint8_t **frame) {
-    cat_segment *s = self;
-    lock(s);
+    segment_end *e = self;
+    lock(e->segment);
     int length = 0;
-    if (line_ready(s, line_now(s))) {
-        const queued_frame *q = &s->queue[s->head & (QUEUE_SIZE - 1)];
-        memcpy(s->taken, q->bytes, q->length);
+    if (line_ready(e, line_now(e))) {
+        const queued_frame *q = queue_first(e);
+        memcpy(e->taken, q->bytes, q->length);
         length = (int)q->length;
-        s->head++;
-        *frame = s->taken;
+        e->head++;
+        *frame = e->taken;
     }
-    unlock(s);
+    unlock(e->segment);
     return length;
 }
 
 static inline int64_t earlier(int64_t a, int64_t b) { return a < b ? a : b; }
 
-static int64_t line_wake_time(const cat_segment *s, int64_t deadline, int wake_on_frame) {
-    if (wake_on_frame && s->head != s->tail)
-        return earlier(deadline, s->queue[s->head & (QUEUE_SIZE - 1)].arrival);
-    return deadline;
+static int64_t line_wake_time(const segment_end *e, int64_t deadline, int wake_on_frame) {
+    const queued_frame *q = wake_on_frame ? queue_first(e) : NULL;
+    return q ? earlier(deadline, q->arrival) : deadline;
 }
 
-static int wait_in_virtual_time(cat_segment *s, int64_t deadline, int wake_on_frame) {
+static int wait_in_virtual_time(segment_end *e, int64_t deadline, int wake_on_frame) {
+    cat_segment *s = e->segment;
     for (;;) {
         if (s->pending || s->service_due <= s->now) {
             int failed = s->service(s->owner);
             if (failed)
                 return failed;
         }
-        if (wake_on_frame && line_ready(s, s->now))
+        if (wake_on_frame && line_ready(e, s->now))
             return 1;
         if (deadline <= s->now)
             return 0;
-        int64_t until = earlier(line_wake_time(s, deadline, wake_on_frame), s->service_due);
+        int64_t until = earlier(line_wake_time(e, deadline, wake_on_frame), s->service_due);
         if (s->clock && until > s->now) {
             int result = s->clock->wait_until(s->clock->self, until);
             if (result < 0)
@@ -169,20 +253,22 @@ static int wait_in_virtual_time(cat_segment *s, int64_t deadline, int wake_on_fr
 
 /* Execution time of the thread that uses the link; then what has come due meanwhile. */
 static int line_spend(void *self, int64_t duration) {
-    cat_segment *s = self;
+    segment_end *e = self;
+    cat_segment *s = e->segment;
     int result = s->clock->spend(s->clock->self, duration);
     int64_t present = s->clock->now(s->clock->self);
-    int passed = present > s->now ? wait_in_virtual_time(s, present, 0) : 0;
+    int passed = present > s->now ? wait_in_virtual_time(e, present, 0) : 0;
     return result < 0 ? result : passed;
 }
 
-static int wait_in_real_time(cat_segment *s, int64_t deadline, int wake_on_frame) {
+static int wait_in_real_time(segment_end *e, int64_t deadline, int wake_on_frame) {
+    cat_segment *s = e->segment;
     for (;;) {
         int64_t now = monotonic_now();
         lock(s);
         segment_advance(s, now);
-        int ready = wake_on_frame && line_ready(s, now);
-        int64_t until = line_wake_time(s, deadline, wake_on_frame);
+        int ready = wake_on_frame && line_ready(e, now);
+        int64_t until = line_wake_time(e, deadline, wake_on_frame);
         unlock(s);
         if (ready)
             return 1;
@@ -195,9 +281,9 @@ static int wait_in_real_time(cat_segment *s, int64_t deadline, int wake_on_frame
 }
 
 static int line_wait_until(void *self, int64_t deadline, int wake_on_frame) {
-    cat_segment *s = self;
-    return s->is_virtual ? wait_in_virtual_time(s, deadline, wake_on_frame)
-                         : wait_in_real_time(s, deadline, wake_on_frame);
+    segment_end *e = self;
+    return e->segment->is_virtual ? wait_in_virtual_time(e, deadline, wake_on_frame)
+                                  : wait_in_real_time(e, deadline, wake_on_frame);
 }
 
 #endif

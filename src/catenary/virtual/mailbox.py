@@ -61,6 +61,10 @@ class Mailbox:
         self.request_written()
         self._deliver()
 
+    def delay(self, nanoseconds: int) -> None:
+        """Requests are fetched that much later from now on, or sooner."""
+        self._delay_ns = max(0, self._delay_ns + nanoseconds)
+
     def request_written(self) -> None:
         if not self._fetching and not self.silent:
             self._fetching = True

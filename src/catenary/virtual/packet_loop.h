@@ -1,9 +1,12 @@
-/* The segment on a NIC: its own small packet loop, apart from `link`, so that the two judge each
- * other. Blocks in poll; the models are stepped after the answer has left.
+/* The segment on a NIC, or on two where it is a ring: its own small packet loop, apart from `link`,
+ * so that the two judge each other. Blocks in poll; the models are stepped after the answer has left.
  * Budget from frame in to frame out: 10 us on an idle core. */
 #ifndef CATENARY_VIRTUAL_PACKET_LOOP_H
 #define CATENARY_VIRTUAL_PACKET_LOOP_H
 
+#ifndef _GNU_SOURCE
+#define _GNU_SOURCE                   /* ppoll */
+#endif
 #include <errno.h>
 #include <poll.h>
 #include <sys/socket.h>
@@ -22,47 +25,126 @@ static void finish_sii(cat_segment *s) {
     }
 }
 
-/* 1: answered or passed over, 0: nothing there, or -errno. */
-static int packet_answer(cat_segment *s, int fd) {
-    static __thread uint8_t frame[65536 + 64];
-    struct sockaddr_ll from;
-    socklen_t size = sizeof from;
-    ssize_t length = recvfrom(fd, frame, sizeof frame, MSG_DONTWAIT, (struct sockaddr *)&from, &size);
-    if (length < 0)
-        return errno == EAGAIN || errno == EINTR ? 0 : -errno;
-    if (from.sll_pkttype == PACKET_OUTGOING)
-        return 1;
-    if (length > (ssize_t)CAT_FRAME_MAX) {
-        s->counters.malformed++;
-        return 1;
-    }
+/* A frame at the interface it leaves by. An interface whose queue is full loses it. */
+static int packet_send(const int *fds, int end, const uint8_t *frame, uint32_t length) {
+    if (fds[end] < 0 || send(fds[end], frame, length, 0) >= 0)
+        return 0;
+    return errno == ENOBUFS || errno == EAGAIN ? 0 : -errno;
+}
+
+/* A frame that a fault delays waits in the queue of the interface it leaves by. */
+static void packet_delay(cat_segment *s, int end, const uint8_t *frame, uint32_t length, int64_t delay) {
+    segment_end *e = &s->ends[end];
+    if (queue_full(e))
+        return;
+    queued_frame *q = queue_place(e);
+    memcpy(q->bytes, frame, length);
+    q->length = length;
+    q->arrival = s->now + delay;
+    queue_put(e);
+}
+
+/* Works a frame through; 0, or -errno. */
+static int packet_through(cat_segment *s, const int *fds, int from, uint8_t *frame, uint32_t length) {
     lock(s);
     s->passage = monotonic_now();
     if (s->synchronous)               /* what SYNC0 latches was latched before this frame came */
         segment_advance(s, s->passage);
     if (s->passage > s->now)
         s->now = s->passage;
+    if (s->link_due <= s->now)
+        links_check(s);
     if (s->sii_due <= s->now)
         finish_sii(s);
-    int back = frame_through(s, frame, (uint32_t)length) && s->connected && s->reachable > 0;
+    routes_refresh(s);
+    const route *r = &s->routes[from];
+    fate fate = s->fault_count ? fate_of(s, r) : NO_FATE;
+    int end = frame_through(s, r, &fate, frame, length);
+    if (end < 0)
+        frame_lost(s, -end, from, s->passage);
+    else if (fate.garble)
+        frame_garble(s, frame, length, fate.offset);
+    if (end >= 0 && fate.delay)
+        packet_delay(s, end, frame, length, fate.delay);
     unlock(s);
-    if (back && send(fd, frame, (size_t)length, 0) < 0 && errno != ENOBUFS && errno != EAGAIN)
-        return -errno;
+    if (end < 0 || fate.delay)
+        return 0;
+    int result = packet_send(fds, end, frame, length);
+    return result == 0 && fate.duplicate ? packet_send(fds, end, frame, length) : result;
+}
+
+/* 1: answered or passed over, 0: nothing there, or -errno. */
+static int packet_answer(cat_segment *s, const int *fds, int from) {
+    static __thread uint8_t frame[65536 + 64];
+    struct sockaddr_ll sender;
+    socklen_t size = sizeof sender;
+    if (fds[from] < 0)
+        return 0;
+    ssize_t length = recvfrom(fds[from], frame, sizeof frame, MSG_DONTWAIT, (struct sockaddr *)&sender, &size);
+    if (length < 0)
+        return errno == EAGAIN || errno == EINTR ? 0 : -errno;
+    if (sender.sll_pkttype == PACKET_OUTGOING)
+        return 1;
+    if (length > (ssize_t)CAT_FRAME_MAX)
+        s->counters.malformed++;
+    else if (!frame_is_ours(frame, (uint32_t)length))
+        s->counters.foreign++;
+    else {
+        int result = packet_through(s, fds, from, frame, (uint32_t)length);
+        return result < 0 ? result : 1;
+    }
     return 1;
 }
 
-static int packet_loop(cat_segment *s, int fd, int stop_fd) {
-    struct pollfd wait[2] = {{.fd = fd, .events = POLLIN}, {.fd = stop_fd, .events = POLLIN}};
+/* Sends what has been delayed long enough; 0, or -errno. *next: when more is. */
+static int packets_due(cat_segment *s, const int *fds, int64_t *next) {
+    *next = NEVER;
+    for (int n = 0; n <= s->ring; n++) {
+        segment_end *e = &s->ends[n];
+        for (; line_ready(e, monotonic_now()); e->head++) {
+            const queued_frame *q = queue_first(e);
+            int result = packet_send(fds, n, q->bytes, q->length);
+            if (result < 0)
+                return result;
+        }
+        *next = queue_first(e) ? earlier(*next, queue_first(e)->arrival) : *next;
+    }
+    return 0;
+}
+
+/* Both interfaces in turn, at most 64 frames: then the models have their turn. */
+static int packets_answer(cat_segment *s, const int *fds) {
+    int answered = 1;
+    for (int burst = 0; burst < 64 && answered; burst++) {
+        answered = 0;
+        for (int n = 0; n < 2; n++) {
+            int result = packet_answer(s, fds, n);
+            if (result < 0)
+                return result;
+            answered |= result;
+        }
+    }
+    return 0;
+}
+
+static int packet_loop(cat_segment *s, int fd, int second_fd, int stop_fd) {
+    const int fds[2] = {fd, second_fd};
+    struct pollfd wait[3] = {{.fd = fd, .events = POLLIN}, {.fd = stop_fd, .events = POLLIN},
+                             {.fd = second_fd, .events = POLLIN}};
     for (;;) {
-        if (poll(wait, 2, -1) < 0 && errno != EINTR)
+        int64_t next, now = monotonic_now();
+        int result = packets_due(s, fds, &next);
+        if (result < 0)
+            return result;
+        int64_t left = next > now ? next - now : 0;
+        struct timespec timeout = {.tv_sec = left / 1000000000, .tv_nsec = left % 1000000000};
+        if (ppoll(wait, 3, next == NEVER ? NULL : &timeout, NULL) < 0 && errno != EINTR)
             return -errno;
         if (wait[1].revents)
             return 0;
-        int answered = 1;
-        for (int burst = 0; burst < 64 && answered > 0; burst++)
-            answered = packet_answer(s, fd);
-        if (answered < 0)
-            return answered;
+        result = packets_answer(s, fds);
+        if (result < 0)
+            return result;
         lock(s);
         segment_advance(s, monotonic_now());
         unlock(s);

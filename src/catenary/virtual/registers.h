@@ -26,6 +26,8 @@ enum {
     REG_ECAT_EVENT_MASK = 0x0200,
     REG_ECAT_EVENT = 0x0210,
     REG_RX_ERRORS = 0x0300,          /* 8 bytes, then forwarded errors 4, processing unit, PDI */
+    REG_FORWARDED_ERRORS = 0x0308,
+    REG_PROCESSING_UNIT_ERRORS = 0x030C,
     REG_LOST_LINKS = 0x0310,
     REG_WATCHDOG_DIVIDER = 0x0400,
     REG_WATCHDOG_PDI = 0x0410,
@@ -72,6 +74,7 @@ enum {
 
 /* bits */
 enum {
+    DL_CONTROL_TEMPORARY = 0x02,     /* of the first byte: loop control lasts a second only */
     DL_CONTROL_ALIAS = 0x01,         /* of the register's fourth byte: bit 24 */
     ECAT_EVENT_DL_STATUS = 0x0004,
     ECAT_EVENT_AL_STATUS = 0x0008,

@@ -17,8 +17,8 @@ class Clock(Protocol):
     def wake_at(self, when: int) -> None: ...
 
 
-class Scheduler:
-    """Owns the actions that are due later, on the segment's clock [ns]."""
+class Agenda:
+    """Owns the actions of a segment that are due later, on its clock [ns]."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -33,12 +33,32 @@ class Scheduler:
     def next_due(self) -> int:
         return self._heap[0][0] if self._heap else FOREVER
 
+    def at(self, when_ns: int, action: Callable[[], None]) -> None:
+        heapq.heappush(self._heap, (when_ns, next(self._order), action))
+        self._clock.wake_at(when_ns)
+
     def after(self, delay_ns: int, action: Callable[[], None]) -> None:
-        when = self._clock.now + delay_ns
-        heapq.heappush(self._heap, (when, next(self._order), action))
-        self._clock.wake_at(when)
+        self.at(self._clock.now + delay_ns, action)
 
     def run_due(self) -> None:
         """Runs what is due now."""
         while self._heap and self._heap[0][0] <= self._clock.now:
             heapq.heappop(self._heap)[2]()
+
+
+class Scheduler:
+    """Owns what one device has to do later, until its power goes: then it does none of it."""
+
+    def __init__(self, agenda: Agenda) -> None:
+        self._agenda = agenda
+        self._ended = False
+
+    @property
+    def now(self) -> int:
+        return self._agenda.now
+
+    def after(self, delay_ns: int, action: Callable[[], None]) -> None:
+        self._agenda.after(delay_ns, lambda: None if self._ended else action())
+
+    def end(self) -> None:
+        self._ended = True

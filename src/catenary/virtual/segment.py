@@ -1,8 +1,8 @@
-"""A virtual segment: devices on a line, a clock, and a link into it."""
+"""A virtual segment: devices in a tree or a ring, a clock, faults, and links into it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Literal, NamedTuple, Protocol, runtime_checkable
 
@@ -11,9 +11,15 @@ from catenary.virtual.devices.coupler import Coupler
 from catenary.virtual.devices.device import Device
 from catenary.virtual.devices.digital_outputs import DigitalOutputs
 from catenary.virtual.devices.servo import Servo
+from catenary.virtual.fault_player import FaultEvent, FaultPlayer, Loss
+from catenary.virtual.faults import Fault
 from catenary.virtual.service import Service, ServiceThread
+from catenary.virtual.wiring import Place, Wiring
 
 ClockKind = Literal["virtual", "monotonic"]
+# From the loss of light to the closed loop [s]: enhanced link detection of the ET1100 (datasheet,
+# section I, chapter 6: about 15 us), and what an ordinary PHY takes.
+LINK_LOSS_DETECTION: Mapping[str, float] = {"enhanced": 15e-6, "standard": 3e-3}
 
 
 @runtime_checkable
@@ -34,34 +40,58 @@ class FrameCounters(NamedTuple):
 
 
 class Segment:
-    """Owns a line of virtual devices. `segment[i]` is the device at position i.
+    """Owns virtual devices and their cables. `segment[i]` is the device at position i.
 
     clock="virtual": a discrete-event clock; time advances only while the link waits.
     clock="monotonic": the machine's, for real time in this process and for `serve`.
     A `realtime.VirtualClock`, or a place on one (`clock.participate()`): virtual time shared with
     tasks; the loop on this segment takes that place, in the thread that the place is for.
+
+    `faults`: what happens to it, by its own time (`time`). `behind`: device → (device, port) it
+    hangs on, where that is not port 1 of the one before. `ring`: the last device leads back to a
+    second interface of the MainDevice. `link_loss_detection`: how long controllers take to see
+    that a cable is dark: "enhanced" (15 us), "standard" (3 ms) or seconds.
     """
 
     def __init__(
-        self, devices: Sequence[Device], *, clock: ClockKind | SharedClock = "virtual"
+        self,
+        devices: Sequence[Device],
+        *,
+        clock: ClockKind | SharedClock = "virtual",
+        faults: Sequence[Fault] = (),
+        behind: Mapping[int, Place] | None = None,
+        ring: bool = False,
+        link_loss_detection: float | Literal["enhanced", "standard"] = "enhanced",
     ) -> None:
         if clock not in ("virtual", "monotonic") and not isinstance(clock, SharedClock):
             raise ValueError(f'clock is "virtual", "monotonic" or a VirtualClock, not {clock!r}')
-        self._devices = tuple(devices)
+        self._devices = list(devices)
         self.clock: ClockKind = "monotonic" if clock == "monotonic" else "virtual"
-        self._core = Core(len(self._devices), self.clock == "virtual")
+        wiring = Wiring([device.ports for device in devices], behind or {}, ring=ring)
+        self._core = Core(
+            len(self._devices),
+            self.clock == "virtual",
+            ring=ring,
+            detection_ns=_detection_ns(link_loss_detection),
+        )
+        for number, cable in enumerate(wiring.cables):
+            self._core.lay_cable(number, cable.up, cable.down)
         if isinstance(clock, SharedClock):
             self._core.use_clock(clock)
         self._service = Service(self._core, self._devices)
+        self._faults = FaultPlayer(self._core, self._devices, wiring, self._service.agenda)
+        self._service.at_first_frame(self._faults.start)
         self._thread: ServiceThread | None = None
-        self._link: SegmentLink | None = None
+        self._links: dict[bool, SegmentLink] = {}
+        for fault in faults:
+            self.inject(fault)
 
     @classmethod
     def from_toml(cls, path: str | Path, *, clock: ClockKind = "virtual") -> Segment:
-        """Reads the devices from a file; ConfigurationError names the file and the field."""
-        from catenary.virtual.configuration import read_devices
+        """Reads the segment from a file; ConfigurationError names the file and the field."""
+        from catenary.virtual.configuration import read_segment
 
-        return cls(read_devices(path), clock=clock)
+        return read_segment(path, clock=clock)
 
     def __len__(self) -> int:
         return len(self._devices)
@@ -82,6 +112,10 @@ class Segment:
         return self._service
 
     @property
+    def ring(self) -> bool:
+        return self._faults.wiring.ring
+
+    @property
     def now_ns(self) -> int:
         return self._core.now
 
@@ -89,30 +123,81 @@ class Segment:
     def frames(self) -> FrameCounters:
         return FrameCounters(*self._core.counters)
 
+    # -- links ---------------------------------------------------------------------------------
+
     def open_link(self) -> SegmentLink:
         """A link into the segment; one at a time."""
-        if self._link is not None:
+        return self._open(second=False)
+
+    def open_second_link(self) -> SegmentLink:
+        """The link to the other end of a ring; ValueError where there is no ring."""
+        return self._open(second=True)
+
+    def _open(self, *, second: bool) -> SegmentLink:
+        if second in self._links:
             raise ValueError("the segment has an open link: close it first")
-        if self.clock == "monotonic":
+        name = "virtual, second end" if second else "virtual"
+        link = SegmentLink(self._core, name, lambda: self._link_closed(second), second=second)
+        if self.clock == "monotonic" and not self._links:
             self._thread = ServiceThread(self._service)
             self._thread.start()
-        self._link = SegmentLink(self._core, "virtual", self._link_closed)
-        return self._link
+        self._links[second] = link
+        return link
 
-    def _link_closed(self) -> None:
-        self._link = None
-        if self._thread is not None:
+    def _link_closed(self, second: bool) -> None:
+        del self._links[second]
+        if self._thread is not None and not self._links:
             self._thread.stop()
             self._thread = None
 
+    # -- faults --------------------------------------------------------------------------------
+
+    @property
+    def time(self) -> float:
+        """The time faults go by [s]: virtual time since the segment was made; in real time since
+        its first frame."""
+        return self._faults.now
+
+    def inject(self, fault: Fault) -> None:
+        """Plans a fault for `fault.at` on the segment's time; without one, or with one that has
+        passed, it begins at once. ValueError names the field that does not fit the segment."""
+        self._faults.add(fault)
+
+    @property
+    def faults_done(self) -> bool:
+        """No fault is still to begin or to end; those without an end do not count."""
+        return self._faults.done
+
+    @property
+    def fault_log(self) -> tuple[FaultEvent, ...]:
+        """What was injected when."""
+        return tuple(self._faults.log)
+
+    def take_losses(self) -> list[Loss]:
+        """The frames that did not come back since the last call, as far as the log goes (4096)."""
+        return self._faults.take_losses()
+
     def unplug(self) -> None:
-        """Pulls the cable between MainDevice and first device: no frame comes back."""
-        self._core.connect(False, len(self._devices))
+        """Pulls the cable between MainDevice and first device: no frame comes back. Seen by the
+        controllers at once, other than a fault."""
+        self._plug_first(0)
 
     def plug(self, devices: int | None = None) -> None:
-        """Plugs it in again; `devices`: the line is cut behind that many."""
-        reachable = len(self._devices) if devices is None else devices
-        self._core.connect(True, reachable)
+        """Plugs all cables in; `devices`: the line is cut behind that many."""
+        self._plug_first(len(self._devices) if devices is None else devices)
+
+    def _plug_first(self, devices: int) -> None:
+        for number in range(len(self._devices)):
+            self._core.plug_cable(number, number < devices, at_once=True)
+
+
+def _detection_ns(given: float | str) -> int:
+    seconds = LINK_LOSS_DETECTION.get(given, None) if isinstance(given, str) else given
+    if seconds is None or not 0 <= seconds <= 1:
+        raise ValueError(
+            f'link_loss_detection is "enhanced", "standard" or 0 to 1 s, not {given!r}'
+        )
+    return round(seconds * 1e9)
 
 
 def demo_segment(*, clock: ClockKind = "virtual") -> Segment:

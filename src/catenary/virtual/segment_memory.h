@@ -4,22 +4,6 @@
 
 #include "line.h"
 
-/* DL status, 0x0110: a line; port 0 towards the MainDevice, port 1 to the next device. */
-static void show_links(cat_segment *s) {
-    for (int n = 0; n < s->count; n++) {
-        controller *c = &s->controllers[n];
-        int up = n > 0 || s->connected, down = n + 1 < s->reachable;
-        c->linked = n < s->reachable;
-        uint8_t *status = c->memory + REG_DL_STATUS;
-        uint8_t links = (uint8_t)((up ? 0x10 : 0) | (down ? 0x20 : 0));
-        uint8_t loops = (uint8_t)((up ? 0x02 : 0x01) | (down ? 0x08 : 0x04) | 0x50);
-        if (((status[0] ^ links) & 0x30) || status[1] != loops)
-            store16(c->memory + REG_ECAT_EVENT, load16(c->memory + REG_ECAT_EVENT) | ECAT_EVENT_DL_STATUS);
-        status[0] = (uint8_t)((status[0] & 0x03) | 0x01 | links);
-        status[1] = loops;
-    }
-}
-
 static int controller_make(controller *c, uint32_t ram, uint32_t sii_words, int slots, int axes) {
     c->memory_size = REG_END + ram;
     c->memory = calloc(1, c->memory_size);
@@ -32,18 +16,56 @@ static int controller_make(controller *c, uint32_t ram, uint32_t sii_words, int 
     return c->memory && c->sii.image && c->slots && c->axes;
 }
 
+/* What is lost with the power: all but what the device is, its EEPROM, its crystal and its shafts. */
+static void controller_forget(controller *c) {
+    memset(c->memory, 0, c->memory_size);
+    memset(c->slots, 0, (size_t)c->slot_count * sizeof *c->slots);
+    memset(c->sm, 0, sizeof c->sm);
+    memset(c->fmmus, 0, sizeof c->fmmus);
+    c->fmmu_active = c->sm_top = 0;
+    c->logical_first = UINT64_MAX;
+    c->logical_end = 0;
+    c->events = 0;
+    c->al_unread = c->outputs_valid = c->outputs_seen = c->outputs_taken = c->inputs_stale = 0;
+    c->watchdog_armed = c->watchdog_expired = 0;
+    c->sii.pending = 0;
+    c->sii.loaded = 0;
+    c->outputs.count = c->inputs.count = 0;
+    c->outputs.sm = c->inputs.sm = -1;
+    c->step_period = c->step_due = c->watchdog_due = c->pdi_watchdog_due = c->sii.due = NEVER;
+    c->emergency = 0;
+    synchronous_end(c);
+    memset(&c->synchronous, 0, sizeof c->synchronous);
+    sync_stop(c);
+    c->sync.active = 0;
+    c->due = NEVER;
+    for (int k = 0; k < c->axis_count; k++) {
+        servo_axis *a = &c->axes[k], before = *a;
+        memset(a, 0, sizeof *a);
+        a->position = before.position;
+        a->load = before.load;
+        a->sto = before.sto;
+    }
+    ports_reset(c);
+}
+
+static void controller_power_off(controller *c) {
+    c->powered = 0;
+    controller_forget(c);
+}
+
 /* Everything as after power-on. */
-static void controller_power_on(controller *c, int fmmus, int sms, int clock_bits, int no_lrw) {
+static void controller_power_on(controller *c) {
     uint8_t *m = c->memory;
-    c->no_lrw = (uint8_t)no_lrw;
-    c->fmmu_count = fmmus;
-    c->sm_count = sms;
+    int fmmus = c->fmmu_count, sms = c->sm_count, clock_bits = c->has_dc, no_lrw = c->no_lrw;
+    controller_forget(c);
     m[REG_TYPE] = 0x11;
     m[REG_BUILD] = 0x02;
     m[REG_FMMU_COUNT] = (uint8_t)fmmus;
     m[REG_SM_COUNT] = (uint8_t)sms;
     m[REG_RAM_SIZE] = (uint8_t)((c->memory_size - REG_END) / 1024);
-    m[REG_PORTS] = 0x0F;                      /* ports 0 and 1 MII, 2 and 3 not there */
+    for (int p = 0; p < PORTS; p++)
+        m[REG_PORTS] |= (uint8_t)(c->ports[p].exists ? 3 << (2 * p) : 0);       /* MII */
     store16(m + REG_FEATURES, (uint16_t)((clock_bits ? FEATURE_DC : 0)
                                          | (clock_bits == 64 ? FEATURE_DC_64 : 0)
                                          | (no_lrw ? FEATURE_NO_LRW : 0)));
@@ -56,36 +78,87 @@ static void controller_power_on(controller *c, int fmmus, int sms, int clock_bit
     store16(m + REG_WATCHDOG_PROCESS_DATA, 1000);
     m[REG_SII_CONTROL] = SII_ADDRESS_2;
     dc_power_on(c, clock_bits);
-    sync_stop(c);
-    c->due = NEVER;
+    for (int n = 0; n < sms; n++)
+        sm_configured(c, n);
+    sii_load(c);
+    c->powered = 1;
+    loops_set(c, 0);
+}
+
+static void controller_free(controller *c) {
+    free(c->memory);
+    free(c->sii.image);
+    free(c->slots);
+    free(c->axes);
+}
+
+/* Nothing stands here yet: no work is due, and no port has a cable. */
+static void controller_blank(controller *c) {
+    c->sync.next0 = c->sync.next1 = c->sync.due = c->due = NEVER;
     c->outputs.sm = c->inputs.sm = -1;
     c->step_period = c->step_due = c->watchdog_due = c->pdi_watchdog_due = c->sii.due = NEVER;
     c->sii.read_time = 200000;
     c->sii.write_time = 3000000;
-    c->clock.hop = 2 * FORWARDING_NS;
-    c->logical_first = UINT64_MAX;
-    for (int n = 0; n < sms; n++)
-        sm_configured(c, n);
+    ports_reset(c);
+}
+
+/* The place in the line stays, the device goes. */
+static void controller_remove(controller *c) {
+    controller empty = {.segment = c->segment, .position = c->position};
+    memcpy(empty.ports, c->ports, sizeof empty.ports);
+    controller_free(c);
+    *c = empty;
+    controller_blank(c);
+}
+
+/* Two devices change places, with all they remember. */
+static void controllers_exchange(controller *a, controller *b) {
+    controller was = *a;
+    *a = *b;
+    *b = was;
+    int position = a->position;
+    a->position = b->position;
+    b->position = position;
+    for (int p = 0; p < PORTS; p++) {
+        int32_t hung = a->ports[p].cable;
+        a->ports[p].cable = b->ports[p].cable;
+        b->ports[p].cable = hung;
+    }
 }
 
 static void segment_free(cat_segment *s) {
     if (s == NULL)
         return;
-    for (int n = 0; s->controllers && n < s->count; n++) {
-        controller *c = &s->controllers[n];
-        free(c->memory);
-        free(c->sii.image);
-        free(c->slots);
-        free(c->axes);
+    for (int n = 0; s->controllers && n < s->count; n++)
+        controller_free(&s->controllers[n]);
+    for (int n = 0; n < 2; n++) {
+        free(s->routes[n].stops);
+        free(s->routes[n].arrivals);
+        free(s->routes[n].times);
+        free(s->ends[n].queue);
     }
+    free(s->cables);
     free(s->controllers);
-    free(s->stations);
-    free(s->queue);
     pthread_mutex_destroy(&s->mutex);
     free(s);
 }
 
-static cat_segment *segment_make(int count, int is_virtual) {
+/* An interface of the MainDevice and the way from it. 0: no memory. */
+static int end_make(cat_segment *s, int number) {
+    segment_end *e = &s->ends[number];
+    route *r = &s->routes[number];
+    e->segment = s;
+    e->number = number;
+    e->queue = calloc(QUEUE_SIZE, sizeof *e->queue);
+    r->stops = calloc(route_room(s), sizeof *r->stops);
+    r->arrivals = calloc(4 * (size_t)route_room(s), sizeof *r->arrivals);
+    r->times = calloc((size_t)s->count * PORTS + 1, sizeof *r->times);
+    for (uint32_t k = 0; k < QUEUE_SIZE; k++)
+        e->order[k] = (uint16_t)k;
+    return e->queue && r->stops && r->arrivals && r->times;
+}
+
+static cat_segment *segment_make(int count, int is_virtual, int ring, int64_t detection) {
     cat_segment *s = calloc(1, sizeof *s);
     if (s == NULL)
         return NULL;
@@ -94,31 +167,40 @@ static cat_segment *segment_make(int count, int is_virtual) {
     pthread_mutexattr_setprotocol(&attributes, PTHREAD_PRIO_INHERIT);
     pthread_mutex_init(&s->mutex, &attributes);
     pthread_mutexattr_destroy(&attributes);
+    s->count = count;
+    s->ring = ring;
+    s->cable_count = count + ring;
     s->controllers = calloc((size_t)count + 1, sizeof *s->controllers);
-    s->stations = calloc((size_t)count + 1, sizeof *s->stations);
-    s->queue = calloc(QUEUE_SIZE, sizeof *s->queue);
-    if (!s->controllers || !s->stations || !s->queue) {
+    s->cables = calloc((size_t)s->cable_count + 1, sizeof *s->cables);
+    if (!s->controllers || !s->cables || !end_make(s, 0) || (ring && !end_make(s, 1))) {
         segment_free(s);
         return NULL;
     }
-    s->count = s->reachable = count;
     s->is_virtual = is_virtual;
-    s->now = s->power_on = is_virtual ? 0 : monotonic_now();
-    s->next_due = s->service_due = s->sii_due = NEVER;
+    s->now = is_virtual ? 0 : monotonic_now();
+    s->epoch = is_virtual ? 0 : -1;
+    s->next_due = s->service_due = s->sii_due = s->link_due = NEVER;
+    s->detection = detection;
+    s->routes_stale = 1;
     s->event_fd = -1;
-    s->connected = 1;
     make_write_mask(s->write_mask);
     for (int n = 0; n < count; n++) {
-        s->controllers[n].segment = s;
-        s->controllers[n].position = n;
+        controller *c = &s->controllers[n];
+        c->segment = s;
+        c->position = n;
+        for (int p = 0; p < PORTS; p++)
+            c->ports[p].cable = -1;
+        controller_blank(c);
     }
     return s;
 }
 
-static void segment_connect(cat_segment *s, int connected, int reachable) {
-    s->connected = connected;
-    s->reachable = reachable < 0 ? 0 : reachable > s->count ? s->count : reachable;
-    show_links(s);
+static void cable_lay(cat_segment *s, int n, cable_end up, cable_end down) {
+    s->cables[n] = (cable){.up = up, .down = down, .delay = CABLE_NS, .plugged = 1};
+    if (up.device >= 0)
+        s->controllers[up.device].ports[up.port].cable = n;
+    if (down.device >= 0)
+        s->controllers[down.device].ports[down.port].cable = n;
 }
 
 static int64_t register_number(const controller *c, uint32_t address, int size) {

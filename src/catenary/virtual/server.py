@@ -73,26 +73,44 @@ def _raise_priority(interface: str, priority: int) -> None:
 
 
 class Server:
-    """Owns a served segment: the socket, the packet loop's thread and the service's.
+    """Owns a served segment: its sockets, the packet loop's thread and the service's.
 
+    `second`: the interface of a ring's other end.
     `priority`: SCHED_FIFO 1 to 99 for the packet loop; None: as the process.
     """
 
-    def __init__(self, segment: Segment, interface: str, *, priority: int | None = None) -> None:
+    def __init__(
+        self,
+        segment: Segment,
+        interface: str,
+        *,
+        second: str | None = None,
+        priority: int | None = None,
+    ) -> None:
         if segment.clock != "monotonic":
             raise ValueError('a served segment needs real time: Segment(..., clock="monotonic")')
         if priority is not None and not 1 <= priority <= 99:
             raise ValueError(f"SCHED_FIFO has priorities 1 to 99, not {priority}")
+        if second is not None and not segment.ring:
+            raise ValueError("the segment is no ring: Segment(..., ring=True) has a second end")
         self.segment = segment
         self.interface = interface
         self._priority = priority
         self._socket = _open_socket(interface)
+        self._second = None if second is None else self._open_second(second)
         self._stop = os.eventfd(0, os.EFD_CLOEXEC)
         self._service = ServiceThread(segment.service)
         self._thread = threading.Thread(target=self._run, name="virtual-packets", daemon=True)
         self._started = threading.Event()
         self._ended = threading.Event()
         self.failure: LinkError | None = None
+
+    def _open_second(self, interface: str) -> socket.socket:
+        try:
+            return _open_socket(interface)
+        except LinkError:
+            self._socket.close()
+            raise
 
     def start(self) -> None:
         self._service.start()
@@ -107,7 +125,8 @@ class Server:
             if self._priority is not None:
                 _raise_priority(self.interface, self._priority)
             self._started.set()
-            result = self.segment.core.answer_packets(self._socket.fileno(), self._stop)
+            second = -1 if self._second is None else self._second.fileno()
+            result = self.segment.core.answer_packets(self._socket.fileno(), second, self._stop)
             if result < 0:
                 hint = "the interface went down" if -result == errno.ENETDOWN else ""
                 raise LinkError(f"{self.interface}: {os.strerror(-result)}", hint=hint)
@@ -132,6 +151,8 @@ class Server:
         self._thread.join()
         self._service.stop()
         self._socket.close()
+        if self._second is not None:
+            self._second.close()
         os.close(self._stop)
 
     def __enter__(self) -> Server:
@@ -153,18 +174,20 @@ def serve(
     segment: Segment,
     interface: str,
     *,
+    second: str | None = None,
     priority: int | None = None,
     with_parent: bool = False,
     ready: Callable[[], None] | None = None,
 ) -> None:
     """Answers on `interface` until SIGINT or SIGTERM; call it in the main thread.
 
+    `second`: the interface of a ring's other end.
     `with_parent`: ends with the parent process too. `ready` is called once frames are answered.
     LinkError: no such interface, down, or not permitted.
     """
     if with_parent:
         die_with_parent()
-    server = Server(segment, interface, priority=priority)
+    server = Server(segment, interface, second=second, priority=priority)
     asked_to_end = threading.Event()
 
     def end(_signal: int, _frame: FrameType | None) -> None:

@@ -10,27 +10,31 @@ import os
 import select
 import signal
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from catenary.virtual._segment import Core
 from catenary.virtual.devices.device import Device
-from catenary.virtual.scheduler import FOREVER, Scheduler
+from catenary.virtual.scheduler import FOREVER, Agenda
 
 STOP_SIGNALS = {signal.SIGINT, signal.SIGTERM}
 IDLE_SECONDS = 0.02  # device models are stepped at least this often while no frame comes
 
 
 class Service:
-    """Owns the scheduler of a segment and hands events to its devices."""
+    """Owns the agenda of a segment and hands events to its devices."""
 
     def __init__(self, core: Core, devices: Sequence[Device]) -> None:
         self.core = core
-        self.scheduler = Scheduler(core)
+        self.agenda = Agenda(core)
         self._devices = devices
+        self._at_first_frame: Callable[[], None] | None = None
         for position, device in enumerate(devices):
-            device.attach(core, position, self.scheduler)
-        core.start()
+            device.attach(core, position, self.agenda)
         core.use_service(self.run)
+
+    def at_first_frame(self, action: Callable[[], None]) -> None:
+        """Runs once, when the segment's time begins to count."""
+        self._at_first_frame = action
 
     def run(self) -> int:
         """Everything that is to be done now; returns when the next is due [ns].
@@ -44,14 +48,17 @@ class Service:
             self._run_due()
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        return self.scheduler.next_due
+        return self.agenda.next_due
 
     def _run_due(self) -> None:
         while True:
             events = self.core.take_events()
             for position, flags in events:
                 self._devices[position].handle(flags)
-            self.scheduler.run_due()
+            if self._at_first_frame is not None and self.core.epoch >= 0:
+                action, self._at_first_frame = self._at_first_frame, None
+                action()
+            self.agenda.run_due()
             if not events:
                 return
 

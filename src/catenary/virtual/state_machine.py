@@ -67,7 +67,7 @@ class StateMachine:
         self.state = INIT
         self.code = 0
         self.transition_ns = MILLISECOND
-        self.refused: dict[int, int] = {}  # state → AL status code
+        self.refused: dict[int, tuple[int, int | None]] = {}  # state → AL status code, times
         self.delays: dict[int, int | None] = {}  # state → [ns]; None: it is never reached
 
     def obey(self) -> None:
@@ -94,7 +94,7 @@ class StateMachine:
 
     def _judge(self, requested: int) -> int:
         if requested in self.refused:
-            return self.refused[requested]
+            return self._refuse(requested)
         if requested == BOOT:
             return BOOTSTRAP_NOT_SUPPORTED
         if requested not in (INIT, PRE_OP, SAFE_OP, OP):
@@ -102,6 +102,12 @@ class StateMachine:
         if requested > self.state and (self.state, requested) not in UPWARDS:
             return INVALID_STATE_CHANGE
         return self._device.check_state(requested)
+
+    def _refuse(self, requested: int) -> int:
+        code, times = self.refused.pop(requested)
+        if times is None or times > 1:
+            self.refused[requested] = code, None if times is None else times - 1
+        return code
 
     def _enter(self, state: int, identify: bool) -> None:
         lack = self._device.lacks_for_op() if (self.state, state) == (SAFE_OP, OP) else 0

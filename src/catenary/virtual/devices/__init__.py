@@ -5,6 +5,15 @@ from catenary.virtual.devices.coupler import Coupler
 from catenary.virtual.devices.device import Device
 from catenary.virtual.devices.digital_inputs import DigitalInputs
 from catenary.virtual.devices.digital_outputs import DigitalOutputs
+from catenary.virtual.devices.junction import Junction
 from catenary.virtual.devices.servo import Servo
 
-__all__ = ["AnalogInputs", "Coupler", "Device", "DigitalInputs", "DigitalOutputs", "Servo"]
+__all__ = [
+    "AnalogInputs",
+    "Coupler",
+    "Device",
+    "DigitalInputs",
+    "DigitalOutputs",
+    "Junction",
+    "Servo",
+]

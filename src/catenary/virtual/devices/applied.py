@@ -62,13 +62,14 @@ class AppliedDevice(Device):
     def handle(self, events: int) -> None:
         self.application.handle(events)
 
-    def refuse_state(self, state: int, code: int | None) -> None:
-        """The next requests of `state` end in an error with `code`; None: no longer."""
+    def refuse_state(self, state: int, code: int | None, times: int | None = None) -> None:
+        """The next requests of `state`, `times` of them or all, end in an error with `code`;
+        None: no longer."""
         refused = self.application.states.refused
         if code is None:
             refused.pop(state, None)
         else:
-            refused[state] = code
+            refused[state] = code, times
 
     def delay_state(self, state: int, seconds: float | None) -> None:
         """How long `state` takes [s]; None: it is never reached."""
@@ -83,6 +84,10 @@ class AppliedDevice(Device):
     def mailbox_silent(self, silent: bool) -> None:
         """Requests are taken no longer: SM0 stays full, SM1 empty."""
         self.application.mailbox.silence(silent)
+
+    def delay_mailbox(self, seconds: float) -> None:
+        """Answers take that much longer from now on [s]; negative: less, but no less than 0."""
+        self.application.mailbox.delay(round(seconds * 1e9))
 
     def send_emergency(self, code: int, data: bytes = b"") -> None:
         self.application.send_emergency(code, data)

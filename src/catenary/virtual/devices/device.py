@@ -11,7 +11,7 @@ from typing import ClassVar
 from catenary.virtual._segment import Core
 from catenary.virtual.crystal import EXACT, ClockBits, Crystal
 from catenary.virtual.description import Description
-from catenary.virtual.scheduler import Scheduler
+from catenary.virtual.scheduler import Agenda, Scheduler
 from catenary.virtual.sii_image import make_sii_image
 
 INIT, PRE_OP, SAFE_OP, OP = 1, 2, 4, 8
@@ -22,6 +22,7 @@ class Device:
     """Owns one virtual device; its place in the segment is given when the segment is made."""
 
     kind: ClassVar[str]
+    ports: tuple[int, ...] = (0, 1)
 
     def __init__(
         self,
@@ -44,6 +45,8 @@ class Device:
         self.clock_bits = clock_bits
         self._crystal = crystal
         self._core: Core | None = None
+        self._agenda: Agenda | None = None
+        self._scheduler: Scheduler | None = None
         self.position = -1
 
     def description(self) -> Description:
@@ -55,7 +58,8 @@ class Device:
             raise ValueError(f"{self.name} stands in no segment yet: Segment([...]) places it")
         return self._core
 
-    def attach(self, core: Core, position: int, scheduler: Scheduler) -> None:
+    def attach(self, core: Core, position: int, agenda: Agenda) -> None:
+        """Puts it into its place and switches it on."""
         if self._core is not None:
             raise ValueError(f"{self.name} stands in a segment already")
         description = self.description()
@@ -70,20 +74,44 @@ class Device:
             clock_bits=self.clock_bits if description.clock else 0,
             lrw=self.lrw,
             identification=description.identification,
+            ports=self.ports,
         )
-        self._core, self.position = core, position
+        self._core, self._agenda, self.position = core, agenda, position
         self.crystal = self._crystal
-        self.started(scheduler)
+        self.switch_on()
+
+    def detach(self) -> None:
+        """It is taken out, without power; another segment may have it."""
+        self.switch_off()
+        self._core = self._agenda = None
+        self.position = -1
+
+    def switch_on(self) -> None:
+        """Power: it boots with its stored defaults."""
+        if self._agenda is None or self._scheduler is not None:
+            return
+        self._scheduler = Scheduler(self._agenda)
+        self.core.switch_power(self.position, True)
+        self.started(self._scheduler)
+
+    def switch_off(self) -> None:
+        """No power: what it was about to do is not done, what it knew is gone."""
+        if self._scheduler is None:
+            return
+        self._scheduler.end()
+        self._scheduler = None
+        self.core.switch_power(self.position, False)
 
     def started(self, scheduler: Scheduler) -> None:
-        """The controller is there; now what the device adds to it."""
+        """The controller has power; now what the device adds to it."""
 
     def handle(self, events: int) -> None:
         """Events of the controller, on the service's thread."""
 
     @property
     def state(self) -> int:
-        """The AL state shown: 1 INIT, 2 PRE-OP, 4 SAFE-OP, 8 OP; bit 4 is the error flag."""
+        """The AL state shown: 1 INIT, 2 PRE-OP, 4 SAFE-OP, 8 OP; bit 4 is the error flag; 0: it
+        has no power."""
         return self.core.peek(self.position, AL_STATUS, 1)[0] & 0x1F
 
     @property

@@ -1,0 +1,89 @@
+/* Faults that hit frames: which ones, and what becomes of them; and the log of what did not come
+ * back. Nothing here costs a frame more than one comparison while no such fault is on. */
+#ifndef CATENARY_VIRTUAL_FRAME_FAULTS_H
+#define CATENARY_VIRTUAL_FRAME_FAULTS_H
+
+#include "route.h"
+
+/* The order is that of fault_player.FRAME_KINDS. LOSE_OUT: before the first device; LOSE_BACK:
+ * behind the last. CORRUPT: bits turn on a cable; GARBLE: with a check sequence that fits. */
+enum frame_fault_kind { FAULT_LOSE_OUT, FAULT_LOSE_BACK, FAULT_CORRUPT, FAULT_GARBLE, FAULT_DELAY, FAULT_DUPLICATE };
+
+typedef struct {
+    int lose_out, lose_back, garble, offset, duplicate;
+    const arrival *corrupt;          /* where the bits had turned when it came in */
+    int64_t delay;
+} fate;
+
+static const fate NO_FATE = {.offset = -1};
+
+/* splitmix64 (Steele, Lea, Flood 2014) */
+static inline uint64_t segment_random(cat_segment *s) {
+    uint64_t z = s->random += 0x9E3779B97F4A7C15u;
+    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
+    z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
+    return z ^ (z >> 31);
+}
+
+static inline const arrival *route_crosses(const route *r, int cable) {
+    for (uint32_t k = 0; k < r->arrival_count; k++)
+        if (r->arrivals[k].cable == cable)
+            return &r->arrivals[k];
+    return NULL;
+}
+
+static void fate_add(cat_segment *s, const frame_fault *f, const arrival *where, fate *result) {
+    switch (f->kind) {
+    case FAULT_LOSE_OUT: result->lose_out = 1; break;
+    case FAULT_LOSE_BACK: result->lose_back = 1; break;
+    case FAULT_CORRUPT: result->corrupt = where; break;
+    case FAULT_GARBLE: result->garble = 1; result->offset = f->offset; break;
+    case FAULT_DELAY: result->delay += f->delay; break;
+    case FAULT_DUPLICATE: result->duplicate = 1; break;
+    }
+}
+
+/* What becomes of the frame that takes this route; counts it. */
+static fate fate_of(cat_segment *s, const route *r) {
+    fate result = NO_FATE;
+    for (int n = 0; s->fault_count && n < MAX_FRAME_FAULTS; n++) {
+        frame_fault *f = &s->faults[n];
+        if (!f->used || f->left == 0)
+            continue;
+        const arrival *where = f->kind == FAULT_CORRUPT ? route_crosses(r, f->cable) : NULL;
+        if ((f->kind == FAULT_CORRUPT && !where) || f->seen++ % f->every)
+            continue;
+        f->left -= f->left > 0;
+        fate_add(s, f, where, &result);
+    }
+    return result;
+}
+
+/* Inverts the byte at `offset`, or one bit anywhere behind the Ethernet header. */
+static void frame_garble(cat_segment *s, uint8_t *frame, uint32_t length, int offset) {
+    if (offset >= 0 && (uint32_t)offset < length)
+        frame[offset] ^= 0xFF;
+    if (offset >= 0 || length <= 14)
+        return;
+    uint64_t bit = segment_random(s) % (8ull * (length - 14));
+    frame[14 + bit / 8] ^= (uint8_t)(1u << (bit & 7));
+}
+
+/* Bad bits are counted by the port they came in at, and by all controllers behind as forwarded. */
+static void frame_corrupted(cat_segment *s, const route *r, const arrival *where) {
+    for (const arrival *a = where; a < r->arrivals + r->arrival_count; a++) {
+        if (a->device < 0)
+            continue;
+        uint8_t *m = s->controllers[a->device].memory;
+        count_up(m + (a == where ? REG_RX_ERRORS + 2 * a->port : REG_FORWARDED_ERRORS + a->port));
+    }
+    for (uint32_t k = where->stops; k < r->stop_count; k++)
+        count_up(r->stops[k].controller->memory + REG_PROCESSING_UNIT_ERRORS);
+}
+
+static void frame_lost(cat_segment *s, int cause, int end, int64_t sent) {
+    s->counters.lost++;
+    s->losses[s->loss_count++ & (LOSS_LOG - 1)] = (loss){sent, cause, end};
+}
+
+#endif

@@ -1,0 +1,103 @@
+"""How devices hang together: a tree in the order in which frames are processed, or a ring.
+
+A frame leaves a controller by port 3, then 1, then 2, as far as something hangs there, and returns
+by port 0 (ET1100 datasheet, section I, 3.2): the positions of devices follow from that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Literal, NamedTuple, TypeAlias
+
+Place: TypeAlias = tuple[int, int]  # device and port
+Neighbour: TypeAlias = int | Literal["main"]  # a device, or the MainDevice
+
+FIRST, SECOND = -1, -2  # the MainDevice's interfaces, as the compiled side numbers them
+PORT_ORDER = (3, 1, 2)
+
+
+class Cable(NamedTuple):
+    """Cable n leads up from device n; in a ring the last one leads back to the MainDevice."""
+
+    up: Place
+    down: Place
+
+
+class Wiring:
+    """The cables of a segment.
+
+    `ports`: the port numbers of each device. `behind`: where a device hangs that does not hang on
+    port 1 of the one before. `ring`: port 1 of the line's last device leads back.
+    """
+
+    def __init__(
+        self, ports: Sequence[Sequence[int]], behind: Mapping[int, Place], *, ring: bool
+    ) -> None:
+        self._below: dict[Place, int] = {}
+        for device in behind:
+            if not 0 < device < len(ports):
+                raise ValueError(f"behind: there is no device {device} that could hang elsewhere")
+        cables = [Cable((FIRST, 0), (0, 0))] if ports else []
+        for device in range(1, len(ports)):
+            up = tuple(behind.get(device, (device - 1, 1)))
+            self._hang(device, (up[0], up[1]), ports)
+            cables.append(Cable((up[0], up[1]), (device, 0)))
+        self._check_order(len(ports))
+        if ring:
+            cables.append(Cable(self._end_of_line(ports), (SECOND, 0)))
+        self.ring = ring
+        self.cables = tuple(cables)
+
+    def _hang(self, device: int, up: Place, ports: Sequence[Sequence[int]]) -> None:
+        above, port = up
+        if not 0 <= above < device:
+            raise ValueError(
+                f"behind: device {device} can hang behind one of 0 to {device - 1}, not {above}"
+            )
+        if port not in PORT_ORDER or port not in ports[above]:
+            raise ValueError(f"behind: device {above} has no port {port} for device {device}")
+        if up in self._below:
+            raise ValueError(
+                f"behind: port {port} of device {above} has device {self._below[up]} already"
+            )
+        self._below[up] = device
+
+    def _check_order(self, count: int) -> None:
+        order: list[int] = []
+        waiting = [0] if count else []
+        while waiting:
+            device = waiting.pop()
+            order.append(device)
+            below = [self._below.get((device, port), -1) for port in PORT_ORDER]
+            waiting += [child for child in reversed(below) if child >= 0]
+        if order != list(range(count)):
+            raise ValueError(
+                f"behind: frames come to the devices in the order {order} (ports 3, 1, 2): "
+                "list them so"
+            )
+
+    def _end_of_line(self, ports: Sequence[Sequence[int]]) -> Place:
+        if not ports:
+            raise ValueError("ring: a ring needs a device")
+        device = 0
+        while (device, 1) in self._below:
+            device = self._below[device, 1]
+        if 1 not in ports[device]:
+            raise ValueError(f"ring: device {device} has no port 1 to lead back")
+        return device, 1
+
+    def between(self, one: Neighbour, other: Neighbour) -> int:
+        """The number of the cable between two neighbours; ValueError names those there are."""
+        for number, cable in enumerate(self.cables):
+            if {_name(cable.up), _name(cable.down)} == {one, other}:
+                return number
+        known = ", ".join(f"{_name(c.up)}-{_name(c.down)}" for c in self.cables[:40])
+        raise ValueError(f"between: {one} and {other} are not neighbours (cables: {known})")
+
+    def at_port(self, device: int, port: int) -> bool:
+        """Whether a cable hangs there."""
+        return any((device, port) in (cable.up, cable.down) for cable in self.cables)
+
+
+def _name(place: Place) -> Neighbour:
+    return "main" if place[0] < 0 else place[0]
