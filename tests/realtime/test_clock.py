@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import multiprocessing
+import signal
 import threading
 from collections.abc import Callable
 
@@ -61,6 +62,38 @@ def test_a_wake_before_the_wait_is_not_lost():
         assert not clock.wait_until(5 * MS)
         assert clock.now_ns == 0
         assert clock.wait_until(5 * MS)
+
+
+class SignalledError(Exception):
+    """Raised by the handler of a signal."""
+
+
+def raise_signalled(number, frame):
+    raise SignalledError
+
+
+def test_a_signal_that_does_not_end_the_sleep_is_seen_nevertheless():
+    """It comes just before the sleep, or, as here, to another thread: nothing is interrupted."""
+
+    def send() -> None:
+        pause.wait(0.05)  # the wait has begun; if it has not, the signal is seen all the same
+        signal.pthread_kill(threading.get_ident(), signal.SIGUSR1)
+
+    pause, rescued = threading.Event(), threading.Event()
+    before = signal.signal(signal.SIGUSR1, raise_signalled)
+    with VirtualClock() as clock:
+        absent = clock.participate()  # time stands still
+        rescue = threading.Timer(20.0, lambda: (rescued.set(), absent.leave()))
+        threads = [rescue, threading.Thread(target=send)]
+        for thread in threads:
+            thread.start()
+        with pytest.raises(SignalledError):
+            clock.wait_until(MS)
+        rescue.cancel()
+        for thread in threads:
+            thread.join()
+    signal.signal(signal.SIGUSR1, before)
+    assert not rescued.is_set()
 
 
 def test_the_higher_priority_preempts():

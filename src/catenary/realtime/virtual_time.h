@@ -20,6 +20,7 @@
 #include <pthread.h>
 #include <stdint.h>
 #include <string.h>
+#include <time.h>
 
 #include "atomics.h"
 #include "clock.h"
@@ -27,6 +28,7 @@
 
 #define VT_PARTICIPANTS 64
 #define VT_OWN_PROCESSOR (-1)
+#define VT_SIGNALS_NS 500000000       /* of the machine's time: longest sleep between looks at signals */
 
 enum {
     VT_FREE,                          /* the slot is nobody's */
@@ -157,11 +159,15 @@ static void vt_schedule(virtual_time *v) {
     } while (vt_advance(v));
 }
 
-/* Sleeps until the turn comes. -EINTR: a signal came first; it stays blocked. */
+/* Sleeps until the turn comes. -EINTR: a signal came first; it stays blocked. A signal that came just
+ * before the sleep, or to another thread, does not end it: so it ends by itself now and then. */
 static int vt_sleep(vt_participant *p) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    int64_t until = (int64_t)t.tv_sec * 1000000000 + t.tv_nsec + VT_SIGNALS_NS;
     while (cat_load_acquire32(&p->turn) == p->seen) {
-        int error = cat_futex_wait_shared(&p->turn, p->seen, CAT_CLOCK_FOREVER);
-        if (error == -EINTR) return error;
+        int error = cat_futex_wait_shared(&p->turn, p->seen, until);
+        if (error == -EINTR || error == -ETIMEDOUT) return -EINTR;
     }
     p->seen = p->turn;
     return 0;
