@@ -186,7 +186,9 @@ def test_sdo_from_another_thread_while_the_loop_runs_and_never_from_its_own(run:
             servo.sdo.write(0x6065, 0, 12345, type=UDINT)
             found.append(servo.sdo.read(0x6065, 0, type=UDINT))
 
-        with cat.Loop(arm, period=2e-3, run=run, lost_limit=1000, late_limit=0) as loop:
+        with cat.Loop(
+            arm, period=2e-3, run=run, lost_limit=1000, late_limit=0, watchdog=5.0
+        ) as loop:
             asking = threading.Thread(target=ask)
             asking.start()
             while asking.is_alive():

@@ -63,6 +63,24 @@ def test_a_flood_of_alien_frames_does_not_keep_a_deadline_from_passing() -> None
         main.scan()
 
 
+class Halting(Echo):
+    """The program is halted for longer than any deadline whenever it looks at the clock."""
+
+    def now(self) -> int:
+        self._now += 200_000_000
+        return self._now
+
+
+def test_answers_that_came_while_the_program_was_halted_are_not_lost() -> None:
+    def asks() -> Procedure[bool]:
+        [reply] = yield [read(Command.BRD, 0, AL_STATUS)]
+        return reply.lost
+
+    runner = BlockingRunner(Halting())
+    assert runner.run_all([asks() for _ in range(200)]) == [False] * 200
+    assert runner.counts.lost == 0
+
+
 def test_many_procedures_share_frames() -> None:
     with MainDevice(Segment([DigitalOutputs() for _ in range(50)])) as main:
         main.scan()

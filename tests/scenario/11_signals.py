@@ -30,7 +30,7 @@ segment = demo_segment(clock="monotonic")
 with cat.MainDevice(segment) as main:
     arm = Arm(main.scan().drives, counts_per_turn=2**20)
     try:
-        with cat.Loop(arm, priority=None) as loop:
+        with cat.Loop(arm, priority=None, watchdog=5.0, lost_limit=1000, late_limit=0) as loop:
             print("running", flush=True)
             home = arm.actual.position.copy()
             for cycle in loop:
@@ -122,7 +122,7 @@ def test_a_real_process_comes_down_by_itself(number: signal.Signals, moment: str
         if moment == "running":
             first_words(child, "running")
         child.send_signal(number)
-        output, errors = child.communicate(timeout=30)
+        output, errors = child.communicate(timeout=60)
     assert "left [2, 2, 2, 2, 2, 2]" in output, (output, errors)
     assert "OPERATION ENABLED" not in output
     if number == signal.SIGTERM:

@@ -168,6 +168,11 @@ class BlockingRunner:
                 self._take(raw, under_way, replies)
             else:
                 self._link.wait_until(deadline, True)
+        for _ in range(WINDOW):  # what came while this process did not run is not lost
+            raw = self._link.receive() if under_way else None
+            if raw is None:
+                break
+            self._take(raw, under_way, replies)
         now = self._link.now()
         for parcel, group in under_way.values():
             self.counts.lost += 1

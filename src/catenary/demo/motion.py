@@ -15,7 +15,8 @@ PERIOD = 1e-3  # [s]
 COUNTS_PER_TURN = 2**20
 # The virtual devices share this machine: a pause of theirs is to be seen as lost cycles and
 # lateness in the figures, not to end the demo. A real machine keeps the defaults.
-LOST_LIMIT = 80  # cycles; the devices' watchdogs bite at 100
+LOST_LIMIT = 800  # cycles
+WATCHDOG = 1.0  # [s] of the devices
 LATE_LIMIT = 0.5  # [s]
 AMPLITUDE = math.pi  # [rad]
 PULSATION = math.pi  # [rad/s]

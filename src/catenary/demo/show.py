@@ -7,7 +7,15 @@ from pathlib import Path
 
 import catenary as cat
 from catenary.demo.ground import ground
-from catenary.demo.motion import LATE_LIMIT, LOST_LIMIT, PERIOD, Recording, drives_of, follow
+from catenary.demo.motion import (
+    LATE_LIMIT,
+    LOST_LIMIT,
+    PERIOD,
+    WATCHDOG,
+    Recording,
+    drives_of,
+    follow,
+)
 from catenary.demo.page import as_html
 from catenary.demo.result import PHASES, Device, Result, as_json
 from catenary.demo.text import ProgressBar, closing_lines, device_lines, timing_lines
@@ -31,7 +39,9 @@ def run(seconds: float, *, refused: str | None) -> Result:
         arm = drives_of(main.scan())
         recording = Recording(seconds, len(arm))
         progress = ProgressBar(seconds)
-        with cat.Loop(arm, period=PERIOD, lost_limit=LOST_LIMIT, late_limit=LATE_LIMIT) as loop:
+        with cat.Loop(
+            arm, period=PERIOD, lost_limit=LOST_LIMIT, late_limit=LATE_LIMIT, watchdog=WATCHDOG
+        ) as loop:
             devices = [device(sub) for sub in main.subs]
             print(device_lines(devices))
             before = loop.timing.counters  # of the start-up
