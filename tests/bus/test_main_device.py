@@ -215,7 +215,7 @@ def test_the_default_mapping_is_read_from_the_dictionary_and_kept() -> None:
         subs = main.scan()
         plan = main.plan()
         assert subs[2].description.mapping_source == "CoE"
-        assert (plan.cycle.output_size, plan.cycle.input_size) == (41, 39)
+        assert (plan.cycle.output_size, plan.cycle.input_size) == (41, 39 + 1)  # mailboxes
         assert all(device.downloads == () for device in plan.devices)
         main.configure(plan)
 

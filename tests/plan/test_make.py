@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import pytest
 
@@ -10,10 +11,16 @@ from catenary.errors import ConfigurationError
 from catenary.model.device import Direction
 from catenary.plan import Number, NumberKind, make_plan
 from catenary.plan.cycle import Copy, DatagramKind, DatagramPlan
+from catenary.plan.layout import MailboxFmmu
 from catenary.plan.wish import PdoWish, WishTables
 from catenary.wire.datagram import Command
+from catenary.wire.features import Feature
 from catenary.wire.frame import decode_frame
 from tests.plan.devices import asks, coupler, demo, lamps, servo
+
+MAILBOXES = DatagramPlan(  # of three drives, behind the 80 bytes of process data
+    DatagramKind.PROCESS_DATA, Command.LRD, 122, 1, 3, -1, inputs=(Copy(132, 39, 1),)
+)
 
 
 def test_the_demo_segment_in_one_frame() -> None:
@@ -21,7 +28,7 @@ def test_the_demo_segment_in_one_frame() -> None:
     outputs, three with inputs: 2 · 5 + 3 = 13."""
     plan = make_plan(demo())
     cycle = plan.cycle
-    assert (cycle.output_size, cycle.input_size) == (1 + 3 * 13 + 1, 3 * 13)
+    assert (cycle.output_size, cycle.input_size) == (1 + 3 * 13 + 1, 3 * 13 + 1)
     [frame] = cycle.frames
     assert frame.datagrams == (
         DatagramPlan(DatagramKind.AL_STATUS, Command.BRD, 16, 2, 6, -1),
@@ -35,6 +42,7 @@ def test_the_demo_segment_in_one_frame() -> None:
             outputs=(Copy(40, 0, 41),),
             inputs=(Copy(81, 0, 39),),
         ),
+        MAILBOXES,
     )
     assert cycle.period_ns == 1_000_000
     assert cycle.device_count == 6
@@ -44,10 +52,42 @@ def test_the_demo_segment_in_one_frame() -> None:
 def test_the_template_is_a_frame_of_its_datagrams() -> None:
     [frame] = make_plan(demo()).cycle.frames
     decoded = decode_frame(frame.template)
-    assert [d.command for d in decoded.datagrams] == [Command.BRD, Command.LRW]
+    assert [d.command for d in decoded.datagrams] == [Command.BRD, Command.LRW, Command.LRD]
     assert decoded.datagrams[0].address == 0x0130_0000
     assert decoded.datagrams[1].address == 0x0001_0000
     assert not any(decoded.datagrams[1].data)
+
+
+def test_mailboxes_ride_in_the_cycle_without_a_part_in_its_verdict() -> None:
+    plan = make_plan(demo(), optional=[3])
+    assert plan.mailboxes.devices == (2, 3, 4)
+    [column] = plan.cycle.input_columns
+    assert column.number == Number(8 * 39, 3, NumberKind.UNSIGNED)
+    assert plan.cycle.input_size == 39 + 1
+    places = [plan.devices[position].layout.mailbox for position in range(6)]
+    assert places == [
+        *(None, None),
+        *(MailboxFmmu(2, 8 * 0x8000 + k) for k in range(3)),
+        None,
+    ]
+    assert "FMMU 2 in   mailbox full, 1 bit" in str(plan)
+
+
+def test_who_has_no_fmmu_to_spare_shows_no_mailbox() -> None:
+    small = replace(servo(1), controller=replace(servo(1).controller, fmmu_count=2))
+    assert make_plan([coupler(0), small, servo(2)]).mailboxes.devices == (2,)
+    bytes_only = servo(1)
+    controller = replace(bytes_only.controller, features=Feature.FMMU_BYTE_ORIENTED)
+    plan = make_plan([coupler(0), replace(bytes_only, controller=controller)])
+    assert plan.mailboxes.devices == ()
+    assert len(plan.cycle.frames[0].datagrams) == 2
+
+
+def test_mailboxes_of_many_devices_take_several_columns() -> None:
+    plan = make_plan([servo(position) for position in range(70)])
+    bits = [column.number.bit_length for column in plan.mailboxes.columns]
+    starts = [column.number.bit_offset - 8 * 70 * 13 for column in plan.mailboxes.columns]
+    assert (bits, starts) == ([32, 32, 6], [0, 32, 64])
 
 
 def test_where_objects_are() -> None:
@@ -104,7 +144,13 @@ def test_a_device_without_lrw_gets_lrd_and_lwr() -> None:
         (Command(d.command).name, d.length, d.expected_counter, d.sync_unit)
         for d in cycle.frames[0].datagrams
     ]
-    assert kinds == [("BRD", 2, 3, -1), ("LRW", 26, 3, 0), ("LWR", 13, 1, 1), ("LRD", 13, 1, 1)]
+    assert kinds == [
+        ("BRD", 2, 3, -1),
+        ("LRW", 26, 3, 0),
+        ("LWR", 13, 1, 1),
+        ("LRD", 13, 1, 1),
+        ("LRD", 1, 2, -1),  # mailboxes
+    ]
     assert cycle.sync_units[1].devices == (2,)
 
 
@@ -121,7 +167,7 @@ def test_an_optional_device_is_a_unit_of_its_own() -> None:
         ((3,), True),
     ]
     counters = [d.expected_counter for d in cycle.frames[0].datagrams[1:]]
-    assert counters == [2 * 4 + 2, 3]
+    assert counters == [2 * 4 + 2, 3, 3]
 
 
 class Slow:

@@ -55,7 +55,7 @@ class Running:
         if plan.cycle.lead_ns and plan.cycle.order == "inline":
             self.engine.set_rehearsal(make_rehearsal(self.views))
         self.laws = LawRunner(self.engine, plan)
-        self.service = Service(main, self.engine, plan.cycle.period_ns)
+        self.service = Service(main, self.engine, plan)
         self._attached = ExitStack()
         self._stations = [sub.station for sub in main.subs]
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from catenary.bus import LaneRunner, MainDevice
 from catenary.core import Engine
 from catenary.errors import LoopError
+from catenary.loop.mailbox_watch import MailboxWatch
+from catenary.plan.make import Plan
 from catenary.procedure.exchange import Procedure
 
 T = TypeVar("T")
@@ -23,8 +25,9 @@ class Service:
     In virtual time nobody else may run: the caller steps, between two cycles.
     """
 
-    def __init__(self, main: MainDevice, engine: Engine, period_ns: int) -> None:
-        self.runner = LaneRunner(engine, grain_ns=period_ns // 2)
+    def __init__(self, main: MainDevice, engine: Engine, plan: Plan) -> None:
+        self.runner = LaneRunner(engine, grain_ns=plan.cycle.period_ns // 2)
+        self._watch = MailboxWatch(plan, main.subs, _mailbox_words(engine, plan), self.runner)
         self._main = main
         self._engine = engine
         self._ended = threading.Event()
@@ -44,6 +47,7 @@ class Service:
 
     def step(self) -> None:
         """In virtual time: what the thread of real time does between two cycles."""
+        self._watch.look(self._engine.now(), self._engine.number)
         if self.runner.busy:
             self._engine.lane_wait(BUSY_NS)
             self.runner.step()
@@ -73,6 +77,7 @@ class Service:
         try:
             while not self._ended.is_set():
                 self.runner.asked.clear()
+                self._watch.look(self._engine.now(), self._engine.number)
                 self.runner.step()
                 if self.runner.busy:
                     self._engine.lane_wait(BUSY_NS)
@@ -81,3 +86,10 @@ class Service:
         except Exception as failure:  # told by the next conversation: a thread has no caller
             self._failure = failure
             self.runner.close()
+
+
+def _mailbox_words(engine: Engine, plan: Plan) -> Sequence[int]:
+    """The last of the input integers."""
+    integers = engine.buffers["input_integers"]
+    words: Sequence[int] = integers[len(integers) - len(plan.mailboxes.columns) :]
+    return words

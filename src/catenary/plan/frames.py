@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from catenary.plan.clocks import ClockChoice
 from catenary.plan.cycle import Copy, DatagramKind, DatagramPlan, FramePlan
 from catenary.plan.layout import UnitLayout
+from catenary.plan.mailboxes import MailboxArea
 from catenary.wire.datagram import HEADER_SIZE as DATAGRAM_HEADER
 from catenary.wire.datagram import OVERHEAD, Command, Datagram
 from catenary.wire.frame import HEADER_SIZE, MAXIMUM_PAYLOAD, encode_frame
@@ -44,7 +45,10 @@ class _Piece:
 
 
 def make_frames(
-    units: Sequence[UnitLayout], device_count: int, clocks: ClockChoice | None = None
+    units: Sequence[UnitLayout],
+    device_count: int,
+    clocks: ClockChoice | None = None,
+    mailboxes: MailboxArea | None = None,
 ) -> tuple[FramePlan, ...]:
     """The frames of one cycle, in the order they are sent. Frame 0 begins with the BRD of AL
     status, which every device answers, and carries the time. What is not exchanged in every cycle
@@ -53,6 +57,7 @@ def make_frames(
     for number, unit in enumerate(units):
         for piece in _of_unit(unit, number):
             pieces.append(replace(piece, every=unit.every, phase=unit.phase))
+    pieces.extend(_of_mailboxes(mailboxes))
     return tuple(_frame(batch) for batch in _batches(pieces))
 
 
@@ -89,6 +94,24 @@ def _clock_piece(
     return _Piece(
         DatagramKind.CLOCK, command, address, register.size, expected_counter, sync_unit=-1
     )
+
+
+def _of_mailboxes(area: MailboxArea | None) -> list[_Piece]:
+    """Belongs to no sync unit: a cycle is good without it."""
+    if area is None or not area.devices:
+        return []
+    inputs = (Copy(0, area.input_offset, area.size),)
+    return [
+        _Piece(
+            DatagramKind.PROCESS_DATA,
+            Command.LRD,
+            area.logical_start,
+            area.size,
+            len(area.devices),
+            sync_unit=-1,
+            inputs=inputs,
+        )
+    ]
 
 
 def _of_unit(unit: UnitLayout, number: int) -> list[_Piece]:

@@ -49,6 +49,14 @@ class FmmuPlan:
 
 
 @dataclass(frozen=True, slots=True)
+class MailboxFmmu:
+    """The FMMU that shows whether the device's mailbox is full: see mailboxes.py."""
+
+    index: int
+    logical_bit: int  # from logical address 0
+
+
+@dataclass(frozen=True, slots=True)
 class DeviceLayout:
     """The place of one device's process data."""
 
@@ -60,6 +68,7 @@ class DeviceLayout:
     input_size: int
     sync_managers: tuple[SyncManagerPlan, ...] = ()
     fmmus: tuple[FmmuPlan, ...] = ()
+    mailbox: MailboxFmmu | None = None
 
 
 @dataclass(frozen=True, slots=True)

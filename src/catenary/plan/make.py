@@ -12,6 +12,7 @@ from catenary.plan.clocks import SyncPlan, choose_clocks, make_clock_plan, make_
 from catenary.plan.cycle import CyclePlan, FollowedClock, Order, ReceiveMode, SyncUnit
 from catenary.plan.frames import make_frames
 from catenary.plan.layout import DeviceData, Layout, make_layout
+from catenary.plan.mailboxes import MailboxArea, with_mailboxes
 from catenary.plan.mapping import Mapping, make_mapping
 from catenary.plan.report import report
 from catenary.plan.start_up import WATCHDOG_UNIT_NS, DevicePlan, make_device_plan
@@ -25,13 +26,15 @@ WATCHDOG_COUNT_MAX = 0xFFFF
 class Plan:
     """What will run, for one network: `print(plan)` shows it; equal plans do the same.
 
-    `tables[k]` are the axes and columns of the k-th wish; in `cycle` they follow one another.
+    `tables[k]` are the axes and columns of the k-th wish; in `cycle` they follow one another, and
+    behind them the columns of the `mailboxes`.
     """
 
     cycle: CyclePlan
     devices: tuple[DevicePlan, ...]
     layout: Layout
     tables: tuple[WishTables, ...]
+    mailboxes: MailboxArea
 
     def __str__(self) -> str:
         return report(self.cycle, self.devices, self.layout)
@@ -81,8 +84,9 @@ def make_plan(
     data = [replace(d, optional=d.optional or d.position in optional) for d in data]
     layout = make_layout(data)
     syncs = _syncs(devices, asked, period_ns)
+    layout, mailboxes = with_mailboxes(layout, devices)
     choice = choose_clocks(devices, _clock_wishes(asked), clock, reference)
-    frames = make_frames(layout.units, len(devices), choice)
+    frames = make_frames(layout.units, len(devices), choice, mailboxes)
     tables = tuple(wish.tables(layout) for wish in wishes)
     cycle = CyclePlan(
         period_ns=period_ns,
@@ -96,7 +100,10 @@ def make_plan(
         device_count=len(devices),
         axes=tuple(axis for table in tables for axis in table.axes),
         output_columns=tuple(c for table in tables for c in table.output_columns),
-        input_columns=tuple(c for table in tables for c in table.input_columns),
+        input_columns=(
+            *(c for table in tables for c in table.input_columns),
+            *mailboxes.columns,
+        ),
         lost_limit=lost_limit,
         late_limit_position_ns=round(late_limit_position * 1e9),
         late_limit_velocity_ns=round(late_limit_velocity * 1e9),
@@ -120,7 +127,7 @@ def make_plan(
         )
         for device, (outputs, inputs), place in zip(devices, mappings, layout.devices, strict=True)
     )
-    return Plan(cycle, plans, layout, tables)
+    return Plan(cycle, plans, layout, tables, mailboxes)
 
 
 def gather_wishes(wishes: Sequence[Wish], period_ns: int) -> dict[int, PdoWish]:

@@ -51,6 +51,8 @@ def _devices(devices: Sequence[DevicePlan]) -> Iterator[str]:
                 f"logical 0x{fmmu.logical_start:08X} + {fmmu.length}  "
                 f"→ 0x{fmmu.physical_start:04X}"
             )
+        if place.mailbox is not None:
+            yield f"    FMMU {place.mailbox.index} in   mailbox full, 1 bit"
         if device.sync is not None:
             yield f"    {_sync(device.sync)}"
         yield from _entries(Direction.OUTPUT, device.outputs, place.output_offset)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from catenary.errors import ConfigurationError, DecodeError
 from catenary.model.device import DeviceDescription, Direction
-from catenary.plan.layout import FmmuPlan, SyncManagerPlan
+from catenary.plan.layout import FmmuPlan, MailboxFmmu, SyncManagerPlan
 from catenary.plan.start_up import WATCHDOG_DIVIDER, DevicePlan
 from catenary.procedure.exchange import Procedure, Request, write
 from catenary.procedure.mailbox import IN, OUT, MailboxChannel
@@ -20,6 +20,7 @@ from catenary.wire.sync_manager import (
     MAILBOX_OUT,
     Activation,
     Control,
+    Status,
     SyncManager,
 )
 
@@ -59,7 +60,10 @@ def configure_process_data(
         if manager.index not in used and not _is_mailbox(device, manager.index):
             requests.append(_switched_off(station, manager.index))
     requests += [_planned_fmmu(station, planned) for planned in plan.layout.fmmus]
-    for number in range(len(plan.layout.fmmus), device.controller.fmmu_count):
+    if plan.layout.mailbox is not None:
+        requests.append(_mailbox_fmmu(station, plan.layout.mailbox))
+    used_fmmus = len(plan.layout.fmmus) + (plan.layout.mailbox is not None)
+    for number in range(used_fmmus, device.controller.fmmu_count):
         block = register.fmmu(number)
         requests.append(write(Command.FPWR, station.address, block, bytes(block.size)))
     if plan.layout.output_size:
@@ -102,6 +106,13 @@ def _planned_fmmu(station: Station, plan: FmmuPlan) -> Request:
         reads=plan.direction is Direction.INPUT,
         writes=plan.direction is Direction.OUTPUT,
     )
+    return write(Command.FPWR, station.address, register.fmmu(plan.index), block.encode())
+
+
+def _mailbox_fmmu(station: Station, plan: MailboxFmmu) -> Request:
+    status = register.sync_manager_status(IN).address
+    full = 8 * status + int(Status.MAILBOX_FULL).bit_length() - 1
+    block = fmmu.bits(plan.logical_bit, full, 1, reads=True)
     return write(Command.FPWR, station.address, register.fmmu(plan.index), block.encode())
 
 

@@ -1,0 +1,77 @@
+"""Who has something to say beside the cycle: emergencies, late answers.
+
+A bit of every mailbox rides in the cycle, where the device has an FMMU to spare: a look at it costs
+nothing (plan/mailboxes.py). All others, and now and then these too, are asked by their register,
+one device at a time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from catenary.bus import LaneRunner, Pending, SubDevice
+from catenary.errors import CatenaryError
+from catenary.plan.make import Plan
+from catenary.procedure.exchange import Procedure
+from catenary.procedure.mailbox import MailboxChannel, drain, exclusively
+
+ASK_NS = 10_000_000  # between two registers, where some device shows no bit
+TRUST_NS = 100_000_000  # where all do
+
+
+class MailboxWatch:
+    """Owns the looks into mailboxes while a loop runs. Whoever steps the lane calls `look`.
+
+    `words`: the last integers of the loop's private buffer of inputs, one bit per device; they
+    change as the loop is iterated.
+    """
+
+    def __init__(
+        self, plan: Plan, subs: Sequence[SubDevice], words: Sequence[int], runner: LaneRunner
+    ) -> None:
+        self._subs = subs
+        self._words = words
+        self._runner = runner
+        self._shown = plan.mailboxes.devices
+        with_mailbox = [sub.position for sub in subs if sub.channel is not None]
+        unseen = [position for position in with_mailbox if position not in self._shown]
+        self._asked = unseen or with_mailbox
+        self._pace_ns = ASK_NS if unseen else TRUST_NS
+        self._next = 0
+        self._due_ns = 0
+        self._reading: dict[int, Pending[None]] = {}
+        self._read_in: dict[int, int] = {}  # position → cycle
+
+    def look(self, now_ns: int, cycle: int) -> None:
+        """Lets every mailbox be read that was full in this cycle, unless somebody talks to the
+        device anyway."""
+        for position in [p for p, reading in self._reading.items() if reading.done]:
+            del self._reading[position]
+            self._read_in[position] = cycle  # its bit in this cycle may be older
+        for position in self._full():
+            if self._read_in.get(position, -1) < cycle:
+                self._read(position)
+        if self._asked and now_ns >= self._due_ns:
+            self._due_ns = now_ns + self._pace_ns
+            self._next = (self._next + 1) % len(self._asked)
+            self._read(self._asked[self._next])
+
+    def _full(self) -> Iterator[int]:
+        for rank in range(len(self._words)):
+            word = int(self._words[rank])
+            while word:
+                bit = word & -word
+                yield self._shown[32 * rank + bit.bit_length() - 1]
+                word ^= bit
+
+    def _read(self, position: int) -> None:
+        channel = self._subs[position].channel
+        if channel is not None and not channel.turns and position not in self._reading:
+            self._reading[position] = self._runner.submit(_emptied(channel))
+
+
+def _emptied(channel: MailboxChannel) -> Procedure[None]:
+    try:
+        yield from exclusively(channel, drain(channel, lambda _: None))
+    except CatenaryError:
+        return  # it is silent, or talks nonsense: whoever asks it something will be told

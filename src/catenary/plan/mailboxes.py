@@ -1,0 +1,80 @@
+"""Whether a device has something to say, as a bit that rides in every cycle.
+
+One bit per device: "mailbox full" of the status of SyncManager 1 (0x080D bit 3), by an FMMU that
+the process data leaves over. SOEM maps the whole byte into the group's inputs (ec_config.c),
+KickCAT a bit (bus.cc), TwinCAT by its "SyncM status" FMMU; IgH and others poll the register.
+
+The bits have a datagram of their own: a register answers in every state, and in the datagram of the
+process data it would count for inputs that are not there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from catenary.model.device import DeviceDescription
+from catenary.plan.cycle import Bank, Column, Number, NumberKind
+from catenary.plan.layout import Layout, MailboxFmmu
+from catenary.wire.features import Feature
+
+LOGICAL_START = 0x0000_8000  # below the process data
+WORD = 32  # bits of a column
+
+
+@dataclass(frozen=True, slots=True)
+class MailboxArea:
+    """The bits in the image of inputs: bit k is of `devices[k]`, by position."""
+
+    devices: tuple[int, ...]
+    input_offset: int  # bytes
+    logical_start: int = LOGICAL_START
+
+    @property
+    def size(self) -> int:
+        """In bytes."""
+        return (len(self.devices) + 7) // 8
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """32 devices each, in their order; as integers."""
+        return tuple(
+            Column(
+                "mailboxes",
+                Number(
+                    8 * self.input_offset + first,
+                    min(WORD, len(self.devices) - first),
+                    NumberKind.UNSIGNED,
+                ),
+                Bank.INTEGER,
+                self.devices[first],
+                sync_unit=-1,
+            )
+            for first in range(0, len(self.devices), WORD)
+        )
+
+
+def with_mailboxes(
+    layout: Layout, devices: Sequence[DeviceDescription]
+) -> tuple[Layout, MailboxArea]:
+    """The layout with an FMMU more for every device that has a mailbox and one to spare."""
+    able = tuple(
+        device.position for device in devices if _can_map(device, len(_fmmus(layout, device)))
+    )
+    area = MailboxArea(able, layout.input_size)
+    bits = {
+        position: MailboxFmmu(len(layout.devices[position].fmmus), 8 * LOGICAL_START + bit)
+        for bit, position in enumerate(able)
+    }
+    places = tuple(replace(place, mailbox=bits.get(place.position)) for place in layout.devices)
+    return replace(layout, devices=places, input_size=layout.input_size + area.size), area
+
+
+def _fmmus(layout: Layout, device: DeviceDescription) -> Sequence[object]:
+    return layout.devices[device.position].fmmus
+
+
+def _can_map(device: DeviceDescription, used: int) -> bool:
+    if device.mailbox is None or used >= device.controller.fmmu_count:
+        return False
+    return not device.controller.features & Feature.FMMU_BYTE_ORIENTED
