@@ -3,6 +3,8 @@ interfaces."""
 
 from __future__ import annotations
 
+import os
+import signal
 import struct
 import time
 from collections.abc import Callable, Iterator
@@ -11,6 +13,8 @@ from typing import Any
 
 import pytest
 
+from catenary.realtime import private_network
+from catenary.realtime.child import Child, start_python
 from catenary.virtual import Segment
 from catenary.virtual.description import VENDOR_ID, Description
 from catenary.virtual.devices.application import BLOB_BYTES
@@ -117,6 +121,39 @@ def test_a_servo_goes_through_its_states_to_a_position(master: Any) -> None:
     cycle_until(master, arrived)
 
 
+@pytest.fixture
+def ring(line: Path, veth: tuple[str, str]) -> Iterator[tuple[str, str, Child]]:
+    """Both interfaces of a ring, and who serves it (serve_ring.py says what it obeys)."""
+    script = str(Path(__file__).parent / "serve_ring.py")
+    with private_network.veth_pair() as other:
+        command = [script, str(line), veth[1], other[1], str(SHOULDER), str(ELBOW)]
+        with start_python(command) as server:
+            assert server.read_line(20.0) == "ready"
+            yield veth[0], other[0], server
+
+
+def test_a_ring_over_both_interfaces_survives_a_cut(ring: tuple[str, str, Child]) -> None:
+    """Cable redundancy of SOEM: a cut in the middle of cyclic operation, and joined again."""
+    first, second, server = ring
+    master = pysoem.Master()
+    master.open(first, second)
+    try:
+        assert master.config_init() == 6
+        to_operational(master)
+        expected = master.expected_wkc
+        for number, word in ((None, "whole"), (signal.SIGUSR1, "cut"), (signal.SIGUSR2, "join")):
+            if number is not None:
+                os.kill(server.pid, number)
+                assert server.read_line(20.0) == word
+                cycle_until(master, lambda: exchange(master) == expected)
+            counters = [exchange(master, 5_000_000) for _ in range(100)]
+            assert counters == [expected] * 100, word
+    finally:
+        master.state = pysoem.INIT_STATE
+        master.write_state()
+        master.close()
+
+
 def to_operational(master: Any) -> None:
     master.config_map()
     assert master.state_check(pysoem.SAFEOP_STATE, 2_000_000) == pysoem.SAFEOP_STATE
@@ -136,6 +173,6 @@ def cycle_until(master: Any, done: Callable[[], bool], seconds: float = 20.0) ->
         exchange(master)
 
 
-def exchange(master: Any) -> int:
+def exchange(master: Any, timeout_us: int = 200_000) -> int:
     master.send_processdata()
-    return int(master.receive_processdata(200_000))
+    return int(master.receive_processdata(timeout_us))

@@ -54,6 +54,7 @@ def live(path: Path, run: Run) -> tuple[str, list[float], int, object]:
                 assert loop.timing.counters["lost"] == 0
                 end = arm.actual.position.copy()
             tasks.stop()
+            link.wait_until(clock.now_ns, False)  # the last job may have ended after the loop
             responses = [one.statistics.response.max for one in tasks]
         assert segment.now_ns == clock.now_ns
     return hashlib.sha256(path.read_bytes()).hexdigest(), responses, cycles, end.tolist()

@@ -28,6 +28,11 @@ def add_parser(commands: Commands) -> None:
         "catenary scan veth0",
     )
     parser.add_argument("interface", metavar="NIC", help="the interface to answer on")
+    parser.add_argument(
+        "--ring",
+        metavar="NIC2",
+        help="close the ring here: the second interface of the MainDevice's cable redundancy",
+    )
     parser.add_argument("--config", metavar="FILE.toml", help="the devices of the segment")
     parser.set_defaults(run=run)
 
@@ -35,13 +40,15 @@ def add_parser(commands: Commands) -> None:
 def run(arguments: argparse.Namespace) -> int:
     from catenary.virtual import Segment, demo_segment, serve
 
+    ring = arguments.ring is not None
     if arguments.config is None:
-        segment = demo_segment(clock="monotonic")
+        segment = demo_segment(clock="monotonic", ring=ring)
     else:
-        segment = Segment.from_toml(arguments.config, clock="monotonic")
+        segment = Segment.from_toml(arguments.config, clock="monotonic", ring=ring)
+    interfaces = f"{arguments.interface} and {arguments.ring}" if ring else arguments.interface
 
     def say() -> None:
-        print(f"{len(segment)} devices answer on {arguments.interface}; Ctrl-C ends", flush=True)
+        print(f"{len(segment)} devices answer on {interfaces}; Ctrl-C ends", flush=True)
 
-    serve(segment, arguments.interface, ready=say)
+    serve(segment, arguments.interface, second=arguments.ring, ready=say)
     return 0

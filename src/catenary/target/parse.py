@@ -48,4 +48,5 @@ def _ring(target: str) -> LinkSource:
 def _virtual(path: str) -> LinkSource:
     from catenary.virtual import Segment, demo_segment  # a NIC needs none of it
 
-    return Segment.from_toml(path) if path else demo_segment()
+    segment = Segment.from_toml(path) if path else demo_segment()
+    return Ring(segment.first, segment.second) if segment.ring else segment

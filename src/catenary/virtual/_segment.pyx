@@ -14,6 +14,7 @@ from libc.string cimport memcpy
 cdef extern from "link.h":
     const char *CAT_LINK_CAPSULE
     uint32_t CAT_LINK_VERSION, CAT_LINK_VIRTUAL_TIME, CAT_LINK_SHARED_TIME, CAT_LINK_SPENDS
+    uint32_t CAT_LINK_FORETELLS
     uint32_t CAT_FRAME_MAX
     ctypedef struct cat_link:
         uint32_t version, flags
@@ -23,6 +24,7 @@ cdef extern from "link.h":
         int64_t (*now)(void *) noexcept nogil
         int (*wait_until)(void *, int64_t, int) noexcept nogil
         int (*spend)(void *, int64_t) noexcept nogil
+        int64_t (*due)(void *) noexcept nogil
 
 cdef extern from "clock.h":
     const char *CAT_CLOCK_CAPSULE
@@ -160,6 +162,7 @@ cdef extern from "segment_memory.h" nogil:
     int64_t line_now(void *)
     int line_wait_until(void *, int64_t, int)
     int line_spend(void *, int64_t)
+    int64_t line_due(void *)
     enum:
         REG_AL_CONTROL, REG_RX_ERRORS, REG_LOST_LINKS, SM_PDI_DEACTIVATE, SM_PDI_REPEAT_ACK
         SM_ACTIVATE_REPEAT, ETHERNET_HEADER, LOSS_NO_LIGHT
@@ -789,7 +792,9 @@ cdef class SegmentLink:
         self._open = True
         self.name = name
         self._table.version = CAT_LINK_VERSION
-        self._table.flags = CAT_LINK_VIRTUAL_TIME if core._segment.is_virtual else 0
+        if core._segment.is_virtual:
+            self._table.flags = CAT_LINK_VIRTUAL_TIME | CAT_LINK_FORETELLS
+            self._table.due = line_due
         if core._segment.clock != NULL:
             self._table.flags |= CAT_LINK_SHARED_TIME | CAT_LINK_SPENDS
             self._table.spend = line_spend

@@ -216,8 +216,9 @@ def _read(path: str | Path) -> SegmentFile:
     return file
 
 
-def read_segment(path: str | Path, *, clock: ClockKind = "virtual") -> Segment:
-    """The segment of a file, with its faults. ConfigurationError names the file and the field."""
+def read_segment(path: str | Path, *, clock: ClockKind = "virtual", ring: bool = False) -> Segment:
+    """The segment of a file, with its faults; a ring where the file or the caller says so.
+    ConfigurationError names the file and the field."""
     file = _read(path)
     devices = [_made(table, position, path) for position, table in enumerate(file.device)]
     behind: dict[int, Place] = {
@@ -230,7 +231,7 @@ def read_segment(path: str | Path, *, clock: ClockKind = "virtual") -> Segment:
             devices,
             clock=clock,
             behind=behind,
-            ring=file.ring,
+            ring=ring or file.ring,
             link_loss_detection=file.link_loss_detection,
         )
     except ValueError as error:

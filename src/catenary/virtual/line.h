@@ -221,6 +221,12 @@ static int line_receive(void *self, const uint8_t **frame) {
 
 static inline int64_t earlier(int64_t a, int64_t b) { return a < b ? a : b; }
 
+/* When the next frame can be received here. */
+static int64_t line_due(void *self) {
+    const queued_frame *q = queue_first(self);
+    return q ? q->arrival : NEVER;
+}
+
 static int64_t line_wake_time(const segment_end *e, int64_t deadline, int wake_on_frame) {
     const queued_frame *q = wake_on_frame ? queue_first(e) : NULL;
     return q ? earlier(deadline, q->arrival) : deadline;

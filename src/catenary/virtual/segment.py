@@ -39,6 +39,18 @@ class FrameCounters(NamedTuple):
     lost: int
 
 
+class SegmentEnd:
+    """One end of a segment, to be opened by whoever drives it."""
+
+    def __init__(self, segment: Segment, *, second: bool) -> None:
+        self._segment = segment
+        self._second = second
+
+    def open_link(self) -> SegmentLink:
+        """A link into the segment at this end; one at a time."""
+        return self._segment.open_end(second=self._second)
+
+
 class Segment:
     """Owns virtual devices and their cables. `segment[i]` is the device at position i.
 
@@ -87,11 +99,14 @@ class Segment:
             self.inject(fault)
 
     @classmethod
-    def from_toml(cls, path: str | Path, *, clock: ClockKind = "virtual") -> Segment:
-        """Reads the segment from a file; ConfigurationError names the file and the field."""
+    def from_toml(
+        cls, path: str | Path, *, clock: ClockKind = "virtual", ring: bool = False
+    ) -> Segment:
+        """Reads the segment from a file; ConfigurationError names the file and the field.
+        `ring`: it is one, whether the file says so or not."""
         from catenary.virtual.configuration import read_segment
 
-        return read_segment(path, clock=clock)
+        return read_segment(path, clock=clock, ring=ring)
 
     def __len__(self) -> int:
         return len(self._devices)
@@ -125,15 +140,24 @@ class Segment:
 
     # -- links ---------------------------------------------------------------------------------
 
+    @property
+    def first(self) -> SegmentEnd:
+        """The end towards the first device."""
+        return SegmentEnd(self, second=False)
+
+    @property
+    def second(self) -> SegmentEnd:
+        """A ring's other end: `MainDevice(segment.first, segment.second)`."""
+        if not self.ring:
+            raise ValueError("only a ring has a second end: Segment(..., ring=True)")
+        return SegmentEnd(self, second=True)
+
     def open_link(self) -> SegmentLink:
-        """A link into the segment; one at a time."""
-        return self._open(second=False)
+        """A link into the segment, at its first end; one at a time."""
+        return self.open_end(second=False)
 
-    def open_second_link(self) -> SegmentLink:
-        """The link to the other end of a ring; ValueError where there is no ring."""
-        return self._open(second=True)
-
-    def _open(self, *, second: bool) -> SegmentLink:
+    def open_end(self, *, second: bool) -> SegmentLink:
+        """What `first` and `second` open."""
         if second in self._links:
             raise ValueError("the segment has an open link: close it first")
         name = "virtual, second end" if second else "virtual"
@@ -200,8 +224,8 @@ def _detection_ns(given: float | str) -> int:
     return round(seconds * 1e9)
 
 
-def demo_segment(*, clock: ClockKind = "virtual") -> Segment:
+def demo_segment(*, clock: ClockKind = "virtual", ring: bool = False) -> Segment:
     """A coupler, a digital output, three servo drives, a digital output."""
     devices: list[Device] = [Coupler(), DigitalOutputs()]
     devices += [Servo(name=f"Catenary virtual servo {k}", serial=k) for k in (1, 2, 3)]
-    return Segment([*devices, DigitalOutputs()], clock=clock)
+    return Segment([*devices, DigitalOutputs()], clock=clock, ring=ring)
