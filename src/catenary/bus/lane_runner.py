@@ -118,8 +118,19 @@ class LaneRunner:
 
     @property
     def busy(self) -> bool:
-        """Whether anything waits for a step."""
+        """Whether anything is asked: there are steps to come."""
         return bool(self._active or self._submitted)
+
+    @property
+    def due(self) -> bool:
+        """Whether anything waits for a step now: a frame to be sent or on its way, the end of a
+        pause. What sleeps does not."""
+        if self._submitted or self._under_way or self._outbox:
+            return True
+        due = self._lane.now() + self._grain_ns
+        return any(
+            pending.task.wake_ns is None or pending.task.wake_ns <= due for pending in self._active
+        )
 
     def step(self) -> None:
         """One exchange of everything that is under way."""

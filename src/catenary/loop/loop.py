@@ -11,6 +11,7 @@ from functools import partial
 from types import TracebackType
 from typing import Any, Literal
 
+from catenary.bus import SubDevice
 from catenary.core import (
     CYCLE_DROPPED,
     CYCLE_LAW_FAILED,
@@ -29,6 +30,7 @@ from catenary.loop.running import LogArray, Running, take_down
 from catenary.loop.signals import SignalGuard
 from catenary.loop.stream import Stream
 from catenary.loop.timing import Timing
+from catenary.loop.watch import Policy
 from catenary.plan.cycle import ReceiveMode
 from catenary.plan.make import Plan, make_plan
 from catenary.wire.al import State
@@ -54,9 +56,12 @@ class Loop:
     thread wakes, to take what has come back and fetch what is needed next into the caches (costs
     that much processor time a cycle); None: 50 us, at most a tenth of the period, when inline, and
     none for laws. `raise_faults`: a drive in fault
-    raises DriveError; else see `Drives.faults`. `laws` are compiled on entry, before the devices go
-    to OP; others when they are started. `cpu` and `priority` (SCHED_FIFO) of the native thread;
-    None: as they are.
+    raises DriveError; else see `Drives.faults`. `on_return`: what becomes of a device that no wish
+    requires and that comes back: "restore", its start-up list is replayed and it goes to OP; or
+    "hold", it stays in PRE-OP until `restore`. `on_replacement`: the same for another device of the
+    same product in its place, which is not even led to PRE-OP when held. `laws` are compiled on
+    entry, before the devices go to OP; others when they are started. `cpu` and `priority`
+    (SCHED_FIFO) of the native thread; None: as they are.
     """
 
     def __init__(
@@ -72,6 +77,8 @@ class Loop:
         watchdog: float | None = 0.1,
         lead: float | None = None,
         raise_faults: bool = True,
+        on_return: Policy = "restore",
+        on_replacement: Policy = "hold",
         laws: Sequence[Law | Callable[..., Any]] = (),
         cpu: int | None = None,
         priority: int | None = 80,
@@ -94,6 +101,11 @@ class Loop:
         if lead is None and run == "inline":
             self._lead = min(LEAD, LEAD_SHARE * period)
         self._raise_faults = raise_faults
+        for name, policy in (("on_return", on_return), ("on_replacement", on_replacement)):
+            if policy not in ("restore", "hold"):
+                raise ValueError(f'{name}={policy!r}: "restore" or "hold"')
+        self._on_return: Policy = on_return
+        self._on_replacement: Policy = on_replacement
         self._laws = [made_law(law) for law in laws]
         self._cpu = cpu
         self._priority = priority
@@ -107,7 +119,13 @@ class Loop:
             self._running = self._iteration = None
             plan = self._make_plan()
             self._main.configure(plan)
-            self._running = Running(self._main, plan, self._wishes)
+            self._running = Running(
+                self._main,
+                plan,
+                self._wishes,
+                on_return=self._on_return,
+                on_replacement=self._on_replacement,
+            )
             for law in self._laws:
                 self._running.laws.compile(law)
             self._running.open()
@@ -211,6 +229,11 @@ class Loop:
         """A ring of at most `capacity` rows of set-points, one row a cycle, that a slower thread
         fills ahead: see `Stream`."""
         return Stream(self._opened.engine, self._opened.views, capacity)
+
+    def restore(self, sub: SubDevice) -> None:
+        """Lets a device that is held (event DeviceHeld or DeviceReplaced) go to OP: from now on,
+        beside the cycle. Returns at once; `sub.state` and the events tell."""
+        self._opened.watch.release(sub)
 
     def _judge(self, flags: int) -> None:
         running = self._opened

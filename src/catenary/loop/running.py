@@ -27,6 +27,7 @@ from catenary.loop.laws.runner import LawRunner
 from catenary.loop.rehearsal import make_rehearsal
 from catenary.loop.service import Service
 from catenary.loop.signals import SignalGuard
+from catenary.loop.watch import Policy, Watch
 from catenary.plan.make import Plan
 from catenary.plan.wish import Wish
 from catenary.procedure.al_state import request_state
@@ -47,7 +48,15 @@ STOP_SLICE_NS = 20_000_000  # between looks at "hurry" while the drives brake
 class Running:
     """Owns the engine of one MainDevice while its loop is open."""
 
-    def __init__(self, main: MainDevice, plan: Plan, wishes: Sequence[Wish]) -> None:
+    def __init__(
+        self,
+        main: MainDevice,
+        plan: Plan,
+        wishes: Sequence[Wish],
+        *,
+        on_return: Policy = "restore",
+        on_replacement: Policy = "hold",
+    ) -> None:
         self.main = main
         self.plan = plan
         self.engine = Engine(plan.cycle, main.link.capsule)
@@ -56,6 +65,15 @@ class Running:
             self.engine.set_rehearsal(make_rehearsal(self.views))
         self.laws = LawRunner(self.engine, plan)
         self.service = Service(main, self.engine, plan)
+        self.watch = Watch(
+            main,
+            plan,
+            disturbed=lambda: self.engine.disturbed,
+            submit=self.service.runner.submit,
+            now=lambda: self.engine.now() * 1e-9,
+            on_return=on_return,
+            on_replacement=on_replacement,
+        )
         self._attached = ExitStack()
         self._stations = [sub.station for sub in main.subs]
 
@@ -70,6 +88,7 @@ class Running:
         self.service.converse(*(request_state(station, State.OP) for station in self._stations))
         for sub in self.main.subs:
             sub.state = State.OP
+        self.service.runner.submit(self.watch.run())
 
     def enable(self) -> None:
         """Enables all axes. Position axes hold when this returns; velocity and torque axes wait for
@@ -106,11 +125,17 @@ class Running:
             raise self._silence_error()
         if flags & CYCLE_LAW_FAILED:
             self.laws.raise_failure(self.log())
-        if self.engine.al_status != State.OP:
+        if self.engine.al_status != State.OP and not self.watch.excuses:
             self._raise_astray()
         states = [state_of(word) for word in self.views.statusword.tolist()]
-        faulty = [axis for axis, state in enumerate(states) if state in IN_FAULT]
+        faulty = [
+            axis
+            for axis, state in enumerate(states)
+            if state in IN_FAULT and self.watch.requires(self.plan.cycle.axes[axis].device)
+        ]
         if faulty and faults:
+            if self.engine.al_status != State.OP:
+                self._raise_astray()  # the fault may be its consequence
             raise self._drive_error(faulty, "in fault")
 
     def _raise_ended(self, flags: int) -> None:
@@ -183,7 +208,7 @@ class Running:
     def _raise_astray(self) -> None:
         log = self.log()
         [answers] = self.service.converse(survey(self._stations))
-        error = state_error(answers, log)
+        error = state_error([a for a in answers if self.watch.requires(a.station.position)], log)
         if error is not None:
             raise error
 

@@ -48,7 +48,7 @@ class Service:
     def step(self) -> None:
         """In virtual time: what the thread of real time does between two cycles."""
         self._watch.look(self._engine.now(), self._engine.number)
-        if self.runner.busy:
+        if self.runner.due:
             self._engine.lane_wait(BUSY_NS)
             self.runner.step()
         self._main.deliver_events()
@@ -79,7 +79,7 @@ class Service:
                 self.runner.asked.clear()
                 self._watch.look(self._engine.now(), self._engine.number)
                 self.runner.step()
-                if self.runner.busy:
+                if self.runner.due:
                     self._engine.lane_wait(BUSY_NS)
                 else:
                     self.runner.asked.wait(IDLE)

@@ -19,10 +19,9 @@ from catenary.bus.event import (
     DeviceLost,
     DeviceReplaced,
     DeviceReturned,
-    Event,
     StateLost,
 )
-from catenary.bus.task import Task
+from catenary.bus.pending import Pending
 from catenary.errors import CatenaryError
 from catenary.loop.diagnosis import ERROR_BIT, STATE_BITS, described
 from catenary.model.device import Identity
@@ -36,7 +35,7 @@ from catenary.procedure.survey import Answer, survey
 from catenary.wire.al import State
 
 Policy = Literal["restore", "hold"]
-Submit = Callable[[Procedure[None]], Task[None]]
+Submit = Callable[[Procedure[None]], Pending[None]]
 
 LOOK = 0.010  # [s] between two looks at the core's flag, and between two surveys
 STRANGERS_MAX = 16  # devices more than were scanned that are still told apart
@@ -61,7 +60,7 @@ class Charge:
     plan: DevicePlan
     required: bool
     standing: Standing = Standing.RUNNING
-    task: Task[None] | None = None
+    task: Pending[None] | None = None
     failures: int = 0
     released: bool = False
 
@@ -76,7 +75,6 @@ class Watch:
         *,
         disturbed: Callable[[], bool],
         submit: Submit,
-        tell: Callable[[Event], None],
         now: Callable[[], float],
         on_return: Policy = "restore",
         on_replacement: Policy = "hold",
@@ -88,9 +86,10 @@ class Watch:
             Charge(sub, device, device.position not in optional)
             for sub, device in zip(main.subs, plan.devices, strict=True)
         ]
+        self._all_required = all(charge.required for charge in self._charges)
         self._disturbed = disturbed
         self._submit = submit
-        self._tell = tell
+        self._tell = main.events.put
         self._now = now
         self._on_return = on_return
         self._on_replacement = on_replacement
@@ -103,17 +102,17 @@ class Watch:
                 yield from self._look()
             yield after(LOOK)
 
-    def excuses(self, answers: Sequence[Answer]) -> bool:
-        """Whether all who are silent or astray are devices that are not required."""
-        return all(
-            not self._charges[answer.station.position].required
-            for answer in answers
-            if answer.word is None or answer.word & (STATE_BITS | ERROR_BIT) != State.OP
+    @property
+    def excuses(self) -> bool:
+        """Whether somebody out of OP is no reason to end the loop: as far as is known, all of them
+        are devices that are not required. Known at the next look, after `LOOK` at most."""
+        return not self._all_required and all(
+            charge.standing is not Standing.ASTRAY for charge in self._charges if charge.required
         )
 
-    @property
-    def all_running(self) -> bool:
-        return all(charge.standing is Standing.RUNNING for charge in self._charges)
+    def requires(self, position: int) -> bool:
+        """Whether the loop ends without this device."""
+        return self._charges[position].required
 
     def release(self, sub: SubDevice) -> None:
         """Lets a device that is held go to OP."""
@@ -148,7 +147,9 @@ class Watch:
         if answer.word is None:
             self._lose(charge)
         elif answer.word & (STATE_BITS | ERROR_BIT) == State.OP:
-            if charge.standing is not Standing.HELD:
+            if charge.standing is Standing.LOST and not self._lets_in(charge):
+                self._welcome(charge)  # out of OP, which it has never left
+            elif charge.standing is not Standing.HELD:
                 self._is_back(charge)
         elif charge.standing is Standing.RUNNING:
             charge.standing = Standing.ASTRAY
@@ -180,7 +181,7 @@ class Watch:
         message = f"{charge.sub.station} answers again"
         self._tell(DeviceReturned(self._now(), charge.sub, message))
 
-    def _conclude(self, charge: Charge, task: Task[None]) -> None:
+    def _conclude(self, charge: Charge, task: Pending[None]) -> None:
         """A conversation that should have led a device back has ended."""
         charge.task = None
         charge.standing = Standing.ASTRAY
@@ -269,11 +270,14 @@ class Watch:
     def _welcome(self, charge: Charge) -> None:
         """A device that was lost has its address (again)."""
         self._tell_returned(charge)
-        if self._on_return == "restore" or charge.released:
+        if self._lets_in(charge):
             charge.released = False
             self._lead(charge, self._restored(charge))
         else:
             self._lead(charge, self._waiting(charge))
+
+    def _lets_in(self, charge: Charge) -> bool:
+        return self._on_return == "restore" or charge.released or charge.required
 
     def _back_to_op(self, charge: Charge) -> Procedure[None]:
         """It kept its configuration, mostly: its error is acknowledged. Else all from INIT."""
