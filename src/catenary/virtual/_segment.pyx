@@ -146,6 +146,7 @@ cdef extern from "segment_memory.h" nogil:
     int sm_pdi_write(controller *, int n, const uint8_t *data, uint32_t size)
     void inputs_put(controller *)
     void inputs_flush(cat_segment *)
+    void slots_refresh(controller *)
     void dc_tune(controller *, double error, double swing, double turn, double scatter, int64_t when)
     void model_period(controller *, int64_t period)
     void synchronous_begin(controller *, int64_t cycle, int steps)
@@ -669,6 +670,9 @@ cdef class Core:
         cdef controller *c = self._at(position)
         if not 0 <= number < c.slot_count:
             raise IndexError(f"no slot {number}")
+        lock(self._segment)
+        slots_refresh(c)
+        unlock(self._segment)
         return c.slots[number]
 
     def put_slot(self, int position, int number, int64_t value):

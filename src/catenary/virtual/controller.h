@@ -137,6 +137,7 @@ typedef struct controller {
     uint8_t outputs_valid;           /* the application takes the outputs: OP and fed */
     uint8_t outputs_seen, outputs_taken;            /* EVENT_OUTPUTS was raised since the last arming */
     uint8_t inputs_stale;            /* the model stepped; its inputs are not in memory yet */
+    uint8_t slots_stale;             /* and not in the slots */
     uint8_t powered;
     uint8_t mute;                    /* injected: logical datagrams pass it by */
     port ports[PORTS];

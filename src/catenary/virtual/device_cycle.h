@@ -17,6 +17,7 @@ static void model_axes(controller *c, int fresh) {
     for (int k = 0; k < c->axis_count; k++)
         servo_step(c, &c->axes[k], c->slots + k * AXIS_SLOTS, c->outputs_valid, fresh,
                    c->step_seconds, c->step_rate);
+    c->slots_stale = 1;
     watchdog_trigger_pdi(c);
 }
 

@@ -5,6 +5,7 @@
 #define CATENARY_VIRTUAL_PROCESS_DATA_H
 
 #include "controller.h"
+#include "servo.h"
 #include "sync_manager.h"
 
 #define PROCESS_DATA_MAX 2048u
@@ -79,6 +80,7 @@ static void inputs_put(controller *c) {
     uint8_t *buffer = sm_pdi_buffer(c, m->sm, &which);
     if (buffer == NULL)
         return;
+    slots_refresh(c);
     memset(buffer, 0, sm->length);
     for (int k = 0; k < m->count; k++) {
         const mapped *e = &m->entries[k];

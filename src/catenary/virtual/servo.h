@@ -204,7 +204,8 @@ static void servo_supervise(controller *c, servo_axis *a, int64_t *slots, double
         return;
     }
     int64_t window = slots[SLOT_FOLLOWING_WINDOW];
-    int outside = window != 0xFFFFFFFF && llabs(slots[SLOT_FOLLOWING_ERROR]) > window;
+    double error = a->command - a->position * a->counts_per_radian;
+    int outside = window != 0xFFFFFFFF && fabs(error) > (double)window;
     a->following_time = outside ? a->following_time + dt : 0;
     if (outside && a->following_time * 1e3 >= (double)slots[SLOT_FOLLOWING_TIME])
         servo_fault(c, a, slots, ERROR_FOLLOWING);
@@ -351,7 +352,15 @@ static void servo_step(controller *c, servo_axis *a, int64_t *slots, int fed, in
     a->torque = servo_powered(a) ? servo_drive(a, slots, fresh, dt, rate) : 0;
     servo_motor(a, dt);
     servo_standstill(a);
-    servo_show(a, slots);
+}
+
+/* The objects show what the axes do when somebody looks. */
+static inline void slots_refresh(controller *c) {
+    if (!c->slots_stale)
+        return;
+    c->slots_stale = 0;
+    for (int k = 0; k < c->axis_count; k++)
+        servo_show(&c->axes[k], c->slots + k * AXIS_SLOTS);
 }
 
 #endif
