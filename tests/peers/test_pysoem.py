@@ -24,6 +24,25 @@ pysoem = pytest.importorskip("pysoem", reason="PySOEM is not installed (extra `p
 SERVO = struct.Struct("<Hbiih")  # both ways: word, mode, velocity, position, torque
 SHOULDER, ELBOW = 2, 3
 CYCLES = 1000
+SYNC0_NS = 2_000_000
+CLOCKED = """
+[[device]]
+kind = "coupler"
+
+[[device]]
+kind = "digital_outputs"
+bits = 8
+
+[[device]]
+kind = "servo"
+crystal = { ppm = 60.0, jitter = 20e-9 }
+sync_missed_limit = 1000
+
+[[device]]
+kind = "servo"
+crystal = { ppm = -45.0, drift_ppm = 1.0 }
+sync_missed_limit = 1000
+"""
 OBJECT_DOES_NOT_EXIST = 0x06020000
 ENABLING = {0x40: 0x06, 0x21: 0x07, 0x23: 0x0F, 0x27: 0x0F}
 
@@ -44,6 +63,27 @@ def master(served: str) -> Iterator[Any]:
         master.state = pysoem.INIT_STATE
         master.write_state()
         master.close()
+
+
+@pytest.fixture
+def clocked(veth: tuple[str, str], tmp_path: Path) -> Iterator[Any]:
+    """Servos with crystals of their own, which forgive a machine that stops for a while."""
+    ours, theirs = veth
+    file = tmp_path / "clocked.toml"
+    file.write_text(CLOCKED)
+    with start_python(
+        ["-m", "catenary.cli", "virtual", "serve", theirs, "--config", str(file)]
+    ) as server:
+        assert server.read_line(20.0), "the virtual segment did not start"
+        master = pysoem.Master()
+        master.open(ours)
+        try:
+            assert master.config_init() == 4
+            yield master
+        finally:
+            master.state = pysoem.INIT_STATE
+            master.write_state()
+            master.close()
 
 
 def test_finds_every_device(master: Any, devices: list[Description]) -> None:
@@ -161,7 +201,14 @@ def to_operational(master: Any) -> None:
     master.write_state()
 
     def operational() -> bool:
-        return bool(master.state_check(pysoem.OP_STATE, 1000) == pysoem.OP_STATE)
+        if master.state_check(pysoem.OP_STATE, 1000) == pysoem.OP_STATE:
+            return True
+        master.read_state()
+        if any(slave.state & pysoem.STATE_ACK for slave in master.slaves):
+            # this machine stood still for longer than a watchdog: acknowledge, and once more
+            master.state = pysoem.OP_STATE | pysoem.STATE_ACK
+            master.write_state()
+        return False
 
     cycle_until(master, operational)
 
@@ -176,3 +223,50 @@ def cycle_until(master: Any, done: Callable[[], bool], seconds: float = 20.0) ->
 def exchange(master: Any, timeout_us: int = 200_000) -> int:
     master.send_processdata()
     return int(master.receive_processdata(timeout_us))
+
+
+def test_clocks_and_sync_pulses_up_to_op(clocked: Any) -> None:
+    """As SOEM's maintainer advises (SOEM#487): clocks first, then SYNC0, then the mapping."""
+    master = clocked
+    assert master.config_dc()
+    for servo in servos(master):
+        servo.dc_sync(True, SYNC0_NS)
+    to_operational(master)
+    for servo in servos(master):
+        assert struct.unpack("<H", servo.sdo_read(0x1C32, 1)) == (2,)  # DC SYNC0
+        assert struct.unpack("<I", servo.sdo_read(0x1C32, 2)) == (SYNC0_NS,)
+
+    def together() -> bool:
+        return all(abs(difference_ns(servo)) < 1_000 for servo in servos(master))
+
+    cycle_until(master, together)
+    before = [next_pulse_ns(servo) for servo in servos(master)]
+    cycle_until(master, lambda: next_pulse_ns(servos(master)[-1]) > before[-1])
+    # Steered to one time, they pulse at the same instants of it, whatever their crystals do.
+    assert {instant % SYNC0_NS for instant in before} == {0}
+
+
+def test_a_servo_without_pulses_does_not_go_to_op(clocked: Any) -> None:
+    master = clocked
+    assert master.config_dc()
+    servo = master.slaves[SHOULDER]
+    servo.sdo_write(0x1C32, 1, struct.pack("<H", 2))
+    master.config_map()
+    assert master.state_check(pysoem.SAFEOP_STATE, 500_000) != pysoem.SAFEOP_STATE
+    master.read_state()
+    assert (servo.state, servo.al_status) == (0x12, 0x0030)
+
+
+def servos(master: Any) -> list[Any]:
+    return [master.slaves[position] for position in (SHOULDER, ELBOW)]
+
+
+def difference_ns(slave: Any) -> int:
+    """Register 0x092C: sign and magnitude."""
+    [raw] = struct.unpack("<I", slave._fprd(0x092C, 4))
+    return -(raw & 0x7FFF_FFFF) if raw >> 31 else int(raw)
+
+
+def next_pulse_ns(slave: Any) -> int:
+    [instant] = struct.unpack("<Q", slave._fprd(0x0990, 8))
+    return int(instant)

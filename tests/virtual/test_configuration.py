@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from catenary.errors import ConfigurationError
-from catenary.virtual import AnalogInputs, Segment, Servo
+from catenary.virtual import AnalogInputs, Crystal, Segment, Servo
 
 GOOD = """
 [[device]]
@@ -19,6 +19,9 @@ name = "shoulder"
 alias = 10
 axes = 2
 counts_per_turn = 4096
+crystal = { ppm = 40.0, jitter = 20e-9 }
+clock_bits = 32
+sync_missed_limit = 7
 position_limits = [-1.5, 1.5]
 
 [[device]]
@@ -38,6 +41,8 @@ def test_a_segment_is_read(tmp_path: Path) -> None:
     assert (servo.name, servo.alias, servo.axes) == ("shoulder", 10, 2)
     assert (servo.counts_per_turn, servo.position_limits) == (4096, (-1.5, 1.5))
     assert analog.channels == 4
+    assert (servo.crystal, analog.crystal) == (Crystal(ppm=40, jitter=20e-9), Crystal())
+    assert (servo.clock_bits, analog.clock_bits, servo.sync_missed_limit) == (32, 64, 7)
 
 
 @pytest.mark.parametrize(
@@ -49,6 +54,11 @@ def test_a_segment_is_read(tmp_path: Path) -> None:
         ('[[device]]\nkind = "servo"\naxes = 9', "1 to 8 axes"),
         ('[[device]]\nkind = "digital_outputs"\nbits = 17', "1 to 16 bits"),
         ('[[device]]\nkind = "servo"\ninertia = -1.0', "inertia"),
+        ('[[device]]\nkind = "servo"\ncrystal = { ppm = 900.0 }', "at most 500 ppm"),
+        ('[[device]]\nkind = "coupler"\ncrystal = { error = 1 }', r"device\[0\].crystal"),
+        ('[[device]]\nkind = "servo"\nclock_bits = 16', "clock_bits"),
+        ('[[device]]\nkind = "digital_inputs"\nclock_bits = 32', "clock_bits"),
+        ('[[device]]\nkind = "servo"\nsync_missed_limit = 0', "sync_missed_limit"),
         ('[[device]]\nname = "x"', "kind"),
         ("device = []", "at least one"),
         ("[[device", "cell.toml"),
