@@ -246,15 +246,15 @@ def test_clocks_and_sync_pulses_up_to_op(clocked: Any) -> None:
     assert {instant % SYNC0_NS for instant in before} == {0}
 
 
-def test_a_servo_without_pulses_does_not_go_to_op(clocked: Any) -> None:
+def test_a_sync0_cycle_too_short_for_the_servo_is_refused(clocked: Any) -> None:
     master = clocked
     assert master.config_dc()
     servo = master.slaves[SHOULDER]
-    servo.sdo_write(0x1C32, 1, struct.pack("<H", 2))
+    servo.dc_sync(True, 20_000)
     master.config_map()
     assert master.state_check(pysoem.SAFEOP_STATE, 500_000) != pysoem.SAFEOP_STATE
     master.read_state()
-    assert (servo.state, servo.al_status) == (0x12, 0x0030)
+    assert (servo.state, servo.al_status) == (0x12, 0x0036)  # DC SYNC0 cycle time
 
 
 def servos(master: Any) -> list[Any]:
