@@ -174,9 +174,13 @@ def test_a_forgotten_engine_ends_its_thread(link) -> None:
     engine = Engine(plan("threaded"), link.capsule)
     before = set(os.listdir("/proc/self/task"))
     engine.start()
-    assert len(os.listdir("/proc/self/task")) == len(before) + 1
+    [thread] = set(os.listdir("/proc/self/task")) - before
     del engine
-    assert set(os.listdir("/proc/self/task")) == before
+    for _ in range(10_000):  # a thread is joined a little before the kernel forgets it
+        if not os.path.exists(f"/proc/self/task/{thread}"):
+            return
+        threading.Event().wait(0.001)
+    raise AssertionError(f"the thread {thread} goes on")
 
 
 def test_axes_without_a_unit_are_refused(link) -> None:
