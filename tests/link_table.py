@@ -35,6 +35,14 @@ class Table(ctypes.Structure):
     )
 
 
+def table_in(capsule: object) -> Table:
+    """The table of a compiled link, whose capsule the caller keeps."""
+    pointer = ctypes.pythonapi.PyCapsule_GetPointer
+    pointer.restype = ctypes.c_void_p
+    pointer.argtypes = [ctypes.py_object, ctypes.c_char_p]
+    return Table.from_address(pointer(capsule, b"catenary.link"))
+
+
 def capsule_of(structure: ctypes.Structure, name: bytes) -> object:
     """A capsule round a structure, which the caller keeps alive; `name` too."""
     new = ctypes.pythonapi.PyCapsule_New

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import os
 import random
 from collections.abc import Sequence
 
@@ -19,12 +20,14 @@ from catenary.wire.frame import decode_frame, encode_frame
 from tests.link_table import (
     FORETELLS,
     NOW,
+    POLLS,
     RECEIVE,
     SEND,
     VIRTUAL_TIME,
     WAIT_UNTIL,
     Table,
     capsule_of,
+    table_in,
 )
 
 HOP_NS = 1_000
@@ -259,6 +262,49 @@ def test_a_late_copy_of_an_earlier_frame_is_no_news(ring: RingOfDevices, link: R
     ring.time += 1_000_000
     [second] = exchange(link, count(2))
     assert second.working_counter == 4
+
+
+class Flooded(End):
+    """A network interface on which somebody else's frames never end (well, after a thousand)."""
+
+    def __init__(self, ring: RingOfDevices, name: str) -> None:
+        super().__init__(ring, name)
+        self.readable, writable = os.pipe()
+        os.write(writable, b"frames")
+        self.table.flags, self.table.fd = POLLS, self.readable
+        self.calls = 0
+
+    def table_receive(self, _, frame) -> int:
+        self.calls += 1
+        if self.calls == 2000:
+            os.read(self.readable, 6)
+        if self.calls % 2:
+            return 0
+        self.ring.time += 1000
+        ctypes.memset(self.lent, 0, 60)
+        frame[0] = ctypes.cast(self.lent, ctypes.POINTER(ctypes.c_uint8))
+        return 60
+
+
+def test_a_flood_of_alien_frames_does_not_outlast_the_deadline(ring: RingOfDevices) -> None:
+    link = RingLink(Flooded(ring, "a"), Flooded(ring, "b"))
+    assert link.wait_until(50_000, True) is False
+    assert 50_000 <= ring.time < 60_000
+
+
+def test_sending_leaves_the_frame_alone_that_was_received(
+    ring: RingOfDevices, link: RingLink
+) -> None:
+    """By the table: until the next receive or wait its bytes stay."""
+    capsule = link.capsule
+    table = table_in(capsule)
+    link.send(encode_frame([question(STATIONS[0])]))
+    assert link.wait_until(link.now() + 1_000_000, True)
+    lent = ctypes.POINTER(ctypes.c_uint8)()
+    length = table.receive(table.self, ctypes.byref(lent))
+    before = bytes(lent[:length])
+    link.send(encode_frame([count()]))
+    assert bytes(lent[:length]) == before
 
 
 def test_closing_closes_both(ring: RingOfDevices) -> None:

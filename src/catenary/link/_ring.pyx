@@ -5,7 +5,8 @@ second; the other copy passes unprocessed. Where the ring is cut both turn round
 back where they were sent. The receiver sees one frame either way (native/ring_merge.h).
 
 A copy is waited for `pair_wait` after the other has come, and not at all once it has failed to
-come several times in a row and the other has met all devices. Costs a copy of each frame on its way, and 2 system calls to send.
+come several times in a row and the other has met all devices. Costs a copy of each frame on its way,
+and 2 system calls to send.
 """
 
 from libc.errno cimport EINTR, EMSGSIZE, errno
@@ -83,7 +84,8 @@ ctypedef struct ring_t:
     uint64_t send_errors[2]
     uint8_t pending[SLOTS]            # indices with a copy, in no order
     slot_t *slots
-    uint8_t out[CAT_FRAME_MAX]
+    uint8_t out[CAT_FRAME_MAX]        # lent to the receiver
+    uint8_t second[CAT_FRAME_MAX]     # the copy that is being sent
 
 
 cdef inline int64_t ring_now(void *self) noexcept nogil:
@@ -117,16 +119,16 @@ cdef int ring_send(void *self, const uint8_t *frame, uint32_t length) noexcept n
     slot.delivered = 0
     slot.expected = 0
     memcpy(slot.sent, frame, length)
-    memcpy(ring.out, frame, length)
-    ring.out[MARK] |= SECOND_BIT
+    memcpy(ring.second, frame, length)
+    ring.second[MARK] |= SECOND_BIT
     if ring.route == BOTH:
-        cat_ring_second(ring.out, length)
+        cat_ring_second(ring.second, length)
     for side in range(2):
         if ring.route != BOTH and ring.route != side:
             continue
         copy = slot.sent
         if side == SECOND:
-            copy = ring.out
+            copy = ring.second
         status = ring.links[side].send(ring.links[side].self, copy, length)
         if status < 0:
             ring.send_errors[side] += 1
@@ -275,7 +277,7 @@ cdef int ring_wait_until(void *self, int64_t deadline, int wake_on_frame) noexce
         status = wait_for_either(ring, min(deadline, due))
         if status < 0:
             return status
-        if status == 0 and ring_now(ring) >= deadline:
+        if ring_now(ring) >= deadline:  # also under a flood of frames that are not ours
             take_in(ring)
             next_due(ring, &due)
             return 1 if due <= ring_now(ring) else 0
