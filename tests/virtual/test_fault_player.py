@@ -100,7 +100,7 @@ def test_a_frame_lost_on_its_way_back_has_been_there() -> None:
 
 
 def test_frames_are_lost_until_the_end() -> None:
-    main = line(lose_frames(None, at=0.002, for_=0.003))
+    main = line(lose_frames(at=0.002, for_=0.003))
     assert counts(main, 7) == [5, 5, None, None, None, 5, 5]
 
 

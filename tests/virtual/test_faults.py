@@ -29,6 +29,12 @@ def test_faults_are_values() -> None:
         power_cycle(2).at = 1.0  # type: ignore[misc]
 
 
+def test_how_many_frames_are_hit() -> None:
+    assert lose_frames().frames == 1
+    assert lose_frames(for_=0.1).frames is None
+    assert lose_frames(5, for_=0.1).frames == 5
+
+
 def test_a_fault_says_its_word() -> None:
     assert power_cycle(2).kind == "power_cycle"
     assert repr(drift(1, ppm=20.0, at=1.0)) == "Drift(device=1, ppm=20.0, at=1.0, for_=None)"

@@ -16,6 +16,7 @@ EVENT_EMERGENCY: Final[int]
 EVENT_SYNC_SEEN: Final[int]
 EVENT_SYNC_MISSED: Final[int]
 EVENT_SYNC_LOST: Final[int]
+EVENT_RESET: Final[int]
 
 SLOT_CONTROLWORD: Final[int]
 SLOT_STATUSWORD: Final[int]

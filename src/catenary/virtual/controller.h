@@ -36,7 +36,8 @@ enum controller_event {
     EVENT_EMERGENCY = 64,            /* a device model has a new error code */
     EVENT_SYNC_SEEN = 128,           /* the first SYNC0 pulse since the device waits for them */
     EVENT_SYNC_MISSED = 256,         /* too many pulses in a row without new outputs */
-    EVENT_SYNC_LOST = 512            /* no pulses any more */
+    EVENT_SYNC_LOST = 512,           /* no pulses any more */
+    EVENT_RESET = 1024               /* the MainDevice resets the device */
 };
 
 /* A SyncManager as the frame path sees it; its registers stay the truth. */
@@ -140,6 +141,9 @@ typedef struct controller {
     uint8_t slots_stale;             /* and not in the slots */
     uint8_t powered;
     uint8_t mute;                    /* injected: logical datagrams pass it by */
+    uint8_t is_protected;            /* by 0x0021 or 0x0031 */
+    uint8_t reset_step;
+    uint64_t registers_enabled, esc_enabled;        /* numbers of the frames that enabled writing */
     port ports[PORTS];
     uint8_t loops_before;            /* 0x0101 under temporary use: what comes back at loops_due */
     int64_t loops_due;

@@ -14,6 +14,7 @@
 #include "sync_manager.h"
 #include "sync_unit.h"
 #include "watchdog.h"
+#include "write_protection.h"
 
 enum { NOP, APRD, APWR, APRW, FPRD, FPWR, FPRW, BRD, BWR, BRW, LRD, LWR, LRW, ARMW, FRMW };
 
@@ -32,6 +33,9 @@ static void fill_mask(uint8_t *mask, uint32_t address, uint32_t size, uint8_t bi
 static void make_write_mask(uint8_t *mask) {
     memset(mask, 0, REG_END);
     fill_mask(mask, REG_STATION, 2, 0xFF);
+    mask[REG_WRITE_ENABLE] = mask[REG_WRITE_PROTECTION] = 0x01;
+    mask[REG_ESC_WRITE_ENABLE] = mask[REG_ESC_WRITE_PROTECTION] = 0x01;
+    mask[REG_RESET] = 0xFF;
     mask[REG_DL_CONTROL] = 0x03;
     mask[REG_DL_CONTROL + 1] = 0xFF;
     mask[REG_DL_CONTROL + 2] = 0x07;
@@ -115,6 +119,10 @@ static void clear_error_counters(controller *c, uint32_t first, uint32_t end) {
 /* What a write of registers [first, end) sets going. */
 static void registers_written(controller *c, uint32_t first, uint32_t end, const uint8_t *data,
                               const uint8_t *activate_before, int64_t passage) {
+    if (touches(first, end, REG_WRITE_ENABLE, REG_ESC_WRITE_PROTECTION + 1 - REG_WRITE_ENABLE))
+        protection_written(c);
+    if (touches(first, end, REG_RESET, 1))
+        reset_written(c);
     if (touches(first, end, REG_AL_CONTROL, 1))
         al_control_written(c);
     if (touches(first, end, REG_RX_ERRORS, REG_LOST_LINKS + 4 - REG_RX_ERRORS)
@@ -150,7 +158,7 @@ static int register_write(controller *c, uint32_t address, uint32_t size, const 
     for (uint32_t k = 0; k < size; k++) {
         uint32_t a = address + k;
         uint8_t mask = c->segment->write_mask[a];
-        if (mask == 0 || !register_open(c, a))
+        if (mask == 0 || !register_open(c, a) || !byte_unprotected(c, a))
             continue;
         c->memory[a] = (uint8_t)((c->memory[a] & ~mask) | (data[k] & mask));
         done = 1;
@@ -187,7 +195,7 @@ static int physical_write(controller *c, uint32_t address, uint32_t size, const 
         data += part;
         size -= part;
     }
-    if (size == 0 || address >= c->memory_size)
+    if (size == 0 || address >= c->memory_size || !ram_unprotected(c))
         return done;
     return done | ram_access(c, address, min32(size, c->memory_size - address), (uint8_t *)data, 1);
 }
@@ -249,7 +257,8 @@ static int datagram_at(controller *c, uint8_t *header, uint32_t size, uint8_t *d
     uint16_t adp = load16(header + 2);
     uint32_t ado = load16(header + 4);
     if (command == LRD || command == LWR || command == LRW)
-        return c->mute ? 0 : fmmu_datagram(c, load32(header + 2), size, data, command != LWR, command != LRD);
+        return c->mute ? 0 : fmmu_datagram(c, load32(header + 2), size, data, command != LWR,
+                                           command != LRD && ram_unprotected(c));
     if (command == FPRD || command == FPWR || command == FPRW)
         return station_matches(c, adp) ? physical_command(c, command - FPRD + APRD, ado, size, data, passage) : 0;
     if (command == FRMW)

@@ -272,7 +272,7 @@ class FaultPlayer:
         way = f"lose_{fault.way}" if isinstance(fault, f.LoseFrames) else fault.kind
         number = self._core.add_frame_fault(
             FRAME_KINDS.index(way),
-            frames=-1 if fault.n is None else fault.n,
+            frames=-1 if fault.frames is None else fault.frames,
             every=fault.every,
             delay_ns=round(fault.by * SECOND) if isinstance(fault, f.Delay) else 0,
             cable=self.wiring.between(*fault.between) if isinstance(fault, f.Corrupt) else -1,

@@ -54,7 +54,8 @@ class _Lasting(_Fault, frozen=True, kw_only=True):
 
 
 class _OfFrames(_Lasting, frozen=True, kw_only=True):
-    """Hits the first frame from `at` on and then every `every`-th, `n` in all; `n` None: no end."""
+    """Hits the first frame from `at` on and then every `every`-th, `n` in all; without `n`: one, or
+    all within `for_`."""
 
     every: int = 1
 
@@ -63,11 +64,17 @@ class _OfFrames(_Lasting, frozen=True, kw_only=True):
         _check("n", getattr(self, "n", None), 1)
         _check("every", self.every, 1)
 
+    @property
+    def frames(self) -> int | None:
+        """How many it hits at most; None: no end."""
+        n: int | None = getattr(self, "n", None)
+        return 1 if n is None and self.for_ is None else n
+
 
 class LoseFrames(_OfFrames, tag="lose_frames", frozen=True):
     """Frames vanish: on their way "out", before the first device, or on their way "back"."""
 
-    n: int | None = 1
+    n: int | None = None
     way: Literal["out", "back"] = msgspec.field(default="out")
 
     def __post_init__(self) -> None:
@@ -80,7 +87,7 @@ class Corrupt(_OfFrames, tag="corrupt", frozen=True):
     """Bits turn on the cable between two neighbours: the controllers behind count it and take
     nothing from the frame, and the MainDevice's interface drops it."""
 
-    n: int | None = 1
+    n: int | None = None
     between: tuple[Neighbour, Neighbour] = ("main", 0)
 
 
@@ -88,7 +95,7 @@ class Garble(_OfFrames, tag="garble", frozen=True):
     """Frames come back with wrong bytes and a check sequence that fits: the byte at `offset`
     inverted, or one bit anywhere."""
 
-    n: int | None = 1
+    n: int | None = None
     offset: int | None = None
 
     def __post_init__(self) -> None:
@@ -99,7 +106,7 @@ class Garble(_OfFrames, tag="garble", frozen=True):
 class Delay(_OfFrames, tag="delay", frozen=True):
     """Frames come back `by` [s] later."""
 
-    n: int | None = 1
+    n: int | None = None
     by: float = 1e-3
 
     def __post_init__(self) -> None:
@@ -110,7 +117,7 @@ class Delay(_OfFrames, tag="delay", frozen=True):
 class Duplicate(_OfFrames, tag="duplicate", frozen=True):
     """Frames come back twice."""
 
-    n: int | None = 1
+    n: int | None = None
 
 
 class Cut(_Lasting, tag="cut", frozen=True):

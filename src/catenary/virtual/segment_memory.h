@@ -28,6 +28,7 @@ static void controller_forget(controller *c) {
     c->events = 0;
     c->al_unread = c->outputs_valid = c->outputs_seen = c->outputs_taken = c->inputs_stale = 0;
     c->watchdog_armed = c->watchdog_expired = 0;
+    c->is_protected = c->reset_step = 0;
     c->sii.pending = 0;
     c->sii.loaded = 0;
     c->outputs.count = c->inputs.count = 0;

@@ -12,7 +12,7 @@ import signal
 import threading
 from collections.abc import Callable, Sequence
 
-from catenary.virtual._segment import Core
+from catenary.virtual._segment import EVENT_RESET, Core
 from catenary.virtual.devices.device import Device
 from catenary.virtual.scheduler import FOREVER, Agenda
 
@@ -55,6 +55,8 @@ class Service:
             events = self.core.take_events()
             for position, flags in events:
                 self._devices[position].handle(flags)
+                if flags & EVENT_RESET:
+                    self._devices[position].reset()
             if self._at_first_frame is not None and self.core.epoch >= 0:
                 action, self._at_first_frame = self._at_first_frame, None
                 action()

@@ -15,6 +15,7 @@ from catenary.virtual.scheduler import Agenda, Scheduler
 from catenary.virtual.sii_image import make_sii_image
 
 INIT, PRE_OP, SAFE_OP, OP = 1, 2, 4, 8
+RESET_DELAY_NS, RESET_NS = 100_000, 20_000_000  # the EEPROM is loaded again
 AL_STATUS, RX_ERRORS, LOST_LINKS, ALIAS = 0x0130, 0x0300, 0x0310, 0x0012
 
 
@@ -101,6 +102,13 @@ class Device:
         self._scheduler.end()
         self._scheduler = None
         self.core.switch_power(self.position, False)
+
+    def reset(self) -> None:
+        """The MainDevice's reset: off, as soon as the frame that asked has left, and on."""
+        if self._scheduler is None or self._agenda is None:
+            return
+        self._scheduler.after(RESET_DELAY_NS, self.switch_off)
+        self._agenda.after(RESET_DELAY_NS + RESET_NS, self.switch_on)
 
     def started(self, scheduler: Scheduler) -> None:
         """The controller has power; now what the device adds to it."""

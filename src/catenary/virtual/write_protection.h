@@ -1,0 +1,50 @@
+/* Write protection, and the reset by three frames (Beckhoff, EtherCAT Slave Controller, section I
+ * §17.3 and §17.4): 0x0021 guards registers, 0x0031 everything, until the enable bit beside it is
+ * written in the same frame before. 0x52, 0x45, 0x53 written to 0x0040 reset the device. */
+#ifndef CATENARY_VIRTUAL_WRITE_PROTECTION_H
+#define CATENARY_VIRTUAL_WRITE_PROTECTION_H
+
+#include "controller.h"
+
+static inline int enabled_in_this_frame(const controller *c, uint64_t enabled) {
+    return enabled == c->segment->counters.frames;
+}
+
+/* May this byte be written now, as far as protection goes? The enable registers always may. */
+static inline int byte_unprotected(const controller *c, uint32_t address) {
+    if (!c->is_protected || address == REG_WRITE_ENABLE || address == REG_ESC_WRITE_ENABLE)
+        return 1;
+    if ((c->memory[REG_ESC_WRITE_PROTECTION] & 1) && !enabled_in_this_frame(c, c->esc_enabled))
+        return 0;
+    return address >= REG_USER_RAM || !(c->memory[REG_WRITE_PROTECTION] & 1)
+        || enabled_in_this_frame(c, c->registers_enabled);
+}
+
+/* May process RAM and what lies beyond the registers? */
+static inline int ram_unprotected(const controller *c) {
+    return !c->is_protected || byte_unprotected(c, REG_USER_RAM);
+}
+
+static void protection_written(controller *c) {
+    uint8_t *m = c->memory;
+    if (m[REG_WRITE_ENABLE] & 1)
+        c->registers_enabled = c->segment->counters.frames;
+    if (m[REG_ESC_WRITE_ENABLE] & 1)
+        c->esc_enabled = c->segment->counters.frames;
+    m[REG_WRITE_ENABLE] = m[REG_ESC_WRITE_ENABLE] = 0;
+    c->is_protected = (m[REG_WRITE_PROTECTION] | m[REG_ESC_WRITE_PROTECTION]) & 1;
+}
+
+/* The register shows how far the sequence has come. */
+static void reset_written(controller *c) {
+    static const uint8_t sequence[3] = {0x52, 0x45, 0x53};
+    uint8_t value = c->memory[REG_RESET];
+    c->reset_step = value == sequence[c->reset_step] ? c->reset_step + 1 : value == sequence[0];
+    if (c->reset_step == 3) {
+        c->reset_step = 0;
+        raise_event(c, EVENT_RESET);
+    }
+    c->memory[REG_RESET] = c->reset_step;
+}
+
+#endif
