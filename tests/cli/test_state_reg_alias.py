@@ -56,7 +56,7 @@ def test_reg_read_explains_a_register(capsys: pytest.CaptureFixture[str]) -> Non
 
 
 def test_reg_read_of_many_bytes_is_a_dump(capsys: pytest.CaptureFixture[str]) -> None:
-    _, out, _ = call("reg read virtual 2 0x0300 20", capsys)
+    _, out, _ = call("reg read virtual 2 0x0301 20", capsys)
     assert out.splitlines() == ["  0000 " + " 00" * 16, "  0010 " + " 00" * 4]
 
 

@@ -25,6 +25,7 @@ from catenary.wire import (
     coe,
     datagram,
     dl,
+    error_counters,
     features,
     fmmu,
     frame,
@@ -163,6 +164,12 @@ TARGETS = (
         (bytes.fromhex("0000000001000007000f000201000000"),),
     ),
     Target("features.decode_information", features.decode_information, _method, (b"\x11" * 10,)),
+    Target(
+        "error_counters.decode_error_counters",
+        error_counters.decode_error_counters,
+        _method,
+        (bytes(range(20)),),
+    ),
     Target("clock.decode_clock", clock.decode_clock, _method, (bytes(range(56)),)),
     Target(
         "clock.decode_receive_times",

@@ -22,6 +22,7 @@ from catenary.procedure.stations import assign, bring_all_down, count, duplicate
 from catenary.wire.al import State
 
 if TYPE_CHECKING:  # plan needs NumPy, a scan does not
+    from catenary.bus.diagnosis import Diagnosis
     from catenary.bus.states import Outcome
     from catenary.plan.cycle import Order, ReceiveMode
     from catenary.plan.make import Plan
@@ -185,6 +186,22 @@ class MainDevice:
         from catenary.bus.states import request_states
 
         return request_states(self._runner, [sub.description for sub in subs], positions, state)
+
+    def diagnose(
+        self, *, since: Diagnosis | None = None, subs: Sequence[SubDevice] | None = None
+    ) -> Diagnosis:
+        """Reads the error counters and states of all devices and judges where a fault is: cable,
+        device, power. Also while a loop runs, from any thread but the loop's: one frame or a few.
+
+        `since`: an earlier diagnosis, after which is counted; else since the devices' power-up.
+        `subs`: those of a `look`; else those of the last `scan`.
+        """
+        from catenary.bus.diagnosis import diagnose
+
+        counts = self._blocking.counts if self._blocking is not None else FrameCounts()
+        lost = counts.lost + counts.malformed
+        chosen = self.subs if subs is None else subs
+        return self.converse(diagnose(chosen, since=since, lost_frames=lost))
 
     def plan(
         self,

@@ -7,10 +7,24 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from catenary.cli import alias, bench, demo, realtime, reg, scan, sdo, sii, state, virtual
+from catenary.cli import (
+    alias,
+    bench,
+    demo,
+    diag,
+    graph,
+    realtime,
+    reg,
+    scan,
+    sdo,
+    sii,
+    state,
+    virtual,
+)
 from catenary.cli.failure import INTERRUPTED, USAGE, report, silence_stdout
 
 DESCRIPTION = "Real-time EtherCAT for Python."
+COMMANDS = (scan, state, graph, diag, sdo, reg, alias, sii, demo, bench, virtual, realtime)
 EPILOG = """\
 TARGET is a network interface (eth0) or a virtual segment (virtual, virtual:FILE.toml).
 
@@ -47,7 +61,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action=ShowVersion, nargs=0, help="print the version")
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for command in (scan, state, sdo, reg, alias, sii, demo, bench, virtual, realtime):
+    for command in COMMANDS:
         command.add_parser(commands)
     return parser
 

@@ -112,6 +112,7 @@ PROCESSING_UNIT_ERROR_COUNTER = Register[int](0x030C, "<B", "ECAT processing uni
 PDI_ERROR_COUNTER = Register[int](0x030D, "<B", "PDI error counter")
 PDI_ERROR_CODE = Register[int](0x030E, "<B", "PDI error code")
 LOST_LINK_COUNTERS = Register[bytes](0x0310, "4s", "lost link counters")
+ERROR_COUNTERS = Register[bytes](0x0300, "20s", "error counters")  # all of them
 
 # Watchdogs
 WATCHDOG_DIVIDER = Register[int](0x0400, "<H", "watchdog divider")

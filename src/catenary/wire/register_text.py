@@ -12,6 +12,7 @@ from catenary.wire.al import AlControl, AlStatus, status_code
 from catenary.wire.clock import Activation as SyncActivation
 from catenary.wire.clock import decode_clock, decode_difference
 from catenary.wire.dl import PORTS, DlControl, DlStatus
+from catenary.wire.error_counters import decode_error_counters
 from catenary.wire.features import decode_information
 from catenary.wire.fmmu import decode_fmmu
 from catenary.wire.register_names import AnyRegister
@@ -140,6 +141,19 @@ def _rx_errors(data: bytes) -> str:
     )
 
 
+def _error_counters(data: bytes) -> str:
+    found = decode_error_counters(data)
+    parts = [
+        f"port {n}: {each.invalid_frames} invalid frames, {each.symbol_errors} symbol errors, "
+        f"{each.forwarded} forwarded, {each.lost_links} lost links"
+        for n, each in enumerate(found.ports)
+        if each
+    ]
+    others = (("processing unit", found.processing_unit), ("PDI", found.pdi))
+    parts += [f"{who}: {count}" for who, count in others if count]
+    return "; ".join(parts) or "no errors"
+
+
 def _per_port(data: bytes) -> str:
     return "; ".join(f"port {n}: {data[n]}" for n in PORTS)
 
@@ -174,6 +188,7 @@ _MEANINGS: tuple[tuple[AnyRegister, Explain], ...] = (
     (register.AL_CONTROL, _al_control),
     (register.AL_STATUS, _al_status),
     (register.AL_STATUS_CODE, _al_status_code),
+    (register.ERROR_COUNTERS, _error_counters),
     (register.RX_ERROR_COUNTERS, _rx_errors),
     (register.FORWARDED_RX_ERROR_COUNTERS, _per_port),
     (register.LOST_LINK_COUNTERS, _per_port),

@@ -1,0 +1,106 @@
+"""A diagnosis of the whole segment: what all devices have counted, who is silent, who complains,
+and what that means."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from catenary.bus.sub_device import SubDevice
+from catenary.errors import DecodeError
+from catenary.model.diagnosis import Observation, judge
+from catenary.model.finding import Finding, Kind, Names
+from catenary.model.silence import judge_silence
+from catenary.model.topology import Topology, make_topology
+from catenary.procedure.error_counters import read_error_counters
+from catenary.procedure.exchange import Procedure
+from catenary.procedure.survey import Answer, survey
+from catenary.wire.al import AlStatus, status_code
+from catenary.wire.error_counters import ErrorCounters
+
+_ERROR_BIT = 0x10
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """What was found. `counters`: by position, of the span of time that was judged, None where
+    nobody answered; `totals`: since power-up. `str()` says it in words."""
+
+    findings: tuple[Finding, ...]
+    counters: tuple[ErrorCounters | None, ...]
+    totals: tuple[ErrorCounters | None, ...]
+    topology: Topology
+    names: Names
+    lost_frames: int = 0  # in all
+
+    def __str__(self) -> str:
+        if not self.findings:
+            return f"nothing found: {len(self.topology)} devices"
+        return "\n".join(map(str, self.findings))
+
+    def __bool__(self) -> bool:
+        """Whether a fault was found."""
+        return bool(self.findings)
+
+
+def diagnose(
+    subs: Sequence[SubDevice], *, since: Diagnosis | None = None, lost_frames: int = 0
+) -> Procedure[Diagnosis]:
+    """Asks all devices in shared frames and judges. `since`: an earlier diagnosis, after which is
+    counted; else all that was counted since the power-up. Nobody's silence is an error."""
+    stations = [sub.station for sub in subs]
+    totals = yield from read_error_counters(stations)
+    answers = yield from survey(stations)
+    topology = make_topology([sub.description.open_ports for sub in subs])
+    names = Names(tuple(sub.name for sub in subs))
+    counters, restarted = _since(totals, since)
+    lost_before = since.lost_frames if since is not None else lost_frames
+    seen = Observation(topology, names, counters, restarted, lost_frames - lost_before)
+    silent = [answer.station.position for answer in answers if answer.word is None]
+    findings = (
+        *judge_silence(topology, names, silent),
+        *judge(seen),
+        *_wiring(topology),
+        *_complaints(names, answers),
+    )
+    return Diagnosis(findings, counters, totals, topology, names, lost_frames)
+
+
+def _since(
+    totals: tuple[ErrorCounters | None, ...], before: Diagnosis | None
+) -> tuple[tuple[ErrorCounters | None, ...], frozenset[int]]:
+    """What was counted after `before`, and whose counters began again."""
+    if before is None or len(before.totals) != len(totals):
+        return totals, frozenset()
+    pairs = list(zip(totals, before.totals, strict=True))
+    counted = tuple(now if now is None or then is None else now.since(then) for now, then in pairs)
+    restarted = frozenset(
+        position
+        for position, (now, then) in enumerate(pairs)
+        if now is not None and then is not None and now.restarted(then)
+    )
+    return counted, restarted
+
+
+def _wiring(topology: Topology) -> list[Finding]:
+    return [
+        Finding(Kind.WIRING, "the wiring", text, "catenary graph shows the tree that was found")
+        for text in topology.contradictions
+    ]
+
+
+def _complaints(names: Names, answers: Sequence[Answer]) -> list[Finding]:
+    """Devices in a state with an error."""
+    found = []
+    for answer in answers:
+        if answer.word is None or not answer.word & _ERROR_BIT:
+            continue
+        position, code = answer.station.position, status_code(answer.code)
+        try:
+            state = str(AlStatus.from_word(answer.word).state)
+        except DecodeError:
+            state = f"state {answer.word & 0xF}"
+        evidence = f"in {state} with an error, AL status code 0x{answer.code:04X}: {code.text}"
+        advice = code.cause or "see its manual"
+        found.append(Finding(Kind.DEVICE, names.device(position), evidence, advice, (position,)))
+    return found

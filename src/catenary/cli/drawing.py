@@ -1,0 +1,100 @@
+"""What a drawing of a segment shows, and the drawing as text."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from catenary.cli.tables import table
+from catenary.model.topology import Topology
+from catenary.wire.error_counters import ErrorCounters, PortErrors
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """One device. `delay_ns`: of its cable and the device before, one way; None: not known."""
+
+    name: str
+    alias: int
+    state: str
+    delay_ns: int | None
+    errors: ErrorCounters | None  # None: not asked, or no answer
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """A segment: its tree and what stands in it, by position."""
+
+    target: str
+    topology: Topology
+    nodes: tuple[Node, ...]
+
+
+HEADINGS = ("device", "cable from", "delay", "state", "alias", "errors")
+
+
+def as_text(drawing: Drawing) -> str:
+    """A line stays a column; a branch is indented, and the way on goes on below it."""
+    rows = [
+        (f"{indent}{position} {node.name}", _from(drawing, position), *_facts(node))
+        for position, (indent, node) in enumerate(
+            zip(indents(drawing.topology), drawing.nodes, strict=True)
+        )
+    ]
+    notes = [f"! {text}" for text in drawing.topology.contradictions]
+    return "\n".join([table([HEADINGS, *rows]), *notes])
+
+
+def indents(topology: Topology) -> tuple[str, ...]:
+    """What stands before each device: `├─` begins a branch, `│ ` leads past one."""
+    found: list[str] = []
+    depths: list[int] = []
+    for position, place in enumerate(topology.places):
+        if place.parent is None:
+            depth, begins = 0, False
+        else:
+            siblings = topology.children(place.parent)
+            begins = siblings[-1].lower != position
+            depth = depths[place.parent] + begins
+        depths.append(depth)
+        bars = "│ " * (depth - begins)
+        found.append(bars + "├─" * begins)
+    return tuple(found)
+
+
+def _from(drawing: Drawing, position: int) -> str:
+    place = drawing.topology.places[position]
+    if place.parent is None:
+        return drawing.target if position == 0 else "?"
+    return f"{place.parent} port {place.parent_port}"
+
+
+def _facts(node: Node) -> tuple[str, ...]:
+    delay = "" if node.delay_ns is None else f"{node.delay_ns} ns"
+    return (delay, node.state, str(node.alias or ""), error_text(node.errors))
+
+
+def error_text(errors: ErrorCounters | None) -> str:
+    """The counters that are not zero."""
+    if errors is None:
+        return ""
+    parts = [f"port {n}: {port_text(port)}" for n, port in enumerate(errors.ports) if port]
+    return "; ".join([*parts, inner_text(errors)] if inner_text(errors) else parts)
+
+
+def inner_text(errors: ErrorCounters | None) -> str:
+    """What the device has counted inside, and not at its port 0 as well."""
+    if errors is None:
+        return ""
+    outside = errors.ports[0].invalid_frames or errors.ports[0].forwarded
+    numbers = ((0 if outside else errors.processing_unit, "processing unit"), (errors.pdi, "PDI"))
+    return ", ".join(f"{what} {count}" for count, what in numbers if count)
+
+
+def port_text(port: PortErrors) -> str:
+    numbers = (
+        (port.invalid_frames, "broken"),
+        (port.symbol_errors, "symbol"),
+        (port.forwarded, "forwarded"),
+        (port.lost_links, "lost links"),
+    )
+    return ", ".join(f"{count} {what}" for count, what in numbers if count)

@@ -1,0 +1,84 @@
+"""`catenary graph TARGET`: how the devices are wired."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from catenary.cli.parsers import Commands, add_command, add_target
+
+if TYPE_CHECKING:
+    from catenary.bus import MainDevice, SubDevice
+    from catenary.cli.drawing import Drawing
+    from catenary.model.topology import Topology
+
+
+def add_parser(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "graph",
+        help="draw how the devices are wired",
+        description="Draws the tree of the segment: devices, ports, delays of the cables where "
+        "clocks measure them (one way, with the device before), states and error counters. "
+        "Exit status 1 where the ports contradict each other.",
+        example="catenary graph eth0\ncatenary graph eth0 --dot | dot -Tsvg -o segment.svg",
+    )
+    add_target(parser)
+    parser.add_argument("--dot", action="store_true", help="for Graphviz")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from catenary.cli.drawing import as_text
+    from catenary.cli.drawing_dot import as_dot
+    from catenary.target import MainDevice
+
+    with MainDevice(arguments.target) as main:
+        subs = main.look()
+        drawing = draw(arguments.target, main, subs)
+    print(as_dot(drawing) if arguments.dot else as_text(drawing))
+    if arguments.dot:
+        for text in drawing.topology.contradictions:
+            print(f"catenary: {text}", file=sys.stderr)
+    return int(bool(drawing.topology.contradictions))
+
+
+def draw(target: str, main: MainDevice, subs: Sequence[SubDevice]) -> Drawing:
+    """Asks for what is drawn."""
+    from catenary.cli.drawing import Drawing, Node
+    from catenary.procedure.clocks import measure
+    from catenary.procedure.survey import survey
+
+    found = main.diagnose(subs=subs)
+    measured = main.converse(measure([sub.description for sub in subs]))
+    answers = main.converse(survey([sub.station for sub in subs]))
+    delays = cable_delays(found.topology, measured.delays_ns)
+    nodes = tuple(
+        Node(sub.name, sub.alias, _state(answer.word), delay, errors)
+        for sub, answer, delay, errors in zip(subs, answers, delays, found.totals, strict=True)
+    )
+    return Drawing(target, found.topology, nodes)
+
+
+def cable_delays(topology: Topology, delays_ns: Sequence[int | None]) -> tuple[int | None, ...]:
+    """From the device before to each device [ns], where both have clocks."""
+    found: list[int | None] = []
+    for place, delay in zip(topology.places, delays_ns, strict=True):
+        before = None if place.parent is None else delays_ns[place.parent]
+        found.append(None if delay is None or before is None else delay - before)
+    return tuple(found)
+
+
+def _state(word: int | None) -> str:
+    from catenary.errors import DecodeError
+    from catenary.wire.al import AlStatus
+
+    if word is None:
+        return "silent"
+    try:
+        status = AlStatus.from_word(word)
+    except DecodeError:
+        return f"state {word & 0xF}"
+    return f"{status.state} + ERROR" if status.error else str(status.state)

@@ -1,0 +1,211 @@
+"""Error counters → the cable or device at fault, on hand-made tables.
+
+The cases are those of Beckhoff's application note "ESC FAQ", §3.12.4, figure 2.
+"""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from catenary.model.diagnosis import judge
+from catenary.model.finding import Kind
+from catenary.model.topology import Cable
+from catenary.wire.error_counters import ErrorCounters, PortErrors
+from tests.model.tables import END, LINE, STAR, counted, line, seen
+
+BROKEN = PortErrors(invalid_frames=14, symbol_errors=3)
+SYMBOLS = PortErrors(symbol_errors=40)
+MARKED = PortErrors(forwarded=14)
+LOST = PortErrors(lost_links=2)
+
+
+def test_nothing_counted_nothing_found() -> None:
+    assert judge(seen(line(5), {})) == ()
+
+
+def test_broken_frames_at_a_port_are_the_cable_to_it() -> None:
+    table = {
+        2: counted(p0=BROKEN, processing_unit=14),
+        3: counted(p0=MARKED, processing_unit=14),
+        1: counted(p1=MARKED),
+    }
+    [found] = judge(seen(line(4), table))
+    assert found.kind is Kind.CABLE
+    assert found.cable == Cable(1, 1, 2)
+    assert found.where == "the cable between device 1 (d1) port 1 and device 2 (d2) port 0"
+    assert found.evidence == "14 broken frames, 3 symbol errors at device 2 (d2) port 0"
+
+
+def test_broken_frames_on_the_way_back_are_the_same_cable() -> None:
+    [found] = judge(seen(line(4), {1: counted(p1=BROKEN), 0: counted(p1=MARKED)}))
+    assert found.cable == Cable(1, 1, 2)
+    assert "at device 1 (d1) port 1" in found.evidence
+
+
+def test_both_ends_of_a_cable_are_one_finding() -> None:
+    [found] = judge(seen(line(4), {1: counted(p1=BROKEN), 2: counted(p0=BROKEN)}))
+    assert found.cable == Cable(1, 1, 2)
+    assert found.evidence.count("14 broken frames") == 2
+
+
+def test_the_cable_to_the_first_device() -> None:
+    [found] = judge(seen(line(3), {0: counted(p0=BROKEN)}))
+    assert found.where == "the cable between the MainDevice and device 0 (d0) port 0"
+
+
+def test_noise_between_frames_is_named_too() -> None:
+    [found] = judge(seen(line(3), {1: counted(p0=SYMBOLS)}))
+    assert (found.kind, found.evidence) == (Kind.CABLE, "40 symbol errors at device 1 (d1) port 0")
+
+
+def test_a_counter_that_is_full_says_so() -> None:
+    [found] = judge(seen(line(3), {1: counted(p0=PortErrors(invalid_frames=255))}))
+    assert "255 or more broken frames" in found.evidence
+
+
+def test_a_branch_is_told_from_the_trunk() -> None:
+    # 0 ─ 1 with branches: port 3 → 2, port 1 → 3, port 2 → 4
+    ports = [LINE, STAR, END, END, END]
+    [found] = judge(seen(ports, {1: counted(p2=BROKEN)}))
+    assert found.cable == Cable(1, 2, 4)
+    [found] = judge(seen(ports, {2: counted(p0=BROKEN)}))
+    assert found.cable == Cable(1, 3, 2)
+
+
+def test_two_cables_that_share_no_device_are_two_findings_the_worse_first() -> None:
+    table = {1: counted(p0=PortErrors(1)), 4: counted(p0=BROKEN)}
+    found = judge(seen(line(6), table))
+    assert [each.cable for each in found] == [Cable(3, 1, 4), Cable(0, 1, 1)]
+
+
+def test_all_cables_of_one_device_are_that_device() -> None:
+    [found] = judge(seen(line(5), {2: counted(p0=BROKEN, p1=BROKEN)}))
+    assert (found.kind, found.devices) == (Kind.DEVICE, (2,))
+    # the same where it is the device that sends badly: its neighbours count
+    [found] = judge(seen(line(5), {1: counted(p1=BROKEN), 3: counted(p0=BROKEN)}))
+    assert (found.kind, found.devices) == (Kind.DEVICE, (2,))
+
+
+def test_noise_on_most_cables_is_no_cable() -> None:
+    table = {n: counted(p0=PortErrors(n + 1)) for n in range(4)}
+    [found] = judge(seen(line(5), table))
+    assert (found.kind, found.devices) == (Kind.EVERYWHERE, (0, 1, 2, 3))
+    assert "4 of 5 cables" in found.evidence
+    assert "the worst is the cable between device 2 (d2) port 1 and device 3" in found.evidence
+
+
+def test_a_pulled_cable_is_counted_at_both_ends() -> None:
+    [found] = judge(seen(line(4), {1: counted(p1=LOST), 2: counted(p0=LOST)}))
+    assert (found.kind, found.cable) == (Kind.CABLE, Cable(1, 1, 2))
+    assert found.evidence.count("2 lost links") == 2
+
+
+def test_a_device_that_lost_its_power_has_counted_nothing_itself() -> None:
+    [found] = judge(seen(line(4), {1: counted(p1=LOST), 3: counted(p0=LOST)}))
+    assert (found.kind, found.devices) == (Kind.POWER, (2,))
+    assert found.where == "the power of device 2 (d2)"
+    assert "device 1 (d1) port 1 lost its link 2 times" in found.evidence
+
+
+def test_the_last_device_losing_its_power() -> None:
+    [found] = judge(seen(line(4), {2: counted(p1=PortErrors(lost_links=1))}))
+    assert (found.kind, found.devices) == (Kind.POWER, (3,))
+    assert "once" in found.evidence
+
+
+def test_a_junction_losing_its_power_explains_all_its_cables() -> None:
+    ports = [LINE, STAR, END, END, END]
+    table = {0: counted(p1=LOST), **{n: counted(p0=LOST) for n in (2, 3, 4)}}
+    [found] = judge(seen(ports, table))
+    assert (found.kind, found.devices) == (Kind.POWER, (1,))
+
+
+def test_a_device_that_began_again_may_have_counted_since() -> None:
+    table = {1: counted(p1=LOST), 2: counted(p0=PortErrors(lost_links=1)), 3: counted(p0=LOST)}
+    found = judge(seen(line(4), table, restarted=frozenset((2,))))
+    assert [each.kind for each in found] == [Kind.POWER]
+    found = judge(seen(line(4), table))
+    assert {each.kind for each in found} == {Kind.CABLE}
+
+
+def test_marked_frames_that_nobody_owns_up_to_broke_before_the_device_in_front() -> None:
+    [found] = judge(seen(line(5), {3: counted(p0=MARKED, processing_unit=14)}))
+    assert found.kind is Kind.CABLE
+    assert found.cable == Cable(1, 1, 2)
+    assert "marked as broken, and no device has counted where they broke" in found.evidence
+
+
+def test_frames_marked_before_the_first_device() -> None:
+    [found] = judge(seen(line(3), {0: counted(p0=MARKED)}))
+    assert found.kind is Kind.MAIN
+
+
+def test_whole_frames_that_are_no_ethercat_are_the_main_devices() -> None:
+    table = {n: counted(processing_unit=5) for n in range(3)}
+    [found] = judge(seen(line(3), table))
+    assert found.kind is Kind.MAIN
+    assert "no other program" in found.advice
+
+
+def test_whole_frames_spoilt_inside_a_device() -> None:
+    [found] = judge(seen(line(4), {2: counted(processing_unit=5), 3: counted(processing_unit=5)}))
+    assert (found.kind, found.devices) == (Kind.DEVICE, (1, 2))
+
+
+def test_lost_frames_that_no_device_has_seen_broken() -> None:
+    [found] = judge(seen(line(3), {}, lost_frames=7))
+    assert found.kind is Kind.MAIN
+    assert "the way back from device 0 (d0) to the MainDevice" in found.where
+
+
+def test_lost_frames_are_explained_by_a_cable() -> None:
+    [found] = judge(seen(line(3), {1: counted(p0=BROKEN)}, lost_frames=7))
+    assert found.kind is Kind.CABLE
+
+
+def test_errors_of_the_processors_interface_are_no_cables() -> None:
+    [found] = judge(seen(line(3), {1: counted(pdi=3)}))
+    assert (found.kind, found.devices) == (Kind.DEVICE, (1,))
+
+
+def test_a_silent_device_has_no_counters() -> None:
+    table = seen(line(3), {1: counted(p0=BROKEN)})
+    quiet = type(table)(table.topology, table.names, (*table.errors[:2], None))
+    [found] = judge(quiet)
+    assert found.cable == Cable(0, 1, 1)
+
+
+byte = st.integers(0, 255)
+port_errors = st.builds(PortErrors, byte, byte, byte, byte)
+counters = st.builds(ErrorCounters, st.tuples(*[port_errors] * 4), byte, byte)
+
+
+@given(
+    st.lists(st.tuples(*[st.booleans()] * 4), min_size=1, max_size=8),
+    st.lists(st.none() | counters, min_size=8, max_size=8),
+    st.sets(st.integers(0, 7)),
+    byte,
+)
+def test_any_counts_on_any_ports_are_judged(ports, errors, restarted, lost) -> None:
+    table = seen(list(ports), {}, restarted=frozenset(restarted), lost_frames=lost)
+    found = judge(
+        type(table)(table.topology, table.names, tuple(errors[: len(ports)]), table.restarted, lost)
+    )
+    for each in found:
+        assert each.where
+        assert each.evidence
+        assert each.advice
+        assert all(0 <= position < len(ports) for position in each.devices)
+
+
+@given(st.integers(2, 12), st.data())
+def test_one_noisy_cable_of_a_line_is_found(count: int, data: st.DataObject) -> None:
+    """Marks behind it, forwarded by every device the frame still passes, do not mislead."""
+    at = data.draw(st.integers(0, count - 1))
+    table = {n: counted(p0=MARKED, p1=MARKED, processing_unit=14) for n in range(at + 1, count)}
+    table |= {n: counted(p1=MARKED) for n in range(at)}
+    table[at] = counted(p0=BROKEN, p1=MARKED, processing_unit=14)
+    [found] = judge(seen(line(count), table))
+    assert found.cable is not None
+    assert found.cable.lower == at
