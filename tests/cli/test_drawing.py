@@ -52,7 +52,7 @@ def test_text_shows_what_contradicts_itself() -> None:
 
 def test_errors_in_a_few_words() -> None:
     errors = counted(p0=PortErrors(14, 3), p1=PortErrors(lost_links=1), processing_unit=14, pdi=2)
-    assert error_text(errors) == "port 0: 14 broken, 3 symbol; port 1: 1 lost links; PDI 2"
+    assert error_text(errors) == "port 0: 14 broken, 3 symbol; port 1: 1 lost link; PDI 2"
     assert error_text(ErrorCounters()) == error_text(None) == ""
 
 

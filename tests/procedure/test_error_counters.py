@@ -7,10 +7,13 @@ from collections.abc import Iterator
 import pytest
 
 import catenary as cat
-from catenary.errors import NoDeviceError
+from catenary.errors import NoDeviceError, ResponseTimeout
 from catenary.procedure.error_counters import clear_error_counters, read_error_counters
+from catenary.procedure.exchange import Reply, Request
 from catenary.procedure.exercise import exercise
+from catenary.procedure.station import Station
 from catenary.wire.error_counters import ErrorCounters, PortErrors
+from tests.procedure.by_hand import play
 
 
 @pytest.fixture
@@ -39,8 +42,26 @@ def test_a_silent_device_is_none(segment: cat.Segment, main: cat.MainDevice) -> 
     stations = [sub.station for sub in main.look(names=False)]
     segment.plug(devices=2)
     found = main.converse(read_error_counters(stations))
-    assert found[:2] == (ErrorCounters(), ErrorCounters())
+    assert found[1] is not None
+    assert found[1].ports[1].lost_links == 1
     assert set(found[2:]) == {None}
+
+
+def test_where_no_frame_comes_back_nobody_has_said_anything(
+    segment: cat.Segment, main: cat.MainDevice
+) -> None:
+    stations = [sub.station for sub in main.look(names=False)]
+    segment.unplug()
+    assert set(main.converse(read_error_counters(stations))) == {None}
+
+
+def test_a_frame_that_is_lost_is_no_silence() -> None:
+    def answer(request: Request) -> Reply:
+        return Reply(request.data, 1, lost=request.address & 0xFFFF == 0x1002)
+
+    stations = [Station(0, 0x1001), Station(1, 0x1002)]
+    with pytest.raises(ResponseTimeout, match="device 1: error counters: the frame did not come"):
+        play(read_error_counters(stations), answer)
 
 
 def test_nobody_to_ask(main: cat.MainDevice) -> None:

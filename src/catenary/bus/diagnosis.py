@@ -31,7 +31,6 @@ class Diagnosis:
     totals: tuple[ErrorCounters | None, ...]
     topology: Topology
     names: Names
-    lost_frames: int = 0  # in all
 
     def __str__(self) -> str:
         if not self.findings:
@@ -47,15 +46,15 @@ def diagnose(
     subs: Sequence[SubDevice], *, since: Diagnosis | None = None, lost_frames: int = 0
 ) -> Procedure[Diagnosis]:
     """Asks all devices in shared frames and judges. `since`: an earlier diagnosis, after which is
-    counted; else all that was counted since the power-up. Nobody's silence is an error."""
+    counted; else all that was counted since the power-up. Nobody's silence is an error.
+    `lost_frames`: that did not come back whole in the same time."""
     stations = [sub.station for sub in subs]
     totals = yield from read_error_counters(stations)
     answers = yield from survey(stations)
     topology = make_topology([sub.description.open_ports for sub in subs])
     names = Names(tuple(sub.name for sub in subs))
     counters, restarted = _since(totals, since)
-    lost_before = since.lost_frames if since is not None else lost_frames
-    seen = Observation(topology, names, counters, restarted, lost_frames - lost_before)
+    seen = Observation(topology, names, counters, restarted, lost_frames)
     silent = [answer.station.position for answer in answers if answer.word is None]
     findings = (
         *judge_silence(topology, names, silent),
@@ -63,7 +62,7 @@ def diagnose(
         *_wiring(topology),
         *_complaints(names, answers),
     )
-    return Diagnosis(findings, counters, totals, topology, names, lost_frames)
+    return Diagnosis(findings, counters, totals, topology, names)
 
 
 def _since(

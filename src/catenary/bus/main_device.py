@@ -188,20 +188,23 @@ class MainDevice:
         return request_states(self._runner, [sub.description for sub in subs], positions, state)
 
     def diagnose(
-        self, *, since: Diagnosis | None = None, subs: Sequence[SubDevice] | None = None
+        self,
+        *,
+        since: Diagnosis | None = None,
+        subs: Sequence[SubDevice] | None = None,
+        lost_frames: int = 0,
     ) -> Diagnosis:
         """Reads the error counters and states of all devices and judges where a fault is: cable,
         device, power. Also while a loop runs, from any thread but the loop's: one frame or a few.
 
         `since`: an earlier diagnosis, after which is counted; else since the devices' power-up.
-        `subs`: those of a `look`; else those of the last `scan`.
+        `subs`: those of a `look`; else those of the last `scan`. `lost_frames`: that the caller has
+        not got back whole in the same time.
         """
         from catenary.bus.diagnosis import diagnose
 
-        counts = self._blocking.counts if self._blocking is not None else FrameCounts()
-        lost = counts.lost + counts.malformed
         chosen = self.subs if subs is None else subs
-        return self.converse(diagnose(chosen, since=since, lost_frames=lost))
+        return self.converse(diagnose(chosen, since=since, lost_frames=lost_frames))
 
     def plan(
         self,

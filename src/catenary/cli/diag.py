@@ -46,8 +46,8 @@ def run(arguments: argparse.Namespace) -> int:
         subs = main.look()
         found = main.diagnose(subs=subs)
         if arguments.seconds is not None:
-            sent, _ = main.converse(exercise(arguments.seconds))
-            found = main.diagnose(subs=subs, since=found)
+            sent, lost = main.converse(exercise(arguments.seconds))
+            found = main.diagnose(subs=subs, since=found, lost_frames=lost)
         if arguments.clear:
             main.converse(clear_error_counters([sub.station for sub in subs]))
     print(as_json(found, arguments.seconds) if arguments.json else as_text(found, sent, arguments))

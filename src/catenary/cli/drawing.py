@@ -95,6 +95,6 @@ def port_text(port: PortErrors) -> str:
         (port.invalid_frames, "broken"),
         (port.symbol_errors, "symbol"),
         (port.forwarded, "forwarded"),
-        (port.lost_links, "lost links"),
+        (port.lost_links, "lost link" if port.lost_links == 1 else "lost links"),
     )
     return ", ".join(f"{count} {what}" for count, what in numbers if count)

@@ -63,6 +63,7 @@ class Observation:
 def judge(seen: Observation) -> tuple[Finding, ...]:
     """What is wrong, the likeliest cause of the most first. Empty: nothing is."""
     power, explained = _power(seen)
+    explained |= _interrupted(seen)
     transport = [*power, *_links(seen, explained), *_noise(seen)]
     transport = transport or [*_forwarded(seen), *_processing_units(seen)]
     transport = transport or [*_lost_frames(seen)]
@@ -83,7 +84,9 @@ def _power(seen: Observation) -> tuple[list[Finding], set[Cable]]:
         far = [end for end in far if end[0] is not None]
         lost = [end for end in far if seen.port(*end).lost_links]
         counted = errors is not None and any(port.lost_links for port in errors.ports)
-        if not lost or len(lost) < len(far) or (counted and position not in seen.restarted):
+        if errors is None or not lost or len(lost) < len(far):
+            continue
+        if counted and position not in seen.restarted:
             continue
         explained.update(cables)
         told = " and ".join(
@@ -94,6 +97,12 @@ def _power(seen: Observation) -> tuple[list[Finding], set[Cable]]:
         evidence = f"{told}, while it has counted none itself: its counters began again"
         found.append(Finding(Kind.POWER, where, evidence, _POWER, (position,)))
     return found, explained
+
+
+def _interrupted(seen: Observation) -> set[Cable]:
+    """The cables of devices that do not answer: of those `judge_silence` tells."""
+    silent = {position for position, errors in enumerate(seen.errors) if errors is None}
+    return {cable for cable in seen.topology.cables if silent & {cable.upper, cable.lower}}
 
 
 def _far_end(cable: Cable, position: int) -> tuple[int | None, int | None]:
@@ -168,11 +177,11 @@ def _counted(seen: Observation, cable: Cable) -> str:
     parts = []
     for end, count in ((cable[:2], upper), (cable[2:], lower)):
         numbers = (
-            (count.invalid_frames, "broken frames"),
-            (count.symbol_errors, "symbol errors"),
-            (count.lost_links, "lost links"),
+            (count.invalid_frames, "broken frame"),
+            (count.symbol_errors, "symbol error"),
+            (count.lost_links, "lost link"),
         )
-        words = [f"{_number(number)} {what}" for number, what in numbers if number]
+        words = [counted(number, what) for number, what in numbers if number]
         if words:
             parts.append(f"{', '.join(words)} at {seen.names.end(*end)}")
     return "; ".join(parts)
@@ -188,10 +197,9 @@ def _forwarded(seen: Observation) -> Iterator[Finding]:
     first = next((at for at in path if seen.port(*at).forwarded), None)
     if first is None:
         return
-    number = _number(seen.port(*first).forwarded)
     evidence = (
-        f"{number} frames arrived at {seen.names.end(*first)} marked as broken, and no device has "
-        "counted where they broke"
+        f"{counted(seen.port(*first).forwarded, 'frame')} arrived at {seen.names.end(*first)} "
+        "marked as broken, and no device has counted where they broke"
     )
     rank = path.index(first)
     if rank == 0:
@@ -213,8 +221,8 @@ def _processing_units(seen: Observation) -> Iterator[Finding]:
         if errors.ports[0].invalid_frames or errors.ports[0].forwarded:
             continue  # broken frames are counted here as well
         evidence = (
-            f"{_number(errors.processing_unit)} frames arrived whole at "
-            f"{seen.names.device(position)} and are no valid EtherCAT frames"
+            f"{counted(errors.processing_unit, 'frame')} arrived whole at "
+            f"{seen.names.device(position)}, but as no valid EtherCAT"
         )
         parent = seen.topology.places[position].parent
         if parent is None:
@@ -228,10 +236,11 @@ def _processing_units(seen: Observation) -> Iterator[Finding]:
 def _lost_frames(seen: Observation) -> Iterator[Finding]:
     """Frames that came back broken or not at all, and no device has counted one: they were lost
     behind the last port that counts, on the way back to the MainDevice. Cases 5 and 6."""
-    if not seen.lost_frames:
+    if not seen.lost_frames or None in seen.errors:
         return
     evidence = (
-        f"{seen.lost_frames} frames did not come back whole, and no device has seen a broken one"
+        f"{counted(seen.lost_frames, 'frame')} did not come back whole, and no device has seen a "
+        "broken one"
     )
     where = f"the way back from {seen.names.device(0)} to the MainDevice, its port or its driver"
     advice = f"the cable to the first device: {_CABLE}; {_MAIN}"
@@ -244,14 +253,17 @@ def _lost_frames(seen: Observation) -> Iterator[Finding]:
 def _processors(seen: Observation) -> Iterator[Finding]:
     for position, errors in enumerate(seen.errors):
         if errors is not None and errors.pdi:
-            evidence = f"{_number(errors.pdi)} errors of the interface to its processor (PDI)"
+            evidence = f"{counted(errors.pdi, 'error')} of the interface to its processor (PDI)"
             where = seen.names.device(position)
             yield Finding(Kind.DEVICE, where, evidence, _PDI, (position,))
 
 
-def _number(count: int) -> str:
-    return f"{FULL} or more" if count >= FULL else str(count)
+def counted(count: int, what: str) -> str:
+    """The count in words. A counter stops at 255."""
+    if count == 1:
+        return f"1 {what}"
+    return f"{count} {what}s" if count < FULL else f"{FULL} or more {what}s"
 
 
 def _times(count: int) -> str:
-    return "once" if count == 1 else f"{_number(count)} times"
+    return "once" if count == 1 else counted(count, "time")

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from catenary.procedure.exchange import Procedure, Request, read, write
-from catenary.procedure.station import Station
+from catenary.procedure.station import Station, answered
 from catenary.wire.datagram import Command
 from catenary.wire.error_counters import ErrorCounters, decode_error_counters
 from catenary.wire.register import (
@@ -22,13 +22,19 @@ from catenary.wire.register import (
 
 
 def read_error_counters(stations: Sequence[Station]) -> Procedure[tuple[ErrorCounters | None, ...]]:
-    """What every device has counted; None: it said nothing."""
+    """What every device has counted; None: it said nothing. Where no frame comes back at all,
+    nobody has said anything; ResponseTimeout where only some frames do: the devices asked in the
+    others are not silent."""
     if not stations:
         return ()
     replies = yield [read(Command.FPRD, station.address, ERROR_COUNTERS) for station in stations]
+    if all(reply.lost for reply in replies):
+        return (None,) * len(stations)
     return tuple(
-        None if reply.lost or reply.working_counter == 0 else decode_error_counters(reply.data)
-        for reply in replies
+        None
+        if reply.working_counter == 0 and not reply.lost
+        else decode_error_counters(answered(reply, station, "error counters"))
+        for station, reply in zip(stations, replies, strict=True)
     )
 
 
