@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from catenary.errors import MailboxError, ResponseTimeout
-from catenary.procedure.exchange import After, Procedure, Reply
+from catenary.procedure.exchange import After, Procedure, Reply, Request
 from catenary.procedure.mailbox import drain
 from catenary.procedure.sdo import download, upload
 from catenary.wire.coe import UploadRequest
@@ -215,3 +217,49 @@ def play_on(procedure: Procedure[bytes], device: MailboxDevice) -> bytes:
             replies = yield step
 
     return play(rest(), device)
+
+
+def test_a_device_that_thinks_is_not_looked_at_meanwhile() -> None:
+    """20 ms: looked at again and again for the first answer, once or twice for the others."""
+    lane = channel()
+    looks: list[int] = []
+    answers = Dictionary(OBJECT)
+    device = MailboxDevice(lambda _: [])
+    now = [0]
+    due: list[int] = []
+
+    def answer(request: Request) -> Reply:
+        if request.address >> 16 == 0x080D and len(request.data) == 1:
+            looks[-1] += 1
+            if due and now[0] >= due[0]:
+                due.clear()
+                for message in answers(device.received[-1]):
+                    device.send(message)
+        count = len(device.received)
+        reply = device(request)
+        if len(device.received) > count:
+            due.append(now[0] + 20_000_000)
+        return reply
+
+    for _ in range(6):
+        looks.append(0)
+        assert play_timed(upload(lane, 0x2000, 0), answer, now) == OBJECT[0x2000, 0]
+    assert looks[0] > 8
+    assert max(looks[2:]) <= 5
+
+
+def play_timed(
+    procedure: Procedure[bytes], answer: Callable[[Request], Reply], now: list[int]
+) -> bytes:
+    step = next(procedure)
+    while True:
+        if isinstance(step, After):
+            now[0] += round(step.seconds * 1e9)
+            replies = []
+        else:
+            now[0] += 100_000
+            replies = [answer(request)._replace(time_ns=now[0]) for request in step]
+        try:
+            step = procedure.send(replies)
+        except StopIteration as stop:
+            return stop.value

@@ -41,6 +41,14 @@ def measure_loop(
     )
 
 
+def measure_storm(*, drives: int, rate: int, seconds: float, file: Path | None = None) -> None:
+    """Prints the phases of the cycle with and without a storm of SDOs, and what a large object
+    takes on an idle bus, beside PySOEM's."""
+    from catenary.bench import storm
+
+    storm.measure(drives=drives, rate=rate, seconds=seconds, file=file)
+
+
 def measure_cost(*, seconds: float, file: Path | None = None) -> None:
     """Prints what a cycle costs as a + b·axes + c·bytes."""
     from catenary.bench import loop

@@ -63,6 +63,7 @@ class Round:
     cpu_ns: int  # processor time of the whole process over the measured cycles
     scheduling: str = ""
     late: int = 0  # cycles in which Python was late and the bus went on; threaded only
+    answers: int = 0  # to SDOs, from all devices, over the measured cycles
 
 
 class _Summary(msgspec.Struct):
@@ -70,6 +71,7 @@ class _Summary(msgspec.Struct):
     cpu_ns: int
     scheduling: str
     late: int = 0
+    answers: int = 0
 
 
 def write_job(job: Job, path: Path) -> None:
@@ -81,7 +83,7 @@ def read_job(path: Path) -> Job:
 
 
 def write_round(result: Round, path: Path) -> None:
-    summary = _Summary(result.lost, result.cpu_ns, result.scheduling, result.late)
+    summary = _Summary(result.lost, result.cpu_ns, result.scheduling, result.late, result.answers)
     np.savez(
         path,
         samples=result.samples,
@@ -93,5 +95,10 @@ def read_round(path: Path) -> Round:
     with np.load(path) as file:
         summary = msgspec.json.decode(file["summary"].tobytes(), type=_Summary)
         return Round(
-            file["samples"], summary.lost, summary.cpu_ns, summary.scheduling, summary.late
+            file["samples"],
+            summary.lost,
+            summary.cpu_ns,
+            summary.scheduling,
+            summary.late,
+            summary.answers,
         )

@@ -53,6 +53,7 @@ def as_json(
                 "lost": run.lost,
                 "late": run.late,
                 "cpu_us_per_cycle": round(run.cpu_us_per_cycle, 3),
+                **({"answers": run.answers} if run.answers else {}),
                 "scheduling": run.scheduling,
                 "timing_us": run.timing_us,
             }

@@ -24,6 +24,7 @@ class Run:
     cpu_us_per_cycle: float
     scheduling: str
     timing_us: Timing
+    answers: int = 0  # to SDOs
 
 
 def combine(name: str, rounds: Sequence[Round]) -> Run:
@@ -41,6 +42,7 @@ def combine(name: str, rounds: Sequence[Round]) -> Run:
         cpu_us_per_cycle=sum(one.cpu_ns for one in rounds) * 1e-3 / len(samples),
         scheduling=" / ".join(sorted({one.scheduling for one in rounds})),
         timing_us={phase: summarise(v[~np.isnan(v)]) for phase, v in columns.items()},
+        answers=sum(one.answers for one in rounds),
     )
 
 

@@ -19,6 +19,7 @@ def add_parser(commands: Commands) -> None:
         example="catenary bench loop --peers c,c-ring,pysoem\ncatenary bench scan --drives 100",
     ).add_subparsers(title="commands", metavar="COMMAND", required=True)
     _add_loop(group)
+    _add_storm(group)
     _add_cost(group)
     _add_scan(group)
     _add_virtual(group)
@@ -56,6 +57,24 @@ def _add_loop(group: Commands) -> None:
     )
     _add_file(parser)
     parser.set_defaults(run=run_loop)
+
+
+def _add_storm(group: Commands) -> None:
+    parser = add_command(
+        group,
+        "storm",
+        help="the loop while objects of all devices are read all the time",
+        description="Runs the loop with and without threads that read objects of all devices, in "
+        "turn; then reads a large object on an idle bus, beside PySOEM.",
+        example="catenary bench storm --drives 3 --seconds 10 --json storm.json",
+    )
+    parser.add_argument("--drives", type=positive_number, default=3, metavar="N")
+    parser.add_argument("--rate", type=positive_number, default=1000, metavar="HZ")
+    parser.add_argument(
+        "--seconds", type=positive_seconds, default=10.0, metavar="S", help="of every way (10)"
+    )
+    _add_file(parser)
+    parser.set_defaults(run=run_storm)
 
 
 def _add_cost(group: Commands) -> None:
@@ -145,6 +164,19 @@ def run_loop(arguments: argparse.Namespace) -> int:
         peers=[name for name in arguments.peers.split(",") if name],
         body=arguments.body,
         spin=arguments.spin,
+        file=arguments.json,
+    )
+    return 0
+
+
+def run_storm(arguments: argparse.Namespace) -> int:
+    from catenary import bench
+
+    bench.enter_private_network()
+    bench.measure_storm(
+        drives=arguments.drives,
+        rate=arguments.rate,
+        seconds=arguments.seconds,
         file=arguments.json,
     )
     return 0

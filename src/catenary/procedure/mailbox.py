@@ -24,6 +24,7 @@ from catenary.model.device import MailboxLayout
 from catenary.procedure.exchange import (
     Procedure,
     Reply,
+    Request,
     after,
     read,
     read_memory,
@@ -47,6 +48,9 @@ OUT, IN = 0, 1  # SyncManagers of the mailbox, by the standard
 WRITE_TIMEOUT = 1.0  # [s] until the device has emptied its mailbox
 READ_TIMEOUT = 2.0  # [s] until it answers; AKDs take their time over 0x1010
 REPEAT_TIMEOUT = 0.2  # [s] until it acknowledges a repeat request
+EAGER_MAX = 256  # bytes of a mailbox that is read without a look before
+LOOK = 100e-6  # [s] between the first two looks whether it has answered
+THINKS_MAX_NS = 20_000_000
 TURN = 0.5e-3  # [s] between two looks whether the mailbox is free
 GRACE = 0.1  # [s] for an answer to a message whose frame was lost
 RECOVERIES = 5  # of one message, then the cable is to blame
@@ -82,12 +86,23 @@ class MailboxChannel:
     listener: Listener | None = None
     dropped: int = 0  # messages nobody waited for, duplicates
     turns: deque[object] = field(default_factory=deque)  # conversations: the first one holds it
+    posted_ns: int | None = None  # when it was asked last, until the answer is there
+    thinks_ns: int = 0  # the device, before it answers, at least
     owed: bool = False  # a question was given up; its answer may still come
 
     def reset(self) -> None:
         """After the SyncManagers were configured anew."""
         self.counter = self.received_counter = 0
         self.repeat_requested = self.owed = False
+
+    def learn(self, empty_ns: int | None) -> None:
+        """An answer is there; at `empty_ns` it was not yet (None: nobody had looked). Nobody looks
+        much earlier the next time: a device takes as long again, and looks cost frames."""
+        if empty_ns is None:
+            self.thinks_ns = self.thinks_ns * 9 // 10
+        elif self.posted_ns is not None:
+            self.thinks_ns = min(empty_ns - self.posted_ns, THINKS_MAX_NS)
+        self.posted_ns = None
 
     def listen(self, listener: Listener) -> None:
         """From now on; what was heard before is told at once."""
@@ -122,12 +137,15 @@ def converse(
     """Sends one message and returns what `accept` makes of the answer. `accept` returns None for
     a message that is none (a late answer to something else)."""
     if channel.owed:
+        channel.posted_ns = None
         yield from _settle(channel)
     channel.counter = next_counter(channel.counter)
     message = Mailbox(kind, data, channel.counter).encode(channel.layout.receive_size)
     channel.owed = True
     for _ in range(RECOVERIES):
         sent, stale = yield from _post(channel, message)
+        if sent and channel.thinks_ns:
+            yield after(channel.thinks_ns * 1e-9)
         if stale and (older := (yield from _take(channel))) is not None:
             _put_aside(channel, older)
         before = channel.dropped
@@ -220,6 +238,7 @@ def _post(channel: MailboxChannel, message: bytes) -> Procedure[tuple[bool, bool
             return False, False
         if reply.working_counter:
             answered(reply, channel.station, "mailbox write")
+            channel.posted_ns = reply.time_ns
             waiting = seen.working_counter == 1 and bool(seen.data[0] & Status.MAILBOX_FULL)
             return True, waiting
         full, status = yield from _is_full(channel, OUT)
@@ -259,17 +278,39 @@ def _stuck(channel: MailboxChannel, full: bool) -> MailboxError:
 
 def _fetch(channel: MailboxChannel, deadline: Deadline) -> Procedure[Mailbox | None]:
     """The next message the device sends; None when the deadline has passed."""
-    pace = Pace()
+    pace = Pace(max(LOOK, channel.thinks_ns * 1e-10))  # a tenth
+    empty_ns: int | None = None
     while True:
-        full, status = yield from _is_full(channel, IN)
-        late = deadline.passed(status)
-        if full:
-            received = yield from _take(channel)
-            if received is not None:
-                return received
-        if late:
+        there, received, time_ns = yield from _look(channel)
+        if there:
+            channel.learn(empty_ns)
+        if received is not None:
+            return received
+        if deadline.passed_at(time_ns):
             return None
+        empty_ns = time_ns
         yield after(pace.pause())
+
+
+def _look(channel: MailboxChannel) -> Procedure[tuple[bool, Mailbox | None, int]]:
+    """(whether there was a message, the message unless it was a duplicate, when).
+
+    A small mailbox is read in the same frame that looks: an empty one is not changed by it, and
+    answers with a working counter of 0. Only where counters tell duplicates: a frame that is lost
+    must be asked for again, and may have been empty.
+    """
+    if not channel.received_counter or channel.layout.send_size > EAGER_MAX:
+        full, status = yield from _is_full(channel, IN)
+        return full, (yield from _take(channel)) if full else None, status.time_ns
+    station = channel.station
+    look = read(Command.FPRD, station.address, sync_manager_status(IN))._replace(repeatable=False)
+    status, reply = yield [look, _read_request(channel)]
+    if not reply.lost:
+        answered(status, station, "mailbox status")
+        if not reply.working_counter:
+            return False, None, reply.time_ns
+    received = yield from _take(channel, reply)
+    return received is not None, received, reply.time_ns
 
 
 def _is_full(channel: MailboxChannel, number: int) -> Procedure[tuple[bool, Reply]]:
@@ -279,20 +320,25 @@ def _is_full(channel: MailboxChannel, number: int) -> Procedure[tuple[bool, Repl
     return Status.MAILBOX_FULL in status, reply
 
 
-def _take(channel: MailboxChannel) -> Procedure[Mailbox | None]:
-    """Reads the full mailbox; None for a duplicate of what was read before, or for nothing."""
+def _read_request(channel: MailboxChannel) -> Request:
     layout = channel.layout
+    return read_memory(
+        channel.station.address, layout.send_offset, layout.send_size, repeatable=False
+    )
+
+
+def _take(channel: MailboxChannel, reply: Reply | None = None) -> Procedure[Mailbox | None]:
+    """Reads the full mailbox; None for a duplicate of what was read before, or for nothing.
+    `reply`: to a read that was made already."""
     for _ in range(RECOVERIES):
-        [reply] = yield [
-            read_memory(
-                channel.station.address, layout.send_offset, layout.send_size, repeatable=False
-            )
-        ]
+        if reply is None:
+            [reply] = yield [_read_request(channel)]
         if not reply.lost:
             channel.received_ns = reply.time_ns
             return _decoded(channel, reply.data) if reply.working_counter else None
         if not (yield from _ask_again(channel)):
             return None
+        reply = None
     raise ResponseTimeout(
         f"{channel.station}: {RECOVERIES} frames that read its mailbox were lost",
         hint="look at the cable: the error counters at 0x0300 tell which",

@@ -49,9 +49,12 @@ class Deadline:
         self._start_ns: int | None = None
 
     def passed(self, reply: Reply) -> bool:
+        return self.passed_at(reply.time_ns)
+
+    def passed_at(self, time_ns: int) -> bool:
         if self._start_ns is None:
-            self._start_ns = reply.time_ns
-        return reply.time_ns - self._start_ns > self.seconds * 1e9
+            self._start_ns = time_ns
+        return time_ns - self._start_ns > self.seconds * 1e9
 
 
 class Pace:

@@ -12,6 +12,8 @@ Peer = Callable[[Job], Round]
 MODULES = {
     "catenary-inline": "with_catenary",
     "catenary-threaded": "with_catenary",
+    "catenary-inline-sdo": "with_catenary",
+    "catenary-threaded-sdo": "with_catenary",
     "catenary-law": "with_catenary_law",
     "catenary-law-storm": "with_catenary_law",
     "c": "with_c",

@@ -1,10 +1,14 @@
-"""Catenary itself, as its users write it, in its three orders."""
+"""Catenary itself, as its users write it, inline and threaded; also while other threads of the
+program read objects of all devices, all the time."""
 
 from __future__ import annotations
 
+import contextlib
 import math
+import os
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from typing import Literal
 
 import numpy as np
@@ -15,7 +19,11 @@ from catenary.bench.job import PHASES, Body, Job, Round
 ORDER: dict[str, Literal["inline", "threaded"]] = {
     "catenary-inline": "inline",
     "catenary-threaded": "threaded",
+    "catenary-inline-sdo": "inline",
+    "catenary-threaded-sdo": "threaded",
 }
+STORM = "-sdo"
+IDENTITY, SERIAL = 0x1018, 4  # what the storm asks for
 # Like the peers, it counts lost and late cycles and goes on; by default it would stop the drives.
 LOST_LIMIT = 1000
 LATE_LIMIT = 0.0
@@ -39,17 +47,48 @@ def run(job: Job) -> Round:
             lost_limit=LOST_LIMIT,
             late_limit=LATE_LIMIT,
         ) as loop:
-            return _measure(loop, arm, job)
+            if not job.peer.endswith(STORM):
+                return _measure(loop, arm, job, [])
+            with storm(arm.subs) as answers:
+                return _measure(loop, arm, job, answers)
 
 
-def _measure(loop: cat.Loop, arm: cat.Drives, job: Job) -> Round:
+@contextlib.contextmanager
+def storm(subs: Sequence[cat.SubDevice]) -> Iterator[list[int]]:
+    """A thread for every device that reads one object again and again; how often each got it."""
+    answers = [0] * len(subs)
+    stop = threading.Event()
+
+    def ask(rank: int) -> None:
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+        while not stop.is_set():
+            try:
+                subs[rank].sdo.read(IDENTITY, SERIAL, type=cat.types.UDINT)
+                answers[rank] += 1
+            except cat.CatenaryError:
+                if not stop.is_set():  # behind the last cycle nobody sends any more
+                    raise
+
+    threads = [threading.Thread(target=ask, args=(rank,)) for rank in range(len(subs))]
+    for thread in threads:
+        thread.start()
+    try:
+        yield answers
+    finally:
+        stop.set()
+        for thread in threads:
+            thread.join()
+
+
+def _measure(loop: cat.Loop, arm: cat.Drives, job: Job, answers: Sequence[int]) -> Round:
     body = _sine(arm, job) if job.body is Body.SINE else _pd(arm, job)
-    before, cpu = loop.timing.counters, 0
+    before, cpu, answered = loop.timing.counters, 0, 0
     last_unmeasured, end = job.warm_up - 1, job.warm_up + job.cycles
     for number, cycle in enumerate(loop):
         body(cycle.time)
         if number == last_unmeasured:
             before, cpu = loop.timing.counters, time.process_time_ns()
+            answered = sum(answers)
         elif number == end:
             break
     cpu = time.process_time_ns() - cpu
@@ -61,6 +100,7 @@ def _measure(loop: cat.Loop, arm: cat.Drives, job: Job) -> Round:
         lost=after["lost"] - before["lost"],
         cpu_ns=cpu,
         late=after["uncommitted"] - before["uncommitted"],
+        answers=sum(answers) - answered,
     )
 
 
