@@ -59,7 +59,7 @@ def times(main: MainDevice, device: int) -> list[int]:
 
 def test_positions_count_along_the_way_of_the_frame() -> None:
     main = tree()
-    assert main.segment.core.processed(0) == [0, 1, 2, 3, 4, 5]
+    assert main.segment.wires.processed(0) == [0, 1, 2, 3, 4, 5]
     assert [main.read(STATION + k, 0x0010, 2) for k in range(6)] == [
         struct.pack("<H", STATION + k) for k in range(6)
     ]
@@ -78,7 +78,7 @@ def test_a_branch_that_is_cut_leaves_the_others() -> None:
     main.segment.inject(cut(between=(1, 2)))
     assert answers(main) is None  # not seen yet
     assert answers(main) == 4
-    assert main.segment.core.processed(0) == [0, 1, 4, 5]
+    assert main.segment.wires.processed(0) == [0, 1, 4, 5]
     assert loops(main, 1) == (0b0111, 0b01101010)
 
 
@@ -102,7 +102,7 @@ def test_a_longer_cable_takes_longer() -> None:
     main = line(2)
     main.exchange(Command.BWR, 0, 0x0900, bytes(4))
     short = times(main, 0)
-    main.segment.core.delay_cable(1, 550)
+    main.segment.wires.delay_cable(1, 550)
     main.exchange(Command.BWR, 0, 0x0900, bytes(4))
     long = times(main, 0)
     assert (long[1] - long[0]) - (short[1] - short[0]) == 2 * 500
@@ -163,11 +163,11 @@ def test_auto_close_opens_by_a_frame_that_comes_to_it() -> None:
         segment.inject(cut(between=(0, 1), for_=0.01))
         link.wait_until(20 * MILLISECOND, False)
         segment.take_losses()
-        assert segment.core.processed(0) == [0]
+        assert segment.wires.processed(0) == [0]
         other.send(encode_frame([Datagram(Command.BRD, 0, b"\0")]))
         assert not other.wait_until(other.now() + MILLISECOND, True)  # the one that opened it
     assert [loss.cause for loss in segment.take_losses()] == ["closed port"]
-    assert segment.core.processed(0) == [0, 1]
+    assert segment.wires.processed(0) == [0, 1]
 
 
 # -- links ------------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ import random
 import pytest
 
 from catenary.virtual import Coupler, Segment, Servo
-from catenary.virtual._segment import SegmentLink
+from catenary.virtual._segment_link import SegmentLink
 from catenary.virtual.faults import Fault, cut, join, power_cycle
 from catenary.wire.datagram import Command, Datagram
 from catenary.wire.frame import Frame, decode_frame, encode_frame
@@ -55,8 +55,8 @@ def _counter(frame: Frame | None) -> int | None:
 
 def test_a_whole_ring_processes_what_comes_from_the_first_end_only() -> None:
     ring = Ends()
-    assert ring.segment.core.processed(0) == list(range(COUNT))
-    assert ring.segment.core.processed(1) == []
+    assert ring.segment.wires.processed(0) == list(range(COUNT))
+    assert ring.segment.wires.processed(1) == []
     # the frame from the first end leaves at the second, and the other way round
     assert ring.counters() == (0, COUNT)
 
@@ -77,8 +77,8 @@ def test_an_unprocessed_frame_is_untouched() -> None:
 def test_behind_a_cut_each_end_has_its_part(at: int) -> None:
     ring = Ends(cut(between=(at - 1, at)))
     ring.let_pass(1)
-    assert ring.segment.core.processed(0) == list(range(at))
-    assert ring.segment.core.processed(1) == list(range(at, COUNT))
+    assert ring.segment.wires.processed(0) == list(range(at))
+    assert ring.segment.wires.processed(1) == list(range(at, COUNT))
     first, second = ring.exchange()
     assert (_counter(first), _counter(second)) == (at, COUNT - at)
     assert first is not None
@@ -102,7 +102,7 @@ def test_two_cuts_leave_an_island() -> None:
     ring = Ends(cut(between=(1, 2)), cut(between=(3, 4)))
     ring.let_pass(1)
     assert ring.counters() == (2, 2)
-    assert ring.segment.core.processed(1) == [4, 5]
+    assert ring.segment.wires.processed(1) == [4, 5]
 
 
 def test_a_device_without_power_cuts_at_both_sides() -> None:
@@ -193,7 +193,7 @@ def test_both_links_are_exclusive() -> None:
 
 def test_servos_in_a_ring_start_without_power_on_one_side() -> None:
     segment = Segment([Servo(), Servo()], ring=True, faults=[cut(between=(0, 1))])
-    assert (segment.core.processed(0), segment.core.processed(1)) == ([0], [])
+    assert (segment.wires.processed(0), segment.wires.processed(1)) == ([0], [])
     with segment.open_link() as link:
         link.wait_until(MILLISECOND, False)
-    assert (segment.core.processed(0), segment.core.processed(1)) == ([0], [1])
+    assert (segment.wires.processed(0), segment.wires.processed(1)) == ([0], [1])

@@ -1,172 +1,20 @@
-"""The compiled segment: controllers, clock and link table for frames; accessors for the
-application's side. The frame path is in the headers, one for each mechanism; nothing of it runs
-under the GIL.
+"""The compiled segment: controllers, clock, and accessors for the application's side. The frame
+path is in the headers, one for each mechanism; nothing of it runs under the GIL.
 """
 
 from cpython.bytes cimport PyBytes_FromStringAndSize
-from cpython.pycapsule cimport PyCapsule_GetPointer, PyCapsule_IsValid, PyCapsule_New
+from cpython.pycapsule cimport PyCapsule_GetPointer, PyCapsule_IsValid
 from cpython.exc cimport PyErr_SetInterrupt
 from libc.errno cimport EINTR, EIO
 from libc.math cimport M_PI as pi
-from libc.stdint cimport int64_t, uint8_t, uint16_t, uint32_t, uint64_t
+from libc.stdint cimport int64_t, uint8_t, uint16_t, uint32_t
 from libc.string cimport memcpy
 
 cdef extern from "link.h":
-    const char *CAT_LINK_CAPSULE
-    uint32_t CAT_LINK_VERSION, CAT_LINK_VIRTUAL_TIME, CAT_LINK_SHARED_TIME, CAT_LINK_SPENDS
-    uint32_t CAT_LINK_FORETELLS
     uint32_t CAT_FRAME_MAX
-    ctypedef struct cat_link:
-        uint32_t version, flags
-        void *self
-        int (*send)(void *, const uint8_t *, uint32_t) noexcept nogil
-        int (*receive)(void *, const uint8_t **) noexcept nogil
-        int64_t (*now)(void *) noexcept nogil
-        int (*wait_until)(void *, int64_t, int) noexcept nogil
-        int (*spend)(void *, int64_t) noexcept nogil
-        int64_t (*due)(void *) noexcept nogil
-
-cdef extern from "clock.h":
-    const char *CAT_CLOCK_CAPSULE
-    uint32_t CAT_CLOCK_VERSION, CAT_CLOCK_VIRTUAL
-    ctypedef struct cat_clock:
-        uint32_t version, flags
-        void *self
-        int64_t (*now)(void *) noexcept nogil
 
 cdef extern from "packet_loop.h" nogil:
     int packet_loop(cat_segment *s, int fd, int second_fd, int stop_fd)
-
-cdef extern from "segment_memory.h" nogil:
-    int MAX_AXES, MAX_MAPPED, AXIS_SLOTS, MODEL_SERVO, MODEL_SLOTS, PORTS, MAX_FRAME_FAULTS
-    int LOSS_LOG
-    int64_t NEVER
-    ctypedef struct sync_manager:
-        uint16_t start, length
-        uint8_t enabled, blocked, mailbox, ecat_writes, watchdog, full, latest, written
-    ctypedef struct mapped:
-        uint32_t bit
-        uint16_t slot
-        uint8_t bits, is_signed
-    ctypedef struct mapping:
-        mapped *entries
-        int count, sm
-    ctypedef struct sii_access:
-        uint8_t *image
-        uint32_t words
-        int64_t read_time, write_time
-    ctypedef struct sync_unit:
-        uint32_t pulses0, pulses1
-    ctypedef struct synchronous_cycle:
-        int64_t cycle, minimum, copy_time
-        uint16_t limit, missed, exceeded, shift_short
-        uint8_t active, seen, error
-    ctypedef struct port:
-        uint8_t exists
-    ctypedef struct cable_end:
-        int device, port
-    ctypedef struct cable:
-        int64_t delay
-        uint8_t plugged, light
-    ctypedef struct loss:
-        int64_t sent
-        int cause, end
-    ctypedef struct frame_fault:
-        int kind, used
-        int64_t left, delay
-        uint32_t every, seen
-        int cable, offset
-    ctypedef struct stop:
-        controller *controller
-    ctypedef struct route:
-        stop *stops
-        uint32_t stop_count
-    ctypedef struct segment_end:
-        uint32_t head, tail
-    ctypedef struct servo_axis:
-        double inertia, viscous, coulomb, load, rated_torque, velocity_limit
-        double counts_per_radian, velocity_per_radian, position_gain, velocity_gain, integral_gain
-        double radian_per_count, radian_per_velocity, per_inertia, per_torque
-        double position, velocity, torque, boot
-        int state
-        uint16_t injected
-        uint8_t sto
-    ctypedef struct controller:
-        uint8_t *memory
-        uint32_t memory_size, events
-        uint8_t emulation, al_unread, frozen, outputs_valid, outputs_seen, powered, mute
-        uint8_t has_dc, no_lrw
-        int fmmu_count
-        port *ports
-        uint16_t identification, emergency
-        sync_manager *sm
-        int sm_count
-        sii_access sii
-        sync_unit sync
-        synchronous_cycle synchronous
-        mapping outputs, inputs
-        int64_t *slots
-        int slot_count, axis_count
-        servo_axis *axes
-    ctypedef struct frame_counters:
-        uint64_t frames, malformed, foreign, lost, datagrams
-    ctypedef struct fate:
-        pass
-    const fate NO_FATE
-    ctypedef struct cat_segment:
-        controller *controllers
-        int count, pending, event_fd, is_virtual, ring, cable_count, fault_count
-        cable *cables
-        route *routes
-        segment_end *ends
-        frame_fault *faults
-        loss *losses
-        uint64_t loss_count, random
-        const cat_clock *clock
-        int64_t now, epoch, next_due, service_due, passage
-        frame_counters counters
-        int (*service)(void *) noexcept
-        void *owner
-    cat_segment *segment_make(int count, int is_virtual, int ring, int64_t detection)
-    void segment_free(cat_segment *)
-    int controller_make(controller *, uint32_t ram, uint32_t sii_words, int slots, int axes)
-    void controller_power_on(controller *)
-    void controller_power_off(controller *)
-    void controller_remove(controller *)
-    void controllers_exchange(controller *, controller *)
-    void cable_lay(cat_segment *, int n, cable_end up, cable_end down)
-    void segment_light(cat_segment *, int at_once)
-    void routes_refresh(cat_segment *)
-    void segment_advance(cat_segment *, int64_t until)
-    void al_show(controller *, uint16_t status, uint16_t code)
-    void sm_configured(controller *, int n)
-    uint8_t *sm_registers(controller *, int n)
-    uint8_t *sm_buffer(controller *, sync_manager *, uint8_t)
-    int sm_pdi_read(controller *, int n, uint8_t *data, uint32_t room)
-    int sm_pdi_write(controller *, int n, const uint8_t *data, uint32_t size)
-    void inputs_put(controller *)
-    void inputs_flush(cat_segment *)
-    void slots_refresh(controller *)
-    void dc_tune(controller *, double error, double swing, double turn, double scatter, int64_t when)
-    void model_period(controller *, int64_t period)
-    void synchronous_begin(controller *, int64_t cycle, int steps)
-    void synchronous_end(controller *)
-    void sync_schedule(controller *)
-    void lock(cat_segment *)
-    void unlock(cat_segment *)
-    int64_t monotonic_now()
-    int64_t register_number(const controller *, uint32_t address, int size)
-    int frame_through(cat_segment *, const route *, const fate *, uint8_t *frame, uint32_t length)
-    int frame_is_ours(const uint8_t *frame, uint32_t length)
-    int line_send(void *, const uint8_t *, uint32_t)
-    int line_receive(void *, const uint8_t **)
-    int64_t line_now(void *)
-    int line_wait_until(void *, int64_t, int)
-    int line_spend(void *, int64_t)
-    int64_t line_due(void *)
-    enum:
-        REG_AL_CONTROL, REG_RX_ERRORS, REG_LOST_LINKS, SM_PDI_DEACTIVATE, SM_PDI_REPEAT_ACK
-        SM_ACTIVATE_REPEAT, ETHERNET_HEADER, LOSS_NO_LIGHT
 
 cdef extern from "segment_memory.h":
     cpdef enum:
@@ -200,12 +48,6 @@ cdef int _serve_application(void *owner) noexcept with gil:
 
 cdef class Core:
     """Owns the controllers' memory. `position` counts devices from the MainDevice, from 0."""
-
-    cdef cat_segment *_segment
-    cdef object _service
-    cdef object _clock
-    cdef readonly object failure
-    cdef readonly int count
 
     def __cinit__(self, int count, bint is_virtual, *, bint ring=False, int64_t detection_ns=0):
         if not 0 <= count <= 65535:
@@ -292,101 +134,6 @@ cdef class Core:
         """The numbers of the ports the device has."""
         cdef controller *c = self._at(position)
         return tuple([p for p in range(PORTS) if c.ports[<int>p].exists])
-
-    # -- cables ---------------------------------------------------------------------------------
-
-    def lay_cable(self, int n, tuple up, tuple down):
-        """Cable n between two (device, port); device -1 and -2: the MainDevice's interfaces."""
-        cdef cable_end above, below
-        above.device, above.port = up
-        below.device, below.port = down
-        for end in (above, below):
-            if not (0 <= n < self._segment.cable_count and -2 <= end.device < self.count
-                    and 0 <= end.port < PORTS):
-                raise ValueError(f"impossible cable {n}")
-        lock(self._segment)
-        cable_lay(self._segment, n, above, below)
-        unlock(self._segment)
-
-    cdef cable *_cable(self, int n) except NULL:
-        if not 0 <= n < self._segment.cable_count:
-            raise IndexError(f"no cable {n}")
-        return &self._segment.cables[n]
-
-    def plug_cable(self, int n, bint plugged, bint at_once=False):
-        """`at_once`: the controllers see it without their time of detection."""
-        cdef cable *k = self._cable(n)
-        lock(self._segment)
-        if not self._segment.is_virtual:
-            segment_advance(self._segment, monotonic_now())
-        k.plugged = plugged
-        segment_light(self._segment, at_once)
-        unlock(self._segment)
-
-    def cable_light(self, int n):
-        return bool(self._cable(n).light)
-
-    def delay_cable(self, int n, int64_t delay_ns):
-        """One way."""
-        lock(self._segment)
-        self._cable(n).delay = delay_ns
-        segment_light(self._segment, False)
-        unlock(self._segment)
-
-    def processed(self, int end):
-        """The positions of the devices that process a frame from an interface, in order."""
-        cdef uint32_t k
-        cdef route *r = &self._segment.routes[end]
-        lock(self._segment)
-        routes_refresh(self._segment)
-        positions = [r.stops[k].controller - self._segment.controllers
-                     for k in range(r.stop_count)]
-        unlock(self._segment)
-        return positions
-
-    # -- faults that hit frames -----------------------------------------------------------------
-
-    def add_frame_fault(self, int kind, *, int64_t frames, uint32_t every, int64_t delay_ns,
-                        int cable, int offset):
-        """Its number; `frames` -1: no end. The order of kinds is frame_faults.h's."""
-        cdef int n
-        cdef frame_fault *f
-        for n in range(MAX_FRAME_FAULTS):
-            f = &self._segment.faults[n]
-            if f.used:
-                continue
-            lock(self._segment)
-            f.kind, f.left, f.every, f.delay = kind, frames, every, delay_ns
-            f.cable, f.offset, f.seen, f.used = cable, offset, 0, 1
-            self._segment.fault_count += 1
-            unlock(self._segment)
-            return n
-        raise ValueError(f"at most {MAX_FRAME_FAULTS} faults can hit frames at a time")
-
-    def frame_fault_left(self, int n):
-        return self._segment.faults[n].left if self._segment.faults[n].used else 0
-
-    def remove_frame_fault(self, int n):
-        lock(self._segment)
-        if self._segment.faults[n].used:
-            self._segment.faults[n].used = 0
-            self._segment.fault_count -= 1
-        unlock(self._segment)
-
-    def losses(self, uint64_t since):
-        """[(sent [ns], cause, interface)] of the frames lost from number `since` on, as far as the
-        log of LOSS_LOG goes back; and how many there were in all."""
-        cdef uint64_t k
-        cdef loss *x
-        lock(self._segment)
-        total = self._segment.loss_count
-        first = max(since, total - min(total, <uint64_t>LOSS_LOG))
-        found = []
-        for k in range(first, total):
-            x = &self._segment.losses[k % <uint64_t>LOSS_LOG]
-            found.append((x.sent, x.cause, x.end))
-        unlock(self._segment)
-        return found, total
 
     def mute(self, int position, bint muted):
         """Logical datagrams pass the device by: they are neither answered nor counted."""
@@ -775,79 +522,3 @@ cdef class Core:
         with nogil:
             result = packet_loop(self._segment, fd, second_fd, stop_fd)
         return result
-
-
-cdef class SegmentLink:
-    """Owns a link table into the segment's line. Keep it as long as its capsule is used."""
-
-    cdef cat_link _table
-    cdef Core _core
-    cdef segment_end *_end
-    cdef object _ended
-    cdef readonly object capsule
-    cdef readonly str name
-    cdef bint _open
-
-    def __init__(self, Core core, str name, ended, *, bint second=False):
-        if second and not core._segment.ring:
-            raise ValueError("only a ring has a second link")
-        self._core = core
-        self._end = &core._segment.ends[1 if second else 0]
-        self._ended = ended
-        self._open = True
-        self.name = name
-        self._table.version = CAT_LINK_VERSION
-        if core._segment.is_virtual:
-            self._table.flags = CAT_LINK_VIRTUAL_TIME | CAT_LINK_FORETELLS
-            self._table.due = line_due
-        if core._segment.clock != NULL:
-            self._table.flags |= CAT_LINK_SHARED_TIME | CAT_LINK_SPENDS
-            self._table.spend = line_spend
-        self._table.self = <void *>self._end
-        self._table.send = line_send
-        self._table.receive = line_receive
-        self._table.now = line_now
-        self._table.wait_until = line_wait_until
-        self.capsule = PyCapsule_New(&self._table, CAT_LINK_CAPSULE, NULL)
-
-    def _check(self, int result):
-        if result < 0:
-            self._core.raise_failure()
-            raise OSError(-result, "the virtual segment's line refused")
-        return result
-
-    def send(self, bytes frame not None):
-        cdef const uint8_t *data = <const uint8_t *><const char *>frame
-        cdef uint32_t size = len(frame)
-        cdef int result
-        with nogil:
-            result = line_send(self._end, data, size)
-        self._check(result)
-
-    def receive(self):
-        cdef const uint8_t *data = NULL
-        cdef int size = line_receive(self._end, &data)
-        return PyBytes_FromStringAndSize(<const char *>data, size) if self._check(size) else None
-
-    def now(self):
-        return line_now(self._end)
-
-    def wait_until(self, int64_t deadline_ns, bint wake_on_frame):
-        cdef int result
-        with nogil:
-            result = line_wait_until(self._end, deadline_ns, wake_on_frame)
-        if result == -EINTR:
-            return False                   # a signal came first: Python handles it on return
-        return bool(self._check(result))
-
-    def close(self):
-        if self._open:
-            self._open = False
-            self._end.head = self._end.tail
-            self._ended()
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *exception):
-        self.close()

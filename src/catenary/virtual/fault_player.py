@@ -9,6 +9,7 @@ from typing import Literal, NamedTuple, TypeAlias
 
 from catenary.virtual import faults as f
 from catenary.virtual._segment import Core
+from catenary.virtual._wires import Wires
 from catenary.virtual.devices.applied import AppliedDevice
 from catenary.virtual.devices.device import Device
 from catenary.virtual.devices.servo import Servo
@@ -49,8 +50,11 @@ class Loss(NamedTuple):
 class FaultPlayer:
     """Owns the faults that are planned or on, and the log of them."""
 
-    def __init__(self, core: Core, devices: list[Device], wiring: Wiring, agenda: Agenda) -> None:
+    def __init__(
+        self, core: Core, wires: Wires, devices: list[Device], wiring: Wiring, agenda: Agenda
+    ) -> None:
         self._core = core
+        self._wires = wires
         self._devices = devices
         self.wiring = wiring
         self._agenda = agenda
@@ -68,7 +72,7 @@ class FaultPlayer:
     @property
     def done(self) -> bool:
         """No fault is still to begin or to end."""
-        left = any(self._core.frame_fault_left(n) > 0 for n, _fault in self._frame_faults)
+        left = any(self._wires.frame_fault_left(n) > 0 for n, _fault in self._frame_faults)
         return not (self._waiting or self._planned or left)
 
     def add(self, fault: f.Fault) -> None:
@@ -125,7 +129,7 @@ class FaultPlayer:
 
     def take_losses(self) -> list[Loss]:
         """The frames that did not come back, since the last call; the latest 4096 at most."""
-        found, self._losses_seen = self._core.losses(self._losses_seen)
+        found, self._losses_seen = self._wires.losses(self._losses_seen)
         epoch = max(self._core.epoch, 0)
         return [Loss((sent - epoch) / SECOND, LOSS_CAUSES[why], end) for sent, why, end in found]
 
@@ -184,21 +188,21 @@ class FaultPlayer:
 
     def _inject(self, fault: f.Fault) -> End | None:
         """Begins it; what ends it."""
-        core = self._core
+        core, wires = self._core, self._wires
         match fault:
             case f.LoseFrames() | f.Corrupt() | f.Garble() | f.Delay() | f.Duplicate():
                 return self._spoil_frames(fault)
             case f.Cut():
                 cable = self.wiring.between(*fault.between)
-                core.plug_cable(cable, False)
-                return partial(core.plug_cable, cable, True)
+                wires.plug_cable(cable, False)
+                return partial(wires.plug_cable, cable, True)
             case f.Join():
-                core.plug_cable(self.wiring.between(*fault.between), True)
+                wires.plug_cable(self.wiring.between(*fault.between), True)
             case f.Unplug():
-                core.plug_cable(fault.device, False)
-                return partial(core.plug_cable, fault.device, True)
+                wires.plug_cable(fault.device, False)
+                return partial(wires.plug_cable, fault.device, True)
             case f.Replug():
-                core.plug_cable(fault.device, True)
+                wires.plug_cable(fault.device, True)
             case f.PowerCycle():
                 return self._switch_off([fault.device])
             case f.Swap():
@@ -265,12 +269,12 @@ class FaultPlayer:
         return lambda: undo() if device.application is application else None
 
     def _spoil_frames(self, fault: f.FrameFault) -> End:
-        used_up = [n for n, _ in self._frame_faults if self._core.frame_fault_left(n) == 0]
+        used_up = [n for n, _ in self._frame_faults if self._wires.frame_fault_left(n) == 0]
         self._frame_faults = [held for held in self._frame_faults if held[0] not in used_up]
         for number in used_up:
-            self._core.remove_frame_fault(number)
+            self._wires.remove_frame_fault(number)
         way = f"lose_{fault.way}" if isinstance(fault, f.LoseFrames) else fault.kind
-        number = self._core.add_frame_fault(
+        number = self._wires.add_frame_fault(
             FRAME_KINDS.index(way),
             frames=-1 if fault.frames is None else fault.frames,
             every=fault.every,
@@ -284,7 +288,7 @@ class FaultPlayer:
     def _spoil_no_longer(self, fault: f.FrameFault) -> None:
         for held in self._frame_faults:
             if held[1] is fault:
-                self._core.remove_frame_fault(held[0])
+                self._wires.remove_frame_fault(held[0])
                 self._frame_faults.remove(held)
                 return
 

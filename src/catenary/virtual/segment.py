@@ -6,7 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Literal, NamedTuple, Protocol, runtime_checkable
 
-from catenary.virtual._segment import Core, SegmentLink
+from catenary.virtual._segment import Core
+from catenary.virtual._segment_link import SegmentLink
+from catenary.virtual._wires import Wires
 from catenary.virtual.devices.coupler import Coupler
 from catenary.virtual.devices.device import Device
 from catenary.virtual.devices.digital_outputs import DigitalOutputs
@@ -86,12 +88,15 @@ class Segment:
             ring=ring,
             detection_ns=_detection_ns(link_loss_detection),
         )
+        self._wires = Wires(self._core)
         for number, cable in enumerate(wiring.cables):
-            self._core.lay_cable(number, cable.up, cable.down)
+            self._wires.lay_cable(number, cable.up, cable.down)
         if isinstance(clock, SharedClock):
             self._core.use_clock(clock)
         self._service = Service(self._core, self._devices)
-        self._faults = FaultPlayer(self._core, self._devices, wiring, self._service.agenda)
+        self._faults = FaultPlayer(
+            self._core, self._wires, self._devices, wiring, self._service.agenda
+        )
         self._service.at_first_frame(self._faults.start)
         self._thread: ServiceThread | None = None
         self._links: dict[bool, SegmentLink] = {}
@@ -121,6 +126,11 @@ class Segment:
     def core(self) -> Core:
         """The compiled side, for `serve` and tests at register level."""
         return self._core
+
+    @property
+    def wires(self) -> Wires:
+        """The compiled side's cables, for tests of where frames go."""
+        return self._wires
 
     @property
     def service(self) -> Service:
@@ -212,7 +222,7 @@ class Segment:
 
     def _plug_first(self, devices: int) -> None:
         for number in range(len(self._devices)):
-            self._core.plug_cable(number, number < devices, at_once=True)
+            self._wires.plug_cable(number, number < devices, at_once=True)
 
 
 def _detection_ns(given: float | str) -> int:
