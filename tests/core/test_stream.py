@@ -28,7 +28,7 @@ def streaming(order: str, **more: object) -> tuple[Bench, Stream]:
 @pytest.mark.parametrize("order", ["threaded", "inline"])
 def test_one_row_a_cycle_whatever_python_writes(order: str) -> None:
     b, stream = streaming(order)
-    assert stream.write(rows(0.001, 0.002, 0.003)) == 3
+    assert stream.write(rows(0.001, 0.002, 0.003), b.engine.number) == 3
     seen = []
     for _ in range(3):
         b.target_position[:] = 9.0
@@ -44,13 +44,13 @@ def test_dry_holds_says_so_and_goes_on(order: str) -> None:
     b, stream = streaming(order)
     b.steps(3)
     assert stream.dry == 0  # not begun: nothing was promised yet
-    stream.write(rows(0.001))
+    stream.write(rows(0.001), b.engine.number)
     b.steps(200)  # longer than any late limit
     assert b.drives[0].target_position == 1
     assert b.drives[0].state == 4
     assert b.engine.next() & CYCLE_DRY
     assert stream.dry > 190
-    stream.write(rows(0.002))
+    stream.write(rows(0.002), b.engine.number)
     b.steps(1)
     assert b.drives[0].target_position == 2
 
@@ -63,7 +63,7 @@ def test_dry_velocity_goes_to_zero() -> None:
         b.engine.next()
     stream = Stream(1, 4)
     b.engine.set_stream(stream)
-    stream.write(np.array([[0.0, 0.03, 0.0]]).tobytes())
+    stream.write(np.array([[0.0, 0.03, 0.0]]).tobytes(), b.engine.number)
     b.steps(1)
     assert b.drives[0].target_velocity == 30
     b.steps(5)
@@ -80,14 +80,14 @@ def test_a_law_finds_the_row_in_its_targets(order: str) -> None:
 
     b.engine.start_law(make_law(b, mirror))
     b.steps(2)
-    stream.write(rows(0.005, 0.006))
+    stream.write(rows(0.005, 0.006), b.engine.number)
     b.steps(2)
     assert b.drives[0].target_position == -6
 
 
 def test_after_it_the_application_goes_on_from_where_it_ended() -> None:
     b, stream = streaming("threaded")
-    stream.write(rows(*np.linspace(0.001, 0.008, 8)))
+    stream.write(rows(*np.linspace(0.001, 0.008, 8)), b.engine.number)
     b.engine.run(4)  # no application meanwhile: the stream goes on
     b.engine.set_stream(None)
     assert b.target_position[0] == pytest.approx(b.drives[0].target_position * 1e-3)
@@ -98,11 +98,11 @@ def test_after_it_the_application_goes_on_from_where_it_ended() -> None:
 def test_bounded_and_validated() -> None:
     stream = Stream(2, 4)
     six = np.zeros((6, 6)).tobytes()
-    assert stream.write(six) == 4
-    assert stream.write(six) == 0
+    assert stream.write(six, 0) == 4
+    assert stream.write(six, 0) == 0
     assert stream.waiting == 4
     with pytest.raises(ValueError, match="6 numbers"):
-        stream.write(b"\0" * 50)
+        stream.write(b"\0" * 50, 0)
     with pytest.raises(ValueError, match="0 rows"):
         Stream(2, 0)
     b = bench(axis(0))
@@ -120,7 +120,7 @@ def test_no_row_is_torn_lost_or_doubled_between_two_threads() -> None:
     def fill() -> None:
         left = np.array([[p, p, p] for p in wanted])
         while len(left):
-            left = left[stream.write(left[:50].tobytes()) :]
+            left = left[stream.write(left[:50].tobytes(), b.engine.number) :]
 
     writer = threading.Thread(target=fill)
     writer.start()
@@ -133,3 +133,21 @@ def test_no_row_is_torn_lost_or_doubled_between_two_threads() -> None:
     writer.join()
     assert np.allclose(seen, wanted[-len(seen) :])
     assert len(seen) == count
+
+
+@pytest.mark.parametrize("order", ["threaded", "inline"])
+def test_rows_written_before_an_axis_was_enabled_again_do_not_move_it(order: str) -> None:
+    """It would jump to the row of the moment. It follows what is written from then on."""
+    b, stream = streaming(order)
+    stream.write(rows(*np.linspace(0.001, 0.008, 8)), b.engine.number)
+    b.steps(2)
+    b.drives[0].state = 1
+    b.steps(1)
+    b.enable()
+    stood = b.drives[0].target_position
+    b.steps(8)
+    assert b.drives[0].state == 4
+    assert b.drives[0].target_position == stood
+    stream.write(rows(0.004), b.engine.number)
+    b.steps(2)
+    assert b.drives[0].target_position == 4

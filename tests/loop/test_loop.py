@@ -1,8 +1,11 @@
 """What Loop refuses before it touches the segment."""
 
+import contextlib
+
 import pytest
 
 import catenary as cat
+from catenary.errors import DriveError
 from catenary.virtual import Segment, Servo
 
 
@@ -28,3 +31,49 @@ def test_the_lead_is_bounded_by_the_period() -> None:
             assert loop.plan.cycle.lead_ns == 25_000
         with cat.Loop(arm, period=1e-3, lead=0) as loop:
             assert loop.plan.cycle.lead_ns == 0
+
+
+def test_a_main_device_that_is_closed_round_an_open_loop_leaves_it_first() -> None:
+    segment = Segment([Servo()])
+    main = cat.MainDevice(segment)
+    main.open()
+    arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+    loop = cat.Loop(arm)
+    loop.__enter__()
+    next(loop)
+    main.close()
+    assert segment[0].state & 0x0F == 1
+    loop.__exit__(None, None, None)
+
+
+def test_what_was_asked_and_not_committed_does_not_come_after_the_stop() -> None:
+    """An exception right after `enable`: the axis stays off while the loop is being left."""
+    segment = Segment([Servo()])
+    with cat.MainDevice(segment) as main:
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        with contextlib.suppress(ZeroDivisionError), cat.Loop(arm, enable=False) as loop:
+            for cycle in loop:
+                if cycle.number == 5:
+                    arm.enable()
+                    raise ZeroDivisionError
+        assert segment[0].drive_state() == "SWITCH ON DISABLED"
+
+
+def test_a_fault_in_a_cycle_that_python_has_missed_is_raised_all_the_same() -> None:
+    segment = Segment([Servo()])
+    with cat.MainDevice(segment) as main:
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        with pytest.raises(DriveError, match="0x2310"), cat.Loop(arm) as loop:
+            for cycle in loop:
+                if cycle.number == 10:
+                    segment[0].inject_fault(0x2310)
+                    cycle.spend(8e-3)
+                assert cycle.number < 20
+
+
+def test_a_period_longer_than_a_second() -> None:
+    with cat.MainDevice(Segment([Servo()])) as main:
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        with cat.Loop(arm, period=1.5, watchdog=5.0, late_limit=0) as loop:
+            assert next(loop).ok
+            assert next(loop).ok

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Self, TypeVar, overload
 
@@ -81,6 +81,7 @@ class MainDevice:
         self._link: Link | None = None
         self._blocking: BlockingRunner | None = None
         self._attached: Runner | None = None
+        self._leave_loop: Callable[[], object] | None = None  # ends the loop that runs
 
     @property
     def link(self) -> Link:
@@ -109,6 +110,8 @@ class MainDevice:
         """Brings all devices to INIT, best effort, and closes the link."""
         if self._link is None:
             return
+        if self._leave_loop is not None:
+            self._leave_loop()  # a loop that was left open must not go on without its link
         try:
             if self.subs:
                 with contextlib.suppress(CatenaryError):  # the segment may be gone, so we go too
@@ -267,15 +270,15 @@ class MainDevice:
         return runner.submit(procedure)
 
     @contextlib.contextmanager
-    def attached(self, runner: Runner) -> Iterator[None]:
+    def attached(self, runner: Runner, leave: Callable[[], object] | None = None) -> Iterator[None]:
         """While a loop runs: conversations go through its runner, scans are refused."""
         if self._attached is not None:
             raise RuntimeError("a loop runs on this MainDevice already")
-        self._attached = runner
+        self._attached, self._leave_loop = runner, leave
         try:
             yield
         finally:
-            self._attached = None
+            self._attached = self._leave_loop = None
 
     @property
     def _runner(self) -> BlockingRunner:

@@ -44,7 +44,7 @@ cdef struct axis_t:
     int8_t mode_shown
     uint16_t status
     uint32_t invalid_in_row    # exchanges of its unit
-    uint64_t read_at           # cycle of its last valid inputs
+    int64_t read_at            # instant of its last valid inputs [ns]
     uint32_t still_cycles      # in a row, at rest
     uint64_t last_raw
     int64_t counts             # last_raw without going round
@@ -106,7 +106,7 @@ cdef class Axes:
     """Owns the axis records and column tables."""
     cdef axes_t c
 
-cdef void axes_read(axes_t *x, actual_t *out, uint64_t number) noexcept nogil
+cdef void axes_read(axes_t *x, actual_t *out, uint64_t number, int64_t instant) noexcept nogil
 cdef void axes_write(axes_t *x, const target_t *target, bint fresh) noexcept nogil
 cdef void axes_tell(const axes_t *x, actual_t *out) noexcept nogil
 cdef void axes_follow(const axes_t *x, const actual_t *actual, target_t *target) noexcept nogil

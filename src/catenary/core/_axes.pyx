@@ -72,7 +72,7 @@ cdef void read_position(axis_t *a, const uint8_t *inputs, double elapsed) noexce
         a.velocity = (a.position - before) / elapsed if a.known else 0.0
 
 
-cdef void read_axis(axes_t *x, axis_t *a, uint64_t number) noexcept nogil:
+cdef void read_axis(axes_t *x, axis_t *a, int64_t instant) noexcept nogil:
     cdef const uint8_t *inputs = x.image.inputs
     a.status = <uint16_t>number_bits(&a.statusword, inputs)
     a.state = cia402_state(a.status)
@@ -82,11 +82,11 @@ cdef void read_axis(axes_t *x, axis_t *a, uint64_t number) noexcept nogil:
     if a.actual_velocity.present:
         a.velocity = number_value(&a.actual_velocity, inputs)
     if a.actual_position.present:
-        read_position(a, inputs, x.period * (number - a.read_at))
+        read_position(a, inputs, (instant - a.read_at) * 1e-9)
     if a.actual_torque.present:
         a.torque = number_value(&a.actual_torque, inputs)
     a.known = 1
-    a.read_at = number
+    a.read_at = instant
     if -a.standstill <= a.velocity <= a.standstill:
         if a.still_cycles < x.still_limit:
             a.still_cycles += 1
@@ -107,8 +107,8 @@ cdef void read_columns(const axes_t *x, actual_t *out) noexcept nogil:
             out.input_bits[c.rank] = number_bits(&c.number, x.image.inputs) != 0
 
 
-cdef void axes_read(axes_t *x, actual_t *out, uint64_t number) noexcept nogil:
-    """After collect of cycle `number`: the input image → actual values."""
+cdef void axes_read(axes_t *x, actual_t *out, uint64_t number, int64_t instant) noexcept nogil:
+    """After collect of cycle `number`, whose instant is `instant` [ns]: the input image → actual values."""
     cdef axis_t *a
     cdef uint32_t i
     cdef uint8_t before
@@ -117,7 +117,7 @@ cdef void axes_read(axes_t *x, actual_t *out, uint64_t number) noexcept nogil:
         a = &x.axes[i]
         before = a.state
         if x.image.unit_fresh[a.unit]:
-            read_axis(x, a, number)
+            read_axis(x, a, instant)
         a.invalid_in_row = x.image.unit_missed[a.unit]
         guard_observe(x, a, before, number)
         if not a.lost and (a.state == OPERATION_ENABLED or a.state == QUICK_STOP_ACTIVE

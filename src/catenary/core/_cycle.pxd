@@ -90,6 +90,10 @@ cdef struct cycle_t:
     uint32_t skipped           # instants before this cycle
     uint32_t lost_in_row
     uint32_t flags
+    uint32_t drops             # cycles so far with each of four things to say
+    uint32_t refusals
+    uint32_t limits
+    uint32_t dries
     uint32_t dry               # the stream had no row for the last set-points
     int missing
     uint64_t lost

@@ -204,7 +204,7 @@ cdef void collect(cycle_t *c, actual_t *actual, int64_t deadline) noexcept nogil
     """The compiled half after the wire: frames → images → actual values."""
     cdef int rc = c.image.collect(c.image.self, deadline)
     c.missing = rc if rc >= 0 else -1
-    axes_read(c.axes, actual, c.number)
+    axes_read(c.axes, actual, c.number, c.scheduled)
     if c.clock != NULL:
         c.next += clock_close(c.clock)
         if c.clock.changes != c.clock.acknowledged:
@@ -227,13 +227,21 @@ cdef void close_header(cycle_t *c, actual_t *actual) noexcept nogil:
     cdef uint32_t unit
     if c.axes.limited:
         c.flags |= LIMITED_SOME
+        c.limits += 1
     if c.axes.refused:
         c.flags |= REFUSED_SOME
+        c.refusals += 1
     if c.dry:
         c.flags |= DRY
+        c.dries += 1
     if c.axes.dropped:
         c.flags |= DROPPED_SOME
         c.axes.dropped = 0
+        c.drops += 1
+    header.drops = c.drops
+    header.refusals = c.refusals
+    header.limits = c.limits
+    header.dries = c.dries
     header.ok = c.flags & OK
     header.number = c.number
     header.time_ns = c.scheduled - c.origin
@@ -272,7 +280,6 @@ cdef bint take_streamed(cycle_t *c, target_t *target, bint fresh) noexcept nogil
         return fresh
     if stream_take(stream, target):
         target.header.hold = 0
-        target.header.seen = c.number
         return True
     if stream.taken == 0:
         return fresh
@@ -362,7 +369,7 @@ cdef void cycle_native(cycle_t *c) noexcept nogil:
     if c.law_seen != cat_load_acquire32(&c.law_request):
         if c.order == THREADED and c.law == NULL and c.law_asked != NULL:
             cycle_take_law(c, handover_latch(c.handover, &fresh))
-            emit(c, &c.handover.target[OF_LAW], False)
+            c.image.emit(c.image.self)  # what was sent last, once more
         else:
             cycle_take_law(c, handover_latch(c.handover, &fresh))
 
@@ -383,7 +390,8 @@ cdef void cycle_take_law(cycle_t *c, const target_t *orders) noexcept nogil:
         target.torque[i] = c.axes.axes[i].commanded_torque
     target.header.hold = 1
     target.header.seen = c.number
-    law_begin(c.law, c.next)
+    if not law_begin(c.law, c.next):
+        c.law = NULL
 
 
 cdef void end_law(cycle_t *c, uint32_t status) noexcept nogil:
@@ -412,7 +420,7 @@ cdef bint step_law(cycle_t *c, actual_t *actual, target_t *target, int64_t usabl
     axes_follow(c.axes, actual, target)
     take_streamed(c, target, False)
     target.header.hold = 0
-    target.header.seen = c.number
+    target.header.seen = c.number  # the law has read them: a streamed row passes through its hands
     actual.header.ok = c.flags & OK
     memcpy(c.handover.target[BEFORE_LAW].header, target.header, c.handover.target_size)
     goes_on = law_run(law, c.axes, actual, target, c.scheduled, c.number)

@@ -18,9 +18,16 @@ cdef class Engine(Parts):
     cdef object rehearsal      # called in the lead
     cdef int64_t left          # when `next` returned [ns]; -1: no application since
 
+    cdef uint32_t drops_heard  # of the counts in the header, what the application has been told
+    cdef uint32_t refusals_heard
+    cdef uint32_t limits_heard
+    cdef uint32_t dries_heard
+
     cdef uint32_t step(self, int64_t timeout_ns=*) except? 0xFFFFFFFF
     cdef bint is_native_cycle(self, bint application) noexcept nogil
     cdef void follow(self) noexcept
+    cdef bint is_led(self) noexcept
+    cdef uint32_t heard(self) noexcept
     cdef void inline_outputs(self, bint application) noexcept nogil
     cdef int inline_inputs(self) except -1
     cdef int lockstep(self) except -1

@@ -38,13 +38,13 @@ class Engine:
         committed yet: drives stay disabled, outputs zero (or as the target buffers say after
         the first `run` or `next`). Again after `stop`: continues. OSError if no thread can be had."""
 
-    def next(self, timeout_ns: int = 1_000_000_000) -> int:
+    def next(self, timeout_ns: int = 0) -> int:
         """One step of the application: commits the target buffers, lets the next cycle happen,
         swaps in the newest actual values. Returns CYCLE_* flags.
 
         inline: emit, tail, wait for the instant, collect. threaded, law: wait for the newest
-        cycle at most `timeout_ns`. OSError when the link fails, KeyboardInterrupt and the like
-        from signal handlers at once.
+        cycle at most `timeout_ns` (0: a second and four periods). OSError when the link fails,
+        KeyboardInterrupt and the like from signal handlers at once.
         """
 
     def run(self, cycles: int) -> int:

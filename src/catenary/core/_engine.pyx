@@ -15,11 +15,15 @@ from libc.string cimport memcpy
 
 from catenary.core._axes cimport axes_follow
 from catenary.core._cycle cimport (
+    DROPPED_SOME,
+    DRY,
     INLINE,
     LATE,
     LAW_DONE,
     LAW_FAILED,
+    LIMITED_SOME,
     NONE,
+    REFUSED_SOME,
     STOPPED,
     cycle_inputs,
     cycle_native,
@@ -42,7 +46,7 @@ from catenary.core._handover cimport (
     handover_swap,
     target_t,
 )
-from catenary.core._law cimport Law, law_t
+from catenary.core._law cimport WAITING, Law, law_t
 from catenary.core._native cimport (
     CAT_LINK_SPENDS,
     cat_add32,
@@ -145,22 +149,46 @@ cdef class Engine(Parts):
 
     # ---- steps
 
-    def next(self, int64_t timeout_ns=SILENCE_NS):
+    def next(self, int64_t timeout_ns=0):
         return self.step(timeout_ns)
 
-    cdef uint32_t step(self, int64_t timeout_ns=SILENCE_NS) except? 0xFFFFFFFF:
+    cdef uint32_t step(self, int64_t timeout_ns=0) except? 0xFFFFFFFF:
+        """`timeout_ns` 0: a second and some periods."""
         if not self.running:
             raise RuntimeError("the engine is not running: start it first")
+        if timeout_ns == 0:
+            timeout_ns = SILENCE_NS + 4 * self.e.cycle.period
         if self.native:
             return self.step_native(timeout_ns)
         if self.is_native_cycle(True):
-            self.commit(self.law is not None or self.stream is not None)
+            self.commit(self.is_led())
             self.lockstep()
         else:
             self.inline_outputs(True)
             self.inline_inputs()
         self.follow()
-        return self.h.actual[PRIVATE].header.flags
+        return self.heard()
+
+    cdef bint is_led(self) noexcept:
+        """Whether a law that has begun, or a stream, says the set-points."""
+        return self.stream is not None or (self.law is not None and self.law.c.status != WAITING)
+
+    cdef uint32_t heard(self) noexcept:
+        """The flags of the cycle, with what was said in cycles that the application has missed."""
+        cdef actual_header_t *header = self.h.actual[PRIVATE].header
+        if header.drops != self.drops_heard:
+            header.flags |= DROPPED_SOME
+        if header.refusals != self.refusals_heard:
+            header.flags |= REFUSED_SOME
+        if header.limits != self.limits_heard:
+            header.flags |= LIMITED_SOME
+        if header.dries != self.dries_heard:
+            header.flags |= DRY
+        self.drops_heard = header.drops
+        self.refusals_heard = header.refusals
+        self.limits_heard = header.limits
+        self.dries_heard = header.dries
+        return header.flags
 
     cdef bint is_native_cycle(self, bint application) noexcept nogil:
         """Whether the next cycle of the caller's thread has the order of a native one. Inline: only
@@ -259,13 +287,13 @@ cdef class Engine(Parts):
         cdef actual_header_t *header = self.h.actual[PRIVATE].header
         cdef uint64_t before = header.number
         cdef uint32_t flags
-        self.commit(self.law is not None or self.stream is not None)
+        self.commit(self.is_led())
         flags = self.await_cycle(timeout_ns)
         self.follow()
         self.left = self.now_ns()
         if before > 0 and header.number > before + 1:
             header.flags |= LATE
-        return header.flags | flags
+        return self.heard() | flags
 
     cdef void commit(self, bint hold) noexcept:
         cdef target_t *target = &self.h.target[PRIVATE]
@@ -313,7 +341,7 @@ cdef class Engine(Parts):
             raise RuntimeError("the engine is not running: start it first")
         flags = self.hold(cycles, False, 0)
         self.left = -1
-        return flags
+        return flags | self.heard()
 
     cdef uint32_t hold(self, int64_t cycles, bint until_stopped, int64_t deadline) except? 0xFFFFFFFF:
         """Cycles without an application: so many, or until nothing moves or the deadline [ns]."""
@@ -446,12 +474,16 @@ cdef class Engine(Parts):
     def start_law(self, Law law not None):
         if not self.running:
             raise RuntimeError("the engine is not running: start it first")
+        if self.law is not None:
+            self.law.supersede()
         kept = [known for known in self.laws[:-1] if not known.ended]
         self.laws = [*kept, *self.laws[-1:], law]  # the cycle may still be in one of them
         self.law = law
         self.ask_law(&law.c)
 
     def stop_law(self):
+        if self.law is not None:
+            self.law.supersede()
         self.ask_law(NULL)
 
     cdef void ask_law(self, law_t *law) noexcept:
@@ -477,7 +509,7 @@ cdef class Engine(Parts):
                 cycles -= 1
         self.follow()
         self.left = -1
-        return flags | self.h.actual[PRIVATE].header.flags
+        return flags | self.heard()
 
     # ---- streams
 

@@ -69,6 +69,8 @@ cdef int frames_emit(void *self) noexcept nogil:
     cdef uint32_t i, k, m
     cdef int rc, first_error = 0
     f.serial += 1
+    if f.serial == 0:  # which says: never sent
+        f.serial = 1
     if f.clock != NULL:  # its datagrams are in the frame that goes first
         clock_emit(f.clock, f.link.now(f.link.self))
     f.missing = 0

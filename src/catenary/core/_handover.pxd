@@ -19,6 +19,10 @@ cdef struct actual_header_t:
     uint32_t flags
     uint32_t lost_in_row
     uint32_t skipped
+    uint32_t drops             # cycles so far with each of four things to say: an application that
+    uint32_t refusals          # misses a cycle hears of it in the next
+    uint32_t limits
+    uint32_t dries
     uint32_t moving            # axes under power and not at rest
     double period              # [s]
     uint32_t axis_count

@@ -45,8 +45,9 @@ cdef class Law:
     cdef fill(self, exchange_t *numbers, values)
     cdef bint ended_before(self, uint64_t number) noexcept
     cdef bint failed(self) noexcept
+    cdef void supersede(self) noexcept
 
-cdef void law_begin(law_t *law, int64_t instant) noexcept nogil
+cdef bint law_begin(law_t *law, int64_t instant) noexcept nogil
 cdef void law_end(law_t *law, uint32_t status, uint64_t number) noexcept nogil
 cdef bint law_run(law_t *law, const axes_t *axes, const actual_t *actual, target_t *target,
                   int64_t instant, uint64_t number) noexcept nogil

@@ -16,6 +16,7 @@ from catenary.core._native cimport (
     CAT_LAW_ABORTED,
     CAT_LAW_FINISHED,
     CAT_LAW_GOES_ON,
+    cat_change32,
     cat_futex_wait,
     cat_futex_wake,
     cat_law_call,
@@ -63,9 +64,10 @@ cdef inline bint take(exchange_t *numbers, double *values) noexcept nogil:
 
 # ---- in the cycle
 
-cdef void law_begin(law_t *law, int64_t instant) noexcept nogil:
+cdef bint law_begin(law_t *law, int64_t instant) noexcept nogil:
+    """False: the application has thought better of it."""
     law.begun = instant
-    cat_store_release32(&law.status, RUNNING)
+    return cat_change32(&law.status, WAITING, RUNNING)
 
 
 cdef void law_end(law_t *law, uint32_t status, uint64_t number) noexcept nogil:
@@ -219,6 +221,12 @@ cdef class Law:
     @property
     def ended(self):
         return cat_load_acquire32(&self.c.status) > RUNNING
+
+    cdef void supersede(self) noexcept:
+        """Ends it where the cycle has not begun with it: then it never will."""
+        if cat_change32(&self.c.status, WAITING, STOPPED_BY_APPLICATION):
+            give(&self.c.memory_out, self.c.numbers.memory)
+            cat_futex_wake(&self.c.status)
 
     cdef bint ended_before(self, uint64_t number) noexcept:
         """That cycle has seen its end."""

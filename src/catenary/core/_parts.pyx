@@ -216,12 +216,17 @@ cdef class Parts:
         self.spare_histograms = old
 
     def log(self):
+        """A record that the native thread has written over meanwhile is left out."""
         cdef uint64_t last = self.e.cycle.number
         cdef uint64_t count = min(last, <uint64_t>LOG_LENGTH)
         cdef uint64_t number
+        cdef record_t record
         parts = []
         for number in range(last - count + 1, last + 1):
-            parts.append((<char *>&self.e.cycle.records[number % RECORDS])[: sizeof(record_t)])
+            record = self.e.cycle.records[number % RECORDS]
+            cat_fence()
+            if record.number == number and self.e.cycle.records[number % RECORDS].number == number:
+                parts.append((<char *>&record)[: sizeof(record_t)])
         return b"".join(parts)
 
     # ---- the acyclic lane

@@ -4,6 +4,7 @@ from catenary.core._handover cimport target_t
 
 cdef struct stream_t:
     double *rows               # position, velocity, torque of all axes, one behind the other
+    uint64_t *seen             # of each row: the cycle whose actual values its writer had read
     uint32_t axes
     uint32_t capacity          # rows
     uint64_t written           # rows so far; the writer's

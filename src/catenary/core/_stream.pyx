@@ -34,6 +34,7 @@ cdef bint stream_take(stream_t *s, target_t *target) noexcept nogil:
     memcpy(target.position, row, size)
     memcpy(target.velocity, row + s.axes, size)
     memcpy(target.torque, row + 2 * s.axes, size)
+    target.header.seen = s.seen[s.taken % s.capacity]
     cat_store_release64(&s.taken, s.taken + 1)
     return True
 
@@ -45,10 +46,11 @@ cdef class Stream:
         self.c.axes = axes
         self.c.capacity = capacity
         self.c.rows = <double *>calloc(<size_t>axes * capacity * QUANTITIES, sizeof(double))
-        if self.c.rows == NULL:
+        self.c.seen = <uint64_t *>calloc(capacity, sizeof(uint64_t))
+        if self.c.rows == NULL or self.c.seen == NULL:
             raise MemoryError
 
-    def write(self, bytes rows not None):
+    def write(self, bytes rows not None, uint64_t seen):
         """Rows of 3·axes float64. How many found room."""
         cdef stream_t *s = &self.c
         cdef size_t size = s.axes * QUANTITIES * sizeof(double)
@@ -61,6 +63,7 @@ cdef class Stream:
         count = min(count, room)
         for number in range(count):
             memcpy(row_of(s, s.written + number), source + number * size, size)
+            s.seen[(s.written + number) % s.capacity] = seen
         cat_store_release64(&s.written, s.written + count)
         return count
 
@@ -82,3 +85,4 @@ cdef class Stream:
 
     def __dealloc__(self):
         free(self.c.rows)
+        free(self.c.seen)

@@ -6,6 +6,7 @@ Leaving, for whatever reason, stops the drives natively before the states go dow
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from functools import partial
 from types import TracebackType
@@ -123,6 +124,7 @@ class Loop:
                 self._main,
                 plan,
                 self._wishes,
+                abandon=self._abandon,
                 on_return=self._on_return,
                 on_replacement=self._on_replacement,
             )
@@ -292,6 +294,11 @@ class Loop:
             cpu=self._cpu,
             priority=self._priority,
         )
+
+    def _abandon(self) -> None:
+        """The MainDevice is being closed while the loop is open."""
+        for problem in self._leave():
+            warnings.warn(f"the loop was left open: {problem}", RuntimeWarning, stacklevel=2)
 
     def _leave(self) -> list[Exception]:
         try:

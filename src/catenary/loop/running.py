@@ -17,6 +17,7 @@ from catenary.core import (
     CYCLE_STOPPED,
     CYCLE_WORKING_COUNTER,
     GOAL_ENABLED,
+    GOAL_QUICK_STOP,
     RECORD_FIELDS,
     Engine,
 )
@@ -41,6 +42,7 @@ LogArray = npt.NDArray[np.void]
 
 FATAL = CYCLE_WORKING_COUNTER | CYCLE_STOPPED | CYCLE_NONE
 ENABLE_TIMEOUT_NS = 5_000_000_000  # mains contactors and brakes are slow, but not this slow
+ENABLE_CYCLES = 20  # where the period is long
 SETTLE_CYCLES = 50  # until the first cycle with all answers
 STOP_SLICE_NS = 20_000_000  # between looks at "hurry" while the drives brake
 
@@ -54,6 +56,7 @@ class Running:
         plan: Plan,
         wishes: Sequence[Wish],
         *,
+        abandon: Callable[[], object],
         on_return: Policy = "restore",
         on_replacement: Policy = "hold",
     ) -> None:
@@ -75,6 +78,8 @@ class Running:
             on_replacement=on_replacement,
         )
         self._attached = ExitStack()
+        self._left = False
+        self._abandon = abandon  # leaves the loop, when the MainDevice is closed round it
         self._stations = [sub.station for sub in main.subs]
 
     # Opening
@@ -83,7 +88,7 @@ class Running:
         """From SAFE-OP to OP: the cycle starts, and valid outputs flow while the states change."""
         self.engine.start()
         self.service.start()
-        self._attached.enter_context(self.main.attached(self.service.runner))
+        self._attached.enter_context(self.main.attached(self.service.runner, self._abandon))
         self._settle()
         self.service.converse(*(request_state(station, State.OP) for station in self._stations))
         for sub in self.main.subs:
@@ -96,7 +101,8 @@ class Running:
         self.views.goal[:] = GOAL_ENABLED
         self.views.request[:] += 1
         in_position = self.views.mode_target == Mode.CSP
-        deadline = self.engine.now() + ENABLE_TIMEOUT_NS
+        patience = max(ENABLE_TIMEOUT_NS, ENABLE_CYCLES * self.plan.cycle.period_ns)
+        deadline = self.engine.now() + patience
         while True:
             flags = self.engine.run(1)
             waiting = in_position & (self.views.axis_flags & AXIS_FOLLOWED == 0)
@@ -156,7 +162,10 @@ class Running:
 
     def leave(self, guard: SignalGuard) -> list[Exception]:
         """Brings everything down, best effort: each step is taken whatever the one before met.
-        What went wrong on the way."""
+        What went wrong on the way. A second time: nothing."""
+        if self._left:
+            return []
+        self._left = True
         steps: tuple[Callable[[SignalGuard], None], ...] = (
             self._stop_axes,
             self._stop_cycle,
@@ -175,15 +184,24 @@ class Running:
         self.engine.stop_law()
         if not self.plan.cycle.axes:
             return
-        self.engine.quick_stop_all()
+        self._stop_all()
         for _ in range(self.plan.cycle.stop_deadline_ns // STOP_SLICE_NS + 1):
             if guard.hurry or self.engine.run_until_stopped(STOP_SLICE_NS):
                 return
 
+    def _stop_all(self) -> None:
+        """All axes brake from the next cycle on. What the body has asked for and not committed yet
+        must not come after it."""
+        self.views.goal[:] = GOAL_QUICK_STOP
+        self.views.request[:] += 1
+        self.engine.quick_stop_all()
+
     def _stop_cycle(self, guard: SignalGuard) -> None:
-        self._attached.close()
-        self.service.end()
-        self.engine.stop()
+        try:
+            self._attached.close()
+            self.service.end()
+        finally:
+            self.engine.stop()
 
     def _take_down(self, guard: SignalGuard) -> None:
         self.main.leave()
@@ -198,7 +216,7 @@ class Running:
             if not valid and not unit.optional
             for position in unit.devices
         ]
-        self.engine.quick_stop_all()  # what still answers need not wait for the questions
+        self._stop_all()  # what still answers need not wait for the questions
         [answers] = self.service.converse(survey(self._stations))
         return silence_error(answers, suspects, lost, log)
 
@@ -216,7 +234,7 @@ class Running:
         """The error for some axes, with what each drive says about it."""
         log = self.log()
         states = [state_of(self.views.statusword.item(axis)) for axis in axes]
-        self.engine.quick_stop_all()
+        self._stop_all()
         troubles = [
             AxisTrouble(self.plan.cycle.axes[axis].name, state, self._error_code(axis))
             for axis, state in zip(axes, states, strict=True)

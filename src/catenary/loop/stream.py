@@ -17,7 +17,7 @@ class Stream:
     From the first row on the stream says the set-points, until `close`; a law that runs beside it
     finds the row in its targets. When it runs dry the axes hold (velocity and torque go to zero),
     `cycle.dry` is True and `dry` counts the cycles; it goes on with the next row. Any thread may
-    write, not two at a time.
+    write, not two at a time. An axis that is enabled later follows the rows written after that.
     """
 
     def __init__(self, engine: core.Engine, views: Views, capacity: int) -> None:
@@ -51,7 +51,7 @@ class Stream:
         for k, name in enumerate(("position", "velocity", "torque")):
             if name in rows:
                 block[:, k] = rows[name]
-        return self._ring.write(block.tobytes())
+        return self._ring.write(block.tobytes(), self._engine.number)
 
     def _checked(self, name: str, values: Rows) -> npt.NDArray[np.float64]:
         array = np.atleast_2d(np.asarray(values, dtype=np.float64))
