@@ -68,7 +68,8 @@ def test_a_fault_in_a_cycle_that_python_has_missed_is_raised_all_the_same() -> N
                 if cycle.number == 10:
                     segment[0].inject_fault(0x2310)
                     cycle.spend(8e-3)
-                assert cycle.number < 20
+                if cycle.number == 20:
+                    break
 
 
 def test_a_period_longer_than_a_second() -> None:
