@@ -227,3 +227,49 @@ def test_pauses_are_counted_in_the_lanes_time() -> None:
 def _state(station: int) -> Procedure[int]:
     [reply] = yield [read(Command.FPRD, station, AL_STATUS)]
     return AL_STATUS.unpack(reply.data)
+
+
+def test_a_loop_that_begins_waits_for_who_talks_and_others_go_beside_it() -> None:
+    """One thread at a time has the link: a conversation of another thread is finished first, one
+    that comes too late for that goes into the lane."""
+    with MainDevice(demo_segment()) as main:
+        drive = main.scan()[2]
+        lane = Lane(main.link)
+        runner = LaneRunner(lane)
+        talking, go_on = threading.Event(), threading.Event()
+        order: list[str] = []
+
+        def talks() -> Procedure[None]:
+            yield [read(Command.FPRD, drive.station.address, AL_STATUS)]
+            talking.set()
+            go_on.wait(60.0)
+            yield [read(Command.FPRD, drive.station.address, AL_STATUS)]
+            order.append("talked")
+
+        first = threading.Thread(target=main.converse, args=(talks(),))
+        first.start()
+        assert talking.wait(60.0)
+        late: list[int] = []
+        second = threading.Thread(target=lambda: late.append(drive.sdo.read(0x1018, 1, type=UDINT)))
+        second.start()  # waits for the first, on the blocking runner; or comes later
+        threading.Timer(0.02, go_on.set).start()
+        with main.attached(runner):
+            order.append("attached")
+            while second.is_alive():
+                runner.step()
+                lane.cycle()
+                second.join(0.001)
+        first.join()
+        assert order == ["talked", "attached"]
+        assert late == [drive.identity.vendor]
+
+
+def test_without_the_lane_nobody_sends_while_a_loop_has_the_link() -> None:
+    with MainDevice(demo_segment()) as main:
+        main.scan()
+        blocking = main._runner
+        with (
+            main.attached(LaneRunner(Lane(main.link))),
+            pytest.raises(RuntimeError, match="a loop has the link"),
+        ):
+            blocking.run(_state(0x1001))

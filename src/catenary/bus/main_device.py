@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Self, TypeVar, overload
 from catenary.bus import event
 from catenary.bus.events import Callback, Callbacks, Events
 from catenary.bus.pending import Pending
-from catenary.bus.runner import BlockingRunner, FrameCounts, Runner
+from catenary.bus.runner import BlockingRunner, FrameCounts, LinkLent, Runner
 from catenary.bus.segment_scan import Found, check_identity, find, with_places
 from catenary.bus.sub_device import SubDevice
 from catenary.errors import CatenaryError, SegmentError
@@ -257,28 +257,42 @@ class MainDevice:
 
     def converse(self, procedure: Procedure[T]) -> T:
         """Runs a procedure, alone or beside the running loop."""
-        runner: Runner = self._attached or self._runner
-        try:
-            return runner.run(procedure)
-        finally:
-            self.deliver_events()
+        while True:
+            runner: Runner = self._attached or self._runner
+            try:
+                return runner.run(procedure)
+            except LinkLent:
+                continue  # a loop has begun in another thread: beside it, then
+            finally:
+                if self._attached is None:
+                    self.deliver_events()
 
     def request(self, procedure: Procedure[T]) -> Pending[T]:
         """Lets a procedure go on beside the running loop. Without one it has ended when this
         returns."""
-        runner: Runner = self._attached or self._runner
-        return runner.submit(procedure)
+        while True:
+            runner: Runner = self._attached or self._runner
+            with contextlib.suppress(LinkLent):
+                return runner.submit(procedure)
 
     @contextlib.contextmanager
     def attached(self, runner: Runner, leave: Callable[[], object] | None = None) -> Iterator[None]:
-        """While a loop runs: conversations go through its runner, scans are refused."""
+        """While a loop runs: conversations go through its runner, scans are refused. Waits for
+        those that other threads have under way: the link is the loop's alone."""
         if self._attached is not None:
             raise RuntimeError("a loop runs on this MainDevice already")
+        blocking = self._runner
         self._attached, self._leave_loop = runner, leave
+        blocking.lend()
         try:
             yield
         finally:
-            self._attached = self._leave_loop = None
+            self._detach()
+
+    def _detach(self) -> None:
+        if self._blocking is not None:
+            self._blocking.take_back()
+        self._attached = self._leave_loop = None
 
     @property
     def _runner(self) -> BlockingRunner:
@@ -326,7 +340,7 @@ class MainDevice:
                 check_identity(sub.description, Identity(*(*wanted, 0, 0)[:4]))
 
     def _bring_down(self, state: State, timeout: float = LEAVE_TIMEOUT) -> None:
-        self._attached = None
+        self._detach()
         stations = [sub.station for sub in self.subs]
         self._runner.run(bring_all_down(stations, state, timeout))
         for sub in self.subs:

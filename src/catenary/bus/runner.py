@@ -7,8 +7,9 @@ procedure said that this is harmless. Every wait has a deadline on the link's cl
 
 from __future__ import annotations
 
+import contextlib
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
@@ -48,6 +49,10 @@ class FrameCounts:
     malformed: int = 0
 
 
+class LinkLent(RuntimeError):
+    """A loop has taken the link meanwhile: its runner is to be asked. Nothing was sent."""
+
+
 class BlockingRunner:
     """Owns the link while a procedure runs; blocks its caller until the end."""
 
@@ -60,6 +65,7 @@ class BlockingRunner:
         self._attempts = attempts
         self._indices = indices()
         self._lock = threading.Lock()
+        self._lent = False
 
     def run(self, procedure: Procedure[T]) -> T:
         """Runs one to its end."""
@@ -68,7 +74,7 @@ class BlockingRunner:
     def submit(self, procedure: Procedure[T]) -> Pending[T]:
         """The same: nobody else would step it, so it has ended when this returns."""
         pending = Pending(Task(procedure))
-        with self._lock:
+        with self._mine():
             try:
                 self._run([pending.task])
             finally:
@@ -79,7 +85,7 @@ class BlockingRunner:
     def run_all(self, procedures: Sequence[Procedure[T]]) -> list[T]:
         """Runs all at once. When some fail, the others are finished first; then the first error
         is raised, with the rest as its notes."""
-        with self._lock:
+        with self._mine():
             tasks = [Task(procedure) for procedure in procedures]
             try:
                 self._run(tasks)
@@ -92,6 +98,22 @@ class BlockingRunner:
         if errors:
             raise errors[0]
         return [task.result() for task in tasks]
+
+    def lend(self) -> None:
+        """The link is a loop's from here on: waits for whoever talks now, refuses others."""
+        with self._lock:
+            self._lent = True
+
+    def take_back(self) -> None:
+        """The loop has given the link back."""
+        self._lent = False
+
+    @contextlib.contextmanager
+    def _mine(self) -> Iterator[None]:
+        with self._lock:
+            if self._lent:
+                raise LinkLent("a loop has the link")
+            yield
 
     def flush(self) -> None:
         """Throws away what has been received before."""

@@ -86,9 +86,9 @@ class Running:
 
     def open(self) -> None:
         """From SAFE-OP to OP: the cycle starts, and valid outputs flow while the states change."""
+        self._attached.enter_context(self.main.attached(self.service.runner, self._abandon))
         self.engine.start()
         self.service.start()
-        self._attached.enter_context(self.main.attached(self.service.runner, self._abandon))
         self._settle()
         self.service.converse(*(request_state(station, State.OP) for station in self._stations))
         for sub in self.main.subs:
@@ -198,10 +198,10 @@ class Running:
 
     def _stop_cycle(self, guard: SignalGuard) -> None:
         try:
-            self._attached.close()
             self.service.end()
         finally:
             self.engine.stop()
+            self._attached.close()  # from here on other threads use the link
 
     def _take_down(self, guard: SignalGuard) -> None:
         self.main.leave()
