@@ -24,7 +24,8 @@ def run_until_it_ends(cell: Cell, arm: cat.Drives) -> WorkingCounterError:
 def test_the_silent_device_is_named(cell: Cell) -> None:
     error = run_until_it_ends(cell, cell.drives())
     assert f"silent: {cell.subs[3].station}" in str(error)
-    assert f"{cell.subs[2].station}" not in str(error)
+    assert f"{cell.subs[2].station}" not in error.message
+    assert f"between {cell.subs[2].station} port 1 and {cell.subs[3].station} port 0" in error.hint
     assert all(state & 0x0F < OP for state in cell.states[:3])
     assert cell.drive_states[0] != "OPERATION ENABLED"
 

@@ -12,7 +12,7 @@ from catenary.model.diagnosis import Observation, judge
 from catenary.model.finding import Finding, Kind, Names
 from catenary.model.silence import judge_silence
 from catenary.model.topology import Topology, make_topology
-from catenary.procedure.error_counters import read_error_counters
+from catenary.procedure.error_counters import counted_since, read_error_counters
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.survey import Answer, survey
 from catenary.wire.al import AlStatus, status_code
@@ -53,7 +53,9 @@ def diagnose(
     answers = yield from survey(stations)
     topology = make_topology([sub.description.open_ports for sub in subs])
     names = Names(tuple(sub.name for sub in subs))
-    counters, restarted = _since(totals, since)
+    counters, restarted = totals, frozenset[int]()
+    if since is not None and len(since.totals) == len(totals):
+        counters, restarted = counted_since(totals, since.totals)
     seen = Observation(topology, names, counters, restarted, lost_frames)
     silent = [answer.station.position for answer in answers if answer.word is None]
     findings = (
@@ -63,22 +65,6 @@ def diagnose(
         *_complaints(names, answers),
     )
     return Diagnosis(findings, counters, totals, topology, names)
-
-
-def _since(
-    totals: tuple[ErrorCounters | None, ...], before: Diagnosis | None
-) -> tuple[tuple[ErrorCounters | None, ...], frozenset[int]]:
-    """What was counted after `before`, and whose counters began again."""
-    if before is None or len(before.totals) != len(totals):
-        return totals, frozenset()
-    pairs = list(zip(totals, before.totals, strict=True))
-    counted = tuple(now if now is None or then is None else now.since(then) for now, then in pairs)
-    restarted = frozenset(
-        position
-        for position, (now, then) in enumerate(pairs)
-        if now is not None and then is not None and now.restarted(then)
-    )
-    return counted, restarted
 
 
 def _wiring(topology: Topology) -> list[Finding]:

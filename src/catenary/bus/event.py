@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from catenary.model.device import Identity
+from catenary.model.finding import Finding
 from catenary.wire import coe
 from catenary.wire.drive_error import error_text
 
@@ -97,6 +98,14 @@ class LinkRestored(Event):
     """A cable carries again."""
 
     between: tuple[int | None, int | None]
+
+
+@dataclass(frozen=True, slots=True)
+class FaultFound(Event):
+    """The error counters point at a cable, a device or its supply; frames may still come through.
+    `sub`: the device, or the one behind the cable."""
+
+    finding: Finding
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from catenary.errors import DriveError, StateError, WorkingCounterError
+from catenary.model.finding import Finding
 from catenary.procedure.survey import Answer
 from catenary.wire.al import State, status_code
 from catenary.wire.cia402 import State as DriveState
@@ -17,9 +18,14 @@ IN_FAULT = (DriveState.FAULT_REACTION_ACTIVE, DriveState.FAULT)
 
 
 def silence_error(
-    answers: Sequence[Answer], suspects: Sequence[int], lost: int, log: object
+    answers: Sequence[Answer],
+    suspects: Sequence[int],
+    lost: int,
+    log: object,
+    findings: Sequence[Finding] = (),
 ) -> WorkingCounterError:
-    """The error for `lost` bad cycles in a row; `suspects`: devices of the units that failed."""
+    """The error for `lost` bad cycles in a row; `suspects`: devices of the units that failed;
+    `findings`: what silence or error counters say of the place."""
     silent = [answer.station for answer in answers if answer.word is None]
     others = [a for a in answers if a.station.position in suspects and a.word is not None]
     stray = [answer for answer in others if is_astray(answer)]
@@ -27,12 +33,14 @@ def silence_error(
         who, hint = "no device answers", "check the cable and power of the first device"
     elif silent:
         who = f"silent: {', '.join(map(str, silent))}"
-        hint = "check the cable before it and its power; what hangs behind it is silent too"
+        places = "; ".join(finding.where for finding in findings) or "the cable before it"
+        hint = f"look at {places}"
     elif stray:
         who = f"not in OP: {'; '.join(map(described, stray))}"
         hint = "a device that was switched off and on again must be brought up again"
     else:
         who = f"all devices answer to single reads; affected: devices {listed(suspects)}"
+        who += "".join(f"; {each.where}: {each.evidence}" for each in findings)
         hint = (
             "frames are lost, corrupted or late on the way: check cables and other traffic on the "
             "port; where the segment is a program on a busy machine, allow it more cycles with "

@@ -24,11 +24,13 @@ from catenary.core import (
 from catenary.errors import CatenaryError, DriveError, LoopError
 from catenary.loop.buffers import bind_wishes
 from catenary.loop.diagnosis import IN_FAULT, AxisTrouble, drive_error, silence_error, state_error
+from catenary.loop.error_watch import ErrorWatch
 from catenary.loop.laws.runner import LawRunner
 from catenary.loop.rehearsal import make_rehearsal
 from catenary.loop.service import Service
 from catenary.loop.signals import SignalGuard
 from catenary.loop.watch import Policy, Watch
+from catenary.model.silence import judge_silence
 from catenary.plan.make import Plan
 from catenary.plan.wish import Wish
 from catenary.procedure.al_state import request_state
@@ -77,6 +79,7 @@ class Running:
             on_return=on_return,
             on_replacement=on_replacement,
         )
+        self.errors = ErrorWatch(main, now=lambda: self.engine.now() * 1e-9)
         self._attached = ExitStack()
         self._left = False
         self._abandon = abandon  # leaves the loop, when the MainDevice is closed round it
@@ -94,6 +97,7 @@ class Running:
         for sub in self.main.subs:
             sub.state = State.OP
         self.service.runner.submit(self.watch.run())
+        self.service.runner.submit(self.errors.run())
 
     def enable(self) -> None:
         """Enables all axes. Position axes hold when this returns; velocity and torque axes wait for
@@ -218,7 +222,10 @@ class Running:
         ]
         self._stop_all()  # what still answers need not wait for the questions
         [answers] = self.service.converse(survey(self._stations))
-        return silence_error(answers, suspects, lost, log)
+        [noise] = self.service.converse(self.errors.look())
+        silent = [answer.station.position for answer in answers if answer.word is None]
+        silence = judge_silence(self.errors.topology, self.errors.names, silent)
+        return silence_error(answers, suspects, lost, log, findings=silence or noise)
 
     def _valid_units(self) -> list[int]:
         return list(self.engine.buffers["unit_valid"].tolist())

@@ -6,6 +6,7 @@ As in `survey` nobody's silence is an error.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TypeAlias
 
 from catenary.procedure.exchange import Procedure, Request, read, write
 from catenary.procedure.station import Station, answered
@@ -20,8 +21,10 @@ from catenary.wire.register import (
     RX_ERROR_COUNTERS,
 )
 
+Totals: TypeAlias = tuple[ErrorCounters | None, ...]  # by position; None: no answer
 
-def read_error_counters(stations: Sequence[Station]) -> Procedure[tuple[ErrorCounters | None, ...]]:
+
+def read_error_counters(stations: Sequence[Station]) -> Procedure[Totals]:
     """What every device has counted; None: it said nothing. Where no frame comes back at all,
     nobody has said anything; ResponseTimeout where only some frames do: the devices asked in the
     others are not silent."""
@@ -36,6 +39,18 @@ def read_error_counters(stations: Sequence[Station]) -> Procedure[tuple[ErrorCou
         else decode_error_counters(answered(reply, station, "error counters"))
         for station, reply in zip(stations, replies, strict=True)
     )
+
+
+def counted_since(now: Totals, before: Totals) -> tuple[Totals, frozenset[int]]:
+    """What was counted between two readings, and whose counters began again in between."""
+    pairs = list(zip(now, before, strict=True))
+    counted = tuple(new if new is None or old is None else new.since(old) for new, old in pairs)
+    restarted = frozenset(
+        position
+        for position, (new, old) in enumerate(pairs)
+        if new is not None and old is not None and new.restarted(old)
+    )
+    return counted, restarted
 
 
 def clear_error_counters(stations: Sequence[Station]) -> Procedure[None]:
