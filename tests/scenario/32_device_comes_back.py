@@ -71,11 +71,12 @@ def run(
 
 
 def kinds(events: list[event.Event]) -> list[tuple[str, int]]:
-    """What was told of devices; what they told themselves is another scenario."""
+    """What was told of devices; what they told themselves, and what the error counters say of
+    their cables and power, are other scenarios."""
     return [
         (type(e).__name__, e.sub.position)
         for e in events
-        if e.sub is not None and not isinstance(e, event.Emergency)
+        if e.sub is not None and not isinstance(e, event.Emergency | event.FaultFound)
     ]
 
 
