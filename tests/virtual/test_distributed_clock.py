@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import random
 import struct
+from dataclasses import replace
 
 import pytest
 
@@ -154,8 +155,8 @@ def test_the_speed_difference_is_bounded_and_says_the_deviation(start: int) -> N
 def test_a_clock_is_caught_and_the_speed_difference_is_its_deviation(ppm: float) -> None:
     main = couplers(Crystal(), Crystal(ppm=ppm))
     main.align()
-    main.burst(10_000)
-    main.run(500)
+    main.burst(30_000)
+    main.run(3_000)
     assert abs(main.difference(1)) < 100
     counted = main.number(1, SPEED_DIFFERENCE, "<h")
     deviation = counted / (5 * (0x1000 + counted + 2) * (0x1000 - counted + 2))
@@ -165,8 +166,10 @@ def test_a_clock_is_caught_and_the_speed_difference_is_its_deviation(ppm: float)
 def test_a_plain_cycle_catches_a_clock_too() -> None:
     main = couplers(Crystal(), Crystal(ppm=50))
     main.align()
-    main.run(200)
-    assert abs(main.difference(1)) < 1_000
+    main.run(1_000)
+    assert 500 < main.difference(1) < 3_000  # 15 000 frames are advised, not 1 000
+    main.run(19_000)
+    assert abs(main.difference(1)) < 100
 
 
 def test_thirty_three_clocks_hold_together_within_two_seconds() -> None:
@@ -184,6 +187,12 @@ def test_thirty_three_clocks_hold_together_within_two_seconds() -> None:
     for _ in range(10):
         main.run(50)
         assert max(abs(main.difference(k)) for k in range(1, 33)) < 1_000
+    # and what is behind the scatter: one comparison without it
+    for k, device in enumerate(main.segment):
+        device.crystal = replace(device.crystal, jitter=0)
+        main.put_number(k, FILTERS, "<B", 0)
+    main.distribute()
+    assert max(abs(main.difference(k)) for k in range(1, 33)) < 1_000
 
 
 def test_a_clock_of_32_bits() -> None:

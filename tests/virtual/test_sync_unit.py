@@ -96,6 +96,12 @@ def test_a_single_shot(main: Clocks) -> None:
     assert pulses(main) == (1, 0)
 
 
+def test_a_signal_that_is_never_down_again_is_one_pulse(main: Clocks) -> None:
+    start(main, 2 * MS, 500)
+    main.let_pass(20)
+    assert pulses(main) == (1, 0)
+
+
 @pytest.mark.parametrize("bits", [64, 32])
 def test_a_start_in_the_past_comes_when_the_clock_has_gone_round(bits: Literal[32, 64]) -> None:
     main = clocks(bits=bits)

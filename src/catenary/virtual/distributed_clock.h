@@ -8,11 +8,13 @@
  * - with the speed counter's start S and difference D, |D| <= S - 0x7F, the local clock deviates by
  *   D / (5 (S + D + 2) (S - D + 2)). That is 1 ns more every S - D + 2 ticks of 10 ns and 1 ns less
  *   every S + D + 2 ticks: the 9, 10 or 11 ns that a tick adds.
- * They do not say how D follows from the differences. Here: D = V - 4 mean, where V is the mean of
+ * They do not say how D follows from the differences. Here: D = V - mean, where V is the mean of
  * 2^(0x0935) values of D. So D is the deviation between the clocks' periods once the difference has
- * settled, as the documents say; a larger S is a smaller bandwidth; with the reset values a clock is
- * caught within some 100 ms ("within 100 ms or so", SOEM#345), and the rest of the difference goes
- * with the mean of 2^12, of which the 15 000 frames that the documents advise are four times.
+ * settled, as the documents say; a larger S is a smaller bandwidth; with the reset values a clock
+ * that is 100 ppm off stays 3 us behind at first ("will lock after a while", "many seconds":
+ * SOEM#547), which goes with the mean of 2^12: the 15 000 frames that the documents advise for the
+ * start are four times that. A larger share of the mean in D catches a clock sooner, and hands the
+ * scatter of the time stamps on to it.
  *
  * Times are exact to a nanosecond where the real ones step by 10. */
 #ifndef CATENARY_VIRTUAL_DISTRIBUTED_CLOCK_H
@@ -26,7 +28,6 @@ enum {
     SPEED_START_MIN = 0x0080,
     SPEED_START_MAX = 0x3FFF,
     SPEED_ROOM = 0x007F,             /* the difference stays this far from the start value */
-    DIFFERENCE_GAIN = 4,             /* speed counter difference for a nanosecond */
     WAKE_UP_NS = 1234567             /* supplies come up one after the other */
 };
 
@@ -121,7 +122,7 @@ static void dc_receive_time(controller *c, uint32_t received, int64_t when) {
     int32_t difference = (int32_t)((uint32_t)own - received);
     k->mean += (difference - k->mean) / (1 << (c->memory[REG_DC_FILTER_DIFFERENCE] & 15));
     dc_show_difference(c);
-    dc_steer(c, k->speed - DIFFERENCE_GAIN * k->mean, when);
+    dc_steer(c, k->speed - k->mean, when);
 }
 
 /* The system time as a frame reads it: when it passed the reference clock. */

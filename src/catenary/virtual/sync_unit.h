@@ -20,6 +20,7 @@ enum {
     SYNC_PENDING_1 = 0x02
 };
 
+#define SYNC_HOLD_MIN 10000           /* no device follows interrupts faster than this [ns] */
 #define SYNC_HORIZON 1000000000000ll  /* a pulse further away is looked for again then [ns] */
 
 /* May a frame write this byte of 0x0900 to 0x09FF now? */
@@ -98,12 +99,19 @@ static void sync_pulse1(controller *c) {
     c->sync.pulses1 += (c->memory[REG_SYNC_ACTIVATION] & SYNC_PULSE_1) != 0;
 }
 
+/* How long a signal is up. One whose next pulse comes before it is down stays up (section I
+ * §9.2.3.1): no further pulse. */
+static inline int64_t sync_hold(const controller *c) {
+    int64_t length = 10 * (int64_t)load16(c->memory + REG_SYNC_PULSE_LENGTH);
+    return length > SYNC_HOLD_MIN ? length : SYNC_HOLD_MIN;
+}
+
 static int sync_pulse0(controller *c) {
     sync_unit *u = &c->sync;
     uint32_t cycle = load32(c->memory + REG_SYNC0_CYCLE);
     int64_t now = u->next0;
     c->memory[REG_SYNC_ACTIVATION_STATUS] &= (uint8_t)~SYNC_PENDING_0;
-    u->next0 = cycle > 0 ? now + cycle : NEVER;              /* 0: a single shot */
+    u->next0 = cycle > sync_hold(c) ? now + cycle : NEVER;   /* 0: a single shot */
     if (u->next1 == NEVER)
         u->next1 = now + load32(c->memory + REG_SYNC1_CYCLE);
     if (u->next0 != NEVER)
