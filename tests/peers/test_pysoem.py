@@ -35,12 +35,12 @@ bits = 8
 
 [[device]]
 kind = "servo"
-crystal = { ppm = 60.0, jitter = 20e-9 }
+crystal = { ppm = 20.0, jitter = 20e-9 }
 sync_missed_limit = 1000
 
 [[device]]
 kind = "servo"
-crystal = { ppm = -45.0, drift_ppm = 1.0 }
+crystal = { ppm = -15.0, drift_ppm = 1.0 }
 sync_missed_limit = 1000
 """
 OBJECT_DOES_NOT_EXIST = 0x06020000
@@ -246,7 +246,7 @@ def test_clocks_and_sync_pulses_up_to_op(clocked: Any) -> None:
     def together() -> bool:
         return all(abs(difference_ns(servo)) < 1_000 for servo in servos(master))
 
-    cycle_until(master, together)
+    cycle_until(master, together, 60.0)
     before = [next_pulse_ns(servo) for servo in servos(master)]
     cycle_until(master, lambda: next_pulse_ns(servos(master)[-1]) > before[-1])
     # Steered to one time, they pulse at the same instants of it, whatever their crystals do.
