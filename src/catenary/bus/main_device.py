@@ -14,11 +14,18 @@ from catenary.bus.runner import BlockingRunner, FrameCounts, LinkLent, Runner
 from catenary.bus.segment_scan import Found, check_identity, find, with_places
 from catenary.bus.sub_device import SubDevice
 from catenary.errors import CatenaryError, SegmentError
-from catenary.link import Link, LinkSource, lives_in_virtual_time
+from catenary.link import Link, LinkSource, lives_in_virtual_time, ring_of
 from catenary.model.device import Identity
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import Heard
-from catenary.procedure.stations import assign, bring_all_down, count, duplicate_aliases, reset
+from catenary.procedure.stations import (
+    StationRegisters,
+    assign,
+    bring_all_down,
+    count,
+    duplicate_aliases,
+    reset,
+)
 from catenary.wire.al import State
 
 if TYPE_CHECKING:  # plan needs NumPy, a scan does not
@@ -149,7 +156,7 @@ class MainDevice:
         runner.flush()
         device_count = runner.run(count())
         runner.run(reset(device_count))
-        registers = runner.run(assign(device_count))
+        registers, ring_notes = self._addressed(runner, device_count)
         found = runner.run_all([find(each) for each in registers])
         descriptions = with_places([each.description for each in found])
         self.subs = SubDevices(
@@ -158,9 +165,12 @@ class MainDevice:
                 for each, description in zip(found, descriptions, strict=True)
             ]
         )
-        self.notes = tuple(
-            f"devices {positions} have the same alias {alias}"
-            for alias, positions in duplicate_aliases(registers).items()
+        self.notes = (
+            *ring_notes,
+            *(
+                f"devices {positions} have the same alias {alias}"
+                for alias, positions in duplicate_aliases(registers).items()
+            ),
         )
         self._note_further_errors()
         self.deliver_events()
@@ -169,6 +179,19 @@ class MainDevice:
         if expected is not None:
             self._check_expected(expected)
         return self.subs
+
+    def _addressed(
+        self, runner: BlockingRunner, device_count: int
+    ) -> tuple[Sequence[StationRegisters], tuple[str, ...]]:
+        """Every device's registers, once it has its station address; what is odd about a ring."""
+        ring = ring_of(self.link)
+        if ring is None:
+            return runner.run(assign(range(device_count))), ()
+        from catenary.bus.ring import assign_from_both_ends, find_cuts
+
+        registers = assign_from_both_ends(runner, ring, device_count)
+        cuts = find_cuts(ring.state, device_count)
+        return registers, (str(cuts),) if cuts is not None and cuts.cables else ()
 
     def look(self, *, names: bool = True) -> SubDevices:
         """The devices as they are: unlike `scan` it changes no state and no mapping, and leaves

@@ -11,7 +11,7 @@ from catenary.link._table import capsule_in_virtual_time
 from catenary.link.fault import Fault
 from catenary.link.interface import Interface
 from catenary.link.protocol import Link, LinkSource
-from catenary.link.ring import Ring
+from catenary.link.ring import Ring, RingLink, ring_of
 
 __all__ = [
     "Fault",
@@ -22,7 +22,9 @@ __all__ = [
     "Recorder",
     "Replay",
     "Ring",
+    "RingLink",
     "lives_in_virtual_time",
+    "ring_of",
 ]
 
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from catenary.link._ring import RingLink
 from catenary.link.protocol import Link, LinkSource
 
+__all__ = ["Ring", "RingLink", "ring_of"]
+
 PAIR_WAIT = 100e-6  # [s]: the two ways round a hundred devices differ by less
 
 
@@ -25,3 +27,13 @@ class Ring:
     def open_link(self) -> RingLink:
         """Opens both."""
         return RingLink(self.first, self.second, self.pair_wait)
+
+
+def ring_of(link: Link) -> RingLink | None:
+    """The ring that a link is, or is wrapped round; None: there is none."""
+    while not isinstance(link, RingLink):
+        inner = getattr(link, "link", None)
+        if inner is None:
+            return None
+        link = inner
+    return link

@@ -23,7 +23,9 @@ from catenary.bus.event import (
 )
 from catenary.bus.pending import Pending
 from catenary.errors import CatenaryError
+from catenary.link import ring_of
 from catenary.loop.diagnosis import ERROR_BIT, STATE_BITS, described
+from catenary.loop.ring_watch import RingWatch
 from catenary.model.device import Identity
 from catenary.model.returning import vacancies
 from catenary.plan.make import Plan
@@ -93,11 +95,17 @@ class Watch:
         self._now = now
         self._on_return = on_return
         self._on_replacement = on_replacement
+        ring = ring_of(main.link)
+        self._ring = (
+            None if ring is None else RingWatch(ring, len(self._charges), tell=self._tell, now=now)
+        )
         self._strangers: set[tuple[int, Identity]] = set()
 
     def run(self) -> Procedure[None]:
         """Goes on until it is cancelled."""
         while True:
+            if self._ring is not None:
+                self._ring.look()
             if self._disturbed() or any(c.standing is not Standing.RUNNING for c in self._charges):
                 yield from self._look()
             yield after(LOOK)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from catenary.errors import NoDeviceError, SegmentError, StateError
 from catenary.procedure.exchange import Procedure, Request, after, physical, read, write
@@ -127,16 +127,20 @@ def _ask_all(word: int, timeout: float) -> Procedure[bool]:
         yield after(pace.pause())
 
 
-def assign(device_count: int) -> Procedure[tuple[StationRegisters, ...]]:
-    """Gives every device its station address, then reads its registers by it."""
-    addresses = [STATION_BASE + position for position in range(device_count)]
+def assign(places: Sequence[int]) -> Procedure[tuple[StationRegisters, ...]]:
+    """Gives the devices, in the order of the frame, the station addresses of these positions; then
+    reads their registers by them."""
+    addresses = [STATION_BASE + place for place in places]
     replies = yield [
-        write(Command.APWR, -position, STATION_ADDRESS, address)
-        for position, address in enumerate(addresses)
+        write(Command.APWR, -rank, STATION_ADDRESS, address)
+        for rank, address in enumerate(addresses)
     ]
-    for position, reply in enumerate(replies):
-        answered(reply, Station(position, addresses[position]), "station address")
-    return (yield from read_registers(addresses))
+    for place, address, reply in zip(places, addresses, replies, strict=True):
+        answered(reply, Station(place, address), "station address")
+    registers = yield from read_registers(addresses)
+    return tuple(
+        replace(each, position=place) for each, place in zip(registers, places, strict=True)
+    )
 
 
 def read_registers(addresses: Sequence[int]) -> Procedure[tuple[StationRegisters, ...]]:

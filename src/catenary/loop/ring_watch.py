@@ -1,0 +1,45 @@
+"""The watch over the cables of a ring: told by the counters of the two copies of every cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from catenary.bus.event import Event, LinkLost, LinkRestored
+from catenary.bus.ring import Cuts, Ends, HasState, find_cuts, named
+
+
+class RingWatch:
+    """Owns which cables of a ring have been told to be cut. A change is told at the second look
+    that finds it: while cables are pulled the copies are counted in different moments."""
+
+    def __init__(
+        self,
+        ring: HasState,
+        device_count: int,
+        *,
+        tell: Callable[[Event], None],
+        now: Callable[[], float],
+    ) -> None:
+        self._ring = ring
+        self._device_count = device_count
+        self._tell = tell
+        self._now = now
+        self._found: Cuts | None = None
+        self._told: tuple[Ends, ...] = ()
+
+    def look(self) -> None:
+        """Tells what has changed."""
+        found = find_cuts(self._ring.state, self._device_count)
+        settled = found == self._found
+        self._found = found
+        if found is None or not settled:
+            return
+        for cable in self._told:
+            if cable not in found.cables:
+                message = f"the cable between {named(cable)} carries again"
+                self._tell(LinkRestored(self._now(), None, message, cable))
+        for cable in found.cables:
+            if cable not in self._told:
+                message = f"the cable between {named(cable)} does not carry; {found}"
+                self._tell(LinkLost(self._now(), None, message, cable))
+        self._told = found.cables
