@@ -69,16 +69,16 @@ def find_cuts(state: RingState, device_count: int) -> Cuts | None:
 def assign_from_both_ends(
     runner: BlockingRunner, ring: RingLink, device_count: int
 ) -> Sequence[StationRegisters]:
-    """Station addresses by position. Where the ring is cut those behind the cut are counted from
-    the second end: the last device is the first one there."""
+    """Station addresses by position. Where the ring is cut, those behind the cut are reached from
+    the second end: what comes from there passes them all unprocessed, turns round at the cut, and
+    is processed on its way back, by the device at the cut first."""
     state = ring.state
     if state.shape is not Shape.CUT and state.shape is not Shape.SECOND_ONLY:
         return runner.run(assign(range(device_count)))
     with routed(ring, "first"):
         found = list(runner.run(assign(range(state.first_devices))) if state.first_devices else ())
     with routed(ring, "second"):
-        places = range(device_count - 1, state.first_devices - 1, -1)
-        found += reversed(runner.run(assign(places)))
+        found += runner.run(assign(range(state.first_devices, device_count)))
     return found
 
 
