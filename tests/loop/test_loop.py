@@ -61,15 +61,20 @@ def test_what_was_asked_and_not_committed_does_not_come_after_the_stop() -> None
 
 def test_a_fault_in_a_cycle_that_python_has_missed_is_raised_all_the_same() -> None:
     segment = Segment([Servo()])
-    with cat.MainDevice(segment) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
-        with pytest.raises(DriveError, match="0x2310"), cat.Loop(arm) as loop:
+
+    def run() -> None:
+        with cat.Loop(arm) as loop:
             for cycle in loop:
                 if cycle.number == 10:
                     segment[0].inject_fault(0x2310)
                     cycle.spend(8e-3)
                 if cycle.number == 20:
                     break
+
+    with cat.MainDevice(segment) as main:
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        with pytest.raises(DriveError, match="0x2310"):
+            run()
 
 
 def test_a_period_longer_than_a_second() -> None:

@@ -6,8 +6,6 @@ the cable is dark. Events say between which devices. Cut twice, an island stands
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator
-
 import pytest
 
 import catenary as cat
@@ -26,8 +24,8 @@ def segment_of(*faults: object, detection: str = "enhanced") -> Segment:
 
 
 @pytest.fixture
-def segment() -> Iterator[Segment]:
-    yield segment_of()
+def segment() -> Segment:
+    return segment_of()
 
 
 def cable_of(between: tuple[int | None, int | None]) -> tuple[int | str, int | str]:
