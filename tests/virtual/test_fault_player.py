@@ -400,6 +400,16 @@ def test_a_fault_that_finds_its_device_gone_misses() -> None:
     assert [event.what for event in main.segment.fault_log] == ["begins", "ends", "misses"]
 
 
+def test_more_faults_of_frames_than_there_is_room_for_miss() -> None:
+    main = line(*(lose_frames(at=0.001 * k, for_=1.0) for k in range(40)))
+    main.let_pass(50)
+    whats = [event.what for event in main.segment.fault_log]
+    assert whats == ["begins"] * 32 + ["misses"] * 8
+    main.let_pass(1000)
+    main.segment.inject(lose_frames(1))
+    assert main.segment.fault_log[-1].what == "begins"
+
+
 @pytest.mark.parametrize(
     ("fault", "says"),
     [

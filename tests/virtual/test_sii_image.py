@@ -6,7 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from catenary.virtual import AnalogInputs, Coupler, Device, DigitalInputs, DigitalOutputs, Servo
+from catenary.virtual import (
+    AnalogInputs,
+    Coupler,
+    Device,
+    DigitalInputs,
+    DigitalOutputs,
+    Junction,
+    Servo,
+)
 from catenary.virtual.description import VENDOR_ID
 from catenary.virtual.sii_image import checksum, make_sii_image
 from catenary.wire.sii import decode_sii
@@ -18,6 +26,7 @@ DEVICES: list[Device] = [
     DigitalOutputs(bits=16),
     DigitalInputs(bits=9),
     AnalogInputs(channels=8),
+    Junction(port_count=3),
 ]
 
 

@@ -38,7 +38,7 @@ def add_parser(commands: Commands) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from catenary.virtual import Segment, demo_segment, serve
+    from catenary.virtual import FaultEvent, Segment, demo_segment, serve
 
     ring = arguments.ring is not None
     if arguments.config is None:
@@ -50,5 +50,8 @@ def run(arguments: argparse.Namespace) -> int:
     def say() -> None:
         print(f"{len(segment)} devices answer on {interfaces}; Ctrl-C ends", flush=True)
 
-    serve(segment, arguments.interface, second=arguments.ring, ready=say)
+    def tell(event: FaultEvent) -> None:
+        print(f"{event.time:.3f} s: {event.fault} {event.what}", flush=True)
+
+    serve(segment, arguments.interface, second=arguments.ring, ready=say, tell=tell)
     return 0

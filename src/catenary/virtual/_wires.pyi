@@ -1,4 +1,8 @@
+from typing import Final
+
 from catenary.virtual._segment import Core
+
+FRAME_FAULTS_MAX: Final[int]
 
 class Wires:
     def __init__(self, core: Core) -> None: ...

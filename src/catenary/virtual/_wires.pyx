@@ -21,6 +21,8 @@ from catenary.virtual._segment cimport (
     unlock,
 )
 
+FRAME_FAULTS_MAX = MAX_FRAME_FAULTS
+
 
 cdef class Wires:
     """Owns nothing: a view of the cables of `core`."""

@@ -73,3 +73,4 @@ class Description:
     slots: int = 0
     current_milliampere: int = 0
     identification: int = 0
+    ports: tuple[int, ...] = (0, 1)

@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple, TypeAlias
 
 from catenary.virtual import faults as f
 from catenary.virtual._segment import Core
-from catenary.virtual._wires import Wires
+from catenary.virtual._wires import FRAME_FAULTS_MAX, Wires
 from catenary.virtual.devices.applied import AppliedDevice
 from catenary.virtual.devices.device import Device
 from catenary.virtual.devices.servo import Servo
@@ -109,6 +109,7 @@ class FaultPlayer:
     def _begin(self, fault: f.Fault) -> None:
         try:
             self._check_kind(fault)
+            self._check_room(fault)
         except ValueError:  # another device stands there by now
             self.log.append(FaultEvent(self.now, fault, "misses"))
             return
@@ -166,6 +167,12 @@ class FaultPlayer:
                 self._check_ports("device", self._devices[fault.device], fault.other)
             case _:
                 pass
+
+    def _check_room(self, fault: f.Fault) -> None:
+        if isinstance(fault, f.FrameFault):
+            self._drop_used_up()
+            if len(self._frame_faults) >= FRAME_FAULTS_MAX:
+                raise ValueError(f"at most {FRAME_FAULTS_MAX} faults can hit frames at a time")
 
     def _check_ports(self, name: str, device: Device, position: int) -> None:
         for port in range(4):
@@ -269,10 +276,6 @@ class FaultPlayer:
         return lambda: undo() if device.application is application else None
 
     def _spoil_frames(self, fault: f.FrameFault) -> End:
-        used_up = [n for n, _ in self._frame_faults if self._wires.frame_fault_left(n) == 0]
-        self._frame_faults = [held for held in self._frame_faults if held[0] not in used_up]
-        for number in used_up:
-            self._wires.remove_frame_fault(number)
         way = f"lose_{fault.way}" if isinstance(fault, f.LoseFrames) else fault.kind
         number = self._wires.add_frame_fault(
             FRAME_KINDS.index(way),
@@ -284,6 +287,12 @@ class FaultPlayer:
         )
         self._frame_faults.append((number, fault))
         return partial(self._spoil_no_longer, fault)
+
+    def _drop_used_up(self) -> None:
+        used_up = [n for n, _ in self._frame_faults if self._wires.frame_fault_left(n) == 0]
+        self._frame_faults = [held for held in self._frame_faults if held[0] not in used_up]
+        for number in used_up:
+            self._wires.remove_frame_fault(number)
 
     def _spoil_no_longer(self, fault: f.FrameFault) -> None:
         for held in self._frame_faults:

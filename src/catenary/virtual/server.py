@@ -16,6 +16,7 @@ from collections.abc import Callable
 from types import FrameType
 
 from catenary.errors import LinkError
+from catenary.virtual.fault_player import FaultEvent
 from catenary.virtual.segment import Segment
 from catenary.virtual.service import ServiceThread
 
@@ -178,11 +179,13 @@ def serve(
     priority: int | None = None,
     with_parent: bool = False,
     ready: Callable[[], None] | None = None,
+    tell: Callable[[FaultEvent], None] | None = None,
 ) -> None:
     """Answers on `interface` until SIGINT or SIGTERM; call it in the main thread.
 
     `second`: the interface of a ring's other end.
-    `with_parent`: ends with the parent process too. `ready` is called once frames are answered.
+    `with_parent`: ends with the parent process too. `ready` is called once frames are answered,
+    `tell` with each fault that began or ended.
     LinkError: no such interface, down, or not permitted.
     """
     if with_parent:
@@ -198,8 +201,14 @@ def serve(
         with server:
             if ready is not None:
                 ready()
+            told = 0
             while not asked_to_end.wait(0.2) and not server.wait(0):
                 server.raise_failure()
+                if tell is not None:
+                    news = segment.fault_log[told:]
+                    told += len(news)
+                    for event in news:
+                        tell(event)
         server.raise_failure()
     finally:
         for number, handler in before.items():

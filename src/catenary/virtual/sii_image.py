@@ -78,10 +78,11 @@ def _general(device: Description, strings: _Strings) -> bytes:
     group, order = strings.number(device.group), strings.number(device.order)
     details = device.mailbox.coe_details if device.mailbox else 0
     identification = 0x10 if device.identification else 0
+    ports = sum(1 << 4 * port for port in device.ports)  # 1: MII
     return struct.pack(
         "<BBBBxBBBBBBBhBxHH12x",
         *(group, 0, order, name, details, 0, 0, 0, device.axes, 0, identification),
-        *(device.current_milliampere, group, 0x0011, 0x0012 if device.identification else 0),
+        *(device.current_milliampere, group, ports, 0x0012 if device.identification else 0),
     )
 
 

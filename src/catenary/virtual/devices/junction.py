@@ -38,4 +38,5 @@ class Junction(Device):
             rx_pdos=(),
             tx_pdos=(),
             clock=True,
+            ports=self.ports,
         )
