@@ -6,6 +6,7 @@ import random
 
 import pytest
 
+from catenary.link import Ring
 from catenary.virtual import Coupler, Segment, Servo
 from catenary.virtual._segment_link import SegmentLink
 from catenary.virtual.faults import Fault, cut, join, power_cycle
@@ -197,3 +198,15 @@ def test_servos_in_a_ring_start_without_power_on_one_side() -> None:
     with segment.open_link() as link:
         link.wait_until(MILLISECOND, False)
     assert (segment.wires.processed(0), segment.wires.processed(1)) == ([0], [1])
+
+
+def test_links_foretell_their_next_frame_for_those_who_wait_at_both_ends() -> None:
+    """`due` of native/link.h, by way of the MainDevice's ring: it wakes at the frame."""
+    segment = Segment([Coupler() for _ in range(COUNT)], ring=True)
+    with Ring(segment.first, segment.second).open_link() as link:
+        link.send(BRD)
+        assert link.wait_until(link.now() + MILLISECOND, True)
+        assert link.now() < 50_000
+        frame = link.receive()
+        assert frame is not None
+        assert decode_frame(frame).datagrams[0].working_counter == COUNT

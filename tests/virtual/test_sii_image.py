@@ -37,6 +37,8 @@ def test_the_decoder_finds_what_was_described(device: Device) -> None:
     assert sii.header.vendor == VENDOR_ID
     assert sii.header.product == description.product_code
     assert sii.header.station_alias == description.alias
+    assert sii.general is not None
+    assert sii.general.physical_ports == {2: 0x0011, 3: 0x0111}[len(device.ports)]
 
 
 def test_the_checksum_of_a_real_image(shared_data: Path) -> None:

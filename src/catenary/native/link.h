@@ -48,7 +48,7 @@ typedef struct cat_link {
      * virtual processor preempts it, so that more time may have passed. 0, or -errno as above. */
     int (*spend)(void *self, int64_t duration);
 
-    /* Only with CAT_LINK_FORETELLS (virtual time). When the next frame can be received [ns];
+    /* Only with CAT_LINK_FORETELLS (segments in this process). When the next frame can be received [ns];
      * INT64_MAX: none is under way. */
     int64_t (*due)(void *self);
 

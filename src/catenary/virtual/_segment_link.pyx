@@ -51,9 +51,10 @@ cdef class SegmentLink:
         self._open = True
         self.name = name
         self._table.version = CAT_LINK_VERSION
+        self._table.flags = CAT_LINK_FORETELLS   # in real time too: what comes was sent by us
+        self._table.due = line_due
         if core._segment.is_virtual:
-            self._table.flags = CAT_LINK_VIRTUAL_TIME | CAT_LINK_FORETELLS
-            self._table.due = line_due
+            self._table.flags |= CAT_LINK_VIRTUAL_TIME
         if core._segment.clock != NULL:
             self._table.flags |= CAT_LINK_SHARED_TIME | CAT_LINK_SPENDS
             self._table.spend = line_spend
