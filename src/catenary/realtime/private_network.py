@@ -23,7 +23,7 @@ from pathlib import Path
 VARIABLE = "CATENARY_PRIVATE_NETWORK"  # in the environment of a program run by `enter`
 INSIDE = "inside"
 MODULE = "catenary.realtime.private_network"
-PROBE_SECONDS = 20.0
+PROBE_SECONDS = 30.0  # a refusal is prompt, a busy machine is not
 ETHERTYPE = 0x88A4
 
 
@@ -112,7 +112,7 @@ def try_real_frames() -> None:
     ):
         sender.bind((first, ETHERTYPE))
         receiver.bind((second, ETHERTYPE))
-        receiver.settimeout(2.0)
+        receiver.settimeout(20.0)
         sender.send(frame)
         receiver.recv(2048)
 
