@@ -42,19 +42,25 @@ def answered(reply: Reply, station: Station, what: str) -> bytes:
 
 
 class Deadline:
-    """Counts one span of time on the stamps of replies [s]; it starts with the first one seen."""
+    """Counts one span of time on the stamps of replies [s]; it starts with the first one seen.
+
+    From one reply to the next at most a quarter of the span counts: a program that was halted
+    looks some times more before it calls a device silent.
+    """
 
     def __init__(self, seconds: float) -> None:
         self.seconds = seconds
-        self._start_ns: int | None = None
+        self._left_ns = seconds * 1e9
+        self._seen_ns: int | None = None
 
     def passed(self, reply: Reply) -> bool:
         return self.passed_at(reply.time_ns)
 
     def passed_at(self, time_ns: int) -> bool:
-        if self._start_ns is None:
-            self._start_ns = time_ns
-        return time_ns - self._start_ns > self.seconds * 1e9
+        if self._seen_ns is not None:
+            self._left_ns -= min(time_ns - self._seen_ns, self.seconds * 1e9 / 4)
+        self._seen_ns = time_ns
+        return self._left_ns < 0
 
 
 class Pace:
