@@ -6,6 +6,7 @@ the cable is dark. Events say between which devices. Cut twice, an island stands
 from __future__ import annotations
 
 import random
+
 import pytest
 
 import catenary as cat
