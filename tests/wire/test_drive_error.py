@@ -12,6 +12,8 @@ from catenary.wire.drive_error import error_text
         (0x7308, "sensor"),  # by its group
         (0x2315, "continuous over-current"),
         (0xFF42, "manufacturer specific"),
+        (0x8210, "process data too short"),
+        (0xA001, "leaving SAFE-OP was not successful"),
         (0xB123, "unknown error"),
     ],
 )

@@ -1,4 +1,5 @@
 """Error codes of drives: object 0x603F and emergencies, IEC 61800-7-201 §"Error codes" (CiA 402-1).
+0x8200 to 0x82FF are of CiA 301, 0xA000 to 0xA0FF EtherCAT's own (ETG.1000.6 §5.6.4).
 
 A drive may use 0xFF00 to 0xFFFF as it likes; its manual says what for.
 """
@@ -80,6 +81,9 @@ ERROR_CODES: dict[int, str] = {
     0x7500: "communication of additional modules",
     0x8000: "monitoring",
     0x8100: "communication",
+    0x8200: "protocol error",
+    0x8210: "process data too short",
+    0x8220: "process data too long",
     0x8300: "torque control",
     0x8311: "excess torque",
     0x8313: "standstill torque",
@@ -91,6 +95,8 @@ ERROR_CODES: dict[int, str] = {
     0x8612: "reference limit",
     0x8700: "synchronisation controller",
     0x9000: "external error",
+    0xA000: "PRE-OP to SAFE-OP was not successful",
+    0xA001: "leaving SAFE-OP was not successful",
     0xF000: "additional functions",
     0xF001: "deceleration",
     0xF004: "control",
