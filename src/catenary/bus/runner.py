@@ -25,7 +25,7 @@ T = TypeVar("T")
 
 FRAME_TIMEOUT = 0.05  # [s]; a frame takes microseconds, a busy machine's scheduler much longer
 ATTEMPTS = 4  # of a repeatable request
-GRID_NS = 50_000  # of the ends of pauses
+GRID_NS = 50_000  # of the ends of pauses: who wakes at almost the same time shares frames
 WINDOW = 16  # frames under way at once: less than any receive ring holds
 
 
@@ -127,14 +127,13 @@ class BlockingRunner:
         while running := [task for task in tasks if not task.done]:
             ready = [task for task in running if task.requests]
             if not ready:
-                self._sleep_until(min(task.wake_ns or 0 for task in running))
+                due = min(task.wake_ns or 0 for task in running)
+                self._sleep_until(due if len(running) == 1 else -(-due // GRID_NS) * GRID_NS)
             else:
                 self._round(ready)
             self._wake(running)
 
     def _sleep_until(self, deadline_ns: int) -> None:
-        """Until a deadline, rounded up: who wakes at almost the same time shares frames."""
-        deadline_ns = -(-deadline_ns // GRID_NS) * GRID_NS
         while self._link.now() < deadline_ns:
             self._link.wait_until(deadline_ns, False)
 

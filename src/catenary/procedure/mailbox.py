@@ -50,6 +50,7 @@ READ_TIMEOUT = 2.0  # [s] until it answers; AKDs take their time over 0x1010
 REPEAT_TIMEOUT = 0.2  # [s] until it acknowledges a repeat request
 EAGER_MAX = 256  # bytes of a mailbox that is read without a look before
 LOOK = 100e-6  # [s] between the first two looks whether it has answered
+THINKS_FIRST_NS = 100_000
 THINKS_MAX_NS = 20_000_000
 TURN = 0.5e-3  # [s] between two looks whether the mailbox is free
 GRACE = 0.1  # [s] for an answer to a message whose frame was lost
@@ -101,7 +102,8 @@ class MailboxChannel:
         if empty_ns is None:
             self.thinks_ns = self.thinks_ns * 9 // 10
         elif self.posted_ns is not None:
-            self.thinks_ns = min(empty_ns - self.posted_ns, THINKS_MAX_NS)
+            more = max(2 * self.thinks_ns, THINKS_FIRST_NS)  # one that was slow once is not slow
+            self.thinks_ns = min(empty_ns - self.posted_ns, more, THINKS_MAX_NS)
         self.posted_ns = None
 
     def listen(self, listener: Listener) -> None:

@@ -17,6 +17,7 @@ from catenary.virtual.devices.device import Device
 from catenary.virtual.scheduler import FOREVER, Agenda
 
 STOP_SIGNALS = {signal.SIGINT, signal.SIGTERM}
+SELECTABLE = 1024
 IDLE_SECONDS = 0.02  # device models are stepped at least this often while no frame comes
 
 
@@ -80,14 +81,21 @@ class ServiceThread:
 
     def _run(self) -> None:
         core = self._service.core
-        poll = select.poll()
-        poll.register(self._event, select.POLLIN)
         while not self._stopping:
             core.advance()
             due = self._service.run()
             wait = IDLE_SECONDS if due == FOREVER else min((due - core.now) / 1e9, IDLE_SECONDS)
-            if wait > 0 and poll.poll(wait * 1e3):
+            if wait > 0 and self._woken(wait):
                 self._drain()
+
+    def _woken(self, wait: float) -> bool:
+        """Whether an event came first. Python rounds the timeout of poll() up to milliseconds, and
+        a mailbox is due in a third of one; select() takes no descriptor beyond 1023."""
+        if self._event < SELECTABLE:
+            return bool(select.select([self._event], [], [], wait)[0])
+        poll = select.poll()
+        poll.register(self._event, select.POLLIN)
+        return bool(poll.poll(wait * 1e3))
 
     def _drain(self) -> None:
         try:
