@@ -9,7 +9,6 @@ import pytest
 
 from catenary.cli.drawing import Drawing, Node, as_text, error_text, indents
 from catenary.cli.drawing_dot import as_dot
-from catenary.cli.graph import cable_delays
 from catenary.model.topology import make_topology
 from catenary.wire.error_counters import ErrorCounters, PortErrors
 from tests.model.tables import END, LINE, STAR, counted, line
@@ -72,8 +71,3 @@ def test_graphviz_reads_it() -> None:
     assert done.stderr == ""
     assert done.stdout.count("\nnode ") == len(TREE) + 1
     assert done.stdout.count("\nedge ") == len(TREE)
-
-
-def test_delays_are_differences_between_neighbours_with_clocks() -> None:
-    topology = make_topology(line(4))
-    assert cable_delays(topology, [0, 150, None, 600]) == (None, 150, None, None)

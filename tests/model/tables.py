@@ -35,8 +35,9 @@ def seen(
     *,
     restarted: frozenset[int] = frozenset(),
     lost_frames: int = 0,
+    ring: bool = False,
 ) -> Observation:
-    topology = make_topology(ports)
+    topology = make_topology(ports, ring=ring)
     names = Names(tuple(f"d{n}" for n in range(len(ports))))
     clean = ErrorCounters()
     table = tuple(errors.get(n, clean) for n in range(len(ports)))

@@ -164,6 +164,21 @@ def test_lost_frames_are_explained_by_a_cable() -> None:
     assert found.kind is Kind.CABLE
 
 
+def test_a_port_with_nobody_behind_it_counts_too() -> None:
+    [found] = judge(seen([LINE, LINE], {1: counted(p1=BROKEN)}))
+    assert found.where == (
+        "the cable between device 1 (d1) port 1 and what is no device that answers"
+    )
+
+
+def test_the_second_end_of_a_ring() -> None:
+    table = seen([LINE, LINE], {1: counted(p1=BROKEN)}, ring=True)
+    [found] = judge(table)
+    assert found.where == (
+        "the cable between device 1 (d1) port 1 and the MainDevice's second interface"
+    )
+
+
 def test_errors_of_the_processors_interface_are_no_cables() -> None:
     [found] = judge(seen(line(3), {1: counted(pdi=3)}))
     assert (found.kind, found.devices) == (Kind.DEVICE, (1,))

@@ -73,6 +73,14 @@ def test_a_port_behind_which_nobody_answers_is_named() -> None:
     assert only.startswith("device 1 port 1 is open, but nobody answers behind it")
 
 
+def test_the_open_end_of_a_ring_is_the_second_interface() -> None:
+    ring = make_topology([LINE, LINE, LINE], ring=True)
+    assert ring.second_end == (2, 1)
+    assert ring.contradictions == ()
+    assert make_topology([LINE, LINE, END], ring=True).second_end is None
+    assert len(make_topology([FORK, LINE, LINE], ring=True).contradictions) == 2
+
+
 def test_a_swapped_device_in_the_middle_is_named() -> None:
     # on the cable: 0, 2 with IN and OUT swapped, 1; the frame is worked on by 1 before 2
     [only] = make_topology([LINE, END, LINE]).contradictions

@@ -43,7 +43,11 @@ class Diagnosis:
 
 
 def diagnose(
-    subs: Sequence[SubDevice], *, since: Diagnosis | None = None, lost_frames: int = 0
+    subs: Sequence[SubDevice],
+    *,
+    since: Diagnosis | None = None,
+    lost_frames: int = 0,
+    ring: bool = False,
 ) -> Procedure[Diagnosis]:
     """Asks all devices in shared frames and judges. `since`: an earlier diagnosis, after which is
     counted; else all that was counted since the power-up. Nobody's silence is an error.
@@ -51,7 +55,7 @@ def diagnose(
     stations = [sub.station for sub in subs]
     totals = yield from read_error_counters(stations)
     answers = yield from survey(stations)
-    topology = make_topology([sub.description.open_ports for sub in subs])
+    topology = make_topology([sub.description.open_ports for sub in subs], ring=ring)
     names = Names(tuple(sub.name for sub in subs))
     counters, restarted = totals, frozenset[int]()
     if since is not None and len(since.totals) == len(totals):

@@ -12,7 +12,6 @@ from catenary.cli.parsers import Commands, add_command, add_target
 if TYPE_CHECKING:
     from catenary.bus import MainDevice, SubDevice
     from catenary.cli.drawing import Drawing
-    from catenary.model.topology import Topology
 
 
 def add_parser(commands: Commands) -> None:
@@ -48,27 +47,20 @@ def run(arguments: argparse.Namespace) -> int:
 def draw(target: str, main: MainDevice, subs: Sequence[SubDevice]) -> Drawing:
     """Asks for what is drawn."""
     from catenary.cli.drawing import Drawing, Node
-    from catenary.procedure.clocks import measure
+    from catenary.model.cable_delay import cable_delays_ns
+    from catenary.procedure.receive_times import read_receive_times
     from catenary.procedure.survey import survey
 
     found = main.diagnose(subs=subs)
-    measured = main.converse(measure([sub.description for sub in subs]))
+    times = main.converse(read_receive_times([sub.description for sub in subs]))
     answers = main.converse(survey([sub.station for sub in subs]))
-    delays = cable_delays(found.topology, measured.delays_ns)
+    closed = found.topology.second_end is not None  # a ring: two frames stamp, from both ends
+    delays = cable_delays_ns(found.topology, [None if closed else each for each in times])
     nodes = tuple(
         Node(sub.name, sub.alias, _state(answer.word), delay, errors)
         for sub, answer, delay, errors in zip(subs, answers, delays, found.totals, strict=True)
     )
     return Drawing(target, found.topology, nodes)
-
-
-def cable_delays(topology: Topology, delays_ns: Sequence[int | None]) -> tuple[int | None, ...]:
-    """From the device before to each device [ns], where both have clocks."""
-    found: list[int | None] = []
-    for place, delay in zip(topology.places, delays_ns, strict=True):
-        before = None if place.parent is None else delays_ns[place.parent]
-        found.append(None if delay is None or before is None else delay - before)
-    return tuple(found)
 
 
 def _state(word: int | None) -> str:

@@ -64,7 +64,7 @@ def judge(seen: Observation) -> tuple[Finding, ...]:
     """What is wrong, the likeliest cause of the most first. Empty: nothing is."""
     power, explained = _power(seen)
     explained |= _interrupted(seen)
-    transport = [*power, *_links(seen, explained), *_noise(seen)]
+    transport = [*power, *_links(seen, explained), *_noise(seen), *_stray_ports(seen)]
     transport = transport or [*_forwarded(seen), *_processing_units(seen)]
     transport = transport or [*_lost_frames(seen)]
     return (*transport, *_processors(seen))
@@ -176,15 +176,37 @@ def _counted(seen: Observation, cable: Cable) -> str:
     upper, lower = seen.ends(cable)
     parts = []
     for end, count in ((cable[:2], upper), (cable[2:], lower)):
-        numbers = (
-            (count.invalid_frames, "broken frame"),
-            (count.symbol_errors, "symbol error"),
-            (count.lost_links, "lost link"),
-        )
-        words = [counted(number, what) for number, what in numbers if number]
-        if words:
-            parts.append(f"{', '.join(words)} at {seen.names.end(*end)}")
+        if words := _words(count):
+            parts.append(f"{words} at {seen.names.end(*end)}")
     return "; ".join(parts)
+
+
+def _words(count: PortErrors) -> str:
+    numbers = (
+        (count.invalid_frames, "broken frame"),
+        (count.symbol_errors, "symbol error"),
+        (count.lost_links, "lost link"),
+    )
+    return ", ".join(counted(number, what) for number, what in numbers if number)
+
+
+def _stray_ports(seen: Observation) -> Iterator[Finding]:
+    """Ports that count, and no device is behind them: a ring's second end, or something that is no
+    EtherCAT device."""
+    wired = {end for cable in seen.topology.cables for end in (cable[:2], cable[2:])}
+    for position, errors in enumerate(seen.errors):
+        for port, count in enumerate(errors.ports if errors is not None else ()):
+            noisy = count.invalid_frames or count.symbol_errors or count.lost_links
+            if not noisy or (position, port) in wired:
+                continue
+            second = (position, port) == seen.topology.second_end
+            behind = (
+                "the MainDevice's second interface" if second else "what is no device that answers"
+            )
+            end = seen.names.end(position, port)
+            where = f"the cable between {end} and {behind}"
+            evidence = f"{_words(count)} at {end}"
+            yield Finding(Kind.CABLE, where, evidence, _CABLE, (position,))
 
 
 # ---- what nobody owns up to

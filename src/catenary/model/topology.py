@@ -64,11 +64,13 @@ class Cable(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Topology:
-    """A segment's tree. All tuples by position."""
+    """A segment's tree. All tuples by position. `second_end`: the port (position, port) that is
+    wired to the second interface of a ring's MainDevice."""
 
     ports: tuple[Ports, ...]
     places: tuple[Place, ...]
     contradictions: tuple[str, ...] = ()
+    second_end: tuple[int, int] | None = None
 
     def __len__(self) -> int:
         return len(self.ports)
@@ -108,8 +110,9 @@ class Topology:
         return tuple(arrivals)
 
 
-def make_topology(ports: Sequence[Ports]) -> Topology:
-    """The tree of the devices, and what contradicts it."""
+def make_topology(ports: Sequence[Ports], *, ring: bool = False) -> Topology:
+    """The tree of the devices, and what contradicts it. `ring`: one open port without a device
+    behind it is that of the MainDevice's second interface."""
     places = tree(ports)
     taken = {(place.parent, place.parent_port) for place in places}
     unanswered = [
@@ -118,6 +121,7 @@ def make_topology(ports: Sequence[Ports]) -> Topology:
         for port in PORT_ORDER
         if open_here[port] and (position, port) not in taken
     ]
+    second_end = unanswered.pop() if ring and len(unanswered) == 1 else None
     found = [
         *_entered_elsewhere(ports),
         *_without_a_place(places, unanswered),
@@ -128,7 +132,7 @@ def make_topology(ports: Sequence[Ports]) -> Topology:
             if ports[position][0] and (position == 0 or places[position].parent is not None)
         ),
     ]
-    return Topology(tuple(ports), places, tuple(found))
+    return Topology(tuple(ports), places, tuple(found), second_end)
 
 
 def _entered_elsewhere(ports: Sequence[Ports]) -> Iterator[str]:
