@@ -9,6 +9,7 @@ import pytest
 import catenary as cat
 from catenary.errors import EepromError, StateError
 from catenary.procedure.al_state import DeviceState
+from catenary.virtual import faults
 from catenary.wire.al import State
 
 OUTPUTS, SERVO = 2, 1
@@ -80,3 +81,17 @@ def test_boot_needs_a_bootstrap_mailbox(main: cat.MainDevice) -> None:
     error = main.request_states(main.look(), [SERVO], State.BOOT)[SERVO]
     assert isinstance(error, EepromError)
     assert "no bootstrap mailbox" in error.message
+
+
+@pytest.mark.parametrize("cut", [None, ("main", 0), (0, 1), (1, 2), (2, "main")])
+def test_a_ring_is_looked_at_from_both_ends(cut: tuple[int | str, int | str] | None) -> None:
+    devices = [cat.Coupler(), cat.Servo(name="a"), cat.Servo(name="b")]
+    segment = cat.Segment(devices, ring=True)
+    if cut is not None:
+        segment.inject(faults.cut(between=cut))
+    with cat.MainDevice(segment.first, segment.second) as main:
+        subs = main.look()
+        assert [sub.name for sub in subs] == ["Catenary virtual coupler", "a", "b"]
+        texts = [each.evidence for each in main.diagnose(subs=subs).findings]
+    wanted = [] if cut is None else [f"the ring is cut between device {cut[0]} and device {cut[1]}"]
+    assert [text for text in texts if "ring" in text] == (wanted if cut in ((0, 1), (1, 2)) else [])

@@ -81,6 +81,14 @@ def test_the_open_end_of_a_ring_is_the_second_interface() -> None:
     assert len(make_topology([FORK, LINE, LINE], ring=True).contradictions) == 2
 
 
+def test_a_cut_ring_says_where() -> None:
+    behind: Ports = (False, True, False, False)
+    ring = make_topology([LINE, END, behind, LINE], ring=True)
+    assert ring.contradictions == ("the ring is cut between device 1 and device 2",)
+    assert ring.second_end == (3, 1)
+    assert ring.cable_at(3, 0) == Cable(2, 1, 3)
+
+
 def test_a_swapped_device_in_the_middle_is_named() -> None:
     # on the cable: 0, 2 with IN and OUT swapped, 1; the frame is worked on by 1 before 2
     [only] = make_topology([LINE, END, LINE]).contradictions

@@ -4,25 +4,51 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from catenary.bus.ring import routed
 from catenary.bus.runner import BlockingRunner
 from catenary.bus.segment_scan import described, unread, with_places
 from catenary.errors import CatenaryError
+from catenary.link import RingLink
+from catenary.link.ring_state import Shape
 from catenary.model.device import DeviceDescription
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.sii import read_image
 from catenary.procedure.sii_owner import with_eeprom
 from catenary.procedure.station import Station
-from catenary.procedure.stations import StationRegisters, count
-from catenary.procedure.visit import visit
+from catenary.procedure.stations import StationRegisters, count, read_registers
+from catenary.procedure.visit import distinct, give_addresses, read_addresses, visit
 
 
-def look(runner: BlockingRunner, names: bool) -> tuple[DeviceDescription, ...]:
+def look(
+    runner: BlockingRunner, ring: RingLink | None, names: bool
+) -> tuple[DeviceDescription, ...]:
     """All devices in the order of their positions, with their parents."""
     runner.flush()
-    registers = runner.run(visit(runner.run(count())))
+    device_count = runner.run(count())
+    if ring is not None and ring.state.shape in (Shape.CUT, Shape.SECOND_ONLY):
+        registers = _visit_from_both_ends(runner, ring, device_count)
+    else:
+        registers = runner.run(visit(device_count))
     if not names:
         return with_places([replace(unread(each), name="") for each in registers])
     return with_places(runner.run_all([_named(each) for each in registers]))
+
+
+def _visit_from_both_ends(
+    runner: BlockingRunner, ring: RingLink, device_count: int
+) -> tuple[StationRegisters, ...]:
+    """As `assign_from_both_ends`: behind the cut devices count from the second end's cut on."""
+    near = ring.state.first_devices
+    with routed(ring, "first"):
+        found = runner.run(read_addresses(near))
+    with routed(ring, "second"):
+        found += runner.run(read_addresses(device_count - near))
+    addresses = distinct(found)
+    with routed(ring, "first"):
+        runner.run(give_addresses(found[:near], addresses[:near]))
+    with routed(ring, "second"):
+        runner.run(give_addresses(found[near:], addresses[near:]))
+    return runner.run(read_registers(addresses))
 
 
 def _named(registers: StationRegisters) -> Procedure[DeviceDescription]:

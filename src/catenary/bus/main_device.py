@@ -201,7 +201,7 @@ class MainDevice:
         """
         from catenary.bus.look import look
 
-        descriptions = look(self._runner, names)
+        descriptions = look(self._runner, ring_of(self.link), names)
         return SubDevices([SubDevice(self, each, None) for each in descriptions])
 
     def request_states(
@@ -230,7 +230,8 @@ class MainDevice:
         from catenary.bus.diagnosis import diagnose
 
         chosen = self.subs if subs is None else subs
-        return self.converse(diagnose(chosen, since=since, lost_frames=lost_frames))
+        ring = ring_of(self.link) is not None
+        return self.converse(diagnose(chosen, since=since, lost_frames=lost_frames, ring=ring))
 
     def plan(
         self,

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from catenary.bus import MainDevice
 from catenary.bus.event import FaultFound
 from catenary.errors import ResponseTimeout
+from catenary.link import ring_of
 from catenary.model.diagnosis import Observation, judge
 from catenary.model.finding import Finding, Names
 from catenary.model.topology import make_topology
@@ -30,7 +31,10 @@ class ErrorWatch:
         self._now = now
         self._last: Totals = ()
         self._told: dict[str, float] = {}  # place → when [s]
-        self.topology = make_topology([sub.description.open_ports for sub in self._subs])
+        self.topology = make_topology(
+            [sub.description.open_ports for sub in self._subs],
+            ring=ring_of(main.link) is not None,
+        )
         self.names = Names(tuple(sub.name for sub in self._subs))
 
     def run(self) -> Procedure[None]:

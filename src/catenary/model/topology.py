@@ -112,7 +112,8 @@ class Topology:
 
 def make_topology(ports: Sequence[Ports], *, ring: bool = False) -> Topology:
     """The tree of the devices, and what contradicts it. `ring`: one open port without a device
-    behind it is that of the MainDevice's second interface."""
+    behind it is that of the MainDevice's second interface; from there a cut ring's devices behind
+    the cut are reached."""
     places = tree(ports)
     taken = {(place.parent, place.parent_port) for place in places}
     unanswered = [
@@ -122,6 +123,10 @@ def make_topology(ports: Sequence[Ports], *, ring: bool = False) -> Topology:
         if open_here[port] and (position, port) not in taken
     ]
     second_end = unanswered.pop() if ring and len(unanswered) == 1 else None
+    cuts = [n for n, open_here in enumerate(ports) if n and ring and not open_here[0]]
+    if len(cuts) == 1 and second_end is not None:
+        text = f"the ring is cut between device {cuts[0] - 1} and device {cuts[0]}"
+        return Topology(tuple(ports), places, (text,), second_end)
     found = [
         *_entered_elsewhere(ports),
         *_without_a_place(places, unanswered),

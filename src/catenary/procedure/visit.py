@@ -18,25 +18,29 @@ from catenary.wire.register import STATION_ADDRESS
 
 def visit(device_count: int) -> Procedure[tuple[StationRegisters, ...]]:
     """The registers of all devices, by the station addresses they have already."""
-    replies = yield [
-        read(Command.APRD, -position, STATION_ADDRESS) for position in range(device_count)
-    ]
-    found = [
-        STATION_ADDRESS.unpack(answered(reply, Station(position, 0), "station address"))
-        for position, reply in enumerate(replies)
-    ]
+    found = yield from read_addresses(device_count)
     addresses = distinct(found)
-    missing = [
-        position for position in range(device_count) if addresses[position] != found[position]
-    ]
-    if missing:
-        replies = yield [
-            write(Command.APWR, -position, STATION_ADDRESS, addresses[position])
-            for position in missing
-        ]
-        for position, reply in zip(missing, replies, strict=True):
-            answered(reply, Station(position, addresses[position]), "station address")
+    yield from give_addresses(found, addresses)
     return (yield from read_registers(addresses))
+
+
+def read_addresses(device_count: int) -> Procedure[tuple[int, ...]]:
+    """The station addresses of the devices, in the order of the frame."""
+    replies = yield [read(Command.APRD, -rank, STATION_ADDRESS) for rank in range(device_count)]
+    return tuple(
+        STATION_ADDRESS.unpack(answered(reply, Station(rank, 0), "station address"))
+        for rank, reply in enumerate(replies)
+    )
+
+
+def give_addresses(found: Sequence[int], wanted: Sequence[int]) -> Procedure[None]:
+    """Writes the station addresses that differ; both in the order of the frame."""
+    missing = [rank for rank in range(len(found)) if wanted[rank] != found[rank]]
+    if not missing:
+        return
+    replies = yield [write(Command.APWR, -rank, STATION_ADDRESS, wanted[rank]) for rank in missing]
+    for rank, reply in zip(missing, replies, strict=True):
+        answered(reply, Station(rank, wanted[rank]), "station address")
 
 
 def distinct(found: Sequence[int]) -> tuple[int, ...]:
