@@ -14,13 +14,10 @@ leave it 0 (ethercrab#236).
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import NamedTuple, TypeAlias, TypeVar
+from typing import TypeVar
 
 from catenary.errors import DecodeError, MailboxError, ResponseTimeout
-from catenary.model.device import MailboxLayout
 from catenary.procedure.exchange import (
     Procedure,
     Reply,
@@ -31,7 +28,9 @@ from catenary.procedure.exchange import (
     write,
     write_memory,
 )
-from catenary.procedure.station import Deadline, Pace, Station, answered
+from catenary.procedure.mailbox_channel import Heard as Heard
+from catenary.procedure.mailbox_channel import MailboxChannel as MailboxChannel
+from catenary.procedure.station import Deadline, Pace, answered
 from catenary.wire import coe
 from catenary.wire.datagram import Command
 from catenary.wire.mailbox import Mailbox, Type, decode_error, decode_mailbox, next_counter
@@ -50,68 +49,10 @@ READ_TIMEOUT = 2.0  # [s] until it answers; AKDs take their time over 0x1010
 REPEAT_TIMEOUT = 0.2  # [s] until it acknowledges a repeat request
 EAGER_MAX = 256  # bytes of a mailbox that is read without a look before
 LOOK = 100e-6  # [s] between the first two looks whether it has answered
-THINKS_FIRST_NS = 100_000
-THINKS_MAX_NS = 20_000_000
 TURN = 0.5e-3  # [s] between two looks whether the mailbox is free
 GRACE = 0.1  # [s] for an answer to a message whose frame was lost
 RECOVERIES = 5  # of one message, then the cable is to blame
-EMERGENCIES_KEPT = 64
 STRANGERS = 64  # messages in a row that nobody can use; queues of devices are shorter
-
-
-class Heard(NamedTuple):
-    """An emergency and when it was read [ns, the link's clock]."""
-
-    emergency: coe.Emergency
-    time_ns: int
-
-
-Listener: TypeAlias = Callable[[Heard], None]
-
-
-@dataclass(slots=True)
-class MailboxChannel:
-    """Owns the state of one SubDevice's mailbox: counters, repeat toggle, emergencies.
-
-    Emergencies come between the answers to anybody's questions: `listener` is told of each, whoever
-    read it; those of before there was one are told by `listen`.
-    """
-
-    station: Station
-    layout: MailboxLayout
-    counter: int = 0  # of what was written last
-    received_counter: int = 0  # of what was read last
-    received_ns: int = 0  # when that was
-    repeat_requested: bool = False  # state of the toggle bit
-    emergencies: deque[Heard] = field(default_factory=lambda: deque(maxlen=EMERGENCIES_KEPT))
-    listener: Listener | None = None
-    dropped: int = 0  # messages nobody waited for, duplicates
-    turns: deque[object] = field(default_factory=deque)  # conversations: the first one holds it
-    posted_ns: int | None = None  # when it was asked last, until the answer is there
-    thinks_ns: int = 0  # the device, before it answers, at least
-    owed: bool = False  # a question was given up; its answer may still come
-
-    def reset(self) -> None:
-        """After the SyncManagers were configured anew."""
-        self.counter = self.received_counter = 0
-        self.repeat_requested = self.owed = False
-
-    def learn(self, empty_ns: int | None) -> None:
-        """An answer is there; at `empty_ns` it was not yet (None: nobody had looked). Nobody looks
-        much earlier the next time: a device takes as long again, and looks cost frames."""
-        if empty_ns is None:
-            self.thinks_ns = self.thinks_ns * 9 // 10
-        elif self.posted_ns is not None:
-            more = max(2 * self.thinks_ns, THINKS_FIRST_NS)  # one that was slow once is not slow
-            self.thinks_ns = min(empty_ns - self.posted_ns, more, THINKS_MAX_NS)
-        self.posted_ns = None
-
-    def listen(self, listener: Listener) -> None:
-        """From now on; what was heard before is told at once."""
-        if self.listener is None:
-            for heard in tuple(self.emergencies):
-                listener(heard)
-        self.listener = listener
 
 
 def exclusively(channel: MailboxChannel, conversation: Procedure[T]) -> Procedure[T]:
@@ -260,7 +201,7 @@ def _put_aside(channel: MailboxChannel, message: Mailbox) -> None:
     """A message that nobody waits for any more; an emergency is heard."""
     emergency = _emergency(message)
     if emergency is not None:
-        _hear(channel, emergency)
+        channel.hear(emergency)
     else:
         channel.dropped += 1
 
@@ -402,19 +343,12 @@ def _sorted(
         )
     emergency = _emergency(message)
     if emergency is not None:
-        _hear(channel, emergency)
+        channel.hear(emergency)
         return None
     answer = accept(message)
     if answer is None:
         channel.dropped += 1
     return answer
-
-
-def _hear(channel: MailboxChannel, emergency: coe.Emergency) -> None:
-    heard = Heard(emergency, channel.received_ns)
-    channel.emergencies.append(heard)
-    if channel.listener is not None:
-        channel.listener(heard)
 
 
 def _emergency(message: Mailbox) -> coe.Emergency | None:

@@ -1,0 +1,47 @@
+"""Emergencies in real time: the thread beside the loop sees the bit of the mailbox and reads it."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import pytest
+
+import catenary as cat
+from catenary.bus.event import Emergency, Event
+from catenary.virtual import Coupler, Segment, Server, Servo
+
+PATIENCE = 30_000  # cycles of 2 ms: a machine may stop for as long as it likes before that
+
+
+@pytest.mark.parametrize("run", ["threaded", "inline"])
+def test_an_emergency_arrives_over_the_wire(
+    veth: tuple[str, str], run: Literal["threaded", "inline"]
+) -> None:
+    servo = Servo()
+    told: list[Event] = []
+    with (
+        Server(Segment([Coupler(), servo], clock="monotonic"), veth[1]),
+        cat.MainDevice(veth[0]) as main,
+    ):
+        main.on_event(told.append)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        with cat.Loop(
+            arm,
+            period=2e-3,
+            run=run,
+            raise_faults=False,
+            lost_limit=PATIENCE,
+            late_limit=0,
+            watchdog=None,
+        ) as loop:
+            found: list[Event] = []
+            for cycle in loop:
+                if cycle.number == 10:
+                    servo.inject_fault(0x7305)
+                found += main.events
+                if found or cycle.number > PATIENCE:
+                    break
+    [event] = found
+    assert isinstance(event, Emergency)
+    assert event.error_code == 0x7305
+    assert told == [event]  # delivered by its thread, at the latest when the MainDevice is closed
