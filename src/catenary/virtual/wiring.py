@@ -27,7 +27,8 @@ class Wiring:
     """The cables of a segment.
 
     `ports`: the port numbers of each device. `behind`: where a device hangs that does not hang on
-    port 1 of the one before. `ring`: port 1 of the line's last device leads back.
+    port 1 of the one before. `ring`: port 1 of the last device leads back: a frame from the first
+    interface has been everywhere when it gets there.
     """
 
     def __init__(
@@ -44,7 +45,7 @@ class Wiring:
             cables.append(Cable((up[0], up[1]), (device, 0)))
         self._check_order(len(ports))
         if ring:
-            cables.append(Cable(self._end_of_line(ports), (SECOND, 0)))
+            cables.append(Cable(_last_port(ports), (SECOND, 0)))
         self.ring = ring
         self.cables = tuple(cables)
 
@@ -76,16 +77,6 @@ class Wiring:
                 "list them so"
             )
 
-    def _end_of_line(self, ports: Sequence[Sequence[int]]) -> Place:
-        if not ports:
-            raise ValueError("ring: a ring needs a device")
-        device = 0
-        while (device, 1) in self._below:
-            device = self._below[device, 1]
-        if 1 not in ports[device]:
-            raise ValueError(f"ring: device {device} has no port 1 to lead back")
-        return device, 1
-
     def between(self, one: Neighbour, other: Neighbour) -> int:
         """The number of the cable between two neighbours; ValueError names those there are."""
         for number, cable in enumerate(self.cables):
@@ -97,6 +88,14 @@ class Wiring:
     def at_port(self, device: int, port: int) -> bool:
         """Whether a cable hangs there."""
         return any((device, port) in (cable.up, cable.down) for cable in self.cables)
+
+
+def _last_port(ports: Sequence[Sequence[int]]) -> Place:
+    if not ports:
+        raise ValueError("ring: a ring needs a device")
+    if 1 not in ports[-1]:
+        raise ValueError(f"ring: device {len(ports) - 1} has no port 1 to lead back")
+    return len(ports) - 1, 1
 
 
 def _name(place: Place) -> Neighbour:
