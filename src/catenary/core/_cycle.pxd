@@ -76,6 +76,7 @@ cdef struct cycle_t:
     uint32_t law_seen
     stream_t *stream           # NULL: the application or the law says the set-points
     int order
+    bint patient               # a cycle may begin late within its period: engines that take turns
     int64_t period
     int64_t lead               # inline, law: awake that long before the instant
     int64_t collect_deadline
@@ -103,7 +104,7 @@ cdef struct cycle_t:
     record_t *records
     histogram_t *histograms    # PHASES of them
 
-cdef void cycle_start(cycle_t *c) noexcept nogil
+cdef void cycle_start(cycle_t *c, int64_t origin) noexcept nogil
 cdef int cycle_wait(cycle_t *c) noexcept nogil
 cdef int cycle_sleep(cycle_t *c, int64_t lead) noexcept nogil
 cdef void cycle_await_lane(cycle_t *c, int64_t until) noexcept nogil

@@ -125,7 +125,7 @@ cdef int cycle_sleep(cycle_t *c, int64_t lead) noexcept nogil:
     """Sleeps until `lead` before the next instant. 0; -EINTR: call again; or -errno."""
     cdef int64_t present = now(c)
     cdef int rc
-    if present > c.next:
+    if present > c.next and (not c.patient or present - c.next >= c.period):
         skip(c, (present - c.next + c.period - 1) // c.period)
     cycle_await_lane(c, c.next - lead)
     rc = c.link.wait_until(c.link.self, c.next - lead, 0)
@@ -315,12 +315,13 @@ cdef void tail(cycle_t *c, int64_t since) noexcept nogil:
 
 # ---- orders
 
-cdef void cycle_start(cycle_t *c) noexcept nogil:
-    """The first instant is one period from now; after a stop the old grid goes on."""
+cdef void cycle_start(cycle_t *c, int64_t origin) noexcept nogil:
+    """The first instant is one period from now, or on the grid of `origin`; after a stop the old
+    grid goes on."""
     cdef int64_t present = now(c)
     cdef bint fresh
     if c.origin == 0:
-        c.origin = present + c.period
+        c.origin = origin if origin > 0 else present + c.period
     c.next = c.origin
     if present >= c.origin:
         c.next += ((present - c.origin) // c.period + 1) * c.period

@@ -14,6 +14,7 @@ cdef class Engine(Parts):
     cdef bint saved_scheduling
     cdef bint native           # the cycle runs in its own thread
     cdef bint running
+    cdef bint committed        # the targets of the next step are on their way already
     cdef bint emitted          # inline: the frames of this cycle are on their way
     cdef object rehearsal      # called in the lead
     cdef int64_t left          # when `next` returned [ns]; -1: no application since

@@ -33,7 +33,7 @@ class Engine:
         the actual one, velocity and torque by zero.
         """
 
-    def start(self) -> None:
+    def start(self, origin_ns: int = 0) -> None:
         """Flushes the link, sets the first instant, starts the native thread. Nothing was
         committed yet: drives stay disabled, outputs zero (or as the target buffers say after
         the first `run` or `next`). Again after `stop`: continues. OSError if no thread can be had."""
@@ -46,6 +46,18 @@ class Engine:
         cycle at most `timeout_ns` (0: a second and four periods). OSError when the link fails,
         KeyboardInterrupt and the like from signal handlers at once.
         """
+
+    def commit_targets(self) -> None:
+        """Commits the target buffers for the next `next`, where that has a thread of its own to
+        wait for: with several engines all commit before the first one is waited for."""
+
+    @property
+    def origin(self) -> int:
+        """The first instant there was [ns]; 0: not started yet. `start(origin_ns)` keeps to the grid
+        of another engine."""
+
+    def take_turns(self) -> None:
+        """Several engines in one thread: their cycles may begin late within the period."""
 
     def run(self, cycles: int) -> int:
         """`cycles` cycles without an application, for start-up and leaving: goals, requests, modes,

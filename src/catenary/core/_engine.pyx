@@ -113,7 +113,7 @@ cdef class Engine(Parts):
 
     # ---- life
 
-    def start(self):
+    def start(self, int64_t origin_ns=0):
         cdef int rc
         if self.running:
             raise RuntimeError("the engine is running")
@@ -125,16 +125,16 @@ cdef class Engine(Parts):
         self.e.thread.body = thread_loop
         self.e.thread.argument = &self.e
         if self.native:
-            cycle_start(&self.e.cycle)
+            cycle_start(&self.e.cycle, origin_ns)
             rc = thread_start(&self.e.thread)
             if rc < 0:
                 raise OSError(-rc, f"native thread: {os.strerror(-rc)}")
         elif not self.virtual:
             self.saved_scheduling = scheduling_save(&self.scheduling_before) == 0
             thread_schedule(&self.e.thread)
-            cycle_start(&self.e.cycle)
+            cycle_start(&self.e.cycle, origin_ns)
         else:
-            cycle_start(&self.e.cycle)
+            cycle_start(&self.e.cycle, origin_ns)
         self.running = True
 
     def stop(self):
@@ -151,6 +151,18 @@ cdef class Engine(Parts):
 
     def next(self, int64_t timeout_ns=0):
         return self.step(timeout_ns)
+
+    def commit_targets(self):
+        if self.native:
+            self.commit(self.is_led())
+            self.committed = True
+
+    @property
+    def origin(self):
+        return self.e.cycle.origin
+
+    def take_turns(self):
+        self.e.cycle.patient = not self.native
 
     cdef uint32_t step(self, int64_t timeout_ns=0) except? 0xFFFFFFFF:
         """`timeout_ns` 0: a second and some periods."""
@@ -287,7 +299,9 @@ cdef class Engine(Parts):
         cdef actual_header_t *header = self.h.actual[PRIVATE].header
         cdef uint64_t before = header.number
         cdef uint32_t flags
-        self.commit(self.is_led())
+        if not self.committed:
+            self.commit(self.is_led())
+        self.committed = False
         flags = self.await_cycle(timeout_ns)
         self.follow()
         self.left = self.now_ns()

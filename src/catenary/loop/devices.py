@@ -18,9 +18,22 @@ class DeviceWish(Wish, Protocol):
 
 def main_device_of(wishes: Sequence[DeviceWish]) -> MainDevice:
     """The MainDevice that all wishes share."""
-    mains = {id(sub.main): sub.main for wish in wishes for sub in wish.subs}
-    if not mains:
+    [(main, _)] = by_network(wishes)
+    return main
+
+
+def by_network(wishes: Sequence[DeviceWish]) -> list[tuple[MainDevice, list[DeviceWish]]]:
+    """The wishes of each MainDevice, in the order of its first one."""
+    networks: dict[int, tuple[MainDevice, list[DeviceWish]]] = {}
+    for wish in wishes:
+        mains = {id(sub.main): sub.main for sub in wish.subs}
+        if len(mains) > 1:
+            raise ValueError(
+                "one wish with devices of several MainDevices: make one for each, and give the "
+                "Loop both"
+            )
+        for key, main in mains.items():
+            networks.setdefault(key, (main, []))[1].append(wish)
+    if not networks:
         raise ValueError("a Loop needs a wish: Drives, Inputs or Outputs")
-    if len(mains) > 1:
-        raise ValueError("wishes on several MainDevices in one Loop are not possible yet")
-    return next(iter(mains.values()))
+    return list(networks.values())

@@ -23,7 +23,7 @@ from catenary.core import (
     Iteration,
 )
 from catenary.errors import LawError
-from catenary.loop.devices import DeviceWish, main_device_of
+from catenary.loop.devices import DeviceWish, by_network, main_device_of
 from catenary.loop.laws.law import Law
 from catenary.loop.laws.law import law as made_law
 from catenary.loop.laws.run import LawRun, Numbers
@@ -64,6 +64,14 @@ class Loop:
     entry, before the devices go to OP; others when they are started. `cpu` and `priority`
     (SCHED_FIFO) of the native thread; None: as they are.
     """
+
+    def __new__(cls, *wishes: DeviceWish, **options: Any) -> Loop:
+        """Wishes on several MainDevices make a `NetworksLoop`."""
+        if cls is Loop and len(by_network(wishes)) > 1:
+            from catenary.loop.networks import NetworksLoop
+
+            return super().__new__(NetworksLoop)
+        return super().__new__(cls)
 
     def __init__(
         self,
@@ -118,18 +126,7 @@ class Loop:
         try:
             self._guard.install()
             self._running = self._iteration = None
-            plan = self._make_plan()
-            self._main.configure(plan)
-            self._running = Running(
-                self._main,
-                plan,
-                self._wishes,
-                abandon=self._abandon,
-                on_return=self._on_return,
-                on_replacement=self._on_replacement,
-            )
-            for law in self._laws:
-                self._running.laws.compile(law)
+            self._running = self._prepared(self._abandon)
             self._running.open()
             if self._enable:
                 self._running.enable()
@@ -139,6 +136,22 @@ class Loop:
             for problem in self._leave():
                 error.add_note(f"on the way down: {problem}")
             raise
+
+    def _prepared(self, abandon: Callable[[], object]) -> Running:
+        """All devices in SAFE-OP, all laws compiled."""
+        plan = self._make_plan()
+        self._main.configure(plan)
+        running = Running(
+            self._main,
+            plan,
+            self._wishes,
+            abandon=abandon,
+            on_return=self._on_return,
+            on_replacement=self._on_replacement,
+        )
+        for law in self._laws:
+            running.laws.compile(law)
+        return running
 
     def __exit__(
         self,

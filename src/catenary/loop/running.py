@@ -81,16 +81,39 @@ class Running:
         )
         self.errors = ErrorWatch(main, now=lambda: self.engine.now() * 1e-9)
         self._attached = ExitStack()
-        self._left = False
+        self._opened = self._left = False
         self._abandon = abandon  # leaves the loop, when the MainDevice is closed round it
         self._stations = [sub.station for sub in main.subs]
+        self._companions: Sequence[Running] = ()
+        self.service.cycle = self.cycle
 
     # Opening
 
-    def open(self) -> None:
-        """From SAFE-OP to OP: the cycle starts, and valid outputs flow while the states change."""
+    def share_time(self, companions: Sequence[Running]) -> None:
+        """Networks whose cycles this thread must run as well, in virtual time."""
+        self._companions = companions
+        self.engine.take_turns()
+
+    def cycle(self) -> int:
+        """One cycle without an application, and one of each companion."""
+        flags = self.engine.run(1)
+        for other in self._companions:
+            if other.is_open:
+                other.engine.run(1)
+                other.service.step()
+        return flags
+
+    @property
+    def is_open(self) -> bool:
+        """Whether its cycle runs."""
+        return self._opened and not self._left
+
+    def open(self, origin_ns: int = 0) -> None:
+        """From SAFE-OP to OP: the cycle starts, and valid outputs flow while the states change.
+        `origin_ns`: an instant of the grid to keep to."""
         self._attached.enter_context(self.main.attached(self.service.runner, self._abandon))
-        self.engine.start()
+        self.engine.start(origin_ns)
+        self._opened = True
         self.service.start()
         self._settle()
         self.service.converse(*(request_state(station, State.OP) for station in self._stations))
@@ -108,7 +131,7 @@ class Running:
         patience = max(ENABLE_TIMEOUT_NS, ENABLE_CYCLES * self.plan.cycle.period_ns)
         deadline = self.engine.now() + patience
         while True:
-            flags = self.engine.run(1)
+            flags = self.cycle()
             waiting = in_position & (self.views.axis_flags & AXIS_FOLLOWED == 0)
             if not waiting.any():
                 return
@@ -120,7 +143,7 @@ class Running:
     def _settle(self) -> None:
         """Until all units answer: the first cycles of a new thread may find nobody."""
         for _ in range(SETTLE_CYCLES):
-            flags = self.engine.run(1)
+            flags = self.cycle()
             self._raise_ended(flags)
             if flags & CYCLE_OK:
                 return
@@ -188,12 +211,12 @@ class Running:
         self.engine.stop_law()
         if not self.plan.cycle.axes:
             return
-        self._stop_all()
+        self.stop_axes_at_once()
         for _ in range(self.plan.cycle.stop_deadline_ns // STOP_SLICE_NS + 1):
             if guard.hurry or self.engine.run_until_stopped(STOP_SLICE_NS):
                 return
 
-    def _stop_all(self) -> None:
+    def stop_axes_at_once(self) -> None:
         """All axes brake from the next cycle on. What the body has asked for and not committed yet
         must not come after it."""
         self.views.goal[:] = GOAL_QUICK_STOP
@@ -220,7 +243,7 @@ class Running:
             if not valid and not unit.optional
             for position in unit.devices
         ]
-        self._stop_all()  # what still answers need not wait for the questions
+        self.stop_axes_at_once()  # what still answers need not wait for the questions
         [answers] = self.service.converse(survey(self._stations))
         [noise] = self.service.converse(self.errors.look())
         silent = [answer.station.position for answer in answers if answer.word is None]
@@ -241,7 +264,7 @@ class Running:
         """The error for some axes, with what each drive says about it."""
         log = self.log()
         states = [state_of(self.views.statusword.item(axis)) for axis in axes]
-        self._stop_all()
+        self.stop_axes_at_once()
         troubles = [
             AxisTrouble(self.plan.cycle.axes[axis].name, state, self._error_code(axis))
             for axis, state in zip(axes, states, strict=True)

@@ -159,11 +159,24 @@ static void line_take(cat_segment *s, queued_frame *q, const route *r) {
         queue_twice(&s->ends[exit], q);
 }
 
+static int wait_in_virtual_time(segment_end *e, int64_t deadline, int wake_on_frame);
+
+/* On a shared clock time may have passed elsewhere, in a wait on another segment's link. */
+static inline void catch_up(segment_end *e) {
+    cat_segment *s = e->segment;
+    if (s->clock) {
+        int64_t present = s->clock->now(s->clock->self);
+        if (present > s->now)
+            wait_in_virtual_time(e, present, 0);
+    }
+}
+
 static int line_send(void *self, const uint8_t *frame, uint32_t length) {
     segment_end *e = self;
     cat_segment *s = e->segment;
     if (length < ETHERNET_HEADER || length > CAT_FRAME_MAX)
         return -EMSGSIZE;
+    catch_up(e);
     lock(s);
     if (!s->is_virtual)
         segment_advance(s, monotonic_now());
@@ -192,6 +205,8 @@ static int line_send(void *self, const uint8_t *frame, uint32_t length) {
 
 static int64_t line_now(void *self) {
     const cat_segment *s = ((segment_end *)self)->segment;
+    if (s->clock)
+        return s->clock->now(s->clock->self);
     return s->is_virtual ? s->now : monotonic_now();
 }
 
@@ -206,9 +221,10 @@ static inline int line_ready(const segment_end *e, int64_t now) {
 
 static int line_receive(void *self, const uint8_t **frame) {
     segment_end *e = self;
+    catch_up(e);
     lock(e->segment);
     int length = 0;
-    if (line_ready(e, line_now(e))) {
+    if (line_ready(e, e->segment->is_virtual ? e->segment->now : monotonic_now())) {
         const queued_frame *q = queue_first(e);
         memcpy(e->taken, q->bytes, q->length);
         length = (int)q->length;

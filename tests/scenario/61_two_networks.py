@@ -1,0 +1,151 @@
+"""Two networks in one loop: upper and lower body, one schedule. Both are complete; one that dies
+does not hold the other; leaving stops every network that answers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import pytest
+
+import catenary as cat
+from catenary.errors import StateError, WorkingCounterError
+from catenary.realtime import VirtualClock
+from catenary.virtual import Coupler, Segment, Servo
+
+
+@dataclass
+class Body:
+    upper: Segment
+    lower: Segment
+    upper_main: cat.MainDevice
+    lower_main: cat.MainDevice
+
+    def wishes(self) -> tuple[cat.Drives, cat.Drives]:
+        return tuple(
+            cat.Drives(main.subs.drives, counts_per_turn=2**20)
+            for main in (self.upper_main, self.lower_main)
+        )  # type: ignore[return-value]
+
+    def assert_safe(self) -> None:
+        for segment in (self.upper, self.lower):
+            assert all(device.state & 0x0F < 8 for device in segment)
+            assert all(servo.drive_state() != "OPERATION ENABLED" for servo in list(segment)[1:])
+
+
+@pytest.fixture
+def body() -> Iterator[Body]:
+    yield from bodies(3, 2)
+
+
+def bodies(upper_axes: int, lower_axes: int) -> Iterator[Body]:
+    with VirtualClock() as clock:
+        upper = Segment([Coupler(), *(Servo(serial=k) for k in range(upper_axes))], clock=clock)
+        lower = Segment([Coupler(), *(Servo(serial=k) for k in range(lower_axes))], clock=clock)
+        with cat.MainDevice(upper) as first, cat.MainDevice(lower) as second:
+            first.scan()
+            second.scan()
+            yield Body(upper, lower, first, second)
+
+
+def test_both_follow_in_every_cycle(body: Body) -> None:
+    upper, lower = body.wishes()
+    with cat.Loop(upper, lower, period=1e-3) as loop:
+        homes = upper.actual.position.copy(), lower.actual.position.copy()
+        for cycle in loop:
+            assert cycle.ok
+            assert [network.ok for network in cycle.networks] == [True, True]
+            upper.target.position[:] = homes[0] + 0.3 * cycle.time
+            lower.target.position[:] = homes[1] - 0.3 * cycle.time
+            if cycle.time > 0.5:
+                break
+        assert upper.actual.position == pytest.approx(homes[0] + 0.15, abs=0.01)
+        assert lower.actual.position == pytest.approx(homes[1] - 0.15, abs=0.01)
+        counters = [network.timing.counters for network in loop.networks]
+        assert [each["lost"] for each in counters] == [0, 0]
+        assert [each["late"] for each in counters] == [0, 0]
+        numbers = {network.number for network in cycle.networks}
+        assert len(numbers) == 1
+    body.assert_safe()
+
+
+@pytest.mark.parametrize("hertz", [4000, 8000])
+def test_the_axes_of_a_humanoid_at_four_and_eight_kilohertz(hertz: int) -> None:
+    """18 + 15 axes, as TOCABI has them: all complete."""
+    for body in bodies(18, 15):
+        upper, lower = body.wishes()
+        with cat.Loop(upper, lower, period=1 / hertz) as loop:
+            for cycle in loop:
+                assert cycle.ok
+                if cycle.number == 500:
+                    break
+            for network in loop.networks:
+                assert network.timing.counters["lost"] == 0
+                assert network.timing.counters["late"] == 0
+        body.assert_safe()
+
+
+def test_one_that_dies_ends_the_loop_and_the_other_is_stopped(body: Body) -> None:
+    upper, lower = body.wishes()
+    with pytest.raises(WorkingCounterError, match="no device answers"):
+        run_and_kill(body, upper, lower)
+    assert all(device.state & 0x0F < 8 for device in body.lower)
+    body.upper.plug()
+
+
+def run_and_kill(
+    body: Body, upper: cat.Drives, lower: cat.Drives, quorum: int | None = None
+) -> list[tuple[bool, bool, bool]]:
+    seen = []
+    with cat.Loop(upper, lower, quorum=quorum) as loop:
+        home = lower.actual.position.copy()
+        for cycle in loop:
+            lower.target.position[:] = home + 0.2 * cycle.time
+            seen.append((cycle.ok, cycle.networks[0].ok, cycle.networks[1].ok))
+            if cycle.number == 100:
+                body.upper.unplug()
+            if cycle.number == 400:
+                break
+        assert lower.enabled.all()
+        assert lower.actual.position == pytest.approx(home + 0.08, abs=0.01)
+    return seen
+
+
+def test_with_a_quorum_the_other_goes_on(body: Body) -> None:
+    upper, lower = body.wishes()
+    seen = run_and_kill(body, upper, lower, quorum=1)
+    assert seen[50] == (True, True, True)
+    assert seen[-1] == (True, False, True)
+    assert all(state & 0x0F < 8 for state in (device.state for device in body.lower))
+    assert "OPERATION ENABLED" not in [servo.drive_state() for servo in list(body.upper)[1:]]
+    body.upper.plug()
+
+
+def test_a_device_that_refuses_op_brings_both_down(body: Body) -> None:
+    from catenary.virtual.faults import refuse_state
+
+    body.lower.inject(refuse_state(1, "OP", code=0x001B, at=0))
+    upper, lower = body.wishes()
+    with pytest.raises(StateError, match="device 1"), cat.Loop(upper, lower):
+        raise AssertionError("it opened")
+    body.assert_safe()
+
+
+def test_what_several_networks_cannot_have(body: Body) -> None:
+    upper, lower = body.wishes()
+    with pytest.raises(ValueError, match="threaded"):
+        cat.Loop(upper, lower, run="inline")
+    with pytest.raises(ValueError, match="quorum"):
+        cat.Loop(upper, lower, quorum=3)
+    with pytest.raises(ValueError, match="one wish with devices of several"):
+        both = [body.upper_main.subs[1], body.lower_main.subs[2]]
+        cat.Loop(cat.Drives(both, counts_per_turn=2**20))
+
+
+def test_segments_with_clocks_of_their_own_are_refused() -> None:
+    segments = Segment([Servo()]), Segment([Servo(), Servo()])
+    with cat.MainDevice(segments[0]) as first, cat.MainDevice(segments[1]) as second:
+        wishes = [cat.Drives(main.scan().drives, counts_per_turn=2**20) for main in (first, second)]
+        with pytest.raises(ValueError, match="VirtualClock"), cat.Loop(*wishes):
+            raise AssertionError("it opened")
