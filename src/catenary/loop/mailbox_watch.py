@@ -7,7 +7,7 @@ one device at a time.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from catenary.bus import LaneRunner, Pending, SubDevice
 from catenary.errors import CatenaryError
@@ -45,24 +45,26 @@ class MailboxWatch:
     def look(self, now_ns: int, cycle: int) -> None:
         """Lets every mailbox be read that was full in this cycle, unless somebody talks to the
         device anyway."""
-        for position in [p for p, reading in self._reading.items() if reading.done]:
-            del self._reading[position]
-            self._read_in[position] = cycle  # its bit in this cycle may be older
-        for position in self._full():
-            if self._read_in.get(position, -1) < cycle:
-                self._read(position)
+        if self._reading:
+            self._note_ends(cycle)
+        for rank, word in enumerate(self._words):
+            if word:
+                self._read_full(32 * rank, word, cycle)
         if self._asked and now_ns >= self._due_ns:
             self._due_ns = now_ns + self._pace_ns
             self._next = (self._next + 1) % len(self._asked)
             self._read(self._asked[self._next])
 
-    def _full(self) -> Iterator[int]:
-        for rank in range(len(self._words)):
-            word = int(self._words[rank])
-            while word:
-                bit = word & -word
-                yield self._shown[32 * rank + bit.bit_length() - 1]
-                word ^= bit
+    def _note_ends(self, cycle: int) -> None:
+        for position in [p for p, reading in self._reading.items() if reading.done]:
+            del self._reading[position]
+            self._read_in[position] = cycle  # its bit in this cycle may be older
+
+    def _read_full(self, first: int, word: int, cycle: int) -> None:
+        for rank in range(first, first + word.bit_length()):
+            position = self._shown[rank]
+            if word >> (rank - first) & 1 and self._read_in.get(position, -1) < cycle:
+                self._read(position)
 
     def _read(self, position: int) -> None:
         channel = self._subs[position].channel
