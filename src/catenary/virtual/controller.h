@@ -157,7 +157,6 @@ typedef struct controller {
     dc_clock clock;
     sync_unit sync;
     int64_t passage;                 /* when the frame in work reached this device */
-    int64_t due;                     /* of any work of this controller */
     int64_t watchdog_due, pdi_watchdog_due;
     uint8_t watchdog_armed, watchdog_expired;
     /* model */
@@ -260,7 +259,8 @@ typedef struct cat_segment {
     int64_t now, epoch;              /* epoch: faults count their time from here, -1: not yet */
     int64_t passage;                 /* when the frame in work starts */
     int64_t frame_end;               /* and when its last byte has */
-    int64_t next_due;                /* of compiled work */
+    int64_t *dues;                   /* of each controller's work: looked through at every instant */
+    int64_t next_due;                /* of all compiled work */
     int64_t sii_due;                 /* of the earliest EEPROM access, for the packet loop */
     int64_t service_due;             /* of the application, Python */
     int synchronous;                 /* how many devices keep time by SYNC0 */
@@ -306,8 +306,8 @@ static inline void raise_event(controller *c, uint32_t event) {
 
 /* Something of this controller is due at `when`: the segment looks no later than that. */
 static inline void due_at(controller *c, int64_t when) {
-    if (when < c->due)
-        c->due = when;
+    int64_t *due = c->segment->dues + c->position;
+    *due = when < *due ? when : *due;
     if (when < c->segment->next_due)
         c->segment->next_due = when;
 }

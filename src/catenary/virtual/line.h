@@ -37,10 +37,8 @@ static inline void unlock(cat_segment *s) { pthread_mutex_unlock(&s->mutex); }
 
 /* All compiled work of one controller that is due at `now`; when the next is. */
 static int64_t controller_advance(controller *c) {
-    int64_t now = c->segment->now;
-    if (c->due > now)
-        return c->due;
-    c->due = NEVER;
+    int64_t *due = c->segment->dues + c->position;
+    *due = NEVER;
     device_advance(c);
     watchdog_check(c);
     sii_check(c);
@@ -48,8 +46,8 @@ static int64_t controller_advance(controller *c) {
     next = c->watchdog_due < next ? c->watchdog_due : next;
     next = c->pdi_watchdog_due < next ? c->pdi_watchdog_due : next;
     next = c->sii.due < next ? c->sii.due : next;
-    c->due = next;
-    return next;
+    *due = next < *due ? next : *due;
+    return *due;
 }
 
 /* Frames that a dark cable catches on their way are lost, though the controllers behind have had
@@ -100,7 +98,9 @@ static void segment_advance(cat_segment *s, int64_t until) {
             links_check(s);
         next = s->link_due;
         for (int n = 0; n < s->count; n++) {
-            int64_t due = controller_advance(&s->controllers[n]);
+            int64_t due = s->dues[n];
+            if (due <= s->now)
+                due = controller_advance(&s->controllers[n]);
             next = due < next ? due : next;
         }
         s->next_due = next < s->next_due ? next : s->next_due;

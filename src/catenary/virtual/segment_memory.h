@@ -39,7 +39,7 @@ static void controller_forget(controller *c) {
     memset(&c->synchronous, 0, sizeof c->synchronous);
     sync_stop(c);
     c->sync.active = 0;
-    c->due = NEVER;
+    c->segment->dues[c->position] = NEVER;
     for (int k = 0; k < c->axis_count; k++) {
         servo_axis *a = &c->axes[k], before = *a;
         memset(a, 0, sizeof *a);
@@ -95,7 +95,7 @@ static void controller_free(controller *c) {
 
 /* Nothing stands here yet: no work is due, and no port has a cable. */
 static void controller_blank(controller *c) {
-    c->sync.next0 = c->sync.next1 = c->sync.due = c->due = NEVER;
+    c->sync.next0 = c->sync.next1 = c->sync.due = c->segment->dues[c->position] = NEVER;
     c->outputs.sm = c->inputs.sm = -1;
     c->step_period = c->step_due = c->watchdog_due = c->pdi_watchdog_due = c->sii.due = NEVER;
     c->sii.read_time = 200000;
@@ -120,6 +120,8 @@ static void controllers_exchange(controller *a, controller *b) {
     int position = a->position;
     a->position = b->position;
     b->position = position;
+    a->segment->dues[a->position] = b->segment->dues[b->position] = a->segment->now;   /* look */
+    due_at(a, a->segment->now);
     for (int p = 0; p < PORTS; p++) {
         int32_t hung = a->ports[p].cable;
         a->ports[p].cable = b->ports[p].cable;
@@ -139,6 +141,7 @@ static void segment_free(cat_segment *s) {
         free(s->ends[n].queue);
     }
     free(s->cables);
+    free(s->dues);
     free(s->controllers);
     pthread_mutex_destroy(&s->mutex);
     free(s);
@@ -173,7 +176,8 @@ static cat_segment *segment_make(int count, int is_virtual, int ring, int64_t de
     s->cable_count = count + ring;
     s->controllers = calloc((size_t)count + 1, sizeof *s->controllers);
     s->cables = calloc((size_t)s->cable_count + 1, sizeof *s->cables);
-    if (!s->controllers || !s->cables || !end_make(s, 0) || (ring && !end_make(s, 1))) {
+    s->dues = calloc((size_t)count + 1, sizeof *s->dues);
+    if (!s->controllers || !s->dues || !s->cables || !end_make(s, 0) || (ring && !end_make(s, 1))) {
         segment_free(s);
         return NULL;
     }

@@ -92,7 +92,8 @@ class Synchronisation:
             return INVALID_DC_CONFIGURATION
         if self.sync0_cycle_ns < self._minimum_ns:
             return DC_SYNC0_CYCLE_TIME
-        if self._cycle_written not in (0, self.sync0_cycle_ns):
+        own = self._step_ns  # read from 0x1C32:02 in free run, it may be written back
+        if self._cycle_written not in (0, own, self.sync0_cycle_ns):
             return DC_CYCLE_TIME
         return 0
 
