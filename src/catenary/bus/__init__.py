@@ -1,11 +1,12 @@
 """MainDevice and SubDevice, and the runners of procedures."""
 
 from catenary.bus.lane_runner import Lane, LaneRunner
-from catenary.bus.main_device import MainDevice, SubDevices
+from catenary.bus.main_device import MainDevice
 from catenary.bus.pending import Pending
 from catenary.bus.runner import BlockingRunner, FrameCounts, Runner
 from catenary.bus.sdo import Sdo
 from catenary.bus.sub_device import SubDevice
+from catenary.bus.sub_devices import SubDevices
 from catenary.wire.sdo_information import ListType
 
 __all__ = [

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Self, TypeVar, overload
+from typing import TYPE_CHECKING, Self, TypeVar
 
 from catenary.bus import event
 from catenary.bus.events import Callback, Callbacks, Events
@@ -13,6 +13,7 @@ from catenary.bus.pending import Pending
 from catenary.bus.runner import BlockingRunner, FrameCounts, LinkLent, Runner
 from catenary.bus.segment_scan import Found, check_identity, find, with_places
 from catenary.bus.sub_device import SubDevice
+from catenary.bus.sub_devices import SubDevices
 from catenary.errors import CatenaryError, SegmentError
 from catenary.link import Link, LinkSource, lives_in_virtual_time, ring_of
 from catenary.model.device import Identity
@@ -38,34 +39,6 @@ if TYPE_CHECKING:  # plan needs NumPy, a scan does not
 T = TypeVar("T")
 
 LEAVE_TIMEOUT = 0.5  # [s] for each state on the way down: nobody waits long for a broken segment
-
-
-class SubDevices(Sequence[SubDevice]):
-    """The devices of a segment, by position."""
-
-    def __init__(self, subs: Sequence[SubDevice] = ()) -> None:
-        self._subs = tuple(subs)
-
-    @property
-    def drives(self) -> tuple[SubDevice, ...]:
-        """Those with CiA 402 axes."""
-        return tuple(sub for sub in self._subs if sub.is_drive)
-
-    @overload
-    def __getitem__(self, position: int) -> SubDevice: ...
-    @overload
-    def __getitem__(self, position: slice) -> tuple[SubDevice, ...]: ...
-    def __getitem__(self, position: int | slice) -> SubDevice | tuple[SubDevice, ...]:
-        return self._subs[position]
-
-    def __len__(self) -> int:
-        return len(self._subs)
-
-    def __iter__(self) -> Iterator[SubDevice]:
-        return iter(self._subs)
-
-    def __repr__(self) -> str:
-        return f"<{len(self._subs)} SubDevices: {', '.join(sub.name for sub in self._subs)}>"
 
 
 class MainDevice:

@@ -1,0 +1,19 @@
+"""A tool that may be plugged off and on while the arm moves: its devices carry the alias 20."""
+
+import sys
+
+import catenary as cat
+
+with cat.MainDevice(sys.argv[1]) as main:
+    subs = main.scan()
+    tool = subs.group(20)
+    arm = cat.Drives([d for d in subs.drives if d not in tool], counts_per_turn=2**20)
+    grip = cat.Outputs(*tool, required=False)
+    with cat.Loop(arm, grip, period=1e-3, on_return="restore") as loop:
+        for cycle in loop:
+            grip.bits[:] = cycle.number // 500 % 2
+            for event in main.events:
+                print(event)
+            if cycle.time > 3.0:
+                break
+        print("the tool is", "there" if all(grip.present) else "gone")
