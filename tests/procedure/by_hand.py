@@ -68,6 +68,7 @@ class MailboxDevice:
         self.lose_out: set[int] = set()
         self.lose_back: set[int] = set()
         self.deduplicates = True
+        self.repeats = True  # its last message, when it is asked to
         self.deaf = False  # does not read its mailbox
         self.next_counter: Callable[[], int] | None = None  # instead of 1 to 7 and again
         self.spoil: Callable[[bytes], bytes] = lambda data: data  # what it does to its messages
@@ -137,9 +138,9 @@ class MailboxDevice:
             return Reply(bytes([0x08 if self._in_buffer is not None else 0]), 1)
         if address == 0x080E:
             toggle = bool(request.data[0] & 0x02)
-            if toggle != self._toggle:
+            if self.repeats and toggle != self._toggle:
                 self._repeat()
-            self._toggle = toggle
+            self._toggle = self.repeats and toggle
             return Reply(request.data, 1)
         if address == 0x080F:
             return Reply(bytes([0x02 if self._toggle else 0]), 1)

@@ -113,6 +113,26 @@ def _longest_run(numbers: set[int]) -> int:
     return longest
 
 
+def test_a_lost_look_needs_no_repeating_where_the_message_is_still_there() -> None:
+    device = MailboxDevice(Dictionary(OBJECT))
+    device.repeats = False
+    lane = channel()
+    play(upload(lane, 0x2000, 0), device)
+    device.lose_out = {3}  # the look of the second upload: 0 to 2 are write, read, write
+    assert play(upload(lane, 0x2000, 0), device) == OBJECT[0x2000, 0]
+    assert not lane.repeat_requested
+
+
+def test_a_look_that_took_the_message_and_was_lost_is_repeated() -> None:
+    device = MailboxDevice(Dictionary(OBJECT))
+    lane = channel()
+    play(upload(lane, 0x2000, 0), device)
+    device.lose_back = {3}
+    assert play(upload(lane, 0x2000, 0), device) == OBJECT[0x2000, 0]
+    assert lane.repeat_requested
+    assert len(device.received) == 2
+
+
 # What devices do against the protocol.
 
 

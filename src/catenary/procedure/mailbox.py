@@ -239,21 +239,38 @@ def _look(channel: MailboxChannel) -> Procedure[tuple[bool, Mailbox | None, int]
     """(whether there was a message, the message unless it was a duplicate, when).
 
     A small mailbox is read in the same frame that looks: an empty one is not changed by it, and
-    answers with a working counter of 0. Only where counters tell duplicates: a frame that is lost
-    must be asked for again, and may have been empty.
+    answers with a working counter of 0. Only where counters tell duplicates: when the frame is
+    lost, nobody knows whether there was a message in it. It is looked for as it is; only when
+    nothing comes within a grace is the device asked for its last message again, because some stacks
+    do not know how to repeat.
     """
-    if not channel.received_counter or channel.layout.send_size > EAGER_MAX:
-        full, status = yield from _is_full(channel, IN)
-        return full, (yield from _take(channel)) if full else None, status.time_ns
+    careful = not channel.received_counter or channel.layout.send_size > EAGER_MAX
+    if careful or channel.unsure_ns is not None:
+        return (yield from _look_first(channel))
     station = channel.station
     look = read(Command.FPRD, station.address, sync_manager_status(IN))._replace(repeatable=False)
     status, reply = yield [look, _read_request(channel)]
-    if not reply.lost:
-        answered(status, station, "mailbox status")
-        if not reply.working_counter:
-            return False, None, reply.time_ns
-    received = yield from _take(channel, reply)
-    return received is not None, received, reply.time_ns
+    if reply.lost:
+        channel.unsure_ns = reply.time_ns
+        return False, None, reply.time_ns
+    answered(status, station, "mailbox status")
+    if not reply.working_counter:
+        return False, None, reply.time_ns
+    channel.received_ns = reply.time_ns
+    return True, _decoded(channel, reply.data), reply.time_ns
+
+
+def _look_first(channel: MailboxChannel) -> Procedure[tuple[bool, Mailbox | None, int]]:
+    """The same, where a full mailbox is read in a frame of its own."""
+    full, status = yield from _is_full(channel, IN)
+    unsure_ns = channel.unsure_ns
+    if not full and unsure_ns is not None and status.time_ns - unsure_ns > GRACE * 1e9:
+        full = yield from _ask_again(channel)
+        channel.unsure_ns = None
+    if not full:
+        return False, None, status.time_ns
+    channel.unsure_ns = None
+    return True, (yield from _take(channel)), status.time_ns
 
 
 def _is_full(channel: MailboxChannel, number: int) -> Procedure[tuple[bool, Reply]]:
@@ -270,18 +287,15 @@ def _read_request(channel: MailboxChannel) -> Request:
     )
 
 
-def _take(channel: MailboxChannel, reply: Reply | None = None) -> Procedure[Mailbox | None]:
-    """Reads the full mailbox; None for a duplicate of what was read before, or for nothing.
-    `reply`: to a read that was made already."""
+def _take(channel: MailboxChannel) -> Procedure[Mailbox | None]:
+    """Reads the full mailbox; None for a duplicate of what was read before, or for nothing."""
     for _ in range(RECOVERIES):
-        if reply is None:
-            [reply] = yield [_read_request(channel)]
+        [reply] = yield [_read_request(channel)]
         if not reply.lost:
             channel.received_ns = reply.time_ns
             return _decoded(channel, reply.data) if reply.working_counter else None
         if not (yield from _ask_again(channel)):
             return None
-        reply = None
     raise ResponseTimeout(
         f"{channel.station}: {RECOVERIES} frames that read its mailbox were lost",
         hint="look at the cable: the error counters at 0x0300 tell which",

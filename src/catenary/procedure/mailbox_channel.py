@@ -46,12 +46,14 @@ class MailboxChannel:
     turns: deque[object] = field(default_factory=deque)  # conversations: the first one holds it
     posted_ns: int | None = None  # when it was asked last, until the answer is there
     thinks_ns: int = 0  # the device, before it answers, at least
+    unsure_ns: int | None = None  # when a frame was lost that may have taken a message
     owed: bool = False  # a question was given up; its answer may still come
 
     def reset(self) -> None:
         """After the SyncManagers were configured anew."""
         self.counter = self.received_counter = 0
         self.repeat_requested = self.owed = False
+        self.unsure_ns = None
 
     def learn(self, empty_ns: int | None) -> None:
         """An answer is there; at `empty_ns` it was not yet (None: nobody had looked). Nobody looks
