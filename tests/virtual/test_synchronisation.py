@@ -9,7 +9,8 @@ from collections.abc import Callable
 
 import pytest
 
-from catenary.virtual import Coupler, Segment, Servo
+from catenary.virtual import Coupler, Crystal, Segment, Servo
+from catenary.virtual.faults import power_cycle
 from catenary.wire.datagram import Command
 from catenary.wire.sii import decode_sii
 from tests.virtual.clocks import ACTIVATION, START_TIME, SYNC0_CYCLE, Clocks
@@ -351,3 +352,28 @@ def test_a_frozen_device_neither_steps_nor_counts(drive: Drive) -> None:
     drive.servo.freeze()
     drive.let_pass(5)
     assert drive.segment.core.synchronous(DEVICE)[2] == 0
+
+
+def test_a_power_cycle_ends_it_all_and_it_can_begin_again(drive: Drive) -> None:
+    drive.operational()
+    drive.segment.inject(power_cycle(DEVICE, for_=0.01))
+    drive.let_pass(20)
+    drive.number_stations()
+    assert drive.number(DEVICE, ACTIVATION, "<B") == 0
+    assert drive.number(DEVICE, SYNC0_CYCLE, "<I") == 0
+    assert not drive.segment.core.synchronous(DEVICE)[0]
+    drive.operational()
+    drive.cycles(20)
+    assert drive.al_status(SERVO) == (8, 0)
+
+
+@pytest.mark.parametrize("phase", [100.0, 900.0])
+def test_a_device_that_nobody_steers_misses_no_pulse(phase: float) -> None:
+    """A device 100 ppm off that nobody steers: its own pulses still come with one frame each."""
+    drive = Drive(Servo(crystal=Crystal(ppm=100)))
+    drive.operational()
+    for _ in range(300):
+        drive.let_pass((drive.first + round(phase * 1e3) - drive.system_time(DEVICE)) % MS / MS)
+        drive.swap()
+    missed = drive.segment.core.synchronous(DEVICE)[2]
+    assert (missed, drive.al_status(SERVO)) == (0, (8, 0))
