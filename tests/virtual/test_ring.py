@@ -192,12 +192,26 @@ def test_both_links_are_exclusive() -> None:
     ring.segment.second.open_link().close()
 
 
-def test_servos_in_a_ring_start_without_power_on_one_side() -> None:
+def test_without_somebody_at_the_second_end_a_ring_is_a_line() -> None:
+    segment = Segment([Coupler(), Coupler()], ring=True)
+    with segment.first.open_link() as link:
+        link.send(BRD)
+        assert link.wait_until(MILLISECOND, True)
+        frame = link.receive()
+        assert frame is not None
+        assert decode_frame(frame).datagrams[0].working_counter == 2
+        with segment.second.open_link():
+            link.send(BRD)
+            assert not link.wait_until(link.now() + MILLISECOND, True)  # it leaves there
+        link.send(BRD)
+        assert link.wait_until(link.now() + MILLISECOND, True)
+
+
+def test_a_ring_may_start_cut() -> None:
     segment = Segment([Servo(), Servo()], ring=True, faults=[cut(between=(0, 1))])
-    assert (segment.wires.processed(0), segment.wires.processed(1)) == ([0], [])
-    with segment.open_link() as link:
+    with segment.first.open_link() as link, segment.second.open_link():
         link.wait_until(MILLISECOND, False)
-    assert (segment.wires.processed(0), segment.wires.processed(1)) == ([0], [1])
+        assert (segment.wires.processed(0), segment.wires.processed(1)) == ([0], [1])
 
 
 def test_links_foretell_their_next_frame_for_those_who_wait_at_both_ends() -> None:

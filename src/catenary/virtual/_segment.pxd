@@ -54,6 +54,7 @@ cdef extern from "segment_memory.h" nogil:
         uint32_t stop_count
     ctypedef struct segment_end:
         uint32_t head, tail
+        int up
     ctypedef struct servo_axis:
         double inertia, viscous, coulomb, load, rated_torque, velocity_limit
         double counts_per_radian, velocity_per_radian, position_gain, velocity_gain, integral_gain

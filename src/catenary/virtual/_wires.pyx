@@ -60,6 +60,15 @@ cdef class Wires:
         segment_light(self._core._segment, at_once)
         unlock(self._core._segment)
 
+    def raise_end(self, int end, bint up):
+        """An interface of the MainDevice is driven, or no longer: as a network card is switched on."""
+        if not 0 <= end <= self._core._segment.ring:
+            raise IndexError(f"no end {end}")
+        lock(self._core._segment)
+        self._core._segment.ends[end].up = up
+        segment_light(self._core._segment, True)
+        unlock(self._core._segment)
+
     def cable_light(self, int n):
         return bool(self._cable(n).light)
 

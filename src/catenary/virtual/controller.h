@@ -237,6 +237,7 @@ typedef struct {
     uint32_t head, tail;             /* take at head, put at tail */
     int64_t busy_until;              /* the wire towards the segment is occupied */
     int number;
+    int up;                          /* somebody drives it: its cable has light */
     uint8_t taken[CAT_FRAME_MAX + 2];
 } segment_end;
 

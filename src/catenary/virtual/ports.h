@@ -120,7 +120,7 @@ static void links_check(cat_segment *s) {
 }
 
 static inline int end_has_power(const cat_segment *s, cable_end e) {
-    return e.device < 0 || s->controllers[e.device].powered;
+    return e.device < 0 ? s->ends[END_FIRST - e.device].up : s->controllers[e.device].powered;
 }
 
 static void end_sees_light(cat_segment *s, cable_end e, int light) {

@@ -63,7 +63,7 @@ class Segment:
 
     `faults`: what happens to it, by its own time (`time`). `behind`: device → (device, port) it
     hangs on, where that is not port 1 of the one before. `ring`: the last device leads back to a
-    second interface of the MainDevice. `link_loss_detection`: how long controllers take to see
+    second interface of the MainDevice; until somebody opens that end, it is a line. `link_loss_detection`: how long controllers take to see
     that a cable is dark: "enhanced" (15 us), "standard" (3 ms) or seconds.
     """
 
@@ -176,10 +176,14 @@ class Segment:
             self._thread = ServiceThread(self._service)
             self._thread.start()
         self._links[second] = link
+        if second:
+            self._wires.raise_end(1, True)
         return link
 
     def _link_closed(self, second: bool) -> None:
         del self._links[second]
+        if second:
+            self._wires.raise_end(1, False)
         if self._thread is not None and not self._links:
             self._thread.stop()
             self._thread = None

@@ -153,6 +153,7 @@ static int end_make(cat_segment *s, int number) {
     route *r = &s->routes[number];
     e->segment = s;
     e->number = number;
+    e->up = number == 0;
     e->queue = calloc(QUEUE_SIZE, sizeof *e->queue);
     r->stops = calloc(route_room(s), sizeof *r->stops);
     r->arrivals = calloc(4 * (size_t)route_room(s), sizeof *r->arrivals);

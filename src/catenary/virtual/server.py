@@ -108,12 +108,16 @@ class Server:
 
     def _open_second(self, interface: str) -> socket.socket:
         try:
+            if interface == self.interface:
+                raise LinkError(f"{interface} cannot be both ends of a ring")
             return _open_socket(interface)
         except LinkError:
             self._socket.close()
             raise
 
     def start(self) -> None:
+        if self._second is not None:
+            self.segment.wires.raise_end(1, True)
         self._service.start()
         self._thread.start()
         self._started.wait()
@@ -154,6 +158,7 @@ class Server:
         self._socket.close()
         if self._second is not None:
             self._second.close()
+            self.segment.wires.raise_end(1, False)
         os.close(self._stop)
 
     def __enter__(self) -> Server:

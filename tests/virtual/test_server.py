@@ -1,0 +1,93 @@
+"""Served segments: what cannot be served, and a ring on two wires."""
+
+from __future__ import annotations
+
+import socket
+
+import pytest
+
+from catenary.errors import LinkError
+from catenary.realtime import private_network
+from catenary.virtual import Coupler, Segment, Server
+from catenary.virtual.faults import cut
+from catenary.wire.datagram import Command, Datagram
+from catenary.wire.frame import decode_frame, encode_frame
+
+ETHERCAT = 0x88A4
+BRD = encode_frame([Datagram(Command.BRD, 0, b"\0")])
+
+
+def ring() -> Segment:
+    return Segment([Coupler() for _ in range(3)], ring=True, clock="monotonic")
+
+
+def wire(interface: str) -> socket.socket:
+    packet = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, socket.htons(ETHERCAT))
+    packet.bind((interface, ETHERCAT))
+    packet.settimeout(20.0)
+    return packet
+
+
+def answer(at: socket.socket) -> int:
+    """The working counter of the next frame that came from the segment."""
+    while True:
+        data, (_name, _protocol, kind, *_rest) = at.recvfrom(2048)
+        if kind != socket.PACKET_OUTGOING:
+            return decode_frame(data).datagrams[0].working_counter
+
+
+def test_virtual_time_cannot_be_served() -> None:
+    with pytest.raises(ValueError, match="real time"):
+        Server(Segment([Coupler()]), "veth0")
+
+
+def test_only_a_ring_has_two_interfaces() -> None:
+    with pytest.raises(ValueError, match="no ring"):
+        Server(Segment([Coupler()], clock="monotonic"), "veth0", second="veth1")
+
+
+def test_the_ends_of_a_ring_are_two(veth: tuple[str, str]) -> None:
+    with pytest.raises(LinkError, match="cannot be both ends"):
+        Server(ring(), veth[0], second=veth[0])
+
+
+def test_frames_leave_a_ring_at_the_other_interface(veth: tuple[str, str]) -> None:
+    segment = ring()
+    with (
+        private_network.veth_pair() as other,
+        Server(segment, veth[1], second=other[1]),
+        wire(veth[0]) as first,
+        wire(other[0]) as second,
+    ):
+        first.send(BRD)
+        assert answer(second) == 3
+        second.send(BRD)
+        assert answer(first) == 0
+        segment.wires.plug_cable(1, False, at_once=True)
+        first.send(BRD)
+        second.send(BRD)
+        assert (answer(first), answer(second)) == (1, 2)
+
+
+def test_a_ring_on_one_interface_is_a_line(veth: tuple[str, str]) -> None:
+    with Server(ring(), veth[1]), wire(veth[0]) as first:
+        first.send(BRD)
+        assert answer(first) == 3
+
+
+def test_faults_reach_a_served_segment(veth: tuple[str, str]) -> None:
+    segment = Segment(
+        [Coupler() for _ in range(3)], clock="monotonic", faults=[cut(between=(0, 1), at=0.01)]
+    )
+    with Server(segment, veth[1]), wire(veth[0]) as first:
+        first.settimeout(0.5)  # what runs into the dark does not come back
+        counters = []
+        while not counters or counters[-1] != 1:
+            first.send(BRD)
+            try:
+                counters.append(answer(first))
+            except TimeoutError:
+                counters.append(None)
+            assert len(counters) < 100_000
+    assert counters[0] == 3
+    assert set(counters) <= {3, None, 1}
