@@ -63,8 +63,9 @@ class Segment:
 
     `faults`: what happens to it, by its own time (`time`). `behind`: device → (device, port) it
     hangs on, where that is not port 1 of the one before. `ring`: the last device leads back to a
-    second interface of the MainDevice; until somebody opens that end, it is a line. `link_loss_detection`: how long controllers take to see
-    that a cable is dark: "enhanced" (15 us), "standard" (3 ms) or seconds.
+    second interface of the MainDevice; until somebody opens that end, it is a line.
+    `link_loss_detection`: how long controllers take to see that a cable is dark: "enhanced"
+    (15 us), "standard" (3 ms) or seconds.
     """
 
     def __init__(
