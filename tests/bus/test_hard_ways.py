@@ -197,3 +197,15 @@ def test_sdo_from_another_thread_while_the_loop_runs_and_never_from_its_own(run:
             with pytest.raises(RuntimeError, match="another thread"):
                 servo.sdo.read(0x6065, 0)
     assert found == [12345]
+
+
+def test_a_port_behind_which_nobody_answers_is_noted() -> None:
+    odd = segment()
+    with cat.MainDevice(odd) as main:
+        main.scan()
+        assert main.notes == ()
+        word = int.from_bytes(odd.core.peek(2, 0x0110, 2), "little") & ~0x0C00 | 0x0820
+        odd.core.poke(2, 0x0110, word.to_bytes(2, "little"))
+        main.scan()
+        [note] = main.notes
+    assert note.startswith("device 2 port 1 is open, but nobody answers behind it")

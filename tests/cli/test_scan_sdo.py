@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -23,6 +24,13 @@ def test_scan_lists_every_device(capsys: pytest.CaptureFixture[str]) -> None:
     assert heading.split()[:2] == ["pos", "name"]
     assert [line.split()[0] for line in lines] == list("012345")
     assert {line.split()[-1] for line in lines} == {"PRE-OP"}
+
+
+def test_scan_notes_what_is_odd(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "twins.toml"
+    path.write_text('[[device]]\nkind = "servo"\nalias = 7\n' * 2)
+    status, _, err = call(f"scan virtual:{path}", capsys)
+    assert (status, err) == (0, "note: devices (0, 1) have the same alias 7\n")
 
 
 def test_scan_for_programs(capsys: pytest.CaptureFixture[str]) -> None:

@@ -7,6 +7,7 @@ import shlex
 
 import pytest
 
+import catenary as cat
 from catenary.cli.main import main
 
 
@@ -101,6 +102,17 @@ def test_an_alias_that_another_device_has_is_refused(
     assert status == 1
     assert "alias 7 is that of device 0" in err
     assert call(f"alias virtual:{path} 1 7 --force", capsys)[0] == 0
+
+
+def test_an_alias_that_another_device_will_have_is_refused_too(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    segment = cat.Segment([cat.Servo(), cat.Servo()])
+    monkeypatch.setattr("catenary.target.main_device.parse", lambda _: segment)
+    assert call("alias eth9 0 7", capsys)[0] == 0
+    status, _, err = call("alias eth9 1 7", capsys)
+    assert status == 1
+    assert "alias 7 is that of device 0" in err
 
 
 @pytest.mark.parametrize(

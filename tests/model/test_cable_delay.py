@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from catenary.model.cable_delay import cable_delays_ns
 from catenary.model.delays import TIME_SPAN, PortTimes
-from catenary.model.topology import Topology, make_topology
+from catenary.model.topology import Topology, make_topology, open_ports
 from tests.model.tables import END, LINE, STAR, line
 
 
@@ -64,3 +64,13 @@ def test_times_that_cannot_be_are_not_shown() -> None:
     assert cable_delays_ns(topology, [(0, 10, 0, 0), (0, 0, 0, 0)]) == (None, 5)
     third = make_topology(line(3))
     assert cable_delays_ns(third, [(0, 10, 0, 0), (0, 500, 0, 0), (0, 0, 0, 0)])[1] is None
+
+
+def test_a_coupler_with_two_terminals_as_recorded() -> None:
+    """EK1100, EL2828, EL2889 in ethercrab's tests/replay-dc.pcapng: DL status and receive times.
+    The EL2889 has no clock."""
+    topology = make_topology([open_ports(word) for word in (0x5A31, 0x5A33, 0x5613)])
+    assert topology.contradictions == ()
+    coupler = (0x3C620F52, 0x3C6211AA, 0, 0)
+    terminal = (0x3D0BD6AE, 0x3D0BD7E4, 0, 0)
+    assert cable_delays_ns(topology, [coupler, terminal, None]) == (None, 145, None)

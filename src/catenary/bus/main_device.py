@@ -11,7 +11,7 @@ from catenary.bus import event
 from catenary.bus.events import Callback, Callbacks, Events
 from catenary.bus.pending import Pending
 from catenary.bus.runner import BlockingRunner, FrameCounts, LinkLent, Runner
-from catenary.bus.segment_scan import Found, check_identity, find, with_places
+from catenary.bus.segment_scan import Found, check_identity, find, oddities, with_places
 from catenary.bus.sub_device import SubDevice
 from catenary.bus.sub_devices import SubDevices
 from catenary.errors import CatenaryError, SegmentError
@@ -144,6 +144,7 @@ class MainDevice:
                 f"devices {positions} have the same alias {alias}"
                 for alias, positions in duplicate_aliases(registers).items()
             ),
+            *oddities(descriptions, ring=ring_of(self.link) is not None),
         )
         self._note_further_errors()
         self.deliver_events()

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from catenary.errors import CatenaryError, IdentityError
 from catenary.model.describe import describe
 from catenary.model.device import DeviceDescription, Identity
-from catenary.model.topology import tree
+from catenary.model.topology import make_topology, tree
 from catenary.procedure.al_state import request_state
 from catenary.procedure.configure import configure_mailbox
 from catenary.procedure.exchange import Procedure
@@ -87,6 +87,12 @@ def with_places(devices: Sequence[DeviceDescription]) -> tuple[DeviceDescription
         replace(device, parent=place.parent, parent_port=place.parent_port)
         for device, place in zip(devices, places, strict=True)
     )
+
+
+def oddities(devices: Sequence[DeviceDescription], *, ring: bool) -> tuple[str, ...]:
+    """What contradicts itself in the wiring (of a ring its cuts say it), and in the EEPROMs."""
+    wiring = () if ring else make_topology([device.open_ports for device in devices]).contradictions
+    return (*wiring, *(f"{device}: {note}" for device in devices for note in device.notes))
 
 
 def check_identity(device: DeviceDescription, expected: Identity) -> None:

@@ -11,7 +11,7 @@ from catenary.cli.arguments import number
 from catenary.cli.parsers import Commands, add_command, add_json, add_position, add_target
 
 if TYPE_CHECKING:
-    from catenary.bus import SubDevice
+    from catenary.bus import MainDevice, SubDevice
 
 
 def add_parser(commands: Commands) -> None:
@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
         device = device_at(devices, arguments.position)
         if arguments.value is not None:
             if arguments.value and not arguments.force:
-                refuse_twins(devices, device, arguments.value)
+                refuse_twins(main, devices, device, arguments.value)
             main.converse(with_eeprom(device.station, write_alias(device.station, arguments.value)))
         stored = main.converse(with_eeprom(device.station, read_alias(device.station)))
     if arguments.json:
@@ -61,16 +61,23 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def refuse_twins(devices: Sequence[SubDevice], device: SubDevice, value: int) -> None:
-    """ConfigurationError where another device has the alias: it would name neither."""
+def refuse_twins(
+    main: MainDevice, devices: Sequence[SubDevice], device: SubDevice, value: int
+) -> None:
+    """ConfigurationError where another device has the alias, now or after its next power-up."""
     from catenary.errors import ConfigurationError
+    from catenary.procedure.alias import read_alias
+    from catenary.procedure.sii_owner import with_eeprom
 
-    twins = [other for other in devices if other is not device and other.alias == value]
-    if twins:
-        raise ConfigurationError(
-            f"alias {value} is that of {twins[0].station} already",
-            hint="take another, or --force when that one is to get a new alias too",
-        )
+    for other in devices:
+        if other is device:
+            continue
+        stored = main.converse(with_eeprom(other.station, read_alias(other.station)))
+        if value in (other.alias, stored):
+            raise ConfigurationError(
+                f"alias {value} is that of {other.station} already",
+                hint="take another, or --force when that one is to get a new alias too",
+            )
 
 
 def show(device: SubDevice, stored: int) -> str:

@@ -59,7 +59,7 @@ def as_text(found: Diagnosis, sent: int, arguments: argparse.Namespace) -> str:
 
     span = SINCE_POWER_UP
     if arguments.seconds is not None:
-        span = f"within {arguments.seconds:g} s, {sent} frames long"
+        span = f"within {arguments.seconds:g} s ({sent} frames sent)"
     if not found:
         return f"nothing found: {len(found.topology)} devices have counted no error {span}"
     lines = [f"{len(found.findings)} found, {span}:", *map(str, found.findings)]

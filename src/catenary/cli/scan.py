@@ -28,6 +28,8 @@ def run(arguments: argparse.Namespace) -> int:
     with MainDevice(arguments.target) as main:
         devices = main.scan(strict=False)
         print(as_json(devices) if arguments.json else as_table(devices))
+    for note in main.notes:
+        print(f"note: {note}", file=sys.stderr)
     failed = [device for device in devices if device.error is not None]
     for device in failed:
         print(f"error: {device.error}", file=sys.stderr)
