@@ -1,6 +1,7 @@
 """A cable breaks every twentieth frame while the drives move; frames between still come through.
 The loop goes on, and an event names the cable within two seconds, once.
 When it breaks every frame, the error that ends the loop names the same cable.
+A device that answers, but gives no process data, is named too.
 """
 
 import pytest
@@ -10,7 +11,7 @@ from catenary.bus.event import FaultFound
 from catenary.errors import WorkingCounterError
 from catenary.model.finding import Kind
 from catenary.model.topology import Cable
-from catenary.virtual.faults import corrupt, cut
+from catenary.virtual.faults import corrupt, cut, wrong_working_counter
 from tests.scenario.cell import Cell
 
 
@@ -67,3 +68,13 @@ def test_a_sound_segment_has_nothing_to_tell(cell: Cell) -> None:
             if cycle.number == 3000:
                 break
     assert found(cell) == []
+
+
+def test_a_device_that_lets_process_data_pass_is_named(cell: Cell) -> None:
+    with pytest.raises(WorkingCounterError) as caught, cat.Loop(cell.drives()) as loop:
+        for cycle in loop:
+            if cycle.number == 100:
+                cell.segment.inject(wrong_working_counter(2))
+            assert cycle.number < 150
+    assert f"in OP, but without process data: {cell.subs[2].station}" in str(caught.value)
+    assert str(cell.subs[3].station) not in str(caught.value)

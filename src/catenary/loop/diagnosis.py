@@ -23,9 +23,11 @@ def silence_error(
     lost: int,
     log: object,
     findings: Sequence[Finding] = (),
+    mute: Sequence[int] = (),
 ) -> WorkingCounterError:
     """The error for `lost` bad cycles in a row; `suspects`: devices of the units that failed;
-    `findings`: what silence or error counters say of the place."""
+    `findings`: what silence or error counters say of the place; `mute`: devices whose inputs do not
+    come even when they are asked for alone."""
     silent = [answer.station for answer in answers if answer.word is None]
     others = [a for a in answers if a.station.position in suspects and a.word is not None]
     stray = [answer for answer in others if is_astray(answer)]
@@ -38,6 +40,13 @@ def silence_error(
     elif stray:
         who = f"not in OP: {'; '.join(map(described, stray))}"
         hint = "a device that was switched off and on again must be brought up again"
+    elif mute:
+        named = ", ".join(str(a.station) for a in answers if a.station.position in mute)
+        who = f"in OP, but without process data: {named}"
+        hint = (
+            "its FMMU or SyncManager was switched off: by another program on this segment, or by "
+            "itself; read its registers, catenary reg read"
+        )
     else:
         who = f"all devices answer to single reads; affected: devices {listed(suspects)}"
         who += "".join(f"; {each.where}: {each.evidence}" for each in findings)

@@ -30,10 +30,12 @@ from catenary.loop.rehearsal import make_rehearsal
 from catenary.loop.service import Service
 from catenary.loop.signals import SignalGuard
 from catenary.loop.watch import Policy, Watch
+from catenary.model.device import Direction
 from catenary.model.silence import judge_silence
 from catenary.plan.make import Plan
 from catenary.plan.wish import Wish
 from catenary.procedure.al_state import request_state
+from catenary.procedure.probe import probe_inputs
 from catenary.procedure.sdo import upload
 from catenary.procedure.survey import survey
 from catenary.types import UINT
@@ -248,7 +250,17 @@ class Running:
         [noise] = self.service.converse(self.errors.look())
         silent = [answer.station.position for answer in answers if answer.word is None]
         silence = judge_silence(self.errors.topology, self.errors.names, silent)
-        return silence_error(answers, suspects, lost, log, findings=silence or noise)
+        [mute] = self.service.converse(probe_inputs(self._input_areas(suspects)))
+        return silence_error(answers, suspects, lost, log, findings=silence or noise, mute=mute)
+
+    def _input_areas(self, positions: Sequence[int]) -> dict[int, tuple[int, int]]:
+        """Where the inputs of some devices lie, as far as they have some."""
+        return {
+            position: (fmmu.logical_start, fmmu.length)
+            for position in positions
+            for fmmu in self.plan.devices[position].layout.fmmus
+            if fmmu.direction is Direction.INPUT
+        }
 
     def _valid_units(self) -> list[int]:
         return list(self.engine.buffers["unit_valid"].tolist())
