@@ -11,10 +11,18 @@ import pytest
 
 import catenary as cat
 from catenary.bus import event
-from catenary.errors import StateError, WorkingCounterError
+from catenary.errors import MailboxError, StateError, WorkingCounterError
 from catenary.types import SINT, UINT, USINT
 from catenary.virtual import Coupler, DigitalOutputs, Fault, Servo
-from catenary.virtual.faults import exchange, leave_state, power_cycle, swap, unplug
+from catenary.virtual.faults import (
+    exchange,
+    leave_state,
+    mailbox_silent,
+    power_cycle,
+    refuse_state,
+    swap,
+    unplug,
+)
 from tests.scenario.cell import OP, PRE_OP, Cell, cell_of
 
 TOOL, GRIPPER = 3, 4
@@ -187,6 +195,59 @@ def test_another_one_of_its_kind_is_taken_by_policy(cell: Cell) -> None:
     )
     assert any(isinstance(e, event.DeviceReplaced) for e in events)
     assert ("DeviceReturned", TOOL) in kinds(events)
+
+
+def test_one_that_was_let_in_belongs_there_from_then_on(cell: Cell) -> None:
+    """It is switched off once more, later: nobody has to let it in again."""
+
+    def look(cycle, arm, tool, gripper, loop) -> None:
+        if cycle.number == 600:
+            loop.restore(cell.subs[TOOL])
+        if cycle.number in (900, 1900):
+            assert cell.states == [OP] * 5
+
+    new = Servo(name="tool", serial=99)
+    events = run(
+        cell,
+        swap(TOOL, new, at=0.2, for_=0.3),
+        power_cycle(TOOL, at=1.2, for_=0.3),
+        seconds=2.0,
+        each=look,
+    )
+    assert sum(isinstance(e, event.DeviceReplaced) for e in events) == 1
+    assert kinds(events).count(("DeviceReturned", TOOL)) == 2
+
+
+def test_one_held_because_it_refused_comes_back_when_it_is_released(cell: Cell) -> None:
+    """Wherever it was when it was given up: here it had not even reached PRE-OP."""
+
+    def look(cycle, arm, tool, gripper, loop) -> None:
+        if cycle.number == 1000:
+            assert cell.states[TOOL] & 0x0F != OP
+            loop.restore(cell.subs[TOOL])
+        if cycle.number == 1400:
+            assert cell.states == [OP] * 5
+
+    falls = leave_state(TOOL, at=0.2, state="INIT", code=0x001A)
+    refuses = refuse_state(TOOL, at=0.2, for_=0.7, state="PRE-OP", code=0x8000)
+    events = run(cell, falls, refuses, each=look)
+    assert kinds(events).count(("DeviceHeld", TOOL)) == 1
+
+
+def test_a_question_it_was_asked_before_it_fell_does_not_hold_it_up(cell: Cell) -> None:
+    """Its mailbox is made anew, so nobody will answer: told at once, not after two seconds."""
+    answers = []
+
+    def look(cycle, arm, tool, gripper, loop) -> None:
+        if cell.segment.time >= 0.195 and not answers:
+            answers.append(cell.subs[TOOL].sdo.request(0x6041, type=UINT))
+        if cycle.number == 600:
+            assert cell.states == [OP] * 5
+            assert isinstance(answers[0].error, MailboxError)
+            assert "brought up anew" in str(answers[0].error)
+
+    silent = mailbox_silent(TOOL, at=0.19, for_=0.05)
+    run(cell, silent, leave_state(TOOL, at=0.2, state="INIT", code=0x001A), each=look)
 
 
 def test_another_product_is_never_taken(cell: Cell) -> None:

@@ -82,3 +82,10 @@ def measure_law(*, axes: int, file: Path | None = None) -> None:
     from catenary.bench import law_call
 
     law_call.measure(axes=axes, file=file)
+
+
+def measure_soak(*, minutes: float, seed: int, file: Path | None = None) -> bool:
+    """Prints what random faults in virtual time did to a loop; whether all invariants held."""
+    from catenary.bench.soak import run
+
+    return run.measure(minutes=minutes, seed=seed, file=file)

@@ -25,6 +25,7 @@ def add_parser(commands: Commands) -> None:
     _add_virtual(group)
     _add_tasks(group)
     _add_law(group)
+    _add_soak(group)
 
 
 def _add_loop(group: Commands) -> None:
@@ -149,6 +150,24 @@ def _add_tasks(group: Commands) -> None:
     parser.set_defaults(run=run_tasks)
 
 
+def _add_soak(group: Commands) -> None:
+    parser = add_command(
+        group,
+        "soak",
+        help="random faults in virtual time, invariants checked in every cycle",
+        description="Runs a loop on a segment in this process while faults of all kinds befall it, "
+        "and judges by the virtual devices' own truth. The same seed gives the same run. Exit "
+        "status 1 if anything happened that must not.",
+        example="catenary bench soak --minutes 10 --seed 7 --json soak.json",
+    )
+    parser.add_argument(
+        "--minutes", type=positive_seconds, default=1.0, metavar="N", help="of virtual time (1)"
+    )
+    parser.add_argument("--seed", type=int, default=1, metavar="S", help="of chance (1)")
+    _add_file(parser)
+    parser.set_defaults(run=run_soak)
+
+
 def _add_file(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there")
 
@@ -217,3 +236,10 @@ def run_law(arguments: argparse.Namespace) -> int:
 
     bench.measure_law(axes=arguments.axes, file=arguments.json)
     return 0
+
+
+def run_soak(arguments: argparse.Namespace) -> int:
+    from catenary import bench
+
+    held = bench.measure_soak(minutes=arguments.minutes, seed=arguments.seed, file=arguments.json)
+    return 0 if held else 1

@@ -61,6 +61,7 @@ class Charge:
     sub: SubDevice
     plan: DevicePlan
     required: bool
+    identity: Identity  # of the device that belongs there: the planned one, or one let in since
     standing: Standing = Standing.RUNNING
     task: Pending[None] | None = None
     failures: int = 0
@@ -85,7 +86,7 @@ class Watch:
             position for unit in plan.cycle.sync_units if unit.optional for position in unit.devices
         }
         self._charges = [
-            Charge(sub, device, device.position not in optional)
+            Charge(sub, device, device.position not in optional, device.identity)
             for sub, device in zip(main.subs, plan.devices, strict=True)
         ]
         self._all_required = all(charge.required for charge in self._charges)
@@ -140,7 +141,7 @@ class Watch:
                 self._lead(charge, self._back_to_op(charge))
             elif charge.standing is Standing.HELD and charge.released:
                 charge.released = False
-                self._lead(charge, self._restored(charge, checked=True))
+                self._lead(charge, self._restored(charge))
 
     def _optional(self) -> Iterator[Charge]:
         return (charge for charge in self._charges if not charge.required)
@@ -248,7 +249,7 @@ class Watch:
             except CatenaryError:
                 return None  # it is gone again: the next look tells
             if found.same_kind(charge.plan.identity):
-                if found.serial == charge.plan.identity.serial:
+                if found.serial == charge.identity.serial:
                     return charge
                 return (yield from self._exchanged(charge, presence, found))
         yield from restore.forget_address(presence)
@@ -262,6 +263,8 @@ class Watch:
         """The same product with another serial number."""
         self._tell_replaced(charge, presence, found)
         if self._on_replacement == "restore" or charge.released:
+            charge.identity = found  # its own place from now on
+            self._strangers = {each for each in self._strangers if each[0] != charge.plan.position}
             return charge
         yield from restore.forget_address(presence)
         return None
@@ -271,7 +274,7 @@ class Watch:
         if (charge.plan.position, found) in self._strangers:
             return
         self._strangers.add((charge.plan.position, found))
-        expected = charge.plan.identity
+        expected = charge.identity
         message = f"{charge.sub.station}: another device is there: {found} instead of {expected}"
         self._tell(DeviceReplaced(self._now(), charge.sub, message, expected, found))
 
@@ -294,10 +297,9 @@ class Watch:
         else:
             yield from self._restored(charge)
 
-    def _restored(self, charge: Charge, checked: bool = False) -> Procedure[None]:
+    def _restored(self, charge: Charge) -> Procedure[None]:
         sub, plan = charge.sub, charge.plan
-        if not checked:
-            yield from restore.bring_to_pre_op(sub.station, sub.channel)
+        yield from restore.bring_to_pre_op(sub.station, sub.channel)
         sub.state = State.PRE_OP
         yield from restore.bring_to_safe_op(sub.station, sub.channel, sub.description, plan)
         sub.state = State.SAFE_OP

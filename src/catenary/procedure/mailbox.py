@@ -84,7 +84,7 @@ def converse(
         yield from _settle(channel)
     channel.counter = next_counter(channel.counter)
     message = Mailbox(kind, data, channel.counter).encode(channel.layout.receive_size)
-    channel.owed = True
+    channel.owed, channel.emptied = True, False
     for _ in range(RECOVERIES):
         sent, stale = yield from _post(channel, message)
         if sent and channel.thinks_ns:
@@ -229,6 +229,11 @@ def _fetch(channel: MailboxChannel, deadline: Deadline) -> Procedure[Mailbox | N
             channel.learn(empty_ns)
         if received is not None:
             return received
+        if channel.emptied:
+            raise MailboxError(
+                f"{channel.station} was brought up anew before it answered",
+                hint="ask again",
+            )
         if deadline.passed_at(time_ns):
             return None
         empty_ns = time_ns

@@ -48,12 +48,14 @@ class MailboxChannel:
     thinks_ns: int = 0  # the device, before it answers, at least
     unsure_ns: int | None = None  # when a frame was lost that may have taken a message
     owed: bool = False  # a question was given up; its answer may still come
+    emptied: bool = False  # configured anew since the question was asked: nobody will answer it
 
     def reset(self) -> None:
         """After the SyncManagers were configured anew."""
         self.counter = self.received_counter = 0
         self.repeat_requested = self.owed = False
         self.unsure_ns = None
+        self.emptied = True
 
     def learn(self, empty_ns: int | None) -> None:
         """An answer is there; at `empty_ns` it was not yet (None: nobody had looked). Nobody looks
