@@ -1,4 +1,4 @@
-"""Two networks in real time: a native thread each, targets committed before either is waited for."""
+"""Two networks in real time: a native thread each; targets are committed before the waiting."""
 
 from __future__ import annotations
 
