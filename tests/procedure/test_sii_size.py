@@ -50,6 +50,11 @@ def test_a_header_that_claims_more_than_its_controller_addresses() -> None:
     assert "its header says 8192 bytes" in extent.note
 
 
+def test_an_emulated_eeprom_does_not_begin_anew_though_it_shows_one_address_byte() -> None:
+    extent = play(read_extent(STATION), eeprom(header(64) + b"\xff" * (8192 - 128)))
+    assert extent == Extent(8192, MAXIMUM_SIZE)
+
+
 def test_two_address_bytes_reach_further() -> None:
     image = header(64) + b"\xff" * 1920
     assert play(read_extent(STATION), eeprom(image, two_byte_address=True)).size == 8192

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
@@ -110,8 +111,6 @@ def complain(
     rows: Iterable[tuple[SubDevice, DeviceState]], errors: dict[int, CatenaryError]
 ) -> int:
     """Says what went wrong to stderr; the exit status."""
-    import sys
-
     for error in errors.values():
         print(f"catenary: {error}", file=sys.stderr)
     return int(bool(errors) or any(now.error for _, now in rows))

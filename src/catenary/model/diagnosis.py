@@ -25,7 +25,10 @@ WIDESPREAD = 3  # cables with noise, and at least half of all: no cable is to bl
 
 _CABLE = "look at its plugs, bends and shield, and how near power cables are; exchange it"
 _DEVICE = "exchange it; before that its supply, its earth and the plugs on both of its sides"
-_POWER = "look for a weak supply or a loose supply terminal"
+_POWER = (
+    "look for a weak supply or a loose supply terminal; a cable of which one pair is broken looks "
+    "much the same"
+)
 _EVERYWHERE = (
     "look for what all share: earthing and shields, cables beside those of motors and inverters, "
     "the supply"

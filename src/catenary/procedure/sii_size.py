@@ -16,6 +16,7 @@ from catenary.wire.sii_check import BYTES_PER_KBIT
 from catenary.wire.sii_interface import ControlStatus
 
 SMALL = 2048  # bytes: what one address byte reaches, 16 kbit
+PROBE_WORDS = 16  # with vendor, product, revision and serial number
 CAUTIOUS = 4096  # bytes: the smallest EEPROM with two address bytes
 
 
@@ -42,11 +43,20 @@ def read_extent(station: Station) -> Procedure[Extent]:
             bound = min(limit, CAUTIOUS)
             return Extent(bound, limit, f"{error.message}; no end mark: {bound} bytes are shown")
         return Extent(end, limit, f"{error.message}; {end} bytes up to the end mark")
+    if size > limit and not (yield from _wraps(station, data)):
+        limit = MAXIMUM_SIZE
     if size <= limit:
         return Extent(size, limit)
     return Extent(
         limit, limit, f"its header says {size} bytes, its controller addresses {limit} of them"
     )
+
+
+def _wraps(station: Station, header: bytes) -> Procedure[bool]:
+    """Whether the EEPROM begins anew where one address byte ends. Emulated ones do not say that
+    they take two, and do (KickCAT's, and processors that play the EEPROM)."""
+    beyond = yield from read_words(station, SMALL // 2, PROBE_WORDS)
+    return beyond == header[: 2 * PROBE_WORDS]
 
 
 def _end_of_categories(station: Station, limit: int) -> Procedure[int | None]:

@@ -17,7 +17,7 @@ from catenary.wire.sii_interface import Command, ControlStatus
 
 WRITE_TIMEOUT = 0.5  # [s] for a word; EEPROMs need 3 to 10 ms
 ATTEMPTS = 4  # of a word: an EEPROM behind a busy processor misses an acknowledge now and then
-REST = 5e-3  # [s] before the next attempt; some devices never show busy while they write (IgH)
+REST = 5e-3  # [s] the longest write cycle of an I²C EEPROM; some devices show no busy in it (IgH)
 
 _COMMAND = struct.Struct("<HIH")  # control, address and data in one datagram: the enable bit
 # holds for the frame it comes in alone (ESC data sheet, register 0x0502)
@@ -62,11 +62,11 @@ def write_word(station: Station, wanted: Change) -> Procedure[None]:
         # Not repeated blindly: a controller that is busy with the first would refuse the second.
         yield [write_memory(station.address, SII_CONTROL_STATUS.address, data, repeatable=False)]
         status = yield from _until_idle(station, wanted.word)
+        yield after(REST)
         if not status.failed:
             found = yield from read_words(station, wanted.word, 1)
             if int.from_bytes(found, "little") == wanted.value:
                 return
-        yield after(REST)
     raise _refused(station, wanted, found, status)
 
 
