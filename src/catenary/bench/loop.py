@@ -31,7 +31,9 @@ STORM = "catenary-law-storm"  # beside a thread that spins and makes garbage
 ROUND_CYCLES = 900  # less than the 1000 that the loop's log reaches back
 DRIVE_BYTES = 26  # both ways
 INPUT_BYTES = 4 * ANALOG_CHANNELS  # of one terminal
-COST_SEGMENTS = ((3, 0), (10, 0), (20, 0), (33, 0), (3, 20), (3, 40), (10, 40))  # drives, terminals
+# drives, axes of each, terminals: 10, 33, 100 and 300 axes, and bytes without axes
+COST_SEGMENTS = ((10, 1, 0), (33, 1, 0), (25, 4, 0), (50, 6, 0), (10, 1, 40), (33, 1, 40))
+COST_RATE = 500  # [Hz]: 300 axes fill six frames, and their devices must have time to move
 
 
 def measure(
@@ -56,19 +58,19 @@ def measure(
 
 def measure_cost(*, seconds: float, file: Path | None) -> None:
     rounds = math.ceil(seconds * 1000 / ROUND_CYCLES)
-    found: dict[tuple[str, int, int], list[Round]] = {}
+    found: dict[tuple[str, int, int], list[Round]] = {}  # by peer, axes, terminals
     for _ in range(rounds):  # all segments in turn: the machine's drift must not look like a cost
-        for drives, terminals in COST_SEGMENTS:
-            with served(drives, terminals) as segment:
-                jobs = make_jobs(OURS, segment, 1000, ROUND_CYCLES, Body.SINE, spin=False)
+        for drives, axes, terminals in COST_SEGMENTS:
+            with served(drives, terminals, axes) as segment:
+                jobs = make_jobs(OURS, segment, COST_RATE, ROUND_CYCLES, Body.SINE, spin=False)
                 for name, one in interleave(jobs, 1, show_progress).items():
-                    found.setdefault((name, drives, terminals), []).extend(one)
+                    found.setdefault((name, drives * axes, terminals), []).extend(one)
     costs: dict[str, list[Point]] = {name: [] for name in OURS}
-    for (name, drives, terminals), ones in found.items():
+    for (name, axes, terminals), ones in found.items():
         run = combine(name, ones)
         cost = run.timing_us["in_controller"]["p50"] + run.timing_us["tail"]["p50"]
-        size = drives * DRIVE_BYTES + terminals * INPUT_BYTES
-        costs[name].append(Point(drives, size, round(cost, 3)))
+        size = axes * DRIVE_BYTES + terminals * INPUT_BYTES
+        costs[name].append(Point(axes, size, round(cost, 3)))
     fits = {name: fit(points) for name, points in costs.items()}
     print(f"{machine()}\nmedian of in_controller + tail:")
     for name, cost_line in fits.items():

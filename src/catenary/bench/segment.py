@@ -1,5 +1,5 @@
 """The segment of the benchmarks: a coupler and drives, served on a network interface by a process
-of its own: `python -m catenary.bench.segment NIC DRIVES INPUTS CPU`."""
+of its own: `python -m catenary.bench.segment NIC DRIVES INPUTS AXES CPU`."""
 
 from __future__ import annotations
 
@@ -45,22 +45,29 @@ def processors() -> Processors:
 
 
 def make_segment(
-    drives: int, inputs: int = 0, *, clock: Literal["virtual", "monotonic"] = "monotonic"
+    drives: int,
+    inputs: int = 0,
+    *,
+    axes: int = 1,
+    clock: Literal["virtual", "monotonic"] = "monotonic",
 ) -> Segment:
-    """A coupler, `drives` servos, and `inputs` terminals of analogue inputs: bytes without axes."""
+    """A coupler, `drives` servos of `axes` axes each, and `inputs` terminals of analogue inputs:
+    bytes without axes."""
     servos = [
-        Servo(counts_per_turn=COUNTS_PER_TURN, rated_torque=RATED_TORQUE) for _ in range(drives)
+        Servo(counts_per_turn=COUNTS_PER_TURN, rated_torque=RATED_TORQUE, axes=axes)
+        for _ in range(drives)
     ]
     terminals = [AnalogInputs(channels=ANALOG_CHANNELS) for _ in range(inputs)]
     return Segment([Coupler(), *servos, *terminals], clock=clock)
 
 
 @contextmanager
-def served(drives: int, inputs: int = 0) -> Iterator[Served]:
+def served(drives: int, inputs: int = 0, axes: int = 1) -> Iterator[Served]:
     """The segment on one end of a pair of interfaces, for as long as the block lasts."""
     cpu = processors().segment
     with veth_pair() as (ours, theirs):
-        arguments = [theirs, str(drives), str(inputs), "" if cpu is None else str(cpu)]
+        numbers = map(str, (drives, inputs, axes))
+        arguments = [theirs, *numbers, "" if cpu is None else str(cpu)]
         with start_python(["-m", "catenary.bench.segment", *arguments]) as server:
             if server.read_line(START_SECONDS) is None:
                 raise LinkError("the segment of the benchmark did not start")
@@ -68,8 +75,8 @@ def served(drives: int, inputs: int = 0) -> Iterator[Served]:
 
 
 def main(arguments: Sequence[str]) -> None:
-    interface, drives, inputs, cpu = arguments
-    segment = make_segment(int(drives), int(inputs))
+    interface, drives, inputs, axes, cpu = arguments
+    segment = make_segment(int(drives), int(inputs), axes=int(axes))
     request_scheduling(priority=PRIORITY, cpu=int(cpu) if cpu else None)
     serve(segment, interface, ready=lambda: print("ready", flush=True))
 
