@@ -168,7 +168,7 @@ def task_sets(draw: st.DrawFn) -> list[Demand]:
     demands = []
     for number, period in enumerate(periods):
         share = draw(st.floats(0.02, 1.0)) / len(periods)
-        execution = max(round(period * share, 3), 0.001)
+        execution = max(math.floor(period * share * 1e3) / 1e3, 0.001)  # down: 1 at most in sum
         priority = draw(st.integers(1, 4))
         demands.append(
             demand(str(number), period, execution, priority=priority, deadline=2 * period)
