@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from catenary import realtime, types
     from catenary.bus import SubDevice
     from catenary.bus import event as events
-    from catenary.drive import Drives, Inputs, Outputs
+    from catenary.drive import DC, Drives, Inputs, Outputs
     from catenary.errors import CatenaryError
     from catenary.loop import Cycle, Loop, law
     from catenary.target import MainDevice
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "DC",
     "AnalogInputs",
     "CatenaryError",
     "Coupler",
@@ -61,6 +62,7 @@ __all__ = [
 _VIRTUAL = ("AnalogInputs", "Coupler", "DigitalInputs", "DigitalOutputs", "Segment", "Servo")
 _HOMES = {
     "CatenaryError": "catenary.errors",
+    "DC": "catenary.drive",
     "Cycle": "catenary.loop",
     "Drives": "catenary.drive",
     "Inputs": "catenary.drive",

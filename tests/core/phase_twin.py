@@ -19,14 +19,22 @@ class Twin:
     drift: float = 0.0
     rest: float = 0.0
     time_constant: float = 16.0  # [cycles]
-    steps: int = 0
+    jumps: int = 0
 
     def step(self, error: int | None) -> int:
-        if error is not None and self.seeking:
+        if error is None:
+            return 0 if self.seeking else self._whole(self.drift)
+        if self.seeking:
             return self._seek(error)
-        if error is None or self.waits or abs(error) > self.plan.step_ns:
-            return self._coast(error)
-        self.strays = 0
+        if self.waits:
+            self.waits -= 1
+            return self._whole(self.drift)
+        if abs(error) > self.plan.step_ns and self.strays < 8:
+            self.strays += 1
+            self.jumps += self.strays == 8
+            return self._whole(self.drift)
+        if abs(error) <= self.plan.step_ns:
+            self.strays = 0
         wanted = self.drift - 2 / self.time_constant * error
         limit = self.plan.rate_limit_ns
         applied = max(-limit, min(limit, wanted))
@@ -40,20 +48,7 @@ class Twin:
     def _seek(self, error: int) -> int:
         self.seeking, self.waits, self.strays = False, 2, 0
         self.time_constant = min(16.0, 1 / self.plan.bandwidth)
-        self.steps += 1
         return -error if error <= 0 else self.period - error
-
-    def _coast(self, error: int | None) -> int:
-        if self.seeking:
-            return 0
-        if error is not None and self.waits:
-            self.waits -= 1
-        elif error is not None:
-            self.strays += 1
-            self.seeking = self.strays >= 8
-            if self.seeking:
-                return 0  # nothing is kept until the instants are in phase again
-        return self._whole(self.drift)
 
     def _whole(self, by: float) -> int:
         self.rest += by

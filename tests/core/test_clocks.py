@@ -38,7 +38,7 @@ def test_as_its_twin_does(runs: list[tuple[int | None, int]]) -> None:
     compiled, twin = PhaseController(PLAN, PERIOD), Twin(PLAN, PERIOD)
     for number, error in enumerate(error for error, count in runs for _ in range(count)):
         assert compiled.step(error) == twin.step(error), number
-    assert compiled.steps == twin.steps
+    assert compiled.jumps == twin.jumps
     assert compiled.drift == pytest.approx(twin.drift)
 
 
@@ -67,7 +67,7 @@ def test_it_finds_phase_and_rate(ppm: float, delay: int) -> None:
     assert max(map(abs, errors[500:])) < 100
     assert max(map(abs, errors[3000:])) < 5
     assert controller.drift == pytest.approx(-ppm * 1e-6 * PERIOD, abs=0.5)
-    assert controller.steps == 1
+    assert controller.jumps == 0
 
 
 def test_it_smooths_what_the_reference_says() -> None:
@@ -100,12 +100,19 @@ def test_single_strays_change_nothing() -> None:
         assert disturbed.step(400_000 if number % 20 == 10 else 10) == expected
 
 
-def test_a_clock_that_jumps_is_followed_by_one_step() -> None:
+@pytest.mark.parametrize("jump", [-400_000, 400_000])
+def test_a_clock_that_jumps_is_followed_within_the_limit(jump: int) -> None:
     controller = PhaseController(PLAN, PERIOD)
-    controller.step(0)
-    moves = [controller.step(-300_000) for _ in range(20)]
-    assert moves.count(300_000) == 1
-    assert controller.steps == 2
+    phases(controller, ppm=50.0)
+    error, moves, errors = float(jump), [], []
+    for _ in range(2000):
+        moves.append(controller.step(round(error)))
+        error += moves[-1] + 50
+        errors.append(abs(error))
+    assert controller.jumps == 1
+    assert max(map(abs, moves)) <= PLAN.rate_limit_ns + 1
+    assert errors[450] < 60_000  # 400 us at 1 us a cycle, and eight cycles to believe it
+    assert max(errors[1500:]) < 100
 
 
 def test_it_coasts_at_the_rate_it_found() -> None:

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from catenary.model.delays import ClockPlace, delays_ns
+from catenary.model.delays import PROCESSING_NS, ClockPlace, delays_ns
 from catenary.model.topology import PORT_ORDER
 
 
@@ -36,6 +36,7 @@ def pass_through(root: Node) -> tuple[list[ClockPlace], list[int]]:
         position = len(places)
         reached.append(now)
         stamps = {0: now}
+        now += PROCESSING_NS
         opened = (True, *(p in node.children for p in (1, 2, 3)))
         places.append(ClockPlace(parent, port, opened, None))  # type: ignore[arg-type]
         for onwards in PORT_ORDER:
@@ -60,13 +61,14 @@ def line(*nodes: Node) -> Node:
 
 def test_a_line() -> None:
     places, reached = pass_through(line(*(Node(cable=100 * k) for k in range(1, 6))))
-    assert delays_ns([places]) == tuple(t - reached[0] for t in reached) == (0, 200, 500, 900, 1400)
+    assert delays_ns([places]) == tuple(t - reached[0] for t in reached)
+    assert reached == [0, 240, 580, 1020, 1560]  # cables and processing units
 
 
 def test_local_times_of_any_origin_and_the_wrap() -> None:
     nodes = [Node(cable=700, zero=zero) for zero in (2**32 - 500, 2**32 - 1, 12345, 2**31)]
     places, _ = pass_through(line(*nodes))
-    assert delays_ns([places]) == (0, 700, 1400, 2100)
+    assert delays_ns([places]) == (0, 740, 1480, 2220)
 
 
 def test_branches_in_the_order_of_the_ports() -> None:
@@ -79,7 +81,7 @@ def test_branches_in_the_order_of_the_ports() -> None:
 def test_devices_without_clocks_are_cable() -> None:
     chain = line(Node(clock=False), Node(), Node(clock=False), Node(300), Node(clock=False))
     places, _ = pass_through(chain)
-    assert delays_ns([places]) == (None, 0, None, 400, None)
+    assert delays_ns([places]) == (None, 0, None, 480, None)
 
 
 def test_a_branch_without_clocks_shares_what_is_known_of_no_part() -> None:
@@ -88,20 +90,20 @@ def test_a_branch_without_clocks_shares_what_is_known_of_no_part() -> None:
     places, reached = pass_through(Node(children={1: coupler}))
     first, *_ = delays_ns([places])
     assert first == 0
-    assert delays_ns([places])[2:] == (200, 400) == tuple(reached[2:])
+    assert delays_ns([places])[2:] == pytest.approx(reached[2:], abs=PROCESSING_NS)
 
 
 def test_clocks_that_no_clock_precedes() -> None:
     root = Node(clock=False, children={3: line(Node(), Node(400)), 1: Node()})
     places, _ = pass_through(root)
-    assert delays_ns([places]) == (None, 0, 400, 800)  # cables to and from the branch not known
+    assert delays_ns([places]) == (None, 0, 440, 880)  # cables to and from the branch not known
 
 
 def test_jitter_of_the_stamps_averages_out() -> None:
     places, _ = pass_through(line(Node(), Node(20), Node(20)))
     early = [replace(p, receive_times_ns=shifted(p, 0, +30)) for p in places]
     late = [replace(p, receive_times_ns=shifted(p, 0, -30)) for p in places]
-    assert delays_ns([early, late]) == delays_ns([places]) == (0, 20, 40)
+    assert delays_ns([early, late]) == delays_ns([places]) == (0, 60, 120)
 
 
 def shifted(place: ClockPlace, port: int, by: int) -> tuple[int, int, int, int]:

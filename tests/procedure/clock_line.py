@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from catenary.model.delays import PROCESSING_NS
 from catenary.model.device import DeviceDescription, Identity
 from catenary.procedure.exchange import Reply, Request
 from catenary.wire.datagram import Command
 from catenary.wire.features import Feature, Information, PortKind
 
 STATION = 0x1001
-HOP_NS = 300
+CABLE_NS = 300  # forwarding included
+HOP_NS = CABLE_NS + PROCESSING_NS
 NONE, STAMPS, SHORT, LONG = "none", "stamps", "short", "long"  # what clock a device has
 FEATURES = {
     NONE: Feature(0),
@@ -83,7 +85,7 @@ class ClockLine:
             return Reply(request.data, 0)
         if request.command is Command.FPWR:
             size = len(request.data)
-            if clock.kind == SHORT and size == 8:
+            if clock.kind == SHORT and size == 8 and address in (0x920, 0x990):
                 return Reply(request.data, 0)
             clock.registers[address : address + size] = request.data
             clock.written.append((address, request.data))
@@ -110,7 +112,8 @@ class ClockLine:
 
     def _latch(self, position: int, clock: ClockModel) -> None:
         local = self.now + HOP_NS * position + clock.zero
-        back = local + 2 * HOP_NS * (len(self.clocks) - 1 - position)
+        behind = len(self.clocks) - 1 - position
+        back = local + behind * (HOP_NS + CABLE_NS) + PROCESSING_NS
         clock.registers[0x900:0x904] = (local % 2**32).to_bytes(4, "little")
         clock.registers[0x904:0x908] = (back % 2**32).to_bytes(4, "little")
         clock.registers[0x918:0x920] = local.to_bytes(8, "little")

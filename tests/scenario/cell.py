@@ -6,7 +6,7 @@ What is asserted is the segment's own truth: `cell.states`, `cell.servos[i].driv
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -64,9 +64,13 @@ class Cell:
 
 
 @contextmanager
-def cell_of(*devices: Device) -> Iterator[Cell]:
-    """A cell that has been scanned; by default a coupler, lamps and two servos."""
-    segment = Segment(devices or (Coupler(), DigitalOutputs(), Servo(serial=1), Servo(serial=2)))
+def cell_of(
+    *devices: Device, behind: Mapping[int, tuple[int, int]] | None = None
+) -> Iterator[Cell]:
+    """A cell that has been scanned; by default a coupler, lamps and two servos. `behind`: as of
+    `Segment`."""
+    chosen = devices or (Coupler(), DigitalOutputs(), Servo(serial=1), Servo(serial=2))
+    segment = Segment(chosen, behind=behind)
     link = FaultInjector(segment)
     with cat.MainDevice(link) as main:
         main.scan()

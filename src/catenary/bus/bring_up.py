@@ -14,11 +14,13 @@ from catenary.plan.make import Plan, gather_wishes
 from catenary.plan.start_up import DevicePlan
 from catenary.plan.wish import ObjectReference, PdoWish, Wish
 from catenary.procedure.al_state import request_state
+from catenary.procedure.clocks import ClockMeasurement
 from catenary.procedure.configure import configure_process_data
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.pdo import read_mapping, verify_mapping, write_downloads
 from catenary.procedure.profile import read_object
+from catenary.procedure.sync import bring_together, read_types, stop, write_types
 from catenary.wire.al import State
 
 
@@ -34,8 +36,12 @@ def describe_mappings(
         sub.description = description
 
 
-def bring_to_safe_op(runner: BlockingRunner, subs: Sequence[SubDevice], plan: Plan) -> None:
-    """Writes every device's part of the plan, then asks for SAFE-OP; all at once."""
+def bring_to_safe_op(
+    runner: BlockingRunner, subs: Sequence[SubDevice], plan: Plan, epoch_ns: int = 0
+) -> ClockMeasurement | None:
+    """Writes every device's part of the plan, brings the clocks together, then asks for SAFE-OP;
+    all at once. `epoch_ns`: the system time less the link's. Returns what was measured of the
+    clocks, if there are any to bring together."""
     if len(subs) != len(plan.devices):
         raise SegmentError(
             f"the plan is for {len(plan.devices)} devices, the segment has {len(subs)}",
@@ -44,8 +50,19 @@ def bring_to_safe_op(runner: BlockingRunner, subs: Sequence[SubDevice], plan: Pl
     for sub, device in zip(subs, plan.devices, strict=True):
         check_identity(sub.description, device.identity)
     runner.run_all([_prepare(sub, device) for sub, device in zip(subs, plan.devices, strict=True)])
+    devices = [sub.description for sub in subs]
+    runner.run(stop([device for device in devices if device.clock_bits]))
+    measured = None
+    if plan.cycle.clock is not None:
+        syncs = {each.position: each.sync for each in plan.devices if each.sync is not None}
+        clock = plan.cycle.clock
+        measured = runner.run(
+            bring_together(devices, syncs, clock.reference, epoch_ns, clock.burst)
+        )
+    runner.run_all([request_state(sub.station, State.SAFE_OP) for sub in subs])
     for sub in subs:
         sub.state = State.SAFE_OP
+    return measured
 
 
 def _describe(sub: SubDevice, wish: PdoWish) -> Procedure[DeviceDescription]:
@@ -72,13 +89,17 @@ def _unmapped(
 def _prepare(sub: SubDevice, plan: DevicePlan) -> Procedure[None]:
     device = sub.description
     yield from request_state(sub.station, State.PRE_OP)
+    if device.coe and plan.sync is not None and not sub.sync_types:
+        sub.sync_types = yield from read_types(_channel(sub))
+    elif plan.sync is None and sub.sync_types:
+        yield from write_types(_channel(sub), sub.sync_types)
+        sub.sync_types = {}
     if plan.downloads:
         channel = _channel(sub)
         yield from write_downloads(channel, plan)
         if plan.mapping_changed:
             yield from verify_mapping(channel, device, plan)
     yield from configure_process_data(sub.station, device, plan)
-    yield from request_state(sub.station, State.SAFE_OP)
 
 
 def _channel(sub: SubDevice) -> MailboxChannel:

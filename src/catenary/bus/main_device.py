@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import time
 from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Self, TypeVar
@@ -38,6 +39,7 @@ if TYPE_CHECKING:  # plan needs NumPy, a scan does not
 
 T = TypeVar("T")
 
+EPOCH_2000_NS = 946_684_800_000_000_000  # 2000-01-01 in Unix time
 LEAVE_TIMEOUT = 0.5  # [s] for each state on the way down: nobody waits long for a broken segment
 
 
@@ -54,6 +56,8 @@ class MainDevice:
     def __init__(self, source: LinkSource) -> None:
         self.subs = SubDevices()
         self.notes: tuple[str, ...] = ()  # what the last scan found odd
+        self.clock_delays_ns: tuple[int | None, ...] = ()  # behind the first clock, by position
+        self.clock_epoch_ns = 0  # system time of the clocks less the link's
         self.events = Events()  # what happened: iterate, or get(timeout=)
         self._callbacks = Callbacks()
         self.events.listen(self._callbacks.tell)
@@ -246,7 +250,9 @@ class MainDevice:
         """Tells every device its part of the plan and brings all to SAFE-OP."""
         from catenary.bus.bring_up import bring_to_safe_op
 
-        bring_to_safe_op(self._runner, self.subs, plan)
+        self.clock_epoch_ns = self._epoch_ns()
+        measured = bring_to_safe_op(self._runner, self.subs, plan, self.clock_epoch_ns)
+        self.clock_delays_ns = measured.delays_ns if measured is not None else ()
 
     def leave(self, *, timeout: float = LEAVE_TIMEOUT) -> None:
         """Brings all devices to SAFE-OP, then PRE-OP. StateError names one that stays up."""
@@ -326,6 +332,13 @@ class MainDevice:
         errors = [sub.error for sub in self.subs if sub.error is not None]
         for other in errors[1:]:
             errors[0].add_note(f"also: {other}")
+
+    def _epoch_ns(self) -> int:
+        """From the link's time to EtherCAT's, which counts from 2000 (ETG.1000.4 §6.8); in virtual
+        time there is no date, so that runs repeat."""
+        if lives_in_virtual_time(self.link):
+            return 0
+        return time.time_ns() - EPOCH_2000_NS - self.link.now()
 
     def _check_expected(self, expected: Sequence[Identity | tuple[int, int] | None]) -> None:
         if len(expected) != len(self.subs):

@@ -28,6 +28,7 @@ class SubDevice:
         self.channel = channel  # None: it has no mailbox
         self.state: State | None = None  # last known; None: unknown
         self.error: CatenaryError | None = None  # why the last scan could not bring it to PRE-OP
+        self.sync_types: dict[int, bytes] = {}  # 0x1C32:01, 0x1C33:01 before a loop with clocks
         self.sdo = Sdo(self)
 
     @property

@@ -15,19 +15,20 @@ class PhaseController:
     @property
     def bandwidth(self) -> float: ...
     @property
-    def steps(self) -> int:
-        """How often the instants were set into phase at once."""
+    def jumps(self) -> int:
+        """How often the clock has jumped."""
 
 class Clock:
     """Owns what a cycle knows of distributed clocks: `Engine.clock`."""
 
     def __init__(self, plan: object, period_ns: int) -> None: ...
     def figures(self) -> dict[str, float]:
-        """locked, following (in phase or on the way), time (of the reference, system time), error,
-        mean_error, worst_error (of the instants' phase; where the reference follows: its own),
-        rate (of the link's clock against the reference, a share), samples, missed, silent (cycles
-        without the reference, in all and in a row), ignored (samples beyond any drift), steps.
-        Times in ns."""
+        """locked, bound (in force), following (in phase or on the way), time (system time of the
+        reference, the last one), time_sent (link's time, when the frame left that brought it),
+        error, mean_error, worst_error (of the instants' phase; where the reference follows: its
+        own), rate (of the reference against the link's clock, a share), samples, missed, silent
+        (cycles without the reference, in all and in a row), holding (its time is kept here),
+        ignored (samples beyond any drift), jumps. Times in ns."""
 
     def differences(self) -> list[tuple[float, int, int, int]]:
         """Per follower (0x092C, local minus reference): mean, last, largest magnitude [ns], reads."""

@@ -6,6 +6,10 @@ instant it belonged to. A PI controller of rising inertia turns phase errors int
 periods (docs/clocks.md explains its gains); plan/clocks.py has the numbers. Where the clocks follow
 the MainDevice, the instants are set into phase once and stay on their grid.
 Its twin in Python: tests/core/phase_twin.py. Budget: 60 ns a cycle.
+
+A reference that does not answer is not asked any more: a device that was switched off comes back
+with another time, and must not spread it. All others then take the time the frame carries, which is
+kept here; now and then the reference is read, and leads again once it says the same.
 """
 
 from libc.math cimport fabs
@@ -15,7 +19,15 @@ from libc.stdlib cimport calloc, free
 cdef enum:
     HOLD = 2                   # an answer tells of an instant that was fixed two cycles before
     REJECTED_MAX = 8           # errors beyond `step` in a row: the clock has jumped
-    SILENT_MAX = 16            # cycles without the reference before the clocks count as unlocked
+    SILENT_MAX = 16            # cycles without the reference before its time is kept here
+    PROBED = 0xFFFFFFFF
+    PROBE_EVERY = 8            # cycles, while its time is kept
+    ADP = 2                    # in a datagram's header
+    ADO = 4
+    DATA = 10
+    NOBODY = 0xFFFF            # IgH's too; 0 is the address of whoever was just switched on
+    SYSTEM_TIME = 0x0910
+    DIFFERENCE = 0x092C
     SETTLE = 16                # cycles within the bound, besides a round of all followers
 
 cdef double FIRST_BANDWIDTH = 1.0 / 16
@@ -61,25 +73,29 @@ cdef int64_t phase_seek(phase_t *p, int64_t error) noexcept nogil:
     p.rejected = 0
     p.bandwidth = FIRST_BANDWIDTH if FIRST_BANDWIDTH > p.bandwidth_end else p.bandwidth_end
     p.mean = 0
-    p.steps += 1
     return -error if error <= 0 else p.period - error
 
 
 cdef int64_t phase_step(phase_t *p, int64_t error) noexcept nogil:
-    """What to move the next instant by, for an error within ± half a period (positive: late)."""
+    """What to move the next instant by, for an error within ± half a period (positive: late).
+
+    Single errors beyond `step` are strays. After some in a row the clock has jumped; that is made up
+    for within the limit of the rate, about as fast as the other clocks can: an instant that jumped
+    too would put the frames behind the SYNC signals of those on their way."""
     cdef double wanted, applied, gain
     if p.state == SEEKING:
         return phase_seek(p, error)
     if p.hold:
         p.hold -= 1
         return phase_coast(p)
-    if error > p.step or error < -p.step:
+    if -p.step <= error <= p.step:
+        p.rejected = 0
+    elif p.rejected < REJECTED_MAX:
         p.ignored += 1
         p.rejected += 1
-        if p.rejected >= REJECTED_MAX:
-            p.state = SEEKING
+        if p.rejected == REJECTED_MAX:
+            p.jumps += 1
         return phase_coast(p)
-    p.rejected = 0
     p.mean += (error - p.mean) * MEAN_SHARE
     wanted = p.drift - 2 * p.bandwidth * error
     applied = bounded(wanted, p.rate_limit)
@@ -105,34 +121,52 @@ cdef inline uint32_t word32(const uint8_t *data) noexcept nogil:
     return data[0] | <uint32_t>data[1] << 8 | <uint32_t>data[2] << 16 | <uint32_t>data[3] << 24
 
 
+cdef inline void put16(uint8_t *field, uint16_t value) noexcept nogil:
+    field[0] = value & 0xFF
+    field[1] = value >> 8
+
+
 cdef inline int64_t expected_time(const clock_t *k, int64_t now) noexcept nogil:
-    """What the reference will say to a frame that leaves now."""
+    """What the reference will say to a frame that leaves now, at the rate that was found."""
+    cdef int64_t since
     if k.follows_main or k.samples == 0:
         return now + k.epoch
-    return k.time + (now - k.time_sent)
+    since = now - k.time_sent
+    return k.time + since - <int64_t>(since * (k.phase.drift / k.phase.period))
+
+
+cdef void ask(clock_t *k) noexcept nogil:
+    """Whose difference the frame brings; while the reference is gone, now and then its time."""
+    if k.holding and k.silent % PROBE_EVERY == 0:
+        k.asked = PROBED
+        put16(k.watch_header + ADP, k.reference)
+        put16(k.watch_header + ADO, SYSTEM_TIME)
+        return
+    k.turn = k.turn + 1 if k.turn + 1 < k.follower_count else 0
+    k.asked = k.turn
+    put16(k.watch_header + ADP, k.followers[k.turn].station)
+    put16(k.watch_header + ADO, DIFFERENCE)
 
 
 cdef void clock_emit(clock_t *k, int64_t now) noexcept nogil:
     """Right before the frame leaves. For devices that find no reference before them it carries
     what the reference is expected to say: they go on as they are."""
     k.payload = <uint32_t>expected_time(k, now)
-    put32(k.time_field, k.payload)
-    if k.main_field != NULL:
-        put32(k.main_field, <uint32_t>(now + k.epoch))
+    put32(k.time_header + DATA, k.payload)
+    put16(k.time_header + ADP, NOBODY if k.holding else k.reference)
+    if k.main_header != NULL:
+        put32(k.main_header + DATA, <uint32_t>(now + k.epoch))
+    if k.watch_header != NULL:
+        ask(k)
     k.sent = now
     k.sent_scheduled = k.scheduled
     k.awaited = 1
-    if k.station_field != NULL:
-        k.turn = k.turn + 1 if k.turn + 1 < k.follower_count else 0
-        k.asked = k.turn
-        k.station_field[0] = k.followers[k.turn].station & 0xFF
-        k.station_field[1] = k.followers[k.turn].station >> 8
 
 
 cdef void take_time(clock_t *k, const uint8_t *data, uint16_t counter) noexcept nogil:
     cdef uint32_t low = word32(data)
     cdef int64_t expected = expected_time(k, k.sent)
-    if counter == 0 or (low == k.payload and counter != k.listeners):
+    if k.holding or counter == 0 or (low == k.payload and counter != k.listeners):
         return  # untouched: others took what we sent
     k.time = expected + <int32_t>(low - <uint32_t>expected)
     k.time_sent = k.sent
@@ -140,16 +174,28 @@ cdef void take_time(clock_t *k, const uint8_t *data, uint16_t counter) noexcept 
     k.sampled = 1
 
 
+cdef void take_probe(clock_t *k, uint32_t low) noexcept nogil:
+    """The reference answers again, and its time goes with ours: it leads."""
+    cdef int32_t error = <int32_t>(low - k.payload)
+    if -k.phase.step <= error <= k.phase.step:
+        k.holding = 0
+        k.silent = 0
+
+
 cdef void take_difference(clock_t *k, const uint8_t *data, uint16_t counter) noexcept nogil:
     """0x092C is sign-magnitude. A device that does not answer keeps its last one: its process data
     tells of it."""
-    cdef follower_t *f = &k.followers[k.asked]
+    cdef follower_t *f
     cdef uint32_t raw = word32(data)
     cdef int32_t value = <int32_t>(raw & 0x7FFFFFFF)
     cdef int32_t magnitude = value
     cdef uint8_t outside
     if counter != 1:
         return
+    if k.asked == PROBED:
+        take_probe(k, raw)
+        return
+    f = &k.followers[k.asked]
     if raw >> 31:
         value = -value
     f.last = value
@@ -189,12 +235,28 @@ cdef int64_t follow_reference(clock_t *k) noexcept nogil:
 cdef int64_t lead_reference(clock_t *k) noexcept nogil:
     """The instants are set into phase with our own time; the error is the reference's."""
     if k.sampled:
+        if k.phase.hold:
+            k.phase.hold -= 1
         k.error = k.time - (k.time_sent + k.epoch)
         k.phase.mean += (k.error - k.phase.mean) * MEAN_SHARE
     if k.phase.state == SEEKING:
         return phase_seek(&k.phase,
                           wrapped(k.scheduled + k.epoch - k.target, k.phase.period))
     return 0
+
+
+cdef void take_bound(clock_t *k) noexcept nogil:
+    """Another bound: what has been read is judged anew."""
+    cdef uint32_t i
+    k.bound = k.bound_asked
+    k.outside = 0
+    for i in range(k.follower_count):
+        k.followers[i].outside = k.followers[i].reads == 0 or fabs(k.followers[i].mean) > k.bound
+        k.outside += k.followers[i].outside
+    k.good = 0
+    if k.locked:
+        k.locked = 0
+        k.changes += 1
 
 
 cdef void watch(clock_t *k) noexcept nogil:
@@ -219,6 +281,8 @@ cdef int64_t clock_close(clock_t *k) noexcept nogil:
     cdef int64_t move, magnitude
     if k.sent == 0:
         return 0
+    if k.bound != k.bound_asked:
+        take_bound(k)
     move = lead_reference(k) if k.follows_main else follow_reference(k)
     if k.sampled:
         k.silent = 0
@@ -228,6 +292,8 @@ cdef int64_t clock_close(clock_t *k) noexcept nogil:
     else:
         k.silent += 1
         k.missed += 1
+        if k.silent >= SILENT_MAX and k.samples > 0 and k.watch_header != NULL:
+            k.holding = 1
     watch(k)
     k.awaited = 0
     k.sampled = 0
@@ -267,8 +333,8 @@ cdef class PhaseController:
         return self.c.bandwidth
 
     @property
-    def steps(self):
-        return self.c.steps
+    def jumps(self):
+        return self.c.jumps
 
 
 cdef class Clock:
@@ -279,8 +345,10 @@ cdef class Clock:
         if len(plan.stations) > 0xFFFF or not 0 <= plan.phase_ns < period_ns:
             raise ValueError(f"clock: {len(plan.stations)} followers, phase {plan.phase_ns}")
         self.c.follows_main = plan.follow == "main"
+        self.c.reference = plan.reference_station
         self.c.target = plan.phase_ns
         self.c.bound = plan.bound_ns
+        self.c.bound_asked = plan.bound_ns
         self.c.follower_count = len(plan.stations)
         self.c.followers = <follower_t *>calloc(len(plan.stations) + 1, sizeof(follower_t))
         if self.c.followers == NULL:
@@ -295,6 +363,7 @@ cdef class Clock:
         cdef clock_t *k = &self.c
         return {
             "locked": bool(k.locked),
+            "bound": k.bound,
             "following": k.phase.state == FOLLOWING,
             "time": k.time,
             "error": k.error,
@@ -304,8 +373,10 @@ cdef class Clock:
             "samples": k.samples,
             "missed": k.missed,
             "silent": k.silent,
+            "holding": bool(k.holding),
+            "time_sent": k.time_sent,
             "ignored": k.phase.ignored,
-            "steps": k.phase.steps,
+            "jumps": k.phase.jumps,
         }
 
     def differences(self):
@@ -326,7 +397,7 @@ cdef class Clock:
     def keep_within(self, int64_t bound_ns):
         if bound_ns <= 0:
             raise ValueError(f"clock: a bound of {bound_ns} ns")
-        self.c.bound = bound_ns
+        self.c.bound_asked = bound_ns
 
     def set_epoch(self, int64_t epoch_ns):
         self.c.epoch = epoch_ns

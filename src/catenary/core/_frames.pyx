@@ -31,7 +31,6 @@ cdef enum:
     ETHERCAT_HEADER = 14
     DATAGRAMS = 16
     HEADER = 10                # of a datagram
-    ADP = 2
     COUNTER = 2
     LENGTH_AND_MORE = 0x87FF   # of its length word: not the circulating bit, not the reserved ones
     CYCLE_INDICES = 0x80
@@ -476,16 +475,16 @@ cdef class Frames:
             check(d.frame == 0 and d.length == 4, "clock: four bytes each, in the first frame")
             header = self.c.frames[0].template + d.offset
             if d.command == FRMW:
-                clock.time_field = header + HEADER
+                clock.time_header = header
                 clock.listeners = d.expected_counter
             elif d.command == FPWR:
-                clock.main_field = header + HEADER
+                clock.main_header = header
             elif d.command == FPRD:
-                clock.station_field = header + ADP
-        check(clock.time_field != NULL, "clock: no frame carries the reference's time")
-        check((clock.main_field != NULL) == (clock.follows_main != 0),
+                clock.watch_header = header
+        check(clock.time_header != NULL, "clock: no frame carries the reference's time")
+        check((clock.main_header != NULL) == (clock.follows_main != 0),
               "clock: our time is sent when the reference follows us, and only then")
-        check((clock.station_field != NULL) == (clock.follower_count > 0),
+        check((clock.watch_header != NULL) == (clock.follower_count > 0),
               "clock: differences are read of followers, and only of them")
         self.c.clock = clock
 

@@ -2,5 +2,6 @@
 
 from catenary.drive.drives import Drives
 from catenary.drive.io import Inputs, Outputs
+from catenary.plan.wish import DC
 
-__all__ = ["Drives", "Inputs", "Outputs"]
+__all__ = ["DC", "Drives", "Inputs", "Outputs"]

@@ -9,6 +9,7 @@ from catenary.bus import SubDevice
 from catenary.drive.axis import MEASURED
 from catenary.drive.objects import NAMED_COLUMNS, AxisObject
 from catenary.plan.cycle import AxisLimits
+from catenary.plan.wish import DC
 from catenary.wire.cia402 import Mode
 
 AxisSource: TypeAlias = SubDevice | tuple[SubDevice, int]
@@ -40,6 +41,13 @@ def axis_name(sub: SubDevice, slot: int) -> str:
 
 def axis_modes(first: str, others: Sequence[str]) -> tuple[Mode, ...]:
     return tuple(dict.fromkeys(mode_of(name) for name in (first, *others)))
+
+
+def clock_wish(dc: DC | bool) -> DC | None:
+    """What `dc=` asks for."""
+    if isinstance(dc, bool):
+        return DC() if dc else None
+    return dc
 
 
 def mode_of(name: str) -> Mode:

@@ -16,6 +16,7 @@ from catenary.drive.arguments import (
     axis_modes,
     axis_name,
     axis_sources,
+    clock_wish,
     cycles_between,
     known,
     mode_of,
@@ -27,7 +28,7 @@ from catenary.drive.state_machine import Goal
 from catenary.drive.units import AxisUnits, one_each, per_axis
 from catenary.drive.values import Array, AxisValues
 from catenary.plan.cycle import Bank
-from catenary.plan.wish import ImageLayout, PdoWish, Views, WishTables
+from catenary.plan.wish import DC, ImageLayout, PdoWish, Views, WishTables
 from catenary.wire.cia402 import State
 
 V = TypeVar("V")
@@ -61,6 +62,8 @@ class Drives:
     `required=False`: the loop goes on without a drive that vanishes; what is not `present` holds
     its last values and follows nothing, and must be enabled again when it is back. `every`: the
     drives are exchanged every so many cycles of the loop.
+
+    `dc`: distributed clocks; True: as each device's SII says, or a `DC` for all of them.
     """
 
     def __init__(
@@ -83,6 +86,7 @@ class Drives:
         columns: Sequence[str | tuple[str, AxisObject]] = (),
         required: bool = True,
         every: int = 1,
+        dc: DC | bool = False,
     ) -> None:
         sources = axis_sources(subs)
         n = len(sources)
@@ -105,6 +109,7 @@ class Drives:
         first_modes = (mode,) * n if isinstance(mode, str) else one_each("mode", mode, n)
         self.subs = tuple(sub for sub, _ in sources)
         self._columns = named_columns(columns)
+        self._clock = clock_wish(dc)
         self._axes = tuple(
             Axis(
                 name=axis_name(sub, slot),
@@ -206,6 +211,7 @@ class Drives:
             wishes[axis.device] = (
                 joined(wishes[axis.device], wish) if axis.device in wishes else wish
             )
+            wishes[axis.device] = replace(wishes[axis.device], clock=self._clock)
         return wishes
 
     def tables(self, layout: ImageLayout) -> WishTables:

@@ -7,11 +7,12 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from catenary.bus import SubDevice
-from catenary.drive.arguments import cycles_between
+from catenary.drive.arguments import clock_wish, cycles_between
 from catenary.errors import MappingError
 from catenary.model.device import Assignment, DeviceDescription, Direction, Entry
 from catenary.plan.cycle import Bank, Column, NumberKind
 from catenary.plan.wish import (
+    DC,
     Bytes,
     ImageLayout,
     Integers,
@@ -59,10 +60,12 @@ class _Channels:
         scale: Mapping[str, float] | None = None,
         required: bool = True,
         every: int = 1,
+        dc: DC | bool = False,
     ) -> None:
         self.subs = subs
         self._required = required
         self._every = cycles_between("every", every)
+        self._clock = clock_wish(dc)
         self._units: list[int] = []
         self._unit_valid: Bytes | None = None
         self._channels = channels([sub.description for sub in subs], self.direction, scale or {})
@@ -88,6 +91,7 @@ class _Channels:
             wishes[sub.position] = PdoWish(
                 outputs=mine if output else (),
                 inputs=() if output else mine,
+                clock=self._clock,
                 every=self._every,
                 required=self._required,
             )
@@ -137,6 +141,7 @@ class Inputs(_Channels):
     `scale` turns raw numbers into floats: `Inputs(sub, scale={"Value": 10 / 0x7FFF})`.
     `required=False`: the loop goes on without a device that vanishes; its channels keep their last
     values, `present` tells. `every`: exchanged every so many cycles of the loop.
+    `dc`: distributed clocks, as for `Drives`.
     """
 
     direction = Direction.INPUT
@@ -148,8 +153,8 @@ class Inputs(_Channels):
 
 class Outputs(_Channels):
     """The outputs of SubDevices, all 0 at the start: write `.bits[:]`, `.integers[:]`, `.reals[:]`,
-    or one by name: `lamps["Output 1"] = 1`. `scale`, `required`, `every` as for `Inputs`. What is
-    out of its range is cut, and `cycle.limited` says so."""
+    or one by name: `lamps["Output 1"] = 1`. `scale`, `required`, `every`, `dc` as for `Inputs`.
+    What is out of its range is cut, and `cycle.limited` says so."""
 
     direction = Direction.OUTPUT
 

@@ -14,6 +14,7 @@ from typing import Any, Literal
 
 from catenary.bus import SubDevice
 from catenary.core import (
+    CYCLE_CLOCKS,
     CYCLE_DROPPED,
     CYCLE_LAW_FAILED,
     CYCLE_NONE,
@@ -23,6 +24,7 @@ from catenary.core import (
     Iteration,
 )
 from catenary.errors import LawError
+from catenary.loop.clocks import Clocks
 from catenary.loop.devices import DeviceWish, by_network, main_device_of
 from catenary.loop.laws.law import Law
 from catenary.loop.laws.law import law as made_law
@@ -32,11 +34,13 @@ from catenary.loop.signals import SignalGuard
 from catenary.loop.stream import Stream
 from catenary.loop.timing import Timing
 from catenary.loop.watch import Policy
-from catenary.plan.cycle import ReceiveMode
+from catenary.plan.clocks import BURST
+from catenary.plan.cycle import FollowedClock, ReceiveMode
 from catenary.plan.make import Plan, make_plan
 from catenary.wire.al import State
 
-TROUBLE = CYCLE_WORKING_COUNTER | CYCLE_DROPPED | CYCLE_STOPPED | CYCLE_NONE | CYCLE_LAW_FAILED
+ENDING = CYCLE_WORKING_COUNTER | CYCLE_DROPPED | CYCLE_STOPPED | CYCLE_NONE | CYCLE_LAW_FAILED
+TROUBLE = ENDING | CYCLE_CLOCKS
 LATE_LIMIT_POSITION = 0.050  # [s], CSP
 LATE_LIMIT_VELOCITY = 0.010  # [s], CSV and CST
 LEAD = 50e-6  # [s]: what a wake-up is late on an ordinary kernel, and the time to use it
@@ -61,8 +65,15 @@ class Loop:
     requires and that comes back: "restore", its start-up list is replayed and it goes to OP; or
     "hold", it stays in PRE-OP until `restore`. `on_replacement`: the same for another device of the
     same product in its place, which is not even led to PRE-OP when held. `laws` are compiled on
-    entry, before the devices go to OP; others when they are started. `cpu` and `priority`
-    (SCHED_FIFO) of the native thread; None: as they are.
+    entry, before the devices go to OP; others when they are started.
+
+    Where a wish has `dc=`: `clock`, whom time is taken from: "reference", the wake-up follows the
+    reference clock; "main", it follows the MainDevice's. `reference`: the device with that clock;
+    None: the first that has one. `margin` [s]: from the instant to the frames, at most; None: 20 %
+    of the period when threaded, 50 % when inline. `burst`: frames that bring the clocks together
+    before the cycle begins.
+
+    `cpu` and `priority` (SCHED_FIFO) of the native thread; None: as they are.
     """
 
     def __new__(cls, *wishes: DeviceWish, **options: Any) -> Loop:
@@ -89,11 +100,17 @@ class Loop:
         on_return: Policy = "restore",
         on_replacement: Policy = "hold",
         laws: Sequence[Law | Callable[..., Any]] = (),
+        clock: Literal["reference", "main"] = "reference",
+        reference: SubDevice | None = None,
+        margin: float | None = None,
+        burst: int = BURST,
         cpu: int | None = None,
         priority: int | None = 80,
     ) -> None:
         if run not in ("threaded", "inline"):
             raise ValueError(f'run={run!r}: "threaded" or "inline"')
+        if clock not in ("reference", "main"):
+            raise ValueError(f'clock={clock!r}: "reference" or "main"')
         if lead is not None and not 0 <= lead < period:
             raise ValueError(f"lead={lead} s: must be less than the period of {period} s")
         self._wishes = wishes
@@ -116,6 +133,10 @@ class Loop:
         self._on_return: Policy = on_return
         self._on_replacement: Policy = on_replacement
         self._laws = [made_law(law) for law in laws]
+        self._clock: FollowedClock = clock
+        self._reference = reference
+        self._margin = margin
+        self._burst = burst
         self._cpu = cpu
         self._priority = priority
         self._guard = SignalGuard((Loop.__exit__.__code__, Loop._leave.__code__))
@@ -131,6 +152,8 @@ class Loop:
             if self._enable:
                 self._running.enable()
             self._running.engine.reset_histograms()
+            if self._running.clocks is not None:
+                self._running.clocks.reset()
             return self  # inside: a signal may come at this line too
         except BaseException as error:
             for problem in self._leave():
@@ -221,7 +244,7 @@ class Loop:
         if not compiled:
             return self._run_as_python(made_law(law), memory, parameters)
         run = running.laws.start(made_law(law), memory, parameters, budget, overruns)
-        running.laws.run(run, TROUBLE, self._judge)
+        running.laws.run(run, ENDING, self._judge)
         return run.memory
 
     def _run_as_python(
@@ -269,6 +292,22 @@ class Loop:
         return Timing(engine.histograms(), engine.counters)
 
     @property
+    def clocks(self) -> Clocks:
+        """The distributed clocks: print it. RuntimeError where no wish has `dc=`."""
+        clocks = self._opened.clocks
+        if clocks is None:
+            raise RuntimeError("no distributed clocks in this loop: Drives(..., dc=True)")
+        return clocks
+
+    def wait_locked(self, within: float = 1e-6, timeout: float = 5.0) -> None:
+        """Cycles, axes holding, until every clock differs by at most `within` [s] from the
+        reference clock and the instants are in phase with it. That bound holds from now on: leaving
+        it is a `ClockUnlocked` event, coming back `ClockLocked`. ClockError after `timeout` [s]."""
+        running = self._opened
+        self.clocks.wait(within, timeout, self._judge)
+        running.judge(CYCLE_CLOCKS, faults=self._raise_faults)
+
+    @property
     def scheduling(self) -> str:
         """What the thread that keeps the instants obtained."""
         return self._opened.engine.scheduling
@@ -304,6 +343,10 @@ class Loop:
             late_limit_velocity=LATE_LIMIT_VELOCITY if late is None else late,
             stop_deadline=self._stop_deadline,
             lead=self._lead,
+            clock=self._clock,
+            reference=None if self._reference is None else self._reference.position,
+            margin=self._margin,
+            burst=self._burst,
             cpu=self._cpu,
             priority=self._priority,
         )

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from catenary.bus import MainDevice
 from catenary.core import (
     AXIS_FOLLOWED,
+    CYCLE_CLOCKS,
     CYCLE_LAW_FAILED,
     CYCLE_NONE,
     CYCLE_OK,
@@ -23,6 +24,7 @@ from catenary.core import (
 )
 from catenary.errors import CatenaryError, DriveError, LoopError
 from catenary.loop.buffers import bind_wishes
+from catenary.loop.clocks import Clocks
 from catenary.loop.diagnosis import IN_FAULT, AxisTrouble, drive_error, silence_error, state_error
 from catenary.loop.error_watch import ErrorWatch
 from catenary.loop.laws.runner import LawRunner
@@ -71,6 +73,8 @@ class Running:
         if plan.cycle.lead_ns and plan.cycle.order == "inline":
             self.engine.set_rehearsal(make_rehearsal(self.views))
         self.laws = LawRunner(self.engine, plan)
+        clock = plan.cycle.clock
+        self.clocks = None if clock is None else Clocks(main, self.engine, clock)
         self.service = Service(main, self.engine, plan)
         self.watch = Watch(
             main,
@@ -78,6 +82,7 @@ class Running:
             disturbed=lambda: self.engine.disturbed,
             submit=self.service.runner.submit,
             now=lambda: self.engine.now() * 1e-9,
+            rejoin=None if self.clocks is None else self.clocks.rejoin,
             on_return=on_return,
             on_replacement=on_replacement,
         )
@@ -118,6 +123,8 @@ class Running:
         self._opened = True
         self.service.start()
         self._settle()
+        if self.clocks is not None:
+            self.clocks.settle(self._raise_ended)
         self.service.converse(*(request_state(station, State.OP) for station in self._stations))
         for sub in self.main.subs:
             sub.state = State.OP
@@ -156,6 +163,8 @@ class Running:
     def judge(self, flags: int, *, faults: bool) -> None:
         """Raises the error for a cycle in trouble; returns where it was a false alarm."""
         self._raise_ended(flags)
+        if flags & CYCLE_CLOCKS and self.clocks is not None:
+            self.clocks.announce()
         if flags & CYCLE_WORKING_COUNTER:
             raise self._silence_error()
         if flags & CYCLE_LAW_FAILED:

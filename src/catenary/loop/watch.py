@@ -79,6 +79,7 @@ class Watch:
         disturbed: Callable[[], bool],
         submit: Submit,
         now: Callable[[], float],
+        rejoin: Callable[[int, DevicePlan], Procedure[None]] | None = None,
         on_return: Policy = "restore",
         on_replacement: Policy = "hold",
     ) -> None:
@@ -94,6 +95,7 @@ class Watch:
         self._submit = submit
         self._tell = main.events.put
         self._now = now
+        self._rejoin = rejoin
         self._on_return = on_return
         self._on_replacement = on_replacement
         ring = ring_of(main.link)
@@ -301,7 +303,8 @@ class Watch:
         sub, plan = charge.sub, charge.plan
         yield from restore.bring_to_pre_op(sub.station, sub.channel)
         sub.state = State.PRE_OP
-        yield from restore.bring_to_safe_op(sub.station, sub.channel, sub.description, plan)
+        clock = self._rejoin(plan.position, plan) if self._rejoin is not None else None
+        yield from restore.bring_to_safe_op(sub.station, sub.channel, sub.description, plan, clock)
         sub.state = State.SAFE_OP
         yield from request_state(sub.station, State.OP)
 

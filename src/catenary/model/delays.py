@@ -2,10 +2,12 @@
 broadcast write (0x0900) passed the ports. ETG.1000.4 §6.8.2; Beckhoff, ESC data sheet I, §9.1.2.
 
 Between two ports of one device the frame was away on the cable behind the second. Taking from that
-what it spent inside the next device's branch leaves twice the way between the two: the same way
-there and back is the assumption of SOEM (`ecx_configdc`), IgH (`ec_slave_calc_port_delays`) and
-ethercrab (`configure_subdevice_offsets`) too. Every clock measures with its own crystal; over some
-microseconds an error of 100 ppm does not count.
+what it spent inside the next device's branch leaves the way there and back. Both take the same, but
+for the processing units: a frame passes one as it leaves by a device's first port, and as it turns
+round in the last device of a branch (data sheet: t_Diff). SOEM (`ecx_configdc`), IgH
+(`ec_slave_calc_port_delays`) and ethercrab (`configure_subdevice_offsets`) leave that out: 20 ns
+for each device on a line. Every clock measures with its own crystal; over some microseconds an
+error of 100 ppm does not count.
 
 Devices without clocks are cable: behind one that branches, several clocks may share what a clock
 before it measured; then what is known of no part is shared out evenly.
@@ -16,10 +18,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from statistics import fmean
+from typing import NamedTuple
 
 from catenary.model.topology import PORT_ORDER, Ports
 
 PortTimes = tuple[int, int, int, int]
+PROCESSING_NS = 40  # what a processing unit adds to forwarding; of other controllers, 20 to 40
 TIME_SPAN = 1 << 32  # receive times are 32 bits wide and wrap every 4.3 s
 
 
@@ -31,6 +35,13 @@ class ClockPlace:
     parent_port: int | None
     open_ports: Ports
     receive_times_ns: PortTimes | None
+
+
+class _Head(NamedTuple):
+    """A clock, and how many devices without one lie before it."""
+
+    position: int
+    between: int
 
 
 def delays_ns(latches: Sequence[Sequence[ClockPlace]]) -> tuple[int | None, ...]:
@@ -64,9 +75,10 @@ def _delays(places: Sequence[ClockPlace]) -> list[float | None]:
             heads = [
                 head
                 for child in children[position]
-                for head in _heads(places, children, child, port)
+                if places[child].parent_port == port
+                for head in _first_clocks(places, children, child)
             ]
-            _share(places, heads, reached, away, delays)
+            _share(places, heads, reached, away, delays, first=before == 0)
             before = port
     return delays
 
@@ -83,23 +95,30 @@ def _start(
         if place.parent is not None:
             continue
         for head in _first_clocks(places, children, position):
-            delays[head] = reached
-            reached += _loop(places[head])
+            delays[head.position] = reached
+            reached += _loop(places[head.position])
 
 
 def _share(
     places: Sequence[ClockPlace],
-    heads: Sequence[int],
+    heads: Sequence[_Head],
     reached: float,
     away: float,
     delays: list[float | None],
+    *,
+    first: bool,
 ) -> None:
-    """The first clocks behind one port, in the order of the frame."""
-    wire = (away - sum(_loop(places[head]) for head in heads)) / (len(heads) + 1)
+    """The first clocks behind one port, in the order of the frame. `first`: the frame leaves by
+    this port straight from the processing unit."""
+    wire = (away - sum(_loop(places[head.position]) for head in heads)) / (len(heads) + 1)
+    if len(heads) == 1:
+        [head] = heads
+        turns = not _onwards(places[head.position])
+        wire += PROCESSING_NS * (first + head.between - turns) / 2
     for head in heads:
         reached += wire
-        delays[head] = reached
-        reached += _loop(places[head])
+        delays[head.position] = reached
+        reached += _loop(places[head.position])
 
 
 def _loop(place: ClockPlace) -> float:
@@ -127,21 +146,15 @@ def _children(places: Sequence[ClockPlace]) -> list[list[int]]:
     return children
 
 
-def _heads(
-    places: Sequence[ClockPlace], children: Sequence[Sequence[int]], child: int, port: int
-) -> Iterator[int]:
-    if places[child].parent_port == port:
-        yield from _first_clocks(places, children, child)
-
-
 def _first_clocks(
     places: Sequence[ClockPlace], children: Sequence[Sequence[int]], start: int
-) -> Iterator[int]:
+) -> Iterator[_Head]:
     """The clocks of a branch that no clock of the branch precedes."""
-    waiting = [start]
+    waiting = [_Head(start, 0)]
     while waiting:
-        position = waiting.pop()
-        if places[position].receive_times_ns is not None:
-            yield position
+        head = waiting.pop()
+        if places[head.position].receive_times_ns is not None:
+            yield head
         else:
-            waiting.extend(reversed(children[position]))
+            behind = reversed(children[head.position])
+            waiting.extend(_Head(child, head.between + 1) for child in behind)

@@ -27,6 +27,7 @@ if TYPE_CHECKING:  # needs NumPy, a scan does not
     from catenary.plan.wish import DC
 
 SYNC_BY_ECAT = 0x0300  # AssignActivate: cyclic operation and SYNC0, controlled by EtherCAT
+BURST = 15_000  # frames: ESC data sheet I §9.1.5; KickCAT sends as many, ethercrab 10 000
 START_DELAY_NS = 100_000_000  # to the first SYNC pulse: as SOEM (`SyncDelay`) and IgH
 HOP_NS = 1000  # through a device and its cable: 0.3 µs by E-bus, up to 1 µs by Ethernet PHYs
 # What of the period is left between the instant and the frames: threaded, the wake-up's lateness;
@@ -146,9 +147,13 @@ def make_clock_plan(
     period_ns: int,
     order: Order,
     margin: float | None = None,
+    burst: int = BURST,
 ) -> ClockPlan:
     """Everything the cycle needs to know of clocks. `margin` [s]: between the instant and the
-    frames; None: by the order. ConfigurationError where the frames do not fit into the period."""
+    frames; None: by the order. `burst`: frames of static drift compensation. ConfigurationError
+    where the frames do not fit into the period."""
+    if burst < 0:
+        raise ConfigurationError(f"a burst of {burst} frames", hint="0 or more")
     wire_ns = sum(wire_time_ns(len(frame.template)) for frame in frames) + HOP_NS * device_count
     allowance_ns = round(ALLOWANCE[order] * period_ns if margin is None else margin * 1e9)
     if allowance_ns < 0 or wire_ns + allowance_ns > period_ns:
@@ -172,6 +177,7 @@ def make_clock_plan(
         drift_limit_ns=DRIFT_LIMIT * period_ns,
         step_ns=round(STEP_SHARE * period_ns),
         bound_ns=BOUND_NS,
+        burst=burst,
     )
 
 

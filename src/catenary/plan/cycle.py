@@ -160,6 +160,7 @@ class ClockPlan:
     drift_limit_ns: float  # and the part of it that stays
     step_ns: int  # a phase error beyond is no drift
     bound_ns: int  # of a difference to the reference, and of the phase
+    burst: int = 15_000  # frames that carry the time before the cycle begins
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from catenary.errors import ConfigurationError
 from catenary.model.device import DeviceDescription, Direction
-from catenary.plan.clocks import SyncPlan, choose_clocks, make_clock_plan, make_sync
+from catenary.plan.clocks import BURST, SyncPlan, choose_clocks, make_clock_plan, make_sync
 from catenary.plan.cycle import CyclePlan, FollowedClock, Order, ReceiveMode, SyncUnit
 from catenary.plan.frames import make_frames
 from catenary.plan.layout import DeviceData, Layout, make_layout
@@ -60,6 +60,7 @@ def make_plan(
     clock: FollowedClock = "reference",
     reference: int | None = None,
     margin: float | None = None,
+    burst: int = BURST,
 ) -> Plan:
     """The plan that fulfils all wishes, or an error that names the object that cannot be.
 
@@ -68,8 +69,8 @@ def make_plan(
     `lead` [s]: inline and with a law, awake that long before the instant. Where a wish asks for
     distributed clocks: `clock`, whom the others follow; `reference`, position of the reference
     clock (None: the first there is); `margin` [s] between the instant and the frames (None: by the
-    order). `optional`: positions without which the cycle is good, beside those that no wish
-    requires.
+    order); `burst`, frames that bring the clocks together before the cycle. `optional`: positions
+    without which the cycle is good, beside those that no wish requires.
     """
     period_ns = round(period * 1e9)
     if period_ns <= 0:
@@ -113,7 +114,7 @@ def make_plan(
         priority=priority,
         clock=None
         if choice is None
-        else make_clock_plan(choice, frames, len(devices), period_ns, order, margin),
+        else make_clock_plan(choice, frames, len(devices), period_ns, order, margin, burst),
     )
     plans = tuple(
         make_device_plan(

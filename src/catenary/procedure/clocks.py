@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from catenary.errors import ClockError
 from catenary.model.delays import ClockPlace, PortTimes, delays_ns
 from catenary.model.device import DeviceDescription
+from catenary.plan.clocks import BURST
 from catenary.procedure.exchange import Procedure, Reply, Request, read, write
 from catenary.procedure.station import Station, answered
 from catenary.wire.clock import decode_receive_times
@@ -35,7 +36,6 @@ from catenary.wire.register import (
 )
 
 LATCHES = 16  # a mean of so many: stamps jitter by a tick of 10 ns each, those of slow PHYs by more
-BURST = 15_000  # frames: ESC data sheet I §9.1.5; KickCAT sends as many, ethercrab 10 000
 BURST_STEP = 512  # frames under way in one step of the procedure
 # The reset values, which SOEM (`ecx_set_slaves_to_default`), KickCAT (`enableDC`) and ethercrab
 # write: no filter on the difference, 2^12 on the speed, and the bandwidth of the loop.
@@ -107,9 +107,8 @@ def align(
             continue
         behind = max(0, delay - nearest)
         offset = measured.latched_ns + epoch_ns + behind - local
-        requests += _alignment(device, offset, behind)
-    for filtered in _filters():
-        requests.append(filtered)
+        requests += alignment(device, offset, behind)
+    requests += filters()
     for reply, request in zip((yield requests), requests, strict=True):
         if request.command is Command.FPWR:
             answered(reply, _station_at(devices, request), "offset and delay of its clock")
@@ -137,6 +136,27 @@ def distribute(device: DeviceDescription) -> Request:
     """FRMW of the system time's low half, which is all that a time loop compares."""
     request = read(Command.FRMW, device.station_address, SYSTEM_TIME_LOW)
     return request._replace(repeatable=False, alone=True)
+
+
+def alignment(device: DeviceDescription, offset: int, delay: int) -> tuple[Request, Request]:
+    """Writes what its system time is ahead of its local one, and its delay [ns]."""
+    station = device.station_address
+    if device.clock_bits == 64:
+        written = write(Command.FPWR, station, SYSTEM_TIME_OFFSET, offset % SPAN_64)
+    else:  # ethercrab #322: eight bytes to a 32-bit clock are refused
+        written = write(Command.FPWR, station, SYSTEM_TIME_OFFSET_LOW, offset % SPAN_32)
+    return written, write(Command.FPWR, station, SYSTEM_TIME_DELAY, delay)
+
+
+def filters(station: int | None = None) -> tuple[Request, ...]:
+    """Lets the time loop of one device, or of all, begin anew. Depths first: several controllers
+    take them over with the write that resets the loop."""
+    command = Command.BWR if station is None else Command.FPWR
+    return (
+        write(command, station or 0, SYSTEM_TIME_DIFFERENCE_FILTER, DIFFERENCE_FILTER),
+        write(command, station or 0, SPEED_COUNTER_FILTER, SPEED_FILTER),
+        write(command, station or 0, SPEED_COUNTER_START, SPEED_START),
+    )
 
 
 def read_system_time(device: DeviceDescription) -> Procedure[int]:
@@ -195,24 +215,6 @@ def _local_time(device: DeviceDescription, answers: tuple[Reply, Reply]) -> int:
 
 def _place(device: DeviceDescription, times: PortTimes | None) -> ClockPlace:
     return ClockPlace(device.parent, device.parent_port, device.open_ports, times)
-
-
-def _alignment(device: DeviceDescription, offset: int, delay: int) -> tuple[Request, ...]:
-    station = device.station_address
-    if device.clock_bits == 64:
-        written = write(Command.FPWR, station, SYSTEM_TIME_OFFSET, offset % SPAN_64)
-    else:  # ethercrab #322: eight bytes to a 32-bit clock are refused
-        written = write(Command.FPWR, station, SYSTEM_TIME_OFFSET_LOW, offset % SPAN_32)
-    return written, write(Command.FPWR, station, SYSTEM_TIME_DELAY, delay)
-
-
-def _filters() -> tuple[Request, ...]:
-    """Depths first: several controllers take them over with the write that resets the loop."""
-    return (
-        write(Command.BWR, 0, SYSTEM_TIME_DIFFERENCE_FILTER, DIFFERENCE_FILTER),
-        write(Command.BWR, 0, SPEED_COUNTER_FILTER, SPEED_FILTER),
-        write(Command.BWR, 0, SPEED_COUNTER_START, SPEED_START),
-    )
 
 
 def _station(device: DeviceDescription) -> Station:

@@ -101,9 +101,10 @@ def bring_to_safe_op(
     channel: MailboxChannel | None,
     device: DeviceDescription,
     plan: DevicePlan,
+    clock: Procedure[None] | None = None,
 ) -> Procedure[None]:
     """Its start-up list and process data, from PRE-OP. What it has mapped is read first: it may be
-    something else after power-up than before."""
+    something else after power-up than before. `clock`: what sets its clock, last of all."""
     if channel is not None and device.coe:
         found = yield from read_mapping(channel, device)
         again = renewed(plan, found)
@@ -111,6 +112,8 @@ def bring_to_safe_op(
         if again.mapping_changed:
             yield from verify_mapping(channel, device, again)
     yield from configure_process_data(station, device, plan)
+    if clock is not None:
+        yield from clock
     yield from request_state(station, State.SAFE_OP)
 
 

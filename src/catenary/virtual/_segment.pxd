@@ -124,6 +124,7 @@ cdef extern from "segment_memory.h" nogil:
     void synchronous_begin(controller *, int64_t cycle, int steps)
     void synchronous_end(controller *)
     void sync_schedule(controller *)
+    int64_t dc_system_time(const controller *, int64_t when)
     void lock(cat_segment *)
     void unlock(cat_segment *)
     int64_t monotonic_now()

@@ -409,6 +409,14 @@ cdef class Core:
         cdef synchronous_cycle *d = &self._at(position).synchronous
         return bool(d.active), bool(d.seen), d.missed, d.exceeded, d.shift_short, bool(d.error)
 
+    def system_time(self, int position):
+        """What the clock says at this moment [ns]: nobody on the bus can read it so exactly."""
+        cdef int64_t time
+        lock(self._segment)
+        time = dc_system_time(self._at(position), self._segment.now)
+        unlock(self._segment)
+        return time
+
     def pulses(self, int position):
         """SYNC0 and SYNC1 pulses since power-on."""
         cdef controller *c = self._at(position)

@@ -1,0 +1,74 @@
+"""Somebody writes the reference clock's offset: its time jumps by 300 us. The other clocks follow
+as fast as they can, and so does the wake-up: the frames stay before the pulses of drives that are
+on their way, nothing is missed, and events say what happened. A jump of one reading alone is a
+stray and changes nothing. A jump by many periods leads the drives' pulses across the frames: they
+say so, the loop ends with their reason, and everything is safe."""
+
+from __future__ import annotations
+
+import pytest
+
+import catenary as cat
+from catenary.bus.event import ClockLocked, ClockUnlocked
+from catenary.errors import StateError
+from tests.scenario.cell import Cell
+from tests.scenario.clocked import clocked_cell, run_for, true_differences
+
+OFFSET = 0x0920
+
+
+def jump(cell: Cell, position: int, by_ns: int) -> None:
+    core = cell.segment.core
+    offset = int.from_bytes(core.peek(position, OFFSET, 8), "little")
+    core.poke(position, OFFSET, ((offset + by_ns) % 2**64).to_bytes(8, "little"))
+
+
+@pytest.mark.parametrize("by_ns", [-300_000, 300_000])
+def test_the_instants_follow_as_fast_as_the_clocks_do(by_ns: int) -> None:
+    with clocked_cell(2) as cell:
+        arm = cell.drives(dc=True)
+        with cat.Loop(arm, period=1e-3) as loop:
+            loop.wait_locked()
+            list(cell.main.events)
+            jump(cell, 0, by_ns)
+            run_for(loop, 3.0)
+            assert loop.clocks.jumps == 1
+            assert loop.clocks.locked
+            assert loop.timing.counters["lost"] == 0
+            events = [e for e in cell.main.events if isinstance(e, ClockLocked | ClockUnlocked)]
+            assert [type(event) for event in events] == [ClockUnlocked, ClockLocked]
+            assert all(abs(d) < 1e-6 for d in true_differences(cell.segment).values())
+            assert cell.drive_states == ["OPERATION ENABLED"] * 2
+
+
+def test_there_and_back_within_a_cycle_is_a_stray() -> None:
+    with clocked_cell(2) as cell, cat.Loop(cell.drives(dc=True), period=1e-3) as loop:
+        loop.wait_locked()
+        jump(cell, 0, 400_000)
+        run_for(loop, 1e-3)
+        jump(cell, 0, -400_000)
+        run_for(loop, 0.5)
+        assert loop.clocks.jumps == 0
+
+
+def test_a_follower_that_jumps_comes_back_by_itself() -> None:
+    with clocked_cell(2) as cell, cat.Loop(cell.drives(dc=True), period=1e-3) as loop:
+        loop.wait_locked()
+        jump(cell, 3, 50_000)
+        run_for(loop, 0.05)
+        assert not loop.clocks.locked
+        run_for(loop, 2.0)
+        assert loop.clocks.locked
+        assert loop.clocks.jumps == 0
+
+
+def test_a_jump_no_drive_can_follow() -> None:
+    with clocked_cell(2) as cell:
+        with (
+            pytest.raises(StateError, match="Synchronization error"),
+            cat.Loop(cell.drives(dc=True), period=1e-3) as loop,
+        ):
+            loop.wait_locked()
+            jump(cell, 0, -20_000_000)
+            run_for(loop, 10.0)
+        cell.assert_safe()

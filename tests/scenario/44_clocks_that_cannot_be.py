@@ -1,0 +1,56 @@
+"""Clocks asked of devices that have none, or of one before its reference: refused before anything
+moves, naming the device. Frames that cannot sit before the beat are refused too."""
+
+from __future__ import annotations
+
+import pytest
+
+import catenary as cat
+from catenary.errors import ConfigurationError
+from tests.scenario.cell import PRE_OP, Cell
+
+
+def enter(cell: Cell, *wishes: object, **options: object) -> None:
+    with cat.Loop(*wishes, period=1e-3, **options):  # type: ignore[arg-type]
+        raise AssertionError("this loop cannot be")
+
+
+def test_a_device_without_a_clock(cell: Cell) -> None:
+    lamps = cat.Outputs(cell.subs[1], dc=True)
+    with pytest.raises(ConfigurationError, match=r"device 1 .*dc= was wished for it.* has none"):
+        enter(cell, cell.drives(dc=True), lamps)
+    assert all(state == PRE_OP for state in cell.states)
+
+
+def test_a_reference_without_a_clock(cell: Cell) -> None:
+    with pytest.raises(ConfigurationError, match=r"device 1 .*given as the reference clock"):
+        enter(cell, cell.drives(dc=True), reference=cell.subs[1])
+
+
+def test_a_reference_behind_its_followers(cell: Cell) -> None:
+    with pytest.raises(ConfigurationError, match=r"device 2 .* lies before device 3"):
+        enter(cell, cell.drives(dc=True), reference=cell.subs[3])
+
+
+def test_frames_that_do_not_fit_before_the_beat(cell: Cell) -> None:
+    with pytest.raises(ConfigurationError, match="do not fit into a period of 1000 us"):
+        enter(cell, cell.drives(dc=True), margin=0.99e-3)
+
+
+def test_two_wishes_that_disagree(cell: Cell) -> None:
+    one = cat.Drives(cell.subs.drives, counts_per_turn=2**20, dc=cat.DC(shift=1e-4))
+    other = cat.Inputs(cell.subs[2], dc=True)
+    with pytest.raises(ConfigurationError, match=r"device 2: two wishes"):
+        enter(cell, one, other)
+
+
+def test_a_reference_of_the_users_choice(cell: Cell) -> None:
+    with cat.Loop(cell.drives(dc=True), period=1e-3, reference=cell.subs[2]) as loop:
+        loop.wait_locked()
+        assert loop.clocks.reference is cell.subs[2]
+        assert set(loop.clocks.differences) == {3}
+
+
+def test_nobody_but_us_is_followed(cell: Cell) -> None:
+    with pytest.raises(ValueError, match='clock=\'gps\': "reference" or "main"'):
+        cat.Loop(cell.drives(dc=True), clock="gps")  # type: ignore[arg-type]

@@ -1,0 +1,78 @@
+"""The device whose clock all others follow is switched off and on again. The others keep time by
+what the frame carries, at the rate that was found, and miss no pulse; what comes back has forgotten
+the time and must not spread it: its clock is set by the others' before it leads again. A follower
+that is switched off gets its time, and its SYNC0, back in the same way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from random import Random
+
+import pytest
+
+import catenary as cat
+from catenary.bus import event
+from catenary.virtual import Junction, Servo
+from catenary.virtual.faults import power_cycle
+from tests.scenario.cell import OP, Cell, cell_of
+from tests.scenario.clocked import crystal
+
+FIRST, SECOND, THIRD = 1, 2, 3
+
+
+@pytest.fixture
+def star() -> Iterator[Cell]:
+    """A junction with three servos, each at a port of its own: each can vanish alone."""
+    random = Random(3)
+    servos = [Servo(serial=k, crystal=crystal(random)) for k in (1, 2, 3)]
+    behind = {1: (0, 3), 2: (0, 1), 3: (0, 2)}
+    with cell_of(Junction(port_count=4), *servos, behind=behind) as cell:
+        yield cell
+
+
+def ride(cell: Cell, vanishing: int, seconds: float = 6.0) -> list[event.Event]:
+    """The others hold while one is without power for half a second."""
+    others = [cell.subs[p] for p in (FIRST, SECOND, THIRD) if p != vanishing]
+    arm = cat.Drives(others, counts_per_turn=2**20, dc=True)
+    tool = cat.Drives([cell.subs[vanishing]], counts_per_turn=2**20, dc=True, required=False)
+    core = cell.segment.core
+    with cat.Loop(arm, tool, period=1e-3, reference=cell.subs[FIRST]) as loop:
+        loop.wait_locked()
+        list(cell.main.events)
+        missed = {sub.position: core.synchronous(sub.position)[2] for sub in others}
+        cell.segment.inject(power_cycle(vanishing, for_=0.5))
+        start: float | None = None
+        for cycle in loop:
+            start = cycle.time if start is None else start
+            assert cycle.ok
+            assert arm.enabled.all()
+            if cycle.time - start >= seconds:
+                break
+        assert {p: core.synchronous(p)[2] for p in missed} == missed
+        assert loop.clocks.locked
+        assert loop.clocks.jumps == 0
+        assert cell.states[vanishing] == OP
+        times = [core.system_time(position) for position in (FIRST, SECOND, THIRD)]
+        assert max(times) - min(times) < 1500
+        assert core.pulses(vanishing)[0] > 0
+    cell.assert_safe()
+    return list(cell.main.events)
+
+
+def kinds(events: list[event.Event]) -> list[str]:
+    told = (event.ClockLocked, event.ClockUnlocked, event.DeviceLost, event.DeviceReturned)
+    return [type(e).__name__ for e in events if isinstance(e, told)]
+
+
+def test_the_reference(star: Cell) -> None:
+    events = ride(star, FIRST)
+    assert set(kinds(events)) == {"ClockUnlocked", "ClockLocked", "DeviceLost", "DeviceReturned"}
+    left = next(e for e in events if isinstance(e, event.ClockUnlocked))
+    assert left.sub is star.subs[FIRST]
+    assert "the reference clock, does not answer" in left.message
+    assert kinds(events)[-1] == "ClockLocked"
+
+
+def test_a_follower(star: Cell) -> None:
+    events = ride(star, SECOND)
+    assert {"DeviceLost", "DeviceReturned"} <= set(kinds(events))
