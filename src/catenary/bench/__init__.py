@@ -89,3 +89,17 @@ def measure_soak(*, minutes: float, seed: int, file: Path | None = None) -> bool
     from catenary.bench.soak import run
 
     return run.measure(minutes=minutes, seed=seed, file=file)
+
+
+def measure_clocks(
+    *,
+    devices: Sequence[int],
+    minutes: float,
+    jitter: float,
+    seed: int,
+    file: Path | None = None,
+) -> bool:
+    """Prints how soon clocks come together, and how long they stay within 1 us. Whether all did."""
+    from catenary.bench import clocks
+
+    return clocks.measure(devices=devices, minutes=minutes, jitter=jitter, seed=seed, file=file)

@@ -26,6 +26,7 @@ def add_parser(commands: Commands) -> None:
     _add_tasks(group)
     _add_law(group)
     _add_soak(group)
+    _add_clocks(group)
 
 
 def _add_loop(group: Commands) -> None:
@@ -168,6 +169,33 @@ def _add_soak(group: Commands) -> None:
     parser.set_defaults(run=run_soak)
 
 
+def _add_clocks(group: Commands) -> None:
+    parser = add_command(
+        group,
+        "clocks",
+        help="how soon distributed clocks come together, and how long they stay",
+        description="Lets crystals differ, drift and scatter, in virtual time, and compares what "
+        "each clock says with the reference. Exit status 1 where one was beyond 1 us.",
+        example="catenary bench clocks --devices 10,33 --minutes 10",
+    )
+    parser.add_argument(
+        "--devices", default="10,33", metavar="N,M", help="segments of so many drives (10,33)"
+    )
+    parser.add_argument(
+        "--minutes", type=positive_seconds, default=10.0, metavar="M", help="of virtual time (10)"
+    )
+    parser.add_argument(
+        "--jitter",
+        type=positive_seconds,
+        default=0.5e-6,
+        metavar="S",
+        help="over which a time stamp scatters; a difference is made of two (0.5e-6)",
+    )
+    parser.add_argument("--seed", type=int, default=1, metavar="N")
+    _add_file(parser)
+    parser.set_defaults(run=run_clocks)
+
+
 def _add_file(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there")
 
@@ -242,4 +270,17 @@ def run_soak(arguments: argparse.Namespace) -> int:
     from catenary import bench
 
     held = bench.measure_soak(minutes=arguments.minutes, seed=arguments.seed, file=arguments.json)
+    return 0 if held else 1
+
+
+def run_clocks(arguments: argparse.Namespace) -> int:
+    from catenary import bench
+
+    held = bench.measure_clocks(
+        devices=[positive_number(each) for each in arguments.devices.split(",")],
+        minutes=arguments.minutes,
+        jitter=arguments.jitter,
+        seed=arguments.seed,
+        file=arguments.json,
+    )
     return 0 if held else 1
