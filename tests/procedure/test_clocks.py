@@ -9,6 +9,7 @@ from catenary.procedure.clocks import (
     align,
     compensate,
     distribute,
+    lead,
     measure,
     read_system_time,
 )
@@ -113,10 +114,24 @@ def test_the_burst_is_so_many_frames() -> None:
     assert all(request.alone and not request.repeatable for request in sent)
 
 
+def test_a_reference_that_follows_is_told_our_time_in_each_frame() -> None:
+    told: list[tuple[Command, int]] = []
+
+    def note(request: Request) -> Reply:
+        told.append((request.command, int.from_bytes(request.data, "little")))
+        return Reply(request.data, 1)
+
+    play(lead(line(LONG).descriptions()[0], 2, EPOCH_NS), note)
+    times = [(EPOCH_NS + k * ROUND_TRIP_NS) % 2**32 for k in (1, 2)]
+    burst = [(Command.FPWR, times[0]), (Command.FRMW, 0), (Command.FPWR, times[1])]
+    assert told == [(Command.FPRD, 0), *burst, (Command.FRMW, 0)]
+
+
 def test_a_burst_without_a_reference_ends() -> None:
     reference = line(LONG).descriptions()[0]
-    with pytest.raises(ClockError, match="does not answer"):
-        play(compensate(reference), lambda request: Reply(request.data, 0))
+    for burst in (compensate(reference), lead(reference, 15_000, 0)):
+        with pytest.raises(ClockError, match="does not answer"):
+            play(burst, lambda request: Reply(request.data, 0))
 
 
 # A coupler, a terminal that only stamps, another terminal: ethercrab's capture replay-dc.pcapng,

@@ -57,7 +57,7 @@ def bring_to_safe_op(
         syncs = {each.position: each.sync for each in plan.devices if each.sync is not None}
         clock = plan.cycle.clock
         measured = runner.run(
-            bring_together(devices, syncs, clock.reference, epoch_ns, clock.burst)
+            bring_together(devices, syncs, clock.reference, epoch_ns, clock.burst, clock.follow)
         )
     runner.run_all([request_state(sub.station, State.SAFE_OP) for sub in subs])
     for sub in subs:

@@ -36,6 +36,7 @@ from catenary.wire.register import (
 )
 
 LATCHES = 16  # a mean of so many: stamps jitter by a tick of 10 ns each, those of slow PHYs by more
+LOST_MAX = 16  # frames of a burst in a row: beyond, nobody is there
 BURST_STEP = 512  # frames under way in one step of the procedure
 # The reset values, which SOEM (`ecx_set_slaves_to_default`), KickCAT (`enableDC`) and ethercrab
 # write: no filter on the difference, 2^12 on the speed, and the bandwidth of the loop.
@@ -120,16 +121,42 @@ def compensate(device: DeviceDescription, count: int = BURST) -> Procedure[None]
     One datagram a frame: a controller compares against the time at which the *frame* began, so a
     second one in it says nothing new (ESC data sheet I §9.1.5; KickCAT, ethercrab send one each).
     """
-    station = _station(device)
     request = distribute(device)
     while count > 0:
         replies = yield [request] * min(count, BURST_STEP)
         count -= len(replies)
-        if all(reply.lost or reply.working_counter == 0 for reply in replies):
-            raise ClockError(
-                f"{station}: the reference clock does not answer",
-                hint="it was switched off, reset or unplugged: scan again",
-            )
+        if not any(map(_is_answer, replies)):
+            raise _no_reference(device)
+
+
+def lead(device: DeviceDescription, count: int, epoch_ns: int) -> Procedure[None]:
+    """The same where the reference follows the MainDevice: each frame tells it our time first.
+
+    What is told is the time of the last answer: on a NIC the reference learns our rate from it, and
+    a phase some 10 us behind, which the cycle makes good.
+    """
+    register = SYSTEM_TIME_LOW
+    [reply] = yield [read(Command.FPRD, device.station_address, register)]
+    spread = distribute(device)._replace(alone=False)
+    silent = 0
+    for _ in range(count):
+        now = (reply.time_ns + epoch_ns) % SPAN_32
+        told = write(Command.FPWR, device.station_address, register, now, repeatable=False)
+        answer, reply = yield [told, spread]
+        silent = 0 if _is_answer(answer) else silent + 1
+        if silent > LOST_MAX:
+            raise _no_reference(device)
+
+
+def _is_answer(reply: Reply) -> bool:
+    return not reply.lost and reply.working_counter > 0
+
+
+def _no_reference(device: DeviceDescription) -> ClockError:
+    return ClockError(
+        f"{_station(device)}: the reference clock does not answer",
+        hint="it was switched off, reset or unplugged: scan again",
+    )
 
 
 def distribute(device: DeviceDescription) -> Request:

@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from catenary.errors import ClockError, SdoAbort
 from catenary.model.device import DeviceDescription
 from catenary.plan.clocks import BURST, SYNC_OBJECTS, SyncPlan, start_time_ns
+from catenary.plan.cycle import FollowedClock
 from catenary.procedure.clocks import (
     SPAN_32,
     SPAN_64,
@@ -21,6 +22,7 @@ from catenary.procedure.clocks import (
     alignment,
     compensate,
     filters,
+    lead,
     measure,
 )
 from catenary.procedure.exchange import Procedure, Reply, Request, read, write
@@ -50,12 +52,16 @@ def bring_together(
     reference: int,
     epoch_ns: int,
     burst: int = BURST,
+    follow: FollowedClock = "reference",
 ) -> Procedure[ClockMeasurement]:
     """All there is to do before the cycle: clocks measured, aligned, brought together by a burst of
     `burst` frames, SYNC signals started. `syncs`: by position."""
     measured = yield from measure(devices)
     yield from align(devices, measured, reference, epoch_ns)
-    yield from compensate(devices[reference], burst)
+    if follow == "main":
+        yield from lead(devices[reference], burst, epoch_ns)
+    else:
+        yield from compensate(devices[reference], burst)
     yield from start(devices, syncs, devices[reference], epoch_ns)
     return measured
 
