@@ -111,7 +111,7 @@ class Callbacks:
 
     def deliver(self) -> None:
         """Calls them with what is pending, unless a thread does; harmless inside a callback."""
-        if self.in_thread or self._delivering:
+        if not self._callbacks or self.in_thread or self._delivering:
             return
         self._delivering = True
         try:

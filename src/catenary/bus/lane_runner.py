@@ -21,6 +21,7 @@ from catenary.wire.frame import decode_frame
 
 T = TypeVar("T")
 
+NEVER_NS = 1 << 62
 FRAMES_PER_STEP = 4  # what a cycle carries besides its own frames
 
 
@@ -125,12 +126,15 @@ class LaneRunner:
     def due(self) -> bool:
         """Whether anything waits for a step now: a frame to be sent or on its way, the end of a
         pause. What sleeps does not."""
+        return self.next_due_ns <= self._lane.now()
+
+    @property
+    def next_due_ns(self) -> int:
+        """When a step is due next [ns, the lane's clock]; 0: now."""
         if self._submitted or self._under_way or self._outbox:
-            return True
-        due = self._lane.now() + self._grain_ns
-        return any(
-            pending.task.wake_ns is None or pending.task.wake_ns <= due for pending in self._active
-        )
+            return 0
+        wakes = [pending.task.wake_ns or 0 for pending in self._active]
+        return min(wakes, default=NEVER_NS) - self._grain_ns
 
     def step(self) -> None:
         """One exchange of everything that is under way."""

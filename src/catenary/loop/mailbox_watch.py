@@ -18,6 +18,8 @@ from catenary.procedure.mailbox import MailboxChannel, drain, exclusively
 ASK_NS = 10_000_000  # between two registers, where some device shows no bit
 TRUST_NS = 100_000_000  # where all do
 
+NEVER_NS = 1 << 62
+
 
 class MailboxWatch:
     """Owns the looks into mailboxes while a loop runs. Whoever steps the lane calls `look`.
@@ -41,6 +43,16 @@ class MailboxWatch:
         self._due_ns = 0
         self._reading: dict[int, Pending[None]] = {}
         self._read_in: dict[int, int] = {}  # position → cycle
+
+    @property
+    def sees_mail(self) -> bool:
+        """Whether some mailbox was full in this cycle, or is being read."""
+        return bool(self._reading) or any(self._words)
+
+    @property
+    def next_look_ns(self) -> int:
+        """When a mailbox is to be asked next [ns]."""
+        return self._due_ns if self._asked else NEVER_NS
 
     def look(self, now_ns: int, cycle: int) -> None:
         """Lets every mailbox be read that was full in this cycle, unless somebody talks to the

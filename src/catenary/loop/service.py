@@ -32,6 +32,7 @@ class Service:
         self.cycle: Callable[[], int] = partial(engine.run, 1)  # one, with whoever shares the time
         self._main = main
         self._engine = engine
+        self._quiet_until = 0  # [ns], in virtual time: nothing is due before
         self._ended = threading.Event()
         self._failure: Exception | None = None
         self._thread: threading.Thread | None = None
@@ -48,11 +49,16 @@ class Service:
         return self.step if self._thread is None else None
 
     def step(self) -> None:
-        """In virtual time: what the thread of real time does between two cycles."""
-        self._watch.look(self._engine.now(), self._engine.number)
-        if self.runner.due:
-            self._engine.lane_wait(BUSY_NS)
-            self.runner.step()
+        """In virtual time: what the thread of real time does between two cycles. Mostly that is
+        nothing, and then it takes next to no time."""
+        now = self._engine.now()
+        if now >= self._quiet_until or self.runner.asked.is_set() or self._watch.sees_mail:
+            self.runner.asked.clear()
+            self._watch.look(now, self._engine.number)
+            if self.runner.due:
+                self._engine.lane_wait(BUSY_NS)
+                self.runner.step()
+            self._quiet_until = min(self.runner.next_due_ns, self._watch.next_look_ns)
         self._main.deliver_events()
 
     def converse(self, *procedures: Procedure[T]) -> list[T]:
