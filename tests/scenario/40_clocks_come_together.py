@@ -5,12 +5,14 @@ for long after. (`catenary bench clocks` runs ten minutes of it.)"""
 
 from __future__ import annotations
 
+from random import Random
+
 import pytest
 
 import catenary as cat
-from catenary.virtual import Crystal, Servo
+from catenary.virtual import Crystal, Junction, Servo
 from tests.scenario.cell import cell_of
-from tests.scenario.clocked import clocked_cell, run_for, true_differences
+from tests.scenario.clocked import clocked_cell, crystal, run_for, true_differences
 
 BOUND = 1e-6
 
@@ -56,6 +58,22 @@ def test_whoever_follows_in_whatever_order(run: str, clock: str) -> None:
             assert all(abs(d) < BOUND for d in true_differences(cell.segment).values())
             assert abs(loop.clocks.phase_error) < BOUND
             assert loop.clocks.jumps == 0
+
+
+def test_over_branches_the_delays_are_right() -> None:
+    """A tree, clocks without scatter: what is left is what the delays are wrong by."""
+    random = Random(4)
+    servos = [Servo(serial=k, crystal=crystal(random, 0.0)) for k in range(6)]
+    behind = {1: (0, 3), 2: (1, 1), 3: (0, 1), 4: (3, 1), 5: (0, 2), 6: (5, 1)}
+    with (
+        cell_of(Junction(), *servos, behind=behind) as cell,
+        cat.Loop(cell.drives(dc=True), period=1e-3) as loop,
+    ):
+        loop.wait_locked()
+        run_for(loop, 16.0)  # four times what the controllers' own filters take
+        found = true_differences(cell.segment)
+    assert len(found) == 6
+    assert max(map(abs, found.values())) < 50e-9
 
 
 def test_the_wake_up_takes_on_the_reference_clocks_rate() -> None:
