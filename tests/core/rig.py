@@ -27,7 +27,16 @@ from catenary.plan.cycle import (
 )
 from catenary.wire.datagram import Command, Datagram
 from catenary.wire.frame import decode_frame, encode_frame
-from tests.link_table import NOW, RECEIVE, SEND, WAIT_UNTIL, Table, capsule_of
+from tests.link_table import (
+    NOW,
+    RECEIVE,
+    REHEARSE,
+    REHEARSES,
+    SEND,
+    WAIT_UNTIL,
+    Table,
+    capsule_of,
+)
 
 MS = 1_000_000
 PERIOD = MS
@@ -36,6 +45,8 @@ DRIVE_SIZE = 13  # controlword, mode, velocity, position, torque; and back
 COUNTS = 1000.0  # per radian
 NM = 0.001  # of one count of torque
 LOGICAL = 0x10000
+
+TICK = 1_000  # [ns] a ticking clock goes on whenever it is read
 
 LINK_NAME = b"catenary.link"
 LAW_NAME = b"catenary.law"
@@ -93,6 +104,21 @@ class ScriptedLink:
             return 1
         self.time = max(self.time, deadline)
         return 0
+
+
+class TickingLink(ScriptedLink):
+    """Like a NIC: time passes by itself, and a way to send can be rehearsed."""
+
+    def __init__(self, answer: Callable[[bytes], Sequence[tuple[int, bytes]]]) -> None:
+        super().__init__(answer)
+        self.rehearsals: list[int] = []  # how many frames were sent before each
+        self.table.flags = REHEARSES
+        self.table.now = NOW(self.tick)
+        self.table.rehearse = REHEARSE(lambda _: self.rehearsals.append(len(self.sent)))
+
+    def tick(self, _) -> int:
+        self.time += TICK
+        return self.time
 
 
 STATUS = (0x0000, 0x0240, 0x0221, 0x0223, 0x1227, 0x0207, 0x021F, 0x0218)  # by CiA 402 state
@@ -298,12 +324,13 @@ class Bench:
 
     plan: CyclePlan
     drives: list[ScriptedDrive] = field(default_factory=list)
+    link_type: type[ScriptedLink] = ScriptedLink
 
     def __post_init__(self) -> None:
         count = len(self.plan.sync_units)
         self.drives = self.drives or [ScriptedDrive() for _ in range(count)]
         self.segment = Segment(self.drives)
-        self.link = ScriptedLink(self.segment.answer)
+        self.link = self.link_type(self.segment.answer)
         self.engine = Engine(self.plan, self.link.capsule)
         for name, buffer in self.engine.buffers.items():
             setattr(self, name, np.asarray(buffer))

@@ -1,40 +1,24 @@
 """Iteration and its Cycle; the lead of an inline cycle."""
 
-from collections.abc import Callable
-
 import pytest
 
 from catenary.core import CYCLE_OK, CYCLE_WORKING_COUNTER, Engine, Iteration
 from tests.core.rig import (
     MS,
-    NOW,
     PERIOD,
+    TICK,
     ScriptedDrive,
-    ScriptedLink,
     Segment,
+    TickingLink,
     axis,
     bench,
     make_plan,
 )
 
 LEAD = 60_000  # [ns]
-TICK = 1_000  # [ns] the clock goes on whenever it is read
 
 
-class TickingLink(ScriptedLink):
-    """Like a NIC: time passes by itself."""
-
-    def __init__(self, answer: Callable) -> None:
-        super().__init__(answer)
-        self.table.flags = 0
-        self.table.now = NOW(self.tick)
-
-    def tick(self, _) -> int:
-        self.time += TICK
-        return self.time
-
-
-def started(link: ScriptedLink, **more: object) -> Engine:
+def started(link: TickingLink, **more: object) -> Engine:
     engine = Engine(make_plan([axis(0)], order="inline", priority=None, **more), link.capsule)
     engine.start()
     return engine

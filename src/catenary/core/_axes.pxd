@@ -101,12 +101,16 @@ cdef struct axes_t:
     uint8_t refused
     uint8_t dropped            # since the last read
     uint32_t moving
+    axes_t *shadow
 
 cdef class Axes:
     """Owns the axis records and column tables."""
     cdef axes_t c
+    cdef axes_t shadow         # what a rehearsed write works on
+    cdef cat_image shadow_image
 
 cdef void axes_read(axes_t *x, actual_t *out, uint64_t number, int64_t instant) noexcept nogil
 cdef void axes_write(axes_t *x, const target_t *target, bint fresh) noexcept nogil
+cdef void axes_rehearse(const axes_t *x, const target_t *target) noexcept nogil
 cdef void axes_tell(const axes_t *x, actual_t *out) noexcept nogil
 cdef void axes_follow(const axes_t *x, const actual_t *actual, target_t *target) noexcept nogil

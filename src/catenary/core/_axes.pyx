@@ -9,6 +9,7 @@ drive is led to a state _cia402's. Budget: 60 ns an axis and direction.
 from libc.math cimport INFINITY, NAN, isfinite
 from libc.stdint cimport int8_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 from libc.stdlib cimport calloc, free
+from libc.string cimport memcpy
 
 from catenary.core._cia402 cimport (
     FAULT_REACTION_ACTIVE,
@@ -27,6 +28,7 @@ from catenary.core._guard cimport (
 from catenary.core._native cimport cat_load_acquire32
 from catenary.core._numbers cimport REAL as REAL_KIND
 from catenary.core._numbers cimport (
+    IMAGE_PADDING,
     make_number,
     number_bits,
     number_integer,
@@ -209,6 +211,18 @@ cdef void axes_write(axes_t *x, const target_t *target, bint fresh) noexcept nog
     write_columns(x, target)
 
 
+cdef void axes_rehearse(const axes_t *x, const target_t *target) noexcept nogil:
+    """A write to nowhere: what the next one needs is in the caches then."""
+    cdef axes_t *shadow = x.shadow
+    cdef axis_t *copies = shadow.axes
+    cdef cat_image *image = shadow.image
+    shadow[0] = x[0]
+    shadow.axes = copies
+    shadow.image = image
+    memcpy(copies, x.axes, x.axis_count * sizeof(axis_t))
+    axes_write(shadow, target, True)
+
+
 cdef void axes_tell(const axes_t *x, actual_t *out) noexcept nogil:
     """What was commanded by the last write, where the values of `axes_read` are already there."""
     cdef uint32_t i
@@ -263,6 +277,12 @@ cdef class Axes:
             raise MemoryError
         if plan.lost_limit < 1:
             raise ValueError(f"lost_limit: {plan.lost_limit}")
+        self.c.shadow = &self.shadow
+        self.shadow.axes = <axis_t *>calloc(len(plan.axes) + 1, sizeof(axis_t))
+        self.shadow.image = &self.shadow_image
+        self.shadow_image.outputs = <uint8_t *>calloc(plan.output_size + IMAGE_PADDING, 1)
+        if not (self.shadow.axes and self.shadow_image.outputs):
+            raise MemoryError
         self.c.period = plan.period_ns / 1e9
         self.c.lost_limit = min(plan.lost_limit, 0x7FFFFFFF)
         self.c.late_limit_position = cycles_of(
@@ -348,5 +368,7 @@ cdef class Axes:
 
     def __dealloc__(self):
         free(self.c.axes)
+        free(self.shadow.axes)
+        free(self.shadow_image.outputs)
         free(self.c.input_columns)
         free(self.c.output_columns)

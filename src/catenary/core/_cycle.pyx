@@ -20,11 +20,12 @@ from libc.errno cimport EINTR
 from libc.stdint cimport int32_t, int64_t, uint8_t, uint32_t, uint64_t
 from libc.string cimport memcpy, memset
 
-from catenary.core._axes cimport axes_follow, axes_read, axes_tell, axes_write
+from catenary.core._axes cimport axes_follow, axes_read, axes_rehearse, axes_tell, axes_write
 from catenary.core._clocks cimport clock_close
 from catenary.core._handover cimport (
     BEFORE_LAW,
     OF_LAW,
+    PRIVATE,
     actual_header_t,
     counts_t,
     handover_latch,
@@ -148,14 +149,23 @@ cdef void cycle_await_lane(cycle_t *c, int64_t until) noexcept nogil:
 
 cdef void cycle_prepare(cycle_t *c) noexcept nogil:
     """In the lead: takes the frames that have come back, so that only late ones are left for the
-    instant, and lets the law make a step that counts for nothing: caches."""
+    instant, and, where there is time, goes the way of the cycle once without effect: a step of the
+    law on scratch, its targets to outputs that are not sent. Then all of it is in the caches."""
     cdef target_t *scratch = &c.handover.target[BEFORE_LAW]
+    cdef target_t *target = &c.handover.target[OF_LAW if c.law != NULL else PRIVATE]
     cdef actual_t *actual = &c.handover.actual[c.handover.actual_triple.back]
+    cdef int64_t left
     c.image.collect(c.image.self, 0)
-    if c.law != NULL and 3 * (c.next - now(c)) > c.lead:
-        memcpy(scratch.header, c.handover.target[OF_LAW].header, c.handover.target_size)
+    left = c.next - now(c)
+    if 3 * left < c.lead:
+        return
+    memcpy(scratch.header, target.header, c.handover.target_size)
+    if c.law != NULL and 2 * c.process < left:  # a long step would be late; it is also warm sooner
         law_rehearse(c.law, actual, scratch, c.next)
-        c.image.collect(c.image.self, 0)
+    axes_rehearse(c.axes, scratch)
+    if c.image.rehearse != NULL:
+        c.image.rehearse(c.image.self)
+    c.image.collect(c.image.self, 0)
 
 
 cdef void cycle_open(cycle_t *c) noexcept nogil:

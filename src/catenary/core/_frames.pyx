@@ -19,10 +19,12 @@ from catenary.core._native cimport (
     CAT_FRAME_MIN,
     CAT_IMAGE_VERSION,
     CAT_LINK_CAPSULE,
+    CAT_LINK_REHEARSES,
     CAT_LINK_VERSION,
     CAT_LINK_VIRTUAL_TIME,
     cat_link,
 )
+from catenary.core._numbers cimport IMAGE_PADDING
 
 cdef enum:
     SOURCE = 6                 # offset of the source address
@@ -37,7 +39,6 @@ cdef enum:
     DRAIN_MAX = 256            # frames looked at in one collect: a flood cannot hold the cycle up
     EVERY_MAX = 10000
     MISSED_MAX = 1000000000
-    IMAGE_PADDING = 16         # numbers are read and written as whole words
 
 cdef enum:
     PROCESS_DATA = 0
@@ -60,12 +61,23 @@ cdef inline uint16_t counter_of(const datagram_t *d, const uint8_t *frame) noexc
 
 # ---- emit
 
+cdef inline void fill(frames_t *f, frame_t *frame) noexcept nogil:
+    """Index and outputs into a frame's template."""
+    cdef datagram_t *d
+    cdef copy_t *copy
+    cdef uint32_t k, m
+    for k in range(frame.first_datagram, frame.first_datagram + frame.datagram_count):
+        d = &f.datagrams[k]
+        frame.template[d.offset + 1] = frame.index
+        for m in range(d.first_output, d.first_output + d.output_count):
+            copy = &f.copies[m]
+            memcpy(frame.template + copy.frame_offset, f.outputs + copy.image_offset, copy.size)
+
+
 cdef int frames_emit(void *self) noexcept nogil:
     cdef frames_t *f = <frames_t *>self
     cdef frame_t *frame
-    cdef datagram_t *d
-    cdef copy_t *copy
-    cdef uint32_t i, k, m
+    cdef uint32_t i
     cdef int rc, first_error = 0
     f.serial += 1
     if f.serial == 0:  # which says: never sent
@@ -84,18 +96,22 @@ cdef int frames_emit(void *self) noexcept nogil:
         f.frame_of_index[f.next_index] = <uint8_t>i
         f.serial_of_index[f.next_index] = f.serial
         f.next_index = (f.next_index + 1) % INDEX_COUNT
-        for k in range(frame.first_datagram, frame.first_datagram + frame.datagram_count):
-            d = &f.datagrams[k]
-            frame.template[d.offset + 1] = frame.index
-            for m in range(d.first_output, d.first_output + d.output_count):
-                copy = &f.copies[m]
-                memcpy(frame.template + copy.frame_offset, f.outputs + copy.image_offset, copy.size)
+        fill(f, frame)
         rc = f.link.send(f.link.self, frame.template, frame.length)
         if rc < 0:
             f.counters.send_errors += 1
             if first_error == 0:
                 first_error = rc
     return first_error
+
+
+cdef void frames_rehearse(void *self) noexcept nogil:
+    cdef frames_t *f = <frames_t *>self
+    cdef uint32_t i
+    for i in range(f.frame_count):
+        fill(f, &f.frames[i])
+    if f.link.flags & CAT_LINK_REHEARSES:
+        f.link.rehearse(f.link.self)
 
 
 # ---- collect
@@ -509,6 +525,7 @@ cdef class Frames:
         self.c.image.emit = frames_emit
         self.c.image.collect = frames_collect
         self.c.image.drain = frames_drain
+        self.c.image.rehearse = frames_rehearse
 
     def __dealloc__(self):
         free(self.c.frames)

@@ -32,6 +32,7 @@ cdef extern from "link.h" nogil:
     const uint32_t CAT_LINK_VIRTUAL_TIME
     const uint32_t CAT_LINK_SHARED_TIME
     const uint32_t CAT_LINK_SPENDS
+    const uint32_t CAT_LINK_REHEARSES
 
     ctypedef struct cat_link:
         uint32_t version
@@ -42,6 +43,7 @@ cdef extern from "link.h" nogil:
         int64_t (*now)(void *self) noexcept nogil
         int (*wait_until)(void *self, int64_t deadline, int wake_on_frame) noexcept nogil
         int (*spend)(void *self, int64_t duration) noexcept nogil
+        void (*rehearse)(void *self) noexcept nogil
 
 
 cdef extern from "image.h" nogil:
@@ -67,6 +69,7 @@ cdef extern from "image.h" nogil:
         int (*emit)(void *self) noexcept nogil
         int (*collect)(void *self, int64_t deadline) noexcept nogil
         void (*drain)(void *self) noexcept nogil
+        void (*rehearse)(void *self) noexcept nogil
 
 
 cdef extern from "packet_ring.h" nogil:

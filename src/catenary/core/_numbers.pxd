@@ -8,6 +8,9 @@ from libc.stdint cimport int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 from libc.string cimport memcpy
 
 cdef enum:
+    IMAGE_PADDING = 16         # bytes behind an image: numbers are read and written as whole words
+
+cdef enum:
     UNSIGNED = 0
     SIGNED = 1
     REAL = 2

@@ -59,8 +59,8 @@ class Loop:
     WorkingCounterError. `stop_deadline` [s] for standing still when leaving. `watchdog` [s] of the
     devices' outputs. `lead` [s], of an inline loop and of laws: how long before each instant the
     thread wakes, to take what has come back and fetch what is needed next into the caches (costs
-    that much processor time a cycle); None: 50 us, at most a tenth of the period, when inline, and
-    none for laws. `raise_faults`: a drive in fault
+    that much processor time a cycle); None: 50 us, at most a tenth of the period; 0: a plain sleep.
+    `raise_faults`: a drive in fault
     raises DriveError; else see `Drives.faults`. `on_return`: what becomes of a device that no wish
     requires and that comes back: "restore", its start-up list is replayed and it goes to OP; or
     "hold", it stays in PRE-OP until `restore`. `on_replacement`: the same for another device of the
@@ -123,9 +123,7 @@ class Loop:
         self._lost_limit = lost_limit
         self._stop_deadline = stop_deadline
         self._watchdog = watchdog
-        self._lead = lead or 0.0
-        if lead is None and run == "inline":
-            self._lead = min(LEAD, LEAD_SHARE * period)
+        self._lead = min(LEAD, LEAD_SHARE * period) if lead is None else lead
         self._raise_faults = raise_faults
         for name, policy in (("on_return", on_return), ("on_replacement", on_replacement)):
             if policy not in ("restore", "hold"):

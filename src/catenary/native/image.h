@@ -12,7 +12,7 @@
 #include <stdint.h>
 
 #define CAT_IMAGE_CAPSULE "catenary.image"
-#define CAT_IMAGE_VERSION 2u
+#define CAT_IMAGE_VERSION 3u
 
 typedef struct cat_image {
     uint32_t version;                 /* CAT_IMAGE_VERSION */
@@ -43,6 +43,10 @@ typedef struct cat_image {
 
     /* Takes what has arrived, between two cycles: judges nothing, waits for nothing. */
     void (*drain)(void *self);
+
+    /* The way of an `emit` as far as it leads without a frame, for the caches' sake; NULL: there
+     * is none. Changes nothing that is sent. */
+    void (*rehearse)(void *self);
 } cat_image;
 
 #endif
