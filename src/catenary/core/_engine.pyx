@@ -276,7 +276,7 @@ cdef class Engine(Parts):
             self.interrupted(rc)
 
     cdef int native_cycle_here(self) noexcept nogil:
-        cdef int rc = cycle_wait(&self.e.cycle)
+        cdef int rc = wait_native(&self.e.cycle)
         if rc == 0:
             cycle_native(&self.e.cycle)
             handover_swap(self.h)
