@@ -40,7 +40,7 @@ def engine(request: pytest.FixtureRequest, link) -> Iterator[Engine]:
     engine.stop()
 
 
-def test_cycles_run_and_figures_are_kept(engine: Engine) -> None:
+def test_cycles_run_and_figures_are_kept(engine: Engine, request: pytest.FixtureRequest) -> None:
     assert engine.run(20) & CYCLE_OK
     numbers = []
     for _ in range(20):
@@ -51,7 +51,8 @@ def test_cycles_run_and_figures_are_kept(engine: Engine) -> None:
     engine.stop()
     counters = engine.counters
     assert counters["cycles"] >= 40
-    assert engine.histograms()["period"]["count"] == counters["cycles"] - 1
+    finished = counters["cycles"] - ("inline" in request.node.name)  # its last one waits for a body
+    assert engine.histograms()["period"]["count"] == finished - 1
     assert engine.scheduling.startswith("SCHED_")
 
 

@@ -85,6 +85,7 @@ cdef struct cycle_t:
     int64_t next               # instant to wait for
     int64_t scheduled          # instant of this cycle
     int64_t wake
+    int64_t interval           # since the last one; -1: none
     int64_t usable             # when Python had the inputs; 0: not known
     int64_t process            # of this cycle; -1: no application
     uint64_t number

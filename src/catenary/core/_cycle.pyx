@@ -102,6 +102,18 @@ cdef inline record_t *record_of(cycle_t *c) noexcept nogil:
     return &c.records[c.number % RECORDS]
 
 
+cdef void clear_next_record(cycle_t *c) noexcept nogil:
+    """Behind a cycle, and not at the head of the next one."""
+    cdef record_t *record = &c.records[(c.number + 1) % RECORDS]
+    memset(record, 0, sizeof(record_t))
+    record.period_ns = -1
+    record.receive_ns = -1
+    record.process_ns = -1
+    record.send_ns = -1
+    record.tail_ns = -1
+    record.round_trip_ns = -1
+
+
 cdef inline int32_t short_ns(int64_t value) noexcept nogil:
     return <int32_t>value if value < 0x7FFFFFFF else 0x7FFFFFFF
 
@@ -163,6 +175,7 @@ cdef void cycle_prepare(cycle_t *c) noexcept nogil:
     if c.law != NULL and 2 * c.process < left:  # a long step would be late; it is also warm sooner
         law_rehearse(c.law, actual, scratch, c.next)
     axes_rehearse(c.axes, scratch)
+    c.records[(c.number + 1) % RECORDS].wake_ns = 0  # fetched
     if c.image.rehearse != NULL:
         c.image.rehearse(c.image.self)
     c.image.collect(c.image.self, 0)
@@ -180,27 +193,21 @@ cdef void cycle_open(cycle_t *c) noexcept nogil:
 
 
 cdef void begin(cycle_t *c, int64_t wake) noexcept nogil:
+    """The inputs are waited for: only what must be said now. Figures follow in the tail."""
     cdef record_t *record
     c.number += 1
     c.scheduled = c.next
     c.next += c.period
     record = record_of(c)
-    memset(record, 0, sizeof(record_t))
     record.number = c.number
     record.scheduled_ns = c.scheduled
     record.wake_ns = wake
     record.skipped = c.skipped
-    record.period_ns = -1
-    record.receive_ns = -1
-    record.process_ns = -1
-    record.send_ns = -1
-    record.tail_ns = -1
-    record.round_trip_ns = -1
     record.lateness_ns = short_ns(wake - c.scheduled)
-    histogram_add(&c.histograms[LATENESS], wake - c.scheduled)
+    c.interval = -1
     if c.begun > 0:
-        record.period_ns = short_ns(wake - c.wake)
-        histogram_add(&c.histograms[PERIOD], wake - c.wake)
+        c.interval = wake - c.wake
+        record.period_ns = short_ns(c.interval)
     c.begun += 1
     c.wake = wake
     c.process = -1
@@ -307,6 +314,9 @@ cdef void tail(cycle_t *c, int64_t since) noexcept nogil:
     if c.number == 0:
         return
     record = record_of(c)
+    histogram_add(&h[LATENESS], c.wake - c.scheduled)
+    if c.interval >= 0:
+        histogram_add(&h[PERIOD], c.interval)
     if record.receive_ns >= 0:
         histogram_add(&h[RECEIVE], record.receive_ns)
     if record.send_ns >= 0:
@@ -321,6 +331,7 @@ cdef void tail(cycle_t *c, int64_t since) noexcept nogil:
     took = now(c) - since
     record.tail_ns = short_ns(took)
     histogram_add(&h[TAIL], took)
+    clear_next_record(c)
 
 
 # ---- orders
@@ -339,6 +350,7 @@ cdef void cycle_start(cycle_t *c, int64_t origin) noexcept nogil:
     c.skipped = 0
     c.usable = 0
     c.begun = 0
+    clear_next_record(c)
     if c.order == LAW:  # its first collect finds the frames of this
         emit(c, handover_latch(c.handover, &fresh), False)
 
