@@ -103,3 +103,12 @@ def measure_clocks(
     from catenary.bench import clocks
 
     return clocks.measure(devices=devices, minutes=minutes, jitter=jitter, seed=seed, file=file)
+
+
+def measure_networks(
+    *, rates: Sequence[int], seconds: float, rounds: int, file: Path | None = None
+) -> None:
+    """Prints what 18 + 15 axes on two networks lose, beside C programs under the same load."""
+    from catenary.bench import networks
+
+    networks.measure(rates=rates, seconds=seconds, rounds=rounds, file=file)

@@ -27,6 +27,7 @@ def add_parser(commands: Commands) -> None:
     _add_law(group)
     _add_soak(group)
     _add_clocks(group)
+    _add_networks(group)
 
 
 def _add_loop(group: Commands) -> None:
@@ -196,6 +197,24 @@ def _add_clocks(group: Commands) -> None:
     parser.set_defaults(run=run_clocks)
 
 
+def _add_networks(group: Commands) -> None:
+    parser = add_command(
+        group,
+        "networks",
+        help="18 + 15 axes on two networks, beside C",
+        description="Runs one loop over two networks, and two C programs on the same networks, in "
+        "turn: cycles lost, instants missed. Then the loop in virtual time.",
+        example="catenary bench networks --rates 4000,8000 --seconds 10 --json networks.json",
+    )
+    parser.add_argument("--rates", default="4000,8000", metavar="HZ,HZ", help="(4000,8000)")
+    parser.add_argument(
+        "--seconds", type=positive_seconds, default=10.0, metavar="S", help="of each (10)"
+    )
+    parser.add_argument("--rounds", type=positive_number, default=5, metavar="N", help="(5)")
+    _add_file(parser)
+    parser.set_defaults(run=run_networks)
+
+
 def _add_file(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there")
 
@@ -284,3 +303,16 @@ def run_clocks(arguments: argparse.Namespace) -> int:
         file=arguments.json,
     )
     return 0 if held else 1
+
+
+def run_networks(arguments: argparse.Namespace) -> int:
+    from catenary import bench
+
+    bench.enter_private_network()
+    bench.measure_networks(
+        rates=[positive_number(each) for each in arguments.rates.split(",")],
+        seconds=arguments.seconds,
+        rounds=arguments.rounds,
+        file=arguments.json,
+    )
+    return 0

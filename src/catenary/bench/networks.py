@@ -1,0 +1,236 @@
+"""`catenary bench networks`: 18 and 15 axes on two networks in one loop, beside two C programs under
+the same load; and the same loop in virtual time.
+
+Each network is a pair of interfaces with a segment of its own. The C programs run at once, one a
+network, as the native threads of the loop do; segments share one processor, masters the other.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+import catenary as cat
+from catenary.bench.job import PHASES, Body, Job, Nanoseconds
+from catenary.bench.loop import make_jobs, show_progress, write
+from catenary.bench.report import machine
+from catenary.bench.rounds import BRING_UP_SECONDS, RoundError, run_round
+from catenary.bench.segment import COUNTS_PER_TURN, make_segment, served
+from catenary.realtime import VirtualClock
+from catenary.realtime.child import start_python
+
+DRIVES = (18, 15)  # of the published humanoid's upper and lower network
+OURS, C = "catenary", "c"
+LATENESS = PHASES.index("lateness")
+
+
+@dataclass(frozen=True, slots=True)
+class Tally:
+    """What one network came to, over all rounds."""
+
+    name: str
+    network: int
+    cycles: int
+    lost: int
+    late: int  # instants that passed without a cycle, or cycles begun a period too late
+    lateness_us: dict[str, float]  # p50, p99, max
+
+
+@dataclass(frozen=True, slots=True)
+class NetworkRound:
+    """One network in one round of the loop."""
+
+    lost: int
+    late: int
+    lateness_ns: list[int]
+
+
+def measure(*, rates: Sequence[int], seconds: float, rounds: int, file: Path | None) -> None:
+    print(machine())
+    found: dict[str, object] = {"machine": machine(), "drives": DRIVES}
+    for rate in rates:
+        tallies = on_wires(rate, seconds, rounds)
+        virtual = in_virtual_time(rate, seconds)
+        print(f"\n{' + '.join(map(str, DRIVES))} axes at {rate} Hz\n{as_text(tallies)}")
+        print(f"  in virtual time: {virtual[0]} cycles on each, {virtual[1]} not complete")
+        found[str(rate)] = {
+            "runs": [asdict(tally) for tally in tallies],
+            "virtual": {"cycles": virtual[0], "incomplete": virtual[1]},
+        }
+    write(file, found)
+
+
+def on_wires(rate: int, seconds: float, rounds: int) -> list[Tally]:
+    """Catenary's loop and the C programs in turn, round by round."""
+    cycles = round(seconds * rate / rounds)
+    with contextlib.ExitStack() as stack:
+        segments = [stack.enter_context(served(drives)) for drives in DRIVES]
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="catenary-bench-")))
+        jobs = [make_jobs([C], one, rate, cycles, Body.SINE, spin=False)[0] for one in segments]
+        ours: list[list[NetworkRound]] = []
+        theirs: list[list[NetworkRound]] = []
+        for number in range(rounds):
+            show_progress(OURS, number + 1, rounds)
+            ours.append(run_ours(jobs))
+            show_progress(C, number + 1, rounds)
+            theirs.append(run_c(jobs, folder))
+    return [*tally(OURS, cycles, ours), *tally(C, cycles, theirs)]
+
+
+def run_c(jobs: Sequence[Job], folder: Path) -> list[NetworkRound]:
+    """One program for each network, at the same time."""
+    places = [folder / str(number) for number in range(len(jobs))]
+    for place in places:
+        place.mkdir(exist_ok=True)
+    with ThreadPoolExecutor(len(jobs)) as pool:
+        rounds = list(pool.map(run_round, jobs, places))
+    return [of_samples(each.lost, each.samples, jobs[0].period_ns) for each in rounds]
+
+
+def of_samples(lost: int, samples: Nanoseconds, period_ns: int) -> NetworkRound:
+    lateness = samples[:, LATENESS]
+    late = int((np.maximum(lateness, 0) // period_ns).sum())
+    return NetworkRound(lost, late, lateness.tolist())
+
+
+def run_ours(jobs: Sequence[Job]) -> list[NetworkRound]:
+    """The loop over all networks, in a process of its own like the C programs."""
+    arguments = ["-m", "catenary.bench.networks", msgspec.json.encode(jobs).decode()]
+    seconds = BRING_UP_SECONDS + (jobs[0].warm_up + jobs[0].cycles) * jobs[0].period_ns * 1e-9
+    with start_python(arguments) as worker:
+        said = worker.read_line(seconds)
+    if said is None or not said.startswith("["):
+        raise RoundError(f"the loop over {len(jobs)} networks failed: {said or 'it said nothing'}")
+    return msgspec.json.decode(said, type=list[NetworkRound])
+
+
+def tally(name: str, cycles: int, rounds: Sequence[Sequence[NetworkRound]]) -> Iterator[Tally]:
+    for network, mine in enumerate(zip(*rounds, strict=True)):
+        lateness = np.concatenate([each.lateness_ns for each in mine]) * 1e-3
+        p50, p99 = np.percentile(lateness, [50.0, 99.0])
+        yield Tally(
+            name=name,
+            network=network,
+            cycles=cycles * len(rounds),
+            lost=sum(each.lost for each in mine),
+            late=sum(each.late for each in mine),
+            lateness_us={
+                "p50": round(float(p50), 2),
+                "p99": round(float(p99), 2),
+                "max": round(float(lateness.max()), 2),
+            },
+        )
+
+
+def as_text(tallies: Sequence[Tally]) -> str:
+    lines = [f"  {'':10}{'network':>8}{'cycles':>9}{'lost':>7}{'late':>7}{'lateness [us] p50, p99, max':>32}"]
+    for each in tallies:
+        lateness = "".join(f"{value:10.1f}" for value in each.lateness_us.values())
+        lines.append(
+            f"  {each.name:10}{each.network:8d}{each.cycles:9d}{each.lost:7d}{each.late:7d}  {lateness}"
+        )
+    return "\n".join(lines)
+
+
+def in_virtual_time(rate: int, seconds: float) -> tuple[int, int]:
+    """Cycles of the loop, and how many were not complete on some network."""
+    incomplete = 0
+    cycles = round(seconds * rate)
+    with VirtualClock() as clock, contextlib.ExitStack() as stack:
+        segments = [make_segment(drives, clock=clock) for drives in DRIVES]
+        mains = [stack.enter_context(cat.MainDevice(segment)) for segment in segments]
+        bodies = [
+            cat.Drives(main.scan().drives, mode="csp", counts_per_turn=COUNTS_PER_TURN)
+            for main in mains
+        ]
+        loop = stack.enter_context(cat.Loop(*bodies, period=1 / rate))
+        for cycle in loop:
+            incomplete += not cycle.ok
+            follow(bodies, cycle.time)
+            if cycle.number + 1 >= cycles:
+                break
+    return cycles, incomplete
+
+
+def follow(bodies: Sequence[cat.Drives], t: float) -> None:
+    for body in bodies:
+        body.target.position[:] = 0.1 * np.sin(np.pi * t)
+
+
+# ---- the process of one round
+
+
+def main(arguments: Sequence[str]) -> None:
+    jobs = msgspec.json.decode(arguments[0], type=list[Job])
+    print(msgspec.json.encode(run_loop(jobs)).decode(), flush=True)
+
+
+def run_loop(jobs: Sequence[Job]) -> list[NetworkRound]:
+    first = jobs[0]
+    with contextlib.ExitStack() as stack:
+        mains = [stack.enter_context(cat.MainDevice(job.interface)) for job in jobs]
+        bodies = [
+            cat.Drives(main.scan().drives, mode="csp", counts_per_turn=COUNTS_PER_TURN)
+            for main in mains
+        ]
+        loop = stack.enter_context(
+            cat.Loop(
+                *bodies,
+                period=first.period_ns * 1e-9,
+                cpu=None if first.cpu is None else [first.cpu] * len(jobs),
+                priority=first.priority,
+                lost_limit=1000,
+                late_limit=0.0,
+            )
+        )
+        return follow_and_count(loop, bodies, first)
+
+
+def follow_and_count(loop: cat.Loop, bodies: Sequence[cat.Drives], job: Job) -> list[NetworkRound]:
+    """Counted from the end of the warm-up; lateness from each network's log, read as it fills."""
+    networks = loop.networks  # type: ignore[attr-defined]
+    before = [network.timing.counters for network in networks]
+    rows: list[list[np.ndarray]] = [[] for _ in networks]
+    for cycle in loop:
+        follow(bodies, cycle.time)
+        if cycle.number == job.warm_up:
+            before = [network.timing.counters for network in networks]
+        elif cycle.number > job.warm_up and cycle.number % 500 == 0:
+            take(rows, networks)
+        if cycle.number >= job.warm_up + job.cycles:
+            break
+    take(rows, networks)
+    return [
+        NetworkRound(
+            lost=after["lost"] - then["lost"],
+            late=after["late"] - then["late"],
+            lateness_ns=lateness_of(mine, job.cycles),
+        )
+        for mine, then, after in zip(
+            rows, before, (network.timing.counters for network in networks), strict=True
+        )
+    ]
+
+
+def take(rows: list[list[np.ndarray]], networks: Sequence[cat.Loop]) -> None:
+    for mine, network in zip(rows, networks, strict=True):
+        mine.append(network.log[["number", "lateness_ns"]].copy())
+
+
+def lateness_of(logs: Sequence[np.ndarray], cycles: int) -> list[int]:
+    """Of each cycle once, the last ones."""
+    together = np.concatenate(logs)
+    _, first = np.unique(together["number"], return_index=True)
+    return together["lateness_ns"][first][-cycles:].astype(int).tolist()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,49 @@
+"""Two networks beside C: what is made of the rounds, and a short round of each on real wires."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from catenary.bench import networks
+from catenary.bench.job import PHASES
+from catenary.bench.networks import NetworkRound, lateness_of, of_samples, tally
+
+
+def test_a_cycle_begun_periods_late_counts_each_instant_it_missed() -> None:
+    samples = np.zeros((4, len(PHASES)), dtype=np.int64)
+    samples[:, PHASES.index("lateness")] = [-5, 200_000, 250_000, 1_000_000]
+    assert of_samples(2, samples, 250_000) == NetworkRound(2, 5, [-5, 200_000, 250_000, 1_000_000])
+
+
+def test_the_networks_are_tallied_apart() -> None:
+    rounds = [
+        [NetworkRound(1, 0, [1000, 2000]), NetworkRound(0, 3, [4000])],
+        [NetworkRound(1, 1, [3000]), NetworkRound(0, 0, [4000])],
+    ]
+    first, second = tally("x", 2, rounds)
+    assert (first.lost, first.late, first.cycles, first.lateness_us["p50"]) == (2, 1, 4, 2.0)
+    assert (second.network, second.lost, second.late, second.lateness_us["max"]) == (1, 0, 3, 4.0)
+
+
+def test_logs_that_overlap_count_a_cycle_once() -> None:
+    log = np.array([(n, 10 * n) for n in range(6)], dtype=[("number", "u8"), ("lateness_ns", "i4")])
+    assert lateness_of([log[:4], log[2:]], 5) == [10, 20, 30, 40, 50]
+
+
+def test_virtual_networks_are_complete() -> None:
+    assert networks.in_virtual_time(8000, 0.05) == (400, 0)
+
+
+@pytest.mark.wire
+def test_both_run_on_wires() -> None:
+    ours_and_c = networks.on_wires(500, 0.2, 1)
+    assert [(each.name, each.network) for each in ours_and_c] == [
+        ("catenary", 0),
+        ("catenary", 1),
+        ("c", 0),
+        ("c", 1),
+    ]
+    for each in ours_and_c:
+        assert each.cycles == 100
+        assert each.lost < each.cycles / 2  # they do exchange; how well is not for a test
