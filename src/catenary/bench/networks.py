@@ -1,5 +1,5 @@
-"""`catenary bench networks`: 18 and 15 axes on two networks in one loop, beside two C programs under
-the same load; and the same loop in virtual time.
+"""`catenary bench networks`: 18 and 15 axes on two networks in one loop, beside two C programs
+under the same load; and the same loop in virtual time.
 
 Each network is a pair of interfaces with a segment of its own. The C programs run at once, one a
 network, as the native threads of the loop do; segments share one processor, masters the other.
@@ -131,11 +131,15 @@ def tally(name: str, cycles: int, rounds: Sequence[Sequence[NetworkRound]]) -> I
 
 
 def as_text(tallies: Sequence[Tally]) -> str:
-    lines = [f"  {'':10}{'network':>8}{'cycles':>9}{'lost':>7}{'late':>7}{'lateness [us] p50, p99, max':>32}"]
+    lines = [
+        f"  {'':10}{'network':>8}{'cycles':>9}{'lost':>7}{'late':>7}"
+        f"{'lateness [us] p50, p99, max':>32}"
+    ]
     for each in tallies:
         lateness = "".join(f"{value:10.1f}" for value in each.lateness_us.values())
         lines.append(
-            f"  {each.name:10}{each.network:8d}{each.cycles:9d}{each.lost:7d}{each.late:7d}  {lateness}"
+            f"  {each.name:10}{each.network:8d}{each.cycles:9d}{each.lost:7d}{each.late:7d}"
+            f"  {lateness}"
         )
     return "\n".join(lines)
 
@@ -229,7 +233,7 @@ def lateness_of(logs: Sequence[np.ndarray], cycles: int) -> list[int]:
     """Of each cycle once, the last ones."""
     together = np.concatenate(logs)
     _, first = np.unique(together["number"], return_index=True)
-    return together["lateness_ns"][first][-cycles:].astype(int).tolist()
+    return [int(lateness) for lateness in together["lateness_ns"][first][-cycles:]]
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from catenary.errors import LinkError
+from catenary.realtime import VirtualClock
 from catenary.realtime.child import start_python
 from catenary.realtime.private_network import veth_pair
 from catenary.realtime.scheduling import request_scheduling
@@ -49,7 +50,7 @@ def make_segment(
     inputs: int = 0,
     *,
     axes: int = 1,
-    clock: Literal["virtual", "monotonic"] = "monotonic",
+    clock: Literal["virtual", "monotonic"] | VirtualClock = "monotonic",
 ) -> Segment:
     """A coupler, `drives` servos of `axes` axes each, and `inputs` terminals of analogue inputs:
     bytes without axes."""

@@ -52,7 +52,7 @@ class ErrorWatch:
         except ResponseTimeout:  # too many frames are lost just now: the cycle tells that
             return ()
         before, self._last = self._last, totals
-        if not before:
+        if not before or totals == before:
             return ()
         counters, restarted = counted_since(totals, before)
         return judge(Observation(self.topology, self.names, counters, restarted))

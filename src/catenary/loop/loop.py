@@ -73,7 +73,9 @@ class Loop:
     of the period when threaded, 50 % when inline. `burst`: frames that bring the clocks together
     before the cycle begins.
 
-    `cpu` and `priority` (SCHED_FIFO) of the native thread; None: as they are.
+    `cpu` and `priority` (SCHED_FIFO) of the native thread; None: as they are. With wishes on
+    several MainDevices (docs/networks.md) `cpu` is a sequence, one for each network, and `quorum`
+    says how many of them must be good for a cycle to be; None: all.
     """
 
     def __new__(cls, *wishes: DeviceWish, **options: Any) -> Loop:
@@ -104,7 +106,8 @@ class Loop:
         reference: SubDevice | None = None,
         margin: float | None = None,
         burst: int = BURST,
-        cpu: int | None = None,
+        cpu: int | Sequence[int] | None = None,
+        quorum: int | None = None,
         priority: int | None = 80,
     ) -> None:
         if run not in ("threaded", "inline"):
@@ -135,6 +138,10 @@ class Loop:
         self._reference = reference
         self._margin = margin
         self._burst = burst
+        if quorum not in (None, 1):
+            raise ValueError(f"quorum={quorum}: there is one network")
+        if cpu is not None and not isinstance(cpu, int):
+            raise ValueError(f"cpu={cpu}: one network has one thread, on one CPU")
         self._cpu = cpu
         self._priority = priority
         self._guard = SignalGuard((Loop.__exit__.__code__, Loop._leave.__code__))

@@ -102,6 +102,7 @@ class Watch:
         self._ring = (
             None if ring is None else RingWatch(ring, len(self._charges), tell=self._tell, now=now)
         )
+        self._unsettled = False  # somebody is not running, as of the last look
         self._strangers: set[tuple[int, Identity]] = set()
 
     def run(self) -> Procedure[None]:
@@ -109,8 +110,9 @@ class Watch:
         while True:
             if self._ring is not None:
                 self._ring.look()
-            if self._disturbed() or any(c.standing is not Standing.RUNNING for c in self._charges):
+            if self._disturbed() or self._unsettled:
                 yield from self._look()
+                self._unsettled = any(c.standing is not Standing.RUNNING for c in self._charges)
             yield after(LOOK)
 
     @property
