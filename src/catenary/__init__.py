@@ -19,7 +19,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from catenary import realtime, types
+    from catenary import control, realtime, types
     from catenary.bus import SubDevice
     from catenary.bus import event as events
     from catenary.drive import DC, Drives, Inputs, Outputs
@@ -53,6 +53,7 @@ __all__ = [
     "Segment",
     "Servo",
     "SubDevice",
+    "control",
     "events",
     "law",
     "realtime",
@@ -76,7 +77,7 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> object:
-    if name in ("errors", "realtime", "types"):
+    if name in ("control", "errors", "realtime", "types"):
         return import_module(f"catenary.{name}")
     if name == "events":
         return import_module("catenary.bus.event")

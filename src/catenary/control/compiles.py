@@ -1,0 +1,41 @@
+"""Which functions of this package Numba compiles inside a law, and how Numba learns of them.
+
+Numba asks for them when it compiles for the first time in a process (its entry point
+`numba_extensions`, named in pyproject.toml): `import catenary.control` costs no Numba, and without
+Numba they are plain functions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any, ParamSpec, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+Row = npt.NDArray[np.float64]
+"""A flat row of float64: a law's memory, its parameters, or a part of them."""
+
+MODULES = ("parts", "pid", "cascade", "dynamics")
+MARK = "__catenary_compiles__"
+
+
+def compiles(function: Callable[P, R]) -> Callable[P, R]:
+    """Marks a function that laws may call: numbers and rows in, no allocation, nothing hidden."""
+    setattr(function, MARK, True)
+    return function
+
+
+def register() -> None:
+    """Called by Numba, once a process: tells it the functions that are marked."""
+    extending: Any = import_module("numba.extending")
+    import_module("catenary.control.pointers_compiled")
+    for name in MODULES:
+        module = import_module(f"catenary.control.{name}")
+        for value in vars(module).values():
+            if getattr(value, MARK, False) and value.__module__ == module.__name__:
+                extending.register_jitable(value)

@@ -1,0 +1,63 @@
+"""Rows of numbers of several blocks in one: a law has one memory and one row of parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from catenary.control.compiles import Row, compiles
+
+PerAxis = float | Sequence[float] | npt.NDArray[np.float64]
+"""One value for all axes, or one for each."""
+
+
+def join(*parts: Sequence[float] | Row) -> Row:
+    """One row of several, each found again by `part(row, k)`. Parts may be empty."""
+    rows = [np.asarray(part, dtype=np.float64).ravel() for part in parts]
+    first = len(rows) + 2  # count, where each begins, the end
+    begins = first + np.cumsum([0, *map(len, rows)])
+    return np.concatenate([[len(rows)], begins, *rows]).astype(np.float64)
+
+
+@compiles
+def part(row: Row, k: int) -> Row:
+    """Part `k` of a row made by `join`: a view, in a law too."""
+    if k < 0 or k >= row[0]:
+        raise IndexError("the row has no such part: see control.join")
+    return row[int(row[1 + k]) : int(row[2 + k])]
+
+
+@compiles
+def restart(memory: Row, i: int, n: int) -> None:
+    """Lets the block whose memory this is begin anew for axis `i` of `n`, as for an axis that is
+    not enabled: integrators empty, filters at their next input."""
+    width = len(memory) // n
+    for k in range(i * width, (i + 1) * width):
+        memory[k] = 0.0
+
+
+def checked(name: str, value: PerAxis, n: int, *, least: float = 0.0, above: bool = False) -> Row:
+    """(n,) one number for each axis. ValueError names the option and the axis: another number of
+    them, NaN, or below `least` (`above`: or equal)."""
+    row = np.array(value, dtype=np.float64)
+    if row.ndim > 1 or row.size not in (1, n):
+        raise ValueError(f"{name}: one value, or one for each of {n} axes, not {row.shape}")
+    row = np.array(np.broadcast_to(row, (n,)))
+    for i, number in enumerate(row.tolist()):
+        if not (number > least if above else number >= least):
+            bound = "above" if above else "at least"
+            raise ValueError(f"{name} of axis {i}: {number}, must be {bound} {least}")
+    return row
+
+
+def axis_count(axes: int) -> int:
+    if axes < 1:
+        raise ValueError(f"axes={axes}: at least one")
+    return axes
+
+
+def table(kind: float, *columns: Row) -> Row:
+    """A block's parameters: its kind, then one line of numbers for each axis."""
+    return np.concatenate([[kind], np.column_stack(columns).ravel()])

@@ -1,0 +1,216 @@
+"""Trajectories within limits of velocity, acceleration and jerk, by ruckig."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from catenary.control.compiles import Row
+from catenary.control.parts import PerAxis, checked
+from catenary.errors import ConfigurationError
+
+Rows = npt.NDArray[np.float64]
+Vector = Sequence[float] | Row
+
+SLACK = 1e-9  # of a limit: what rounding may take
+
+
+@dataclass(frozen=True, slots=True)
+class MotionLimits:
+    """What no sample exceeds; each one value for all axes, or one for each. [rad/s], [rad/s²],
+    [rad/s³], [rad]."""
+
+    velocity: PerAxis
+    acceleration: PerAxis
+    jerk: PerAxis
+    position_min: PerAxis = -math.inf
+    position_max: PerAxis = math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class MotionState:
+    """Where a motion begins when the axes do not stand: (n,) [rad], [rad/s], [rad/s²]."""
+
+    position: Vector
+    velocity: Vector
+    acceleration: Vector | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Trajectory:
+    """A motion as rows, one a period: `time` (k,) [s], from one period on; `position`, `velocity`,
+    `acceleration` (k, n) [rad], [rad/s], [rad/s²]. The last row is the goal, at rest. `duration`
+    [s] is that of the motion, which ends within the last period."""
+
+    time: Row
+    position: Rows
+    velocity: Rows
+    acceleration: Rows
+    duration: float
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+
+def trajectory(
+    start: Vector | MotionState,
+    goal: Vector | Sequence[Vector],
+    limits: MotionLimits,
+    period: float,
+) -> Trajectory:
+    """The fastest motion from `start` (n,) [rad] to rest at `goal` (n,), all axes arriving
+    together, sampled every `period` [s]. Several goals (m, n): one after the other, at rest in
+    each.
+
+    ValueError names the axis and the limit: a goal outside them, a start beyond them or that cannot
+    stop within them, NaN. Needs ruckig: pip install 'catenary[traj]'.
+
+    Source: Berscheid and Kröger, Jerk-limited real-time trajectory generation with arbitrary target
+    states, RSS 2021.
+    """
+    if not period > 0 or math.isinf(period):
+        raise ValueError(f"period={period} s: must be positive")
+    ruckig = _ruckig()
+    first = start if isinstance(start, MotionState) else MotionState(start, np.zeros(len(start)))
+    q, v, a = _begin(first)
+    bounds = _Bounds.of(limits, len(q))
+    bounds.check_start(q, v, a)
+    goals = np.array(goal, dtype=np.float64)
+    goals = goals[None] if goals.ndim == 1 else goals
+    if goals.ndim != 2 or goals.shape[1] != len(q) or not len(goals):
+        raise ValueError(f"goal: {len(q)} numbers, or rows of them, not the shape {goals.shape}")
+    for row in goals:
+        bounds.check_goal(row)
+    rest = np.zeros(len(q))
+    stages = [(q, v, a), *((row, rest, rest) for row in goals)]
+    pieces = [_piece(ruckig, begin, end[0], bounds) for begin, end in pairwise(stages)]
+    return _sampled(pieces, goals[-1], period)
+
+
+@dataclass(frozen=True, slots=True)
+class _Bounds:
+    velocity: Row
+    acceleration: Row
+    jerk: Row
+    position_min: Row
+    position_max: Row
+
+    @classmethod
+    def of(cls, limits: MotionLimits, n: int) -> _Bounds:
+        rates = [
+            checked(name, getattr(limits, name), n, above=True)
+            for name in ("velocity", "acceleration", "jerk")
+        ]
+        for name, row in zip(("velocity", "acceleration", "jerk"), rates, strict=True):
+            _raise_first(name, row, np.isinf(row), "must be finite")
+        low, high = (
+            checked(name, getattr(limits, name), n, least=-math.inf)
+            for name in ("position_min", "position_max")
+        )
+        _raise_first("position_min", low, low >= high, "is not below position_max")
+        velocity, acceleration, jerk = rates
+        return cls(velocity, acceleration, jerk, low, high)
+
+    def check_start(self, q: Row, v: Row, a: Row) -> None:
+        self._check_position("start", q)
+        _raise_first("start: velocity", v, abs(v) > self.velocity * (1 + SLACK), self.velocity)
+        most = self.acceleration
+        _raise_first("start: acceleration", a, abs(a) > most * (1 + SLACK), most)
+        # while the acceleration goes to zero the velocity goes on: v + a |a| / (2 j)
+        ahead = v + a * abs(a) / (2 * self.jerk)
+        what = "start: velocity once its acceleration has ended"
+        _raise_first(what, ahead, abs(ahead) > self.velocity * (1 + SLACK), self.velocity)
+
+    def check_goal(self, q: Row) -> None:
+        _raise_first("goal", q, ~np.isfinite(q), "must be finite")
+        self._check_position("goal", q)
+
+    def check_way(self, lowest: Row, highest: Row) -> None:
+        """ValueError: the motion has to pass a position limit."""
+        self._check_position("the way there: its lowest position", lowest)
+        self._check_position("the way there: its highest position", highest)
+
+    def _check_position(self, what: str, q: Row) -> None:
+        for name, row, sign in (
+            ("position_min", self.position_min, -1.0),
+            ("position_max", self.position_max, 1.0),
+        ):
+            beyond = sign * (q - row) > SLACK * np.maximum(1.0, abs(np.nan_to_num(row)))
+            _raise_first(what, q, beyond, row, name)
+
+
+def _raise_first(what: str, row: Row, wrong: npt.NDArray[np.bool_], *why: object) -> None:
+    """ValueError for the first axis that is wrong."""
+    for i in np.flatnonzero(wrong).tolist():
+        limit, name = why[0], why[1] if len(why) > 1 else "limit"
+        said = limit if isinstance(limit, str) else f"beyond its {name} {np.asarray(limit)[i]:g}"
+        raise ValueError(f"{what} of axis {i}: {row[i]:g} {said}")
+
+
+def _begin(state: MotionState) -> tuple[Row, Row, Row]:
+    q = np.array(state.position, dtype=np.float64)
+    if q.ndim != 1 or not q.size:
+        raise ValueError(f"start: one number for each axis, not the shape {q.shape}")
+    rows = [q]
+    for name in ("velocity", "acceleration"):
+        given = getattr(state, name)
+        row = np.zeros(len(q)) if given is None else np.array(given, dtype=np.float64)
+        if row.shape != q.shape:
+            raise ValueError(f"start: {name}: {len(q)} numbers, not the shape {row.shape}")
+        rows.append(row)
+    for name, row in zip(("position", "velocity", "acceleration"), rows, strict=True):
+        _raise_first(f"start: {name}", row, ~np.isfinite(row), "must be finite")
+    return rows[0], rows[1], rows[2]
+
+
+def _ruckig() -> Any:
+    try:
+        return import_module("ruckig")
+    except ImportError as error:
+        raise ConfigurationError(
+            "trajectories are made by ruckig, which is not installed",
+            hint="pip install 'catenary[traj]'",
+        ) from error
+
+
+def _piece(ruckig: Any, begin: tuple[Row, Row, Row], goal: Row, bounds: _Bounds) -> Any:
+    """ruckig's trajectory from one state to rest."""
+    n = len(goal)
+    wanted = ruckig.InputParameter(n)
+    q, v, a = begin
+    wanted.current_position, wanted.current_velocity = q.tolist(), v.tolist()
+    wanted.current_acceleration = a.tolist()
+    wanted.target_position = goal.tolist()
+    wanted.max_velocity = bounds.velocity.tolist()
+    wanted.max_acceleration = bounds.acceleration.tolist()
+    wanted.max_jerk = bounds.jerk.tolist()
+    piece = ruckig.Trajectory(n)
+    result = ruckig.Ruckig(n).calculate(wanted, piece)
+    if result not in (ruckig.Result.Working, ruckig.Result.Finished):
+        raise ValueError(f"no motion from {q} to {goal}: ruckig says {result}")
+    extremes = piece.position_extrema
+    bounds.check_way(
+        np.array([axis.min for axis in extremes]), np.array([axis.max for axis in extremes])
+    )
+    return piece
+
+
+def _sampled(pieces: Sequence[Any], goal: Row, period: float) -> Trajectory:
+    ends = np.cumsum([piece.duration for piece in pieces])
+    duration = float(ends[-1])
+    count = max(1, math.ceil(duration / period - SLACK))
+    rows = np.empty((count, 3, len(goal)))
+    for k in range(count - 1):
+        now = (k + 1) * period
+        which = int(np.searchsorted(ends, now))
+        rows[k] = pieces[which].at_time(now - (ends[which] - pieces[which].duration))[:3]
+    rows[-1] = goal, np.zeros(len(goal)), np.zeros(len(goal))
+    time = period * np.arange(1, count + 1, dtype=np.float64)
+    return Trajectory(time, rows[:, 0], rows[:, 1], rows[:, 2], duration)

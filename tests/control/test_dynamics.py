@@ -1,0 +1,122 @@
+"""Gravity and inverse dynamics: against a pendulum's formula and MuJoCo's own Python."""
+
+import math
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from catenary import control
+from catenary.errors import ConfigurationError
+from tests.control.arm import PENDULUM, THREE
+
+JOINTS = ["turn", "shoulder", "elbow"]
+
+
+@pytest.fixture
+def three(tmp_path: Path) -> Path:
+    path = tmp_path / "three.xml"
+    path.write_text(THREE)
+    return path
+
+
+@pytest.fixture
+def pendulum(tmp_path: Path) -> control.Dynamics:
+    path = tmp_path / "pendulum.xml"
+    path.write_text(PENDULUM)
+    return control.Dynamics(path)
+
+
+def test_a_pendulums_gravity_is_m_g_l_sin(pendulum: control.Dynamics) -> None:
+    for angle in np.linspace(-4, 4, 17):
+        assert pendulum.gravity([angle])[0] == pytest.approx(2 * 9.81 * 0.5 * math.sin(angle))
+
+
+def test_a_pendulums_inverse_dynamics(pendulum: control.Dynamics) -> None:
+    """(m l² + I + armature) q̈ + b q̇ + m g l sin q"""
+    q, v, a = 0.7, -1.3, 4.0
+    expected = (2 * 0.25 + 0.01 + 0.05) * a + 0.3 * v + 2 * 9.81 * 0.5 * math.sin(q)
+    assert pendulum.inverse([q], [v], [a])[0] == pytest.approx(expected)
+
+
+def oracle(path: Path, order: list[str], q, v, a) -> np.ndarray:
+    """MuJoCo's own: M q̈ + bias, from functions that ours does not call."""
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    degrees = [model.joint(name).dofadr[0] for name in order]
+    data.qpos[[model.joint(name).qposadr[0] for name in order]] = q
+    data.qvel[degrees] = v
+    mujoco.mj_forward(model, data)
+    mass = np.zeros((model.nv, model.nv))
+    for k in range(model.nv):
+        column, unit = np.zeros(model.nv), np.eye(model.nv)[k]
+        mujoco.mj_mulM(model, data, column, unit)
+        mass[:, k] = column
+    acceleration = np.zeros(model.nv)
+    acceleration[degrees] = a
+    return (mass @ acceleration + data.qfrc_bias)[degrees]
+
+
+@pytest.mark.parametrize("order", [JOINTS, JOINTS[::-1], ["elbow", "turn", "shoulder"]])
+def test_joints_in_the_axes_order(three: Path, order: list[str]) -> None:
+    dynamics = control.Dynamics(three, joints=order, axes=3)
+    assert dynamics.joints == tuple(order)
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        q, v, a = rng.uniform(-3, 3, (3, 3))  # beyond the shoulder's range too
+        expected = oracle(three, order, q, v, a)
+        assert dynamics.inverse(q, v, a) == pytest.approx(expected, abs=1e-9)
+        still = np.zeros(3)
+        assert dynamics.gravity(q) == pytest.approx(oracle(three, order, q, still, still))
+
+
+def test_gravity_does_not_remember_a_motion(three: Path) -> None:
+    dynamics = control.Dynamics(three, joints=JOINTS)
+    q = [0.1, 0.2, 0.3]
+    before = dynamics.gravity(q)
+    dynamics.inverse([1, 1, 1], [5, 5, 5], [9, 9, 9])
+    assert dynamics.gravity(q).tolist() == before.tolist()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"joints": ["turn", "wrist"]}, r"no joint 'wrist'\n.*it has turn, shoulder, elbow, ball"),
+        ({"joints": ["turn", "turn"]}, "joint 'turn' is named twice"),
+        ({}, "joint 'ball' is neither hinge nor slide"),
+        ({"joints": JOINTS, "axes": 6}, r"3 joints \(turn, shoulder, elbow\) for 6 axes"),
+        ({"joints": []}, "no joints"),
+    ],
+)
+def test_joints_that_do_not_match_are_named(three: Path, options: dict, message: str) -> None:
+    with pytest.raises(ConfigurationError, match=message):
+        control.Dynamics(three, **options)
+
+
+def test_a_file_that_is_not_there_or_no_model(tmp_path: Path) -> None:
+    with pytest.raises(ConfigurationError, match=r"nowhere\.xml"):
+        control.Dynamics(tmp_path / "nowhere.xml")
+    (tmp_path / "page.xml").write_text("<html/>")
+    with pytest.raises(ConfigurationError, match=r"page\.xml"):
+        control.Dynamics(tmp_path / "page.xml")
+
+
+def test_vectors_of_another_length_and_another_memory(three: Path) -> None:
+    dynamics = control.Dynamics(three, joints=JOINTS)
+    with pytest.raises(ValueError, match="position: one number for each of turn, shoulder, elbow"):
+        dynamics.gravity([0.0, 0.0])
+    with pytest.raises(ValueError, match="another number of joints"):
+        control.gravity(dynamics.memory, np.zeros(2), np.zeros(2))
+    with pytest.raises(ValueError, match="not the memory of a Dynamics"):
+        control.gravity(np.zeros(40), np.zeros(3), np.zeros(3))
+
+
+def test_each_law_has_a_workspace_of_its_own(three: Path) -> None:
+    dynamics = control.Dynamics(three, joints=JOINTS)
+    first, second = dynamics.memory, dynamics.memory
+    assert first[3] != second[3]  # the mjData's address
+    q, torque = np.array([0.1, 0.2, 0.3]), np.empty(3)
+    del dynamics
+    control.gravity(first, q, torque)  # lives longer than the object
+    assert torque == pytest.approx(oracle(three, JOINTS, q, np.zeros(3), np.zeros(3)))

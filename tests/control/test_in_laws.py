@@ -1,0 +1,116 @@
+"""Blocks inside compiled laws: the same numbers as in Python, no allocation, errors told."""
+
+import subprocess
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import catenary as cat
+from catenary import control
+from catenary.errors import LawError
+from tests.control.arm import THREE
+
+pytest.importorskip("numba", reason="laws are compiled by Numba: pip install 'catenary[law]'")
+JOINTS = ["turn", "shoulder", "elbow"]
+
+
+@contextmanager
+def opened(mode: str = "cst", axes: int = 3) -> Iterator[tuple[cat.Drives, cat.Loop]]:
+    servo = cat.Servo(axes=axes, inertia=0.01, rated_torque=20.0)
+    with cat.MainDevice(cat.Segment([servo])) as main:
+        arm = cat.Drives(main.scan().drives, mode=mode, counts_per_turn=2**20)
+        with cat.Loop(arm, period=1e-3) as loop, warnings.catch_warnings():
+            warnings.simplefilter("error")  # a law that allocates is warned of
+            yield arm, loop
+
+
+@cat.law
+def hold(actual, target, memory, time, parameters):
+    state, goal = control.part(memory, 0), control.part(memory, 1)
+    for i in range(actual.n):
+        if not actual.enabled[i]:
+            control.restart(state, i, actual.n)
+        target.torque[i] = control.cascade(
+            state,
+            parameters,
+            i,
+            goal[i],
+            0.0,
+            0.0,
+            actual.position[i],
+            actual.velocity[i],
+            actual.dt,
+        )
+    return time > 1.0
+
+
+def test_a_cascade_in_a_law_is_the_one_in_python() -> None:
+    block = control.Cascade(control.Pid(3, 20.0, limit=5.0), control.Pid(3, 1.0, 5.0, limit=10.0))
+    goal = [0.5, -0.5, 1.0]
+    ends = []
+    for compiled in (True, False):
+        with opened() as (arm, loop):
+            memory = control.join(block.memory, goal)
+            memory = loop.run(hold, memory, block.parameters, compiled=compiled)
+            assert arm.actual.position == pytest.approx(goal, abs=2e-3)
+            ends.append(memory)
+    assert ends[0] == pytest.approx(ends[1], abs=0.02)  # a cycle apart
+
+
+@cat.law
+def weightless(actual, target, memory, time):
+    model, torque, motion = (
+        control.part(memory, 0),
+        control.part(memory, 1),
+        control.part(memory, 2),
+    )
+    control.gravity(model, actual.position, torque)
+    for i in range(actual.n):
+        target.torque[i] = torque[i]
+    control.inverse(model, actual.position, actual.velocity, actual.velocity, motion)
+    control.gravity(model, control.part(memory, 3), torque)
+    return time > 0.05
+
+
+def test_dynamics_in_a_law_are_those_in_python(tmp_path: Path) -> None:
+    path = tmp_path / "three.xml"
+    path.write_text(THREE)
+    dynamics = control.Dynamics(path, joints=JOINTS)
+    place = np.array([0.4, -0.3, 0.9])
+    for compiled in (True, False):
+        with opened() as (arm, loop):
+            memory = control.join(dynamics.memory, np.zeros(3), np.zeros(3), place)
+            memory = loop.run(weightless, memory, compiled=compiled)
+            assert control.part(memory, 1).tolist() == dynamics.gravity(place).tolist()
+            q = arm.actual.position
+            assert abs(control.part(memory, 2)).max() < 200
+            assert np.isfinite(q).all()
+
+
+def test_the_wrong_parameters_stop_the_drives_and_are_told() -> None:
+    with opened() as (_, loop):
+        pid = control.Pid(3, 1.0)
+        memory = control.join(np.zeros(30), np.zeros(3))
+        with pytest.raises(LawError, match="not the parameters of a Cascade"):
+            loop.run(hold, memory, pid.parameters)
+
+
+def test_more_axes_than_the_model_has_joints(tmp_path: Path) -> None:
+    path = tmp_path / "three.xml"
+    path.write_text(THREE)
+    dynamics = control.Dynamics(path, joints=JOINTS)
+    with opened(axes=4) as (_, loop):
+        memory = control.join(dynamics.memory, np.zeros(4), np.zeros(4), np.zeros(4))
+        with pytest.raises(LawError, match="another number of joints"):
+            loop.run(weightless, memory)
+
+
+@pytest.mark.parametrize("use", ["import catenary", "from catenary import control"])
+def test_numba_is_not_imported_before_a_law_is_compiled(use: str) -> None:
+    code = f"{use}\nimport sys\nassert 'numba' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True)
