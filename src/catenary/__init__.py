@@ -19,12 +19,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from catenary import control, realtime, types
+    from catenary import control, realtime, share, types
     from catenary.bus import SubDevice
     from catenary.bus import event as events
     from catenary.drive import DC, Drives, Inputs, Outputs
     from catenary.errors import CatenaryError
     from catenary.loop import Cycle, Loop, law
+    from catenary.share import Share, attach
     from catenary.target import MainDevice
     from catenary.virtual import (
         AnalogInputs,
@@ -52,11 +53,14 @@ __all__ = [
     "Outputs",
     "Segment",
     "Servo",
+    "Share",
     "SubDevice",
+    "attach",
     "control",
     "events",
     "law",
     "realtime",
+    "share",
     "types",
 ]
 
@@ -71,13 +75,15 @@ _HOMES = {
     "law": "catenary.loop",
     "MainDevice": "catenary.target",
     "Outputs": "catenary.drive",
+    "Share": "catenary.share",
     "SubDevice": "catenary.bus",
+    "attach": "catenary.share",
     **dict.fromkeys(_VIRTUAL, "catenary.virtual"),
 }
 
 
 def __getattr__(name: str) -> object:
-    if name in ("control", "errors", "realtime", "types"):
+    if name in ("control", "errors", "realtime", "share", "types"):
         return import_module(f"catenary.{name}")
     if name == "events":
         return import_module("catenary.bus.event")

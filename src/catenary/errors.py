@@ -144,3 +144,7 @@ class TaskError(RealtimeError):
 
 class LawError(LoopError):
     """A control law that cannot be compiled, or that failed and stopped the drives."""
+
+
+class ShareError(CatenaryError):
+    """A share that is not there, not to be opened, or no share: names it and what there is."""

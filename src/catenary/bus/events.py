@@ -36,7 +36,7 @@ class Events:
         self._pending: deque[Event] = deque()
         self._capacity = capacity
         self._changed = threading.Condition()
-        self._listener: Callable[[Event], None] | None = None
+        self._listeners: tuple[Callable[[Event], None], ...] = ()
 
     def put(self, event: Event) -> None:
         """Adds one. Never waits."""
@@ -46,8 +46,8 @@ class Events:
                 self.dropped += 1
             self._pending.append(event)
             self._changed.notify()
-            listener = self._listener
-        if listener is not None:
+            listeners = self._listeners
+        for listener in listeners:
             listener(event)
 
     def get(self, timeout: float = 0.0) -> Event | None:
@@ -73,9 +73,17 @@ class Events:
     def __len__(self) -> int:
         return len(self._pending)
 
-    def listen(self, listener: Callable[[Event], None] | None) -> None:
-        """Who is told of every event, in the thread that puts it."""
-        self._listener = listener
+    def listen(self, listener: Callable[[Event], None]) -> Callable[[], None]:
+        """Lets it be told of every event, in the thread that puts it; until what is returned is
+        called."""
+        with self._changed:
+            self._listeners = (*self._listeners, listener)
+
+        def forget() -> None:
+            with self._changed:
+                self._listeners = tuple(each for each in self._listeners if each is not listener)
+
+        return forget
 
 
 class Callbacks:

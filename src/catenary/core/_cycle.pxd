@@ -6,7 +6,7 @@ from catenary.core._handover cimport actual_t, handover_t, target_t
 from catenary.core._histogram cimport histogram_t
 from catenary.core._lane cimport lane_t
 from catenary.core._law cimport law_t
-from catenary.core._native cimport cat_image, cat_link
+from catenary.core._native cimport cat_image, cat_link, cat_sink
 from catenary.core._stream cimport stream_t
 
 cdef enum:  # flags of a cycle
@@ -75,6 +75,7 @@ cdef struct cycle_t:
     uint32_t law_request       # counts what was asked
     uint32_t law_seen
     stream_t *stream           # NULL: the application or the law says the set-points
+    const cat_sink *sink       # NULL: nobody is given the cycles
     int order
     bint patient               # a cycle may begin late within its period: engines that take turns
     int64_t period

@@ -305,8 +305,17 @@ cdef bint take_streamed(cycle_t *c, target_t *target, bint fresh) noexcept nogil
     return False
 
 
-cdef void tail(cycle_t *c, int64_t since) noexcept nogil:
-    """Acyclic frames; then the figures of the cycle."""
+cdef int64_t give(cycle_t *c, record_t *record, int64_t since, const actual_t *actual,
+                  const target_t *target) noexcept nogil:
+    """The cycle for the sink; what the tail took with it. The sink's own time cannot be in what it
+    is given."""
+    record.tail_ns = short_ns(now(c) - since)
+    c.sink.put(c.sink.self, c.number, record, actual.header, target.header)
+    return now(c) - since
+
+
+cdef void tail(cycle_t *c, int64_t since, const actual_t *actual, const target_t *target) noexcept nogil:
+    """Acyclic frames; then the figures of the cycle, and whoever is given them."""
     cdef record_t *record
     cdef histogram_t *h = c.histograms
     cdef int64_t took
@@ -328,7 +337,7 @@ cdef void tail(cycle_t *c, int64_t since) noexcept nogil:
         histogram_add(&h[PROCESS], c.process)
         if record.receive_ns >= 0 and record.send_ns >= 0:
             histogram_add(&h[IN_CONTROLLER], c.process + record.receive_ns + record.send_ns)
-    took = now(c) - since
+    took = give(c, record, since, actual, target) if c.sink != NULL else now(c) - since
     record.tail_ns = short_ns(took)
     histogram_add(&h[TAIL], took)
     clear_next_record(c)
@@ -379,7 +388,7 @@ cdef void cycle_threaded(cycle_t *c) noexcept nogil:
     record.receive_ns = short_ns(published - seen)
     if c.missing == 0:
         record.round_trip_ns = short_ns(seen - sent)
-    tail(c, published)
+    tail(c, published, actual, target)
 
 
 cdef void cycle_native(cycle_t *c) noexcept nogil:
@@ -487,7 +496,7 @@ cdef void cycle_law(cycle_t *c) noexcept nogil:
     close_header(c, actual)
     handover_publish(c.handover)
     handover_wake(c.handover)
-    tail(c, sent)
+    tail(c, sent, actual, target)
 
 
 cdef void cycle_inputs(cycle_t *c, actual_t *actual) noexcept nogil:
@@ -506,6 +515,7 @@ cdef void cycle_outputs(cycle_t *c, target_t *target, bint application) noexcept
     """inline, after Python's body; `application` False: nobody computed."""
     cdef int64_t done = now(c)
     cdef int64_t sent
+    cdef actual_t *actual = &c.handover.actual[PRIVATE]
     target.header.seen = c.number
     target.header.hold = not application
     emit(c, target, take_streamed(c, target, True))
@@ -514,4 +524,6 @@ cdef void cycle_outputs(cycle_t *c, target_t *target, bint application) noexcept
         record_of(c).send_ns = short_ns(sent - done)
         if application:
             c.process = done - c.usable
-    tail(c, sent)
+    if c.sink != NULL:
+        axes_tell(c.axes, actual)
+    tail(c, sent, actual, target)

@@ -17,6 +17,7 @@ cdef class Engine(Parts):
     cdef bint committed        # the targets of the next step are on their way already
     cdef bint emitted          # inline: the frames of this cycle are on their way
     cdef object rehearsal      # called in the lead
+    cdef object sink           # keeps what is given the cycles alive
     cdef int64_t left          # when `next` returned [ns]; -1: no application since
 
     cdef uint32_t drops_heard  # of the counts in the header, what the application has been told

@@ -161,6 +161,22 @@ class Engine:
     def clock(self) -> Clock | None:
         """The distributed clocks; None where the plan has none."""
 
+    # Sinks.
+    def set_sink(self, capsule: object) -> None:
+        """A capsule "catenary.sink" (native/sink.h) that is given every cycle behind its frames;
+        None: nobody. RuntimeError while the engine runs; ValueError for a table of another version
+        or of other blocks."""
+
+    @property
+    def sink_sizes(self) -> tuple[int, int, int]:
+        """Bytes of the blocks a sink is given: record (RECORD_FIELDS), actual, target."""
+
+    def sink_fields(
+        self,
+    ) -> tuple[dict[str, tuple[int, str, int | None]], dict[str, tuple[int, str, int | None]]]:
+        """What lies in the blocks, (actual, target): name → (offset, NumPy format, count; None for a
+        single number). `reals`, `integers`, `bits`: the columns, by bank."""
+
     # Laws.
     def law_fields(
         self,

@@ -9,6 +9,7 @@ import os
 
 cimport cython
 from cpython.exc cimport PyErr_CheckSignals
+from cpython.pycapsule cimport PyCapsule_GetPointer
 from libc.errno cimport EINTR
 from libc.stdint cimport int64_t, uint32_t, uint64_t
 from libc.string cimport memcpy
@@ -49,12 +50,15 @@ from catenary.core._handover cimport (
 from catenary.core._law cimport WAITING, Law, law_t
 from catenary.core._native cimport (
     CAT_LINK_SPENDS,
+    CAT_SINK_CAPSULE,
+    CAT_SINK_VERSION,
     cat_add32,
     cat_fence,
     cat_futex_wait,
     cat_futex_wake,
     cat_link,
     cat_load_acquire32,
+    cat_sink,
     cat_store_release32,
 )
 from catenary.core._parts cimport Parts, engine_t
@@ -524,6 +528,22 @@ cdef class Engine(Parts):
         self.follow()
         self.left = -1
         return flags | self.heard()
+
+    # ---- sinks
+
+    def set_sink(self, capsule):
+        cdef const cat_sink *sink = NULL
+        if self.running:
+            raise RuntimeError("the engine is running: a sink is set before, and taken away after")
+        if capsule is not None:
+            sink = <const cat_sink *>PyCapsule_GetPointer(capsule, CAT_SINK_CAPSULE)
+            if sink.version != CAT_SINK_VERSION:
+                raise ValueError(f"sink table of version {sink.version}, not {CAT_SINK_VERSION}")
+            asked = (sink.record_size, sink.actual_size, sink.target_size)
+            if asked != self.sink_sizes:
+                raise ValueError(f"a sink for blocks of {asked} bytes, there are {self.sink_sizes}")
+        self.e.cycle.sink = sink
+        self.sink = capsule
 
     # ---- streams
 

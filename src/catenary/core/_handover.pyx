@@ -231,6 +231,45 @@ cdef class Handover:
         }
         return actual, target
 
+    def sink_fields(self):
+        """The blocks a sink is given, (actual, target): name → (offset, NumPy format, count; None
+        for a single number)."""
+        cdef actual_t *a = &self.c.actual[PRIVATE]
+        cdef target_t *t = &self.c.target[PRIVATE]
+        cdef counts_t *n = &self.c.counts
+        cdef char *of_actual = <char *>a.header
+        cdef char *of_target = <char *>t.header
+        actual = {
+            "time_ns": (<char *>&a.header.time_ns - of_actual, "<i8", None),
+            "moving": (<char *>&a.header.moving - of_actual, "<u4", None),
+            "position": (<char *>a.position - of_actual, "<f8", n.axes),
+            "velocity": (<char *>a.velocity - of_actual, "<f8", n.axes),
+            "torque": (<char *>a.torque - of_actual, "<f8", n.axes),
+            "commanded_position": (<char *>a.commanded_position - of_actual, "<f8", n.axes),
+            "commanded_velocity": (<char *>a.commanded_velocity - of_actual, "<f8", n.axes),
+            "commanded_torque": (<char *>a.commanded_torque - of_actual, "<f8", n.axes),
+            "statusword": (<char *>a.statusword - of_actual, "<u2", n.axes),
+            "mode": (<char *>a.mode - of_actual, "i1", n.axes),
+            "state": (<char *>a.state - of_actual, "u1", n.axes),
+            "axis_flags": (<char *>a.flags - of_actual, "u1", n.axes),
+            "enabled": (<char *>a.enabled - of_actual, "u1", n.axes),
+            "unit_valid": (<char *>a.unit_valid - of_actual, "u1", n.units),
+            "reals": (<char *>a.input_reals - of_actual, "<f8", n.input_reals),
+            "integers": (<char *>a.input_integers - of_actual, "<i8", n.input_integers),
+            "bits": (<char *>a.input_bits - of_actual, "u1", n.input_bits),
+        }
+        target = {
+            "target_position": (<char *>t.position - of_target, "<f8", n.axes),
+            "target_velocity": (<char *>t.velocity - of_target, "<f8", n.axes),
+            "target_torque": (<char *>t.torque - of_target, "<f8", n.axes),
+            "target_mode": (<char *>t.mode - of_target, "i1", n.axes),
+            "goal": (<char *>t.goal - of_target, "u1", n.axes),
+            "reals": (<char *>t.output_reals - of_target, "<f8", n.output_reals),
+            "integers": (<char *>t.output_integers - of_target, "<i8", n.output_integers),
+            "bits": (<char *>t.output_bits - of_target, "u1", n.output_bits),
+        }
+        return actual, target
+
     def blocks(self):
         """Python's own blocks whole, (actual, target), as bytes."""
         cdef actual_t *a = &self.c.actual[PRIVATE]

@@ -98,6 +98,20 @@ cdef extern from "triple_buffer.h" nogil:
     int cat_triple_take(cat_triple *triple)
 
 
+cdef extern from "sink.h" nogil:
+    const char *CAT_SINK_CAPSULE
+    const uint32_t CAT_SINK_VERSION
+
+    ctypedef struct cat_sink:
+        uint32_t version
+        uint32_t record_size
+        uint32_t actual_size
+        uint32_t target_size
+        void *self
+        void (*put)(void *self, uint64_t number, const void *record, const void *actual,
+                    const void *target) noexcept nogil
+
+
 cdef extern from "law.h" nogil:
     const int CAT_LAW_GOES_ON
     const int CAT_LAW_FINISHED

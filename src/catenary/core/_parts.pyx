@@ -131,6 +131,13 @@ cdef class Parts:
     def law_fields(self):
         return self.handover.law_fields()
 
+    def sink_fields(self):
+        return self.handover.sink_fields()
+
+    @property
+    def sink_sizes(self):
+        return sizeof(record_t), self.h.actual_size, self.h.target_size
+
     @property
     def number(self):
         return self.h.actual[PRIVATE].header.number

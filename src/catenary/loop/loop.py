@@ -29,6 +29,7 @@ from catenary.loop.devices import DeviceWish, by_network, main_device_of
 from catenary.loop.laws.law import Law
 from catenary.loop.laws.law import law as made_law
 from catenary.loop.laws.run import LawRun, Numbers
+from catenary.loop.publishing import one_sink_each
 from catenary.loop.running import LogArray, Running, take_down
 from catenary.loop.signals import SignalGuard
 from catenary.loop.stream import Stream
@@ -37,6 +38,7 @@ from catenary.loop.watch import Policy
 from catenary.plan.clocks import BURST
 from catenary.plan.cycle import FollowedClock, ReceiveMode
 from catenary.plan.make import Plan, make_plan
+from catenary.plan.sink import Sink
 from catenary.wire.al import State
 
 ENDING = CYCLE_WORKING_COUNTER | CYCLE_DROPPED | CYCLE_STOPPED | CYCLE_NONE | CYCLE_LAW_FAILED
@@ -65,7 +67,8 @@ class Loop:
     requires and that comes back: "restore", its start-up list is replayed and it goes to OP; or
     "hold", it stays in PRE-OP until `restore`. `on_replacement`: the same for another device of the
     same product in its place, which is not even led to PRE-OP when held. `laws` are compiled on
-    entry, before the devices go to OP; others when they are started.
+    entry, before the devices go to OP; others when they are started. `sink` is given every cycle
+    (a `cat.Share`: to other processes).
 
     Where a wish has `dc=`: `clock`, whom time is taken from: "reference", the wake-up follows the
     reference clock; "main", it follows the MainDevice's. `reference`: the device with that clock;
@@ -102,6 +105,7 @@ class Loop:
         on_return: Policy = "restore",
         on_replacement: Policy = "hold",
         laws: Sequence[Law | Callable[..., Any]] = (),
+        sink: Sink | Sequence[Sink] | None = None,
         clock: Literal["reference", "main"] = "reference",
         reference: SubDevice | None = None,
         margin: float | None = None,
@@ -134,6 +138,7 @@ class Loop:
         self._on_return: Policy = on_return
         self._on_replacement: Policy = on_replacement
         self._laws = [made_law(law) for law in laws]
+        [self._sink] = one_sink_each(sink, 1)
         self._clock: FollowedClock = clock
         self._reference = reference
         self._margin = margin
@@ -161,6 +166,7 @@ class Loop:
                 self._running.clocks.reset()
             return self  # inside: a signal may come at this line too
         except BaseException as error:
+            self._tell_end(error)
             for problem in self._leave():
                 error.add_note(f"on the way down: {problem}")
             raise
@@ -179,6 +185,8 @@ class Loop:
         )
         for law in self._laws:
             running.laws.compile(law)
+        if self._sink is not None:
+            running.publish(self._sink)
         return running
 
     def __exit__(
@@ -187,6 +195,8 @@ class Loop:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
+        if error is not None:
+            self._tell_end(error)
         problems = self._leave()
         if error is not None:
             for problem in problems:
@@ -360,6 +370,10 @@ class Loop:
         """The MainDevice is being closed while the loop is open."""
         for problem in self._leave():
             warnings.warn(f"the loop was left open: {problem}", RuntimeWarning, stacklevel=2)
+
+    def _tell_end(self, error: BaseException) -> None:
+        if self._running is not None:
+            self._running.tell_end(error)
 
     def _leave(self) -> list[Exception]:
         try:

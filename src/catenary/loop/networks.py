@@ -20,7 +20,9 @@ from catenary.errors import CatenaryError
 from catenary.link import Link
 from catenary.loop.devices import DeviceWish, by_network
 from catenary.loop.loop import TROUBLE, Loop
+from catenary.loop.publishing import one_sink_each
 from catenary.loop.running import STOP_SLICE_NS, Running, take_down
+from catenary.plan.sink import Sink
 from catenary.wire.al import State
 
 NETWORK_TROUBLE = CYCLE_WORKING_COUNTER | CYCLE_STOPPED | CYCLE_NONE
@@ -80,7 +82,7 @@ class NetworksLoop(Loop):
     `quorum`: how many networks must be good for the cycle to be; None: all. While as many are, one
     that fails does not end the loop: its axes are stopped by its drives' watchdogs or natively, and
     `cycle.networks[i].ok` tells. Threaded only. `cpu`: one for each network; None: one each of the
-    last, where there are more than networks.
+    last, where there are more than networks. `sink`: one for each network.
     """
 
     def __init__(
@@ -88,6 +90,7 @@ class NetworksLoop(Loop):
         *wishes: DeviceWish,
         quorum: int | None = None,
         cpu: int | Sequence[int] | None = None,
+        sink: Sink | Sequence[Sink] | None = None,
         **options: Any,
     ) -> None:
         if options.get("run", "threaded") != "threaded":
@@ -102,9 +105,9 @@ class NetworksLoop(Loop):
         if quorum is not None and not 1 <= quorum <= count:
             raise ValueError(f"quorum={quorum}: from 1 to the number of networks, {count}")
         super().__init__(*groups[0][1], **options)
-        cpus = cpus_for(count, cpu)
+        places = zip(groups, cpus_for(count, cpu), one_sink_each(sink, count), strict=True)
         self.networks = tuple(
-            Loop(*mine, **options, cpu=one) for (_, mine), one in zip(groups, cpus, strict=True)
+            Loop(*mine, **options, cpu=one, sink=its) for (_, mine), one, its in places
         )
         self._quorum = count if quorum is None else quorum
         self._all: list[Running] = []
@@ -127,6 +130,7 @@ class NetworksLoop(Loop):
                 running.engine.reset_histograms()
             return self
         except BaseException as error:
+            self._tell_end(error)
             for problem in self._leave():
                 error.add_note(f"on the way down: {problem}")
             raise
@@ -201,6 +205,10 @@ class NetworksLoop(Loop):
         return self._all[0]
 
     # Leaving
+
+    def _tell_end(self, error: BaseException) -> None:
+        for one in self._all:
+            one.tell_end(error)
 
     def _leave(self) -> list[Exception]:
         """Every network that answers is stopped, whatever the others do."""

@@ -28,6 +28,7 @@ from catenary.loop.clocks import Clocks
 from catenary.loop.diagnosis import IN_FAULT, AxisTrouble, drive_error, silence_error, state_error
 from catenary.loop.error_watch import ErrorWatch
 from catenary.loop.laws.runner import LawRunner
+from catenary.loop.publishing import Publisher
 from catenary.loop.rehearsal import make_rehearsal
 from catenary.loop.service import Service
 from catenary.loop.signals import SignalGuard
@@ -35,6 +36,7 @@ from catenary.loop.watch import Policy, Watch
 from catenary.model.device import Direction
 from catenary.model.silence import judge_silence
 from catenary.plan.make import Plan
+from catenary.plan.sink import Sink
 from catenary.plan.wish import Wish
 from catenary.procedure.al_state import request_state
 from catenary.procedure.probe import probe_inputs
@@ -92,9 +94,19 @@ class Running:
         self._abandon = abandon  # leaves the loop, when the MainDevice is closed round it
         self._stations = [sub.station for sub in main.subs]
         self._companions: Sequence[Running] = ()
+        self._publisher: Publisher | None = None
         self.service.cycle = self.cycle
 
     # Opening
+
+    def publish(self, sink: Sink) -> None:
+        """Gives every cycle to the sink, from the first one on."""
+        self._publisher = Publisher(sink, self.main, self.engine, self.plan)
+
+    def tell_end(self, error: BaseException) -> None:
+        """Lets those who read along know why the loop ends."""
+        if self._publisher is not None:
+            self._publisher.tell_end(error)
 
     def share_time(self, companions: Sequence[Running]) -> None:
         """Networks whose cycles this thread must run as well, in virtual time."""
@@ -240,6 +252,8 @@ class Running:
         finally:
             self.engine.stop()
             self._attached.close()  # from here on other threads use the link
+            if self._publisher is not None:
+                self._publisher.close()
 
     def _take_down(self, guard: SignalGuard) -> None:
         self.main.leave()

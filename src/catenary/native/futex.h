@@ -29,8 +29,12 @@ static inline int cat_futex_wait_shared(uint32_t *word, uint32_t value, int64_t 
     return errno == EAGAIN ? 0 : -errno;
 }
 
+static inline void cat_futex_wake_some_shared(uint32_t *word, int count) {
+    syscall(SYS_futex, word, FUTEX_WAKE, count, 0, 0, 0);
+}
+
 static inline void cat_futex_wake_shared(uint32_t *word) {
-    syscall(SYS_futex, word, FUTEX_WAKE, 0x7fffffff, 0, 0, 0);
+    cat_futex_wake_some_shared(word, 0x7fffffff);
 }
 
 #endif

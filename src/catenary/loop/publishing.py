@@ -1,0 +1,174 @@
+"""What a loop gives to a sink: the blocks of the core by names and units, and what happens beside
+the cycle."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import fields
+from itertools import groupby
+
+import numpy as np
+
+from catenary.bus import MainDevice
+from catenary.bus.event import Event
+from catenary.core import RECORD_FIELDS, Engine
+from catenary.plan.cycle import Bank, Column
+from catenary.plan.make import Plan
+from catenary.plan.sink import Block, Incident, Sink, SinkField, SinkLayout
+
+Places = dict[str, tuple[int, str, int | None]]  # name → offset, format, count
+
+BANKS = {Bank.REAL: "reals", Bank.INTEGER: "integers", Bank.BIT: "bits"}
+LEFT_OUT = ("reserved", *BANKS.values())
+PER_UNIT = ("unit_valid",)
+UNITS = {"position": "rad", "velocity": "rad/s", "torque": "N·m"}
+EVENT_FIELDS = {field.name for field in fields(Event)}
+
+
+class Publisher:
+    """Owns a loop's side of its sink, from `open` to `close`."""
+
+    def __init__(self, sink: Sink, main: MainDevice, engine: Engine, plan: Plan) -> None:
+        self._sink = sink
+        self._engine = engine
+        self._main = main
+        self._ended = False
+        capsule = sink.open(sink_layout(engine, plan))
+        try:
+            engine.set_sink(capsule)
+        except BaseException:
+            sink.close()
+            raise
+        self._forget: Callable[[], None] = main.events.listen(self._hear)
+
+    def tell_end(self, error: BaseException) -> None:
+        """The error that ends the loop."""
+        self._tell(type(error).__name__, str(error), self._engine.now() * 1e-9, None, {})
+
+    def close(self) -> None:
+        """After the engine was stopped."""
+        if self._ended:
+            return
+        self._ended = True
+        self._forget()
+        self._engine.set_sink(None)
+        self._sink.close()
+
+    def _hear(self, event: Event) -> None:
+        position = None if event.sub is None else event.sub.position
+        details = {
+            field.name: plain(getattr(event, field.name))
+            for field in fields(event)
+            if field.name not in EVENT_FIELDS
+        }
+        self._tell(type(event).__name__, event.message, event.time, position, details)
+
+    def _tell(
+        self,
+        kind: str,
+        message: str,
+        when: float,
+        position: int | None,
+        details: dict[str, object],
+    ) -> None:
+        self._sink.tell(Incident(kind, message, when, position, details))
+
+
+def plain(value: object) -> object:
+    """As JSON has it: numbers and texts stay."""
+    if isinstance(value, bytes):
+        return value.hex(" ")
+    if isinstance(value, tuple):
+        return [plain(each) for each in value]
+    return value if isinstance(value, (int, float, str, type(None))) else str(value)
+
+
+def sink_layout(engine: Engine, plan: Plan) -> SinkLayout:
+    """What the loop gives in every cycle."""
+    actual, target = engine.sink_fields()
+    own = [*of_record(), *of_block("actual", actual), *of_block("target", target)]
+    taken = {each.name for each in own}
+    columns = [
+        *columns_of("actual", actual, (table.input_columns for table in plan.tables)),
+        *columns_of("target", target, (table.output_columns for table in plan.tables)),
+    ]
+    record_size, actual_size, target_size = engine.sink_sizes
+    return SinkLayout(
+        period=plan.cycle.period_ns * 1e-9,
+        axes=tuple(axis.name for axis in plan.cycle.axes),
+        fields=(*own, *with_own_names(columns, taken)),
+        record_size=record_size,
+        actual_size=actual_size,
+        target_size=target_size,
+        utc_offset_ns=time.time_ns() - engine.now(),
+        virtual_time=engine.scheduling == "virtual time",
+    )
+
+
+def of_record() -> Iterator[SinkField]:
+    """The times and flags of the cycle."""
+    places = np.dtype(RECORD_FIELDS).fields
+    assert places is not None
+    for name, (kind, offset, *_) in places.items():
+        if name not in LEFT_OUT:
+            yield SinkField(name, "record", offset, kind.str, None, unit_of(name))
+
+
+def of_block(block: Block, places: Places) -> Iterator[SinkField]:
+    """What every loop has; arrays of no length are left out."""
+    for name, (offset, code, count) in places.items():
+        if name in LEFT_OUT or count == 0:
+            continue
+        per_axis = count is not None and name not in PER_UNIT
+        yield SinkField(name, block, offset, code, count, unit_of(name), per_axis)
+
+
+def unit_of(name: str) -> str:
+    return "ns" if name.endswith("_ns") else UNITS.get(name.rpartition("_")[2], "")
+
+
+def columns_of(
+    block: Block, places: Places, columns: Iterable[Sequence[Column]]
+) -> Iterator[tuple[SinkField, int]]:
+    """Every column with its device: a group as one array, a single one as a number."""
+    used = dict.fromkeys(Bank, 0)
+    for of_wish in columns:
+        for (group, bank), members in groupby(of_wish, key=lambda c: (c.group, c.bank)):
+            here = list(members)
+            for part in [here] if group else [[column] for column in here]:
+                start, code, _ = places[BANKS[bank]]
+                offset = start + used[bank] * np.dtype(code).itemsize
+                used[bank] += len(part)
+                name, count = (group, len(part)) if group else (part[0].name, None)
+                yield SinkField(name, block, offset, code, count), part[0].device
+
+
+def with_own_names(
+    columns: Sequence[tuple[SinkField, int]], taken: set[str]
+) -> Iterator[SinkField]:
+    """A name that several have gets its device with it, and a number where that is not enough."""
+    often = Counter(each.name for each, _ in columns)
+    for each, device in columns:
+        name = each.name
+        if often[name] > 1 or name in taken:
+            name = f"{name} of device {device}"
+        base, more = name, 2
+        while name in taken:
+            name, more = f"{base} ({more})", more + 1
+        taken.add(name)
+        yield SinkField(name, each.block, each.offset, each.format, each.count)
+
+
+def one_sink_each(sinks: Sink | Sequence[Sink] | None, networks: int) -> list[Sink | None]:
+    """The sink of every network. ValueError: not as many."""
+    if sinks is None:
+        return [None] * networks
+    given = list(sinks) if isinstance(sinks, Sequence) else [sinks]
+    if len(given) != networks:
+        raise ValueError(
+            f"sink: {len(given)} for {networks} networks; each needs one of its own: "
+            "sink=[cat.Share('upper'), cat.Share('lower')]"
+        )
+    return list(given)

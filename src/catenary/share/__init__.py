@@ -1,0 +1,12 @@
+"""Shared memory: what a loop does, for other processes to read; their commands; a mutex.
+
+with cat.Share("arm") as share, cat.Loop(arm, sink=share) as loop: ...      # one process
+with cat.attach("arm") as arm: ...                                          # any others
+"""
+
+from catenary.share.events import SharedEvent
+from catenary.share.layout import ShareField, ShareLayout
+from catenary.share.reader import Reader, attach
+from catenary.share.share import Share
+
+__all__ = ["Reader", "Share", "ShareField", "ShareLayout", "SharedEvent", "attach"]

@@ -1,0 +1,53 @@
+from libc.stdint cimport int64_t, uint8_t, uint32_t, uint64_t
+
+cdef extern from "ring.h" nogil:
+    ctypedef struct share_ring:
+        uint64_t newest
+        uint32_t tick
+        uint32_t ended
+
+    ctypedef struct ring_view:
+        share_ring *ring
+        uint64_t count
+        uint64_t stride
+        uint64_t size
+
+    uint64_t ring_stride(uint64_t size)
+    uint8_t *ring_begin(const ring_view *v, uint64_t number)
+    void ring_publish(const ring_view *v, uint64_t number)
+    void ring_end(const ring_view *v)
+    int ring_copy(const ring_view *v, uint64_t number, uint8_t *bytes)
+    uint64_t ring_copy_newest(const ring_view *v, uint8_t *bytes)
+    uint64_t ring_copy_rows(const ring_view *v, uint64_t first, uint64_t last, uint8_t *bytes)
+    int ring_wait(const ring_view *v, uint64_t seen, int64_t deadline)
+
+cdef extern from "sink.h" nogil:
+    const char *CAT_SINK_CAPSULE
+    const uint32_t CAT_SINK_VERSION
+
+    ctypedef struct cat_sink:
+        uint32_t version
+        uint32_t record_size
+        uint32_t actual_size
+        uint32_t target_size
+        void *self
+        void (*put)(void *self, uint64_t number, const void *record, const void *actual,
+                    const void *target) noexcept nogil
+
+cdef class Ring:
+    """Holds a buffer of somebody's memory, and knows the ring in it."""
+    cdef Py_buffer buffer
+    cdef ring_view view
+
+cdef struct cycle_rows:
+    ring_view view
+    uint64_t record_size
+    uint64_t actual_size
+    uint64_t target_size
+    uint64_t actual_at         # in the row
+    uint64_t target_at
+
+cdef class CycleWriter(Ring):
+    """Owns the table a cycle calls."""
+    cdef cat_sink sink
+    cdef cycle_rows rows

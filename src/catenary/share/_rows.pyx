@@ -1,0 +1,159 @@
+# cython: boundscheck=False, wraparound=False, cdivision=True
+"""Rings of rows in shared memory (ring.h): who writes, who reads, and the table the cycle calls.
+
+Budget of a put: two copies of some kilobytes into memory that is out of the caches, and one system
+call: about 1 us for 33 axes.
+"""
+
+from cpython.buffer cimport PyBUF_SIMPLE, PyBUF_WRITABLE, PyBuffer_Release, PyObject_GetBuffer
+from cpython.bytearray cimport PyByteArray_AS_STRING
+from cpython.bytes cimport PyBytes_AS_STRING, PyBytes_FromStringAndSize
+from cpython.exc cimport PyErr_CheckSignals
+from cpython.pycapsule cimport PyCapsule_GetContext, PyCapsule_New, PyCapsule_SetContext
+from cpython.ref cimport Py_DECREF, Py_INCREF, PyObject
+from libc.errno cimport EINTR
+from libc.stdint cimport int64_t, uint8_t, uint32_t, uint64_t
+from libc.string cimport memcpy, memset
+
+cdef enum:
+    COUNT_MAX = 1 << 24
+    SIZE_MAX = 1 << 24
+
+
+def memory_size(uint64_t count, uint64_t size):
+    return sizeof(share_ring) + count * ring_stride(size)
+
+
+def row_parts(uint64_t record_size, uint64_t actual_size, uint64_t target_size):
+    actual_at = (record_size + 7) // 8 * 8
+    target_at = actual_at + (actual_size + 7) // 8 * 8
+    return 0, actual_at, target_at, target_at + (target_size + 7) // 8 * 8
+
+
+cdef class Ring:
+    def __cinit__(self, memory, uint64_t offset, uint64_t count, uint64_t size, *args, writable=False):
+        """A ring of `count` rows of `size` bytes at `offset` of a buffer. ValueError: it cannot be."""
+        PyObject_GetBuffer(memory, &self.buffer, PyBUF_WRITABLE if writable else PyBUF_SIMPLE)
+        if not (1 <= count <= COUNT_MAX and 1 <= size <= SIZE_MAX) or count & (count - 1):
+            raise ValueError(f"a ring of {count} rows of {size} bytes")
+        if offset % 64 or offset > <uint64_t>self.buffer.len:
+            raise ValueError(f"a ring at {offset} of {self.buffer.len} bytes")
+        if memory_size(count, size) > <uint64_t>self.buffer.len - offset:
+            raise ValueError(f"a ring of {count} rows of {size} bytes at {offset} does not lie"
+                             f" in {self.buffer.len} bytes")
+        self.view = ring_view(
+            ring=<share_ring *>(<uint8_t *>self.buffer.buf + offset),
+            count=count,
+            stride=ring_stride(size),
+            size=size,
+        )
+
+    def __dealloc__(self):
+        PyBuffer_Release(&self.buffer)
+
+    @property
+    def newest(self):
+        return self.view.ring.newest
+
+    @property
+    def ended(self):
+        return self.view.ring.ended != 0
+
+    # ---- reading
+
+    def copy(self):
+        cdef bytes row = PyBytes_FromStringAndSize(NULL, self.view.size)
+        cdef uint64_t number = ring_copy_newest(&self.view, <uint8_t *>PyBytes_AS_STRING(row))
+        return number, row
+
+    def copy_after(self, uint64_t after):
+        cdef uint64_t newest = self.view.ring.newest
+        cdef uint64_t first, copied
+        cdef uint8_t *place
+        if newest <= after:
+            return bytearray(), 0
+        first = after + 1
+        if newest >= self.view.count and first <= newest - self.view.count:
+            first = newest - self.view.count + 1
+        rows = bytearray((newest - first + 1) * self.view.size)
+        place = <uint8_t *>PyByteArray_AS_STRING(rows)
+        with nogil:
+            copied = ring_copy_rows(&self.view, first, newest, place)
+        del rows[copied * self.view.size :]
+        return rows, newest - after - copied
+
+    def wait(self, uint64_t seen, int64_t deadline_ns):
+        cdef int rc
+        while True:
+            with nogil:
+                rc = ring_wait(&self.view, seen, deadline_ns)
+            if rc != -EINTR:
+                break
+            PyErr_CheckSignals()
+        if rc < 0:
+            raise OSError(-rc, "futex")
+        return rc == 1
+
+    # ---- writing
+
+    def write(self, bytes row not None):
+        cdef uint64_t number = self.view.ring.newest + 1
+        cdef uint64_t size = len(row)
+        cdef uint8_t *place
+        if self.buffer.readonly:
+            raise ValueError("the memory is read-only")
+        if size > self.view.size:
+            raise ValueError(f"{size} bytes, a row has {self.view.size}")
+        place = ring_begin(&self.view, number)
+        memcpy(place, PyBytes_AS_STRING(row), size)
+        memset(place + size, 0, self.view.size - size)
+        ring_publish(&self.view, number)
+
+    def end(self):
+        if self.buffer.readonly:
+            raise ValueError("the memory is read-only")
+        ring_end(&self.view)
+
+
+cdef void put(void *self, uint64_t number, const void *record, const void *actual,
+              const void *target) noexcept nogil:
+    cdef cycle_rows *rows = <cycle_rows *>self
+    cdef uint8_t *row = ring_begin(&rows.view, number)
+    memcpy(row, record, rows.record_size)
+    memcpy(row + rows.actual_at, actual, rows.actual_size)
+    memcpy(row + rows.target_at, target, rows.target_size)
+    ring_publish(&rows.view, number)
+
+
+cdef void release_owner(object capsule) noexcept:
+    Py_DECREF(<object>PyCapsule_GetContext(capsule))
+
+
+cdef class CycleWriter(Ring):
+    def __init__(self, memory, uint64_t offset, uint64_t count, uint64_t size, sizes, *, writable):
+        record_size, actual_size, target_size = sizes
+        _, actual_at, target_at, whole = row_parts(record_size, actual_size, target_size)
+        if not writable or whole != size:
+            raise ValueError(f"rows of {size} bytes for blocks of {whole}")
+        self.rows = cycle_rows(
+            view=self.view,
+            record_size=record_size,
+            actual_size=actual_size,
+            target_size=target_size,
+            actual_at=actual_at,
+            target_at=target_at,
+        )
+        self.sink.version = CAT_SINK_VERSION
+        self.sink.record_size = record_size
+        self.sink.actual_size = actual_size
+        self.sink.target_size = target_size
+        self.sink.self = &self.rows
+        self.sink.put = put
+
+    @property
+    def capsule(self):
+        """The capsule keeps the writer and its memory."""
+        capsule = PyCapsule_New(&self.sink, CAT_SINK_CAPSULE, release_owner)
+        PyCapsule_SetContext(capsule, <void *><PyObject *>self)
+        Py_INCREF(self)
+        return capsule

@@ -1,0 +1,53 @@
+"""What happens beside the cycle, as lines of JSON in a ring."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import msgspec
+
+from catenary.plan.sink import Incident
+from catenary.share.layout import EVENT_SIZE
+
+CUT_OFF = " ..."
+
+
+class SharedEvent(msgspec.Struct, frozen=True):
+    """Something that happened."""
+
+    serial: int  # of the event, from 1
+    number: int  # of the last cycle before it; 0: before the first
+    kind: str  # the name of its class in `cat.events`, or of the error that ended the loop
+    message: str
+    time: float  # of the loop's clock [s]
+    position: int | None  # of the device; None: about the segment
+    details: Mapping[str, object]
+
+    def __str__(self) -> str:
+        return f"{self.time:.3f} s, cycle {self.number}: {self.message}"
+
+
+def encode_event(incident: Incident, serial: int, number: int) -> bytes:
+    """A line that fits its row, whatever is in it: details go first, then the message's end."""
+    event = SharedEvent(
+        serial,
+        number,
+        incident.kind,
+        incident.message,
+        incident.time,
+        incident.position,
+        incident.details,
+    )
+    line = msgspec.json.encode(event)
+    if len(line) > EVENT_SIZE:
+        event = msgspec.structs.replace(event, details={})
+        line = msgspec.json.encode(event)
+    while len(line) > EVENT_SIZE:
+        kept = max(len(event.message) - (len(line) - EVENT_SIZE) - len(CUT_OFF), 0)
+        event = msgspec.structs.replace(event, message=event.message[:kept] + CUT_OFF)
+        line = msgspec.json.encode(event)
+    return line
+
+
+def decode_event(row: bytes | bytearray) -> SharedEvent:
+    return msgspec.json.decode(row.rstrip(b"\0"), type=SharedEvent)

@@ -1,0 +1,158 @@
+"""What lies in a segment, said by the segment itself.
+
+0   8 bytes  "CATSHARE"
+8   u32      version of all that follows
+12  u32      bytes of the description
+16  u64      bytes of the segment
+24           the description: a ShareLayout as JSON
+...          the ring of cycles and the ring of events (ring.h), where the description says
+"""
+
+from __future__ import annotations
+
+import mmap
+import struct
+from typing import Literal
+
+import msgspec
+import numpy as np
+
+from catenary.errors import ShareError
+from catenary.plan.sink import SinkField, SinkLayout
+from catenary.share import _rows
+from catenary.share.process import Process
+
+MAGIC = b"CATSHARE"
+VERSION = 1
+HEADER = struct.Struct("<8sIIQ")
+ALIGNMENT = 4096
+EVENT_SIZE = 1024  # bytes of an event
+EVENT_COUNT = 256
+ROWS_MIN = 64
+
+Clock = Literal["monotonic", "virtual"]
+
+
+class ShareField(msgspec.Struct, frozen=True):
+    """A field of a cycle's record."""
+
+    name: str
+    dtype: str  # of one number, NumPy's: "<f8"
+    shape: tuple[int, ...]  # (): a single number
+    unit: str  # "rad", "rad/s", "N·m", "ns"; "": a count, a code, or as the device has it
+    offset: int  # in the row [bytes]
+    per_axis: bool  # one number for each of the layout's axes
+
+
+class RingPlace(msgspec.Struct, frozen=True):
+    """A ring in the segment."""
+
+    offset: int  # [bytes]
+    count: int
+    size: int  # of a row [bytes]
+
+
+class ShareLayout(msgspec.Struct, frozen=True):
+    """What one run of a loop shares."""
+
+    name: str
+    version: int
+    period: float  # [s]
+    axes: tuple[str, ...]  # names, in the order of the fields that are per axis
+    fields: tuple[ShareField, ...]
+    clock: Clock  # of scheduled_ns and wake_ns
+    utc_offset_ns: int  # UTC less that clock
+    opened: float  # [s] UTC
+    writer: Process
+    rows: RingPlace
+    events: RingPlace
+
+    @property
+    def dtype(self) -> np.dtype[np.void]:
+        """Of a cycle's record."""
+        return np.dtype(
+            {
+                "names": [field.name for field in self.fields],
+                "formats": [(field.dtype, field.shape) for field in self.fields],
+                "offsets": [field.offset for field in self.fields],
+                "itemsize": self.rows.size,
+            }
+        )
+
+    @property
+    def size(self) -> int:
+        """Of the segment [bytes]."""
+        return self.events.offset + _rows.memory_size(self.events.count, self.events.size)
+
+
+def make_layout(
+    name: str, sink: SinkLayout, *, history: float, opened: float, writer: Process
+) -> ShareLayout:
+    """Room for the cycles of `history` seconds."""
+    blocks = (sink.record_size, sink.actual_size, sink.target_size)
+    *starts, row_size = _rows.row_parts(*blocks)
+    places = dict(zip(("record", "actual", "target"), starts, strict=True))
+    count = power_of_two(max(round(history / sink.period), ROWS_MIN))
+
+    def made(description: int) -> ShareLayout:
+        rows_at = aligned(HEADER.size + description)
+        events_at = aligned(rows_at + _rows.memory_size(count, row_size))
+        return ShareLayout(
+            name=name,
+            version=VERSION,
+            period=sink.period,
+            axes=sink.axes,
+            fields=tuple(make_field(each, places[each.block]) for each in sink.fields),
+            clock="virtual" if sink.virtual_time else "monotonic",
+            utc_offset_ns=sink.utc_offset_ns,
+            opened=opened,
+            writer=writer,
+            rows=RingPlace(rows_at, count, row_size),
+            events=RingPlace(events_at, EVENT_COUNT, EVENT_SIZE),
+        )
+
+    return made(len(msgspec.json.encode(made(0))) + ALIGNMENT)
+
+
+def make_field(field: SinkField, start: int) -> ShareField:
+    shape = () if field.count is None else (field.count,)
+    return ShareField(
+        field.name, field.format, shape, field.unit, start + field.offset, field.per_axis
+    )
+
+
+def aligned(offset: int) -> int:
+    return -(-offset // ALIGNMENT) * ALIGNMENT
+
+
+def power_of_two(least: int) -> int:
+    return 1 << (least - 1).bit_length()
+
+
+def encode_head(layout: ShareLayout) -> bytes:
+    """The bytes a segment begins with."""
+    description = msgspec.json.encode(layout)
+    return HEADER.pack(MAGIC, layout.version, len(description), layout.size) + description
+
+
+def decode_head(memory: mmap.mmap | bytes, size: int) -> ShareLayout:
+    """The layout of a segment of `size` bytes. ShareError: it is none, or of another version."""
+    head = memory[: HEADER.size]
+    if len(head) < HEADER.size or not head.startswith(MAGIC):
+        raise ShareError("it is no share: it does not begin as one")
+    _, version, length, whole = HEADER.unpack(head)
+    if version != VERSION:
+        raise ShareError(
+            f"it has the layout of version {version}, this program reads version {VERSION}",
+            hint="let both programs use the same release of catenary",
+        )
+    if whole > size or HEADER.size + length > size:
+        raise ShareError(f"it is cut off: {size} bytes of {whole}")
+    try:
+        layout = msgspec.json.decode(memory[HEADER.size : HEADER.size + length], type=ShareLayout)
+        fits = layout.size <= size and layout.dtype.itemsize == layout.rows.size
+    except (msgspec.MsgspecError, ValueError, OverflowError) as error:
+        raise ShareError(f"its description is broken: {error}") from error
+    if not fits:
+        raise ShareError("its description does not fit its size")
+    return layout

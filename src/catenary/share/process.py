@@ -1,0 +1,62 @@
+"""Who a process is, so that another one that got its number later is not taken for it."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import msgspec
+
+BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
+STATE, START_TIME = 0, 19  # fields of /proc/PID/stat behind the command, proc(5)
+DEAD = ("Z", "X")
+
+
+class Process(msgspec.Struct, frozen=True):
+    """A process on this machine."""
+
+    pid: int
+    start_time: int  # clock ticks after the boot
+    boot_id: str
+    command: str
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether it runs, as the same process. Seen from another PID namespace: False."""
+        return _start_time(self.pid) == self.start_time and self.boot_id == _boot_id()
+
+    def __str__(self) -> str:
+        return f"process {self.pid} ({self.command})" if self.command else f"process {self.pid}"
+
+
+def this_process() -> Process:
+    pid = os.getpid()
+    return Process(pid, _start_time(pid) or 0, _boot_id(), _command(pid))
+
+
+def _start_time(pid: int) -> int | None:
+    """None: there is no such process, or it waits to be buried."""
+    try:
+        stat = Path(f"/proc/{pid}/stat").read_text()
+    except OSError:
+        return None
+    fields = stat.rpartition(")")[2].split()
+    return None if fields[STATE] in DEAD else int(fields[START_TIME])
+
+
+def _boot_id() -> str:
+    try:
+        return BOOT_ID.read_text().strip()
+    except OSError:  # /proc is not whole in some containers
+        return ""
+
+
+def _command(pid: int) -> str:
+    """Its program, and where that is Python, the script."""
+    try:
+        words = Path(f"/proc/{pid}/cmdline").read_bytes().decode(errors="replace").split("\0")
+    except OSError:
+        return ""
+    scripts = [word for word in words[1:] if word and not word.startswith("-")]
+    chosen = scripts[0] if scripts and "python" in words[0] else words[0]
+    return Path(chosen).name

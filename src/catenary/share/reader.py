@@ -1,0 +1,152 @@
+"""Reading along: what another process' loop does, cycle by cycle."""
+
+from __future__ import annotations
+
+import time
+from types import TracebackType
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from catenary.errors import ShareError
+from catenary.share import memory
+from catenary.share._rows import Ring
+from catenary.share.events import SharedEvent, decode_event
+from catenary.share.layout import ShareLayout, decode_head
+from catenary.share.memory import Segment
+
+LOOK_NS = 250_000_000  # between two looks whether the writer still lives
+FOR_EVER = 1 << 62
+CYCLES, EVENTS = 0, 1
+
+Rows = npt.NDArray[np.void]
+State = Literal["running", "ended", "dead"]
+
+
+def attach(name: str, *, stale: bool = False) -> Reader:
+    """The cycles that another process shares as `name`, for reading; leave it by `with`.
+
+    `stale`: also one whose writer has died, to see its last cycles. ShareError: there is none, it
+    may not be read, its writer is dead, or it has the layout of another version.
+    """
+    path = memory.path_of(name)
+    try:
+        segment = memory.open_segment(path)
+        layout = decode_head(segment.memory, segment.size)
+    except FileNotFoundError as error:
+        others = ", ".join(map(repr, memory.names())) or "none"
+        raise ShareError(
+            f"there is no share {name!r}; there are: {others}",
+            hint="it is there while a Loop with sink=cat.Share(...) is open",
+        ) from error
+    except PermissionError as error:
+        raise ShareError(
+            f"the share {name!r} may not be read: {path} belongs to another user",
+            hint="its writer can allow it: cat.Share(..., mode=0o640) for the group",
+        ) from error
+    except ShareError as error:
+        raise ShareError(f"the share {name!r}: {error.message}", hint=error.hint) from error
+    reader = Reader(segment, layout)
+    if reader.state == "dead" and not stale:
+        raise ShareError(
+            f"the share {name!r} is stale: {layout.writer} has died",
+            hint=f"its last cycles are still there: cat.attach({name!r}, stale=True); a new "
+            "writer replaces it",
+        )
+    return reader
+
+
+class Reader:
+    """Owns one process' sight of a share; `catenary.attach` makes it.
+
+        with cat.attach("arm") as arm:
+            while arm.wait(timeout=1.0):
+                now = arm.read()
+                print(now["number"], now["position"])
+
+    The memory is mapped for reading only: nothing here can delay or change the loop.
+    """
+
+    def __init__(self, segment: Segment, layout: ShareLayout) -> None:
+        self.layout = layout
+        self.dtype = layout.dtype
+        rows, events = layout.rows, layout.events
+        self._rings: tuple[Ring, Ring] | None = (
+            Ring(segment.memory, rows.offset, rows.count, rows.size),
+            Ring(segment.memory, events.offset, events.count, events.size),
+        )
+        self._seen = 0
+
+    def __enter__(self) -> Reader:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Lets go of the memory; what was read stays. The share is there for others."""
+        self._rings = None
+
+    @property
+    def state(self) -> State:
+        """Of the writer: "running"; "ended": its loop was left; "dead": killed, or crashed."""
+        if self._ring(CYCLES).ended:
+            return "ended"
+        return "running" if self.layout.writer.is_alive else "dead"
+
+    @property
+    def alive(self) -> bool:
+        """Whether there may be more cycles."""
+        return self.state == "running"
+
+    @property
+    def number(self) -> int:
+        """Of the newest cycle; 0: there is none yet."""
+        return self._ring(CYCLES).newest
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Sleeps until there is a cycle newer than the last one that `read` or `wait` has seen.
+        False: `timeout` [s] has passed, or no more will come: see `alive`."""
+        deadline = FOR_EVER if timeout is None else time.monotonic_ns() + round(timeout * 1e9)
+        while True:
+            slice_end = min(deadline, time.monotonic_ns() + LOOK_NS)
+            if self._ring(CYCLES).wait(self._seen, slice_end):
+                self._seen = self._ring(CYCLES).newest
+                return True
+            if slice_end == deadline or not self.alive:
+                return False
+
+    def read(self) -> np.void:
+        """The newest cycle: a record of `dtype`, copied whole. ShareError: there is none yet."""
+        number, row = self._ring(CYCLES).copy()
+        if number == 0:
+            raise ShareError(
+                f"the share {self.layout.name!r} has no cycle yet", hint="wait() for it"
+            )
+        self._seen = number
+        record: np.void = np.frombuffer(row, self.dtype)[0]
+        return record
+
+    def rows(self, after: int) -> tuple[Rows, int]:
+        """Every cycle behind number `after` that is still there, oldest first, as an array of
+        `dtype`; and how many there were that have been overwritten."""
+        rows, lost = self._ring(CYCLES).copy_after(after)
+        return np.frombuffer(rows, self.dtype), lost
+
+    def events(self, after: int = 0) -> tuple[list[SharedEvent], int]:
+        """Every event behind serial `after` that is still there, oldest first; and how many have
+        been overwritten."""
+        rows, lost = self._ring(EVENTS).copy_after(after)
+        size = self.layout.events.size
+        return [decode_event(rows[at : at + size]) for at in range(0, len(rows), size)], lost
+
+    def _ring(self, which: int) -> Ring:
+        if self._rings is None:
+            raise RuntimeError("the reader is closed")
+        return self._rings[which]

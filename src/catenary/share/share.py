@@ -1,0 +1,149 @@
+"""Share: what a loop does, for other processes to read."""
+
+from __future__ import annotations
+
+import threading
+import time
+from types import TracebackType
+
+from catenary.errors import ShareError
+from catenary.plan.sink import Incident, SinkLayout
+from catenary.share import memory
+from catenary.share._rows import CycleWriter, Ring
+from catenary.share.events import encode_event
+from catenary.share.layout import ShareLayout, decode_head, encode_head, make_layout
+from catenary.share.memory import Segment
+from catenary.share.process import this_process
+
+HISTORY = 2.0  # [s]
+
+
+class Share:
+    """Owns a name under which other processes find the cycles of a loop.
+
+        with cat.Share("arm") as share, cat.Loop(arm, period=1e-3, sink=share) as loop:
+            for cycle in loop: ...
+
+    Others `cat.attach("arm")`; nothing they do delays the loop. `history` [s] of cycles are kept.
+    `mode`: the permissions of the files, as of chmod: 0o600, this user alone; 0o640, the group
+    may read; 0o660, and command. One loop at a time; each loop that is opened with the share begins
+    a segment of its own, whose cycles count from 1: who is attached to the one before sees its end,
+    and attaches again. ShareError: the name belongs to a living process.
+    """
+
+    def __init__(self, name: str, *, history: float = HISTORY, mode: int = 0o600) -> None:
+        if not history > 0:
+            raise ValueError(f"history={history} s: must be positive")
+        if not 0 <= mode <= 0o777:
+            raise ValueError(f"mode={mode:#o}: permissions as of chmod, such as 0o600")
+        self.name = name
+        self.path = memory.path_of(name)
+        self._history = history
+        self._mode = mode
+        self._entered = False
+        self._segment: Segment | None = None
+        self._layout: ShareLayout | None = None
+        self._cycles: CycleWriter | None = None
+        self._events: Ring | None = None
+        self._telling = threading.Lock()
+
+    def __enter__(self) -> Share:
+        self._refuse_taken()
+        self._entered = True
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._entered = False
+        self.close()
+        if self._segment is not None:
+            self._segment.unlink()
+            self._segment = None
+
+    @property
+    def layout(self) -> ShareLayout:
+        """Of the loop that is, or was last, open."""
+        if self._layout is None:
+            raise RuntimeError(f"the share {self.name!r} has no layout before a Loop is open")
+        return self._layout
+
+    # plan.sink.Sink
+
+    def open(self, layout: SinkLayout) -> object:
+        """The segment of a loop that opens. Called by the loop."""
+        if not self._entered:
+            raise RuntimeError(f"use the share in a with block: with cat.Share({self.name!r}) ...")
+        if self._cycles is not None:
+            raise RuntimeError(f"the share {self.name!r} belongs to a loop already: one for each")
+        made = make_layout(
+            self.name,
+            layout,
+            history=self._history,
+            opened=time.time(),
+            writer=this_process(),
+        )
+        segment = memory.create(self.path, made.size, self._mode)
+        head = encode_head(made)
+        segment.memory[: len(head)] = head
+        blocks = (layout.record_size, layout.actual_size, layout.target_size)
+        rows, events = made.rows, made.events
+        cycles = CycleWriter(
+            segment.memory, rows.offset, rows.count, rows.size, blocks, writable=True
+        )
+        self._publish(segment)
+        self._segment, self._layout, self._cycles = segment, made, cycles
+        self._events = Ring(segment.memory, events.offset, events.count, events.size, writable=True)
+        return cycles.capsule
+
+    def tell(self, incident: Incident) -> None:
+        """Something happened beside the cycle. Called by the loop; from any thread."""
+        with self._telling:
+            if self._events is not None and self._cycles is not None:
+                number = self._events.newest + 1
+                self._events.write(encode_event(incident, number, self._cycles.newest))
+
+    def close(self) -> None:
+        """The loop has ended; what it shared stays readable until the next one, or the block's
+        end. Called by the loop."""
+        with self._telling:
+            for ring in (self._events, self._cycles):
+                if ring is not None:
+                    ring.end()
+            self._cycles = self._events = None
+
+    def _publish(self, segment: Segment) -> None:
+        try:
+            with memory.deciding():
+                self._refuse_taken()
+                segment.publish(self.path)
+        except BaseException:
+            segment.path.unlink(missing_ok=True)
+            raise
+
+    def _refuse_taken(self) -> None:
+        """A name whose writer lives is not ours; one whose writer is dead may be replaced."""
+        if self._segment is not None and self._segment.is_published:
+            return
+        try:
+            found = memory.open_segment(self.path)
+            layout = decode_head(found.memory, found.size)
+        except FileNotFoundError:
+            return
+        except PermissionError as error:
+            raise ShareError(
+                f"the share {self.name!r} belongs to another user", hint=f"see {self.path}"
+            ) from error
+        except ShareError as error:
+            raise ShareError(
+                f"{self.path} is in the way: {error.message}",
+                hint="choose another name, or remove it",
+            ) from error
+        if layout.writer.is_alive:
+            raise ShareError(
+                f"the share {self.name!r} belongs to {layout.writer}, which lives",
+                hint="choose another name, or end that process",
+            )
