@@ -13,6 +13,7 @@ from catenary.virtual.devices import (
 )
 from catenary.virtual.fault_player import FaultEvent, Loss
 from catenary.virtual.faults import Fault
+from catenary.virtual.plant import Joint, Plant
 from catenary.virtual.segment import FrameCounters, Segment, demo_segment
 from catenary.virtual.server import Server, serve
 
@@ -26,8 +27,10 @@ __all__ = [
     "Fault",
     "FaultEvent",
     "FrameCounters",
+    "Joint",
     "Junction",
     "Loss",
+    "Plant",
     "Segment",
     "Server",
     "Servo",

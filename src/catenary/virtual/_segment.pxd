@@ -55,6 +55,22 @@ cdef extern from "segment_memory.h" nogil:
     ctypedef struct segment_end:
         uint32_t head, tail
         int up
+    ctypedef struct plant_joint:
+        servo_axis *axis
+        double *q
+        double *v
+        double *force
+        double *friction
+        double ratio, zero, dry, brake
+        int64_t brake_delay
+    ctypedef struct plant:
+        void (*step)(const void *, void *) noexcept nogil
+        const void *model
+        void *data
+        plant_joint *joints
+        int count, wild, ending
+        int64_t period, due
+        uint64_t steps
     ctypedef struct servo_axis:
         double inertia, viscous, coulomb, load, rated_torque, velocity_limit
         double counts_per_radian, velocity_per_radian, position_gain, velocity_gain, integral_gain
@@ -87,6 +103,7 @@ cdef extern from "segment_memory.h" nogil:
     const fate NO_FATE
     ctypedef struct cat_segment:
         controller *controllers
+        plant *plant
         int count, pending, event_fd, is_virtual, ring, cable_count, fault_count
         cable *cables
         route *routes
@@ -110,6 +127,10 @@ cdef extern from "segment_memory.h" nogil:
     void segment_light(cat_segment *, int at_once)
     void routes_refresh(cat_segment *)
     void segment_advance(cat_segment *, int64_t until)
+    void segment_work(cat_segment *, int64_t until, int steps_plant)
+    void plant_free(plant *)
+    void plant_hang(plant_joint *, servo_axis *)
+    void servo_place(servo_axis *, double position)
     void al_show(controller *, uint16_t status, uint16_t code)
     void sm_configured(controller *, int n)
     uint8_t *sm_registers(controller *, int n)
@@ -146,6 +167,7 @@ cdef class Core:
     cdef cat_segment *_segment
     cdef object _service
     cdef object _clock
+    cdef object _plant               # what the plant's addresses point into
     cdef readonly object failure
     cdef readonly int count
     cdef controller *_at(self, int position) except NULL

@@ -461,8 +461,16 @@ cdef class Core:
         cdef servo_axis *a = self._axis(position, axis)
         return a.position, a.velocity, a.torque, a.state
 
+    def tune_axis(self, int position, int axis, *, double velocity_gain, double integral_gain):
+        """The velocity loop's gains [N m s/rad], [N m/rad]."""
+        cdef servo_axis *a = self._axis(position, axis)
+        a.velocity_gain, a.integral_gain = velocity_gain, integral_gain
+
     def move_axis(self, int position, int axis, double to):
-        self._axis(position, axis).position = to
+        cdef servo_axis *a = self._axis(position, axis)
+        lock(self._segment)
+        servo_place(a, to)
+        unlock(self._segment)
 
     def load_axis(self, int position, int axis, double load):
         self._axis(position, axis).load = load

@@ -1,4 +1,5 @@
-"""A segment as a TOML file: `[[device]]` tables in the order of the line, `[[fault]]` tables.
+"""A segment as a TOML file: `[[device]]` tables in the order of the line, `[[fault]]` tables, a
+`[plant]` that their motors move.
 
 ring = true
 
@@ -33,6 +34,7 @@ from catenary.virtual.devices.digital_outputs import DigitalOutputs
 from catenary.virtual.devices.junction import Junction
 from catenary.virtual.devices.servo import Servo
 from catenary.virtual.faults import Fault
+from catenary.virtual.plant import STEP, Joint, Plant
 from catenary.virtual.segment import ClockKind, Segment
 from catenary.virtual.wiring import Place
 
@@ -178,14 +180,33 @@ DeviceTable = (
 )
 
 
+class PlantTable(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    model: str
+    joint: tuple[Joint, ...] | None = None
+    passive: tuple[str, ...] = ()
+    step: float = STEP
+    contacts: bool = True
+
+    def plant(self, path: str | Path) -> Plant:
+        """`path`: of the file; the model's is counted from there."""
+        return Plant(
+            Path(path).parent / self.model,
+            self.joint,
+            passive=self.passive,
+            step=self.step,
+            contacts=self.contacts,
+        )
+
+
 class SegmentFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     device: tuple[DeviceTable, ...]
+    plant: PlantTable | None = None
     fault: tuple[Fault, ...] = ()
     ring: bool = False
     link_loss_detection: float | Literal["enhanced", "standard"] = "enhanced"
 
 
-HINT = "docs/virtual.md lists the fields of devices, docs/faults.md those of faults"
+HINT = "docs/virtual.md lists the fields of devices and plants, docs/faults.md those of faults"
 
 
 def _made(table: DeviceTable, position: int, path: str | Path) -> Device:
@@ -230,12 +251,15 @@ def read_segment(path: str | Path, *, clock: ClockKind = "virtual", ring: bool =
         segment = Segment(
             devices,
             clock=clock,
+            plant=None if file.plant is None else file.plant.plant(path),
             behind=behind,
             ring=ring or file.ring,
             link_loss_detection=file.link_loss_detection,
         )
     except ValueError as error:
         raise ConfigurationError(f"{path}: {error}", hint=HINT) from error
+    except ConfigurationError as error:
+        raise ConfigurationError(f"{path}: plant: {error.message}", hint=error.hint) from error
     for number, fault in enumerate(file.fault):
         try:
             segment.inject(fault)

@@ -120,6 +120,7 @@ typedef struct {
 } mapping;
 
 struct servo_axis;
+struct plant;
 struct cat_segment;
 
 enum { MODEL_NONE = 0, MODEL_SLOTS = 1, MODEL_SERVO = 2 };
@@ -264,6 +265,7 @@ typedef struct cat_segment {
     int64_t next_due;                /* of all compiled work */
     int64_t sii_due;                 /* of the earliest EEPROM access, for the packet loop */
     int64_t service_due;             /* of the application, Python */
+    struct plant *plant;             /* what the motors of servos turn together; NULL: nothing */
     int synchronous;                 /* how many devices keep time by SYNC0 */
     int inputs_stale;                /* some controller's inputs are */
     int pending;                     /* some controller has events */

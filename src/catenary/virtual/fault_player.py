@@ -51,13 +51,20 @@ class FaultPlayer:
     """Owns the faults that are planned or on, and the log of them."""
 
     def __init__(
-        self, core: Core, wires: Wires, devices: list[Device], wiring: Wiring, agenda: Agenda
+        self,
+        core: Core,
+        wires: Wires,
+        devices: list[Device],
+        wiring: Wiring,
+        agenda: Agenda,
+        replaced: Callable[[Device, Device], None] | None = None,
     ) -> None:
         self._core = core
         self._wires = wires
         self._devices = devices
         self.wiring = wiring
         self._agenda = agenda
+        self._replaced = replaced
         self._waiting: list[f.Fault] = []  # real time: until the first frame
         self._planned = 0
         self._frame_faults: list[tuple[int, f.FrameFault]] = []
@@ -318,10 +325,13 @@ class FaultPlayer:
         return lambda: setattr(device, "crystal", before)
 
     def _put_in(self, position: int, device: Device) -> None:
-        self._devices[position].detach()
+        old = self._devices[position]
+        old.detach()
         self._core.remove_controller(position)
         self._devices[position] = device
         device.attach(self._core, position, self._agenda)
+        if self._replaced is not None:
+            self._replaced(old, device)
 
     def _exchange(self, one: int, other: int) -> None:
         devices = self._devices

@@ -12,6 +12,7 @@
 #include "controller.h"
 #include "datagram.h"
 #include "device_cycle.h"
+#include "plant.h"
 
 enum {
     BYTE_NS = 80,                     /* 100 Mbit/s */
@@ -87,19 +88,24 @@ static void segment_light(cat_segment *s, int at_once) {
 }
 
 /* Runs compiled work up to `until`, in the order of its times; in virtual time it stops where an
- * event wants the application. */
-static void segment_advance(cat_segment *s, int64_t until) {
-    while (s->next_due <= until) {
+ * event wants the application. With a plant every instant has its turn, so that motors and joints
+ * keep step however late it is; the joints come first, as encoders show what was before. */
+static void segment_work(cat_segment *s, int64_t until, int steps_plant) {
+    int64_t bound = plant_bound(s, until, steps_plant);
+    while (s->next_due <= bound) {
         if (s->next_due > s->now)
             s->now = s->next_due;
-        int64_t next = NEVER;
+        int64_t instant = s->plant ? s->next_due : s->now;
+        if (s->plant && s->plant->due <= instant)
+            plant_step(s);
+        int64_t next = s->plant ? s->plant->due : NEVER;
         s->next_due = NEVER;
         if (s->link_due <= s->now)
             links_check(s);
-        next = s->link_due;
+        next = s->link_due < next ? s->link_due : next;
         for (int n = 0; n < s->count; n++) {
             int64_t due = s->dues[n];
-            if (due <= s->now)
+            if (due <= instant)
                 due = controller_advance(&s->controllers[n]);
             next = due < next ? due : next;
         }
@@ -110,6 +116,9 @@ static void segment_advance(cat_segment *s, int64_t until) {
     if (until > s->now)
         s->now = until;
 }
+
+/* In real time a plant is stepped by its own thread: others go no further than its next step. */
+static inline void segment_advance(cat_segment *s, int64_t until) { segment_work(s, until, s->is_virtual); }
 
 /* The next place in the queue of frames towards an interface. */
 static inline queued_frame *queue_place(segment_end *e) {

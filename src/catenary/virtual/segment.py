@@ -15,6 +15,7 @@ from catenary.virtual.devices.digital_outputs import DigitalOutputs
 from catenary.virtual.devices.servo import Servo
 from catenary.virtual.fault_player import FaultEvent, FaultPlayer, Loss
 from catenary.virtual.faults import Fault
+from catenary.virtual.plant import Plant
 from catenary.virtual.service import Service, ServiceThread
 from catenary.virtual.wiring import Place, Wiring
 
@@ -61,7 +62,8 @@ class Segment:
     A `realtime.VirtualClock`, or a place on one (`clock.participate()`): virtual time shared with
     tasks; the loop on this segment takes that place, in the thread that the place is for.
 
-    `faults`: what happens to it, by its own time (`time`). `behind`: device → (device, port) it
+    `plant`: what the motors of its servos turn. `faults`: what happens to it, by its own time
+    (`time`). `behind`: device → (device, port) it
     hangs on, where that is not port 1 of the one before. `ring`: the last device leads back to a
     second interface of the MainDevice; until somebody opens that end, it is a line.
     `link_loss_detection`: how long controllers take to see that a cable is dark: "enhanced"
@@ -73,6 +75,7 @@ class Segment:
         devices: Sequence[Device],
         *,
         clock: ClockKind | SharedClock = "virtual",
+        plant: Plant | None = None,
         faults: Sequence[Fault] = (),
         behind: Mapping[int, Place] | None = None,
         ring: bool = False,
@@ -94,9 +97,15 @@ class Segment:
             self._wires.lay_cable(number, cable.up, cable.down)
         if isinstance(clock, SharedClock):
             self._core.use_clock(clock)
-        self._service = Service(self._core, self._devices)
+        self.plant = plant
+        self._service = Service(self._core, self._devices, plant)
         self._faults = FaultPlayer(
-            self._core, self._wires, self._devices, wiring, self._service.agenda
+            self._core,
+            self._wires,
+            self._devices,
+            wiring,
+            self._service.agenda,
+            None if plant is None else plant.replaced,
         )
         self._service.at_first_frame(self._faults.start)
         self._thread: ServiceThread | None = None

@@ -45,6 +45,7 @@ static void controller_forget(controller *c) {
         memset(a, 0, sizeof *a);
         a->position = before.position;
         a->load = before.load;
+        a->joint = before.joint;
         a->sto = before.sto;
     }
     ports_reset(c);
@@ -107,6 +108,7 @@ static void controller_blank(controller *c) {
 static void controller_remove(controller *c) {
     controller empty = {.segment = c->segment, .position = c->position};
     memcpy(empty.ports, c->ports, sizeof empty.ports);
+    plant_forget(c->segment->plant, c);
     controller_free(c);
     *c = empty;
     controller_blank(c);
@@ -140,6 +142,7 @@ static void segment_free(cat_segment *s) {
         free(s->routes[n].times);
         free(s->ends[n].queue);
     }
+    plant_free(s->plant);
     free(s->cables);
     free(s->dues);
     free(s->controllers);

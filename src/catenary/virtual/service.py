@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 
 from catenary.virtual._segment import EVENT_RESET, Core
 from catenary.virtual.devices.device import Device
+from catenary.virtual.plant import Plant
 from catenary.virtual.scheduler import FOREVER, Agenda
 
 STOP_SIGNALS = {signal.SIGINT, signal.SIGTERM}
@@ -24,13 +25,16 @@ IDLE_SECONDS = 0.02  # device models are stepped at least this often while no fr
 class Service:
     """Owns the agenda of a segment and hands events to its devices."""
 
-    def __init__(self, core: Core, devices: Sequence[Device]) -> None:
+    def __init__(self, core: Core, devices: Sequence[Device], plant: Plant | None = None) -> None:
         self.core = core
+        self.plant = plant
         self.agenda = Agenda(core)
         self._devices = devices
         self._at_first_frame: Callable[[], None] | None = None
         for position, device in enumerate(devices):
             device.attach(core, position, self.agenda)
+        if plant is not None:
+            plant.attach(core, devices)
         core.use_service(self.run)
 
     def at_first_frame(self, action: Callable[[], None]) -> None:
@@ -62,6 +66,8 @@ class Service:
                 action, self._at_first_frame = self._at_first_frame, None
                 action()
             self.agenda.run_due()
+            if self.plant is not None:
+                self.plant.check()
             if not events:
                 return
 
@@ -78,6 +84,8 @@ class ServiceThread:
     def start(self) -> None:
         self._service.core.wake_by(self._event)
         self._thread.start()
+        if self._service.plant is not None:
+            self._service.plant.start()
 
     def _run(self) -> None:
         core = self._service.core
@@ -107,5 +115,7 @@ class ServiceThread:
         self._stopping = True
         os.eventfd_write(self._event, 1)
         self._thread.join()
+        if self._service.plant is not None:
+            self._service.plant.stop()
         self._service.core.wake_by(-1)
         os.close(self._event)

@@ -2,7 +2,8 @@
  * (IEC 61800-7-201 §10 state machine, §12 to §14 modes), stepped at the device's own cycle.
  *
  * Written from the profile, apart from the MainDevice's side, so that they judge each other.
- * Motor: J dv/dt = T + T_load - b v - T_c sign(v), semi-implicit Euler. Budget: 0.1 us a step. */
+ * Motor: J dv/dt = T + T_load - b v - T_c sign(v), semi-implicit Euler; or a joint of a plant
+ * (plant.h). Budget: 0.1 us a step. */
 #ifndef CATENARY_VIRTUAL_SERVO_H
 #define CATENARY_VIRTUAL_SERVO_H
 
@@ -39,6 +40,8 @@ enum {
 
 typedef enum { RAMP_NONE, RAMP_TO_DISABLED, RAMP_AND_STAY, RAMP_TO_READY, RAMP_TO_SWITCHED_ON, RAMP_TO_FAULT } ramp_end;
 
+struct plant_joint;
+
 typedef struct servo_axis {
     /* the machine, SI */
     double inertia, viscous, coulomb, load;           /* kg m2, N m s/rad, N m, N m */
@@ -48,6 +51,7 @@ typedef struct servo_axis {
     double position_gain, velocity_gain, integral_gain;
     /* its state */
     double position, velocity, torque, integral;      /* rad, rad/s, N m, N m */
+    struct plant_joint *joint;                        /* what the motor turns; NULL: a shaft of its own */
     /* set-points */
     int64_t target;                                   /* unwrapped target position, counts */
     double command, command_velocity, ramp;           /* counts; rad/s; rad/s */
@@ -350,7 +354,8 @@ static void servo_step(controller *c, servo_axis *a, int64_t *slots, int fed, in
     servo_command(c, a, slots);
     servo_supervise(c, a, slots, dt);
     a->torque = servo_powered(a) ? servo_drive(a, slots, fresh, dt, rate) : 0;
-    servo_motor(a, dt);
+    if (a->joint == NULL)
+        servo_motor(a, dt);
     servo_standstill(a);
 }
 

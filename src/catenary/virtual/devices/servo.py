@@ -142,6 +142,7 @@ class Servo(AppliedDevice):
         self.following_error_turns = following_error_turns
         self.position_limits = position_limits
         self.sync_missed_limit = sync_missed_limit
+        self._inertias = [inertia] * axes  # what the loops are tuned for
 
     def _pdos(
         self, base: int, default: tuple[int, ...], others: tuple[tuple[int, ...], ...]
@@ -181,8 +182,8 @@ class Servo(AppliedDevice):
 
     def started(self, scheduler: Scheduler) -> None:
         counts_per_radian = self.counts_per_turn / (2 * math.pi)
-        velocity_gain = self.inertia * VELOCITY_BANDWIDTH
         for axis in range(self.axes):
+            velocity_gain, integral_gain = self._gains(axis)
             self.core.make_axis(
                 self.position,
                 axis,
@@ -195,12 +196,24 @@ class Servo(AppliedDevice):
                 velocity_per_radian=self.velocity_counts_per_turn / (2 * math.pi),
                 position_gain=POSITION_BANDWIDTH,
                 velocity_gain=velocity_gain,
-                integral_gain=velocity_gain * VELOCITY_BANDWIDTH / 5,
+                integral_gain=integral_gain,
                 boot=BOOT_SECONDS,
             )
             self._preset(axis, counts_per_radian)
         super().started(scheduler)
         self.core.run_model(self.position, STEP_NS)
+
+    def _gains(self, axis: int) -> tuple[float, float]:
+        velocity_gain = self._inertias[axis] * VELOCITY_BANDWIDTH
+        return velocity_gain, velocity_gain * VELOCITY_BANDWIDTH / 5
+
+    def tune(self, inertia: float, axis: int = 0) -> None:
+        """Tunes the velocity loop for what the motor turns, its own inertia included [kg·m²]."""
+        self._inertias[axis] = inertia
+        velocity_gain, integral_gain = self._gains(axis)
+        self.core.tune_axis(
+            self.position, axis, velocity_gain=velocity_gain, integral_gain=integral_gain
+        )
 
     def _preset(self, axis: int, counts_per_radian: float) -> None:
         low, high = self.position_limits or (0.0, 0.0)

@@ -1,0 +1,243 @@
+"""A MuJoCo model as a plant needs it: read from MJCF or URDF, its joints by name, the addresses of
+its numbers. MuJoCo is imported here alone, and only when a plant is made.
+
+Friction: under load MuJoCo's dry friction creeps. `SOLIMP`, and a time constant as short as the
+step allows, make it stiff: the arm of examples/cobot creeps 1e-6 rad/s on its brakes.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from catenary.errors import ConfigurationError
+
+if TYPE_CHECKING:
+    import mujoco
+
+ROOTS = ("mujoco", "robot")
+SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+TIME_CONSTANT_STEPS, DAMPING_RATIO = 2.0, 1.0  # MuJoCo's documentation: no less than two steps
+DEEPEST = 1e-3  # bodies may touch at the start, no more [m]
+
+
+class Addresses(NamedTuple):
+    """Where a joint's numbers lie, in qpos, qvel, qfrc_applied and dof_frictionloss."""
+
+    q: int
+    v: int
+    force: int
+    friction: int
+
+
+def read_model(path: str | Path, *, step: float, contacts: bool) -> Model:
+    """Reads an MJCF or URDF file. ConfigurationError says what is missing or wrong."""
+    path = Path(path)
+    mujoco = _mujoco(path)
+    root = _root(path)
+    try:
+        if root.tag == "mujoco":
+            model = mujoco.MjModel.from_xml_path(str(path))
+        else:
+            meshes = _leave_out_shapes(root, path) if contacts else _leave_out_shapes(root)
+            model = mujoco.MjModel.from_xml_string(ElementTree.tostring(root, "unicode"), meshes)
+    except ValueError as error:
+        raise ConfigurationError(f"{path}: MuJoCo refuses the model: {error}") from error
+    model.opt.timestep = step
+    flags = mujoco.mjtDisableBit
+    # the motors are the only actuators; a simulation that failed must not begin anew unasked
+    model.opt.disableflags |= flags.mjDSBL_ACTUATION | flags.mjDSBL_AUTORESET
+    if not contacts:
+        model.opt.disableflags |= flags.mjDSBL_CONTACT
+    return Model(path, model)
+
+
+def _mujoco(path: Path) -> Any:
+    try:
+        import mujoco
+    except ImportError as error:
+        raise ConfigurationError(
+            f"{path} cannot be simulated: MuJoCo is not installed",
+            hint="pip install 'catenary[sim]'",
+        ) from error
+    return mujoco
+
+
+def _root(path: Path) -> ElementTree.Element:
+    try:
+        root = ElementTree.fromstring(path.read_bytes())
+    except OSError as error:
+        raise ConfigurationError(f"{path}: {error.strerror}: a plant needs its model") from error
+    except ElementTree.ParseError as error:
+        raise ConfigurationError(f"{path} is no XML: {error}") from error
+    if root.tag not in ROOTS:
+        raise ConfigurationError(
+            f"{path}: <{root.tag}> is neither MJCF (<mujoco>) nor URDF (<robot>)",
+            hint="xacro files have to be expanded: xacro robot.urdf.xacro > robot.urdf"
+            if path.suffix == ".xacro"
+            else "",
+        )
+    return root
+
+
+def _leave_out_shapes(root: ElementTree.Element, path: Path | None = None) -> dict[str, bytes]:
+    """Takes out of a URDF what is only looked at, and without `path` what collides too; the meshes
+    of what is left, found from `path` up."""
+    for link in root.iter("link"):
+        for shape in [*link.iter("visual"), *([] if path else link.iter("collision"))]:
+            link.remove(shape)
+    meshes = [mesh.get("filename", "") for mesh in root.iter("mesh")] if path else []
+    return {Path(name).name: _mesh(name, path).read_bytes() for name in meshes if path}
+
+
+def _mesh(name: str, path: Path) -> Path:
+    """`package://name/meshes/x.stl`: below the package's folder, where the URDF is too."""
+    below = name.removeprefix("package://").removeprefix("file://")
+    parts = Path(below).parts
+    for start in range(len(parts) if "://" in name else 1):
+        for folder in path.resolve().parents:
+            if (folder / Path(*parts[start:])).is_file():
+                return folder / Path(*parts[start:])
+    raise ConfigurationError(
+        f"{path}: the mesh {name} is not there",
+        hint="contacts=False (in TOML: contacts = false) needs no shapes",
+    )
+
+
+class Model:
+    """Owns a MuJoCo model and its state."""
+
+    def __init__(self, path: Path, model: mujoco.MjModel) -> None:
+        import mujoco
+
+        self._mujoco = mujoco
+        self.path = path
+        self.model = model
+        self.data = mujoco.MjData(model)
+        self._starts: dict[str, float] = {}
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The joints a motor can turn: hinges and slides."""
+        kinds = self._mujoco.mjtJoint
+        turnable = int(kinds.mjJNT_HINGE), int(kinds.mjJNT_SLIDE)
+        return tuple(
+            self.model.joint(n).name
+            for n in range(self.model.njnt)
+            if int(self.model.jnt_type[n]) in turnable
+        )
+
+    def check_joints(self, turned: Sequence[str], passive: Sequence[str]) -> None:
+        """Every joint is turned by one motor, or passive: else an error names those there are."""
+        there = f"its joints are {', '.join(self.joints) or 'none'}"
+        for name in [*turned, *passive]:
+            if name not in self.joints:
+                raise ConfigurationError(f"{self.path} has no joint {name!r}; {there}")
+            if [*turned, *passive].count(name) > 1:
+                raise ConfigurationError(f"{self.path}: joint {name!r} is used twice; {there}")
+        left = [name for name in self.joints if name not in turned and name not in passive]
+        if left:
+            raise ConfigurationError(
+                f"{self.path}: no motor turns {', '.join(map(repr, left))}; {there}",
+                hint=f"give each a joint of the plant, or passive={left!r}",
+            )
+
+    def _id(self, name: str) -> int:
+        return int(self.model.joint(name).id)
+
+    def _dof(self, name: str) -> int:
+        return int(self.model.jnt_dofadr[self._id(name)])
+
+    def place(self, name: str, position: float) -> None:
+        """Where a joint is at first [rad or m]."""
+        low, high = self.model.jnt_range[self._id(name)].tolist()
+        if self.model.jnt_limited[self._id(name)] and not low <= position <= high:
+            raise ConfigurationError(
+                f"{self.path}: joint {name!r} cannot start at {position:g}: it goes from {low:g} to"
+                f" {high:g}"
+            )
+        self._starts[name] = position
+
+    def _start(self) -> None:
+        self._mujoco.mj_resetData(self.model, self.data)
+        for name, position in self._starts.items():
+            self.data.qpos[self.model.jnt_qposadr[self._id(name)]] = position
+        self._mujoco.mj_forward(self.model, self.data)
+
+    def check_start(self) -> None:
+        """ConfigurationError where bodies begin inside of one another: contact tears at them."""
+        self._start()
+        for contact in self.data.contact:
+            if contact.dist > -DEEPEST:
+                continue
+            one, other = (self._body(geom) for geom in (contact.geom1, contact.geom2))
+            raise ConfigurationError(
+                f"{self.path}: {one} and {other} begin {-1e3 * contact.dist:.1f} mm inside of one"
+                " another: their contact would hold or tear the joints",
+                hint="exclude the pair (MJCF: <contact><exclude body1=... body2=.../></contact>),"
+                " start elsewhere, or contacts=False",
+            )
+
+    def _body(self, geom: int) -> str:
+        return f"body {self.model.body(self.model.geom_bodyid[geom]).name!r}"
+
+    def add_motor(self, name: str, *, inertia: float, viscous: float) -> None:
+        """What the motor adds at the joint: [kg·m²], [N·m·s/rad]."""
+        dof = self._dof(name)
+        self.model.dof_armature[dof] += inertia
+        self.model.dof_damping[dof] += viscous
+        time_constant = TIME_CONSTANT_STEPS * self.model.opt.timestep
+        self.model.dof_solref[dof] = time_constant, DAMPING_RATIO
+        self.model.dof_solimp[dof] = SOLIMP
+
+    def settle(self) -> None:
+        """The motors are in: all that follows from them, and the beginning once more."""
+        self._mujoco.mj_setConst(self.model, self.data)
+        self._start()
+        self._mujoco.mj_step(self.model, self.data)  # fails here rather than in compiled code
+        self._start()
+
+    def inertia(self, name: str) -> float:
+        """What a motor at the joint has to turn at the start, with its own [kg·m²]."""
+        dof = self._dof(name)
+        dense = np.zeros((self.model.nv, self.model.nv))
+        self._mujoco.mj_fullM(self.model, self.data, dense)
+        return float(dense[dof, dof])
+
+    def dry_friction(self, name: str) -> float:
+        """That the model gives the joint [N·m]."""
+        return float(self.model.dof_frictionloss[self._dof(name)])
+
+    # -- for compiled code ---------------------------------------------------------------------
+
+    def addresses(self, name: str) -> Addresses:
+        dof = self._dof(name)
+        return Addresses(
+            q=_address(self.data.qpos, int(self.model.jnt_qposadr[self._id(name)])),
+            v=_address(self.data.qvel, dof),
+            force=_address(self.data.qfrc_applied, dof),
+            friction=_address(self.model.dof_frictionloss, dof),
+        )
+
+    @property
+    def step_address(self) -> int:
+        """Of mj_step, in the library the mujoco package itself uses."""
+        [library] = Path(str(self._mujoco.__file__)).parent.glob("libmujoco.so*")
+        return ctypes.cast(ctypes.CDLL(str(library)).mj_step, ctypes.c_void_p).value or 0
+
+    @property
+    def model_address(self) -> int:
+        return int(self.model._address)
+
+    @property
+    def data_address(self) -> int:
+        return int(self.data._address)
+
+
+def _address(numbers: np.ndarray, index: int) -> int:
+    return int(numbers.ctypes.data) + index * numbers.itemsize

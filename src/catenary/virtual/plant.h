@@ -1,0 +1,132 @@
+/* A plant: one MuJoCo model that the motors of several servos turn, instead of each its own shaft.
+ *
+ * At its own fixed step, on the segment's clock: motor torques in, one mj_step, joint states out. The
+ * torque a servo computed at t acts from t on; the servos find the state of t + step at t + step.
+ * MuJoCo is called by a function pointer, its arrays by their addresses: nothing of Python, no
+ * allocation. Never in the path of frames: in real time one thread alone steps it, and lets the
+ * segment go while MuJoCo computes. Budget: 10 us a step of a six-axis arm, nearly all in mj_step.
+ *
+ * Motor inertia, viscous and dry friction are in the model (armature, damping, frictionloss). A brake
+ * is dry friction that comes and goes. */
+#ifndef CATENARY_VIRTUAL_PLANT_H
+#define CATENARY_VIRTUAL_PLANT_H
+
+#include "device_cycle.h"
+
+#define WILD 1e6                      /* a motor does not turn as fast as this [rad/s] */
+
+/* A joint of the model and the motor on it: motor angle = ratio (q - zero). */
+typedef struct plant_joint {
+    servo_axis *axis;                 /* NULL: no motor hangs on it */
+    double *q, *v, *force, *friction; /* in qpos, qvel, qfrc_applied, dof_frictionloss */
+    double ratio, zero;               /* turns of the motor a turn of the joint, with their sign; rad */
+    double dry, brake;                /* at the joint: dry friction; and what the closed brake adds */
+    int64_t brake_delay, closes;      /* from the end of the motor's torque; when it closes [ns] */
+    double place;                     /* somebody turned it by hand: where to */
+    uint8_t placed;
+} plant_joint;
+
+typedef struct plant {
+    void (*step)(const void *model, void *data);
+    const void *model;
+    void *data;
+    plant_joint *joints;
+    int count;
+    int64_t period, due;              /* [ns] */
+    int wild;                         /* the joint, from 1, that went beyond all bounds: it stands still */
+    int ending;                       /* real time: its thread is to end */
+    uint64_t steps;
+} plant;
+
+static inline int plant_braked(plant_joint *j, int64_t now) {
+    if (j->axis == NULL || !servo_powered(j->axis))
+        return j->closes <= now;
+    j->closes = now + j->brake_delay;
+    return 0;
+}
+
+static void plant_apply(plant *p, int64_t now) {
+    for (int k = 0; k < p->count; k++) {
+        plant_joint *j = &p->joints[k];
+        *j->force = j->axis ? j->ratio * (j->axis->torque + j->axis->load) : 0;
+        *j->friction = j->dry + (plant_braked(j, now) ? j->brake : 0);
+        if (j->placed) {
+            *j->q = j->place;
+            *j->v = 0;
+            j->placed = 0;
+        }
+    }
+}
+
+/* What the encoders see. */
+static void plant_show(plant *p) {
+    for (int k = 0; k < p->count; k++) {
+        plant_joint *j = &p->joints[k];
+        double velocity = j->ratio * *j->v;
+        if (!(fabs(velocity) < WILD))
+            p->wild = k + 1;
+        if (!j->axis || p->wild || j->placed)
+            continue;
+        j->axis->position = j->ratio * (*j->q - j->zero);
+        j->axis->velocity = velocity;
+    }
+}
+
+/* One step, due now. In real time others may pass while MuJoCo computes; they stop before p->due. */
+static void plant_step(cat_segment *s) {
+    plant *p = s->plant;
+    plant_apply(p, s->now);
+    if (!s->is_virtual)
+        pthread_mutex_unlock(&s->mutex);
+    p->step(p->model, p->data);
+    if (!s->is_virtual)
+        pthread_mutex_lock(&s->mutex);
+    p->steps++;
+    plant_show(p);
+    p->due += p->period;
+    if (p->due <= s->now - CATCH_UP_STEPS * p->period)
+        p->due = s->now + p->period;
+    if (!p->wild)
+        return;
+    p->due = NEVER;
+    s->pending = 1;
+    wake_service(s);
+}
+
+/* How far the caller may work: only who steps the plant passes its steps. */
+static inline int64_t plant_bound(const cat_segment *s, int64_t until, int steps_plant) {
+    return !s->plant || steps_plant || until < s->plant->due ? until : s->plant->due - 1;
+}
+
+static void plant_hang(plant_joint *j, servo_axis *a) {
+    j->axis = a;
+    a->joint = j;
+    a->position = j->ratio * (*j->q - j->zero);
+    a->velocity = j->ratio * *j->v;
+}
+
+/* The motors of a device that goes come off. */
+static void plant_forget(plant *p, const controller *c) {
+    for (int k = 0; p && k < p->count; k++)
+        for (int n = 0; n < c->axis_count; n++)
+            if (p->joints[k].axis == &c->axes[n])
+                p->joints[k].axis = NULL;
+}
+
+/* Somebody turns the shaft by hand [rad of the motor]. */
+static inline void servo_place(servo_axis *a, double position) {
+    plant_joint *j = a->joint;
+    a->position = position;
+    if (j == NULL)
+        return;
+    j->place = j->zero + position / j->ratio;
+    j->placed = 1;
+}
+
+static void plant_free(plant *p) {
+    if (p)
+        free(p->joints);
+    free(p);
+}
+
+#endif

@@ -1,0 +1,249 @@
+"""A simulated arm behind virtual servos: their motors turn the joints of one MuJoCo model.
+
+    Segment(
+        [Servo(axes=2, inertia=2e-5, rated_torque=0.6)],
+        plant=Plant("arm.xml", [Joint("shoulder", gear=101), Joint("elbow", gear=50)]),
+    )
+
+The compiled segment steps the model (`plant.h`); this is how motors and joints come together.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import msgspec
+
+from catenary.errors import ConfigurationError
+from catenary.virtual._plant import CompiledPlant
+from catenary.virtual._segment import Core
+from catenary.virtual.devices.device import Device
+from catenary.virtual.devices.servo import Servo
+from catenary.virtual.mujoco_model import read_model
+
+if TYPE_CHECKING:
+    import mujoco
+
+# The servos' own cycle: torques change that often. A shorter step shows nothing that they could
+# see, a longer one is a dead time in their velocity loops (80 Hz).
+STEP = 250e-6
+SHORTEST_STEP, LONGEST_STEP = 20e-6, 1e-3
+SECOND = 1e9
+
+
+class Joint(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A joint of the model and the motor that turns it: motor angle = direction · gear · (joint
+    angle - zero) [rad]; of a slide: · (position - zero) [m], `gear` [rad/m].
+
+    `start`: where the joint is at first [rad]; None: as the model says.
+    `brake`: what the holding brake holds at the joint [N·m]; None: what the motor can do at most,
+    0: there is none. It closes `brake_delay` [s] after the drive's torque has ended, opens when
+    the drive is in operation enabled, and is closed without power.
+    `axis`: (position of the servo, its axis); None: the next axis on the line.
+    """
+
+    name: str
+    gear: float = 1.0
+    direction: Literal[1, -1] = 1
+    zero: float = 0.0
+    start: float | None = None
+    brake: float | None = None
+    brake_delay: float = 0.0
+    axis: tuple[int, int] | None = None
+
+    def __post_init__(self) -> None:
+        if not 0 < self.gear < math.inf:
+            raise ValueError(f"joint {self.name!r}: gear must be positive, not {self.gear}")
+        if self.direction not in (1, -1):
+            raise ValueError(f"joint {self.name!r}: direction is 1 or -1, not {self.direction}")
+        if self.brake is not None and not 0 <= self.brake < math.inf:
+            raise ValueError(f"joint {self.name!r}: brake is 0 or more N·m, not {self.brake}")
+        if not 0 <= self.brake_delay <= 10:
+            raise ValueError(f"joint {self.name!r}: a brake takes 0 to 10 s to close")
+
+    @property
+    def ratio(self) -> float:
+        return self.direction * self.gear
+
+
+class Plant:
+    """Owns a MuJoCo model whose joints the servos of one segment turn.
+
+    `path`: an MJCF or URDF file. `joints`: those that motors turn, in the order of the axes on the
+    line; None: all of the model, in its order, without gears. `passive`: joints no motor turns.
+    `step`: of the simulation [s]. `contacts=False`: bodies pass through each other.
+
+    ConfigurationError: MuJoCo or the file is missing, the model cannot be read or begins in
+    contact; the joints there are, where they are not those asked for.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        joints: Sequence[Joint] | None = None,
+        *,
+        passive: Sequence[str] = (),
+        step: float = STEP,
+        contacts: bool = True,
+    ) -> None:
+        if not SHORTEST_STEP <= step <= LONGEST_STEP:
+            raise ValueError(
+                f"a plant's step is {SHORTEST_STEP:g} to {LONGEST_STEP:g} s, not {step}:"
+                " longer ones are a dead time in the drives' velocity loops"
+            )
+        self.step = step
+        self._model = read_model(path, step=step, contacts=contacts)
+        self.joints = self._chosen(joints, passive)
+        self._compiled: CompiledPlant | None = None
+        self._motors: list[tuple[Servo, int]] = []
+        self._thread: threading.Thread | None = None
+
+    def _chosen(self, joints: Sequence[Joint] | None, passive: Sequence[str]) -> tuple[Joint, ...]:
+        if joints is None:
+            joints = [Joint(name) for name in self._model.joints if name not in passive]
+        self._model.check_joints([joint.name for joint in joints], passive)
+        for joint in joints:
+            if joint.start is not None:
+                self._model.place(joint.name, joint.start)
+        self._model.check_start()
+        return tuple(joints)
+
+    @property
+    def path(self) -> Path:
+        return self._model.path
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """MuJoCo's model, with the motors in it once the segment is made."""
+        return self._model.model
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """MuJoCo's state. To be looked at in virtual time; in real time a thread works on it."""
+        return self._model.data
+
+    # -- motors and joints ---------------------------------------------------------------------
+
+    def attach(self, core: Core, devices: Sequence[Device]) -> None:
+        """Hangs the joints on the servos; the segment does it when it is made."""
+        if self._compiled is not None:
+            raise ValueError(f"{self.path.name} moves in another segment already")
+        self._motors = self._paired(devices)
+        for joint, (servo, _axis) in zip(self.joints, self._motors, strict=True):
+            self._model.add_motor(
+                joint.name,
+                inertia=servo.inertia * joint.gear**2,
+                viscous=servo.viscous_friction * joint.gear**2,
+            )
+        self._model.settle()
+        compiled = CompiledPlant(
+            core,
+            len(self.joints),
+            step=self._model.step_address,
+            model=self._model.model_address,
+            data=self._model.data_address,
+            period_ns=round(self.step * SECOND),
+            keep=self._model,
+        )
+        for n in range(len(self.joints)):
+            self._make_joint(compiled, n)
+            self._hang(compiled, n)
+        self._compiled = compiled
+        compiled.begin()
+
+    def _paired(self, devices: Sequence[Device]) -> list[tuple[Servo, int]]:
+        """The motor of each joint."""
+        there = {
+            (position, axis): device
+            for position, device in enumerate(devices)
+            if isinstance(device, Servo)
+            for axis in range(device.axes)
+        }
+        rest = iter(sorted(there.keys() - {joint.axis for joint in self.joints}))
+        places = [joint.axis or next(rest, None) for joint in self.joints]
+        axes = ", ".join(f"({position}, {axis})" for position, axis in there) or "none"
+        for joint, place in zip(self.joints, places, strict=True):
+            if place is None or place not in there:
+                asked = "axis" if place is None else f"axis {place}"
+                raise ConfigurationError(
+                    f"{self.path.name}: there is no {asked} for joint {joint.name!r};"
+                    f" the axes are {axes}"
+                )
+            if places.count(place) > 1:
+                raise ConfigurationError(f"{self.path.name}: two joints have the axis {place}")
+        if any(rest) and not any(joint.axis for joint in self.joints):
+            raise ConfigurationError(
+                f"{self.path.name}: {len(self.joints)} joints are turned, but the segment has"
+                f" {len(there)} axes",
+                hint="where some axes turn nothing of the model, give each joint its"
+                " axis=(position, axis)",
+            )
+        return [(there[place], place[1]) for place in places if place is not None]
+
+    def _make_joint(self, compiled: CompiledPlant, n: int) -> None:
+        joint, (servo, _axis) = self.joints[n], self._motors[n]
+        most = servo.rated_torque * servo.max_torque_ratio * joint.gear
+        at = self._model.addresses(joint.name)
+        compiled.make_joint(
+            n,
+            q=at.q,
+            v=at.v,
+            force=at.force,
+            friction=at.friction,
+            ratio=joint.ratio,
+            zero=joint.zero,
+            dry=self._model.dry_friction(joint.name) + servo.coulomb_friction * joint.gear,
+            brake=most if joint.brake is None else joint.brake,
+            brake_delay_ns=round(joint.brake_delay * SECOND),
+        )
+
+    def _hang(self, compiled: CompiledPlant, n: int) -> None:
+        """The motor comes to the joint, and its loops are tuned for what it has to turn."""
+        joint, (servo, axis) = self.joints[n], self._motors[n]
+        compiled.hang(n, servo.position, axis)
+        servo.tune(self._model.inertia(joint.name) / joint.gear**2, axis)
+
+    def replaced(self, old: Device, new: Device) -> None:
+        """Another device stands in the place of one: the motors are wired to it."""
+        for n, (servo, axis) in enumerate(self._motors):
+            if servo is old and isinstance(new, Servo) and axis < new.axes and self._compiled:
+                self._motors[n] = new, axis
+                self._hang(self._compiled, n)
+
+    # -- time ----------------------------------------------------------------------------------
+
+    def check(self) -> None:
+        """ConfigurationError when the simulation went beyond all bounds: it stands still then."""
+        wild = -1 if self._compiled is None else self._compiled.wild
+        if wild < 0:
+            return
+        raise ConfigurationError(
+            f"{self.path.name}: joint {self.joints[wild].name!r} went beyond all bounds after"
+            f" {self.data.time:.4f} s",
+            hint="look for masses and inertias near zero, bodies that overlap, a step (now"
+            f" {self.step:g} s) that is too long for them",
+        )
+
+    @property
+    def steps(self) -> int:
+        """How many the simulation has made."""
+        return 0 if self._compiled is None else self._compiled.steps
+
+    def start(self) -> None:
+        """Real time: a thread steps it from now on, without the GIL."""
+        if self._compiled is not None:
+            self._thread = threading.Thread(
+                target=self._compiled.run, name="virtual-plant", daemon=True
+            )
+            self._thread.start()
+
+    def stop(self) -> None:
+        """The arm stands still until `start`."""
+        if self._compiled is not None and self._thread is not None:
+            self._compiled.end()
+            self._thread.join()
+            self._thread = None
