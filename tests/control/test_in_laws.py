@@ -92,6 +92,57 @@ def test_dynamics_in_a_law_are_those_in_python(tmp_path: Path) -> None:
             assert np.isfinite(q).all()
 
 
+@cat.law
+def everything(memory, parameters):
+    """All blocks on signals of their own, so that it does not matter when it begins."""
+    count, kept = control.part(memory, 0), control.part(memory, 1)
+    count[0] += 1.0
+    time, dt = count[0] * 1e-3, 1e-3
+    sweep = control.chirp(control.part(parameters, 0), 0, time)
+    q, v = 0.3 * sweep, sweep
+    for i in range(2):
+        x = control.low_pass(control.part(memory, 2), control.part(parameters, 1), i, q)
+        known = control.feed_forward(control.part(parameters, 2), i, v, q)
+        known += control.friction(control.part(parameters, 3), i, v)
+        x += control.pid(control.part(memory, 3), control.part(parameters, 4), i, q, v, known, dt)
+        stiff = control.part(parameters, 5)
+        x += control.impedance(control.part(memory, 4), stiff, i, 0.1, 0.0, known, 0.2, q, v, dt)
+        yields = control.part(parameters, 6)
+        x += control.natural_admittance(control.part(memory, 5), yields, i, 0.1, 0.0, 0.2, q, v, dt)
+        found = control.residual(control.part(memory, 6), control.part(parameters, 7), i, x, v, dt)
+        hit = control.threshold(control.part(memory, 7), control.part(parameters, 8), i, found, dt)
+        way = control.part(parameters, 9)
+        kept[i] += x + found + hit + control.homing(control.part(memory, 8), way, i, q, x, dt)
+    if control.homed(control.part(memory, 8)):
+        control.restart(control.part(memory, 8), 0, 2)
+    return count[0] > 500.0
+
+
+def test_every_block_is_the_same_compiled_and_allocates_nothing() -> None:
+    blocks = [
+        control.LowPass(2, [50.0, 80.0], 1e-3),
+        control.Pid(2, 2.0, 3.0, 0.01, limit=5.0, rate=900.0, derivative_time=0.01),
+        control.Impedance(2, 5.0, 0.4, 0.01, 0.05, bandwidth=80.0, compensation=0.2, limit=3.0),
+        control.NaturalAdmittance(2, 0.01, 0.3, 4.0, 5.0),
+        control.Residual(2, 50.0, 0.01),
+        control.Threshold(2, 0.5, 0.003),
+        control.Homing(2, 0.5, 0.3, 2.0, time=0.002),
+    ]
+    chirp = control.Chirp(1, 1.0, 1.0, 30.0, 2.0)
+    known = control.FeedForward(2, 0.1, 0.2), control.Friction(2, 0.1, 0.2)
+    given = [chirp, blocks[0], *known, *blocks[1:]]
+    parameters = control.join(*(block.parameters for block in given))
+    memory = control.join([0.0], [0.0, 0.0], *(block.memory for block in blocks))
+    ends = []
+    for compiled in (True, False):
+        with opened("csp") as (_, loop):
+            ends.append(loop.run(everything, memory, parameters, compiled=compiled))
+    assert ends[0] == pytest.approx(ends[1], rel=1e-9, abs=1e-12)
+    assert control.part(ends[0], 0)[0] == 501.0
+    assert abs(control.part(ends[0], 1)).min() > 1.0
+    assert control.part(ends[0], 8).any()  # homing
+
+
 def test_the_wrong_parameters_stop_the_drives_and_are_told() -> None:
     with opened() as (_, loop):
         pid = control.Pid(3, 1.0)

@@ -1,5 +1,6 @@
 """`catenary bench law`: what one call of a compiled law takes, called again and again from native
-code: the law with its bounds checks and the function that turns what it raises into a status."""
+code: the law with its bounds checks and the function that turns what it raises into a status. A PD
+law, and a cascade of `catenary.control` with friction and feed-forward."""
 
 from __future__ import annotations
 
@@ -12,11 +13,14 @@ from typing import Any
 
 import numpy as np
 
+from catenary import control
 from catenary.bench.loop import write
 from catenary.bench.report import machine
 from catenary.loop import law
 from catenary.loop.laws.compiler import compile_law
+from catenary.loop.laws.law import Law
 from catenary.loop.laws.layout import LawLayout, record_type
+from catenary.loop.laws.run import Numbers
 
 CALLS = 100_000
 ROUNDS = 31
@@ -30,15 +34,41 @@ def pd(actual, target, memory, time, parameters):  # type: ignore[no-untyped-def
     return time > 5.0
 
 
+@law
+def cascade(actual, target, memory, parameters):  # type: ignore[no-untyped-def]
+    gains, motor = control.part(parameters, 0), control.part(parameters, 1)
+    rub = control.part(parameters, 2)
+    for i in range(actual.n):
+        known = control.feed_forward(motor, i, 0.1, 0.2) + control.friction(rub, i, 0.1)
+        target.torque[i] = control.cascade(
+            memory, gains, i, 1.0, 0.1, known, actual.position[i], actual.velocity[i], 1e-3
+        )
+
+
 def measure(*, axes: int, file: Path | None) -> None:
-    found = sorted(call_times(axes))
-    median = statistics.median(found)
-    print(f"{machine()}\na PD law on {axes} axes, {CALLS} calls, {ROUNDS} times")
-    print(f"  median {median:.1f} ns a call, {found[0]:.1f} to {found[-1]:.1f}")
-    write(file, {"machine": machine(), "axes": axes, "call_ns": [round(ns, 2) for ns in found]})
+    print(f"{machine()}\n{axes} axes, {CALLS} calls, {ROUNDS} times")
+    figures: dict[str, object] = {"machine": machine(), "axes": axes}
+    for name, of_law in {"pd": pd, "cascade": cascade}.items():
+        found = sorted(call_times(axes, of_law))
+        median = statistics.median(found)
+        print(f"  {name:8} median {median:.1f} ns a call, {found[0]:.1f} to {found[-1]:.1f}")
+        figures["call_ns" if of_law is pd else f"{name}_ns"] = [round(ns, 2) for ns in found]
+    write(file, figures)
 
 
-def call_times(axes: int) -> list[float]:
+def numbers_of(axes: int, of_law: Law) -> tuple[Numbers, Numbers]:
+    """Its memory and its parameters."""
+    if of_law is pd:
+        return np.zeros(axes), np.array([4.0, 0.2])
+    block = control.Cascade(
+        control.Pid(axes, 20.0, limit=3.0, rate=50.0),
+        control.Pid(axes, 40.0, 200.0, limit=100.0, rate=1e4),
+    )
+    known = control.FeedForward(axes, 0.1), control.Friction(axes, 0.1, 0.2)
+    return block.memory, control.join(block.parameters, *(part.parameters for part in known))
+
+
+def call_times(axes: int, of_law: Law = pd) -> list[float]:
     """[ns] a call, of every round."""
     numba: Any = import_module("numba")
     block = 8 * axes
@@ -54,10 +84,10 @@ def call_times(axes: int) -> list[float]:
         ),
         record_type({"torque": (0, "<f8", axes)}, (), block),
     )
-    compiled = compile_law(pd, layout)
+    compiled = compile_law(of_law, layout)
     actual, target = np.zeros(1, layout.actual), np.zeros(1, layout.target)
     actual["n"] = axes
-    memory, parameters = np.zeros(axes), np.array([4.0, 0.2])
+    memory, parameters = numbers_of(axes, of_law)
     pointer = ctypes.CFUNCTYPE(
         ctypes.c_int32,
         *(ctypes.c_void_p, ctypes.c_void_p),
@@ -65,11 +95,13 @@ def call_times(axes: int) -> list[float]:
         ctypes.c_double,
     )(compiled.address)
 
+    memory_count, parameter_count = len(memory), len(parameters)
+
     @numba.njit  # type: ignore[untyped-decorator]
     def many(a: int, t: int, m: int, p: int) -> int:
         total = 0
         for _ in range(CALLS):
-            total += pointer(a, t, m, axes, p, 2, 1.0)
+            total += pointer(a, t, m, memory_count, p, parameter_count, 1.0)
         return total
 
     places = [array.ctypes.data for array in (actual, target, memory, parameters)]

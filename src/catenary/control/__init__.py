@@ -5,25 +5,56 @@ A block is two things: a value that holds its numbers (`Cascade(...)`, with `.pa
 (`cascade(memory, parameters, i, ...)`). State is nowhere but in the memory; zeros begin anew.
 """
 
+from catenary.control.admittance import NaturalAdmittance, natural_admittance
 from catenary.control.cascade import Cascade, cascade
+from catenary.control.collision import Residual, Threshold, model_residual, residual, threshold
 from catenary.control.dynamics import Dynamics, gravity, inverse
+from catenary.control.feed_forward import FeedForward, Friction, feed_forward, friction
+from catenary.control.homing import Homing, Stops, homed, homing, stops
+from catenary.control.identification import Chirp, FrequencyResponse, chirp, frequency_response
+from catenary.control.impedance import Impedance, impedance
+from catenary.control.low_pass import LowPass, low_pass
 from catenary.control.parts import join, part, restart
 from catenary.control.pid import Pid, pid
 from catenary.control.trajectory import MotionLimits, MotionState, Trajectory, trajectory
 
 __all__ = [
     "Cascade",
+    "Chirp",
     "Dynamics",
+    "FeedForward",
+    "FrequencyResponse",
+    "Friction",
+    "Homing",
+    "Impedance",
+    "LowPass",
     "MotionLimits",
     "MotionState",
+    "NaturalAdmittance",
     "Pid",
+    "Residual",
+    "Stops",
+    "Threshold",
     "Trajectory",
     "cascade",
+    "chirp",
+    "feed_forward",
+    "frequency_response",
+    "friction",
     "gravity",
+    "homed",
+    "homing",
+    "impedance",
     "inverse",
     "join",
+    "low_pass",
+    "model_residual",
+    "natural_admittance",
     "part",
     "pid",
+    "residual",
     "restart",
+    "stops",
+    "threshold",
     "trajectory",
 ]

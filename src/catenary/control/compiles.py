@@ -20,7 +20,10 @@ R = TypeVar("R")
 Row = npt.NDArray[np.float64]
 """A flat row of float64: a law's memory, its parameters, or a part of them."""
 
-MODULES = ("parts", "pid", "cascade", "dynamics")
+MODULES = (
+    *("parts", "pid", "cascade", "dynamics", "low_pass", "feed_forward", "impedance"),
+    *("admittance", "collision", "identification", "homing"),
+)
 MARK = "__catenary_compiles__"
 
 

@@ -1,0 +1,124 @@
+"""Finding out what an axis is: a logarithmic chirp, and the frequency response from its record."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from catenary.control.compiles import Row, compiles
+from catenary.control.parts import PerAxis, axis_count, checked, table
+
+KIND = 11.0
+NUMBERS = 4  # amplitude, first, last, duration
+
+Vector = npt.NDArray[np.float64] | Sequence[float]
+
+
+@dataclass(frozen=True)
+class Chirp:
+    """A sine whose frequency rises from `first` to `last` [Hz] by the same factor in the same time,
+    for `duration` [s], then nothing; `amplitude` in whatever unit it is used. Has no memory.
+
+    Source: Farina, Simultaneous measurement of impulse response and distortion with a swept-sine
+    technique, AES 108, 2000.
+    """
+
+    axes: int
+    amplitude: PerAxis
+    first: PerAxis
+    last: PerAxis
+    duration: PerAxis
+
+    def __post_init__(self) -> None:
+        _ = self.parameters
+
+    @property
+    def parameters(self) -> Row:
+        """(1 + 4 · axes,)"""
+        n = axis_count(self.axes)
+        amplitude = checked("amplitude", self.amplitude, n)
+        names = ("first", "last", "duration")
+        first, last, duration = (
+            checked(name, getattr(self, name), n, above=True) for name in names
+        )
+        for i in np.flatnonzero(first == last).tolist():
+            raise ValueError(f"last of axis {i}: {last[i]:g} Hz, the same as first")
+        return table(KIND, amplitude, first, last, duration)
+
+
+@compiles
+def chirp(parameters: Row, i: int, time: float) -> float:
+    """The value of axis `i` at `time` [s]: A sin(2π f₀ T / ln(f₁/f₀) ((f₁/f₀)^(t/T) - 1))."""
+    if parameters[0] != KIND:
+        raise ValueError("chirp: these are not the parameters of a Chirp")
+    p = 1 + NUMBERS * i
+    first, duration = parameters[p + 1], parameters[p + 3]
+    if time < 0.0 or time > duration:
+        return 0.0
+    rise = math.log(parameters[p + 2] / first)
+    phase = 2 * math.pi * first * duration / rise * (math.exp(rise * time / duration) - 1)
+    value: float = parameters[p] * math.sin(phase)
+    return value
+
+
+@dataclass(frozen=True, slots=True)
+class FrequencyResponse:
+    """`frequency` (k,) [Hz]; `response` (k,) complex, output over input; `coherence` (k,) 0 to 1:
+    the share of the output that the input explains. Trust what is near 1."""
+
+    frequency: Row
+    response: npt.NDArray[np.complex128]
+    coherence: Row
+
+    @property
+    def magnitude_db(self) -> Row:
+        """(k,) [dB]"""
+        decibels: Row = 20 * np.log10(abs(self.response))
+        return decibels
+
+    @property
+    def phase_deg(self) -> Row:
+        """(k,) [degrees], without jumps."""
+        degrees: Row = np.degrees(np.unwrap(np.angle(self.response)))
+        return degrees
+
+
+def frequency_response(
+    given: Vector, measured: Vector, period: float, *, segment: int | None = None
+) -> FrequencyResponse:
+    """What a record of one axis says: `given` and `measured` (k,), one every `period` [s], in any
+    units. `segment`: samples of each of the half-overlapping pieces that are averaged (None: an
+    eighth of the record); the resolution is 1 / (segment · period) [Hz].
+
+    Source: H₁ = S_xy / S_xx by Welch's averaged periodograms with Hann windows, each piece's mean
+    taken away; coherence |S_xy|² / (S_xx S_yy). Bendat and Piersol, Random Data, ch. 6 and 9.
+    """
+    x, y = (np.asarray(row, dtype=np.float64) for row in (given, measured))
+    if x.ndim != 1 or x.shape != y.shape:
+        raise ValueError(f"two records of one axis, equally long, not {x.shape} and {y.shape}")
+    if not period > 0:
+        raise ValueError(f"period={period} s: must be positive")
+    length = len(x) // 8 if segment is None else segment
+    if not 8 <= length <= len(x):
+        raise ValueError(f"segment={length} samples of {len(x)}: at least 8, at most all")
+    begins = range(0, len(x) - length + 1, max(1, length // 2))
+    if len(begins) < 2:
+        raise ValueError(f"segment={length} of {len(x)} samples: one piece has no coherence")
+    window = np.hanning(length + 1)[:-1]  # periodic
+    pieces_x = [
+        np.fft.rfft(window * (x[k : k + length] - x[k : k + length].mean())) for k in begins
+    ]
+    pieces_y = [
+        np.fft.rfft(window * (y[k : k + length] - y[k : k + length].mean())) for k in begins
+    ]
+    spectra = np.array(pieces_x)[:, 1:], np.array(pieces_y)[:, 1:]  # without the mean
+    sxx, syy = ((abs(piece) ** 2).mean(axis=0) for piece in spectra)
+    sxy = (spectra[0].conj() * spectra[1]).mean(axis=0)
+    frequency = np.arange(1, len(sxx) + 1, dtype=np.float64) / (length * period)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        coherence = np.where(sxx * syy > 0, abs(sxy) ** 2 / (sxx * syy), 0.0)
+        return FrequencyResponse(frequency, sxy / sxx, coherence)

@@ -1,0 +1,71 @@
+"""Second-order Butterworth low-pass."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from catenary.control.compiles import Row, compiles
+from catenary.control.parts import PerAxis, axis_count, checked, table
+
+KIND = 4.0
+COEFFICIENTS = 5  # b0, b1, b2, a1, a2
+STATES = 3  # begun, and the two of the transposed direct form II
+
+
+@dataclass(frozen=True)
+class LowPass:
+    """A low-pass of second order, maximally flat, for each axis: 3 dB down at `cutoff` [Hz], with
+    one step every `period` [s].
+
+    Source: the Butterworth polynomial s² + √2 s + 1 by the bilinear transform with its frequency
+    prewarped, K = tan(π cutoff period): Oppenheim and Schafer, Discrete-Time Signal Processing,
+    §7.2.
+    """
+
+    axes: int
+    cutoff: PerAxis
+    period: float
+
+    def __post_init__(self) -> None:
+        _ = self.parameters  # wrong values are found where they are written
+
+    @property
+    def parameters(self) -> Row:
+        """(1 + 5 · axes,)"""
+        if not self.period > 0:
+            raise ValueError(f"period={self.period} s: must be positive")
+        cutoff = checked("cutoff", self.cutoff, axis_count(self.axes), above=True)
+        for i in np.flatnonzero(cutoff * self.period >= 0.5).tolist():
+            raise ValueError(
+                f"cutoff of axis {i}: {cutoff[i]:g} Hz, must be below half the rate, "
+                f"{0.5 / self.period:g} Hz"
+            )
+        k = np.tan(math.pi * cutoff * self.period)
+        norm = 1 / (1 + math.sqrt(2) * k + k * k)
+        b = k * k * norm
+        a = 2 * (k * k - 1) * norm, (1 - math.sqrt(2) * k + k * k) * norm
+        return table(KIND, b, 2 * b, b, *a)
+
+    @property
+    def memory(self) -> Row:
+        """(3 · axes,) zeros: begins at rest at its first input."""
+        return np.zeros(STATES * self.axes)
+
+
+@compiles
+def low_pass(memory: Row, parameters: Row, i: int, value: float) -> float:
+    """The next output of axis `i`, in the unit of `value`."""
+    if parameters[0] != KIND:
+        raise ValueError("low_pass: these are not the parameters of a LowPass")
+    m, p = STATES * i, 1 + COEFFICIENTS * i
+    if memory[m] == 0.0:
+        memory[m] = 1.0
+        memory[m + 1] = value * (1.0 - parameters[p])
+        memory[m + 2] = value * (parameters[p + 2] - parameters[p + 4])
+    output: float = parameters[p] * value + memory[m + 1]
+    memory[m + 1] = parameters[p + 1] * value - parameters[p + 3] * output + memory[m + 2]
+    memory[m + 2] = parameters[p + 2] * value - parameters[p + 4] * output
+    return output

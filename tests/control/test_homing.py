@@ -1,0 +1,82 @@
+"""Homing of two fingers between hard stops, and of one that has none."""
+
+import numpy as np
+import pytest
+
+from catenary import control
+
+DT = 1e-3
+OPEN, SHUT, INERTIA = (-0.8, 0.9), (0.5, -0.4), 0.01
+
+
+class Fingers:
+    """Two axes between stops; they meet where their closing ways add up to `gap`."""
+
+    def __init__(self, *, stops: bool = True) -> None:
+        self.q, self.v = np.array([-0.1, 0.2]), np.zeros(2)
+        self.stops = stops
+
+    def outside(self, i: int) -> float:
+        """The stiff stop's torque, and the other finger's."""
+        low, high = sorted((OPEN[i], SHUT[i]))
+        over = max(self.q[i] - high, 0) + min(self.q[i] - low, 0)
+        met = max(0.0, self.q[0] - self.q[1] - 0.2)
+        torque = -2000 * over * self.stops - [1, -1][i] * 2000 * met
+        return torque - 1.0 * self.v[i] * self.stops * (over != 0 or met > 0)
+
+    def step(self, torque: np.ndarray) -> None:
+        outside = np.array([self.outside(0), self.outside(1)])
+        self.v += (torque + outside - 0.02 * self.v) * DT / INERTIA
+        self.q += self.v * DT
+
+
+def home(fingers: Fingers, seconds: float = 20.0) -> tuple[np.ndarray, int]:
+    block = control.Homing(2, [-0.5, 0.5], torque=0.3, travel=2.0, time=0.05)
+    loop = control.Pid(2, 0.5, 5.0, limit=0.5)
+    memory, kept, torque = block.memory, loop.memory, np.zeros(2)
+    for k in range(round(seconds / DT)):
+        for i in range(2):
+            wanted = control.homing(memory, block.parameters, i, fingers.q[i], torque[i], DT)
+            torque[i] = control.pid(kept, loop.parameters, i, wanted, fingers.v[i], 0.0, DT)
+        fingers.step(torque)
+        if control.homed(memory):
+            return memory, k
+    return memory, -1
+
+
+def test_the_three_phases_find_all_stops() -> None:
+    fingers = Fingers()
+    memory, steps = home(fingers)
+    assert steps > 0
+    found = control.stops(memory)
+    assert found.open == pytest.approx(OPEN, abs=0.01)
+    assert found.closed[0] == pytest.approx(SHUT[0], abs=0.01)
+    assert found.closed[1] == pytest.approx(SHUT[1], abs=0.01)
+    assert found.meeting[0] - found.meeting[1] == pytest.approx(0.2, abs=0.02)
+    assert not found.failed.any()
+
+
+def test_without_stops_both_stand_and_say_so() -> None:
+    fingers = Fingers(stops=False)
+    memory, steps = home(fingers)
+    assert steps > 0
+    found = control.stops(memory)
+    assert found.failed.any()
+    assert np.isnan(found.open).all()
+    asked = [
+        control.homing(
+            memory, control.Homing(2, -0.5, 0.3, 2.0).parameters, i, fingers.q[i], 0.0, DT
+        )
+        for i in range(2)
+    ]
+    assert asked == [0.0, 0.0]
+
+
+def test_before_anything_is_found_all_is_nan() -> None:
+    found = control.stops(control.Homing(2, 0.5, 0.3, 2.0).memory)
+    assert np.isnan([found.open, found.closed, found.meeting]).all()
+
+
+def test_an_axis_without_a_way_to_open() -> None:
+    with pytest.raises(ValueError, match="velocity of axis 1: 0"):
+        control.Homing(2, [0.5, 0.0], 0.3, 2.0)
