@@ -13,12 +13,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
 from catenary.errors import ConfigurationError
 
 if TYPE_CHECKING:
     import mujoco
+    import numpy as np
 
 ROOTS = ("mujoco", "robot")
 SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
@@ -205,6 +204,8 @@ class Model:
     def inertia(self, name: str) -> float:
         """What a motor at the joint has to turn at the start, with its own [kg·m²]."""
         dof = self._dof(name)
+        import numpy as np  # comes with MuJoCo; without a plant nothing here needs it
+
         dense = np.zeros((self.model.nv, self.model.nv))
         self._mujoco.mj_fullM(self.model, self.data, dense)
         return float(dense[dof, dof])

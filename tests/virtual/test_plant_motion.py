@@ -1,0 +1,75 @@
+"""The example's arm under a whole MainDevice: by SYNC0, in tasks' time, twice the same."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+import catenary as cat
+from catenary.realtime import VirtualClock
+from catenary.virtual import Crystal, Plant, Segment, Servo
+
+COBOT = Path(__file__).resolve().parents[2] / "examples" / "cobot"
+GEARS = {"gear_ratio": [121.0] * 3 + [101.0] * 3, "direction": [1, 1, -1, 1, -1, 1]}
+Values = npt.NDArray[np.float64]
+
+
+def example() -> Segment:
+    return Segment.from_toml(COBOT / "segment.toml")
+
+
+def sway(segment: Segment, **options: object) -> tuple[Values, Values]:
+    """Positions and targets of 500 cycles of a smooth motion in CSP [rad]."""
+    positions, targets = [], []
+    with cat.MainDevice(segment) as main:
+        given = {"counts_per_turn": 131072, **GEARS, **options}
+        arm = cat.Drives(main.scan().drives, **given)  # type: ignore[arg-type]
+        with cat.Loop(arm, period=1e-3) as loop:
+            if options.get("dc"):
+                loop.wait_locked(timeout=30)
+            first = arm.actual.position.copy()
+            for k, _cycle in enumerate(loop):
+                arm.target.position[:] = first + 0.3 * (1 - math.cos(4e-3 * k))
+                positions.append(arm.actual.position.copy())
+                targets.append(arm.target.position.copy())
+                if k == 500:
+                    break
+    return np.array(positions), np.array(targets)
+
+
+def worst(positions: Values, targets: Values, lag: int) -> float:
+    """The largest following error [rad], where a target shows its effect `lag` cycles later."""
+    return float(np.abs(positions[lag:] - targets[:-lag]).max())
+
+
+def test_an_arm_follows_in_position_control() -> None:
+    """The largest speed is 1.2 rad/s: a cycle more or less would be 1.2e-3 rad."""
+    assert worst(*sway(example()), lag=2) < 4e-4
+
+
+def test_servos_that_keep_time_by_sync0_move_it_too() -> None:
+    """Six clocks, none of them the plant's: pulses fall between its steps."""
+    segment = example()
+    for k, device in enumerate(segment):
+        device.crystal = Crystal(ppm=20.0 * k - 50)
+    assert worst(*sway(segment, dc=True), lag=3) < 6e-4
+
+
+def test_two_runs_are_the_same_to_the_bit() -> None:
+    first, second = sway(example()), sway(example())
+    assert first[0].tobytes() == second[0].tobytes()
+    assert first[1].tobytes() == second[1].tobytes()
+
+
+def test_it_lives_by_the_time_of_tasks() -> None:
+    """A clock that others share: as many steps as its time has."""
+    plant = Plant(COBOT / "arm.xml")
+    segment = Segment([Servo(axes=6)], plant=plant, clock=VirtualClock())
+    link = segment.open_link()
+    began = link.now()
+    link.wait_until(began + 1_000_000_000, False)
+    assert plant.steps == 4000
+    assert link.now() == began + 1_000_000_000
