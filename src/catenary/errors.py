@@ -148,3 +148,7 @@ class LawError(LoopError):
 
 class ShareError(CatenaryError):
     """A share that is not there, not to be opened, or no share: names it and what there is."""
+
+
+class LeaseError(ShareError):
+    """Axes that another client commands, or that this one commands no longer."""

@@ -18,13 +18,18 @@ HEADERS = HERE.parent.parent / "src" / "catenary" / "native"
 
 @functools.cache
 def load_hammer() -> ctypes.CDLL:
+    hammer = compiled(HERE / "hammer.c")
+    hammer.hammer_ring.restype = ctypes.c_uint64
+    return hammer
+
+
+def compiled(source: Path) -> ctypes.CDLL:
+    """A C file of the tests as a library."""
     compiler = shutil.which(os.environ.get("CC", "cc")) or shutil.which("gcc")
     if compiler is None:
         pytest.skip("no C compiler")
     with tempfile.TemporaryDirectory() as folder:
         library = Path(folder) / "hammer.so"
         flags = ["-O2", "-shared", "-fPIC", "-pthread", f"-I{HEADERS}", "-Wall", "-Werror"]
-        subprocess.run([compiler, *flags, str(HERE / "hammer.c"), "-o", str(library)], check=True)
-        hammer = ctypes.CDLL(str(library))
-    hammer.hammer_ring.restype = ctypes.c_uint64
-    return hammer
+        subprocess.run([compiler, *flags, str(source), "-o", str(library)], check=True)
+        return ctypes.CDLL(str(library))

@@ -260,3 +260,31 @@ def test_the_mode_of_the_file_is_the_permission(name: str) -> None:
         arm = cat.Drives(main.scan().drives, counts_per_turn=TURN)
         with cat.Share(name, mode=0o640) as share, cat.Loop(arm, sink=share):
             assert Path(f"/dev/shm/catenary-{name}").stat().st_mode & 0o777 == 0o640
+
+
+@pytest.mark.parametrize("order", ["threaded", "inline"])
+def test_in_real_time_too(name: str, order: str) -> None:
+    """Nothing is said of how timely: only that every cycle is shared, whatever thread runs it."""
+    segment = Segment([Servo()], clock="monotonic")
+    with cat.MainDevice(segment) as main:
+        arm = cat.Drives(main.scan().drives, counts_per_turn=TURN)
+        loop = cat.Loop(
+            arm,
+            period=2e-3,
+            run=order,  # type: ignore[arg-type]
+            lost_limit=1_000_000,
+            late_limit=0,
+            watchdog=None,
+            raise_faults=False,
+            sink=(share := cat.Share(name)),
+        )
+        with share, loop, cat.attach(name) as reader:
+            for cycle in loop:
+                if cycle.number >= 50:
+                    break
+            assert reader.layout.clock == "monotonic"
+            assert reader.wait(timeout=60.0)
+            rows, lost = reader.rows(after=0)
+            assert lost == 0
+            assert (rows["number"] == np.arange(1, len(rows) + 1)).all()
+            assert (rows["wake_ns"] >= rows["scheduled_ns"]).all()

@@ -4,9 +4,27 @@ with cat.Share("arm") as share, cat.Loop(arm, sink=share) as loop: ...      # on
 with cat.attach("arm") as arm: ...                                          # any others
 """
 
+from catenary.share.commands import Command, LeaseEnd
+from catenary.share.desk import Reason
 from catenary.share.events import SharedEvent
 from catenary.share.layout import ShareField, ShareLayout
+from catenary.share.lease import Lease
+from catenary.share.mutex import Mutex
+from catenary.share.process import Process
 from catenary.share.reader import Reader, attach
 from catenary.share.share import Share
 
-__all__ = ["Reader", "Share", "ShareField", "ShareLayout", "SharedEvent", "attach"]
+__all__ = [
+    "Command",
+    "Lease",
+    "LeaseEnd",
+    "Mutex",
+    "Process",
+    "Reader",
+    "Reason",
+    "Share",
+    "ShareField",
+    "ShareLayout",
+    "SharedEvent",
+    "attach",
+]

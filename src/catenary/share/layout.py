@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import mmap
 import struct
+import uuid
 from typing import Literal
 
 import msgspec
@@ -57,6 +58,7 @@ class ShareLayout(msgspec.Struct, frozen=True):
 
     name: str
     version: int
+    run: str  # a number no other run of a loop has
     period: float  # [s]
     axes: tuple[str, ...]  # names, in the order of the fields that are per axis
     fields: tuple[ShareField, ...]
@@ -92,6 +94,7 @@ def make_layout(
     blocks = (sink.record_size, sink.actual_size, sink.target_size)
     *starts, row_size = _rows.row_parts(*blocks)
     places = dict(zip(("record", "actual", "target"), starts, strict=True))
+    run = uuid.uuid4().hex
     count = power_of_two(max(round(history / sink.period), ROWS_MIN))
 
     def made(description: int) -> ShareLayout:
@@ -100,6 +103,7 @@ def make_layout(
         return ShareLayout(
             name=name,
             version=VERSION,
+            run=run,
             period=sink.period,
             axes=sink.axes,
             fields=tuple(make_field(each, places[each.block]) for each in sink.fields),

@@ -21,14 +21,14 @@ PREFIX = "catenary-"  # of shares; what belongs to them has "catenary." and a wo
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 
 
-def path_of(name: str) -> Path:
-    """Where a segment lives. ValueError: not a name."""
+def path_of(name: str, part: str = "") -> Path:
+    """Where a segment lives, or what belongs to it. ValueError: not a name."""
     if not NAME.fullmatch(name):
         raise ValueError(
             f"share {name!r}: a name has up to 64 letters, digits, '.', '_' and '-', and begins "
             "with a letter or digit"
         )
-    return FOLDER / f"{PREFIX}{name}"
+    return FOLDER / (f"catenary.{part}-{name}" if part else f"{PREFIX}{name}")
 
 
 def names() -> list[str]:

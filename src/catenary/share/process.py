@@ -57,6 +57,13 @@ def _command(pid: int) -> str:
         words = Path(f"/proc/{pid}/cmdline").read_bytes().decode(errors="replace").split("\0")
     except OSError:
         return ""
-    scripts = [word for word in words[1:] if word and not word.startswith("-")]
-    chosen = scripts[0] if scripts and "python" in words[0] else words[0]
-    return Path(chosen).name
+    if "python" not in words[0]:
+        return Path(words[0]).name
+    for word, following in zip(words[1:], [*words[2:], ""], strict=True):
+        if word == "-c":
+            break
+        if word == "-m":
+            return following
+        if word and not word.startswith("-"):
+            return Path(word).name
+    return "python"

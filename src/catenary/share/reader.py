@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from types import TracebackType
 from typing import Literal
 
@@ -12,8 +13,10 @@ import numpy.typing as npt
 from catenary.errors import ShareError
 from catenary.share import memory
 from catenary.share._rows import Ring
+from catenary.share.desk import Desk, open_desk
 from catenary.share.events import SharedEvent, decode_event
 from catenary.share.layout import ShareLayout, decode_head
+from catenary.share.lease import Lease, lease_of
 from catenary.share.memory import Segment
 
 LOOK_NS = 250_000_000  # between two looks whether the writer still lives
@@ -47,7 +50,10 @@ def attach(name: str, *, stale: bool = False) -> Reader:
         ) from error
     except ShareError as error:
         raise ShareError(f"the share {name!r}: {error.message}", hint=error.hint) from error
-    reader = Reader(segment, layout)
+    try:
+        reader = Reader(segment, layout)
+    except ValueError as error:
+        raise ShareError(f"the share {name!r}: its description is broken: {error}") from error
     if reader.state == "dead" and not stale:
         raise ShareError(
             f"the share {name!r} is stale: {layout.writer} has died",
@@ -77,6 +83,7 @@ class Reader:
             Ring(segment.memory, events.offset, events.count, events.size),
         )
         self._seen = 0
+        self._desk: Desk | None = None
 
     def __enter__(self) -> Reader:
         return self
@@ -145,6 +152,16 @@ class Reader:
         rows, lost = self._ring(EVENTS).copy_after(after)
         size = self.layout.events.size
         return [decode_event(rows[at : at + size]) for at in range(0, len(rows), size)], lost
+
+    def lease(self, axes: Sequence[str | int] | None = None, *, for_: float = 0.5) -> Lease:
+        """The right to command some axes, by name or number (None: all), for `for_` seconds after
+        each command. LeaseError: another client has one of them. ShareError: the loop has ended, or
+        may not be commanded."""
+        if not self.alive:
+            raise ShareError(f"the loop of the share {self.layout.name!r} has ended")
+        if self._desk is None:
+            self._desk = open_desk(self.layout)
+        return lease_of(self._desk, self.layout, axes, for_)
 
     def _ring(self, which: int) -> Ring:
         if self._rings is None:

@@ -6,10 +6,14 @@ import threading
 import time
 from types import TracebackType
 
+import numpy as np
+
 from catenary.errors import ShareError
 from catenary.plan.sink import Incident, SinkLayout
 from catenary.share import memory
 from catenary.share._rows import CycleWriter, Ring
+from catenary.share.commands import Command, Commanded, CommandReader, LeaseEnd, apply
+from catenary.share.desk import Desk, Values, make_desk
 from catenary.share.events import encode_event
 from catenary.share.layout import ShareLayout, decode_head, encode_head, make_layout
 from catenary.share.memory import Segment
@@ -42,6 +46,8 @@ class Share:
         self._mode = mode
         self._entered = False
         self._segment: Segment | None = None
+        self._desk: Desk | None = None
+        self._commands: CommandReader | None = None
         self._layout: ShareLayout | None = None
         self._cycles: CycleWriter | None = None
         self._events: Ring | None = None
@@ -62,7 +68,49 @@ class Share:
         self.close()
         if self._segment is not None:
             self._segment.unlink()
-            self._segment = None
+        if self._desk is not None:
+            self._desk.segment.unlink()
+        self._segment = self._desk = None
+
+    # Commands of other processes, for the thread that iterates
+
+    def apply(self, *drives: Commanded) -> list[LeaseEnd]:
+        """Writes what clients command into the targets of drives: of each axis the newest command.
+
+            for cycle in loop:
+                for end in share.apply(arm):
+                    print(end)
+
+        Axes whose lease has ended hold where they are commanded to be, and are returned: the
+        application decides what else is to become of them. Never waits.
+        """
+        reader = self._reader()
+        commands, ended = reader.commands(), reader.ended()
+        if commands or ended:
+            apply(commands, ended, drives, self.layout.axes, self._commanded_position())
+        return ended
+
+    def commands(self) -> list[Command]:
+        """The commands that have come since the last call, of leases that are valid; of each client
+        oldest first. Never waits."""
+        return self._reader().commands()
+
+    def ended(self) -> list[LeaseEnd]:
+        """The leases whose end the last `commands` has found: nobody commands their axes."""
+        return self._reader().ended()
+
+    def _reader(self) -> CommandReader:
+        if self._commands is None:
+            raise RuntimeError(f"the share {self.name!r} takes no commands before a Loop is open")
+        return self._commands
+
+    def _commanded_position(self) -> Values:
+        """Of the newest cycle [rad]."""
+        if self._cycles is None:
+            return np.full(len(self.layout.axes), np.nan)
+        _, row = self._cycles.copy()
+        commanded: Values = np.frombuffer(row, self._dtype)[0]["commanded_position"]
+        return commanded
 
     @property
     def layout(self) -> ShareLayout:
@@ -94,8 +142,11 @@ class Share:
         cycles = CycleWriter(
             segment.memory, rows.offset, rows.count, rows.size, blocks, writable=True
         )
-        self._publish(segment)
+        desk = make_desk(made, self._mode)
+        self._publish(segment, desk.segment)
         self._segment, self._layout, self._cycles = segment, made, cycles
+        self._dtype = made.dtype
+        self._desk, self._commands = desk, CommandReader(desk, made)
         self._events = Ring(segment.memory, events.offset, events.count, events.size, writable=True)
         return cycles.capsule
 
@@ -114,14 +165,19 @@ class Share:
                 if ring is not None:
                     ring.end()
             self._cycles = self._events = None
+            if self._desk is not None:
+                self._desk.end_all()
 
-    def _publish(self, segment: Segment) -> None:
+    def _publish(self, segment: Segment, desk: Segment) -> None:
+        """The desk first: who finds the segment finds its desk."""
         try:
             with memory.deciding():
                 self._refuse_taken()
+                desk.publish(memory.path_of(self.name, "commands"))
                 segment.publish(self.path)
         except BaseException:
-            segment.path.unlink(missing_ok=True)
+            for draft in (segment, desk):
+                draft.path.unlink(missing_ok=True)
             raise
 
     def _refuse_taken(self) -> None:

@@ -1,0 +1,176 @@
+"""The loop's side of the desk: commands of clients, and leases that end."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from catenary.share.desk import QUANTITIES, Desk, Reason, Values
+from catenary.share.layout import ShareLayout
+from catenary.share.process import Process
+
+LOOK_NS = 20_000_000  # between two questions whether the clients' processes live
+
+
+class Targets(Protocol):
+    """What commands are written to: the `target` of `Drives`."""
+
+    @property
+    def position(self) -> Values: ...
+    @property
+    def velocity(self) -> Values: ...
+    @property
+    def torque(self) -> Values: ...
+
+
+class Commanded(Protocol):
+    """What `Drives` have of it."""
+
+    @property
+    def names(self) -> tuple[str, ...]: ...
+    @property
+    def target(self) -> Targets: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """Set-points of a client; None: not said."""
+
+    axes: tuple[int, ...]  # in the layout's order
+    position: Values | None  # [rad], one for each of `axes`
+    velocity: Values | None  # [rad/s]
+    torque: Values | None  # [N·m]
+    client: Process
+
+
+@dataclass(frozen=True, slots=True)
+class LeaseEnd:
+    """A lease that is over; nobody commands its axes now."""
+
+    axes: tuple[str, ...]
+    reason: Reason
+    client: Process
+
+    def __str__(self) -> str:
+        return f"lease on {', '.join(self.axes)} of {self.client}: {self.reason}"
+
+
+@dataclass(slots=True)
+class _Known:
+    """A lease as the loop has seen it."""
+
+    serial: int
+    axes: tuple[int, ...]
+    client: Process
+
+
+class CommandReader:
+    """Owns what the loop knows of its clients. Called by the thread that iterates; never waits."""
+
+    def __init__(self, desk: Desk, layout: ShareLayout) -> None:
+        self._desk = desk
+        self._layout = layout
+        self._known: dict[int, _Known] = {}  # by place
+        self._ended: list[LeaseEnd] = []
+        self._look_ns = 0
+
+    def commands(self) -> list[Command]:
+        """Those of valid leases that have come since the last call; by client, oldest first."""
+        self._follow_leases()
+        return [
+            command for place, known in self._known.items() for command in self._read(place, known)
+        ]
+
+    def ended(self) -> list[LeaseEnd]:
+        """Leases whose end `commands` has seen since the last call."""
+        ended, self._ended = self._ended, []
+        return ended
+
+    def _read(self, place: int, known: _Known) -> list[Command]:
+        desk = self._desk
+        entry = desk.places[place]
+        rows, lost = desk.rings[place].copy_after(int(entry["taken"]))
+        if not rows and not lost:
+            return []
+        array = np.frombuffer(rows, desk.row)
+        entry["taken"] += len(array) + lost
+        return [self._command(row, known) for row in array if row["lease"] == known.serial]
+
+    def _command(self, row: np.void, known: _Known) -> Command:
+        axes = list(known.axes)
+        position, velocity, torque = (
+            row[name][axes] if int(row["quantities"]) >> bit & 1 else None
+            for bit, name in enumerate(QUANTITIES)
+        )
+        return Command(known.axes, position, velocity, torque, known.client)
+
+    def _follow_leases(self) -> None:
+        """Notes new leases, and ends those that are over."""
+        places = self._desk.places
+        if not self._known and not places["lease"].any():
+            return
+        now = time.monotonic_ns()
+        ask = now >= self._look_ns
+        if ask:
+            self._look_ns = now + LOOK_NS
+        valid = (places["lease"] != 0) & (places["ended"] != places["lease"])
+        for place in np.flatnonzero(valid).tolist():
+            self._follow(place, now, ask)
+        for place in [place for place in self._known if not valid[place]]:
+            self._forget(place, self._desk.reason(place))
+
+    def _follow(self, place: int, now: int, ask: bool) -> None:
+        entry = self._desk.places[place]
+        serial = int(entry["lease"])
+        known = self._known.get(place)
+        if known is not None and known.serial != serial:
+            self._forget(place, self._desk.reason(place))
+            known = None
+        if known is None:
+            axes = tuple(np.flatnonzero(self._desk.holders == serial).tolist())
+            if len(axes) != entry["axes"]:
+                return  # its axes are being given to it this moment
+            known = self._known[place] = _Known(serial, axes, self._desk.client(place))
+        if entry["deadline_ns"] > now and not ask:
+            return
+        reason = self._desk.ending(place, now)
+        if reason is not None:
+            entry["reason"] = reason
+            entry["ended"] = serial  # from here on it cannot be renewed
+            self._forget(place, reason)
+
+    def _forget(self, place: int, reason: Reason) -> None:
+        known = self._known.pop(place)
+        names = tuple(self._layout.axes[axis] for axis in known.axes)
+        self._ended.append(LeaseEnd(names, reason, known.client))
+
+
+def apply(
+    commands: Sequence[Command],
+    ended: Sequence[LeaseEnd],
+    drives: Sequence[Commanded],
+    axes: Sequence[str],
+    commanded: npt.NDArray[np.float64],
+) -> None:
+    """Axes whose lease has ended hold: positions as `commanded`, no velocity, no torque. Then the
+    newest command of each axis is written into the targets: another client may have them by now."""
+    places = {name: (each.target, k) for each in drives for k, name in enumerate(each.names)}
+    for name in (name for end in ended for name in end.axes if name in places):
+        target, k = places[name]
+        held = commanded[axes.index(name)]
+        target.position[k] = held if np.isfinite(held) else target.position[k]
+        target.velocity[k] = target.torque[k] = 0.0
+    for command in commands:
+        for quantity in QUANTITIES:
+            values: Values | None = getattr(command, quantity)
+            if values is None:
+                continue
+            for axis, value in zip(command.axes, values.tolist(), strict=True):
+                if axes[axis] in places:
+                    target, k = places[axes[axis]]
+                    getattr(target, quantity)[k] = value

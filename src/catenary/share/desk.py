@@ -1,0 +1,178 @@
+"""The desk: where clients leave commands for a loop, and who may command which axis.
+
+A file of its own, since clients write in it. Behind the head lie the mutex, the holders (for every
+axis the serial of the lease it belongs to, 0: nobody's), the places (one for each client) and the
+ring of each place. Clients change it under the mutex alone; the loop never takes the mutex, and
+writes two words of a place only: how far it has read, and which lease it has ended.
+"""
+
+from __future__ import annotations
+
+import struct
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from catenary.errors import ShareError
+from catenary.share import _rows, memory
+from catenary.share._mutex import MUTEX_SIZE, SharedMutex
+from catenary.share._rows import Ring
+from catenary.share.layout import VERSION, ShareLayout
+from catenary.share.memory import Segment
+from catenary.share.process import Process
+
+MAGIC = b"CATADESK"
+HEAD = struct.Struct("<8sII32s")
+PLACES = 16
+COMMANDS = 64  # of a client that the loop has not read
+QUANTITIES = ("position", "velocity", "torque")
+
+PLACE = np.dtype(
+    [
+        ("lease", "<u8"),  # serial; 0: the place is free
+        ("ended", "<u8"),  # the lease that the loop has ended
+        ("taken", "<u8"),  # commands that the loop has read
+        ("deadline_ns", "<i8"),  # CLOCK_MONOTONIC
+        ("last", "<u8"),  # the lease before, and why it ended
+        ("reason", "<u8"),
+        ("start_time", "<u8"),  # the client
+        ("pid", "<i8"),
+        ("axes", "<u8"),  # how many: the loop waits until it sees all of them
+        ("command", "S64"),
+    ]
+)
+
+Values = npt.NDArray[np.float64]
+
+
+class Reason(IntEnum):
+    """Why a lease has ended."""
+
+    RELEASED = 1
+    EXPIRED = 2  # not renewed in time
+    DIED = 3  # its process has ended
+    LOOP_ENDED = 4
+
+    def __str__(self) -> str:
+        return REASONS[self]
+
+
+REASONS = {
+    Reason.RELEASED: "released",
+    Reason.EXPIRED: "not renewed in time",
+    Reason.DIED: "its process died",
+    Reason.LOOP_ENDED: "the loop has ended",
+}
+
+
+class Geometry(NamedTuple):
+    """Where things lie in the file."""
+
+    holders: int
+    places: int
+    rings: int
+    ring_size: int
+    size: int
+
+
+def row_dtype(axes: int) -> np.dtype[np.void]:
+    """Of a command: NaN where an axis is not meant."""
+    return np.dtype(
+        [("lease", "<u8"), ("quantities", "<u8"), *((q, "<f8", (axes,)) for q in QUANTITIES)]
+    )
+
+
+def geometry(axes: int) -> Geometry:
+    holders = memory_aligned(HEAD.size) + MUTEX_SIZE
+    places = memory_aligned(holders + 8 * axes)
+    rings = memory_aligned(places + PLACES * PLACE.itemsize)
+    ring_size = memory_aligned(_rows.memory_size(COMMANDS, row_dtype(axes).itemsize))
+    return Geometry(holders, places, rings, ring_size, rings + PLACES * ring_size)
+
+
+def memory_aligned(offset: int) -> int:
+    return -(-offset // 64) * 64
+
+
+class Desk:
+    """Owns one process' sight of the desk of a loop."""
+
+    def __init__(self, segment: Segment, layout: ShareLayout, *, fresh: bool = False) -> None:
+        axes = len(layout.axes)
+        where = geometry(axes)
+        self.segment = segment
+        self._boot_id = layout.writer.boot_id
+        self.row = row_dtype(axes)
+        self.mutex = SharedMutex(segment.memory, memory_aligned(HEAD.size), fresh=fresh)
+        self.holders = np.frombuffer(segment.memory, "<u8", axes, where.holders)
+        self.places = np.frombuffer(segment.memory, PLACE, PLACES, where.places)
+        self.rings = [
+            Ring(
+                segment.memory,
+                where.rings + k * where.ring_size,
+                COMMANDS,
+                self.row.itemsize,
+                writable=True,
+            )
+            for k in range(PLACES)
+        ]
+
+    def client(self, place: int) -> Process:
+        """Who has the place, or had it last."""
+        entry = self.places[place]
+        return Process(
+            int(entry["pid"]),
+            int(entry["start_time"]),
+            self._boot_id,
+            bytes(entry["command"]).decode(errors="replace"),
+        )
+
+    def reason(self, place: int) -> Reason:
+        """Why its last lease has ended."""
+        reason = int(self.places[place]["reason"])
+        return Reason(reason) if reason in tuple(Reason) else Reason.EXPIRED
+
+    def end_all(self) -> None:
+        """The loop's side: no lease can be renewed any more."""
+        self.places["reason"] = Reason.LOOP_ENDED
+        self.places["ended"] = self.places["lease"]
+
+    def ending(self, place: int, now_ns: int) -> Reason | None:
+        """Why the lease of a place is over; None: it is not. Asks the kernel for the process."""
+        entry = self.places[place]
+        if entry["deadline_ns"] <= now_ns:
+            return Reason.EXPIRED if self.client(place).is_alive else Reason.DIED
+        return None if self.client(place).is_alive else Reason.DIED
+
+
+def make_desk(layout: ShareLayout, mode: int) -> Desk:
+    """A desk nobody sees yet."""
+    path = memory.path_of(layout.name, "commands")
+    segment = memory.create(path, geometry(len(layout.axes)).size, mode)
+    head = HEAD.pack(MAGIC, VERSION, len(layout.axes), layout.run.encode())
+    segment.memory[: HEAD.size] = head
+    return Desk(segment, layout, fresh=True)
+
+
+def open_desk(layout: ShareLayout) -> Desk:
+    """The desk of a running loop. ShareError: there is none for us."""
+    path = memory.path_of(layout.name, "commands")
+    try:
+        segment = memory.open_segment(path, writable=True)
+    except FileNotFoundError as error:
+        raise ShareError(f"the share {layout.name!r} takes no commands") from error
+    except PermissionError as error:
+        raise ShareError(
+            f"the share {layout.name!r} may not be commanded: {path} belongs to another user",
+            hint="its writer can allow it: cat.Share(..., mode=0o660) for the group",
+        ) from error
+    if segment.size != geometry(len(layout.axes)).size:
+        raise ShareError(f"{path} does not belong to the share {layout.name!r}")
+    magic, version, axes, run = HEAD.unpack(segment.memory[: HEAD.size])
+    if (magic, version, axes, run.decode()) != (MAGIC, VERSION, len(layout.axes), layout.run):
+        raise ShareError(
+            f"the loop of the share {layout.name!r} is another one by now", hint="attach again"
+        )
+    return Desk(segment, layout)

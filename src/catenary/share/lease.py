@@ -1,0 +1,201 @@
+"""Lease: the right to command some axes of a loop in another process, for a while."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from types import TracebackType
+
+import numpy as np
+import numpy.typing as npt
+
+from catenary.errors import LeaseError
+from catenary.share.desk import COMMANDS, PLACES, QUANTITIES, Desk, Reason
+from catenary.share.layout import ShareLayout
+from catenary.share.process import this_process
+
+LOCK_NS = 1 << 62  # a dead owner's lock is recovered, a living one's block is short
+
+
+class Lease:
+    """The right to command some axes, until it is released, not renewed in time, or its process
+    has ended. `Reader.lease` makes it.
+
+        with arm.lease(axes=["1 Servo"], for_=0.5) as command:
+            command.send(position=[0.3])       # renews it, too
+    """
+
+    def __init__(self, desk: Desk, layout: ShareLayout, axes: Sequence[int], for_: float) -> None:
+        self.axes = tuple(layout.axes[axis] for axis in axes)
+        self._layout = layout
+        self._desk = desk
+        self._numbers = list(axes)
+        self._for_ns = round(for_ * 1e9)
+        desk.mutex.lock(LOCK_NS)
+        try:
+            self._place = self._take_place()
+            self._serial = self._take_axes()
+        finally:
+            desk.mutex.unlock()
+
+    def send(
+        self,
+        position: npt.ArrayLike | None = None,
+        *,
+        velocity: npt.ArrayLike | None = None,
+        torque: npt.ArrayLike | None = None,
+    ) -> None:
+        """Set-points for the axes of the lease, in their order: [rad], [rad/s], [N·m]; for the next
+        cycle that looks. Renews the lease. LeaseError: it is over, or the loop does not take
+        commands. ValueError: another shape, NaN or infinity."""
+        row = np.zeros((), self._desk.row)
+        given_values = zip(QUANTITIES, (position, velocity, torque), strict=True)
+        for bit, (name, given) in enumerate(given_values):
+            row[name] = np.nan
+            if given is not None:
+                row[name][self._numbers] = self._checked(name, given)
+                row["quantities"] |= np.uint64(1 << bit)
+        if not row["quantities"]:
+            raise ValueError("nothing to send: position=, velocity= or torque=")
+        row["lease"] = self._serial
+        self._renew(row.tobytes())
+
+    def renew(self) -> None:
+        """Keeps the lease for as long again. LeaseError: it is over."""
+        self._renew(None)
+
+    def release(self) -> None:
+        """Gives the axes back; harmless when the lease is over."""
+        self._desk.mutex.lock(LOCK_NS)
+        try:
+            if self._is_valid():
+                free(self._desk, self._place, Reason.RELEASED)
+        finally:
+            self._desk.mutex.unlock()
+
+    def __enter__(self) -> Lease:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.release()
+
+    def _renew(self, row: bytes | None) -> None:
+        """All of it under the mutex: a place that has gone to another client is not written to."""
+        desk, place = self._desk, self._desk.places[self._place]
+        desk.mutex.lock(LOCK_NS)
+        try:
+            now = time.monotonic_ns()
+            if not self._is_valid() or place["deadline_ns"] <= now:
+                raise LeaseError(
+                    f"the lease on {', '.join(self.axes)} is over: {self._why()}",
+                    hint="take it again; send() or renew() more often than every "
+                    f"{self._for_ns * 1e-9:g} s, or ask for longer",
+                )
+            place["deadline_ns"] = now + self._for_ns
+            if row is None:
+                return
+            ring = desk.rings[self._place]
+            if ring.newest - int(place["taken"]) >= COMMANDS:
+                raise LeaseError(
+                    f"the loop has not taken the last {COMMANDS} commands",
+                    hint="its body has to call share.apply(drives) or share.commands()",
+                )
+            ring.write(row)
+        finally:
+            desk.mutex.unlock()
+
+    def _is_valid(self) -> bool:
+        place = self._desk.places[self._place]
+        return bool(place["lease"] == self._serial and place["ended"] != self._serial)
+
+    def _why(self) -> str:
+        place = self._desk.places[self._place]
+        told = self._serial in (place["last"], place["ended"])
+        return str(self._desk.reason(self._place) if told else Reason.EXPIRED)
+
+    def _checked(self, name: str, given: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        values = np.asarray(given, dtype=np.float64)
+        if values.shape not in ((), (len(self.axes),)):
+            raise ValueError(f"{name}: one for each of {len(self.axes)} axes, not {values.shape}")
+        if not np.isfinite(values).all():
+            raise ValueError(f"{name}: NaN or infinity is no set-point")
+        return values
+
+    def _take_place(self) -> int:
+        """A free place, or one whose lease is over. Under the mutex."""
+        desk, now = self._desk, time.monotonic_ns()
+        for place, entry in enumerate(desk.places):
+            if entry["lease"] and entry["ended"] == entry["lease"]:
+                free(desk, place, desk.reason(place))
+            elif entry["lease"] and (reason := desk.ending(place, now)):
+                free(desk, place, reason)
+        orphans = ~np.isin(desk.holders, desk.places["lease"])  # of a client killed while it took
+        desk.holders[orphans] = 0
+        for place, entry in enumerate(desk.places):
+            if not entry["lease"]:
+                return place
+        raise LeaseError(f"{PLACES} clients command the share {self._layout.name!r} already")
+
+    def _take_axes(self) -> int:
+        """The serial of the new lease. Under the mutex."""
+        desk = self._desk
+        for axis in self._numbers:
+            if holder := desk.holders[axis]:
+                [place] = np.flatnonzero(desk.places["lease"] == holder)
+                left = (int(desk.places[place]["deadline_ns"]) - time.monotonic_ns()) * 1e-9
+                raise LeaseError(
+                    f"axis {self._layout.axes[axis]!r} is leased to {desk.client(int(place))} for "
+                    f"another {max(left, 0.0):.3f} s",
+                    hint="wait until that lease is released or over",
+                )
+        serial = int(max(desk.places["lease"].max(), desk.places["last"].max())) + 1
+        me, entry = this_process(), desk.places[self._place]
+        entry["pid"], entry["start_time"] = me.pid, me.start_time
+        entry["command"] = me.command.encode()[:64]
+        entry["axes"] = len(self._numbers)
+        entry["deadline_ns"] = time.monotonic_ns() + self._for_ns
+        desk.holders[self._numbers] = serial
+        entry["lease"] = serial
+        return serial
+
+
+def free(desk: Desk, place: int, reason: Reason) -> None:
+    """The place and its axes are nobody's. Under the mutex."""
+    entry = desk.places[place]
+    serial = entry["lease"]
+    desk.holders[desk.holders == serial] = 0
+    entry["reason"] = reason
+    entry["last"] = serial
+    entry["lease"] = 0
+
+
+def axis_numbers(layout: ShareLayout, axes: Sequence[str | int] | None) -> list[int]:
+    """The places of axes in the layout. ValueError: names what is not there."""
+    if axes is None:
+        return list(range(len(layout.axes)))
+    if isinstance(axes, str):
+        raise ValueError(f"axes={axes!r}: a list of names")
+    known = {name: number for number, name in enumerate(layout.axes)}
+    numbers = []
+    for axis in axes:
+        number = known.get(axis) if isinstance(axis, str) else axis
+        if number is None or not 0 <= number < len(layout.axes):
+            there = ", ".join(map(repr, layout.axes))
+            raise ValueError(f"no axis {axis!r} in the share {layout.name!r}; there are: {there}")
+        numbers.append(number)
+    if not numbers or len(set(numbers)) != len(numbers):
+        raise ValueError(f"axes={list(axes)!r}: each once, at least one")
+    return numbers
+
+
+def lease_of(
+    desk: Desk, layout: ShareLayout, axes: Sequence[str | int] | None, for_: float
+) -> Lease:
+    if not 0 < for_ <= 3600:
+        raise ValueError(f"for_={for_} s: more than 0, at most an hour")
+    return Lease(desk, layout, axis_numbers(layout, axes), for_)

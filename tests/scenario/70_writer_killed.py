@@ -1,0 +1,61 @@
+"""A loop is killed (kill -9) in the middle of its cycles, while other processes read along.
+They are told, whether asleep or not; every cycle that was shared can still be read, and is whole.
+A new loop takes the name; who was attached to the old one sees its last cycles, not the new ones.
+"""
+
+import numpy as np
+import pytest
+
+import catenary as cat
+from catenary.errors import ShareError
+from catenary.virtual import Segment, Servo
+from tests.share.names import own_name
+from tests.share.processes import LOOP, started
+
+READER = """
+import sys
+import catenary as cat
+with cat.attach(sys.argv[1]) as arm:
+    arm.wait()
+    print("attached", flush=True)
+    while arm.wait():
+        arm.read()
+    print(arm.state, flush=True)
+"""
+
+
+def test_readers_are_told_and_keep_what_was_shared() -> None:
+    with own_name("writer") as name, started(LOOP, name) as loop:
+        assert loop.line() == "running"
+        with started(READER, name) as other, cat.attach(name) as arm:
+            assert other.line() == "attached"
+            assert arm.alive
+            loop.kill()
+            assert other.line() == "dead"
+            while arm.wait():
+                pass
+            assert arm.state == "dead"
+            rows, _ = arm.rows(after=0)
+            assert len(rows) >= arm.layout.rows.count - 1  # but one that was being written
+            assert (np.diff(rows["number"]) == 1).all()
+            assert rows["number"][-1] == arm.number
+            steps = np.diff(rows["commanded_position"], axis=0)
+            assert steps == pytest.approx(1e-6, abs=1e-9)
+            assert_replaced(name, arm)
+
+
+def assert_replaced(name: str, old: cat.share.Reader) -> None:
+    last = old.number
+    with pytest.raises(ShareError, match=r"is stale: process \d+ .* has died"):
+        cat.attach(name)
+    assert cat.attach(name, stale=True).number == last
+    with cat.MainDevice(Segment([Servo()])) as main:
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        with cat.Share(name) as share, cat.Loop(arm, sink=share) as loop:
+            next(loop)
+            with cat.attach(name) as new:
+                assert new.alive
+                assert len(new.layout.axes) == 1
+            assert (old.state, old.number, len(old.layout.axes)) == ("dead", last, 2)
+    with pytest.raises(ShareError, match="there is no share"):
+        cat.attach(name, stale=True)

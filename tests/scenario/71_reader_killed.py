@@ -1,0 +1,51 @@
+"""Readers are killed (kill -9) in the middle of their reading, and of their sleep.
+The loop goes on without a missing cycle, other readers too, and nothing is left behind.
+"""
+
+import numpy as np
+import pytest
+
+import catenary as cat
+from tests.share.names import own_name
+from tests.share.processes import LOOP, comes_true, started
+
+READING = """
+import sys
+import catenary as cat
+arm = cat.attach(sys.argv[1])
+arm.wait()
+print("reading", flush=True)
+while True:
+    arm.read()
+    arm.rows(after=arm.number - 1000)
+"""
+SLEEPING = """
+import sys
+import catenary as cat
+arm = cat.attach(sys.argv[1])
+arm.wait()
+print("sleeping", flush=True)
+while True:
+    arm.wait()
+"""
+
+
+@pytest.mark.parametrize("text", [READING, SLEEPING])
+def test_nobody_misses_them(text: str) -> None:
+    with own_name("reader") as name, started(LOOP, name) as loop:
+        assert loop.line() == "running"
+        with cat.attach(name) as arm:
+            for _ in range(3):
+                with started(text, name) as victim, started(text, name) as second:
+                    assert victim.line()
+                    assert second.line()
+                    victim.kill()
+                    second.kill()
+                assert arm.alive
+                before = arm.number
+                assert arm.wait(timeout=60.0)
+                assert comes_true(lambda before=before: arm.number > before + 1000)
+            rows, _ = arm.rows(after=arm.number - 500)
+            assert (np.diff(rows["number"]) == 1).all()
+        with cat.attach(name) as again:
+            assert again.wait(timeout=60.0)

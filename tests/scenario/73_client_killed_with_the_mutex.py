@@ -1,0 +1,57 @@
+"""A process is killed (kill -9) while it has a mutex: one of its own, and the one of a loop's desk.
+The lock goes to the next who asks, who is told; leases work as before; the loop never waited.
+"""
+
+import catenary as cat
+from catenary.share import Mutex
+from catenary.virtual import Segment, Servo
+from tests.share.names import own_name
+from tests.share.processes import started
+
+OWNER = """
+import sys
+from catenary.share import Mutex
+with Mutex(sys.argv[1]):
+    print("mine", flush=True)
+    sys.stdin.readline()
+"""
+IN_MID_LEASE = """
+import sys
+import catenary as cat
+with cat.attach(sys.argv[1]) as arm:
+    arm.lease(axes=[0], for_=3600.0)
+    arm._desk.mutex.lock(0)
+    arm._desk.holders[:] = 77  # a lease that is being taken, and never will be
+    print("mine", flush=True)
+    sys.stdin.readline()
+"""
+
+
+def test_the_next_owner_is_told() -> None:
+    with own_name("mutex") as name:
+        with started(OWNER, name) as owner:
+            assert owner.line() == "mine"
+            mutex = Mutex(name)
+            assert not mutex.acquire(timeout=0.0)
+            owner.kill()
+        with mutex:
+            assert mutex.recovered
+        with mutex:
+            assert not mutex.recovered
+
+
+def test_a_lease_can_be_taken_where_another_client_died_taking_one() -> None:
+    with own_name("desk") as name, cat.MainDevice(Segment([Servo(), Servo()])) as main:
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        with cat.Share(name) as share, cat.Loop(arm, sink=share) as loop:
+            next(loop)
+            with started(IN_MID_LEASE, name) as client:
+                assert client.line() == "mine"
+                next(loop)
+                share.apply(arm)  # with the mutex in other hands
+                client.kill()
+            with cat.attach(name) as reader, reader.lease(for_=3600.0) as command:
+                command.send(position=[0.001, 0.002])
+                next(loop)
+                share.apply(arm)
+                assert arm.target.position.tolist() == [0.001, 0.002]

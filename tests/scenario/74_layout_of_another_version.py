@@ -1,0 +1,82 @@
+"""What lies under the name of a share was written by another release, is cut off, or is no share.
+Readers refuse it and say both versions; a writer does not overwrite what it does not understand.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import catenary as cat
+from catenary.errors import ShareError
+from catenary.share.layout import HEADER, MAGIC, VERSION
+from catenary.virtual import Segment, Servo
+from tests.share.names import own_name
+
+
+@pytest.fixture
+def shared() -> Iterator[tuple[str, Path]]:
+    """A name, and a file there as a loop has written it."""
+    with own_name("version") as name, cat.MainDevice(Segment([Servo()])) as main:
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        path = Path(f"/dev/shm/catenary-{name}")
+        with cat.Share(name, history=0.01) as share, cat.Loop(arm, sink=share) as loop:
+            next(loop)
+            bytes_ = path.read_bytes()
+        path.write_bytes(bytes_)
+        yield name, path
+
+
+def assert_refused(name: str, said: str) -> None:
+    with pytest.raises(ShareError, match=f"the share '{name}': .*{said}"):
+        cat.attach(name, stale=True)
+    with pytest.raises(ShareError, match="is in the way"), cat.Share(name):
+        pass
+
+
+def test_another_version(shared: tuple[str, Path]) -> None:
+    name, path = shared
+    cat.attach(name)  # as it is
+    content = path.read_bytes()
+    path.write_bytes(MAGIC + (VERSION + 1).to_bytes(4, "little") + content[12:])
+    assert_refused(name, f"version {VERSION + 1}, this program reads version {VERSION}")
+
+
+@pytest.mark.parametrize("kept", [5, HEADER.size, 300, -1])
+def test_cut_off(shared: tuple[str, Path], kept: int) -> None:
+    name, path = shared
+    path.write_bytes(path.read_bytes()[:kept])
+    assert_refused(name, "cut off" if kept != 5 else "no share")
+
+
+def test_a_description_that_is_broken(shared: tuple[str, Path]) -> None:
+    name, path = shared
+    content = path.read_bytes()
+    path.write_bytes(content[: HEADER.size] + b"[" + content[HEADER.size + 1 :])
+    assert_refused(name, "description is broken")
+
+
+@pytest.mark.parametrize(
+    ("says", "instead"),
+    [
+        (b'"count":64', b'"count":65'),
+        (b'"count":256', b'"count":999'),
+        (b'"size":1024', b'"size":9999'),
+    ],
+)
+def test_a_description_of_another_size(
+    shared: tuple[str, Path], says: bytes, instead: bytes
+) -> None:
+    name, path = shared
+    content = path.read_bytes()
+    assert says in content
+    path.write_bytes(content.replace(says, instead, 1))
+    with pytest.raises(ShareError, match=r"a ring of|does not fit|broken"):
+        cat.attach(name, stale=True)
+
+
+@pytest.mark.parametrize("content", [b"", b"something else", bytes(8192)])
+def test_something_else(content: bytes) -> None:
+    with own_name("else") as name:
+        Path(f"/dev/shm/catenary-{name}").write_bytes(content)
+        assert_refused(name, "is empty" if not content else "no share")

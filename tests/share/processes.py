@@ -1,0 +1,69 @@
+"""Programs in processes of their own, for tests that kill them."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from threading import Event
+
+DEADLINE = 60.0  # [s] machines stop for a while
+
+LOOP = """
+import sys
+import catenary as cat
+from catenary.virtual import Segment, Servo
+with cat.MainDevice(Segment([Servo(), Servo()])) as main:
+    arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+    share = cat.Share(sys.argv[1])
+    with share, cat.Loop(arm, sink=share) as loop:
+        for cycle in loop:
+            arm.target.position[:] = 1e-6 * cycle.number
+            if cycle.number == 100:
+                print("running", flush=True)
+"""  # in virtual time: thousands of cycles a second, none of which waits
+
+
+class Program:
+    """Owns a process."""
+
+    def __init__(self, text: str, *arguments: str) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", text, *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+
+    def line(self) -> str:
+        """What it says next."""
+        assert self.process.stdout is not None
+        return self.process.stdout.readline().strip()
+
+    def kill(self) -> None:
+        self.process.send_signal(signal.SIGKILL)
+        self.process.wait(DEADLINE)
+
+
+@contextmanager
+def started(text: str, *arguments: str) -> Iterator[Program]:
+    program = Program(text, *arguments)
+    try:
+        yield program
+    finally:
+        program.kill()
+        for stream in (program.process.stdin, program.process.stdout):
+            if stream is not None:
+                stream.close()
+
+
+def comes_true(condition: Callable[[], bool]) -> bool:
+    """Looks again and again, for as long as a machine may need."""
+    pause = Event()
+    for _ in range(round(DEADLINE / 0.01)):
+        if condition():
+            return True
+        pause.wait(0.01)
+    return False
