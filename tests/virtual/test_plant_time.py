@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +14,7 @@ from catenary.errors import ConfigurationError
 from catenary.virtual import Joint, Plant, Segment, Server, Servo
 from catenary.wire.datagram import Command
 from tests.virtual.main_device import MainDevice
-from tests.virtual.plants import PENDULUM, frictionless, model
+from tests.virtual.plants import PENDULUM, Time, frictionless, model
 from tests.virtual.test_server import BRD, answer, wire
 
 PATIENCE = 20.0  # s
@@ -76,15 +78,64 @@ def test_a_served_arm_swings(tmp_path: Path, veth: tuple[str, str]) -> None:
     assert ended > 400
 
 
+def free(folder: Path, text: str = PENDULUM, **options: object) -> tuple[Segment, Servo]:
+    plant = Plant(model(folder, text), [Joint("swing", brake=0)])
+    servo = frictionless()
+    return Segment([servo], plant=plant, **options), servo  # type: ignore[arg-type]
+
+
 def test_a_simulation_beyond_all_bounds_stops_and_says_so(tmp_path: Path) -> None:
-    segment = Segment(
-        [frictionless()], plant=Plant(model(tmp_path, PENDULUM), [Joint("swing", brake=0)])
-    )
-    servo = segment[0]
-    assert isinstance(servo, Servo)
-    link = segment.open_link()
+    segment, servo = free(tmp_path)
+    time = Time(segment)
     servo.apply_load(3e9)
-    with pytest.raises(
-        ConfigurationError, match=r"joint 'swing' went beyond all bounds after 0\.000"
-    ):
-        link.wait_until(link.now() + 10_000_000, False)
+    with pytest.raises(ConfigurationError, match=r"after 0\.000. s: joint 'swing' went beyond all"):
+        time.pass_by(0.01)
+
+
+def test_what_is_no_number_is_told_in_mujocos_words(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And not in a file, which MuJoCo would write."""
+    monkeypatch.chdir(tmp_path)
+    segment, servo = free(tmp_path)
+    time = Time(segment)
+    servo.apply_load(math.nan)
+    with pytest.raises(ConfigurationError, match="MuJoCo says: Nan, Inf or huge value in QACC"):
+        time.pass_by(0.01)
+    assert not (tmp_path / "MUJOCO_LOG.TXT").exists()
+
+
+BOXES = "".join(
+    f"""<body pos="{0.3 * (k % 4)} {0.3 * (k // 4)} .5"><freejoint/>
+    <geom type="box" size=".1 .1 .1" mass="1"/></body>"""
+    for k in range(12)
+)
+CROWDED = """<mujoco><size memory="{}K"/><worldbody><geom type="plane" size="3 3 .1"/>{}
+  <body pos="0 0 3"><joint name="swing"/><geom size=".05" pos="0 .1 0"/></body>
+</worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("kilobytes", [20, 40, 60, 70, 80])
+def test_too_little_memory_for_contacts_does_not_end_the_process(
+    tmp_path: Path, kilobytes: int
+) -> None:
+    """Boxes fall on the floor. MuJoCo warns, or ends the process where nobody hears its errors."""
+    segment, _servo = free(tmp_path, CROWDED.format(kilobytes, BOXES))
+    with pytest.raises(ConfigurationError, match=r"MuJoCo says: .*memory"):
+        Time(segment).pass_by(1.0)
+
+
+def test_in_real_time_it_stands_still_and_frames_are_answered_on(
+    tmp_path: Path, veth: tuple[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[object] = []
+    monkeypatch.setattr(threading, "excepthook", lambda what: said.append(what.exc_value))
+    segment, servo = free(tmp_path, clock="monotonic")
+    with Server(segment, veth[1]) as server, wire(veth[0]) as near:
+        servo.apply_load(3e9)
+        until(lambda: bool(said))
+        near.send(BRD)
+        assert answer(near) == 1
+        with pytest.raises(ConfigurationError, match="beyond all bounds"):
+            server.raise_failure()
+    assert isinstance(said[0], ConfigurationError)

@@ -7,6 +7,7 @@ class CompiledPlant:
         joints: int,
         *,
         step: int,
+        hear: int,
         model: int,
         data: int,
         period_ns: int,
@@ -34,3 +35,5 @@ class CompiledPlant:
     def steps(self) -> int: ...
     @property
     def wild(self) -> int: ...
+    @property
+    def complaint(self) -> str: ...

@@ -8,6 +8,7 @@ from catenary.virtual._segment cimport (
     cat_segment,
     lock,
     monotonic_now,
+    mujoco_message,
     plant,
     plant_free,
     plant_hang,
@@ -40,9 +41,10 @@ cdef class CompiledPlant:
     cdef Core _core
     cdef plant *_plant
 
-    def __init__(self, Core core, int joints, *, uintptr_t step, uintptr_t model, uintptr_t data,
-                 int64_t period_ns, keep):
-        """`step`, `model`, `data`: addresses of mj_step, an mjModel and an mjData; `keep` owns them."""
+    def __init__(self, Core core, int joints, *, uintptr_t step, uintptr_t hear, uintptr_t model,
+                 uintptr_t data, int64_t period_ns, keep):
+        """`step`, `hear`, `model`, `data`: addresses of mj_step, of what sets a thread's message
+        handler (0: none), of an mjModel and an mjData; `keep` owns them."""
         cdef plant *p
         if core._segment.plant != NULL:
             raise ValueError("the segment has a plant already")
@@ -55,6 +57,7 @@ cdef class CompiledPlant:
         if p == NULL or p.joints == NULL:
             raise MemoryError("no memory for the plant")
         p.step = <void (*)(const void *, void *) noexcept nogil>step
+        p.hear = <void (*)(void (*)(const mujoco_message *) noexcept nogil) noexcept nogil>hear
         p.model, p.data = <const void *>model, <void *>data
         p.count, p.period = joints, period_ns
         core._plant = keep
@@ -97,7 +100,7 @@ cdef class CompiledPlant:
         unlock(self._core._segment)
 
     def run(self):
-        """Real time: steps the plant, and what is due beside it, until `end`."""
+        """Real time: steps the plant, and what is due beside it, until `end` or its own."""
         cdef cat_segment *s = self._core._segment
         cdef plant *p = self._plant
         cdef int64_t now, due
@@ -106,7 +109,7 @@ cdef class CompiledPlant:
             now = monotonic_now()
             if p.due < now:
                 p.due = now
-            while not p.ending:
+            while not p.ending and not p.wild and not p.words[0]:
                 now = monotonic_now()
                 segment_work(s, now, 1)
                 due = p.due
@@ -127,3 +130,8 @@ cdef class CompiledPlant:
     def wild(self) -> int:
         """The joint that went beyond all bounds, -1: none; then the plant stands still."""
         return self._plant.wild - 1
+
+    @property
+    def complaint(self) -> str:
+        """MuJoCo's, in its words; then the plant stands still."""
+        return (<bytes>self._plant.words).decode("utf-8", "replace")

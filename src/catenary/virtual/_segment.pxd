@@ -63,7 +63,10 @@ cdef extern from "segment_memory.h" nogil:
         double *friction
         double ratio, zero, dry, brake
         int64_t brake_delay
+    ctypedef struct mujoco_message:
+        pass
     ctypedef struct plant:
+        void (*hear)(void (*)(const mujoco_message *) noexcept nogil) noexcept nogil
         void (*step)(const void *, void *) noexcept nogil
         const void *model
         void *data
@@ -71,6 +74,7 @@ cdef extern from "segment_memory.h" nogil:
         int count, wild, ending
         int64_t period, due
         uint64_t steps
+        char words[256]
     ctypedef struct servo_axis:
         double inertia, viscous, coulomb, load, rated_torque, velocity_limit
         double counts_per_radian, velocity_per_radian, position_gain, velocity_gain, integral_gain

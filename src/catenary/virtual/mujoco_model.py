@@ -198,7 +198,10 @@ class Model:
         """The motors are in: all that follows from them, and the beginning once more."""
         self._mujoco.mj_setConst(self.model, self.data)
         self._start()
-        self._mujoco.mj_step(self.model, self.data)  # fails here rather than in compiled code
+        try:
+            self._mujoco.mj_step(self.model, self.data)  # fails here rather than in compiled code
+        except self._mujoco.FatalError as error:
+            raise ConfigurationError(f"{self.path}: MuJoCo cannot simulate it: {error}") from error
         self._start()
 
     def inertia(self, name: str) -> float:
@@ -225,11 +228,11 @@ class Model:
             friction=_address(self.model.dof_frictionloss, dof),
         )
 
-    @property
-    def step_address(self) -> int:
-        """Of mj_step, in the library the mujoco package itself uses."""
+    def function(self, name: str) -> int:
+        """Of the library the mujoco package itself uses; 0: it has none of this name."""
         [library] = Path(str(self._mujoco.__file__)).parent.glob("libmujoco.so*")
-        return ctypes.cast(ctypes.CDLL(str(library)).mj_step, ctypes.c_void_p).value or 0
+        function = getattr(ctypes.CDLL(str(library)), name, None)
+        return 0 if function is None else ctypes.cast(function, ctypes.c_void_p).value or 0
 
     @property
     def model_address(self) -> int:

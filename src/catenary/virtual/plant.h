@@ -11,6 +11,8 @@
 #ifndef CATENARY_VIRTUAL_PLANT_H
 #define CATENARY_VIRTUAL_PLANT_H
 
+#include <setjmp.h>
+
 #include "device_cycle.h"
 
 #define WILD 1e6                      /* a motor does not turn as fast as this [rad/s] */
@@ -26,16 +28,23 @@ typedef struct plant_joint {
     uint8_t placed;
 } plant_joint;
 
+/* How an mjLogMessage begins (MuJoCo 4). */
+typedef struct { int level, topic; char subject[1024]; } mujoco_message;
+enum { MUJOCO_WARNING = 2, MUJOCO_ERROR = 3 };
+
 typedef struct plant {
     void (*step)(const void *model, void *data);
+    void (*hear)(void (*)(const mujoco_message *));   /* this thread's messages; NULL: not to be had */
     const void *model;
     void *data;
     plant_joint *joints;
     int count;
     int64_t period, due;              /* [ns] */
-    int wild;                         /* the joint, from 1, that went beyond all bounds: it stands still */
+    int wild;                         /* the joint, from 1, that went beyond all bounds */
     int ending;                       /* real time: its thread is to end */
     uint64_t steps;
+    char words[256];                  /* what MuJoCo complained of */
+    jmp_buf escape;                   /* out of a step that failed */
 } plant;
 
 static inline int plant_braked(plant_joint *j, int64_t now) {
@@ -72,13 +81,38 @@ static void plant_show(plant *p) {
     }
 }
 
+static __thread plant *plant_stepped;  /* by this thread, now */
+
+/* After an error MuJoCo would end the process; the state it was in is not used again. */
+static void plant_hear(const mujoco_message *m) {
+    plant *p = plant_stepped;
+    if (m->level < MUJOCO_WARNING)
+        return;
+    if (!p->words[0])
+        strncpy(p->words, m->subject, sizeof p->words - 1);
+    if (m->level >= MUJOCO_ERROR)
+        longjmp(p->escape, 1);
+}
+
+static void plant_simulate(plant *p) {
+    if (p->hear == NULL) {
+        p->step(p->model, p->data);
+        return;
+    }
+    plant_stepped = p;
+    p->hear(plant_hear);
+    if (_setjmp(p->escape) == 0)
+        p->step(p->model, p->data);
+    p->hear(NULL);
+}
+
 /* One step, due now. In real time others may pass while MuJoCo computes; they stop before p->due. */
 static void plant_step(cat_segment *s) {
     plant *p = s->plant;
     plant_apply(p, s->now);
     if (!s->is_virtual)
         pthread_mutex_unlock(&s->mutex);
-    p->step(p->model, p->data);
+    plant_simulate(p);
     if (!s->is_virtual)
         pthread_mutex_lock(&s->mutex);
     p->steps++;
@@ -86,7 +120,7 @@ static void plant_step(cat_segment *s) {
     p->due += p->period;
     if (p->due <= s->now - CATCH_UP_STEPS * p->period)
         p->due = s->now + p->period;
-    if (!p->wild)
+    if (!p->wild && !p->words[0])
         return;
     p->due = NEVER;
     s->pending = 1;

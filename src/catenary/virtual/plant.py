@@ -143,7 +143,8 @@ class Plant:
         compiled = CompiledPlant(
             core,
             len(self.joints),
-            step=self._model.step_address,
+            step=self._model.function("mj_step"),
+            hear=self._model.function("_mjPRIVATE_setTlsLogHandler"),
             model=self._model.model_address,
             data=self._model.data_address,
             period_ns=round(self.step * SECOND),
@@ -218,14 +219,17 @@ class Plant:
 
     def check(self) -> None:
         """ConfigurationError when the simulation went beyond all bounds: it stands still then."""
-        wild = -1 if self._compiled is None else self._compiled.wild
-        if wild < 0:
+        if self._compiled is None or (self._compiled.wild < 0 and not self._compiled.complaint):
             return
+        what = [f"MuJoCo says: {self._compiled.complaint}"] if self._compiled.complaint else []
+        if self._compiled.wild >= 0:
+            name = self.joints[self._compiled.wild].name
+            what.insert(0, f"joint {name!r} went beyond all bounds")
         raise ConfigurationError(
-            f"{self.path.name}: joint {self.joints[wild].name!r} went beyond all bounds after"
-            f" {self.data.time:.4f} s",
+            f"{self.path.name}: the simulation ended after {self.data.time:.4f} s:"
+            f" {'; '.join(what)}",
             hint="look for masses and inertias near zero, bodies that overlap, a step (now"
-            f" {self.step:g} s) that is too long for them",
+            f" {self.step:g} s) that is too long for them, too little memory (MJCF: <size memory>)",
         )
 
     @property
@@ -237,9 +241,13 @@ class Plant:
         """Real time: a thread steps it from now on, without the GIL."""
         if self._compiled is not None:
             self._thread = threading.Thread(
-                target=self._compiled.run, name="virtual-plant", daemon=True
+                target=self._run, args=(self._compiled,), name="virtual-plant", daemon=True
             )
             self._thread.start()
+
+    def _run(self, compiled: CompiledPlant) -> None:
+        compiled.run()
+        self.check()  # frames are answered on; a thread's error is printed
 
     def stop(self) -> None:
         """The arm stands still until `start`."""

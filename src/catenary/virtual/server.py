@@ -148,6 +148,8 @@ class Server:
     def raise_failure(self) -> None:
         if self.failure is not None:
             raise self.failure
+        if self.segment.plant is not None:
+            self.segment.plant.check()
 
     def stop(self) -> None:
         if self._socket.fileno() < 0:

@@ -66,7 +66,7 @@ class Service:
                 action, self._at_first_frame = self._at_first_frame, None
                 action()
             self.agenda.run_due()
-            if self.plant is not None:
+            if self.plant is not None and self.core.is_virtual:
                 self.plant.check()
             if not events:
                 return
