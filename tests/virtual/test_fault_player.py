@@ -334,6 +334,15 @@ def test_drive_fault_sto_and_a_model_that_stands_still() -> None:
     assert main.segment.fault_log[-1].fault == freeze(3, at=0.04)
 
 
+def test_a_frozen_device_may_be_taken_away_before_it_thaws() -> None:
+    """(Found by the soak: `catenary bench soak --minutes 1 --seed 24`.)"""
+    other = Servo()
+    main = line(freeze(3, at=0.01, for_=0.05), swap(3, other, at=0.02))
+    main.let_pass(100)
+    assert main.segment[3] is other
+    assert main.segment.fault_log[-1] == FaultEvent(0.06, freeze(3, at=0.01, for_=0.05), "ends")
+
+
 def test_a_crystal_that_drifts() -> None:
     main = line(drift(0, ppm=100.0, at=1.0, for_=1.0))
     main.number_stations()

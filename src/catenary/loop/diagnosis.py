@@ -81,6 +81,26 @@ def state_error(answers: Sequence[Answer], log: object) -> StateError | None:
     return error
 
 
+def forgetful_error(silent: Sequence[Answer], al_status: int, log: object) -> StateError:
+    """The error for devices that lost their addresses while all frames come back: they were off for
+    a moment. `al_status`: the OR of all states."""
+    first = silent[0]
+    error = StateError(
+        f"{first.station} does not answer to its address any more, while not all that answer are "
+        f"in OP (AL status 0x{al_status:02X}, all together)",
+        position=first.station.position,
+        requested=int(State.OP),
+        actual=int(State.INIT),
+        code=0,
+        log=log,
+        hint="it was switched off and on for less time than the loop endures lost frames, or "
+        "exchanged: look at its supply; a new scan() and Loop bring it up again",
+    )
+    for other in silent[1:]:
+        error.add_note(f"also: {other.station}")
+    return error
+
+
 class AxisTrouble(NamedTuple):
     """One axis and what it says about itself."""
 

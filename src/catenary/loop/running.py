@@ -25,7 +25,14 @@ from catenary.core import (
 from catenary.errors import CatenaryError, DriveError, LoopError
 from catenary.loop.buffers import bind_wishes
 from catenary.loop.clocks import Clocks
-from catenary.loop.diagnosis import IN_FAULT, AxisTrouble, drive_error, silence_error, state_error
+from catenary.loop.diagnosis import (
+    IN_FAULT,
+    AxisTrouble,
+    drive_error,
+    forgetful_error,
+    silence_error,
+    state_error,
+)
 from catenary.loop.error_watch import ErrorWatch
 from catenary.loop.laws.runner import LawRunner
 from catenary.loop.publishing import Publisher
@@ -289,11 +296,20 @@ class Running:
         return list(self.engine.buffers["unit_valid"].tolist())
 
     def _raise_astray(self) -> None:
+        """Somebody says that it is not in OP. Who does not answer under its address twice, while
+        something does, has forgotten it."""
         log = self.log()
-        [answers] = self.service.converse(survey(self._stations))
-        error = state_error([a for a in answers if self.watch.requires(a.station.position)], log)
-        if error is not None:
-            raise error
+        for look in range(2):
+            [answers] = self.service.converse(survey(self._stations))
+            needed = [a for a in answers if self.watch.requires(a.station.position)]
+            error = state_error(needed, log)
+            if error is not None:
+                raise error
+            silent = [answer for answer in needed if answer.word is None]
+            if not silent or len(silent) == len(answers) or self.engine.al_status == State.OP:
+                return
+            if look:
+                raise forgetful_error(silent, self.engine.al_status, log)
 
     def _drive_error(self, axes: Sequence[int], what: str) -> DriveError:
         """The error for some axes, with what each drive says about it."""

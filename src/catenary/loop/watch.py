@@ -120,7 +120,9 @@ class Watch:
         """Whether somebody out of OP is no reason to end the loop: as far as is known, all of them
         are devices that are not required. Known at the next look, after `LOOK` at most."""
         return not self._all_required and all(
-            charge.standing is not Standing.ASTRAY for charge in self._charges if charge.required
+            charge.standing not in (Standing.ASTRAY, Standing.LOST)
+            for charge in self._charges
+            if charge.required
         )
 
     def requires(self, position: int) -> bool:

@@ -239,7 +239,7 @@ class FaultPlayer:
             case f.Freeze():
                 device = self._devices[fault.device]
                 device.freeze(True)
-                return partial(device.freeze, False)
+                return self._while_placed(device, lambda: device.freeze(False))
             case f.DriveFault():
                 servo = self._servo(fault.device)
                 servo.inject_fault(fault.code, fault.axis)
