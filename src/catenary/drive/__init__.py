@@ -1,7 +1,8 @@
 """CiA 402 axes and I/O as wishes: objects, units, arrays."""
 
 from catenary.drive.drives import Drives
+from catenary.drive.homing import HomingMethod
 from catenary.drive.io import Inputs, Outputs
 from catenary.plan.wish import DC
 
-__all__ = ["DC", "Drives", "Inputs", "Outputs"]
+__all__ = ["DC", "Drives", "HomingMethod", "Inputs", "Outputs"]

@@ -15,7 +15,10 @@ from catenary.wire.cia402 import Mode
 AxisSource: TypeAlias = SubDevice | tuple[SubDevice, int]
 
 EVERY_MAX = 10_000  # cycles: beyond, ask by SDO
-MODES: dict[str, Mode] = {"csp": Mode.CSP, "csv": Mode.CSV, "cst": Mode.CST}
+MODES: dict[str, Mode] = {
+    **{"csp": Mode.CSP, "csv": Mode.CSV, "cst": Mode.CST},
+    "hm": Mode.HM,  # homing: no target, `Drives.home` runs it
+}
 
 
 def axis_sources(subs: Iterable[AxisSource]) -> list[tuple[SubDevice, int]]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from catenary.drive import objects
+from catenary.drive.homing import HomingMethod
 from catenary.drive.objects import AxisObject, Unit
 from catenary.drive.units import AxisUnits
 from catenary.errors import MappingError
@@ -40,6 +41,7 @@ class Axis:
     columns: Mapping[str, AxisObject] = field(default_factory=dict)
     every: int = 1  # cycles between two exchanges
     required: bool = True  # the cycle is not good without its device
+    homing: HomingMethod | None = None
 
     def index(self, base: int) -> int:
         """The number of slot 0's object `base` in this slot."""
@@ -62,7 +64,11 @@ class Axis:
 
     def pdo_wish(self, start_up: tuple[tuple[int, int, bytes], ...] = ()) -> PdoWish:
         """Everything the axis exchanges every cycle."""
-        wanted = [objects.CONTROLWORD, objects.MODE_TARGET, *(TARGETS[m] for m in self.modes)]
+        wanted = [
+            objects.CONTROLWORD,
+            objects.MODE_TARGET,
+            *(TARGETS[m] for m in self.modes if m in TARGETS),
+        ]
         given = [objects.STATUSWORD, objects.MODE_ACTUAL, *(MEASURED[m] for m in self.measured)]
         for column in self.columns.values():
             (wanted if column.output else given).append(column)

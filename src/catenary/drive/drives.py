@@ -23,13 +23,14 @@ from catenary.drive.arguments import (
     named_columns,
 )
 from catenary.drive.axis import MEASURED, Axis, column_bank
+from catenary.drive.homing import HomingMethod, Timed, run_homing
 from catenary.drive.objects import AxisObject
 from catenary.drive.state_machine import Goal
 from catenary.drive.units import AxisUnits, one_each, per_axis
 from catenary.drive.values import Array, AxisValues
 from catenary.plan.cycle import Bank
 from catenary.plan.wish import DC, ImageLayout, PdoWish, Views, WishTables
-from catenary.wire.cia402 import State
+from catenary.wire.cia402 import Mode, State
 
 V = TypeVar("V")
 PerAxis: TypeAlias = V | Sequence[V]
@@ -45,7 +46,8 @@ class Drives:
 
     `subs`: SubDevices with all of their axes, or `(SubDevice, slot)` for single ones.
     `mode`: "csp", "csv" or "cst", one for all or one for each; `other_modes` may be switched to
-    while the loop runs. Every further option is one value for all axes, or one for each:
+    while the loop runs ("hm" too: `home`). Every further option is one value for all axes, or one
+    for each:
 
     `counts_per_turn` of the motor's encoder; `gear_ratio` motor turns per joint turn; `direction`
     1 or -1; `offset` [rad] of the joint where the drive says 0; `velocity_unit` [rad/s of the
@@ -62,6 +64,8 @@ class Drives:
     `required=False`: the loop goes on without a drive that vanishes; what is not `present` holds
     its last values and follows nothing, and must be enabled again when it is back. `every`: the
     drives are exchanged every so many cycles of the loop.
+
+    `homing`: a `HomingMethod`, how the drive finds its home.
 
     `dc`: distributed clocks; True: as each device's SII says, or a `DC` for all of them.
     """
@@ -82,6 +86,7 @@ class Drives:
         position_max: PerAxis[float | None] = None,
         velocity_limit: PerAxis[float | None] = None,
         torque_limit: PerAxis[float | None] = None,
+        homing: PerAxis[HomingMethod | None] = None,
         measured: Sequence[str] | None = None,
         columns: Sequence[str | tuple[str, AxisObject]] = (),
         required: bool = True,
@@ -123,9 +128,15 @@ class Drives:
                 columns=self._columns,
                 every=cycles_between("every", every),
                 required=required,
+                homing=home,
             )
-            for (sub, slot), first, unit, limit in zip(
-                sources, first_modes, units, limits, strict=True
+            for (sub, slot), first, unit, limit, home in zip(
+                sources,
+                first_modes,
+                units,
+                limits,
+                per_axis("homing", homing, n),
+                strict=True,
             )
         )
         self.actual = AxisValues("actual")
@@ -195,6 +206,19 @@ class Drives:
             if wanted not in self._axes[axis].modes:
                 raise ValueError(f"{self.names[axis]}: make Drives with other_modes=[{mode!r}]")
         self._bound().mode_target[axes] = wanted
+
+    def home(self, loop: Iterable[Timed], axes: Axes = ALL, *, timeout: float = 30.0) -> None:
+        """Lets enabled axes find their homes themselves (mode 6, "hm" in `other_modes`), and waits,
+        iterating `loop`; then they hold, in the mode they had, positions counted from the new zero.
+
+        DriveError names an axis that reports an error, drops out, or is not home within `timeout`
+        [s]; the search is over then. ValueError: made without "hm".
+        """
+        chosen = np.atleast_1d(np.arange(len(self))[axes])
+        for axis in chosen.tolist():
+            if Mode.HM not in self._axes[axis].modes:
+                raise ValueError(f"{self.names[axis]}: make Drives with other_modes=['hm']")
+        run_homing(self._bound(), self.names, loop, chosen, timeout)
 
     # plan.wish.Wish
 

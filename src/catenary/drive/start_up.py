@@ -36,8 +36,10 @@ def with_rated_torque(axis: Axis, sub: SubDevice) -> Axis:
 
 
 def downloads(axis: Axis, sub: SubDevice, period_ns: int) -> tuple[tuple[int, int, bytes], ...]:
-    """0x6060 and 0x60C2, for drives that do not map the mode and for the period."""
-    return _mode(axis, sub) + _interpolation(axis, sub, period_ns)
+    """0x6060 and 0x60C2, for drives that do not map the mode and for the period; what homing
+    needs."""
+    found = _mode(axis, sub) + _interpolation(axis, sub, period_ns)
+    return found + (axis.homing.downloads(axis.units, axis.index(0)) if axis.homing else ())
 
 
 def _mode(axis: Axis, sub: SubDevice) -> tuple[tuple[int, int, bytes], ...]:

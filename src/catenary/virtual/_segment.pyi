@@ -53,6 +53,12 @@ SLOT_INTERPOLATION_PERIOD: Final[int]
 SLOT_INTERPOLATION_EXPONENT: Final[int]
 SLOT_VELOCITY_DEMAND: Final[int]
 SLOT_POLARITY: Final[int]
+SLOT_HOME_OFFSET: Final[int]
+SLOT_HOMING_METHOD: Final[int]
+SLOT_HOMING_SPEED: Final[int]
+SLOT_HOMING_SLOW: Final[int]
+SLOT_HOMING_ACCELERATION: Final[int]
+SLOT_HOMING_TORQUE: Final[int]
 
 class Core:
     failure: BaseException | None

@@ -22,7 +22,9 @@ enum servo_slot {
     SLOT_FOLLOWING_WINDOW, SLOT_FOLLOWING_TIME, SLOT_LIMIT_MIN, SLOT_LIMIT_MAX,
     SLOT_MAX_TORQUE, SLOT_MAX_SPEED, SLOT_QUICK_STOP_DECELERATION, SLOT_DECELERATION,
     SLOT_INTERPOLATION_PERIOD, SLOT_INTERPOLATION_EXPONENT, SLOT_VELOCITY_DEMAND,
-    SLOT_POLARITY, AXIS_SLOTS
+    SLOT_POLARITY,
+    SLOT_HOME_OFFSET, SLOT_HOMING_METHOD, SLOT_HOMING_SPEED, SLOT_HOMING_SLOW,
+    SLOT_HOMING_ACCELERATION, SLOT_HOMING_TORQUE, AXIS_SLOTS
 };
 
 enum {
@@ -30,7 +32,7 @@ enum {
     QUICK_STOP_ACTIVE, FAULT_REACTION_ACTIVE, FAULT
 };
 
-enum { CSP = 8, CSV = 9, CST = 10 };
+enum { HM = 6, CSP = 8, CSV = 9, CST = 10 };
 
 enum {
     ERROR_OVERCURRENT = 0x2310, ERROR_STO = 0xFF01, ERROR_FOLLOWING = 0x8611,
@@ -57,6 +59,10 @@ typedef struct servo_axis {
     double command, command_velocity, ramp;           /* counts; rad/s; rad/s */
     double interpolated;                              /* seconds left to reach the target */
     double following_time;                            /* seconds outside the window */
+    int64_t zero;                                     /* where the axis shows 0, counts of the shaft */
+    double pressed;                                   /* seconds against a stop, while homing */
+    int homing;
+    uint8_t homing_asked;
     int state, mode;
     ramp_end ramping;
     uint16_t last_controlword, injected;
@@ -76,7 +82,12 @@ static inline int servo_powered(const servo_axis *a) {
 }
 
 static inline int64_t servo_counts(const servo_axis *a) {
-    return llrint(a->position * a->counts_per_radian);
+    return llrint(a->position * a->counts_per_radian) - a->zero;
+}
+
+/* The same, not quantised. */
+static inline double servo_exact(const servo_axis *a) {
+    return a->position * a->counts_per_radian - (double)a->zero;
 }
 
 /* Loops restart from where the motor is: nothing commanded earlier counts. */
@@ -208,7 +219,7 @@ static void servo_supervise(controller *c, servo_axis *a, int64_t *slots, double
         return;
     }
     int64_t window = slots[SLOT_FOLLOWING_WINDOW];
-    double error = a->command - a->position * a->counts_per_radian;
+    double error = a->command - servo_exact(a);
     int outside = window != 0xFFFFFFFF && fabs(error) > (double)window;
     a->following_time = outside ? a->following_time + dt : 0;
     if (outside && a->following_time * 1e3 >= (double)slots[SLOT_FOLLOWING_TIME])
@@ -265,6 +276,8 @@ static double servo_ramp(servo_axis *a, const int64_t *slots, double limit, doub
     return servo_velocity_loop(a, a->ramp, 0, limit, dt);
 }
 
+#include "servo_homing.h"
+
 static double servo_drive(servo_axis *a, const int64_t *slots, int fresh, double dt, double rate) {
     double limit = a->rated_torque * (double)slots[SLOT_MAX_TORQUE] * 1e-3;
     double feed_forward = (double)slots[SLOT_TORQUE_OFFSET] * 1e-3 * a->rated_torque;
@@ -274,7 +287,7 @@ static double servo_drive(servo_axis *a, const int64_t *slots, int fresh, double
     else if (a->mode == CSP) {
         servo_interpolate(a, slots, fresh, dt, rate);
         double offset = (double)slots[SLOT_VELOCITY_OFFSET] * a->radian_per_velocity;
-        double error = a->command * a->radian_per_count - a->position;
+        double error = (a->command - servo_exact(a)) * a->radian_per_count;
         torque = servo_velocity_loop(a, a->position_gain * error + a->command_velocity + offset, feed_forward, limit, dt);
     } else if (a->mode == CSV) {
         a->command_velocity = (double)(slots[SLOT_TARGET_VELOCITY] + slots[SLOT_VELOCITY_OFFSET]) * a->radian_per_velocity;
@@ -283,7 +296,9 @@ static double servo_drive(servo_axis *a, const int64_t *slots, int fresh, double
         torque = (double)slots[SLOT_TARGET_TORQUE] * 1e-3 * a->rated_torque + feed_forward;
         if (fabs(a->velocity) > a->velocity_limit && torque * a->velocity > 0)
             torque = 0;
-    } else
+    } else if (a->mode == HM)
+        torque = homing_drive(a, slots, limit, dt);
+    else
         torque = servo_velocity_loop(a, 0, 0, limit, dt);
     return clamp(torque, limit);
 }
@@ -307,6 +322,8 @@ static uint16_t servo_statusword(const servo_axis *a, const int64_t *slots) {
         word |= 0x0020;                                      /* quick stop is not active */
     if (a->state != OPERATION_ENABLED)
         return word;
+    if (a->mode == HM)
+        return word | homing_status(a);
     int cyclic = a->mode == CSP || a->mode == CSV || a->mode == CST;
     if (cyclic && a->ramping == RAMP_NONE && a->fed)
         word |= 0x1000;                                      /* follows the set-point */
@@ -335,7 +352,7 @@ static void servo_show(servo_axis *a, int64_t *slots) {
 /* The mode changes at standstill of the set-point: the loops restart bumplessly. */
 static void servo_change_mode(servo_axis *a, const int64_t *slots) {
     int mode = (int)slots[SLOT_MODE];
-    if (mode == a->mode || (mode != CSP && mode != CSV && mode != CST && mode != 0))
+    if (mode == a->mode || (mode != HM && mode != CSP && mode != CSV && mode != CST && mode != 0))
         return;                                              /* unknown: the display keeps the old one */
     double integral = a->integral;
     servo_hold(a);
@@ -352,6 +369,7 @@ static void servo_step(controller *c, servo_axis *a, int64_t *slots, int fed, in
     a->fed = (uint8_t)fed;
     servo_change_mode(a, slots);
     servo_command(c, a, slots);
+    homing_command(a, slots);
     servo_supervise(c, a, slots, dt);
     a->torque = servo_powered(a) ? servo_drive(a, slots, fresh, dt, rate) : 0;
     if (a->joint == NULL)

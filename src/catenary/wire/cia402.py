@@ -58,8 +58,8 @@ class Status(IntFlag):
     REMOTE = 1 << 9  # the controlword is obeyed
     TARGET_REACHED = 1 << 10
     INTERNAL_LIMIT_ACTIVE = 1 << 11
-    MODE_12 = 1 << 12  # CSP, CSV, CST: the drive follows the set-points
-    MODE_13 = 1 << 13  # CSP: following error
+    MODE_12 = 1 << 12  # CSP, CSV, CST: the drive follows the set-points; HM: homing attained
+    MODE_13 = 1 << 13  # CSP: following error; HM: homing error
     MANUFACTURER_14 = 1 << 14
     MANUFACTURER_15 = 1 << 15
 
@@ -195,10 +195,14 @@ class Object(IntEnum):
     MOTOR_RATED_TORQUE = 0x6076  # [mN·m]; torques are in thousandths of it
     TORQUE_ACTUAL = 0x6077
     TARGET_POSITION = 0x607A
+    HOME_OFFSET = 0x607C
     SOFTWARE_POSITION_LIMIT = 0x607D
     QUICK_STOP_DECELERATION = 0x6085
     POSITION_ENCODER_RESOLUTION = 0x608F
     GEAR_RATIO = 0x6091
+    HOMING_METHOD = 0x6098
+    HOMING_SPEEDS = 0x6099
+    HOMING_ACCELERATION = 0x609A
     POSITION_OFFSET = 0x60B0
     VELOCITY_OFFSET = 0x60B1
     TORQUE_OFFSET = 0x60B2

@@ -1,4 +1,4 @@
-"""A servo drive, CiA 402 (IEC 61800-7-201): CSP, CSV, CST on 1 to 8 axes, objects + 0x800·k.
+"""A servo drive, CiA 402 (IEC 61800-7-201): CSP, CSV, CST and homing on 1 to 8 axes, at + 0x800·k.
 
 The motor, its loops and the drive's state machine are compiled (`servo.h`) and stepped at the
 device's own cycle. Positions count `counts_per_turn` a turn; velocities are counts a second;
@@ -25,6 +25,7 @@ from catenary.virtual.crystal import EXACT, ClockBits, Crystal
 from catenary.virtual.description import Description, MappedEntry, Pdo
 from catenary.virtual.devices.application import Application, mailbox_of, sync_managers_of
 from catenary.virtual.devices.applied import AppliedDevice
+from catenary.virtual.devices.servo_homing import add_homing, homing_presets
 from catenary.virtual.devices.servo_objects import (
     BITS,
     DEFAULT_RX,
@@ -41,8 +42,8 @@ STEP_NS = 250_000
 MINIMUM_CYCLE_NS = 62_500  # of SYNC0
 COPY_NS = 20_000  # outputs have to be there so long before SYNC0
 BOOT_SECONDS = 0.02
-SUPPORTED_MODES = {0, 8, 9, 10}
-SUPPORTED_MODES_MASK = 1 << 7 | 1 << 8 | 1 << 9  # 0x6502: CSP, CSV, CST
+SUPPORTED_MODES = {0, 6, 8, 9, 10}
+SUPPORTED_MODES_MASK = 1 << 5 | 1 << 7 | 1 << 8 | 1 << 9  # 0x6502: HM, CSP, CSV, CST
 VELOCITY_BANDWIDTH = 2 * math.pi * 80  # rad/s
 POSITION_BANDWIDTH = 100.0  # rad/s
 AXIS_STRIDE, PDO_STRIDE = 0x800, 0x10
@@ -235,6 +236,7 @@ class Servo(AppliedDevice):
             (_segment.SLOT_DECELERATION, deceleration // 2),
             (_segment.SLOT_INTERPOLATION_PERIOD, 1),
             (_segment.SLOT_INTERPOLATION_EXPONENT, -3),
+            *homing_presets(self.velocity_counts_per_turn / (2 * math.pi)),
         ):
             self.core.put_slot(self.position, _segment.SLOTS_PER_AXIS * axis + slot, value)
 
@@ -272,6 +274,7 @@ class Servo(AppliedDevice):
             slot("Max position limit", 4, _segment.SLOT_LIMIT_MAX, RW),
         ]
         dictionary.add_record(0x607D + base, "Software position limit", limits, code=ARRAY)
+        add_homing(dictionary, base, slot)
         interpolation = [
             slot(
                 "Interpolation time period value", UNSIGNED8, _segment.SLOT_INTERPOLATION_PERIOD, RW

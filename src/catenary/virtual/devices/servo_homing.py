@@ -1,0 +1,48 @@
+"""The objects of mode 6, homing (CiA 402-2), of one axis; what they do is in `servo_homing.h`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from catenary.virtual import _segment
+from catenary.virtual.coe.dictionary import (
+    ARRAY,
+    INTEGER8,
+    INTEGER32,
+    UNSIGNED16,
+    UNSIGNED32,
+    Dictionary,
+    Entry,
+)
+from catenary.virtual.devices.servo_objects import RW
+
+HERE = 37
+TORQUE = 300  # per mille of the rated torque: a stop
+
+
+def add_homing(
+    dictionary: Dictionary, base: int, slot: Callable[[str, int, int, int], Entry]
+) -> None:
+    """Objects at `base` + index; `slot` makes an entry of the model's own values."""
+    add = dictionary.add_variable
+    add(0x607C + base, slot("Home offset", INTEGER32, _segment.SLOT_HOME_OFFSET, RW))
+    add(0x6098 + base, slot("Homing method", INTEGER8, _segment.SLOT_HOMING_METHOD, RW))
+    speeds = [
+        slot("Speed during search for switch", UNSIGNED32, _segment.SLOT_HOMING_SPEED, RW),
+        slot("Speed during search for zero", UNSIGNED32, _segment.SLOT_HOMING_SLOW, RW),
+    ]
+    dictionary.add_record(0x6099 + base, "Homing speeds", speeds, code=ARRAY)
+    acceleration = _segment.SLOT_HOMING_ACCELERATION
+    add(0x609A + base, slot("Homing acceleration", UNSIGNED32, acceleration, RW))
+    add(0x2110 + base, slot("Homing torque", UNSIGNED16, _segment.SLOT_HOMING_TORQUE, RW))
+
+
+def homing_presets(velocity_per_radian: float) -> tuple[tuple[int, int], ...]:
+    """(slot, value) before anybody writes: method 37, 1 rad/s, 0.2 rad/s, 10 rad/s²."""
+    return (
+        (_segment.SLOT_HOMING_METHOD, HERE),
+        (_segment.SLOT_HOMING_SPEED, round(velocity_per_radian)),
+        (_segment.SLOT_HOMING_SLOW, round(0.2 * velocity_per_radian)),
+        (_segment.SLOT_HOMING_ACCELERATION, round(10 * velocity_per_radian)),
+        (_segment.SLOT_HOMING_TORQUE, TORQUE),
+    )

@@ -1,0 +1,74 @@
+/* Homing of a servo axis, mode 6 (CiA 402-2 / IEC 61800-7-201 §13): the drive finds its own home.
+ *
+ * Methods: 37 (and its old number 35), the present position is home; and two of the manufacturer's,
+ * numbered as Maxon's EPOS4 has them: -3 and -4, against a hard stop in positive and in negative
+ * direction, found by the torque (0x2110, which is also the most it pushes with). Zero is home + home
+ * offset (0x607C), as the profile says: at home the axis shows -offset. Bit 4 starts, without it the
+ * search stops. Included by servo.h. */
+#ifndef CATENARY_VIRTUAL_SERVO_HOMING_H
+#define CATENARY_VIRTUAL_SERVO_HOMING_H
+
+#define HOMING_PRESSED 0.02           /* the torque lasts so long at standstill: a stop [s] */
+
+typedef enum { HOMING_NOT_STARTED, HOMING_SEARCHES, HOMING_ATTAINED, HOMING_FAILED } homing_state;
+
+enum { HOME_HERE_OLD = 35, HOME_HERE = 37, HOME_STOP_POSITIVE = -3, HOME_STOP_NEGATIVE = -4 };
+
+/* The present position becomes home. */
+static void homing_attain(servo_axis *a, const int64_t *slots) {
+    a->zero = llrint(a->position * a->counts_per_radian) + slots[SLOT_HOME_OFFSET];
+    servo_hold(a);
+    a->homing = HOMING_ATTAINED;
+}
+
+static void homing_start(servo_axis *a, const int64_t *slots) {
+    int64_t method = slots[SLOT_HOMING_METHOD];
+    a->pressed = 0;
+    a->ramp = a->velocity;
+    if (method == HOME_HERE || method == HOME_HERE_OLD)
+        homing_attain(a, slots);
+    else if (method == HOME_STOP_POSITIVE || method == HOME_STOP_NEGATIVE)
+        a->homing = HOMING_SEARCHES;
+    else
+        a->homing = HOMING_FAILED;
+}
+
+/* Bit 4 of the controlword, and the mode. */
+static void homing_command(servo_axis *a, const int64_t *slots) {
+    int asked = a->mode == HM && a->state == OPERATION_ENABLED && (slots[SLOT_CONTROLWORD] & 0x10);
+    if (a->mode != HM)
+        a->homing = HOMING_NOT_STARTED;
+    if (asked && !a->homing_asked)
+        homing_start(a, slots);
+    else if (!asked && a->homing == HOMING_SEARCHES)
+        a->homing = HOMING_NOT_STARTED;
+    a->homing_asked = (uint8_t)asked;
+}
+
+/* The torque of mode 6: towards the stop at 0x6099:01 with the ramp of 0x609A, else standing. */
+static double homing_drive(servo_axis *a, const int64_t *slots, double limit, double dt) {
+    double speed = 0, step = larger(1e-3, (double)slots[SLOT_HOMING_ACCELERATION] * a->radian_per_velocity) * dt;
+    if (a->homing == HOMING_SEARCHES) {
+        speed = (double)slots[SLOT_HOMING_SPEED] * a->radian_per_velocity;
+        speed = slots[SLOT_HOMING_METHOD] == HOME_STOP_POSITIVE ? speed : -speed;
+        limit = smaller(limit, a->rated_torque * (double)slots[SLOT_HOMING_TORQUE] * 1e-3);
+    }
+    a->ramp += clamp(speed - a->ramp, step);
+    double torque = clamp(servo_velocity_loop(a, a->ramp, 0, limit, dt), limit);
+    int stuck = speed != 0 && torque * speed > 0 && fabs(torque) >= limit && fabs(a->velocity) < 0.1 * fabs(speed);
+    a->pressed = stuck ? a->pressed + dt : 0;
+    if (a->pressed < HOMING_PRESSED)
+        return torque;
+    homing_attain(a, slots);
+    return 0;
+}
+
+/* Bits 10, 12 and 13 of the statusword. */
+static uint16_t homing_status(const servo_axis *a) {
+    uint16_t stands = fabs(a->velocity) < 0.05 && a->homing != HOMING_SEARCHES ? 0x0400 : 0;
+    if (a->homing == HOMING_ATTAINED)
+        return stands | 0x1000;
+    return a->homing == HOMING_FAILED ? stands | 0x2000 : stands;
+}
+
+#endif
