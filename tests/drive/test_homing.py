@@ -104,7 +104,7 @@ def test_against_a_joints_hard_stop(tmp_path: Path, method: int, stop: float) ->
 def test_a_stop_that_is_nowhere() -> None:
     method = HomingMethod(-3, speed=2.0, acceleration=20.0)
     with opened(Servo(name="Left"), homing=method) as (arm, loop):
-        with pytest.raises(DriveError, match="1 Left has not found its home within 0.5 s"):
+        with pytest.raises(DriveError, match=r"1 Left has not found its home within 0\.5 s"):
             arm.home(loop, timeout=0.5)
         for _ in range(400):
             next(loop)
