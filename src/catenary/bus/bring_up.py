@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from catenary.bus.ring import end_for_clocks
 from catenary.bus.runner import BlockingRunner
 from catenary.bus.segment_scan import check_identity
 from catenary.bus.sub_device import SubDevice
 from catenary.errors import ConfigurationError, SegmentError
+from catenary.link import RingLink
 from catenary.model.device import DeviceDescription, Direction, mapped_entries
 from catenary.plan.make import Plan, gather_wishes
 from catenary.plan.start_up import DevicePlan
@@ -37,11 +39,15 @@ def describe_mappings(
 
 
 def bring_to_safe_op(
-    runner: BlockingRunner, subs: Sequence[SubDevice], plan: Plan, epoch_ns: int = 0
+    runner: BlockingRunner,
+    subs: Sequence[SubDevice],
+    plan: Plan,
+    epoch_ns: int = 0,
+    ring: RingLink | None = None,
 ) -> ClockMeasurement | None:
     """Writes every device's part of the plan, brings the clocks together, then asks for SAFE-OP;
-    all at once. `epoch_ns`: the system time less the link's. Returns what was measured of the
-    clocks, if there are any to bring together."""
+    all at once. `epoch_ns`: the system time less the link's; `ring`: what the devices are on, if it
+    is one. Returns what was measured of the clocks, if there are any to bring together."""
     if len(subs) != len(plan.devices):
         raise SegmentError(
             f"the plan is for {len(plan.devices)} devices, the segment has {len(subs)}",
@@ -56,8 +62,11 @@ def bring_to_safe_op(
     if plan.cycle.clock is not None:
         syncs = {each.position: each.sync for each in plan.devices if each.sync is not None}
         clock = plan.cycle.clock
+        end = None if ring is None else end_for_clocks(runner, ring, devices)
         measured = runner.run(
-            bring_together(devices, syncs, clock.reference, epoch_ns, clock.burst, clock.follow)
+            bring_together(
+                devices, syncs, clock.reference, epoch_ns, clock.burst, clock.follow, end
+            )
         )
     runner.run_all([request_state(sub.station, State.SAFE_OP) for sub in subs])
     for sub in subs:

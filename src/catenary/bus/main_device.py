@@ -251,7 +251,8 @@ class MainDevice:
         from catenary.bus.bring_up import bring_to_safe_op
 
         self.clock_epoch_ns = self._epoch_ns()
-        measured = bring_to_safe_op(self._runner, self.subs, plan, self.clock_epoch_ns)
+        ring = ring_of(self.link)
+        measured = bring_to_safe_op(self._runner, self.subs, plan, self.clock_epoch_ns, ring)
         self.clock_delays_ns = measured.delays_ns if measured is not None else ()
 
     def leave(self, *, timeout: float = LEAVE_TIMEOUT) -> None:

@@ -7,9 +7,13 @@ from contextlib import contextmanager
 from typing import NamedTuple, Protocol
 
 from catenary.bus.runner import BlockingRunner
+from catenary.errors import ClockError
 from catenary.link import RingLink
 from catenary.link.ring_state import RingState, Shape
-from catenary.procedure.stations import StationRegisters, assign
+from catenary.model.device import DeviceDescription
+from catenary.model.topology import make_topology
+from catenary.procedure.clocks import RingEnd
+from catenary.procedure.stations import StationRegisters, assign, count
 
 Ends = tuple[int | None, int | None]  # positions at the ends of a cable; None: the MainDevice
 
@@ -80,6 +84,31 @@ def assign_from_both_ends(
     with routed(ring, "second"):
         found += runner.run(assign(range(state.first_devices, device_count)))
     return found
+
+
+def end_for_clocks(
+    runner: BlockingRunner, ring: RingLink, devices: Sequence[DeviceDescription]
+) -> RingEnd | None:
+    """The port to close while delays are measured; None: the ring is cut right there, and a line
+    already. ClockError where it is cut elsewhere: frames from two ends bring no common time."""
+    device_count = runner.run(count())  # renews the state
+    topology = make_topology([device.open_ports for device in devices], ring=True)
+    state = ring.state
+    if state.shape is not Shape.CLOSED:
+        if state.first_devices == device_count:
+            return topology.second_end
+        cuts = find_cuts(state, device_count)
+        raise ClockError(
+            f"clocks: {cuts or 'the ring is cut'}; who is behind it has no common time with those "
+            "before it",
+            hint="mend the cable and scan again, or leave dc= out",
+        )
+    if topology.second_end is None or topology.contradictions:
+        raise ClockError(
+            "clocks: the ring was cut when it was scanned, and is closed now",
+            hint="scan again: the ports tell where its second end is",
+        )
+    return topology.second_end
 
 
 @contextmanager

@@ -11,13 +11,14 @@ measured through it, and it is left alone, as IgH does (`has_dc_system_time`).
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from catenary.errors import ClockError
 from catenary.model.delays import ClockPlace, PortTimes, delays_ns
 from catenary.model.device import DeviceDescription
 from catenary.plan.clocks import BURST
 from catenary.procedure.exchange import Procedure, Reply, Request, read, write
+from catenary.procedure.line import as_line
 from catenary.procedure.station import Station, answered
 from catenary.wire.clock import decode_receive_times
 from catenary.wire.datagram import Command
@@ -42,6 +43,7 @@ BURST_STEP = 512  # frames under way in one step of the procedure
 # write: no filter on the difference, 2^12 on the speed, and the bandwidth of the loop.
 DIFFERENCE_FILTER, SPEED_FILTER, SPEED_START = 0, 12, 0x1000
 SPAN_64, SPAN_32 = 1 << 64, 1 << 32
+RingEnd = tuple[int, int]  # position and port of what the second interface is wired to
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,9 +68,24 @@ class ClockMeasurement:
 
 
 def measure(
-    devices: Sequence[DeviceDescription], *, latches: int = LATCHES
+    devices: Sequence[DeviceDescription],
+    *,
+    second_end: RingEnd | None = None,
+    latches: int = LATCHES,
 ) -> Procedure[ClockMeasurement]:
-    """Latches all receive times, several times, and makes delays of them."""
+    """Latches all receive times, several times, and makes delays of them. `second_end`: the port of
+    a ring that is closed meanwhile, since nothing comes back through the ports of a closed ring."""
+    if second_end is None:
+        return (yield from _measure(devices, latches))
+    position, port = second_end
+    end = devices[position]
+    port_0, port_1, port_2, port_3 = (p != port and end.open_ports[p] for p in range(4))
+    last = replace(end, open_ports=(port_0, port_1, port_2, port_3))
+    line = [last if device is end else device for device in devices]
+    return (yield from as_line(_station(end), port, _measure(line, latches)))
+
+
+def _measure(devices: Sequence[DeviceDescription], latches: int) -> Procedure[ClockMeasurement]:
     clocks = [device for device in devices if device.controller.supports_clocks]
     if not clocks:
         return ClockMeasurement((None,) * len(devices), (None,) * len(devices), 0)

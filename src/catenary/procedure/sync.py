@@ -18,6 +18,7 @@ from catenary.procedure.clocks import (
     SPAN_32,
     SPAN_64,
     ClockMeasurement,
+    RingEnd,
     align,
     alignment,
     compensate,
@@ -53,10 +54,11 @@ def bring_together(
     epoch_ns: int,
     burst: int = BURST,
     follow: FollowedClock = "reference",
+    second_end: RingEnd | None = None,
 ) -> Procedure[ClockMeasurement]:
     """All there is to do before the cycle: clocks measured, aligned, brought together by a burst of
-    `burst` frames, SYNC signals started. `syncs`: by position."""
-    measured = yield from measure(devices)
+    `burst` frames, SYNC signals started. `syncs`: by position. `second_end`: of a ring."""
+    measured = yield from measure(devices, second_end=second_end)
     yield from align(devices, measured, reference, epoch_ns)
     if follow == "main":
         yield from lead(devices[reference], burst, epoch_ns)
