@@ -227,6 +227,27 @@ def test_a_port_that_cannot_send_leaves_the_other(ring: RingOfDevices, link: Rin
     assert link.counts["send_errors_first"] == 3
 
 
+@pytest.mark.parametrize("side", [0, 1])
+def test_a_port_without_a_link_is_told_as_a_cut(
+    ring: RingOfDevices, link: RingLink, side: int
+) -> None:
+    """Linux refuses frames for a port without a carrier (ENETDOWN, ENOBUFS): a closed ring whose
+    cable to the MainDevice is pulled hears of it in no other way."""
+    exchange(link, count(0))
+    assert link.state.shape is Shape.CLOSED
+    ring.ends[side].refuses = True
+    ring.cut = 3 if side else -1
+    for index in range(1, 5):
+        [back] = exchange(link, count(index))
+        assert back.working_counter == 4
+    assert link.state.cut_behind == ring.cut
+    assert link.state.shape is (Shape.FIRST_ONLY if side else Shape.SECOND_ONLY)
+    ring.ends[side].refuses = False
+    ring.cut = None
+    exchange(link, count(5))
+    assert link.state == RingState(Shape.CLOSED, 4, 0)
+
+
 def test_no_port_is_an_error(ring: RingOfDevices, link: RingLink) -> None:
     ring.ends[0].refuses = ring.ends[1].refuses = True
     with pytest.raises(Exception, match="send"):

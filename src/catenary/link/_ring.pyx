@@ -103,6 +103,11 @@ cdef void forget(ring_t *ring, uint8_t index) noexcept nogil:
             return
 
 
+cdef inline void note_missed(ring_t *ring, int side) noexcept nogil:
+    if ring.missed[side] < GIVEN_UP:
+        ring.missed[side] += 1
+
+
 cdef int ring_send(void *self, const uint8_t *frame, uint32_t length) noexcept nogil:
     cdef ring_t *ring = <ring_t *> self
     cdef slot_t *slot
@@ -132,6 +137,7 @@ cdef int ring_send(void *self, const uint8_t *frame, uint32_t length) noexcept n
         status = ring.links[side].send(ring.links[side].self, copy, length)
         if status < 0:
             ring.send_errors[side] += 1
+            note_missed(ring, side)   # a port without a carrier refuses frames: none comes back
             worst = status
         else:
             slot.expected |= 1 << side
@@ -243,8 +249,7 @@ cdef int ring_receive(void *self, const uint8_t **frame) noexcept nogil:
     whole = slot.back == slot.expected
     if not whole:
         ring.unpaired += 1
-        if ring.missed[SECOND if slot.back == 1 else FIRST] < GIVEN_UP:
-            ring.missed[SECOND if slot.back == 1 else FIRST] += 1
+        note_missed(ring, SECOND if slot.back == 1 else FIRST)
     if slot.sent[16] == BRD:
         ring.total = 0
         for side in range(2):

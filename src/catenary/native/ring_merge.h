@@ -2,8 +2,10 @@
  *
  * Data areas that devices read into start as zero in both copies, so what came back is the OR of
  * the two, and the working counter their sum: in a closed ring the second copy passes unprocessed
- * and adds nothing; in a cut one each copy has met the devices of its side alone (ETG.1000.4 §4.3;
- * SOEM's nicdrv and TwinCAT's cable redundancy do the same with the whole frame).
+ * and adds nothing; in a cut one each copy has met the devices of its side alone (ETG.1000.4 §4.3).
+ * SOEM (nicdrv.c, `ecx_outframe_red` and `ecx_waitinframe_red`) sends an empty broadcast on the second
+ * link, and once it sees a cut, what came back on the first link again on the second: no merging,
+ * and the time goes on behind the cut, but a cycle costs two round trips there.
  * A datagram that the second copy did not carry is a NOP there and left as it is.
  */
 #ifndef CATENARY_RING_MERGE_H
