@@ -366,3 +366,26 @@ def test_what_must_not_be_there_twice_is_not_in_the_second_copy(command: Command
     frame = encode_frame([Datagram(command, 0, bytes(4), 1), Datagram(Command.BRD, 0, bytes(2), 1)])
     commands = [d.command for d in decode_frame(second_copy(frame)).datagrams]
     assert commands == [Command.NOP, Command.BRD]
+
+
+def test_the_time_that_is_expected_leads_the_clocks_behind_a_cut(
+    ring: RingOfDevices, link: RingLink
+) -> None:
+    """The second copy asks nobody for it; what comes back is what the reference clock has said."""
+    ring.cut = 1
+    expected = Datagram(Command.FRMW, 0x1001 | 0x910 << 16, bytes(3) + b"\x01", 5)
+    [back] = exchange(link, expected)
+    assert back.working_counter == 2
+    [behind] = decode_frame(ring.ends[1].sent[-1]).datagrams
+    assert (behind.command, behind.adp, behind.data) == (Command.FRMW, 0xFFFF, expected.data)
+    asked = [Datagram(Command.FRMW, 0x1001 | 0x910 << 16, b"\x5a\x5a", 5, 3)]
+    first, other = encode_frame(asked), second_copy(encode_frame(asked))
+    assert merge(first, other) == first
+
+
+def test_a_time_that_only_the_second_copy_brought_is_nobodys(
+    ring: RingOfDevices, link: RingLink
+) -> None:
+    ring.cut = -1
+    [back] = exchange(link, Datagram(Command.FRMW, 0x1001 | 0x910 << 16, b"\x01\x02", 5))
+    assert (back.data, back.working_counter) == (b"\x01\x02", 0)

@@ -10,6 +10,7 @@ from random import Random
 import pytest
 
 import catenary as cat
+from catenary.bus.event import ClockLocked, ClockUnlocked
 from catenary.errors import ClockError
 from catenary.virtual import Coupler, Segment, Servo
 from catenary.virtual.faults import cut, join
@@ -21,9 +22,13 @@ LAST_CABLE = (COUNT - 1, "main")
 
 @pytest.fixture
 def segment() -> Segment:
+    return segment_of(jitter=0.0)
+
+
+def segment_of(jitter: float) -> Segment:
     random = Random(3)
-    servos = [Servo(serial=k, crystal=crystal(random, 0.0)) for k in range(1, COUNT)]
-    return Segment([Coupler(crystal=crystal(random, 0.0)), *servos], ring=True)
+    servos = [Servo(serial=k, crystal=crystal(random, jitter)) for k in range(1, COUNT)]
+    return Segment([Coupler(crystal=crystal(random, jitter)), *servos], ring=True)
 
 
 @pytest.fixture
@@ -95,3 +100,36 @@ def test_mended_since_the_scan_it_is_scanned_again(
         raise AssertionError("it opened")
     with cat.Loop(drives(main)) as loop:
         assert_together(segment, loop)
+
+
+@pytest.mark.parametrize("cable", [("main", 0), (1, 2), (3, 4)])
+def test_behind_a_cut_they_are_led_by_the_time_that_is_expected(
+    cable: tuple[int | str, int | str],
+) -> None:
+    """Not as well as by the reference clock, but no SYNC pulse runs away from the frames."""
+    segment = segment_of(jitter=0.2e-6)
+    with cat.MainDevice(segment.first, segment.second) as main, cat.Loop(drives(main)) as loop:
+        loop.wait_locked(within=1e-6, timeout=2.0)
+        run_for(loop, 2.0)
+        segment.inject(cut(between=cable, at=0))
+        for _ in range(30):
+            run_for(loop, 2.0)
+            assert max(map(abs, true_differences(segment).values())) < 5e-6
+            assert not loop.clocks.locked  # nothing on the bus compares them with the reference
+        segment.inject(join(between=cable, at=0))
+        run_for(loop, 5.0)
+        assert loop.clocks.locked
+        assert max(map(abs, true_differences(segment).values())) < 1e-6
+    told = [e for e in main.events if isinstance(e, ClockLocked | ClockUnlocked)]
+    assert [type(e) for e in told] == [ClockLocked, ClockUnlocked, ClockLocked]
+    assert "the ring is cut" in told[1].message
+
+
+def test_cut_behind_the_last_clock_they_are_together(
+    segment: Segment, main: cat.MainDevice
+) -> None:
+    with cat.Loop(drives(main)) as loop:
+        loop.wait_locked(within=1e-6, timeout=2.0)
+        segment.inject(cut(between=LAST_CABLE, at=0))
+        run_for(loop, 1.0)
+        assert loop.clocks.locked

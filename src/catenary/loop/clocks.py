@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Mapping
 
 from catenary.bus import MainDevice, SubDevice
 from catenary.bus.event import ClockLocked, ClockUnlocked
 from catenary.core import Clock, Engine
 from catenary.errors import ClockError
+from catenary.link import ring_of
 from catenary.plan.cycle import ClockPlan
 from catenary.plan.start_up import DevicePlan
 from catenary.procedure.exchange import Procedure
@@ -32,7 +34,9 @@ class Clocks:
         self._engine = engine
         self._clock: Clock = clock
         self._plan = plan
+        self._ring = ring_of(main.link)
         self._announced = False
+        self._announcing = threading.Lock()  # who iterates, and who looks at a ring's cables
 
     @property
     def reference(self) -> SubDevice:
@@ -41,8 +45,9 @@ class Clocks:
 
     @property
     def locked(self) -> bool:
-        """Whether all differences and the phase of the instants are within the bound."""
-        return bool(self._clock.figures()["locked"])
+        """Whether all differences and the phase of the instants are within the bound, as far as the
+        reference clock is heard: never while some are behind the cut of a ring."""
+        return bool(self._clock.figures()["locked"]) and self._cut is None
 
     @property
     def bound(self) -> float:
@@ -131,16 +136,16 @@ class Clocks:
 
     def announce(self) -> None:
         """Puts an event where the clocks have come together or apart since the last one."""
-        _ = self._clock.changes  # what follows tells of all of them
-        locked = self.locked
-        if locked is self._announced:
-            return
-        self._announced = locked
-        self._main.events.put(self._event(locked))
+        with self._announcing:
+            _ = self._clock.changes  # what follows tells of all of them
+            locked = self.locked
+            if locked is self._announced:
+                return
+            self._announced = locked
+            self._main.events.put(self._event(locked))
 
     def __str__(self) -> str:
-        figures = self._clock.figures()
-        state = "locked" if figures["locked"] else "not locked"
+        state = "locked" if self.locked else "not locked"
         lines = [
             f"clocks {state} within {self.bound * 1e6:g} us; reference: {self.reference.station}",
             f"phase of the instants {self.phase_error * 1e6:+.3f} us, at most "
@@ -170,7 +175,19 @@ class Clocks:
         position = max(off, key=lambda p: abs(off[p]))
         return self._main.subs[position], off[position]
 
+    @property
+    def _cut(self) -> int | None:
+        """The position in front of a ring's cut that parts the clocks; -1: the first cable. Behind
+        it they are led by the time that is expected of the reference: nobody compares the two."""
+        if self._ring is None:
+            return None
+        cut, clocks = self._ring.state.cut_behind, (self._plan.reference, *self._plan.followers)
+        return cut if cut is not None and any(position > cut for position in clocks) else None
+
     def _trouble(self) -> str:
+        cut = self._cut
+        if cut is not None:
+            return f"the ring is cut: from device {cut + 1} on none hears the reference clock"
         if self._silent:
             return f"{self.reference.station}, the reference clock, does not answer"
         sub, difference = self._worst()

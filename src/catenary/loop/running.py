@@ -92,6 +92,7 @@ class Running:
             submit=self.service.runner.submit,
             now=lambda: self.engine.now() * 1e-9,
             rejoin=None if self.clocks is None else self.clocks.rejoin,
+            cables_seen=self._announce_clocks,
             on_return=on_return,
             on_replacement=on_replacement,
         )
@@ -182,8 +183,8 @@ class Running:
     def judge(self, flags: int, *, faults: bool) -> None:
         """Raises the error for a cycle in trouble; returns where it was a false alarm."""
         self._raise_ended(flags)
-        if flags & CYCLE_CLOCKS and self.clocks is not None:
-            self.clocks.announce()
+        if flags & CYCLE_CLOCKS:
+            self._announce_clocks()
         if flags & CYCLE_WORKING_COUNTER:
             raise self._silence_error()
         if flags & CYCLE_LAW_FAILED:
@@ -200,6 +201,10 @@ class Running:
             if self.engine.al_status != State.OP:
                 self._raise_astray()  # the fault may be its consequence
             raise self._drive_error(faulty, "in fault")
+
+    def _announce_clocks(self) -> None:
+        if self.clocks is not None:
+            self.clocks.announce()
 
     def _raise_ended(self, flags: int) -> None:
         if flags & CYCLE_STOPPED:

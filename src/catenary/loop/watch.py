@@ -80,6 +80,7 @@ class Watch:
         submit: Submit,
         now: Callable[[], float],
         rejoin: Callable[[int, DevicePlan], Procedure[None]] | None = None,
+        cables_seen: Callable[[], None] = lambda: None,
         on_return: Policy = "restore",
         on_replacement: Policy = "hold",
     ) -> None:
@@ -96,6 +97,7 @@ class Watch:
         self._tell = main.events.put
         self._now = now
         self._rejoin = rejoin
+        self._cables_seen = cables_seen
         self._on_return = on_return
         self._on_replacement = on_replacement
         ring = ring_of(main.link)
@@ -110,6 +112,7 @@ class Watch:
         while True:
             if self._ring is not None:
                 self._ring.look()
+                self._cables_seen()
             if self._disturbed() or self._unsettled:
                 yield from self._look()
                 self._unsettled = any(c.standing is not Standing.RUNNING for c in self._charges)

@@ -6,7 +6,8 @@
  * SOEM (nicdrv.c, `ecx_outframe_red` and `ecx_waitinframe_red`) sends an empty broadcast on the second
  * link, and once it sees a cut, what came back on the first link again on the second: no merging,
  * and the time goes on behind the cut, but a cycle costs two round trips there.
- * A datagram that the second copy did not carry is a NOP there and left as it is.
+ * A datagram that the second copy did not carry is a NOP there and left as it is; so is the time, which
+ * the second copy brings to whoever is behind a cut instead of asking the reference clock.
  */
 #ifndef CATENARY_RING_MERGE_H
 #define CATENARY_RING_MERGE_H
@@ -16,7 +17,9 @@
 enum {
     CAT_MERGE_HEADER = 16,            /* Ethernet and EtherCAT headers */
     CAT_DATAGRAM_HEADER = 10,
-    CAT_DATAGRAM_COUNTER = 2
+    CAT_DATAGRAM_COUNTER = 2,
+    CAT_FRMW = 14,
+    CAT_NOBODY = 0xFF                 /* both bytes of a station address that no device has */
 };
 
 static inline uint32_t cat_word(const uint8_t *p) { return (uint32_t)p[0] | (uint32_t)p[1] << 8; }
@@ -35,6 +38,11 @@ static inline uint32_t cat_datagrams_end(const uint8_t *frame, uint32_t length) 
     return end <= length ? end : 0;
 }
 
+/* Whether the second copy's datagram says nothing of the first's: it is not the same question. */
+static inline int cat_is_apart(const uint8_t *mine, const uint8_t *other) {
+    return other[0] == 0 || (other[0] == CAT_FRMW && cat_word(other + 2) != cat_word(mine + 2));
+}
+
 /* Merges `other` into `frame`. 0, or -1 where the two are not copies of one frame (then `frame` may
  * have been changed up to the datagram that differs). */
 static inline int cat_ring_merge(uint8_t *frame, uint32_t length, const uint8_t *other, uint32_t other_length) {
@@ -43,7 +51,7 @@ static inline int cat_ring_merge(uint8_t *frame, uint32_t length, const uint8_t 
     for (uint32_t at = CAT_MERGE_HEADER; at < end;) {
         uint32_t size = cat_datagram_size(frame, at, end);
         if (size == 0 || cat_datagram_size(other, at, end) != size || frame[at + 1] != other[at + 1]) return -1;
-        if (other[at] != 0) {         /* not a NOP */
+        if (!cat_is_apart(frame + at, other + at)) {
             if (other[at] != frame[at]) return -1;
             uint32_t counter = at + size - CAT_DATAGRAM_COUNTER;
             for (uint32_t i = at + CAT_DATAGRAM_HEADER; i < counter; i++) frame[i] |= other[i];
@@ -56,17 +64,32 @@ static inline int cat_ring_merge(uint8_t *frame, uint32_t length, const uint8_t 
     return 0;
 }
 
+/* Without a time in it a datagram that reads at one device and writes at all others would write zeros. */
+static inline int cat_is_zero(const uint8_t *data, uint32_t size) {
+    for (uint32_t i = 0; i < size; i++)
+        if (data[i]) return 0;
+    return 1;
+}
+
 /* Makes the second copy: datagrams that must not be there twice become NOPs. Those with a position
- * (it would count from the other end), and those that read at one device and write at all others
- * (behind a cut they would write zeros: the time). */
+ * (it would count from the other end), and those that read at one device and write at all others, if
+ * they carry nothing. If they do, it is the time that is expected of the reference clock: the second
+ * copy asks nobody for a better one, and so leads the clocks behind a cut. */
 static inline void cat_ring_second(uint8_t *frame, uint32_t length) {
     uint32_t end = cat_datagrams_end(frame, length);
     for (uint32_t at = CAT_MERGE_HEADER; at < end;) {
         uint32_t size = cat_datagram_size(frame, at, end);
         if (size == 0) return;
         switch (frame[at]) {
+        case CAT_FRMW:
+            if (!cat_is_zero(frame + at + CAT_DATAGRAM_HEADER,
+                             size - CAT_DATAGRAM_HEADER - CAT_DATAGRAM_COUNTER)) {
+                frame[at + 2] = frame[at + 3] = CAT_NOBODY;
+                break;
+            }
+            /* fallthrough */
         case 1: case 2: case 3:       /* APRD, APWR, APRW */
-        case 13: case 14:             /* ARMW, FRMW */
+        case 13:                      /* ARMW */
             frame[at] = 0;
         }
         at += size;
