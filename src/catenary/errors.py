@@ -152,3 +152,7 @@ class ShareError(CatenaryError):
 
 class LeaseError(ShareError):
     """Axes that another client commands, or that this one commands no longer."""
+
+
+class RecordingError(CatenaryError):
+    """A recording that cannot be written or read."""

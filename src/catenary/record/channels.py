@@ -1,0 +1,164 @@
+"""Which channel of the file carries which fields of the rows.
+
+    /NAME/joint_states    sensor_msgs/JointState    position, velocity, effort as measured
+    /NAME/joint_commands  sensor_msgs/JointState    the same as sent to the drives
+    /NAME/cycle           catenary_msgs/Cycle       all the rest: timing, flags, states, inputs ...
+    /NAME/log             rcl_interfaces/Log        events, in words
+    /NAME/events          std_msgs/String           events, as JSON
+
+All is CDR with its definition in the file, so any reader of ROS 2 bags reads it, and PlotJuggler and
+Foxglove know joints by their names. catenary_msgs/Cycle depends on the loop: its definition is the
+file's own.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from math import prod
+
+import numpy as np
+
+from catenary.errors import RecordingError
+from catenary.record.cdr import CdrLayout, CdrMessage, Rows
+from catenary.record.definitions import (
+    JOINT_STATE,
+    TYPES,
+    Definition,
+    make_definition,
+)
+from catenary.record.layout import Field, Layout
+
+JOINT_CHANNELS = {  # topic: ROS's name → the row's
+    "joint_states": {"position": "position", "velocity": "velocity", "effort": "torque"},
+    "joint_commands": {
+        "position": "commanded_position",
+        "velocity": "commanded_velocity",
+        "effort": "commanded_torque",
+    },
+}
+SECOND_NS = 1_000_000_000
+INFO, WARNING, ERROR = 20, 30, 40  # of rcl_interfaces/Log
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """One message of every row. `fields`: of the message → of the row."""
+
+    topic: str
+    definition: Definition
+    message: CdrMessage
+    fields: dict[str, str]
+
+    def encode(self, rows: Rows, times_ns: np.ndarray[tuple[int], np.dtype[np.int64]]) -> bytes:
+        """One message of each row, one behind the other. times_ns: UTC, one of each row."""
+        columns = {name: rows[source] for name, source in self.fields.items()}
+        columns["sec"], columns["nanosec"] = np.divmod(times_ns, SECOND_NS)
+        return self.message.encode(columns, len(rows))
+
+    def decode(self, messages: bytes, rows: Rows) -> None:
+        """Puts the fields of messages back into rows, as many as there are messages."""
+        values = self.message.decode(messages)
+        for name, source in self.fields.items():
+            rows[source] = values[name]
+
+
+def topic(layout: Layout, name: str) -> str:
+    return f"/{_ros_name(layout.name)}/{name}"
+
+
+def make_channels(layout: Layout) -> list[Channel]:
+    """The channels that carry every field of the layout, each in one of them."""
+    joints = [
+        _joint_channel(layout, name, fields)
+        for name, wanted in JOINT_CHANNELS.items()
+        if (fields := {ros: row for ros, row in wanted.items() if layout.of_axes(row)})
+    ]
+    carried = {row for channel in joints for row in channel.fields.values()}
+    rest = [field for field in layout.fields if field.name not in carried]
+    return [*joints, _cycle_channel(layout, rest)]
+
+
+def encode_log(time_ns: int, level: int, name: str, message: str, number: int) -> bytes:
+    """rcl_interfaces/Log. `line` is the cycle's number, as far as 32 bits go."""
+    layout = CdrLayout()
+    layout.field("sec", "<i4")
+    layout.field("nanosec", "<u4")
+    layout.field("level", "u1")
+    for text in (name, message, "", ""):  # no file, no function: nobody wrote it there
+        layout.text(text)
+    layout.field("line", "<u4")
+    sec, nanosec = divmod(time_ns, SECOND_NS)
+    values = {"sec": sec, "nanosec": nanosec, "level": level, "line": number & 0xFFFFFFFF}
+    return layout.make().encode({key: np.array([value]) for key, value in values.items()}, 1)
+
+
+def encode_text(text: str) -> bytes:
+    """std_msgs/String."""
+    layout = CdrLayout()
+    layout.text(text)
+    return layout.make().constant
+
+
+def decode_text(message: bytes) -> str:
+    """The text of a std_msgs/String."""
+    return message[8:-1].decode()
+
+
+def _with_header(layout: Layout) -> CdrLayout:
+    message = CdrLayout()
+    message.field("sec", "<i4")
+    message.field("nanosec", "<u4")
+    message.text(layout.name)  # frame_id
+    return message
+
+
+def _joint_channel(layout: Layout, name: str, fields: dict[str, str]) -> Channel:
+    message = _with_header(layout)
+    message.texts(layout.axes)
+    for quantity in ("position", "velocity", "effort"):
+        message.sequence(quantity, "<f8", len(layout.axes) if quantity in fields else 0)
+    return Channel(topic(layout, name), JOINT_STATE, message.make(), fields)
+
+
+def _cycle_channel(layout: Layout, rest: list[Field]) -> Channel:
+    message = _with_header(layout)
+    fields: dict[str, str] = {}
+    lines: list[tuple[str, str, int | None, str]] = []
+    for field in rest:
+        name = _unused(_ros_name(field.name), fields)
+        length = prod(field.shape) if field.shape else None
+        message.field(name, field.dtype, field.shape)
+        fields[name] = field.name
+        lines.append((name, _ros_type(layout, field), length, _comment(field)))
+    definition = make_definition("catenary_msgs/msg/Cycle", lines)
+    return Channel(topic(layout, "cycle"), definition, message.make(), fields)
+
+
+def _ros_type(layout: Layout, field: Field) -> str:
+    dtype = np.dtype(field.dtype)
+    code = f"{dtype.kind}{dtype.itemsize}"
+    if code not in TYPES or 0 in field.shape or dtype.byteorder == ">":
+        raise RecordingError(
+            f"{layout.name}: field {field.name!r} of {field.dtype} {field.shape} is no message's",
+            hint="recorded are numbers of 1 to 8 bytes, little endian, and arrays that are not empty",
+        )
+    return TYPES[code]
+
+
+def _comment(field: Field) -> str:
+    unit = f"[{field.unit}]" if field.unit else ""
+    axes = "one for each axis" if field.per_axis else ""
+    return ", ".join(filter(None, (unit, axes)))
+
+
+def _ros_name(name: str) -> str:
+    """A name as ROS allows it: lower case, digits, single underscores, a letter first."""
+    plain = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
+    return plain if plain[:1].isalpha() else f"x_{plain}".rstrip("_")
+
+
+def _unused(name: str, taken: dict[str, str]) -> str:
+    reserved = {"header", "sec", "nanosec", *taken}
+    candidates = (name if n == 1 else f"{name}_{n}" for n in range(1, len(reserved) + 2))
+    return next(each for each in candidates if each not in reserved)

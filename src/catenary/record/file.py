@@ -1,0 +1,136 @@
+"""Rows and events to an MCAP file: chunks of half a second, compressed with zstd, with an index.
+
+Written by the library of MCAP's authors; ours are the bytes of the messages.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from catenary.errors import RecordingError
+from catenary.record.cdr import Rows
+from catenary.record.channels import (
+    ERROR,
+    INFO,
+    WARNING,
+    Channel,
+    encode_log,
+    encode_text,
+    make_channels,
+    topic,
+)
+from catenary.record.definitions import LOG, STRING, Definition
+from catenary.record.event import Event
+from catenary.record.extra import require
+from catenary.record.layout import NUMBER, TIME, Layout
+from catenary.record.mcap_records import END_RECORD, LAYOUT_RECORD
+from catenary.record.output import Output
+
+FORMAT = "1"
+GOOD_NEWS = ("DeviceReturned", "LinkRestored", "ClockLocked")
+CHUNK_SECONDS = 0.5  # what a killed recorder loses at most
+SMALLEST_CHUNK, LARGEST_CHUNK = 1 << 14, 1 << 22  # [bytes]
+SEQUENCE_MASK = 0xFFFFFFFF
+
+
+class RecordingFile:
+    """Owns an MCAP file that is being written.
+
+    OSError from `write`, `write_event` and `finish`
+    is the disk's: the file then ends in the middle of something, `repair` makes it whole.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        layout: Layout,
+        *,
+        force: bool = False,
+    ) -> None:
+        """RecordingError: the file exists (without `force`), or the extra is not installed."""
+        library: Any = require("mcap.writer")
+        self.layout = layout
+        self._channels = make_channels(layout)
+        self._output = _create(path, force)
+        self._writer = library.Writer(self._output, chunk_size=chunk_size(layout, self._channels))
+        self._writer.start("ros2", f"catenary; {library.LIBRARY_IDENTIFIER}")
+        self._writer.add_metadata(LAYOUT_RECORD, self._describe())
+        self._schemas: dict[str, int] = {}
+        self._ids = [self._register(each.topic, each.definition) for each in self._channels]
+        self._log = self._register(topic(layout, "log"), LOG)
+        self._events = self._register(topic(layout, "events"), STRING)
+
+    def write(self, rows: Rows) -> None:
+        """All messages of these rows, in the order of time."""
+        times = rows[TIME].astype(np.int64) + self.layout.utc_offset_ns
+        parts = [
+            (number, channel.encode(rows, times), len(channel.message.constant))
+            for number, channel in zip(self._ids, self._channels, strict=True)
+        ]
+        add = self._writer.add_message
+        for n, (time, sequence) in enumerate(zip(times.tolist(), rows[NUMBER].tolist())):
+            for number, data, size in parts:
+                message = data[n * size : (n + 1) * size]
+                add(number, time, message, time, sequence & SEQUENCE_MASK)
+
+    def write_event(self, event: Event) -> None:
+        """In words for people, and whole for programs."""
+        time_ns = round(event.time * 1e9) + self.layout.utc_offset_ns
+        level, number = level_of(event.kind), event.number
+        words = encode_log(time_ns, level, self.layout.name, event.message, number)
+        whole = encode_text(msgspec.json.encode(event).decode())
+        for channel, message in ((self._log, words), (self._events, whole)):
+            self._writer.add_message(channel, time_ns, message, time_ns, number & SEQUENCE_MASK)
+
+    def finish(self, end: Mapping[str, object]) -> None:
+        """Writes what ends the file: `end` as metadata, then the index; and closes it."""
+        self._writer.add_metadata(END_RECORD, {key: str(value) for key, value in end.items()})
+        self._writer.finish()
+        self._output.close()
+
+    def close(self) -> None:
+        """Closes the file as it is; after `finish` there is nothing to do."""
+        self._output.close()
+
+    def _describe(self) -> dict[str, str]:
+        return {
+            "format": FORMAT,
+            "layout": msgspec.json.encode(self.layout).decode(),
+        }
+
+    def _register(self, topic: str, definition: Definition) -> int:
+        if definition.name not in self._schemas:
+            self._schemas[definition.name] = self._writer.register_schema(
+                definition.name, "ros2msg", definition.text.encode()
+            )
+        schema = self._schemas[definition.name]
+        return int(self._writer.register_channel(topic, "cdr", schema))
+
+
+def level_of(kind: str) -> int:
+    """How bad an event is, by its kind: an error ended the loop, what comes back is good news."""
+    if kind.endswith("Error"):
+        return ERROR
+    return INFO if kind in GOOD_NEWS else WARNING
+
+
+def chunk_size(layout: Layout, channels: list[Channel]) -> int:
+    """Bytes, before compression, that half a second of cycles takes."""
+    record = 31  # MCAP's own bytes before each message
+    cycle = sum(len(channel.message.constant) + record for channel in channels)
+    return min(max(int(cycle * CHUNK_SECONDS / layout.period), SMALLEST_CHUNK), LARGEST_CHUNK)
+
+
+def _create(path: str | os.PathLike[str], force: bool) -> Output:
+    try:
+        return Output(path, force=force)
+    except FileExistsError as error:
+        raise RecordingError(
+            f"{Path(path)} exists", hint="another name, or --force (force=True) to replace it"
+        ) from error

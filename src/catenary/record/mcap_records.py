@@ -1,0 +1,111 @@
+"""What is whole in an MCAP file, however it ends.
+
+The library's readers stop with an error where a file does: here the end is where the last whole
+record ends. MCAP: https://mcap.dev/spec
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+from collections.abc import Iterator
+from io import BytesIO
+from typing import Any, BinaryIO, NamedTuple
+
+from catenary.errors import RecordingError
+from catenary.record.extra import require
+
+MAGIC = b"\x89MCAP0\r\n"
+HEAD = struct.Struct("<BQ")  # opcode, length of what follows
+MESSAGE_HEAD = struct.Struct("<BQHIQQ")  # ... channel, sequence, log time, publish time
+HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX = range(0x01, 0x08)
+METADATA, DATA_END = 0x0C, 0x0F
+LAYOUT_RECORD = "catenary.layout"  # the metadata that begins a recording
+END_RECORD = "catenary.end"  # and the one that ends it
+LARGEST_CHUNK = 1 << 28  # [bytes] what is longer is no chunk of ours, but damage
+
+
+class Place(NamedTuple):
+    """A whole record in a file."""
+
+    opcode: int
+    offset: int  # of its first byte, the opcode
+    end: int
+
+
+class ChunkMessage(NamedTuple):
+    """A message within the bytes of a chunk."""
+
+    channel: int
+    sequence: int
+    time_ns: int  # log time, UTC
+    offset: int  # of its record within the chunk
+    data: bytes
+
+
+def places(stream: BinaryIO) -> Iterator[Place]:
+    """The whole records of the data section, in their order. RecordingError: no MCAP file."""
+    size = os.fstat(stream.fileno()).st_size
+    stream.seek(0)
+    if stream.read(len(MAGIC)) != MAGIC:
+        raise RecordingError(f"{stream.name} is no MCAP file: it does not begin like one")
+    at = len(MAGIC)
+    while at + HEAD.size <= size:
+        stream.seek(at)
+        opcode, length = HEAD.unpack(stream.read(HEAD.size))
+        end = at + HEAD.size + length
+        if end > size or opcode == 0:
+            return
+        yield Place(opcode, at, end)
+        if opcode == DATA_END:
+            return
+        at = end
+
+
+def read_record(stream: BinaryIO, place: Place) -> Any:
+    """The library's record at a place of the file: Metadata, Chunk, Schema or Channel."""
+    stream.seek(place.offset)
+    return decode_record(stream.read(place.end - place.offset))
+
+
+def decode_record(data: bytes) -> Any:
+    """The library's record of these bytes: Metadata, Chunk, Schema or Channel."""
+    records: Any = require("mcap.records")
+    streams: Any = require("mcap.data_stream")
+    kinds = {
+        METADATA: records.Metadata,
+        CHUNK: records.Chunk,
+        SCHEMA: records.Schema,
+        CHANNEL: records.Channel,
+    }
+    return kinds[data[0]].read(streams.ReadDataStream(BytesIO(data[HEAD.size :])))
+
+
+def chunk_bytes(chunk: Any) -> bytes | None:
+    """What a chunk holds; None where it is damaged."""
+    reader: Any = require("mcap.stream_reader")
+    damage = (ValueError, RuntimeError, require("zstandard").ZstdError)
+    if chunk.uncompressed_size > LARGEST_CHUNK:
+        return None
+    try:
+        stream, length = reader.get_chunk_data_stream(chunk, validate_crc=True)
+        return bytes(stream.read(length))
+    except damage:
+        return None
+
+
+def chunk_records(data: bytes) -> Iterator[tuple[int, int, int]]:
+    """(opcode, offset, end) of each record within a chunk's bytes."""
+    at = 0
+    while at + HEAD.size <= len(data):
+        opcode, length = HEAD.unpack_from(data, at)
+        yield opcode, at, at + HEAD.size + length
+        at += HEAD.size + length
+
+
+def chunk_messages(data: bytes) -> Iterator[ChunkMessage]:
+    """The messages within a chunk's bytes, in their order."""
+    for opcode, at, end in chunk_records(data):
+        if opcode == MESSAGE:
+            _, _, channel, sequence, time_ns, _ = MESSAGE_HEAD.unpack_from(data, at)
+            yield ChunkMessage(channel, sequence, time_ns, at, data[at + MESSAGE_HEAD.size : end])

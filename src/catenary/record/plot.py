@@ -1,0 +1,258 @@
+"""Draws a recording with matplotlib: one row for each axis, the timing of the cycles below.
+
+Figures are made without pyplot: nothing global, no window.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import degrees
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from catenary.errors import RecordingError
+from catenary.record.extra import require
+from catenary.record.recording import Recording
+from catenary.record.series import (
+    Floats,
+    of_axes,
+    prefix_for,
+    thin,
+    timing_us,
+    tracking_error,
+    with_gaps,
+)
+
+POINTS = 700  # of each line: about two for each pixel of a column
+WIDTH = 14.0  # [inch]
+HEAD_HEIGHT, TIMING_HEIGHT = 0.9, 2.5
+ROOMY, TIGHT, MANY = 1.75, 1.2, 8  # the height of a row, for up to so many axes and for more
+RESOLUTION = 110  # [pixels per inch]
+MARKED_EVENTS = 40  # more would hide the lines
+
+INK, SOFT, RULE = "#1d2430", "#5f6b7a", "#dfe3e8"
+REFERENCE, POSITION, ERROR, TORQUE, BAR, MARK = (
+    "#9aa5b1",
+    "#0f6cbd",
+    "#c2410c",
+    "#15803d",
+    "#2f6f9f",
+    "#b42318",
+)
+STYLE = {
+    "font.family": "sans-serif",
+    "font.size": 9.0,
+    "axes.edgecolor": RULE,
+    "axes.labelcolor": SOFT,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "grid.color": RULE,
+    "grid.linewidth": 0.6,
+    "text.color": INK,
+    "xtick.color": SOFT,
+    "ytick.color": SOFT,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "legend.frameon": False,
+    "svg.fonttype": "none",  # text stays text
+    "svg.hashsalt": "catenary",  # the same picture, the same bytes
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    name: str
+    values: Floats  # (cycles, axes)
+    color: str
+    width: float = 1.1
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One quantity, drawn for every axis."""
+
+    title: str  # with the unit
+    lines: tuple[Line, ...]
+
+
+def plot(
+    recording: Recording,
+    path: str | os.PathLike[str],
+    *,
+    axes: Sequence[str] | None = None,
+    reference: str = "commanded_position",
+    unit: str = "rad",
+) -> None:
+    """Draws a recording into a .png, .svg, .pdf or .html file. `axes`: only these, by name;
+    `reference`: the field that positions are compared with; `unit`: of angles, "rad" or "deg"."""
+    from catenary.record.page import as_html
+
+    kind = Path(path).suffix.lower()
+    if kind not in (".png", ".svg", ".pdf", ".html"):
+        raise ValueError(f"{path}: a plot is a .png, .svg, .pdf or .html file")
+    with style():
+        figure = draw(recording, axes=axes, reference=reference, unit=unit)
+        if kind == ".html":
+            Path(path).write_text(as_html(recording, figure, reference=reference, unit=unit))
+        else:
+            figure.savefig(path)
+
+
+def style() -> Any:
+    """The context in which figures are made and saved."""
+    return require("matplotlib").rc_context(STYLE)
+
+
+def draw(
+    recording: Recording,
+    *,
+    axes: Sequence[str] | None = None,
+    reference: str = "commanded_position",
+    unit: str = "rad",
+) -> Any:
+    """A matplotlib Figure."""
+    chosen = choose(recording, axes)
+    columns = make_columns(recording, reference, unit)
+    rows = len(chosen) if columns else 0
+    row_height = ROOMY if rows <= MANY else TIGHT
+    heights = [rows * row_height, TIMING_HEIGHT]
+    figure = require("matplotlib.figure").Figure(
+        figsize=(WIDTH, HEAD_HEIGHT + sum(heights)), dpi=RESOLUTION, layout="constrained"
+    )
+    figure.get_layout_engine().set(h_pad=0.05, w_pad=0.08, hspace=0.02, wspace=0.02)
+    figure.suptitle(headline(recording), x=0.012, ha="left", fontsize=11.0)
+    upper, lower = figure.subfigures(2, 1, height_ratios=[max(heights[0], 0.01), heights[1]])
+    if rows:
+        _draw_axes(upper, recording, columns, chosen)
+    _draw_timing(lower, recording)
+    return figure
+
+
+def choose(recording: Recording, axes: Sequence[str] | None) -> list[int]:
+    """The numbers of the axes asked for; of all without a choice."""
+    if axes is None:
+        return list(range(len(recording.axes)))
+    unknown = [name for name in axes if name not in recording.axes]
+    if unknown:
+        raise RecordingError(
+            f"{recording.name} has no axis {', '.join(map(repr, unknown))}",
+            hint=f"it has {', '.join(recording.axes)}",
+        )
+    return [recording.axes.index(name) for name in axes]
+
+
+def make_columns(recording: Recording, reference: str, unit: str) -> list[Column]:
+    """What was recorded of position, tracking error and torque. ValueError: no such unit."""
+    if unit not in ("rad", "deg"):
+        raise ValueError(f"angles are drawn in rad or deg, not in {unit!r}")
+    factor, name = (1.0, "rad") if unit == "rad" else (degrees(1.0), "°")
+    lines = (
+        ("reference", reference, REFERENCE, 2.6, factor),
+        ("actual", "position", POSITION, 1.1, factor),
+        ("commanded", "commanded_torque", REFERENCE, 2.6, 1.0),
+        ("actual", "torque", TORQUE, 1.1, 1.0),
+    )
+    made = [
+        Line(label, values * scale, color, width) if values is not None else None
+        for label, field, color, width, scale in lines
+        for values in [of_axes(recording, field)]
+    ]
+    error = tracking_error(recording, reference)
+    shift = [] if error is None else [Line("reference - actual", error * factor, ERROR)]
+    columns = (
+        _column("position", name, [each for each in made[:2] if each]),
+        _column("tracking error", name, shift),
+        _column("torque", "N·m", [each for each in made[2:] if each]),
+    )
+    return [column for column in columns if column.lines]
+
+
+def _column(title: str, unit: str, lines: Sequence[Line]) -> Column:
+    if not lines:
+        return Column(title, ())
+    top = max((line.values for line in lines), key=lambda values: float(_top(values)))
+    scale, prefix = (1.0, "") if unit == "°" else prefix_for(top)
+    scaled = [Line(each.name, each.values / scale, each.color, each.width) for each in lines]
+    return Column(f"{title} [{prefix}{unit}]", tuple(scaled))
+
+
+def _top(values: Floats) -> float:
+    finite = np.abs(values[np.isfinite(values)])
+    return float(finite.max()) if len(finite) else 0.0
+
+
+def headline(recording: Recording) -> str:
+    """What the recording is, in two lines."""
+    seconds = float(recording.time[-1]) if len(recording) else 0.0
+    lost = f"{recording.lost} lost" if recording.lost else "none lost"
+    events = f", {len(recording.events)} events" if recording.events else ""
+    return (
+        f"{recording.name}: {len(recording.axes)} axes at {1.0 / recording.period:.6g} Hz\n"
+        f"{len(recording)} cycles in {seconds:.3f} s, {lost}{events}; ended: {recording.ended}"
+    )
+
+
+def _draw_axes(part: Any, recording: Recording, columns: list[Column], chosen: list[int]) -> None:
+    """A row of plots for each axis, a column for each quantity."""
+    grid = part.subplots(len(chosen), len(columns), sharex=True, squeeze=False)
+    for place, column in enumerate(columns):
+        drawn = [
+            (line, thin(*with_gaps(recording, line.values[:, chosen]), POINTS))
+            for line in column.lines
+        ]
+        for row, plot in enumerate(grid[:, place]):
+            for line, (time, values) in drawn:
+                plot.plot(time, values[:, row], color=line.color, lw=line.width, label=line.name)
+            _mark_events(plot, recording)
+            plot.margins(x=0.01)
+        _head(grid[0, place], column)
+        grid[-1, place].set_xlabel("time [s]")
+    for row, axis in enumerate(chosen):
+        grid[row, 0].set_ylabel(
+            recording.axes[axis], rotation=0, ha="right", va="center", color=INK, weight="bold"
+        )
+
+
+def _head(plot: Any, column: Column) -> None:
+    """The title of a column with its legend beside it."""
+    plot.set_title(column.title, loc="left", fontsize=10.0)
+    plot.legend(
+        loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(column.lines), fontsize=8.0,
+        borderaxespad=0.1, handlelength=1.6, columnspacing=1.2,
+    )  # fmt: skip
+
+
+def _mark_events(plot: Any, recording: Recording) -> None:
+    for event in recording.events[:MARKED_EVENTS]:
+        at = event.time - recording.start_ns * 1e-9
+        plot.axvline(at, color=MARK, lw=0.8, ls=(0, (2, 2)), zorder=0.5)
+
+
+def _draw_timing(part: Any, recording: Recording) -> None:
+    """Histograms, with counts in decades so that a single late cycle is seen."""
+    phases = ("period", "lateness", "in_controller")
+    known = {phase: values for phase in phases for values in [timing_us(recording, phase)]}
+    for plot, (phase, values) in zip(
+        part.subplots(1, len(phases), squeeze=False)[0], known.items(), strict=True
+    ):
+        title = phase.replace("_", " ")
+        if values is None:
+            plot.set_axis_off()
+            plot.set_title(f"{title}: not recorded", loc="left", fontsize=9.0, color=SOFT)
+            continue
+        low, median, high = np.quantile(values, (0.0005, 0.5, 0.9995))
+        span = max(high - low, 1.0)
+        edges = np.linspace(max(low - span / 2, 0.0), high + span / 2, 61)
+        plot.hist(np.clip(values, edges[0], edges[-1]), bins=edges, color=BAR)
+        plot.set_yscale("log")
+        plot.set_ylim(0.7, None)
+        words = f"median {median:.1f}, p99 {np.quantile(values, 0.99):.1f}, max {values.max():.1f}"
+        plot.set_title(f"{title}: {words}", loc="left", fontsize=9.0)
+        plot.set_xlabel(f"{title} [µs]; the outermost bars hold what lies beyond")
+        plot.set_ylabel("cycles")

@@ -1,0 +1,183 @@
+"""Takes every cycle of a share into a file.
+
+It attaches like any other reader: the loop does not know of it and cannot be delayed. What it is too
+late for is counted and said, in the file and at its end.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from catenary.errors import RecordingError
+from catenary.record.cdr import Rows
+from catenary.record.file import RecordingFile
+from catenary.record.layout import NUMBER, TIME, Field, Layout
+from catenary.record.repair import repair
+from catenary.share import Reader, SharedEvent, ShareLayout, attach
+
+PACE = 0.05  # [s] between two looks: what came meanwhile is encoded together
+LOOKS_PER_HISTORY = 8  # at least, where the share remembers less than half a second
+PATIENCE = 0.25  # [s] without a cycle, before it is asked whether more will come
+ENDINGS = {
+    "running": "stopped",
+    "ended": "the loop ended",
+    "dead": "the process of the loop died",
+}
+
+
+class Recorder:
+    """Owns a recording while it is made.
+
+        with record.Recorder("arm", "arm.mcap") as recorder:
+            recorder.run(seconds=60.0)
+
+    It begins with the oldest cycle that the share remembers. `take` writes what is new; `run` does
+    so until the loop ends. `share`: a name, or what `cat.attach` gave. RecordingError: the file
+    exists (without `force`), cannot be written, or the extra is not installed.
+    """
+
+    def __init__(
+        self, share: str | Reader, path: str | os.PathLike[str], *, force: bool = False
+    ) -> None:
+        self.path = Path(path)
+        self.cycles = 0  # written
+        self.lost = 0  # overwritten before they were taken
+        self._own = attach(share) if isinstance(share, str) else None
+        self._share = share if isinstance(share, Reader) else self._own
+        self._number = 0  # of the last cycle taken
+        self._serial = 0  # of the last event taken
+        self._file: RecordingFile | None = None
+        try:
+            self._file = RecordingFile(path, describe(self._share.layout), force=force)
+            rows, _ = self._share.rows(0)  # what is forgotten already was before our time
+            self._write(rows)
+        except BaseException:
+            self._let_go()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    @property
+    def ended(self) -> str:
+        """Why the recording ends, if it does so now."""
+        return ENDINGS[self._share.state]
+
+    def take(self) -> int:
+        """Writes every cycle and event since the last time; how many cycles. RecordingError: the
+        disk is full, or fails otherwise; the file was made whole as far as it got."""
+        rows, lost = self._share.rows(self._number)
+        if lost:
+            self.lost += lost
+            self._tell_lost(lost, rows)
+        self._write(rows)
+        return len(rows)
+
+    def run(self, *, seconds: float | None = None, stop: threading.Event | None = None) -> None:
+        """Records until the loop ends, for so long, or until `stop` is set."""
+        stop = stop or threading.Event()
+        alarm = threading.Timer(seconds or 0.0, stop.set)
+        alarm.daemon = True
+        if seconds is not None:
+            alarm.start()
+        try:
+            while not stop.is_set():
+                if self._share.wait(PATIENCE):
+                    self.take()
+                    stop.wait(self._pace)
+                elif not self._share.alive:
+                    break
+        finally:
+            alarm.cancel()
+
+    def close(self) -> None:
+        """Takes what is left and ends the file. RecordingError: as `take`."""
+        if self._file is None:
+            return
+        try:
+            self.take()
+            words = {"ended": self.ended, "cycles": self.cycles, "lost": self.lost}
+            self._on_disk(lambda file: file.finish(words))
+        finally:
+            self._let_go()
+
+    @property
+    def _pace(self) -> float:
+        layout = self._share.layout
+        return min(PACE, layout.rows.count * layout.period / LOOKS_PER_HISTORY)
+
+    def _write(self, rows: Rows) -> None:
+        events, _ = self._share.events(self._serial)
+        for event in events:
+            self._serial = event.serial
+            self._on_disk(lambda file, event=event: file.write_event(event))
+        if len(rows):
+            self._number = int(rows[NUMBER][-1])
+            self._on_disk(lambda file: file.write(rows))
+            self.cycles += len(rows)
+
+    def _tell_lost(self, lost: int, rows: Rows) -> None:
+        """An event of our own, where the gap is."""
+        layout = self._share.layout
+        number = self._number + lost
+        time = float(rows[TIME][0]) * 1e-9 - layout.period if len(rows) else 0.0
+        message = f"{lost} cycles were overwritten before they could be recorded"
+        event = SharedEvent(0, number, "CyclesLost", message, time, None, {"cycles": lost})
+        self._on_disk(lambda file: file.write_event(event))
+
+    def _on_disk(self, write: Callable[[RecordingFile], None]) -> None:
+        """What may find the disk full."""
+        assert self._file is not None, "the recorder is closed"
+        try:
+            write(self._file)
+        except OSError as error:
+            self._let_go()
+            raise self._cut_off(error) from error
+
+    def _cut_off(self, error: OSError) -> RecordingError:
+        reason = error.strerror or str(error)
+        failed = f"{self.path}: {reason}"
+        try:
+            repaired = repair(self.path, end={"ended": reason, "lost": self.lost})
+        except OSError as second:
+            return RecordingError(
+                f"{failed}; not even its end could be written ({second.strerror})",
+                hint=f"make room, then: catenary record --repair {self.path}",
+            )
+        if not repaired.chunks:
+            return RecordingError(f"{failed}; nothing was recorded", hint="make room first")
+        return RecordingError(
+            f"{failed}; the recording is whole, but ends after {repaired.seconds:.3f} s",
+            hint="make room before the next one",
+        )
+
+    def _let_go(self) -> None:
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+        if self._own is not None:
+            self._own.close()
+
+
+def describe(layout: ShareLayout) -> Layout:
+    """What of a share's layout is the recording's."""
+    fields = tuple(
+        Field(each.name, each.dtype, each.shape, each.unit, each.per_axis)
+        for each in layout.fields
+    )
+    return Layout(
+        layout.name, layout.period, layout.axes, fields, layout.clock, layout.utc_offset_ns
+    )

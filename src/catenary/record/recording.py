@@ -1,0 +1,170 @@
+"""A recording read back: rows as they were in the loop, by the names of their fields."""
+
+from __future__ import annotations
+
+import os
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from catenary.errors import RecordingError
+from catenary.record.cdr import Rows
+from catenary.record.channels import decode_text, make_channels, topic
+from catenary.record.event import Event
+from catenary.record.file import FORMAT
+from catenary.record.layout import TIME, Layout
+from catenary.record.mcap_records import (
+    CHANNEL,
+    CHUNK,
+    END_RECORD,
+    LAYOUT_RECORD,
+    METADATA,
+    chunk_bytes,
+    chunk_messages,
+    chunk_records,
+    decode_record,
+    places,
+    read_record,
+)
+
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """The cycles of a loop, oldest first. `recording["position"]` has the shape (cycles, axes).
+
+    `events`: what happened beside the cycles; `lost`: cycles that were not recorded, since the
+    recorder was late; `ended`: why the recording ended, "cut off" if nobody wrote that down (the
+    recorder was killed).
+    """
+
+    layout: Layout
+    rows: Rows
+    events: tuple[Event, ...]
+    lost: int
+    ended: str
+
+    def __getitem__(self, field: str) -> npt.NDArray[Any]:
+        if self.layout.field(field) is None:
+            names = ", ".join(each.name for each in self.layout.fields)
+            raise KeyError(f"{self.layout.name} has no field {field!r}; it has {names}")
+        return self.rows[field]
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @property
+    def name(self) -> str:
+        return self.layout.name
+
+    @property
+    def period(self) -> float:
+        """Of the loop [s]."""
+        return self.layout.period
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Their names, in the order of the columns."""
+        return self.layout.axes
+
+    @property
+    def time(self) -> npt.NDArray[np.float64]:
+        """Of each cycle, from the first one on [s]."""
+        return np.asarray((self.rows[TIME] - self.start_ns) * 1e-9)
+
+    @property
+    def start_ns(self) -> int:
+        """When its first cycle was, in the loop's clock; + layout.utc_offset_ns: UTC."""
+        return int(self.rows[TIME][0]) if len(self.rows) else 0
+
+    def unit(self, field: str) -> str:
+        """The unit of a field, empty for a number without one."""
+        found = self.layout.field(field)
+        return found.unit if found is not None else ""
+
+
+def read(path: str | os.PathLike[str], *, start: float = 0.0, end: float = np.inf) -> Recording:
+    """Reads a recording, or the part between `start` and `end` seconds after its first cycle. One
+    that was cut off is read as far as it is whole. RecordingError: it is none of ours, or cannot be
+    read."""
+    with Path(path).open("rb") as stream:
+        reader = _Reader(stream)
+        return reader.read(start, end)
+
+
+class _Reader:
+    """Owns what was found in a file so far."""
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self._stream = stream
+        self._metadata: dict[str, dict[str, str]] = {}
+        self._topics: dict[int, str] = {}  # by channel id
+        self._messages: dict[str, list[bytes]] = defaultdict(list)  # by topic
+        self._first: int | None = None
+
+    def read(self, start: float, end: float) -> Recording:
+        for place in places(self._stream):
+            if place.opcode == METADATA:
+                record = read_record(self._stream, place)
+                self._metadata[record.name] = record.metadata
+            elif place.opcode == CHUNK and not self._read_chunk(
+                read_record(self._stream, place), start, end
+            ):
+                break
+        return self._make()
+
+    def _read_chunk(self, chunk: Any, start: float, end: float) -> bool:
+        """False: the chunk is damaged, and with it what follows."""
+        if self._first is None:
+            self._first = chunk.message_start_time
+        first, last = (self._first + max(int(min(s, 1e9) * 1e9), 0) for s in (start, end))
+        aside = chunk.message_start_time > last or chunk.message_end_time < first
+        if aside and self._topics:
+            return True
+        data = chunk_bytes(chunk)
+        if data is None:
+            return False
+        self._read_channels(data)
+        for message in chunk_messages(data):
+            if first <= message.time_ns <= last:
+                self._messages[self._topics[message.channel]].append(message.data)
+        return True
+
+    def _read_channels(self, data: bytes) -> None:
+        for opcode, at, end in chunk_records(data):
+            if opcode == CHANNEL:
+                channel = decode_record(data[at:end])
+                self._topics[channel.id] = channel.topic
+
+    def _make(self) -> Recording:
+        head = self._metadata.get(LAYOUT_RECORD)
+        if head is None or head.get("format") != FORMAT:
+            raise RecordingError(
+                f"{self._stream.name} is no recording of Catenary's (format {FORMAT})",
+                hint="other MCAP files are read with the packages mcap and mcap-ros2-support",
+            )
+        layout = msgspec.json.decode(head["layout"], type=Layout)
+        tail = self._metadata.get(END_RECORD, {})
+        texts = self._messages[topic(layout, "events")]
+        return Recording(
+            layout=layout,
+            rows=_rows(layout, self._messages),
+            events=tuple(msgspec.json.decode(decode_text(text), type=Event) for text in texts),
+            lost=int(tail.get("lost", 0)),
+            ended=tail.get("ended", "cut off"),
+        )
+
+
+def _rows(layout: Layout, messages: Mapping[str, list[bytes]]) -> Rows:
+    channels = make_channels(layout)
+    count = min(len(messages[channel.topic]) for channel in channels)  # a cut may divide a cycle
+    rows = np.zeros(count, layout.dtype)
+    for channel in channels:
+        channel.decode(b"".join(messages[channel.topic][:count]), rows)
+    return rows
