@@ -62,3 +62,13 @@ def positive_seconds(text: str) -> float:
     if not 0.0 < value < 1e6:
         raise argparse.ArgumentTypeError(f"{text} s is not between 0 and a million")
     return value
+
+
+def seconds(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of seconds") from None
+    if not 0.0 <= value < 1e9:
+        raise argparse.ArgumentTypeError(f"{text} s is not between 0 and a thousand million")
+    return value

@@ -13,7 +13,9 @@ from catenary.cli import (
     demo,
     diag,
     graph,
+    plot,
     realtime,
+    record,
     reg,
     scan,
     sdo,
@@ -24,7 +26,10 @@ from catenary.cli import (
 from catenary.cli.failure import INTERRUPTED, USAGE, report, silence_stdout
 
 DESCRIPTION = "Real-time EtherCAT for Python."
-COMMANDS = (scan, state, graph, diag, sdo, reg, alias, sii, demo, bench, virtual, realtime)
+COMMANDS = (
+    *(scan, state, graph, diag, sdo, reg, alias, sii),
+    *(demo, bench, virtual, realtime, record, plot),
+)
 EPILOG = """\
 TARGET is a network interface (eth0) or a virtual segment (virtual, virtual:FILE.toml).
 

@@ -1,8 +1,27 @@
 """Recordings of a loop, by another process, as MCAP files that PlotJuggler and Foxglove open.
 
-    with record.Recorder("arm", "arm.mcap") as recorder:   # or: catenary record arm arm.mcap
-        while recorder.take(): ...
+    catenary record arm arm.mcap            # beside the running program
 
-    recording = record.read("arm.mcap")
-    recording["position"], recording["commanded_position"]  # (cycles, axes) [rad]
+    recording = cat.record.read("arm.mcap")
+    recording["position"], recording.time   # (cycles, axes) [rad], (cycles,) [s]
+    cat.record.plot(recording, "arm.png")
+
+It stands above `share` like the dashboard: it attaches to a loop and knows nothing else of it.
 """
+
+from catenary.record.layout import Field, Layout
+from catenary.record.plot import plot
+from catenary.record.recorder import Recorder
+from catenary.record.recording import Recording, read
+from catenary.record.repair import Repaired, repair
+
+__all__ = [
+    "Field",
+    "Layout",
+    "Recorder",
+    "Recording",
+    "Repaired",
+    "plot",
+    "read",
+    "repair",
+]

@@ -10,7 +10,7 @@ from math import degrees
 from typing import Any
 
 from catenary.record.recording import Recording
-from catenary.record.series import largest, of_axes, rms, tracking_error
+from catenary.record.series import count_of, largest, of_axes, rms, tracking_error
 
 SHOWN_EVENTS = 500
 STYLE = """\
@@ -57,7 +57,7 @@ def as_html(recording: Recording, figure: Any, *, reference: str, unit: str) -> 
 def _summary(recording: Recording) -> str:
     lost = f"{recording.lost} cycles lost" if recording.lost else "no cycle lost"
     return (
-        f"{len(recording.axes)} axes at {1.0 / recording.period:.6g} Hz, {len(recording)} cycles, "
+        f"{count_of(len(recording.axes), 'axis', 'axes')} at {1.0 / recording.period:.6g} Hz, {len(recording)} cycles, "
         f"{lost}; ended: {recording.ended}."
     )
 

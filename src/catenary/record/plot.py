@@ -19,6 +19,7 @@ from catenary.record.extra import require
 from catenary.record.recording import Recording
 from catenary.record.series import (
     Floats,
+    count_of,
     of_axes,
     prefix_for,
     thin,
@@ -36,7 +37,7 @@ MARKED_EVENTS = 40  # more would hide the lines
 
 INK, SOFT, RULE = "#1d2430", "#5f6b7a", "#dfe3e8"
 REFERENCE, POSITION, ERROR, TORQUE, BAR, MARK = (
-    "#9aa5b1",
+    "#b9c2cc",
     "#0f6cbd",
     "#c2410c",
     "#15803d",
@@ -153,10 +154,10 @@ def make_columns(recording: Recording, reference: str, unit: str) -> list[Column
         raise ValueError(f"angles are drawn in rad or deg, not in {unit!r}")
     factor, name = (1.0, "rad") if unit == "rad" else (degrees(1.0), "°")
     lines = (
-        ("reference", reference, REFERENCE, 2.6, factor),
-        ("actual", "position", POSITION, 1.1, factor),
-        ("commanded", "commanded_torque", REFERENCE, 2.6, 1.0),
-        ("actual", "torque", TORQUE, 1.1, 1.0),
+        ("reference", reference, REFERENCE, 3.4, factor),
+        ("actual", "position", POSITION, 1.0, factor),
+        ("commanded", "commanded_torque", REFERENCE, 3.4, 1.0),
+        ("actual", "torque", TORQUE, 1.0, 1.0),
     )
     made = [
         Line(label, values * scale, color, width) if values is not None else None
@@ -191,9 +192,11 @@ def headline(recording: Recording) -> str:
     """What the recording is, in two lines."""
     seconds = float(recording.time[-1]) if len(recording) else 0.0
     lost = f"{recording.lost} lost" if recording.lost else "none lost"
-    events = f", {len(recording.events)} events" if recording.events else ""
+    count = len(recording.events)
+    events = f", {count_of(count, 'event', 'events')} (dashed)" if count else ""
+    axes = count_of(len(recording.axes), "axis", "axes")
     return (
-        f"{recording.name}: {len(recording.axes)} axes at {1.0 / recording.period:.6g} Hz\n"
+        f"{recording.name}: {axes} at {1.0 / recording.period:.6g} Hz\n"
         f"{len(recording)} cycles in {seconds:.3f} s, {lost}{events}; ended: {recording.ended}"
     )
 
@@ -231,7 +234,7 @@ def _head(plot: Any, column: Column) -> None:
 def _mark_events(plot: Any, recording: Recording) -> None:
     for event in recording.events[:MARKED_EVENTS]:
         at = event.time - recording.start_ns * 1e-9
-        plot.axvline(at, color=MARK, lw=0.8, ls=(0, (2, 2)), zorder=0.5)
+        plot.axvline(at, color=MARK, lw=0.9, ls=(0, (3, 2)), zorder=1.5)
 
 
 def _draw_timing(part: Any, recording: Recording) -> None:
@@ -254,5 +257,7 @@ def _draw_timing(part: Any, recording: Recording) -> None:
         plot.set_ylim(0.7, None)
         words = f"median {median:.1f}, p99 {np.quantile(values, 0.99):.1f}, max {values.max():.1f}"
         plot.set_title(f"{title}: {words}", loc="left", fontsize=9.0)
-        plot.set_xlabel(f"{title} [µs]; the outermost bars hold what lies beyond")
+        beyond = int(np.count_nonzero(values > edges[-1]))
+        note = f"; {beyond} beyond, in the last bar" if beyond else ""
+        plot.set_xlabel(f"{title} [µs]{note}")
         plot.set_ylabel("cycles")

@@ -71,6 +71,10 @@ class Recorder:
     ) -> None:
         self.close()
 
+    def __str__(self) -> str:
+        layout = self._share.layout
+        return f"{layout.name} ({len(layout.axes)} axes at {1.0 / layout.period:.6g} Hz)"
+
     @property
     def ended(self) -> str:
         """Why the recording ends, if it does so now."""

@@ -21,9 +21,10 @@ CUT_OFF = {"ended": "cut off, and repaired"}
 
 @dataclass(frozen=True, slots=True)
 class Repaired:
-    """What became of a file. `dropped`: bytes at its end that were not whole or found no room;
+    """What became of a file. `repaired`: False, it was whole; `dropped`: bytes at its end that were not whole or found no room;
     `chunks`: how many are left; `seconds`: how long what is left lasts."""
 
+    repaired: bool
     dropped: int
     chunks: int
     seconds: float
@@ -44,11 +45,12 @@ def repair(path: str | os.PathLike[str], *, end: Mapping[str, object] | None = N
         before = os.fstat(stream.fileno()).st_size
         summary = find_whole(stream)
         if is_whole(path):
-            return Repaired(0, len(summary.chunks), summary.seconds)
+            return Repaired(False, 0, len(summary.chunks), summary.seconds)
         words = summary.ended or {key: str(value) for key, value in (end or CUT_OFF).items()}
         while not _write_end(stream, summary, words):
             summary.drop_last_chunk()
-    return Repaired(max(before - summary.end, 0), len(summary.chunks), summary.seconds)
+    dropped = max(before - summary.end, 0)
+    return Repaired(True, dropped, len(summary.chunks), summary.seconds)
 
 
 def _write_end(stream: BinaryIO, summary: Summary, words: dict[str, str]) -> bool:

@@ -72,3 +72,7 @@ def prefix_for(values: Floats) -> tuple[float, str]:
     if top == 0.0:
         return PREFIXES[0]
     return next((each for each in PREFIXES if top >= each[0]), PREFIXES[-1])
+
+
+def count_of(count: int, one: str, many: str) -> str:
+    return f"{count} {one if count == 1 else many}"

@@ -1,0 +1,60 @@
+"""`catenary plot FILE.mcap`: a recording as a picture or a page."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+
+from catenary.cli.arguments import seconds
+from catenary.cli.failure import UsageError
+from catenary.cli.parsers import Commands, add_command
+
+KINDS = (".png", ".html", ".svg", ".pdf")
+
+
+def add_parser(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "plot",
+        help="a recording as a picture or a page",
+        description="Draws a recording: position with its reference, tracking error and torque of "
+        "every axis, histograms of the timing, events as dashed lines. A page (.html) has the "
+        "figures of every axis and the events in words too. Needs catenary[log].",
+        example="catenary plot arm.mcap\n"
+        "catenary plot arm.mcap -o arm.html --degrees\n"
+        "catenary plot arm.mcap -o stop.png --axis elbow --start 12.5 --end 13",
+    )
+    parser.add_argument("file", metavar="FILE.mcap", help="the recording")
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", type=Path, help=f"{', '.join(KINDS)}; else FILE.png"
+    )
+    parser.add_argument("--axis", metavar="NAME", action="append", help="only this one; repeatable")
+    parser.add_argument("--start", metavar="S", type=seconds, default=0.0, help="from second S on")
+    parser.add_argument("--end", metavar="S", type=seconds, default=math.inf, help="until second S")
+    parser.add_argument(
+        "--reference",
+        metavar="FIELD",
+        default="commanded_position",
+        help="what positions are compared with (commanded_position; target_position in CST)",
+    )
+    parser.add_argument("--degrees", action="store_true", help="angles in degrees, not radians")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    output = arguments.output or Path(arguments.file).with_suffix(".png")
+    if output.suffix.lower() not in KINDS:
+        raise UsageError(f"{output}: a plot is one of {', '.join(KINDS)}", hint="-o x.png")
+    from catenary.record import plot, read
+
+    recording = read(arguments.file, start=arguments.start, end=arguments.end)
+    plot(
+        recording,
+        output,
+        axes=arguments.axis,
+        reference=arguments.reference,
+        unit="deg" if arguments.degrees else "rad",
+    )
+    print(f"{output}: {len(recording)} cycles of {recording.name}, {len(recording.axes)} axes")
+    return 0

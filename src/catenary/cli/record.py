@@ -1,0 +1,108 @@
+"""`catenary record SHARE FILE.mcap`: every cycle of a running loop into a file."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from catenary.cli.arguments import positive_seconds
+from catenary.cli.failure import UsageError
+from catenary.cli.parsers import Commands, add_command, add_json
+
+if TYPE_CHECKING:
+    from catenary.record import Recorder
+
+
+def add_parser(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "record",
+        help="every cycle of a running loop into a file",
+        description="Records what a loop shares (Loop(..., sink=cat.Share(NAME))): targets, "
+        "actuals, timing and events of every cycle, as MCAP, which PlotJuggler and Foxglove open. "
+        "Begins with the oldest cycle that is still there; ends with the loop, or on Ctrl-C. "
+        "Needs catenary[log].",
+        example="catenary record arm arm.mcap\n"
+        "catenary record arm arm.mcap --seconds 60\n"
+        "catenary record --repair arm.mcap\n"
+        "catenary plot arm.mcap",
+    )
+    parser.add_argument("share", metavar="SHARE", nargs="?", help="the name the loop shares under")
+    parser.add_argument("file", metavar="FILE.mcap", help="the file to write")
+    parser.add_argument("--seconds", metavar="N", type=positive_seconds, help="end after so long")
+    parser.add_argument("--force", action="store_true", help="replace an existing file")
+    parser.add_argument(
+        "--repair",
+        action="store_true",
+        help="make a file whole that was cut off because the recorder was killed; no SHARE",
+    )
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    if arguments.repair:
+        return repair_file(arguments)
+    if arguments.share is None:
+        raise UsageError(
+            "which share is to be recorded?", hint="catenary record SHARE FILE.mcap; see --help"
+        )
+    from catenary.record import Recorder
+
+    with stopped_by_signals() as stop:
+        with Recorder(arguments.share, arguments.file, force=arguments.force) as recorder:
+            if not arguments.json:
+                print(f"recording {recorder} to {arguments.file}; Ctrl-C ends", flush=True)
+            recorder.run(seconds=arguments.seconds, stop=stop)
+        print(as_json(recorder) if arguments.json else as_text(recorder))
+    return 0
+
+
+@contextmanager
+def stopped_by_signals() -> Iterator[threading.Event]:
+    """An event that SIGINT and SIGTERM set, so that the file is ended as it should be."""
+    stop = threading.Event()
+    kinds = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(kind, lambda *_: stop.set()) for kind in kinds]
+    try:
+        yield stop
+    finally:
+        for kind, handler in zip(kinds, before, strict=True):
+            signal.signal(kind, handler)
+
+
+def as_text(recorder: Recorder) -> str:
+    lost = f"{recorder.lost} lost" if recorder.lost else "none lost"
+    return f"{recorder.path}: {recorder.cycles} cycles, {lost}; {recorder.ended}"
+
+
+def as_json(recorder: Recorder) -> str:
+    return json.dumps(
+        {
+            "file": str(recorder.path),
+            "cycles": recorder.cycles,
+            "lost": recorder.lost,
+            "ended": recorder.ended,
+        },
+        indent=2,
+    )
+
+
+def repair_file(arguments: argparse.Namespace) -> int:
+    if arguments.share is not None:
+        raise UsageError("--repair takes a file and no share", hint="see --help")
+    from catenary.record import repair
+
+    done = repair(arguments.file)
+    if arguments.json:
+        print(json.dumps({"dropped": done.dropped, "seconds": done.seconds}, indent=2))
+    elif done.repaired:
+        print(f"{arguments.file}: whole again, {done.seconds:.3f} s; {done.dropped} bytes dropped")
+    else:
+        print(f"{arguments.file}: nothing to repair, {done.seconds:.3f} s")
+    return 0
