@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from catenary.record.event import Event
 from catenary.record.layout import Field, Layout
+from catenary.share import SharedEvent
 
 MONDAY_NS = 1_763_942_400_000_000_000  # a time in UTC
 PERIOD_NS = 1_000_000
@@ -66,6 +66,7 @@ def _values(field: Field, n: npt.NDArray[np.int64], random: np.random.Generator)
     return random.integers(0, 100, shape).astype(dtype)
 
 
-def make_event(number: int, kind: str = "DeviceLost", **details: object) -> Event:
+def make_event(number: int, kind: str = "DeviceLost", **details: object) -> SharedEvent:
     time = (5_000_000_123 + number * PERIOD_NS) * 1e-9
-    return Event(1, number, kind, f"device 2 (elbow) does not answer: {kind}", time, 2, details)
+    message = f"device 2 (elbow) does not answer: {kind}"
+    return SharedEvent(1, number, kind, message, time, 2, details)

@@ -99,14 +99,15 @@ def test_events_are_a_log_for_people_and_json_for_programs(tmp_path: Path) -> No
         ]
     assert [log.level for log in logs] == [20, 30, 40]
     assert logs[1].msg == "device 2 (elbow) does not answer: DeviceLost"
-    assert [event.kind for event in read(tmp_path / "x.mcap").events][0] == "DeviceReturned"
+    assert read(tmp_path / "x.mcap").events[0].kind == "DeviceReturned"
 
 
 def test_it_is_compressed_in_chunks_with_an_index(tmp_path: Path) -> None:
     write(tmp_path / "x.mcap", make_layout(6), 3000)
     with (tmp_path / "x.mcap").open("rb") as stream:
         summary = make_reader(stream).get_summary()
-    assert summary is not None and summary.statistics is not None
+    assert summary is not None
+    assert summary.statistics is not None
     assert summary.statistics.message_count == 3 * 3000 + 2
     assert 5 <= len(summary.chunk_indexes) <= 8  # of half a second
     assert {index.compression for index in summary.chunk_indexes} == {"zstd"}
@@ -125,7 +126,7 @@ def test_a_chunk_is_neither_tiny_nor_huge() -> None:
 
 def test_an_existing_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "x.mcap").write_text("precious")
-    with pytest.raises(RecordingError, match="x.mcap exists") as caught:
+    with pytest.raises(RecordingError, match=r"x\.mcap exists") as caught:
         RecordingFile(tmp_path / "x.mcap", make_layout(1))
     assert "--force" in caught.value.hint
     assert (tmp_path / "x.mcap").read_text() == "precious"

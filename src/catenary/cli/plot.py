@@ -35,8 +35,8 @@ def add_parser(commands: Commands) -> None:
     parser.add_argument(
         "--reference",
         metavar="FIELD",
-        default="commanded_position",
-        help="what positions are compared with (commanded_position; target_position in CST)",
+        help="what positions are compared with, such as target_position; else, in CSP, "
+        "commanded_position",
     )
     parser.add_argument("--degrees", action="store_true", help="angles in degrees, not radians")
     parser.set_defaults(run=run)

@@ -2,15 +2,17 @@
 
     catenary record arm arm.mcap            # beside the running program
 
-    recording = cat.record.read("arm.mcap")
+    from catenary import record
+
+    recording = record.read("arm.mcap")
     recording["position"], recording.time   # (cycles, axes) [rad], (cycles,) [s]
-    cat.record.plot(recording, "arm.png")
+    record.plot(recording, "arm.png")
 
 It stands above `share` like the dashboard: it attaches to a loop and knows nothing else of it.
 """
 
+from catenary.record.figure import plot
 from catenary.record.layout import Field, Layout
-from catenary.record.plot import plot
 from catenary.record.recorder import Recorder
 from catenary.record.recording import Recording, read
 from catenary.record.repair import Repaired, repair

@@ -77,13 +77,15 @@ class CdrLayout:
             self.text(value)
 
     def make(self) -> CdrMessage:
-        place = {
-            "names": self._names,
-            "formats": self._formats,
-            "offsets": self._offsets,
-            "itemsize": len(self._constant),
-        }
-        return CdrMessage(np.dtype(place), bytes(self._constant))
+        dtype = np.dtype(
+            {
+                "names": self._names,
+                "formats": self._formats,
+                "offsets": self._offsets,
+                "itemsize": len(self._constant),
+            }
+        )
+        return CdrMessage(dtype, bytes(self._constant))
 
     def _count(self, length: int) -> None:
         self._align(4)

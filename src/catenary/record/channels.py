@@ -6,9 +6,9 @@
     /NAME/log             rcl_interfaces/Log        events, in words
     /NAME/events          std_msgs/String           events, as JSON
 
-All is CDR with its definition in the file, so any reader of ROS 2 bags reads it, and PlotJuggler and
-Foxglove know joints by their names. catenary_msgs/Cycle depends on the loop: its definition is the
-file's own.
+All is CDR with its definition in the file, so any reader of ROS 2 bags reads it, and PlotJuggler
+and Foxglove know joints by their names. catenary_msgs/Cycle depends on the loop: its definition is
+the file's own.
 """
 
 from __future__ import annotations
@@ -141,7 +141,7 @@ def _ros_type(layout: Layout, field: Field) -> str:
     if code not in TYPES or 0 in field.shape or dtype.byteorder == ">":
         raise RecordingError(
             f"{layout.name}: field {field.name!r} of {field.dtype} {field.shape} is no message's",
-            hint="recorded are numbers of 1 to 8 bytes, little endian, and arrays that are not empty",
+            hint="recorded are little endian numbers of 1 to 8 bytes, and arrays of them",
         )
     return TYPES[code]
 

@@ -26,11 +26,11 @@ from catenary.record.channels import (
     topic,
 )
 from catenary.record.definitions import LOG, STRING, Definition
-from catenary.record.event import Event
 from catenary.record.extra import require
 from catenary.record.layout import NUMBER, TIME, Layout
 from catenary.record.mcap_records import END_RECORD, LAYOUT_RECORD
 from catenary.record.output import Output
+from catenary.share import SharedEvent
 
 FORMAT = "1"
 GOOD_NEWS = ("DeviceReturned", "LinkRestored", "ClockLocked")
@@ -74,12 +74,14 @@ class RecordingFile:
             for number, channel in zip(self._ids, self._channels, strict=True)
         ]
         add = self._writer.add_message
-        for n, (time, sequence) in enumerate(zip(times.tolist(), rows[NUMBER].tolist())):
+        for n, time, sequence in zip(
+            range(len(rows)), times.tolist(), rows[NUMBER].tolist(), strict=True
+        ):
             for number, data, size in parts:
                 message = data[n * size : (n + 1) * size]
                 add(number, time, message, time, sequence & SEQUENCE_MASK)
 
-    def write_event(self, event: Event) -> None:
+    def write_event(self, event: SharedEvent) -> None:
         """In words for people, and whole for programs."""
         time_ns = round(event.time * 1e9) + self.layout.utc_offset_ns
         level, number = level_of(event.kind), event.number

@@ -31,7 +31,7 @@ tbody th, .words td, .words th { text-align: left; }
 """
 
 
-def as_html(recording: Recording, figure: Any, *, reference: str, unit: str) -> str:
+def as_html(recording: Recording, figure: Any, *, reference: str | None, unit: str) -> str:
     """`figure`: as `draw` made it of the same recording."""
     return f"""<!doctype html>
 <html lang="en">
@@ -57,8 +57,8 @@ def as_html(recording: Recording, figure: Any, *, reference: str, unit: str) -> 
 def _summary(recording: Recording) -> str:
     lost = f"{recording.lost} cycles lost" if recording.lost else "no cycle lost"
     return (
-        f"{count_of(len(recording.axes), 'axis', 'axes')} at {1.0 / recording.period:.6g} Hz, {len(recording)} cycles, "
-        f"{lost}; ended: {recording.ended}."
+        f"{count_of(len(recording.axes), 'axis', 'axes')} at {1.0 / recording.period:.6g} Hz, "
+        f"{len(recording)} cycles, {lost}; ended: {recording.ended}."
     )
 
 
@@ -70,7 +70,7 @@ def _svg(figure: Any) -> str:
     return drawn[drawn.index("<svg") :]
 
 
-def _axis_table(recording: Recording, reference: str, unit: str) -> str:
+def _axis_table(recording: Recording, reference: str | None, unit: str) -> str:
     factor, name = (1e3, "mrad") if unit == "rad" else (degrees(1.0), "°")
     error = tracking_error(recording, reference)
     velocity, torque = of_axes(recording, "velocity"), of_axes(recording, "torque")

@@ -1,7 +1,7 @@
 """Takes every cycle of a share into a file.
 
-It attaches like any other reader: the loop does not know of it and cannot be delayed. What it is too
-late for is counted and said, in the file and at its end.
+It attaches like any other reader: the loop does not know of it and cannot be delayed. What it is
+too late for is counted and said, in the file and at its end.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Self, TypeVar
 
 from catenary.errors import RecordingError
 from catenary.record.cdr import Rows
@@ -28,6 +28,8 @@ ENDINGS = {
     "ended": "the loop ended",
     "dead": "the process of the loop died",
 }
+
+T = TypeVar("T")
 
 
 class Recorder:
@@ -47,8 +49,9 @@ class Recorder:
         self.path = Path(path)
         self.cycles = 0  # written
         self.lost = 0  # overwritten before they were taken
-        self._own = attach(share) if isinstance(share, str) else None
-        self._share = share if isinstance(share, Reader) else self._own
+        self.ended = ""  # why, once it has
+        self._share = attach(share) if isinstance(share, str) else share
+        self._own = isinstance(share, str)
         self._number = 0  # of the last cycle taken
         self._serial = 0  # of the last event taken
         self._file: RecordingFile | None = None
@@ -74,11 +77,6 @@ class Recorder:
     def __str__(self) -> str:
         layout = self._share.layout
         return f"{layout.name} ({len(layout.axes)} axes at {1.0 / layout.period:.6g} Hz)"
-
-    @property
-    def ended(self) -> str:
-        """Why the recording ends, if it does so now."""
-        return ENDINGS[self._share.state]
 
     def take(self) -> int:
         """Writes every cycle and event since the last time; how many cycles. RecordingError: the
@@ -113,8 +111,9 @@ class Recorder:
             return
         try:
             self.take()
+            self.ended = ENDINGS[self._share.state]
             words = {"ended": self.ended, "cycles": self.cycles, "lost": self.lost}
-            self._on_disk(lambda file: file.finish(words))
+            self._on_disk(RecordingFile.finish, words)
         finally:
             self._let_go()
 
@@ -127,10 +126,10 @@ class Recorder:
         events, _ = self._share.events(self._serial)
         for event in events:
             self._serial = event.serial
-            self._on_disk(lambda file, event=event: file.write_event(event))
+            self._on_disk(RecordingFile.write_event, event)
         if len(rows):
             self._number = int(rows[NUMBER][-1])
-            self._on_disk(lambda file: file.write(rows))
+            self._on_disk(RecordingFile.write, rows)
             self.cycles += len(rows)
 
     def _tell_lost(self, lost: int, rows: Rows) -> None:
@@ -140,13 +139,13 @@ class Recorder:
         time = float(rows[TIME][0]) * 1e-9 - layout.period if len(rows) else 0.0
         message = f"{lost} cycles were overwritten before they could be recorded"
         event = SharedEvent(0, number, "CyclesLost", message, time, None, {"cycles": lost})
-        self._on_disk(lambda file: file.write_event(event))
+        self._on_disk(RecordingFile.write_event, event)
 
-    def _on_disk(self, write: Callable[[RecordingFile], None]) -> None:
+    def _on_disk(self, write: Callable[[RecordingFile, T], None], value: T) -> None:
         """What may find the disk full."""
         assert self._file is not None, "the recorder is closed"
         try:
-            write(self._file)
+            write(self._file, value)
         except OSError as error:
             self._let_go()
             raise self._cut_off(error) from error
@@ -172,15 +171,14 @@ class Recorder:
         if self._file is not None:
             self._file.close()
             self._file = None
-        if self._own is not None:
-            self._own.close()
+        if self._own:
+            self._share.close()
 
 
 def describe(layout: ShareLayout) -> Layout:
     """What of a share's layout is the recording's."""
     fields = tuple(
-        Field(each.name, each.dtype, each.shape, each.unit, each.per_axis)
-        for each in layout.fields
+        Field(each.name, each.dtype, each.shape, each.unit, each.per_axis) for each in layout.fields
     )
     return Layout(
         layout.name, layout.period, layout.axes, fields, layout.clock, layout.utc_offset_ns

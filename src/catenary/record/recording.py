@@ -16,12 +16,12 @@ import numpy.typing as npt
 from catenary.errors import RecordingError
 from catenary.record.cdr import Rows
 from catenary.record.channels import decode_text, make_channels, topic
-from catenary.record.event import Event
 from catenary.record.file import FORMAT
 from catenary.record.layout import TIME, Layout
 from catenary.record.mcap_records import (
     CHANNEL,
     CHUNK,
+    DATA_END,
     END_RECORD,
     LAYOUT_RECORD,
     METADATA,
@@ -32,7 +32,7 @@ from catenary.record.mcap_records import (
     places,
     read_record,
 )
-
+from catenary.share import SharedEvent
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class Recording:
 
     layout: Layout
     rows: Rows
-    events: tuple[Event, ...]
+    events: tuple[SharedEvent, ...]
     lost: int
     ended: str
 
@@ -107,9 +107,11 @@ class _Reader:
         self._topics: dict[int, str] = {}  # by channel id
         self._messages: dict[str, list[bytes]] = defaultdict(list)  # by topic
         self._first: int | None = None
+        self._complete = False  # the data section ends as it should
 
     def read(self, start: float, end: float) -> Recording:
         for place in places(self._stream):
+            self._complete = place.opcode == DATA_END
             if place.opcode == METADATA:
                 record = read_record(self._stream, place)
                 self._metadata[record.name] = record.metadata
@@ -151,13 +153,13 @@ class _Reader:
             )
         layout = msgspec.json.decode(head["layout"], type=Layout)
         tail = self._metadata.get(END_RECORD, {})
-        texts = self._messages[topic(layout, "events")]
+        texts = map(decode_text, self._messages[topic(layout, "events")])
         return Recording(
             layout=layout,
             rows=_rows(layout, self._messages),
-            events=tuple(msgspec.json.decode(decode_text(text), type=Event) for text in texts),
+            events=tuple(msgspec.json.decode(text, type=SharedEvent) for text in texts),
             lost=int(tail.get("lost", 0)),
-            ended=tail.get("ended", "cut off"),
+            ended=tail.get("ended", "cut off") if self._complete else "cut off",
         )
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from catenary.record.mcap_records import END_RECORD, MAGIC
+from catenary.record.mcap_records import MAGIC
 from catenary.record.summary import Summary, encode_end, find_whole
 
 CUT_OFF = {"ended": "cut off, and repaired"}
@@ -21,8 +21,8 @@ CUT_OFF = {"ended": "cut off, and repaired"}
 
 @dataclass(frozen=True, slots=True)
 class Repaired:
-    """What became of a file. `repaired`: False, it was whole; `dropped`: bytes at its end that were not whole or found no room;
-    `chunks`: how many are left; `seconds`: how long what is left lasts."""
+    """What became of a file. `repaired`: False, it was whole; `dropped`: bytes at its end that were
+    not whole or found no room; `chunks`: how many are left; `seconds`: how long these last."""
 
     repaired: bool
     dropped: int
@@ -40,13 +40,13 @@ def is_whole(path: str | os.PathLike[str]) -> bool:
 
 def repair(path: str | os.PathLike[str], *, end: Mapping[str, object] | None = None) -> Repaired:
     """Makes a cut-off recording whole, in place. `end`: what to say of its end. RecordingError: it
-    is no MCAP file; OSError: there is no room even for a summary of nothing."""
+    is no recording; OSError: there is no room even for a summary of nothing."""
     with Path(path).open("r+b", buffering=0) as stream:
         before = os.fstat(stream.fileno()).st_size
         summary = find_whole(stream)
         if is_whole(path):
             return Repaired(False, 0, len(summary.chunks), summary.seconds)
-        words = summary.ended or {key: str(value) for key, value in (end or CUT_OFF).items()}
+        words = {key: str(value) for key, value in (end or CUT_OFF).items()}
         while not _write_end(stream, summary, words):
             summary.drop_last_chunk()
     dropped = max(before - summary.end, 0)
@@ -55,7 +55,7 @@ def repair(path: str | os.PathLike[str], *, end: Mapping[str, object] | None = N
 
 def _write_end(stream: BinaryIO, summary: Summary, words: dict[str, str]) -> bool:
     """False: there is no room for it, and there is a chunk whose room it could have."""
-    data = memoryview(encode_end(summary, END_RECORD, words))
+    data = memoryview(encode_end(summary, words))
     try:
         stream.truncate(summary.end)
         stream.seek(summary.end)

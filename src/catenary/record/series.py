@@ -8,32 +8,44 @@ import numpy.typing as npt
 from catenary.record.layout import NUMBER
 from catenary.record.recording import Recording
 
+CSP = 8  # mode of operation, IEC 61800-7-201 §7.2: cyclic synchronous position
 UNKNOWN_BELOW = 0.0  # a cycle that does not know a phase has -1 ns
 Floats = npt.NDArray[np.float64]
 PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
 
-def of_axes(recording: Recording, field: str) -> Floats | None:
+def of_axes(recording: Recording, field: str | None) -> Floats | None:
     """A field with a value for each axis, (cycles, axes); None where it was not recorded."""
-    if not recording.layout.of_axes(field):
+    if field is None or not recording.layout.of_axes(field):
         return None
     return np.asarray(recording[field], np.float64)
 
 
-def tracking_error(recording: Recording, reference: str = "commanded_position") -> Floats | None:
+def reference_of(recording: Recording) -> str | None:
+    """The field that positions are to be compared with: the positions sent to the drives, where any
+    drive was to follow them. In other modes only the application knows what it follows."""
+    if recording.layout.field("mode") is None or (recording["mode"] == CSP).any():
+        return "commanded_position"
+    return None
+
+
+def tracking_error(recording: Recording, reference: str | None) -> Floats | None:
     """Reference minus actual position, (cycles, axes) [rad]; None where one was not recorded."""
-    wanted, actual = of_axes(recording, reference), of_axes(recording, "position")
+    actual = of_axes(recording, "position")
+    wanted = of_axes(recording, reference)
     return None if wanted is None or actual is None else wanted - actual
 
 
 def rms(values: Floats) -> Floats:
-    """Of each column."""
-    return np.asarray(np.sqrt(np.nanmean(np.square(values), axis=0)))
+    """Of each column, where it is known."""
+    known = np.isfinite(values)
+    count = np.maximum(known.sum(axis=0), 1)
+    return np.asarray(np.sqrt(np.square(values).sum(axis=0, where=known) / count))
 
 
 def largest(values: Floats) -> Floats:
-    """The largest magnitude in each column."""
-    return np.asarray(np.nanmax(np.abs(values), axis=0))
+    """The largest magnitude in each column, where it is known."""
+    return np.asarray(np.abs(values).max(axis=0, where=np.isfinite(values), initial=0.0))
 
 
 def timing_us(recording: Recording, phase: str) -> Floats | None:

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, BinaryIO
 
+from catenary.errors import RecordingError
 from catenary.record.extra import require
 from catenary.record.mcap_records import (
     CHANNEL,
@@ -17,6 +18,7 @@ from catenary.record.mcap_records import (
     END_RECORD,
     FOOTER,
     HEAD,
+    LAYOUT_RECORD,
     MAGIC,
     MESSAGE_INDEX,
     METADATA,
@@ -33,9 +35,8 @@ from catenary.record.mcap_records import (
 
 @dataclass(frozen=True, slots=True)
 class WholeChunk:
-    """A chunk with its index behind it."""
+    """A chunk, with its index behind it."""
 
-    end: int  # of both in the file
     index: Any  # the library's ChunkIndex
     counts: Counter[int]  # messages of each channel
 
@@ -50,6 +51,8 @@ class Summary:
     chunks: list[WholeChunk] = field(default_factory=list)
     metadata: list[Any] = field(default_factory=list)  # the library's MetadataIndex
     ended: dict[str, str] = field(default_factory=dict)  # what the recorder said of its end
+    complete: bool = False  # the end of the data section is there
+    missing: bytes = b""  # index of the last chunk, to be written behind it
 
     @property
     def seconds(self) -> float:
@@ -60,28 +63,36 @@ class Summary:
         return float((last.message_end_time - first.message_start_time) * 1e-9)
 
     def drop_last_chunk(self) -> None:
+        self.missing, self.complete = b"", False
         self.end = self.chunks.pop().index.chunk_start_offset
         self.metadata = [each for each in self.metadata if each.offset < self.end]
 
 
 def find_whole(stream: BinaryIO) -> Summary:
-    """Reads a file up to where it is damaged, or ends."""
+    """Reads a file up to where it is damaged, or ends. RecordingError: it is none of ours."""
     records: Any = require("mcap.records")
     summary = Summary()
     for group in groups(places(stream)):
         first, indexes = group[0], group[1:]
-        if first.opcode == CHUNK and not _add_chunk(summary, stream, first, indexes):
-            break
+        if first.opcode == CHUNK:
+            if not _add_chunk(summary, stream, first, indexes):
+                break
+            continue
         if first.opcode == METADATA:
             record = read_record(stream, first)
             if record.name == END_RECORD:
                 summary.ended = record.metadata
-                break
             length = first.end - first.offset
             summary.metadata.append(records.MetadataIndex(first.offset, length, record.name))
         if first.opcode == DATA_END:
+            summary.complete = True
             break
-        summary.end = group[-1].end
+        summary.end = first.end
+    if LAYOUT_RECORD not in [each.name for each in summary.metadata]:
+        raise RecordingError(
+            f"{stream.name} is no recording of Catenary's",
+            hint="`mcap recover`, of MCAP's authors, mends others",
+        )
     return summary
 
 
@@ -98,7 +109,7 @@ def groups(found: Iterable[Place]) -> Iterator[list[Place]]:
 
 
 def _add_chunk(summary: Summary, stream: BinaryIO, place: Place, indexes: list[Place]) -> bool:
-    """False: the chunk or the index behind it is not whole."""
+    """False: the chunk is not whole, or the index behind it, so that nothing else can follow."""
     records: Any = require("mcap.records")
     chunk = read_record(stream, place)
     data = chunk_bytes(chunk)
@@ -106,8 +117,11 @@ def _add_chunk(summary: Summary, stream: BinaryIO, place: Place, indexes: list[P
         return False
     counts = Counter(message.channel for message in chunk_messages(data))
     offsets = {_channel(stream, index): index.offset for index in indexes}
-    if set(offsets) != set(counts):
-        return False
+    length = indexes[-1].end - place.end if indexes else 0
+    whole = set(offsets) == set(counts)
+    if not whole:
+        offsets, summary.missing = _index_anew(data, place.end)
+        length = len(summary.missing)
     _add_descriptions(summary, data)
     index = records.ChunkIndex(
         chunk_start_offset=place.offset,
@@ -115,13 +129,28 @@ def _add_chunk(summary: Summary, stream: BinaryIO, place: Place, indexes: list[P
         message_start_time=chunk.message_start_time,
         message_end_time=chunk.message_end_time,
         message_index_offsets=offsets,
-        message_index_length=indexes[-1].end - place.end if indexes else 0,
+        message_index_length=length,
         compression=chunk.compression,
         compressed_size=len(chunk.data),
         uncompressed_size=chunk.uncompressed_size,
     )
-    summary.chunks.append(WholeChunk(indexes[-1].end if indexes else place.end, index, counts))
-    return True
+    summary.chunks.append(WholeChunk(index, counts))
+    summary.end = place.end + (length if whole else 0)
+    return whole
+
+
+def _index_anew(data: bytes, start: int) -> tuple[dict[int, int], bytes]:
+    """The index of a chunk as it will stand at `start`: where each channel's begins, and all of
+    it."""
+    records: Any = require("mcap.records")
+    entries: dict[int, list[tuple[int, int]]] = {}
+    for message in chunk_messages(data):
+        entries.setdefault(message.channel, []).append((message.time_ns, message.offset))
+    offsets, coded = {}, b""
+    for channel, times in entries.items():
+        offsets[channel] = start + len(coded)
+        coded += _encode([records.MessageIndex(channel, times)])
+    return offsets, coded
 
 
 def _channel(stream: BinaryIO, index: Place) -> int:
@@ -140,13 +169,17 @@ def _add_descriptions(summary: Summary, data: bytes) -> None:
             summary.channels[channel.id] = channel
 
 
-def encode_end(summary: Summary, name: str, words: dict[str, str]) -> bytes:
-    """All that follows `summary.end`: a last metadata record, the end of the data, the summary,
-    the footer."""
+def encode_end(summary: Summary, words: dict[str, str]) -> bytes:
+    """All that follows `summary.end`: a missing index, a metadata record, the end of the data, the
+    summary, the footer."""
     records: Any = require("mcap.records")
-    last = _encode([records.Metadata(name, words)])
-    data = last + _encode([records.DataEnd(0)])
-    metadata = [*summary.metadata, records.MetadataIndex(summary.end, len(last), name)]
+    metadata, data = list(summary.metadata), summary.missing
+    if not (summary.complete and summary.ended):  # else the recorder has said it
+        last = _encode([records.Metadata(END_RECORD, {**summary.ended, **words})])
+        metadata = [each for each in metadata if each.name != END_RECORD]
+        metadata.append(records.MetadataIndex(summary.end + len(data), len(last), END_RECORD))
+        data += last
+    data += _encode([records.DataEnd(0)])
     return data + _encode_summary(summary, metadata, summary.end + len(data))
 
 

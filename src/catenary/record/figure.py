@@ -22,6 +22,7 @@ from catenary.record.series import (
     count_of,
     of_axes,
     prefix_for,
+    reference_of,
     thin,
     timing_us,
     tracking_error,
@@ -32,6 +33,7 @@ POINTS = 700  # of each line: about two for each pixel of a column
 WIDTH = 14.0  # [inch]
 HEAD_HEIGHT, TIMING_HEIGHT = 0.9, 2.5
 ROOMY, TIGHT, MANY = 1.75, 1.2, 8  # the height of a row, for up to so many axes and for more
+WIDE, NARROW = 3.4, 1.0  # of lines [points]
 RESOLUTION = 110  # [pixels per inch]
 MARKED_EVENTS = 40  # more would hide the lines
 
@@ -71,7 +73,7 @@ class Line:
     name: str
     values: Floats  # (cycles, axes)
     color: str
-    width: float = 1.1
+    width: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,13 +89,15 @@ def plot(
     path: str | os.PathLike[str],
     *,
     axes: Sequence[str] | None = None,
-    reference: str = "commanded_position",
+    reference: str | None = None,
     unit: str = "rad",
 ) -> None:
     """Draws a recording into a .png, .svg, .pdf or .html file. `axes`: only these, by name;
-    `reference`: the field that positions are compared with; `unit`: of angles, "rad" or "deg"."""
+    `reference`: the field that positions are compared with (else the commanded ones, in CSP);
+    `unit`: of angles, "rad" or "deg"."""
     from catenary.record.page import as_html
 
+    reference = checked_reference(recording, reference)
     kind = Path(path).suffix.lower()
     if kind not in (".png", ".svg", ".pdf", ".html"):
         raise ValueError(f"{path}: a plot is a .png, .svg, .pdf or .html file")
@@ -114,11 +118,12 @@ def draw(
     recording: Recording,
     *,
     axes: Sequence[str] | None = None,
-    reference: str = "commanded_position",
+    reference: str | None = None,
     unit: str = "rad",
 ) -> Any:
     """A matplotlib Figure."""
     chosen = choose(recording, axes)
+    reference = checked_reference(recording, reference)
     columns = make_columns(recording, reference, unit)
     rows = len(chosen) if columns else 0
     row_height = ROOMY if rows <= MANY else TIGHT
@@ -148,33 +153,62 @@ def choose(recording: Recording, axes: Sequence[str] | None) -> list[int]:
     return [recording.axes.index(name) for name in axes]
 
 
-def make_columns(recording: Recording, reference: str, unit: str) -> list[Column]:
+def checked_reference(recording: Recording, reference: str | None) -> str | None:
+    """The field asked for, or the one that suits the recording."""
+    if reference is None:
+        return reference_of(recording)
+    if not recording.layout.of_axes(reference):
+        known = [field.name for field in recording.layout.fields]
+        raise RecordingError(
+            f"{recording.name} has no field {reference!r} with a number for each axis",
+            hint="it has " + ", ".join(name for name in known if recording.layout.of_axes(name)),
+        )
+    return reference
+
+
+def make_columns(recording: Recording, reference: str | None, unit: str) -> list[Column]:
     """What was recorded of position, tracking error and torque. ValueError: no such unit."""
     if unit not in ("rad", "deg"):
         raise ValueError(f"angles are drawn in rad or deg, not in {unit!r}")
     factor, name = (1.0, "rad") if unit == "rad" else (degrees(1.0), "°")
-    lines = (
-        ("reference", reference, REFERENCE, 3.4, factor),
-        ("actual", "position", POSITION, 1.0, factor),
-        ("commanded", "commanded_torque", REFERENCE, 3.4, 1.0),
-        ("actual", "torque", TORQUE, 1.0, 1.0),
-    )
-    made = [
-        Line(label, values * scale, color, width) if values is not None else None
-        for label, field, color, width, scale in lines
-        for values in [of_axes(recording, field)]
-    ]
-    error = tracking_error(recording, reference)
-    shift = [] if error is None else [Line("reference - actual", error * factor, ERROR)]
+    commanded = of_axes(recording, "commanded_torque")
     columns = (
-        _column("position", name, [each for each in made[:2] if each]),
-        _column("tracking error", name, shift),
-        _column("torque", "N·m", [each for each in made[2:] if each]),
+        _column(
+            "position",
+            name,
+            _line("reference", of_axes(recording, reference), REFERENCE, WIDE, factor),
+            _line("actual", of_axes(recording, "position"), POSITION, NARROW, factor),
+        ),
+        _column(
+            "tracking error",
+            name,
+            _line(
+                "reference - actual", tracking_error(recording, reference), ERROR, NARROW, factor
+            ),
+        ),
+        _column(
+            "torque",
+            "N·m",
+            _line("commanded", commanded if was_commanded(commanded) else None, REFERENCE, WIDE),
+            _line("actual", of_axes(recording, "torque"), TORQUE, NARROW),
+        ),
     )
     return [column for column in columns if column.lines]
 
 
-def _column(title: str, unit: str, lines: Sequence[Line]) -> Column:
+def was_commanded(values: Floats | None) -> bool:
+    """A quantity that is zero throughout, or unknown, was not."""
+    return values is not None and bool(np.nan_to_num(values).any())
+
+
+def _line(
+    name: str, values: Floats | None, color: str, width: float, factor: float = 1.0
+) -> Line | None:
+    return None if values is None else Line(name, values * factor, color, width)
+
+
+def _column(title: str, unit: str, *wanted: Line | None) -> Column:
+    lines = [line for line in wanted if line is not None]
     if not lines:
         return Column(title, ())
     top = max((line.values for line in lines), key=lambda values: float(_top(values)))
@@ -253,6 +287,7 @@ def _draw_timing(part: Any, recording: Recording) -> None:
         span = max(high - low, 1.0)
         edges = np.linspace(max(low - span / 2, 0.0), high + span / 2, 61)
         plot.hist(np.clip(values, edges[0], edges[-1]), bins=edges, color=BAR)
+        plot.ticklabel_format(axis="x", useOffset=False)
         plot.set_yscale("log")
         plot.set_ylim(0.7, None)
         words = f"median {median:.1f}, p99 {np.quantile(values, 0.99):.1f}, max {values.max():.1f}"
