@@ -78,12 +78,12 @@ def thin(time: Floats, values: Floats, most: int) -> tuple[Floats, Floats]:
 
 
 def prefix_for(values: Floats) -> tuple[float, str]:
-    """The unit's prefix with which the largest value has digits before the point."""
+    """The unit's prefix with which the largest value is 0.1 or more: 0.7 rad stay radians."""
     finite = np.abs(values[np.isfinite(values)])
     top = float(finite.max()) if len(finite) else 0.0
     if top == 0.0:
         return PREFIXES[0]
-    return next((each for each in PREFIXES if top >= each[0]), PREFIXES[-1])
+    return next((each for each in PREFIXES if top >= 0.1 * each[0]), PREFIXES[-1])
 
 
 def count_of(count: int, one: str, many: str) -> str:

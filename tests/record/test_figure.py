@@ -1,0 +1,151 @@
+"""What a picture holds, asked of the figure; how it looks was looked at."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from xml.etree import ElementTree
+
+import msgspec
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from catenary import record
+from catenary.errors import RecordingError
+from catenary.record.figure import draw
+from catenary.record.recording import Recording
+from tests.record.made import make_event, make_layout, make_rows
+
+
+def make_recording(axes: int, count: int = 400) -> Recording:
+    layout = make_layout(axes)
+    rows = make_rows(layout, count)
+    return Recording(layout, rows, (make_event(100),), 0, "the loop ended")
+
+
+@pytest.mark.parametrize("axes", [1, 6, 33])
+def test_each_axis_has_position_error_and_torque(axes: int) -> None:
+    recording = make_recording(axes)
+    upper, lower = draw(recording).subfigs
+    assert len(upper.axes) == 3 * axes
+    assert len(lower.axes) == 3
+    titles = [plot.get_title(loc="left") for plot in upper.axes[:3]]
+    assert titles == ["position [rad]", "tracking error [mrad]", "torque [N·m]"]
+    names = [plot.get_ylabel() for plot in upper.axes[::3]]
+    assert tuple(names) == recording.axes
+    reference, actual = upper.axes[-3].lines[:2]
+    assert np.array_equal(reference.get_ydata(), recording["commanded_position"][:, -1])
+    assert np.array_equal(actual.get_ydata(), recording["position"][:, -1])
+
+
+def test_degrees_and_a_choice_of_axes() -> None:
+    recording = make_recording(6)
+    upper, _ = draw(recording, axes=["joint4"], unit="deg").subfigs
+    assert [plot.get_title(loc="left") for plot in upper.axes][:2] == [
+        "position [°]",
+        "tracking error [°]",
+    ]
+    drawn = upper.axes[0].lines[1].get_ydata()
+    assert drawn == pytest.approx(np.degrees(recording["position"][:, 4]))
+
+
+def test_events_are_marked_at_their_time() -> None:
+    recording = make_recording(1)
+    plot = draw(recording).subfigs[0].axes[0]
+    assert plot.lines[-1].get_xdata() == pytest.approx([0.099, 0.099])
+
+
+def test_a_loop_without_axes_has_its_timing() -> None:
+    upper, lower = draw(make_recording(0)).subfigs
+    assert not upper.axes
+    assert [plot.get_title(loc="left").split(":")[0] for plot in lower.axes] == [
+        "period",
+        "lateness",
+        "in controller",
+    ]
+
+
+def test_a_recording_without_a_cycle_is_drawn() -> None:
+    figure = draw(make_recording(2, 0))
+    assert "0 cycles" in figure.get_suptitle()
+
+
+def test_what_was_not_commanded_is_not_drawn() -> None:
+    recording = make_recording(2)
+    recording.rows["commanded_torque"] = 0.0
+    recording.rows["commanded_torque"][0] = np.nan
+    torque = draw(recording).subfigs[0].axes[2]
+    assert [line.get_label() for line in torque.lines[:-1]] == ["actual"]
+
+
+@pytest.mark.parametrize("kind", ["png", "svg", "pdf"])
+def test_pictures(tmp_path: Path, kind: str) -> None:
+    record.plot(make_recording(2), tmp_path / f"x.{kind}")
+    data = (tmp_path / f"x.{kind}").read_bytes()
+    if kind == "png":
+        height, width, _ = imread(tmp_path / "x.png").shape
+        assert width == 1540
+        assert height > 600
+    elif kind == "svg":
+        texts = {e.text for e in ElementTree.fromstring(data).iter() if e.tag.endswith("}text")}
+        assert {"joint1", "tracking error [mrad]", "time [s]"} <= texts
+    else:
+        assert data.startswith(b"%PDF")
+
+
+class Page(HTMLParser):
+    """What a page shows, and whether it fetches or executes anything."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.words: list[str] = []
+        self.foreign: list[str] = []
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        self.open.append(tag)
+        if tag in ("script", "img", "iframe", "link"):
+            self.foreign.append(tag)
+        self.foreign += [
+            f"{key}={value}"
+            for key, value in attributes
+            if key in ("src", "href", "xlink:href") and not str(value).startswith("#")
+        ]
+
+    def handle_data(self, data: str) -> None:
+        self.words.append(data.strip())
+
+
+def test_a_page_is_self_contained_and_says_everything_in_words(tmp_path: Path) -> None:
+    recording = make_recording(3)
+    evil = msgspec.structs.replace(recording.events[0], message="<script>alert(1)</script>")
+    record.plot(replace(recording, events=(evil,)), tmp_path / "x.html")
+    page = Page()
+    page.feed((tmp_path / "x.html").read_text())
+    assert page.foreign == []
+    words = set(page.words)
+    assert {"Axes", "Events", "joint2", "error, rms [mrad]", evil.message, "DeviceLost"} <= words
+    error = recording["commanded_position"] - recording["position"]
+    assert f"{np.sqrt((error[:, 0] ** 2).mean()) * 1e3:.4g}" in words
+
+
+def test_the_same_recording_is_the_same_page(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        record.plot(make_recording(1), tmp_path / f"{name}.html")
+    assert (tmp_path / "a.html").read_bytes() == (tmp_path / "b.html").read_bytes()
+
+
+def test_what_cannot_be_drawn_is_said(tmp_path: Path) -> None:
+    recording = make_recording(2)
+    with pytest.raises(RecordingError, match="no axis 'elbow'") as caught:
+        record.plot(recording, tmp_path / "x.png", axes=["elbow"])
+    assert caught.value.hint == "it has joint0, joint1"
+    with pytest.raises(RecordingError, match="no field 'target_position'"):
+        record.plot(recording, tmp_path / "x.png", reference="target_position")
+    with pytest.raises(ValueError, match=r"\.png, \.svg, \.pdf or \.html"):
+        record.plot(recording, tmp_path / "x.bmp")
+    with pytest.raises(ValueError, match="not in 'turns'"):
+        record.plot(recording, tmp_path / "x.png", unit="turns")
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,68 @@
+"""Reading a part, and what a recording says of itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from catenary import record
+from catenary.record.file import RecordingFile
+from tests.record.made import make_event, make_layout, make_rows
+
+COUNT = 4000
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("recording") / "x.mcap"
+    layout = make_layout(4)
+    file = RecordingFile(path, layout)
+    rows = make_rows(layout, COUNT)
+    for start in range(0, COUNT, 100):
+        file.write(rows[start : start + 100])
+    file.write_event(make_event(1500))
+    file.finish({"ended": "the loop ended", "cycles": COUNT, "lost": 0})
+    return path
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "first", "last"),
+    [
+        (0.0, np.inf, 1, COUNT),
+        (1.0, 2.0, 1001, 2001),
+        (0.0, 0.0, 1, 1),
+        (3.9, 100.0, 3901, COUNT),
+        (1.2345, 1.2345, 0, 0),
+    ],
+)
+def test_a_part_is_read_by_its_seconds(
+    path: Path, start: float, end: float, first: int, last: int
+) -> None:
+    whole, part = record.read(path), record.read(path, start=start, end=end)
+    assert np.array_equal(part.rows, whole.rows[first - 1 : last] if first else whole.rows[:0])
+    assert (part.ended, part.lost) == ("the loop ended", 0)
+    at = 1500 * 1e-3 - 1e-3
+    assert len(part.events) == (1 if start <= at <= end else 0)
+
+
+def test_what_it_says_of_itself(path: Path) -> None:
+    recording = record.read(path)
+    assert (recording.name, recording.period) == ("cell-1", 1e-3)
+    assert recording.axes == ("joint0", "joint1", "joint2", "joint3")
+    assert len(recording) == COUNT
+    assert recording.time[0] == 0.0
+    assert recording.time[-1] == pytest.approx((COUNT - 1) * 1e-3)
+    assert recording["velocity"].shape == (COUNT, 4)
+    assert [recording.unit(field) for field in ("torque", "flags", "no")] == ["N·m", "", ""]
+
+
+def test_a_field_that_is_not_there_is_answered_with_those_that_are(path: Path) -> None:
+    with pytest.raises(KeyError, match=r"no field 'speed'; it has number, .*velocity"):
+        record.read(path)["speed"]
+
+
+def test_a_file_that_is_not_there() -> None:
+    with pytest.raises(FileNotFoundError):
+        record.read("/nowhere/x.mcap")
