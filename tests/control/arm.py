@@ -35,3 +35,27 @@ THREE = """
   </worldbody>
 </mujoco>
 """
+
+URDF = """<?xml version="1.0"?>
+<robot name="two">
+  <link name="base"/>
+  <link name="upper">
+    <visual><geometry><mesh filename="package://two/meshes/upper.stl"/></geometry></visual>
+    <collision><geometry><mesh filename="package://two/meshes/upper.stl"/></geometry></collision>
+    <inertial><origin xyz="0 0 -0.3"/><mass value="3"/>
+      <inertia ixx="0.02" iyy="0.02" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+  </link>
+  <link name="lower">
+    <inertial><origin xyz="0 0 -0.2"/><mass value="1"/>
+      <inertia ixx="0.01" iyy="0.01" izz="0.005" ixy="0" ixz="0" iyz="0"/></inertial>
+  </link>
+  <joint name="shoulder" type="revolute">
+    <parent link="base"/><child link="upper"/><axis xyz="0 1 0"/>
+    <limit lower="-2" upper="2" effort="100" velocity="3"/>
+  </joint>
+  <joint name="elbow" type="revolute">
+    <parent link="upper"/><child link="lower"/><origin xyz="0 0 -0.6"/><axis xyz="0 1 0"/>
+    <limit lower="-1.5" upper="1.5" effort="50" velocity="3"/>
+  </joint>
+</robot>
+"""

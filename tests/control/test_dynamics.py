@@ -9,7 +9,7 @@ import pytest
 
 from catenary import control
 from catenary.errors import ConfigurationError
-from tests.control.arm import PENDULUM, THREE
+from tests.control.arm import PENDULUM, THREE, URDF
 
 JOINTS = ["turn", "shoulder", "elbow"]
 
@@ -94,12 +94,44 @@ def test_joints_that_do_not_match_are_named(three: Path, options: dict, message:
         control.Dynamics(three, **options)
 
 
+def test_motor_inertia_through_the_gear_is_added(tmp_path: Path) -> None:
+    path = tmp_path / "pendulum.xml"
+    path.write_text(PENDULUM)
+    with_motor = control.Dynamics(path, armature=1.5)
+    assert with_motor.inverse([0], [0], [2.0])[0] == pytest.approx((2 * 0.25 + 0.06 + 1.5) * 2)
+    with pytest.raises(ValueError, match="armature: one value, or one for each of 1 axes"):
+        control.Dynamics(path, armature=[1.0, 2.0])
+
+
+def test_a_urdf_without_its_meshes(tmp_path: Path) -> None:
+    """Two links that hang: at q the shoulder carries both, the elbow its own."""
+    path = tmp_path / "two.urdf"
+    path.write_text(URDF)
+    dynamics = control.Dynamics(path, joints=["elbow", "shoulder"], axes=2)
+    elbow, shoulder = 0.4, -0.9
+    lower = 1.0 * 9.81 * 0.2 * math.sin(shoulder + elbow)
+    upper = 9.81 * (3.0 * 0.3 + 1.0 * 0.6) * math.sin(shoulder)
+    assert dynamics.gravity([elbow, shoulder]) == pytest.approx([lower, upper + lower])
+
+
+@pytest.mark.shared_data
+def test_indy7_by_its_path(shared_data: Path) -> None:
+    """Its masses, from its own file, are what the shoulder carries when the arm lies level."""
+    path = shared_data / "robots/indy7/derived_indy7_flat.urdf"
+    dynamics = control.Dynamics(path, axes=6)
+    assert len(dynamics.joints) == 6
+    assert dynamics.gravity(np.zeros(6)) == pytest.approx(np.zeros(6), abs=8.0)  # upright
+    level = dynamics.gravity([0, np.pi / 2, 0, 0, 0, 0])
+    assert 50.0 < abs(level[1]) < 431.97  # [N·m], its largest torque
+
+
 def test_a_file_that_is_not_there_or_no_model(tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError, match=r"nowhere\.xml"):
         control.Dynamics(tmp_path / "nowhere.xml")
-    (tmp_path / "page.xml").write_text("<html/>")
-    with pytest.raises(ConfigurationError, match=r"page\.xml"):
-        control.Dynamics(tmp_path / "page.xml")
+    for text in ("<html/>", "<robot", "<mujoco><worldbody><body/></mujoco>"):
+        (tmp_path / "page.xml").write_text(text)
+        with pytest.raises(ConfigurationError, match=r"page\.xml"):
+            control.Dynamics(tmp_path / "page.xml")
 
 
 def test_vectors_of_another_length_and_another_memory(three: Path) -> None:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from catenary.control.compiles import Row, compiles
 from catenary.control.model import Model, load_model
+from catenary.control.parts import PerAxis
 from catenary.control.pointers import call, doubles
 
 KIND = 3.0
@@ -27,17 +28,23 @@ class Dynamics:
 
     `joints`: the names of the axes' joints, in the axes' order; None: all joints of the model, in
     its order. Joints that are not named stay where the model has them. `axes`: how many there must
-    be. The model's joint damping and armature (motor inertia seen through the gear) count; its
-    contacts, joint limits and dry friction do not. ConfigurationError: a file that is no model, a
+    be. The model's joint damping and armature (motor inertia seen through the gear) count, and
+    `armature` [kg·m²] is added, one value or one for each axis; its contacts, joint limits and dry
+    friction do not count. ConfigurationError: a file that is no model, a
     joint that it does not have, or one that is neither hinge nor slide.
 
     Source: MuJoCo's `mj_inverse` (Featherstone's recursive Newton-Euler, computed in C).
     """
 
     def __init__(
-        self, path: str | Path, *, joints: Sequence[str] | None = None, axes: int | None = None
+        self,
+        path: str | Path,
+        *,
+        joints: Sequence[str] | None = None,
+        axes: int | None = None,
+        armature: PerAxis = 0.0,
     ) -> None:
-        self._model: Model = load_model(Path(path), joints, axes)
+        self._model: Model = load_model(Path(path), joints, axes, armature)
         self._own = self.memory
 
     @property

@@ -4,13 +4,18 @@ the axes."""
 from __future__ import annotations
 
 import ctypes
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from catenary.control.parts import PerAxis, checked
 from catenary.errors import ConfigurationError
+
+XACRO = "an MJCF or URDF file; xacro has to be expanded: xacro robot.urdf.xacro > robot.urdf"
+SLIDE, HINGE = 2, 3  # mjtJoint
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,19 +35,19 @@ class Model:
         return data
 
 
-def load_model(path: Path, joints: Sequence[str] | None, axes: int | None) -> Model:
+def load_model(
+    path: Path, joints: Sequence[str] | None, axes: int | None, armature: PerAxis
+) -> Model:
     """ConfigurationError: MuJoCo is not there, or the file, or the joints."""
     mujoco = _mujoco()
-    try:
-        native = mujoco.MjModel.from_xml_path(str(path))
-    except ValueError as error:  # MuJoCo's word for a missing file and for a wrong one
-        raise ConfigurationError(
-            f"{path}: {str(error).strip()}", hint="an MJCF or URDF file, its meshes beside it"
-        ) from error
+    native = _native(mujoco, path)
     flags = mujoco.mjtDisableBit
     native.opt.disableflags |= flags.mjDSBL_CONTACT | flags.mjDSBL_LIMIT | flags.mjDSBL_FRICTIONLOSS
     chosen = _chosen(native, path, joints, axes)
     places = tuple((int(j.qposadr[0]), int(j.dofadr[0])) for j in map(native.joint, chosen))
+    inertia = checked("armature", armature, len(chosen))
+    for (_, degree), more in zip(places, inertia.tolist(), strict=True):
+        native.dof_armature[degree] += more
     return Model(mujoco, native, chosen, places, _address(mujoco))
 
 
@@ -54,6 +59,26 @@ def _mujoco() -> Any:
             "the dynamics of a model are computed by MuJoCo, which is not installed",
             hint="pip install 'catenary[sim]'",
         ) from error
+
+
+def _native(mujoco: Any, path: Path) -> Any:
+    """The mjModel. A URDF's shapes are left out: its masses and inertias are what moves, and its
+    meshes need not be there."""
+    try:
+        root = ElementTree.fromstring(path.read_bytes())
+    except OSError as error:
+        raise ConfigurationError(f"{path}: {error.strerror}") from error
+    except ElementTree.ParseError as error:
+        raise ConfigurationError(f"{path} is no XML: {error}", hint=XACRO) from error
+    try:
+        if root.tag != "robot":
+            return mujoco.MjModel.from_xml_path(str(path))
+        for link in root.iter("link"):
+            for shape in [*link.iter("visual"), *link.iter("collision")]:
+                link.remove(shape)
+        return mujoco.MjModel.from_xml_string(ElementTree.tostring(root, "unicode"))
+    except ValueError as error:
+        raise ConfigurationError(f"{path}: MuJoCo refuses it: {error}", hint=XACRO) from error
 
 
 def _chosen(
@@ -81,9 +106,6 @@ def _chosen(
     if not chosen:
         raise ConfigurationError(f"{path}: no joints", hint="an arm has at least one")
     return chosen
-
-
-SLIDE, HINGE = 2, 3  # mjtJoint
 
 
 def _address(mujoco: Any) -> int:
