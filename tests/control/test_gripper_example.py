@@ -1,0 +1,53 @@
+"""examples/gripper: what it promises, said by the example and seen in the model."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+FOLDER = Path(__file__).resolve().parents[2] / "examples" / "gripper"
+
+
+@pytest.fixture(scope="module")
+def said() -> dict[str, list[float]]:
+    """The numbers behind each line's first word, colon or figure."""
+    pytest.importorskip("numba", reason="laws are compiled by Numba: pip install 'catenary[law]'")
+    done = subprocess.run(
+        [sys.executable, str(FOLDER / "gripper.py")],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    found: dict[str, list[float]] = {}
+    for line in done.stdout.splitlines():
+        numbers = [float(number) for number in re.findall(r"-?\d+\.\d+", line)]
+        found.setdefault(line.split()[0], []).extend(numbers)
+    return found
+
+
+def test_homing_finds_the_joints_ranges_and_where_the_fingers_meet(said) -> None:
+    assert said["open"] == pytest.approx([-0.8, -0.8], abs=0.01)
+    assert said["closed"] == pytest.approx([0.6, 0.6], abs=0.01)
+    # tips of 8 mm meet where 100 mm · sin(angle) = 40 mm - 8 mm
+    assert said["meeting"] == pytest.approx([0.326, 0.326], abs=0.01)
+
+
+def test_the_stiffness_seen_from_outside_is_the_one_asked_for(said) -> None:
+    first, second = said["stiffness"][:3], said["stiffness"][3:]
+    assert first == pytest.approx([2.0, 2.0, 2.0], rel=0.03)
+    assert second == pytest.approx([4.0, 4.0, 4.0], rel=0.03)
+
+
+def test_the_object_is_felt_soon_and_where_it_is(said) -> None:
+    after, *places = said["felt"]
+    assert 0.5 <= after <= 10.0  # [ms]
+    assert places == pytest.approx([0.17, 0.17], abs=0.02)  # 100 mm · sin = 40 - 15 - 8 mm
+
+
+def test_it_is_short() -> None:
+    files = [FOLDER / "gripper.py", FOLDER / "gripper.xml"]
+    assert sum(len(file.read_text().splitlines()) for file in files) <= 120
