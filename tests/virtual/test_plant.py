@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from catenary.virtual import Joint, Plant, Segment, Servo
-from catenary.virtual.faults import power_cycle, safe_torque_off, swap
+from catenary.virtual import Joint, Plant, Segment, Servo, _segment
+from catenary.virtual.faults import exchange, power_cycle, safe_torque_off, swap
 from tests.virtual.plants import (
     DOUBLE,
     GRAVITY,
@@ -99,7 +99,7 @@ def test_the_encoder_counts_the_motors_turns_from_the_zero_of_the_joint(tmp_path
     )  # fmt: skip
     Time(segment).pass_by(0.1)
     servo = servo_of(segment)
-    counts = servo.core.slot(0, 11)  # SLOT_POSITION, 0x6064
+    counts = servo.core.slot(0, _segment.SLOT_POSITION)  # 0x6064
     assert counts == round(-20 * (1.0 - 0.3) / TURN * 1000)
     assert counts == round(servo.position_rad / TURN * 1000)
 
@@ -197,6 +197,41 @@ def test_a_drive_that_is_replaced_gets_the_motor(tmp_path: Path) -> None:
     assert servo_of(segment) is new
     assert new.position_rad == segment.plant.data.joint("swing").qpos[0] != 0.5
     assert old.position == -1
+
+
+def test_drives_that_change_places_on_the_line_keep_their_motors(tmp_path: Path) -> None:
+    joints = [Joint("shoulder", brake=100), Joint("elbow", brake=0, start=0.5)]
+    servos = [frictionless(name="one"), frictionless(name="other")]
+    segment = Segment(servos, plant=Plant(model(tmp_path, DOUBLE), joints))
+    time = Time(segment)
+    segment.inject(exchange(0, 1, for_=0.1))
+    time.pass_by(0.3)
+    assert segment.plant is not None
+    assert [device.name for device in segment] == ["other", "one"]
+    positions = [servo.position_rad for servo in servos]
+    assert positions == segment.plant.data.qpos.tolist()
+    assert positions[1] != 0.5
+
+
+FINGER = """
+<mujoco><option gravity="0 0 0"/><worldbody>
+  <geom name="object" type="box" size=".02 .05 .05" pos=".1 0 0"/>
+  <body name="finger"><joint name="grip" type="slide" axis="1 0 0"/>
+    <geom type="box" size=".01 .02 .02" mass=".1"/></body>
+</worldbody></mujoco>
+"""
+
+
+@pytest.mark.parametrize(("contacts", "grips"), [(True, True), (False, False)])
+def test_a_finger_meets_an_object(tmp_path: Path, contacts: bool, grips: bool) -> None:
+    """A spindle of 500 rad/m closes 70 mm until the faces meet."""
+    plant = Plant(model(tmp_path, FINGER), [Joint("grip", gear=500.0, brake=0)], contacts=contacts)
+    servo = Servo(inertia=1e-5, coulomb_friction=0.0)
+    segment = Segment([servo], plant=plant)
+    servo.apply_load(0.02)  # 10 N
+    Time(segment).pass_by(2.0)
+    assert (servo.position_rad / 500 == pytest.approx(0.07, abs=1e-3)) is grips
+    assert grips or servo.position_rad / 500 > 0.075
 
 
 def test_a_shaft_turned_by_hand_turns_the_joint(tmp_path: Path) -> None:
