@@ -234,6 +234,16 @@ def test_a_finger_meets_an_object(tmp_path: Path, contacts: bool, grips: bool) -
     assert grips or servo.position_rad / 500 > 0.075
 
 
+def test_somebody_pushes_the_arm(tmp_path: Path) -> None:
+    """A force at the point mass of the hanging pendulum: angle = force t² / 2 m l, from rest."""
+    segment = pendulum(tmp_path, frictionless())
+    assert segment.plant is not None
+    segment.plant.data.body("rod").xfrc_applied[0] = 5.0  # N, at its centre of mass
+    Time(segment).pass_by(0.05)
+    angle = servo_of(segment).position_rad
+    assert angle == pytest.approx(-0.5 * 5.0 / (MASS * LENGTH) * 0.05**2, rel=0.01)
+
+
 def test_a_shaft_turned_by_hand_turns_the_joint(tmp_path: Path) -> None:
     segment = pendulum(tmp_path, frictionless(), gear=10.0, brake=None)
     servo, time = servo_of(segment), Time(segment)

@@ -146,7 +146,15 @@ def test_bodies_that_begin_in_one_another_are_named(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"gear": 0.0}, {"gear": math.inf}, {"direction": 2}, {"brake": -1.0}, {"brake_delay": -0.1}],
+    [
+        {"gear": 0.0},
+        {"gear": math.inf},
+        {"direction": 2},
+        {"zero": math.nan},
+        {"start": math.inf},
+        {"brake": -1.0},
+        {"brake_delay": -0.1},
+    ],
 )
 def test_joints_that_cannot_be(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="joint 'elbow'"):

@@ -63,11 +63,14 @@ def measure_scan(*, drives: int, file: Path | None = None) -> None:
     scan.measure(drives=drives, file=file)
 
 
-def measure_virtual(*, drives: int, seconds: float, file: Path | None = None) -> None:
-    """Prints how much faster than real time a segment in this process runs."""
+def measure_virtual(
+    *, drives: int, seconds: float, file: Path | None = None, config: Path | None = None
+) -> None:
+    """Prints how much faster than real time a segment in this process runs: so many drives, or
+    those of a file."""
     from catenary.bench import virtual_time
 
-    virtual_time.measure(drives=drives, seconds=seconds, file=file)
+    virtual_time.measure(drives=drives, seconds=seconds, file=file, config=config)
 
 
 def measure_tasks(*, seconds: float, file: Path | None = None) -> None:

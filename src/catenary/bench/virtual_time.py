@@ -13,6 +13,7 @@ import catenary as cat
 from catenary.bench.loop import write
 from catenary.bench.report import machine
 from catenary.bench.segment import COUNTS_PER_TURN, make_segment
+from catenary.virtual import Segment, Servo
 
 Order = Literal["inline", "threaded"]
 
@@ -20,10 +21,18 @@ PERIOD = 1e-3  # [s]
 ORDERS: tuple[Order, ...] = ("inline", "threaded")
 
 
-def measure(*, drives: int, seconds: float, file: Path | None) -> None:
-    found: dict[str, float] = {order: run(drives, seconds, order) for order in ORDERS}
+def measure(*, drives: int, seconds: float, file: Path | None, config: Path | None = None) -> None:
+    """`config`: a segment's file instead of so many drives."""
+
+    def segment() -> Segment:
+        return (
+            make_segment(drives, clock="virtual") if config is None else Segment.from_toml(config)
+        )
+
+    found: dict[str, float] = {order: run(segment(), seconds, order) for order in ORDERS}
     if find_spec("numba"):
-        found["law"] = run_law(drives, seconds)
+        found["law"] = run_law(segment(), seconds)
+    drives = sum(device.axes for device in segment() if isinstance(device, Servo))
     print(f"{machine()}\n{drives} drives, {seconds:g} s of virtual time at {1 / PERIOD:.0f} Hz")
     for order, took in found.items():
         print(f"  {order:10} {took:7.3f} s: {seconds / took:6.0f} times real time")
@@ -32,6 +41,7 @@ def measure(*, drives: int, seconds: float, file: Path | None) -> None:
         {
             "machine": machine(),
             "drives": drives,
+            "config": None if config is None else config.name,
             "virtual_seconds": seconds,
             "times_real_time": {order: round(seconds / took, 1) for order, took in found.items()},
         },
@@ -45,9 +55,9 @@ def sine(actual, target, memory, time, parameters):  # type: ignore[no-untyped-d
     return time >= parameters[0]
 
 
-def run_law(drives: int, seconds: float) -> float:
+def run_law(segment: Segment, seconds: float) -> float:
     """The same for a law, without compiling it."""
-    with cat.MainDevice(make_segment(drives, clock="virtual")) as main:
+    with cat.MainDevice(segment) as main:
         arm = cat.Drives(main.scan().drives, mode="csp", counts_per_turn=COUNTS_PER_TURN)
         with cat.Loop(arm, period=PERIOD, laws=[sine]) as loop:
             home = arm.actual.position.copy()
@@ -57,9 +67,9 @@ def run_law(drives: int, seconds: float) -> float:
             return time.perf_counter() - start
 
 
-def run(drives: int, seconds: float, order: Order) -> float:
+def run(segment: Segment, seconds: float, order: Order) -> float:
     """How long the loop took [s], without bring-up and leaving."""
-    with cat.MainDevice(make_segment(drives, clock="virtual")) as main:
+    with cat.MainDevice(segment) as main:
         arm = cat.Drives(main.scan().drives, mode="csp", counts_per_turn=COUNTS_PER_TURN)
         with cat.Loop(arm, period=PERIOD, run=order) as loop:
             home = arm.actual.position.copy()

@@ -117,6 +117,9 @@ def _add_virtual(group: Commands) -> None:
     )
     parser.add_argument("--drives", type=positive_number, default=3, metavar="N")
     parser.add_argument(
+        "--config", type=Path, metavar="FILE.toml", help="the drives of this segment, and its arm"
+    )
+    parser.add_argument(
         "--seconds", type=positive_seconds, default=20.0, metavar="S", help="of virtual time (20)"
     )
     _add_file(parser)
@@ -267,7 +270,12 @@ def run_scan(arguments: argparse.Namespace) -> int:
 def run_virtual(arguments: argparse.Namespace) -> int:
     from catenary import bench
 
-    bench.measure_virtual(drives=arguments.drives, seconds=arguments.seconds, file=arguments.json)
+    bench.measure_virtual(
+        drives=arguments.drives,
+        seconds=arguments.seconds,
+        file=arguments.json,
+        config=arguments.config,
+    )
     return 0
 
 

@@ -60,6 +60,8 @@ class Joint(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError(f"joint {self.name!r}: gear must be positive, not {self.gear}")
         if self.direction not in (1, -1):
             raise ValueError(f"joint {self.name!r}: direction is 1 or -1, not {self.direction}")
+        if not math.isfinite(self.zero) or not math.isfinite(self.start or 0.0):
+            raise ValueError(f"joint {self.name!r}: zero and start are numbers")
         if self.brake is not None and not 0 <= self.brake < math.inf:
             raise ValueError(f"joint {self.name!r}: brake is 0 or more N·m, not {self.brake}")
         if not 0 <= self.brake_delay <= 10:
