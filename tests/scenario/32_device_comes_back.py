@@ -11,7 +11,11 @@ import pytest
 
 import catenary as cat
 from catenary.bus import event
-from catenary.errors import MailboxError, StateError, WorkingCounterError
+from catenary.errors import EepromError, MailboxError, StateError, WorkingCounterError
+from catenary.model.device import Identity
+from catenary.procedure import restore
+from catenary.procedure.exchange import Procedure
+from catenary.procedure.station import Station
 from catenary.types import SINT, UINT, USINT
 from catenary.virtual import Coupler, DigitalOutputs, Fault, Servo
 from catenary.virtual.faults import (
@@ -181,6 +185,26 @@ def test_another_one_of_its_kind_is_told_and_held(cell: Cell) -> None:
     assert ("DeviceReturned", TOOL) not in kinds(events)
 
 
+def test_one_whose_eeprom_cannot_be_read_is_not_taken_for_the_one_before(
+    cell: Cell, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was given the address of the place to be asked who it is, and does not say."""
+    asked: list[Station] = []
+
+    def unreadable(station: Station) -> Procedure[Identity]:
+        asked.append(station)
+        yield []
+        raise EepromError(f"{station}: EEPROM error")
+
+    monkeypatch.setattr(restore, "identify", unreadable)
+    events = run(cell, swap(TOOL, with_=Servo(name="tool", serial=99), at=0.1))
+    assert len(asked) > 3  # at every look again
+    [held] = [e for e in events if isinstance(e, event.DeviceHeld)]
+    assert "does not say what it is" in held.reason
+    assert ("DeviceReturned", TOOL) not in kinds(events)
+    assert cell.states[TOOL] & 0x0F < PRE_OP
+
+
 def test_another_one_of_its_kind_is_taken_by_policy(cell: Cell) -> None:
     def look(cycle, arm, tool, gripper, loop) -> None:
         if cycle.number == 1400:
@@ -314,3 +338,16 @@ def test_an_object_of_a_device_that_came_back_can_be_read(cell: Cell) -> None:
     run(cell, power_cycle(TOOL, at=0.2, for_=0.3), each=look)
     assert answers[0].done
     assert answers[0].result() & 0x4F
+
+
+def test_a_watch_that_fails_is_no_secret(cell: Cell, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nobody waits for its result while the loop runs: leaving tells."""
+
+    def broken(at_most: int) -> Procedure[list[restore.Presence]]:
+        yield []
+        raise ZeroDivisionError(f"of {at_most}")
+
+    monkeypatch.setattr(restore, "look_around", broken)
+    with pytest.raises(ZeroDivisionError):
+        run(cell, unplug(TOOL, at=0.1), seconds=0.3)
+    assert cell.states[:TOOL] == [PRE_OP] * TOOL

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 
 from catenary.bus import MainDevice
 from catenary.bus.event import FaultFound
-from catenary.errors import ResponseTimeout
+from catenary.errors import CatenaryError
 from catenary.link import ring_of
 from catenary.model.diagnosis import Observation, judge
 from catenary.model.finding import Finding, Names
@@ -49,7 +49,7 @@ class ErrorWatch:
         counted before the loop began is `main.diagnose()`'s."""
         try:
             totals = yield from read_error_counters([sub.station for sub in self._subs])
-        except ResponseTimeout:  # too many frames are lost just now: the cycle tells that
+        except CatenaryError:  # frames are lost just now, or two answer to one address
             return ()
         before, self._last = self._last, totals
         if not before or totals == before:

@@ -8,7 +8,7 @@ from contextlib import ExitStack
 import numpy as np
 import numpy.typing as npt
 
-from catenary.bus import MainDevice
+from catenary.bus import MainDevice, Pending
 from catenary.core import (
     AXIS_FOLLOWED,
     CYCLE_CLOCKS,
@@ -102,6 +102,7 @@ class Running:
         self._abandon = abandon  # leaves the loop, when the MainDevice is closed round it
         self._stations = [sub.station for sub in main.subs]
         self._companions: Sequence[Running] = ()
+        self._watches: list[Pending[None]] = []
         self._publisher: Publisher | None = None
         self.service.cycle = self.cycle
 
@@ -148,8 +149,7 @@ class Running:
         self.service.converse(*(request_state(station, State.OP) for station in self._stations))
         for sub in self.main.subs:
             sub.state = State.OP
-        self.service.runner.submit(self.watch.run())
-        self.service.runner.submit(self.errors.run())
+        self._watches = [self.service.runner.submit(w.run()) for w in (self.watch, self.errors)]
 
     def enable(self) -> None:
         """Enables all axes. Position axes hold when this returns; velocity and torque axes wait for
@@ -231,6 +231,7 @@ class Running:
         steps: tuple[Callable[[SignalGuard], None], ...] = (
             self._stop_axes,
             self._stop_cycle,
+            self._tell_of_watches,
             self._take_down,
         )
         problems: list[Exception] = []
@@ -266,6 +267,12 @@ class Running:
             self._attached.close()  # from here on other threads use the link
             if self._publisher is not None:
                 self._publisher.close()
+
+    def _tell_of_watches(self, guard: SignalGuard) -> None:
+        """They are endless: one that has ended before the loop did so by its own fault."""
+        for watch in self._watches:
+            if watch.error is not None and not isinstance(watch.error, LoopError):
+                raise watch.error
 
     def _take_down(self, guard: SignalGuard) -> None:
         self.main.leave()

@@ -65,6 +65,7 @@ class Charge:
     standing: Standing = Standing.RUNNING
     task: Pending[None] | None = None
     failures: int = 0
+    unread: int = 0  # times that somebody in its place did not say who it is
     released: bool = False
 
 
@@ -255,8 +256,11 @@ class Watch:
                     found = yield from restore.identify(station)
                 elif found.same_kind(charge.plan.identity):
                     yield from restore.give_address(presence, station)
-            except CatenaryError:
-                return None  # it is gone again: the next look tells
+            except CatenaryError as error:
+                # Gone again, or it does not say who it is: it must not answer for the one before.
+                yield from restore.forget_address(presence)
+                self._note_unread(charge, error)
+                return None
             if found.same_kind(charge.plan.identity):
                 if found.serial == charge.identity.serial:
                     return charge
@@ -265,6 +269,14 @@ class Watch:
         if lost and found is not None:
             self._tell_replaced(lost[0], presence, found)
         return None
+
+    def _note_unread(self, charge: Charge, error: CatenaryError) -> None:
+        """Tells once of somebody who has failed to say who it is as often as is forgiven."""
+        charge.unread += 1
+        if charge.unread == FAILURES_MAX:
+            reason = f"who is there now does not say what it is: {error.message}"
+            message = f"{charge.sub.station} is held: {reason}"
+            self._tell(DeviceHeld(self._now(), charge.sub, message, 0, reason))
 
     def _exchanged(
         self, charge: Charge, presence: restore.Presence, found: Identity
@@ -289,6 +301,7 @@ class Watch:
 
     def _welcome(self, charge: Charge) -> None:
         """A device that was lost has its address (again)."""
+        charge.unread = 0
         self._tell_returned(charge)
         if self._lets_in(charge):
             charge.released = False
