@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from catenary.bus.ring import routed
+from catenary.bus.ring import check_direction, routed
 from catenary.bus.runner import BlockingRunner
 from catenary.bus.segment_scan import described, unread, with_places
 from catenary.errors import CatenaryError
@@ -25,6 +25,8 @@ def look(
     """All devices in the order of their positions, with their parents."""
     runner.flush()
     device_count = runner.run(count())
+    if ring is not None:
+        check_direction(ring.state)
     if ring is not None and ring.state.shape in (Shape.CUT, Shape.SECOND_ONLY):
         registers = _visit_from_both_ends(runner, ring, device_count)
     else:

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from typing import NamedTuple, Protocol
 
 from catenary.bus.runner import BlockingRunner
-from catenary.errors import ClockError
+from catenary.errors import ClockError, SegmentError
 from catenary.link import RingLink
 from catenary.link.ring_state import RingState, Shape
 from catenary.model.device import DeviceDescription
@@ -70,6 +70,16 @@ def find_cuts(state: RingState, device_count: int) -> Cuts | None:
     return Cuts(((upper, island[0]), (island[-1], lower)), island)
 
 
+def check_direction(state: RingState) -> None:
+    """SegmentError where the two ports are swapped: what is sent on the first passes all devices
+    from behind, where nobody processes it."""
+    if state.shape is Shape.CLOSED and state.second_devices and not state.first_devices:
+        raise SegmentError(
+            "the ring is wired the wrong way round: its devices are entered from the second port",
+            hint="swap the two cables at the MainDevice, or the names of its ports",
+        )
+
+
 def assign_from_both_ends(
     runner: BlockingRunner, ring: RingLink, device_count: int
 ) -> Sequence[StationRegisters]:
@@ -77,6 +87,7 @@ def assign_from_both_ends(
     the second end: what comes from there passes them all unprocessed, turns round at the cut, and
     is processed on its way back, by the device at the cut first."""
     state = ring.state
+    check_direction(state)
     if state.shape is not Shape.CUT and state.shape is not Shape.SECOND_ONLY:
         return runner.run(assign(range(device_count)))
     with routed(ring, "first"):

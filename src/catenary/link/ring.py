@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from catenary.errors import ConfigurationError
 from catenary.link._ring import RingLink
 from catenary.link.protocol import Link, LinkSource
 
@@ -23,6 +24,13 @@ class Ring:
     first: Link | LinkSource
     second: Link | LinkSource
     pair_wait: float = PAIR_WAIT
+
+    def __post_init__(self) -> None:
+        if self.first == self.second:
+            raise ConfigurationError(
+                f"{self.first}: the same port twice is no ring",
+                hint='give two different ports, MainDevice("eth0", "eth1"), or one alone',
+            )
 
     def open_link(self) -> RingLink:
         """Opens both."""

@@ -1,0 +1,31 @@
+"""Rings as the MainDevice sees them, over the virtual segment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+import catenary as cat
+from catenary.errors import ConfigurationError, SegmentError
+from catenary.link import Interface
+from catenary.virtual import Coupler, Segment, Servo
+
+
+@pytest.mark.parametrize("ask", [cat.MainDevice.scan, cat.MainDevice.look])
+def test_two_ports_that_are_swapped_are_told(ask: Callable[[cat.MainDevice], object]) -> None:
+    """Frames then pass all devices unprocessed from the first port, and positions mean nobody."""
+    segment = Segment([Coupler(), Servo()], ring=True)
+    with (
+        cat.MainDevice(segment.second, segment.first) as main,
+        pytest.raises(SegmentError, match="wrong way round") as caught,
+    ):
+        ask(main)
+    assert "swap the two cables" in caught.value.hint
+
+
+def test_a_ring_needs_two_ports() -> None:
+    with pytest.raises(ConfigurationError, match="twice"):
+        cat.MainDevice("eth9", "eth9")
+    with pytest.raises(ConfigurationError, match="eth9"):
+        cat.MainDevice(Interface("eth9"), "eth9")
