@@ -32,6 +32,17 @@ from tests.bus.links import Echo
 from tests.plan.devices import Asking, asks
 
 
+def test_the_eeprom_belongs_to_the_device_once_it_is_asked_for_pre_op() -> None:
+    """Some refuse PRE-OP without it; who looks into it afterwards gives it back."""
+    segment = demo_segment()
+    with MainDevice(segment) as main:
+        for _ in range(2):
+            for sub in main.scan():
+                assert segment.core.peek(sub.position, 0x0500, 1) == b"\x01"
+        main.look()
+        assert segment.core.peek(2, 0x0500, 1) == b"\x01"
+
+
 def test_a_scan_ends_in_pre_op_with_names_and_profiles() -> None:
     segment = demo_segment()
     with MainDevice(segment) as main:

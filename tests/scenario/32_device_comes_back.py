@@ -110,6 +110,7 @@ def test_switched_off_and_on_it_is_led_back(cell: Cell) -> None:
             assert gripper.present == (True,)
             assert cell.states == [OP] * 5
             assert cell.segment[GRIPPER].outputs == 0x0F
+            assert cell.segment.core.peek(TOOL, 0x0500, 1) == b"\x01"  # the EEPROM is its own
             assert not tool.enabled.any()
             tool.enable()
 

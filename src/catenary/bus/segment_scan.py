@@ -17,6 +17,7 @@ from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.pdo import read_mapping
 from catenary.procedure.profile import read_profile
 from catenary.procedure.sii import read_image
+from catenary.procedure.sii_owner import hand_over
 from catenary.procedure.station import Station
 from catenary.procedure.stations import StationRegisters
 from catenary.wire.al import State
@@ -44,10 +45,12 @@ def bring_to_pre_op(device: DeviceDescription) -> Procedure[Found]:
     """Opens the mailbox, asks for PRE-OP and reads the profile."""
     station = Station(device.position, device.station_address, device.name)
     if device.mailbox is None:
+        yield from hand_over(station)
         yield from request_state(station, State.PRE_OP)
         return Found(device)
     channel = MailboxChannel(station, device.mailbox)
     yield from configure_mailbox(channel)
+    yield from hand_over(station)
     yield from request_state(station, State.PRE_OP)
     if device.coe:
         device = yield from read_profile(channel, device)

@@ -16,6 +16,7 @@ from catenary.procedure.exchange import Procedure, Request, read, write, write_m
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.pdo import read_mapping, verify_mapping, write_downloads
 from catenary.procedure.sii import read_identity
+from catenary.procedure.sii_owner import hand_over
 from catenary.procedure.station import Station, answered
 from catenary.procedure.stations import FMMU_BLOCK, SYNC_MANAGER_BLOCK
 from catenary.wire.al import State
@@ -93,6 +94,7 @@ def bring_to_pre_op(station: Station, channel: MailboxChannel | None) -> Procedu
     yield [write(Command.FPWR, station.address, ACTIVATION, 0)]  # has no answer without clocks
     if channel is not None:
         yield from configure_mailbox(channel)
+    yield from hand_over(station)
     yield from request_state(station, State.PRE_OP)
 
 

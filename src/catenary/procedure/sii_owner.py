@@ -19,6 +19,12 @@ from catenary.wire.sii_interface import (
 T = TypeVar("T")
 
 
+def hand_over(station: Station) -> Procedure[None]:
+    """Gives the EEPROM to the device's processor: some need it on their way from INIT to PRE-OP.
+    SOEM (`ecx_config_init`) and IgH (`ec_fsm_slave_config_enter_assign_pdi`) do so right before."""
+    yield from _configure(station, CONFIGURATION_TO_PDI)
+
+
 def with_eeprom(station: Station, procedure: Procedure[T], *, force: bool = False) -> Procedure[T]:
     """Runs `procedure` with the EEPROM in our hands; afterwards it is whose it was.
 

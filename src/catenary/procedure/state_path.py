@@ -18,7 +18,7 @@ from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.pdo import read_mapping
 from catenary.procedure.sii import read_words
-from catenary.procedure.sii_owner import with_eeprom
+from catenary.procedure.sii_owner import hand_over, with_eeprom
 from catenary.procedure.station import Station
 from catenary.wire.al import State
 from catenary.wire.sii import BOOTSTRAP_WORD, MailboxArea
@@ -52,6 +52,7 @@ def climb(
     for state in path(before, target):
         if state is State.PRE_OP and before not in (State.SAFE_OP, State.OP):
             channel = yield from _open_mailbox(station, device)
+            yield from hand_over(station)
         elif state is State.BOOT and before is not State.BOOT:
             yield from _open_bootstrap(station)
         yield from request_state(station, state)
