@@ -20,11 +20,13 @@ JOINTS = ["turn", "shoulder", "elbow"]
 
 
 @contextmanager
-def opened(mode: str = "cst", axes: int = 3) -> Iterator[tuple[cat.Drives, cat.Loop]]:
+def opened(
+    mode: str = "cst", axes: int = 3, **more: float
+) -> Iterator[tuple[cat.Drives, cat.Loop]]:
     servo = cat.Servo(axes=axes, inertia=0.01, rated_torque=20.0)
     with cat.MainDevice(cat.Segment([servo])) as main:
         arm = cat.Drives(main.scan().drives, mode=mode, counts_per_turn=2**20)
-        with cat.Loop(arm, period=1e-3) as loop, warnings.catch_warnings():
+        with cat.Loop(arm, period=1e-3, **more) as loop, warnings.catch_warnings():
             warnings.simplefilter("error")  # a law that allocates is warned of
             yield arm, loop
 
@@ -141,6 +143,32 @@ def test_every_block_is_the_same_compiled_and_allocates_nothing() -> None:
     assert control.part(ends[0], 0)[0] == 501.0
     assert abs(control.part(ends[0], 1)).min() > 1.0
     assert control.part(ends[0], 8).any()  # homing
+
+
+def test_a_rehearsal_leaves_nothing_behind_in_the_model(tmp_path: Path) -> None:
+    """With a lead each step is rehearsed on a copy of the memory, but in the same workspace."""
+    path = tmp_path / "three.xml"
+    path.write_text(THREE)
+    dynamics = control.Dynamics(path, joints=JOINTS)
+    ends = []
+    for lead in (0.0, 100e-6):
+        with opened(lead=lead) as (_, loop):
+            memory = control.join(dynamics.memory, np.zeros(3), np.zeros(3), np.full(3, 0.2))
+            memory = loop.run(weightless, memory)
+            ends.append([*control.part(memory, 1), *control.part(memory, 2)])
+    assert ends[0] == ends[1]
+
+
+def test_without_numba_blocks_are_plain_python() -> None:
+    code = """
+import sys
+sys.modules["numba"] = None
+from catenary import control
+block = control.Cascade(control.Pid(1, 2.0), control.Pid(1, 3.0))
+print(control.cascade(block.memory, block.parameters, 0, 1.0, 0.0, 0.5, 0.0, 0.0, 1e-3))
+"""
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert float(done.stdout) == 6.5
 
 
 def test_the_wrong_parameters_stop_the_drives_and_are_told() -> None:
