@@ -49,6 +49,13 @@ def measure_storm(*, drives: int, rate: int, seconds: float, file: Path | None =
     storm.measure(drives=drives, rate=rate, seconds=seconds, file=file)
 
 
+def measure_share(*, drives: int, rate: int, seconds: float, file: Path | None = None) -> None:
+    """Prints what reading a cycle takes, and what readers cost the loop that shares it."""
+    from catenary.bench import share
+
+    share.measure(drives=drives, rate=rate, seconds=seconds, file=file)
+
+
 def measure_cost(*, seconds: float, file: Path | None = None) -> None:
     """Prints what a cycle costs as a + b·axes + c·bytes."""
     from catenary.bench import loop

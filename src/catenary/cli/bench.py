@@ -20,6 +20,7 @@ def add_parser(commands: Commands) -> None:
     ).add_subparsers(title="commands", metavar="COMMAND", required=True)
     _add_loop(group)
     _add_storm(group)
+    _add_share(group)
     _add_cost(group)
     _add_scan(group)
     _add_virtual(group)
@@ -78,6 +79,24 @@ def _add_storm(group: Commands) -> None:
     )
     _add_file(parser)
     parser.set_defaults(run=run_storm)
+
+
+def _add_share(group: Commands) -> None:
+    parser = add_command(
+        group,
+        "share",
+        help="what reading along takes, and costs the loop",
+        description="Reads the newest cycle again and again beside a plain copy; runs the loop "
+        "without a share, with one, and with 16 readers in processes of their own, in turn.",
+        example="catenary bench share --seconds 5 --json share.json",
+    )
+    parser.add_argument("--drives", type=positive_number, default=3, metavar="N")
+    parser.add_argument("--rate", type=positive_number, default=1000, metavar="HZ")
+    parser.add_argument(
+        "--seconds", type=positive_seconds, default=5.0, metavar="S", help="of every way (5)"
+    )
+    _add_file(parser)
+    parser.set_defaults(run=run_share)
 
 
 def _add_cost(group: Commands) -> None:
@@ -243,6 +262,19 @@ def run_storm(arguments: argparse.Namespace) -> int:
 
     bench.enter_private_network()
     bench.measure_storm(
+        drives=arguments.drives,
+        rate=arguments.rate,
+        seconds=arguments.seconds,
+        file=arguments.json,
+    )
+    return 0
+
+
+def run_share(arguments: argparse.Namespace) -> int:
+    from catenary import bench
+
+    bench.enter_private_network()
+    bench.measure_share(
         drives=arguments.drives,
         rate=arguments.rate,
         seconds=arguments.seconds,

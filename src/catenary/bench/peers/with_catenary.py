@@ -16,12 +16,6 @@ import numpy as np
 import catenary as cat
 from catenary.bench.job import PHASES, Body, Job, Round
 
-ORDER: dict[str, Literal["inline", "threaded"]] = {
-    "catenary-inline": "inline",
-    "catenary-threaded": "threaded",
-    "catenary-inline-sdo": "inline",
-    "catenary-threaded-sdo": "threaded",
-}
 STORM = "-sdo"
 IDENTITY, SERIAL = 0x1018, 4  # what the storm asks for
 # Like the peers, it counts lost and late cycles and goes on; by default it would stop the drives.
@@ -31,6 +25,20 @@ MODE = {Body.SINE: "csp", Body.PD: "cst"}
 
 
 def run(job: Job) -> Round:
+    with opened(job) as (loop, arm):
+        if not job.peer.endswith(STORM):
+            return measure(loop, arm, job, [])
+        with storm(arm.subs) as answers:
+            return measure(loop, arm, job, answers)
+
+
+def order(job: Job) -> Literal["inline", "threaded"]:
+    return "inline" if "-inline" in job.peer else "threaded"
+
+
+@contextlib.contextmanager
+def opened(job: Job, sink: cat.Share | None = None) -> Iterator[tuple[cat.Loop, cat.Drives]]:
+    """The loop of a round."""
     with cat.MainDevice(job.interface) as main:
         subs = main.scan()
         arm = cat.Drives(
@@ -41,16 +49,14 @@ def run(job: Job) -> Round:
         with cat.Loop(
             arm,
             period=job.period_ns * 1e-9,
-            run=ORDER[job.peer],
+            run=order(job),
             cpu=job.cpu,
             priority=job.priority,
             lost_limit=LOST_LIMIT,
             late_limit=LATE_LIMIT,
+            sink=sink,
         ) as loop:
-            if not job.peer.endswith(STORM):
-                return _measure(loop, arm, job, [])
-            with storm(arm.subs) as answers:
-                return _measure(loop, arm, job, answers)
+            yield loop, arm
 
 
 @contextlib.contextmanager
@@ -84,7 +90,7 @@ def storm(subs: Sequence[cat.SubDevice]) -> Iterator[list[int]]:
             thread.join()
 
 
-def _measure(loop: cat.Loop, arm: cat.Drives, job: Job, answers: Sequence[int]) -> Round:
+def measure(loop: cat.Loop, arm: cat.Drives, job: Job, answers: Sequence[int]) -> Round:
     body = _sine(arm, job) if job.body is Body.SINE else _pd(arm, job)
     before, cpu, answered = loop.timing.counters, 0, 0
     last_unmeasured, end = job.warm_up - 1, job.warm_up + job.cycles

@@ -1,0 +1,40 @@
+"""Reads along in a loop of another process, and commands one of its axes for a while.
+
+python examples/attach_from_another_process.py        # with a virtual arm in a process of its own
+python examples/attach_from_another_process.py arm    # with yours: cat.Share("arm"), share.apply
+"""
+
+import multiprocessing
+import sys
+
+import catenary as cat
+
+
+def move(name, started):
+    """The loop: two axes in virtual time; other processes may command them."""
+    with cat.MainDevice(cat.Segment([cat.Servo(), cat.Servo()])) as main:
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        with cat.Share(name) as share, cat.Loop(arm, period=1e-3, sink=share) as loop:
+            started.set()
+            while not share.apply(arm):  # until a client gives its axes back, or dies: they hold
+                next(loop)
+
+
+def read_and_command(name):
+    with cat.attach(name) as arm, arm.lease(axes=[0], for_=5.0) as command:
+        while arm.wait(timeout=1.0) and (now := arm.read())["position"][0] < 0.1:
+            command.send(position=now["commanded_position"][:1] + 1e-4)
+        print(f"cycle {now['number']}: {arm.layout.axes[0]} at {now['position'][0]:.3f} rad")
+        rows, lost = arm.rows(after=now["number"] - 100)
+        print(f"{len(rows)} cycles, {lost} lost, fastest {rows['velocity'][:, 0].max():.2f} rad/s")
+
+
+if __name__ == "__main__":
+    if len(sys.argv) > 1:
+        sys.exit(read_and_command(sys.argv[1]))
+    started = multiprocessing.Event()
+    robot = multiprocessing.Process(target=move, args=("example", started), daemon=True)
+    robot.start()
+    started.wait(60.0)
+    read_and_command("example")
+    robot.join()

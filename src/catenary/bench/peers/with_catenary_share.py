@@ -1,0 +1,97 @@
+"""Catenary with a share: nobody reads it, or 16 processes do, a hundred times a second each."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import sys
+import time
+from collections.abc import Iterator, Sequence
+
+import catenary as cat
+from catenary.bench.job import Job, Round
+from catenary.bench.peers.with_catenary import measure, opened
+from catenary.errors import ShareError
+from catenary.realtime.child import Child, start_python
+from catenary.realtime.libc import signal_on_parents_death
+
+READERS = 16
+PAUSE = 0.010  # [s]
+START_SECONDS = 60.0
+WITH_READERS = "-readers"
+
+
+def run(job: Job) -> Round:
+    name = f"bench-{os.getpid()}"
+    if not job.peer.endswith(WITH_READERS):
+        with cat.Share(name) as share, opened(job, share) as (loop, arm):
+            return measure(loop, arm, job, [])
+    with (
+        readers(name) as child,
+        cat.Share(name) as share,
+        opened(job, share) as (loop, arm),
+    ):
+        attend(loop, child)
+        return measure(loop, arm, job, [])
+
+
+def attend(loop: cat.Loop, child: Child) -> None:
+    """Cycles until every reader has read: a loop must not stand still for them."""
+    missing = READERS
+    deadline = time.monotonic() + START_SECONDS
+    for _ in loop:
+        if child.read_line(0.0) is not None:
+            missing -= 1
+        if missing == 0:
+            return
+        if time.monotonic() > deadline:
+            raise RuntimeError(f"{missing} readers did not come")
+
+
+@contextlib.contextmanager
+def readers(name: str) -> Iterator[Child]:
+    """They look for the loop before it is there. They run anywhere but where the loop was put, with
+    ordinary scheduling."""
+    here = os.sched_getaffinity(0)
+    elsewhere = os.sched_getaffinity(os.getppid()) - here or here  # of who leads the benchmark
+    arguments = ["-m", __name__, name, ",".join(map(str, elsewhere))]
+    with start_python(arguments) as child:
+        if child.read_line(START_SECONDS) is None:
+            raise RuntimeError("the readers did not start")
+        yield child
+
+
+def main(arguments: Sequence[str]) -> None:
+    """All readers: one process each, of one start of the interpreter. They end with the loop."""
+    name, cpus = arguments
+    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    os.sched_setaffinity(0, map(int, cpus.split(",")))
+    print("ready", flush=True)
+    for _ in range(READERS - 1):
+        if os.fork() == 0:
+            signal_on_parents_death(signal.SIGKILL)
+            break
+    with attached(name) as arm:
+        arm.wait(timeout=START_SECONDS)
+        arm.read()
+        os.write(sys.stdout.fileno(), b"reading\n")
+        while arm.wait(timeout=START_SECONDS):
+            arm.read()
+            time.sleep(PAUSE)
+
+
+def attached(name: str) -> cat.share.Reader:
+    """As soon as the loop is there."""
+    deadline = time.monotonic() + START_SECONDS
+    while True:
+        try:
+            return cat.attach(name)
+        except ShareError:
+            if time.monotonic() > deadline:
+                raise
+            time.sleep(PAUSE)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

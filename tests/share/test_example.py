@@ -1,0 +1,22 @@
+"""The example runs: it reads along, commands an axis, and the loop it does it to ends in peace."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "attach_from_another_process.py"
+
+
+def test_it_reads_and_commands() -> None:
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLE)], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    first, second = done.stdout.splitlines()
+    assert "0 Catenary virtual servo at 0.1" in first
+    assert re.match(r"\d+ cycles, \d+ lost, fastest \d", second)
+    assert len(EXAMPLE.read_text().splitlines()) <= 40
+    assert not Path("/dev/shm/catenary-example").exists()
