@@ -15,6 +15,7 @@ from catenary.errors import RecordingError
 from catenary.record.file import LARGEST_CHUNK, SMALLEST_CHUNK, RecordingFile, chunk_size
 from catenary.record.layout import Field, Layout
 from catenary.record.recording import read
+from catenary.record.repair import repair
 from tests.record.made import MONDAY_NS, make_event, make_layout, make_rows
 
 AXES = (0, 1, 6, 33)
@@ -144,7 +145,7 @@ def test_a_field_that_is_no_number_is_named(tmp_path: Path) -> None:
 
 def test_names_that_fall_together_are_kept_apart(tmp_path: Path) -> None:
     base = make_layout(0)
-    twins = tuple(Field(name, "<f8") for name in ("in.0", "IN 0", "header", "2nd", "é"))
+    twins = tuple(Field(name, "<f8") for name in ("in.0", "IN 0", "header", "2nd", "é", "in"))
     layout = Layout("x", 1e-3, (), (*base.fields, *twins))
     rows = make_rows(layout, 5)
     file = RecordingFile(tmp_path / "x.mcap", layout)
@@ -155,4 +156,28 @@ def test_names_that_fall_together_are_kept_apart(tmp_path: Path) -> None:
     with AnyReader([tmp_path / "x.mcap"]) as reader:
         connection, _, raw = next(iter(reader.messages()))
         message = reader.deserialize(raw, connection.msgtype)
-    assert {"in_0", "in_0_2", "header_2", "x_2nd", "x"} <= set(vars(message))
+    assert {"in_0", "in_0_2", "header_2", "x_2nd", "x", "x_in"} <= set(vars(message))
+
+
+def test_a_file_has_one_recorder(tmp_path: Path) -> None:
+    path = tmp_path / "x.mcap"
+    first = RecordingFile(path, make_layout(1))
+    with pytest.raises(RecordingError, match="is being recorded by another process"):
+        RecordingFile(path, make_layout(1), force=True)
+    with pytest.raises(RecordingError, match="is being recorded by another process"):
+        repair(path)
+    first.write(make_rows(make_layout(1), 10))
+    first.finish({})
+    assert len(read(path)) == 10
+    RecordingFile(path, make_layout(1), force=True).finish({})
+
+
+def test_a_disk_that_is_full_from_the_beginning(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(fd: int, data: bytes) -> int:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.write", full)
+    with pytest.raises(OSError, match=r"No space left on device: '.*x\.mcap'"):
+        RecordingFile(tmp_path / "x.mcap", make_layout(1))

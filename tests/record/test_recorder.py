@@ -151,6 +151,15 @@ def test_it_ends_when_the_loop_is_killed(name: str, tmp_path: Path) -> None:
     assert (child.returncode, errors) == (0, "")
     assert said.endswith("none lost; the process of the loop died\n")
     assert len(record.read(tmp_path / "x.mcap")) > 1000
+    with pytest.raises(ShareError, match="is stale"):
+        record.Recorder(name, tmp_path / "late.mcap")
+    with record.Recorder(name, tmp_path / "late.mcap", stale=True) as late:
+        late.run()
+    assert late.ended == "the process of the loop died"
+    assert np.array_equal(
+        record.read(tmp_path / "late.mcap")["position"],
+        record.read(tmp_path / "x.mcap")["position"],
+    )
 
 
 @pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM])

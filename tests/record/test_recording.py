@@ -66,3 +66,16 @@ def test_a_field_that_is_not_there_is_answered_with_those_that_are(path: Path) -
 def test_a_file_that_is_not_there() -> None:
     with pytest.raises(FileNotFoundError):
         record.read("/nowhere/x.mcap")
+
+
+def test_an_event_before_the_first_cycle_is_of_the_first_part(tmp_path: Path) -> None:
+    layout = make_layout(0)
+    file = RecordingFile(tmp_path / "x.mcap", layout)
+    file.write_event(make_event(1))
+    file.write(make_rows(layout, 1000, first=501))
+    file.finish({})
+    whole = record.read(tmp_path / "x.mcap")
+    assert (len(whole), len(whole.events)) == (1000, 1)
+    part = record.read(tmp_path / "x.mcap", start=0.25)
+    assert (part["number"][0], len(part.events)) == (751, 0)
+    assert len(record.read(tmp_path / "x.mcap", end=0.25).events) == 1

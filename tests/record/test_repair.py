@@ -18,7 +18,7 @@ from catenary.record.recording import read
 from catenary.record.repair import is_whole, repair
 from tests.record.made import make_event, make_layout, make_rows
 
-COUNT = 2500
+COUNT = 2200
 
 
 @pytest.fixture(scope="module")

@@ -29,6 +29,7 @@ def add_parser(commands: Commands) -> None:
         "Needs catenary[log].",
         example="catenary record arm arm.mcap\n"
         "catenary record arm arm.mcap --seconds 60\n"
+        "catenary record arm crash.mcap --stale\n"
         "catenary record --repair arm.mcap\n"
         "catenary plot arm.mcap",
     )
@@ -36,6 +37,11 @@ def add_parser(commands: Commands) -> None:
     parser.add_argument("file", metavar="FILE.mcap", help="the file to write")
     parser.add_argument("--seconds", metavar="N", type=positive_seconds, help="end after so long")
     parser.add_argument("--force", action="store_true", help="replace an existing file")
+    parser.add_argument(
+        "--stale",
+        action="store_true",
+        help="also a share whose process has died: its last cycles, as far as it remembers them",
+    )
     parser.add_argument(
         "--repair",
         action="store_true",
@@ -55,7 +61,8 @@ def run(arguments: argparse.Namespace) -> int:
     from catenary.record import Recorder
 
     with stopped_by_signals() as stop:
-        with Recorder(arguments.share, arguments.file, force=arguments.force) as recorder:
+        options = {"force": arguments.force, "stale": arguments.stale}
+        with Recorder(arguments.share, arguments.file, **options) as recorder:
             if not arguments.json:
                 print(f"recording {recorder} to {arguments.file}; Ctrl-C ends", flush=True)
             recorder.run(seconds=arguments.seconds, stop=stop)

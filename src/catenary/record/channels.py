@@ -13,6 +13,7 @@ the file's own.
 
 from __future__ import annotations
 
+import keyword
 import re
 from dataclasses import dataclass
 from math import prod
@@ -65,6 +66,11 @@ class Channel:
 
 def topic(layout: Layout, name: str) -> str:
     return f"/{_ros_name(layout.name)}/{name}"
+
+
+def is_event(topic: str) -> bool:
+    """Whether it is no topic of the cycles."""
+    return topic.endswith(("/log", "/events"))
 
 
 def make_channels(layout: Layout) -> list[Channel]:
@@ -155,7 +161,8 @@ def _comment(field: Field) -> str:
 def _ros_name(name: str) -> str:
     """A name as ROS allows it: lower case, digits, single underscores, a letter first."""
     plain = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
-    return plain if plain[:1].isalpha() else f"x_{plain}".rstrip("_")
+    usable = plain[:1].isalpha() and not keyword.iskeyword(plain)  # messages become classes
+    return plain if usable else f"x_{plain}".rstrip("_")
 
 
 def _unused(name: str, taken: dict[str, str]) -> str:

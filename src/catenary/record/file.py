@@ -59,8 +59,12 @@ class RecordingFile:
         self._channels = make_channels(layout)
         self._output = _create(path, force)
         self._writer = library.Writer(self._output, chunk_size=chunk_size(layout, self._channels))
-        self._writer.start("ros2", f"catenary; {library.LIBRARY_IDENTIFIER}")
-        self._writer.add_metadata(LAYOUT_RECORD, self._describe())
+        try:
+            self._writer.start("ros2", f"catenary; {library.LIBRARY_IDENTIFIER}")
+            self._writer.add_metadata(LAYOUT_RECORD, self._describe())
+        except OSError as error:
+            self._output.close()
+            raise OSError(error.errno, error.strerror, str(path)) from error
         self._schemas: dict[str, int] = {}
         self._ids = [self._register(each.topic, each.definition) for each in self._channels]
         self._log = self._register(topic(layout, "log"), LOG)

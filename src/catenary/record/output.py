@@ -3,17 +3,28 @@ that it was given."""
 
 from __future__ import annotations
 
+import fcntl
 import os
+from pathlib import Path
+
+from catenary.errors import RecordingError
 
 
 class Output:
-    """Owns the descriptor of a file that is written from its beginning."""
+    """Owns the descriptor of a file that is written from its beginning, and its lock."""
 
     def __init__(self, path: str | os.PathLike[str], *, force: bool = False) -> None:
-        """FileExistsError unless `force`, which begins the file anew."""
-        new = os.O_TRUNC if force else os.O_EXCL
+        """FileExistsError unless `force`, which begins the file anew. RecordingError: another
+        recorder writes it."""
+        new = 0 if force else os.O_EXCL
         self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC | new, 0o666)
         self._position = 0
+        try:
+            lock(self._fd, path)
+            os.ftruncate(self._fd, 0)
+        except BaseException:
+            self.close()
+            raise
 
     def write(self, data: bytes) -> int:
         rest = memoryview(data)
@@ -30,3 +41,15 @@ class Output:
         if self._fd >= 0:
             os.close(self._fd)
             self._fd = -1
+
+
+def lock(fd: int, path: str | os.PathLike[str]) -> None:
+    """Until the descriptor is closed nobody else writes a recording here. RecordingError: somebody
+    does already."""
+    try:
+        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        raise RecordingError(
+            f"{Path(path)} is being recorded by another process",
+            hint="end that recorder first, or choose another name",
+        ) from error

@@ -39,18 +39,24 @@ class Recorder:
             recorder.run(seconds=60.0)
 
     It begins with the oldest cycle that the share remembers. `take` writes what is new; `run` does
-    so until the loop ends. `share`: a name, or what `cat.attach` gave. RecordingError: the file
-    exists (without `force`), cannot be written, or the extra is not installed.
+    so until the loop ends. `share`: a name, or what `cat.attach` gave; `stale`: also one whose
+    process has died, for its last cycles. RecordingError: the file exists (without `force`), or the
+    extra is not installed; OSError: the file cannot be made.
     """
 
     def __init__(
-        self, share: str | Reader, path: str | os.PathLike[str], *, force: bool = False
+        self,
+        share: str | Reader,
+        path: str | os.PathLike[str],
+        *,
+        force: bool = False,
+        stale: bool = False,
     ) -> None:
         self.path = Path(path)
         self.cycles = 0  # written
         self.lost = 0  # overwritten before they were taken
         self.ended = ""  # why, once it has
-        self._share = attach(share) if isinstance(share, str) else share
+        self._share = attach(share, stale=stale) if isinstance(share, str) else share
         self._own = isinstance(share, str)
         self._number = 0  # of the last cycle taken
         self._serial = 0  # of the last event taken

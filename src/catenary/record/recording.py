@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections import defaultdict
 from collections.abc import Mapping
@@ -15,7 +16,7 @@ import numpy.typing as npt
 
 from catenary.errors import RecordingError
 from catenary.record.cdr import Rows
-from catenary.record.channels import decode_text, make_channels, topic
+from catenary.record.channels import decode_text, is_event, make_channels, topic
 from catenary.record.file import FORMAT
 from catenary.record.layout import TIME, Layout
 from catenary.record.mcap_records import (
@@ -25,6 +26,7 @@ from catenary.record.mcap_records import (
     END_RECORD,
     LAYOUT_RECORD,
     METADATA,
+    ChunkMessage,
     chunk_bytes,
     chunk_messages,
     chunk_records,
@@ -33,6 +35,8 @@ from catenary.record.mcap_records import (
     read_record,
 )
 from catenary.share import SharedEvent
+
+LONGEST = 1e9  # [s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,49 +98,51 @@ def read(path: str | os.PathLike[str], *, start: float = 0.0, end: float = np.in
     that was cut off is read as far as it is whole. RecordingError: it is none of ours, or cannot be
     read."""
     with Path(path).open("rb") as stream:
-        reader = _Reader(stream)
-        return reader.read(start, end)
+        return _Reader(stream, start, end).read()
 
 
 class _Reader:
     """Owns what was found in a file so far."""
 
-    def __init__(self, stream: BinaryIO) -> None:
+    def __init__(self, stream: BinaryIO, start: float, end: float) -> None:
         self._stream = stream
+        self._part = (start, end)  # [s] after the first cycle
         self._metadata: dict[str, dict[str, str]] = {}
         self._topics: dict[int, str] = {}  # by channel id
         self._messages: dict[str, list[bytes]] = defaultdict(list)  # by topic
-        self._first: int | None = None
+        self._wanted = (-math.inf, math.inf)  # log time [ns]; known with the first cycle
         self._complete = False  # the data section ends as it should
 
-    def read(self, start: float, end: float) -> Recording:
+    def read(self) -> Recording:
         for place in places(self._stream):
             self._complete = place.opcode == DATA_END
             if place.opcode == METADATA:
                 record = read_record(self._stream, place)
                 self._metadata[record.name] = record.metadata
-            elif place.opcode == CHUNK and not self._read_chunk(
-                read_record(self._stream, place), start, end
-            ):
+            if place.opcode == CHUNK and not self._read_chunk(read_record(self._stream, place)):
                 break
         return self._make()
 
-    def _read_chunk(self, chunk: Any, start: float, end: float) -> bool:
+    def _read_chunk(self, chunk: Any) -> bool:
         """False: the chunk is damaged, and with it what follows."""
-        if self._first is None:
-            self._first = chunk.message_start_time
-        first, last = (self._first + max(int(min(s, 1e9) * 1e9), 0) for s in (start, end))
-        aside = chunk.message_start_time > last or chunk.message_end_time < first
-        if aside and self._topics:
+        first, last = self._wanted
+        if chunk.message_start_time > last or chunk.message_end_time < first:
             return True
         data = chunk_bytes(chunk)
         if data is None:
             return False
         self._read_channels(data)
         for message in chunk_messages(data):
-            if first <= message.time_ns <= last:
-                self._messages[self._topics[message.channel]].append(message.data)
+            self._read_message(self._topics[message.channel], message)
         return True
+
+    def _read_message(self, topic: str, message: ChunkMessage) -> None:
+        if self._wanted == (-math.inf, math.inf) and not is_event(topic):
+            start, end = self._part  # events before the first cycle are of its first part
+            low = message.time_ns + round(start * 1e9) if start > 0 else -math.inf
+            self._wanted = (low, message.time_ns + round(min(end, LONGEST) * 1e9))
+        if self._wanted[0] <= message.time_ns <= self._wanted[1]:
+            self._messages[topic].append(message.data)
 
     def _read_channels(self, data: bytes) -> None:
         for opcode, at, end in chunk_records(data):
@@ -154,10 +160,12 @@ class _Reader:
         layout = msgspec.json.decode(head["layout"], type=Layout)
         tail = self._metadata.get(END_RECORD, {})
         texts = map(decode_text, self._messages[topic(layout, "events")])
+        events = (msgspec.json.decode(text, type=SharedEvent) for text in texts)
+        first = self._wanted[0]  # those before the first cycle were met before it was known
         return Recording(
             layout=layout,
             rows=_rows(layout, self._messages),
-            events=tuple(msgspec.json.decode(text, type=SharedEvent) for text in texts),
+            events=tuple(e for e in events if e.time * 1e9 + layout.utc_offset_ns >= first),
             lost=int(tail.get("lost", 0)),
             ended=tail.get("ended", "cut off") if self._complete else "cut off",
         )

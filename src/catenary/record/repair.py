@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from catenary.record.mcap_records import MAGIC
+from catenary.record.output import lock
 from catenary.record.summary import Summary, encode_end, find_whole
 
 CUT_OFF = {"ended": "cut off, and repaired"}
@@ -40,8 +41,9 @@ def is_whole(path: str | os.PathLike[str]) -> bool:
 
 def repair(path: str | os.PathLike[str], *, end: Mapping[str, object] | None = None) -> Repaired:
     """Makes a cut-off recording whole, in place. `end`: what to say of its end. RecordingError: it
-    is no recording; OSError: there is no room even for a summary of nothing."""
+    is no recording, or is being made; OSError: there is no room even for a summary of nothing."""
     with Path(path).open("r+b", buffering=0) as stream:
+        lock(stream.fileno(), path)
         before = os.fstat(stream.fileno()).st_size
         summary = find_whole(stream)
         if is_whole(path):

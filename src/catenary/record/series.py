@@ -24,9 +24,9 @@ def of_axes(recording: Recording, field: str | None) -> Floats | None:
 def reference_of(recording: Recording) -> str | None:
     """The field that positions are to be compared with: the positions sent to the drives, where any
     drive was to follow them. In other modes only the application knows what it follows."""
-    if recording.layout.field("mode") is None or (recording["mode"] == CSP).any():
-        return "commanded_position"
-    return None
+    sent = recording.layout.of_axes("commanded_position")
+    followed = recording.layout.field("mode") is None or (recording["mode"] == CSP).any()
+    return "commanded_position" if sent and followed else None
 
 
 def tracking_error(recording: Recording, reference: str | None) -> Floats | None:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any, BinaryIO
 
 from catenary.errors import RecordingError
+from catenary.record.channels import is_event
 from catenary.record.extra import require
 from catenary.record.mcap_records import (
     CHANNEL,
@@ -51,16 +52,16 @@ class Summary:
     chunks: list[WholeChunk] = field(default_factory=list)
     metadata: list[Any] = field(default_factory=list)  # the library's MetadataIndex
     ended: dict[str, str] = field(default_factory=dict)  # what the recorder said of its end
+    first_ns: int | None = None  # log time of the first cycle
     complete: bool = False  # the end of the data section is there
     missing: bytes = b""  # index of the last chunk, to be written behind it
 
     @property
     def seconds(self) -> float:
-        """From the first message to the last."""
-        if not self.chunks:
+        """From the first cycle to the last message."""
+        if not self.chunks or self.first_ns is None:
             return 0.0
-        first, last = self.chunks[0].index, self.chunks[-1].index
-        return float((last.message_end_time - first.message_start_time) * 1e-9)
+        return float((self.chunks[-1].index.message_end_time - self.first_ns) * 1e-9)
 
     def drop_last_chunk(self) -> None:
         self.missing, self.complete = b"", False
@@ -123,6 +124,8 @@ def _add_chunk(summary: Summary, stream: BinaryIO, place: Place, indexes: list[P
         offsets, summary.missing = _index_anew(data, place.end)
         length = len(summary.missing)
     _add_descriptions(summary, data)
+    if summary.first_ns is None:
+        summary.first_ns = _first_cycle(summary, data)
     index = records.ChunkIndex(
         chunk_start_offset=place.offset,
         chunk_length=place.end - place.offset,
@@ -151,6 +154,13 @@ def _index_anew(data: bytes, start: int) -> tuple[dict[int, int], bytes]:
         offsets[channel] = start + len(coded)
         coded += _encode([records.MessageIndex(channel, times)])
     return offsets, coded
+
+
+def _first_cycle(summary: Summary, data: bytes) -> int | None:
+    """The log time of the first message that is no event."""
+    cycles = {each.id for each in summary.channels.values() if not is_event(each.topic)}
+    times = (each.time_ns for each in chunk_messages(data) if each.channel in cycles)
+    return next(times, None)
 
 
 def _channel(stream: BinaryIO, index: Place) -> int:
