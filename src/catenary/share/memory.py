@@ -10,6 +10,7 @@ import fcntl
 import mmap
 import os
 import re
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -102,10 +103,16 @@ def create(path: Path, size: int, mode: int) -> Segment:
 
 
 def open_segment(path: Path, *, writable: bool = False) -> Segment:
-    """One that is there. FileNotFoundError, PermissionError."""
+    """One that is there. FileNotFoundError, PermissionError; ShareError: no file, or empty."""
     access = os.O_RDWR if writable else os.O_RDONLY
-    descriptor = os.open(path, access | os.O_CLOEXEC | os.O_NOFOLLOW)
-    if os.fstat(descriptor).st_size == 0:
+    try:
+        descriptor = os.open(path, access | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK)
+    except (FileNotFoundError, PermissionError):
+        raise
+    except OSError as error:
+        raise ShareError(f"{path} is no share: {error.strerror}") from error
+    status = os.fstat(descriptor)
+    if not stat.S_ISREG(status.st_mode) or status.st_size == 0:
         os.close(descriptor)
-        raise ShareError(f"{path} is empty")
+        raise ShareError(f"{path} is {'empty' if status.st_size == 0 else 'no file'}")
     return Segment(path, descriptor, writable=writable)

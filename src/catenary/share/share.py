@@ -175,9 +175,11 @@ class Share:
                 self._refuse_taken()
                 desk.publish(memory.path_of(self.name, "commands"))
                 segment.publish(self.path)
-        except BaseException:
+        except BaseException as error:
             for draft in (segment, desk):
                 draft.path.unlink(missing_ok=True)
+            if isinstance(error, PermissionError):  # /dev/shm lets only owners replace files
+                raise self._belongs_to_another() from error
             raise
 
     def _refuse_taken(self) -> None:
@@ -190,9 +192,7 @@ class Share:
         except FileNotFoundError:
             return
         except PermissionError as error:
-            raise ShareError(
-                f"the share {self.name!r} belongs to another user", hint=f"see {self.path}"
-            ) from error
+            raise self._belongs_to_another() from error
         except ShareError as error:
             raise ShareError(
                 f"{self.path} is in the way: {error.message}",
@@ -203,3 +203,8 @@ class Share:
                 f"the share {self.name!r} belongs to {layout.writer}, which lives",
                 hint="choose another name, or end that process",
             )
+
+    def _belongs_to_another(self) -> ShareError:
+        return ShareError(
+            f"the share {self.name!r} belongs to another user", hint=f"see {self.path}"
+        )
