@@ -122,6 +122,49 @@ def test_with_a_quorum_the_other_goes_on(body: Body) -> None:
     body.upper.plug()
 
 
+def test_one_that_is_plugged_in_again_does_not_stop_the_other(body: Body) -> None:
+    """Its devices are out of OP by their watchdogs. They are led back, and stand until asked."""
+    upper, lower = body.wishes()
+    with cat.Loop(upper, lower, quorum=1) as loop:
+        home = lower.actual.position.copy()
+        for cycle in loop:
+            assert cycle.ok
+            lower.target.position[:] = home + 0.2 * cycle.time
+            if cycle.number == 100:
+                body.upper.unplug()
+            if cycle.number == 500:
+                assert not cycle.networks[0].ok
+                body.upper.plug()
+            if cycle.number == 800:
+                break
+        assert cycle.networks[0].ok
+        assert [device.state for device in body.upper] == [8] * 4
+        assert not upper.enabled.any()
+        assert lower.enabled.all()
+        assert lower.actual.position == pytest.approx(home + 0.16, abs=0.01)
+    body.assert_safe()
+
+
+@pytest.mark.parametrize("quorum", [1, 2])
+def test_a_network_that_answers_out_of_op_does_not_count(body: Body, quorum: int) -> None:
+    """Unplugged for so long only that watchdogs stop its drives, and nobody calls it lost."""
+    upper, lower = body.wishes()
+    with (
+        pytest.raises((WorkingCounterError, StateError)),
+        cat.Loop(upper, lower, quorum=quorum) as loop,
+    ):
+        for cycle in loop:
+            if cycle.number == 100:
+                body.upper.unplug()
+            if cycle.number == 220:
+                body.upper.plug()
+            if cycle.number == 230:
+                assert quorum == 1
+                body.lower.unplug()
+            assert cycle.number < 250
+    body.lower.plug()
+
+
 def test_a_device_that_refuses_op_brings_both_down(body: Body) -> None:
     from catenary.virtual.faults import refuse_state
 

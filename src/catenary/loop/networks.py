@@ -34,6 +34,7 @@ class NetworksCycle:
 
     def __init__(self, networks: Sequence[Cycle], quorum: int) -> None:
         self.networks = tuple(networks)
+        self.alive = (True,) * len(self.networks)  # whether each one's devices are in OP
         self._quorum = quorum
 
     @property
@@ -48,8 +49,10 @@ class NetworksCycle:
 
     @property
     def ok(self) -> bool:
-        """Whether as many networks as the quorum asks for were good."""
-        return sum(network.ok for network in self.networks) >= self._quorum
+        """Whether as many networks as the quorum asks for were good. One whose devices are out of
+        OP is not, though it answers."""
+        good = [n.ok and alive for n, alive in zip(self.networks, self.alive, strict=True)]
+        return sum(good) >= self._quorum
 
     @property
     def lost(self) -> int:
@@ -116,6 +119,7 @@ class NetworksLoop(Loop):
         try:
             self._guard.install()
             self._all = []
+            self._dead: set[int] = set()  # by identity: those that have died and are not back
             self._cycles: NetworksCycle | None = None
             for network in self.networks:
                 network._running = network._prepared(self._abandon)
@@ -154,12 +158,13 @@ class NetworksLoop(Loop):
             for one in running:
                 one.engine.commit_targets()
             flags = [one.engine.next() for one in running]
-        self._judge_all(flags)
+        self._judge_all(self._cycles, flags)
         return self._cycles
 
-    def _judge_all(self, flags: Sequence[int]) -> None:
+    def _judge_all(self, cycle: NetworksCycle, flags: Sequence[int]) -> None:
         """Raises what ends the loop: too few networks, or trouble in one that is alive."""
-        alive = [not each & NETWORK_TROUBLE for each in flags]
+        alive = [self._lives(one, mine) for one, mine in zip(self._all, flags, strict=True)]
+        cycle.alive = tuple(alive)
         for one, mine, lives in zip(self._all, flags, alive, strict=True):
             if not lives and sum(alive) >= self._quorum:
                 continue
@@ -167,6 +172,15 @@ class NetworksLoop(Loop):
                 if not lives:
                     self._stop_others(one)
                 one.judge(mine, faults=self._raise_faults)
+
+    def _lives(self, one: Running, flags: int) -> bool:
+        """Whether a network carries its devices. One that was dead and answers again is so once
+        they are in OP: those that their watchdogs stopped do not stop the other networks."""
+        if flags & NETWORK_TROUBLE:
+            self._dead.add(id(one))
+        elif one.engine.al_status == State.OP:
+            self._dead.discard(id(one))
+        return id(one) not in self._dead
 
     def _stop_others(self, dead: Running) -> None:
         for one in self._all:
