@@ -12,7 +12,7 @@ import pytest
 import catenary as cat
 from catenary.errors import StateError, WorkingCounterError
 from catenary.realtime import VirtualClock
-from catenary.virtual import Coupler, Segment, Servo
+from catenary.virtual import Coupler, Crystal, Segment, Servo
 
 
 @dataclass
@@ -173,6 +173,40 @@ def test_a_device_that_refuses_op_brings_both_down(body: Body) -> None:
     with pytest.raises(StateError, match="device 1"), cat.Loop(upper, lower):
         raise AssertionError("it opened")
     body.assert_safe()
+
+
+def test_their_clocks_follow_the_main_device() -> None:
+    """Two reference clocks are two times; one schedule needs one, which the clocks follow."""
+    with VirtualClock() as clock:
+        segments = [
+            Segment([Coupler(crystal=Crystal(ppm)), Servo(crystal=Crystal(-ppm))], clock=clock)
+            for ppm in (100.0, -60.0)
+        ]
+        with cat.MainDevice(segments[0]) as first, cat.MainDevice(segments[1]) as second:
+            wishes = [
+                cat.Drives(main.scan().drives, counts_per_turn=2**20, dc=True)
+                for main in (first, second)
+            ]
+            with cat.Loop(*wishes) as loop:
+                loop.wait_locked(within=1e-6, timeout=2.0)
+                assert [network.clocks.locked for network in loop.networks] == [True, True]
+                for cycle in loop:
+                    assert cycle.ok
+                    assert not cycle.late
+                    assert len({network.number for network in cycle.networks}) == 1
+                    if cycle.time > 10.0:
+                        break
+                assert [network.clocks.locked for network in loop.networks] == [True, True]
+            with pytest.raises(ValueError, match='clock="main"'):
+                cat.Loop(*wishes, clock="reference")
+
+
+def test_clocks_that_nobody_wished_for_cannot_be_waited_for(body: Body) -> None:
+    with (
+        cat.Loop(*body.wishes()) as loop,
+        pytest.raises(RuntimeError, match="dc=True"),
+    ):
+        loop.wait_locked()
 
 
 def test_what_several_networks_cannot_have(body: Body) -> None:

@@ -85,7 +85,8 @@ class NetworksLoop(Loop):
     `quorum`: how many networks must be good for the cycle to be; None: all. While as many are, one
     that fails does not end the loop: its axes are stopped by its drives' watchdogs or natively, and
     `cycle.networks[i].ok` tells. Threaded only. `cpu`: one for each network; None: one each of the
-    last, where there are more than networks. `sink`: one for each network.
+    last, where there are more than networks. `sink`: one for each network. Where
+    wishes have `dc=`, the clocks of all follow the MainDevice (`clock="main"`).
     """
 
     def __init__(
@@ -103,6 +104,11 @@ class NetworksLoop(Loop):
             )
         if options.get("laws"):
             raise ValueError("laws belong to one network: make a Loop for it")
+        if options.setdefault("clock", "main") != "main":
+            raise ValueError(
+                'several networks need clock="main": each reference clock would have its own '
+                "instants, and one schedule has one"
+            )
         groups = by_network(wishes)
         count = len(groups)
         if quorum is not None and not 1 <= quorum <= count:
@@ -199,6 +205,20 @@ class NetworksLoop(Loop):
             )
         for one in self._all:
             one.share_time([other for other in self._all if other is not one])
+
+    def wait_locked(self, within: float = 1e-6, timeout: float = 5.0) -> None:
+        """See `Loop.wait_locked`: one network after the other, each within the timeout. Their
+        clocks follow the MainDevice: `loop.networks[i].clocks`."""
+        clocked = [(one, one.clocks) for one in self._all if one.clocks is not None]
+        if not clocked:
+            raise RuntimeError("no distributed clocks in this loop: Drives(..., dc=True)")
+        for running, clocks in clocked:
+
+            def check(flags: int, running: Running = running) -> None:
+                if flags & TROUBLE or running.engine.al_status != State.OP:
+                    running.judge(flags, faults=self._raise_faults)
+
+            clocks.wait(within, timeout, check)
 
     # What one network has, and several have each
 

@@ -83,7 +83,7 @@ class Running:
             self.engine.set_rehearsal(make_rehearsal(self.views))
         self.laws = LawRunner(self.engine, plan)
         clock = plan.cycle.clock
-        self.clocks = None if clock is None else Clocks(main, self.engine, clock)
+        self.clocks = None if clock is None else Clocks(main, self.engine, clock, self.cycle)
         self.service = Service(main, self.engine, plan)
         self.watch = Watch(
             main,
