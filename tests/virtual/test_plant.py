@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from catenary.virtual import Joint, Plant, Segment, Servo, _segment
+from catenary.virtual import Coupler, Joint, Plant, Segment, Servo, _segment
 from catenary.virtual.faults import exchange, power_cycle, safe_torque_off, swap
 from tests.virtual.plants import (
     DOUBLE,
@@ -191,8 +191,9 @@ def test_a_drive_that_is_replaced_gets_the_motor(tmp_path: Path) -> None:
     segment = pendulum(tmp_path, frictionless(), start=0.5)
     time = Time(segment)
     old, new = servo_of(segment), frictionless(name="spare")
-    segment.inject(swap(0, new, for_=0.1))
-    time.pass_by(0.3)
+    segment.inject(swap(0, Coupler(), for_=0.1))  # the wrong one first: nobody turns the motor
+    segment.inject(swap(0, new, at=0.2, for_=0.1))
+    time.pass_by(0.4)
     assert segment.plant is not None
     assert servo_of(segment) is new
     assert new.position_rad == segment.plant.data.joint("swing").qpos[0] != 0.5

@@ -101,7 +101,8 @@ class Plant:
         self._model = read_model(path, step=step, contacts=contacts)
         self.joints = self._chosen(joints, passive)
         self._compiled: CompiledPlant | None = None
-        self._motors: list[tuple[Servo, int]] = []
+        self._wired: list[tuple[Device, int]] = []  # where the motor of each joint is wired to
+        self._inertias: list[float] = []  # what it turns at the start, at its shaft
         self._thread: threading.Thread | None = None
 
     def _chosen(self, joints: Sequence[Joint] | None, passive: Sequence[str]) -> tuple[Joint, ...]:
@@ -134,14 +135,15 @@ class Plant:
         """Hangs the joints on the servos; the segment does it when it is made."""
         if self._compiled is not None:
             raise ValueError(f"{self.path.name} moves in another segment already")
-        self._motors = self._paired(devices)
-        for joint, (servo, _axis) in zip(self.joints, self._motors, strict=True):
+        motors = self._paired(devices)
+        for joint, (servo, _axis) in zip(self.joints, motors, strict=True):
             self._model.add_motor(
                 joint.name,
                 inertia=servo.inertia * joint.gear**2,
                 viscous=servo.viscous_friction * joint.gear**2,
             )
         self._model.settle()
+        self._inertias = [self._model.inertia(j.name) / j.gear**2 for j in self.joints]
         compiled = CompiledPlant(
             core,
             len(self.joints),
@@ -152,9 +154,10 @@ class Plant:
             period_ns=round(self.step * SECOND),
             keep=self._model,
         )
-        for n in range(len(self.joints)):
-            self._make_joint(compiled, n)
-            self._hang(compiled, n)
+        for n, (servo, axis) in enumerate(motors):
+            self._make_joint(compiled, n, servo)
+            self._hang(compiled, n, servo, axis)
+        self._wired = [*motors]
         self._compiled = compiled
         compiled.begin()
 
@@ -187,8 +190,8 @@ class Plant:
             )
         return [(there[place], place[1]) for place in places if place is not None]
 
-    def _make_joint(self, compiled: CompiledPlant, n: int) -> None:
-        joint, (servo, _axis) = self.joints[n], self._motors[n]
+    def _make_joint(self, compiled: CompiledPlant, n: int, servo: Servo) -> None:
+        joint = self.joints[n]
         most = servo.rated_torque * servo.max_torque_ratio * joint.gear
         at = self._model.addresses(joint.name)
         compiled.make_joint(
@@ -204,18 +207,19 @@ class Plant:
             brake_delay_ns=round(joint.brake_delay * SECOND),
         )
 
-    def _hang(self, compiled: CompiledPlant, n: int) -> None:
+    def _hang(self, compiled: CompiledPlant, n: int, servo: Servo, axis: int) -> None:
         """The motor comes to the joint, and its loops are tuned for what it has to turn."""
-        joint, (servo, axis) = self.joints[n], self._motors[n]
         compiled.hang(n, servo.position, axis)
-        servo.tune(self._model.inertia(joint.name) / joint.gear**2, axis)
+        servo.tune(self._inertias[n], axis)
 
     def replaced(self, old: Device, new: Device) -> None:
         """Another device stands in the place of one: the motors are wired to it."""
-        for n, (servo, axis) in enumerate(self._motors):
-            if servo is old and isinstance(new, Servo) and axis < new.axes and self._compiled:
-                self._motors[n] = new, axis
-                self._hang(self._compiled, n)
+        for n, (device, axis) in enumerate(self._wired):
+            if device is not old:
+                continue
+            self._wired[n] = new, axis
+            if isinstance(new, Servo) and axis < new.axes and self._compiled is not None:
+                self._hang(self._compiled, n, new, axis)
 
     # -- time ----------------------------------------------------------------------------------
 
