@@ -178,10 +178,8 @@ def test_a_device_that_refuses_op_brings_both_down(body: Body) -> None:
 def test_their_clocks_follow_the_main_device() -> None:
     """Two reference clocks are two times; one schedule needs one, which the clocks follow."""
     with VirtualClock() as clock:
-        segments = [
-            Segment([Coupler(crystal=Crystal(ppm)), Servo(crystal=Crystal(-ppm))], clock=clock)
-            for ppm in (100.0, -60.0)
-        ]
+        crystals = [Crystal(ppm=100.0), Crystal(ppm=-60.0)]
+        segments = [Segment([Coupler(crystal=c), Servo()], clock=clock) for c in crystals]
         with cat.MainDevice(segments[0]) as first, cat.MainDevice(segments[1]) as second:
             wishes = [
                 cat.Drives(main.scan().drives, counts_per_turn=2**20, dc=True)
