@@ -48,6 +48,9 @@ def test_it_swings_while_nobody_sends(tmp_path: Path) -> None:
     after = steps(segment)
     assert segment.plant is not None
     assert segment.plant.data.time == pytest.approx(after * 250e-6)
+    link = segment.open_link()  # and on from where it stood
+    until(lambda: steps(segment) > after + 40)
+    link.close()
 
 
 def test_a_frame_is_answered_without_a_step(tmp_path: Path) -> None:

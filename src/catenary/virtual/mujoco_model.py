@@ -45,7 +45,7 @@ def read_model(path: str | Path, *, step: float, contacts: bool) -> Model:
         else:
             meshes = _leave_out_shapes(root, path) if contacts else _leave_out_shapes(root)
             model = mujoco.MjModel.from_xml_string(ElementTree.tostring(root, "unicode"), meshes)
-    except ValueError as error:
+    except (ValueError, mujoco.FatalError) as error:
         raise ConfigurationError(f"{path}: MuJoCo refuses the model: {error}") from error
     model.opt.timestep = step
     flags = mujoco.mjtDisableBit
