@@ -12,6 +12,7 @@ from catenary.cli import (
     bench,
     demo,
     diag,
+    doctor,
     graph,
     plot,
     realtime,
@@ -28,7 +29,7 @@ from catenary.cli.failure import INTERRUPTED, USAGE, report, silence_stdout
 DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
     *(scan, state, graph, diag, sdo, reg, alias, sii),
-    *(demo, bench, virtual, realtime, record, plot),
+    *(demo, doctor, bench, virtual, realtime, record, plot),
 )
 EPILOG = """\
 TARGET is a network interface (eth0) or a virtual segment (virtual, virtual:FILE.toml).

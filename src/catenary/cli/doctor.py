@@ -1,0 +1,156 @@
+"""`catenary doctor [NIC]`: whether this machine is fit for a real-time loop, and what to type."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from catenary.cli.arguments import number, positive_seconds
+from catenary.cli.failure import FAILED, UsageError
+from catenary.cli.parsers import Commands, add_command, add_json
+
+if TYPE_CHECKING:
+    from catenary.doctor import Change, Examination
+
+EXAMPLE = """\
+catenary doctor
+catenary doctor eth0 --seconds 60
+catenary doctor eth0 --json
+sudo .venv/bin/catenary doctor eth0 --apply
+sudo .venv/bin/catenary doctor --undo"""
+
+
+def add_parser(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "doctor",
+        help="whether this machine is fit for real time, and what to type",
+        description="Looks at the kernel, processors, clocks, permissions and a network card, and "
+        "measures how late threads wake up. Sends nothing and changes nothing without --apply. "
+        "Every check is explained in docs/doctor.md. Exit status 1: a check failed.",
+        example=EXAMPLE,
+    )
+    parser.add_argument("nic", metavar="NIC", nargs="?", help="the card of the segment: eth0")
+    parser.add_argument(
+        "--seconds", type=seconds, default=3.0, help="of the latency test (default 3; 0: none)"
+    )
+    parser.add_argument(
+        "--period", type=period, default=1e-3, metavar="SECONDS", help="of the loop (default 0.001)"
+    )
+    parser.add_argument(
+        "--priority", type=priority, default=80, help="of its thread, 1 to 99 (default 80)"
+    )
+    parser.add_argument(
+        "--cpu", type=number, help="it is to run on (default: the last isolated one, else the last)"
+    )
+    add_json(parser)
+    doing = parser.add_mutually_exclusive_group()
+    doing.add_argument(
+        "--apply", action="store_true", help="list what can be changed and undone; ask; change it"
+    )
+    doing.add_argument("--undo", action="store_true", help="take back what --apply changed")
+    parser.add_argument("--yes", action="store_true", help="with --apply: do not ask")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from catenary.doctor import as_json, as_text
+
+    if arguments.json and (arguments.apply or arguments.undo):
+        raise UsageError("--json only looks: it goes with neither --apply nor --undo")
+    if arguments.undo:
+        return undo()
+    examination = look(arguments)
+    if arguments.json:
+        print(as_json(examination))
+    else:
+        print(as_text(examination, colour=sys.stdout.isatty() and "NO_COLOR" not in os.environ))
+    if arguments.apply:
+        return apply(examination.changes, ask=not arguments.yes)
+    return FAILED if examination.failed else 0
+
+
+def look(arguments: argparse.Namespace) -> Examination:
+    from catenary.doctor import examine, measure, obtainable_cpu, this_machine
+
+    machine = this_machine(
+        arguments.nic, cpu=arguments.cpu, period=arguments.period, priority=arguments.priority
+    )
+    if not arguments.seconds:
+        return examine(machine)
+    if not arguments.json and sys.stderr.isatty():
+        print(f"measuring for {arguments.seconds:g} s ...", file=sys.stderr)
+    cpu = obtainable_cpu(machine) if arguments.cpu is None else arguments.cpu
+    latency = measure(
+        arguments.seconds, period=arguments.period, priority=arguments.priority, cpu=cpu
+    )
+    return examine(machine, latency)
+
+
+def apply(changes: tuple[Change, ...], *, ask: bool) -> int:
+    """The exit status: 1 where something was refused."""
+    from catenary.doctor import MachineGround, change_lines, open_state
+    from catenary.doctor import apply as make
+
+    if not changes:
+        print("\nNothing to change that could be undone: the rest is yours to type.")
+        return 0
+    ground = MachineGround()
+    print("\nTo be changed, until `catenary doctor --undo` or a reboot:")
+    print(*change_lines(changes, ground), sep="\n")
+    if os.geteuid() != 0:
+        print("(Most of it takes root: sudo with this command's full path.)")
+    if ask and not agreed():
+        print("Nothing was changed.")
+        return 0
+    return tell(make(changes, ground, open_state()))
+
+
+def agreed() -> bool:
+    if not sys.stdin.isatty():
+        raise UsageError("--apply asks first, and there is nobody to ask", hint="--apply --yes")
+    return input("Change them? [y/N] ").strip().lower() in ("y", "yes")
+
+
+def undo() -> int:
+    from catenary.doctor import MachineGround, open_state
+    from catenary.doctor import undo as take_back
+
+    state = open_state()
+    if not state.load():
+        print(f"Nothing to undo: {state.path} notes no change since this machine was started.")
+        return 0
+    return tell(take_back(MachineGround(), state))
+
+
+def tell(lines: Iterable[str]) -> int:
+    refused = False
+    for line in lines:
+        print(line)
+        refused |= line.startswith("REFUSED")
+    return FAILED if refused else 0
+
+
+def seconds(text: str) -> float:
+    return 0.0 if text in ("0", "0.0") else positive_seconds(text)
+
+
+def period(text: str) -> float:
+    from catenary.realtime.task import check_period
+
+    value = positive_seconds(text)
+    try:
+        check_period("latency", "period", value)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return value
+
+
+def priority(text: str) -> int:
+    value = number(text)
+    if not 1 <= value <= 99:
+        raise argparse.ArgumentTypeError(f"priority {value} is not within 1 to 99")
+    return value

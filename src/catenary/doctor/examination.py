@@ -1,0 +1,102 @@
+"""All checks, in the order in which they are shown: the ground first, the measurement last."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from catenary.doctor import clocks, interrupts, kernel, network, permissions, processors
+from catenary.doctor.card import Card
+from catenary.doctor.change import Change
+from catenary.doctor.check import Check, skipped
+from catenary.doctor.clock_state import read_clock_state
+from catenary.doctor.ethtool import read_card
+from catenary.doctor.latency import Latency, judge
+from catenary.doctor.machine import Machine
+from catenary.errors import LinkError
+
+GROUPS: tuple[tuple[str, Sequence[Callable[[Machine], Check]]], ...] = (
+    ("kernel", kernel.CHECKS),
+    ("processors", processors.CHECKS),
+    ("clocks", clocks.CHECKS),
+    ("permissions", permissions.CHECKS),
+)
+CARD_CHECKS = (*network.CHECKS, *interrupts.CHECKS)
+CHANGES_THE_PORT = "nic-"  # ids whose changes touch the card
+
+
+@dataclass(frozen=True, slots=True)
+class Examination:
+    """groups: title and checks, in order. latency: what was measured; None: nothing."""
+
+    groups: tuple[tuple[str, tuple[Check, ...]], ...]
+    latency: Latency | None = None
+
+    @property
+    def checks(self) -> tuple[Check, ...]:
+        return tuple(check for _, checks in self.groups for check in checks)
+
+    @property
+    def failed(self) -> bool:
+        return any(check.status == "FAIL" for check in self.checks)
+
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """What `--apply` may do. A port that carries this machine's network is left alone."""
+        in_use = any(check.id == "nic-use" and check.status == "FAIL" for check in self.checks)
+        return tuple(
+            change
+            for check in self.checks
+            for change in check.changes
+            if not (in_use and check.id.startswith(CHANGES_THE_PORT))
+        )
+
+
+def examine(machine: Machine, latency: Latency | None = None) -> Examination:
+    """Judges a machine by its files and answers; `latency` as it was measured there."""
+    groups = [(title, tuple(check(machine) for check in checks)) for title, checks in GROUPS]
+    card = machine.card
+    if card is None:
+        groups.append(("network card", (no_card(machine),)))
+    else:
+        checks = tuple(check(machine, card) for check in CARD_CHECKS)
+        groups.append((f"network card {card.name}", checks))
+    groups.append(("latency", (judge(latency, machine),)))
+    return Examination(tuple(groups), latency)
+
+
+def no_card(machine: Machine) -> Check:
+    names = [path.rpartition("/")[2] for path in machine.matching("/sys/class/net/*")]
+    cards = [name for name in names if machine.exists(f"/sys/class/net/{name}/device")]
+    there = f"there is {', '.join(cards)}" if cards else "there is no card here"
+    return skipped("nic", f"none was named; {there}", "catenary doctor NIC")
+
+
+def this_machine(
+    nic: str | None, *, cpu: int | None = None, period: float = 1e-3, priority: int = 80
+) -> Machine:
+    """LinkError: there is no such network interface. ValueError: no such CPU."""
+    card = None if nic is None else known_card(nic)
+    machine = Machine(
+        root=Path("/"),
+        card=card,
+        clock=read_clock_state(),
+        wanted_cpu=cpu,
+        period=period,
+        priority=priority,
+    )
+    if cpu is not None and cpu not in machine.cpus:
+        there = ", ".join(map(str, sorted(machine.cpus)))
+        raise ValueError(f"CPU {cpu} does not exist or is switched off; there are: {there}")
+    return machine
+
+
+def known_card(nic: str) -> Card:
+    names = [name for _, name in socket.if_nameindex()]
+    if nic not in names:
+        raise LinkError(
+            f"there is no network interface {nic!r}", hint=f"there are: {', '.join(names)}"
+        )
+    return read_card(nic)

@@ -1,0 +1,102 @@
+"""Who carries the card's interrupts, and whether a loop may therefore spin."""
+
+from __future__ import annotations
+
+import re
+
+from catenary.doctor.card import Card
+from catenary.doctor.change import Change
+from catenary.doctor.check import Check, passed, skipped, warned
+from catenary.doctor.machine import Machine, as_list, cpu_list
+
+
+def card_interrupts(machine: Machine, card: Card) -> list[int]:
+    """Numbers of its lines in /proc/interrupts, by its name or its device's; else its MSI ones."""
+    place = f"/sys/class/net/{card.name}"
+    names = [card.name, *filter(None, [device_name(machine, place)])]
+    known = "|".join(map(re.escape, names))
+    text = machine.text("/proc/interrupts") or ""
+    found = re.findall(rf"^\s*(\d+):.*[\s,](?:{known})(?:[-:@].*)?$", text, re.MULTILINE)
+    if not found:
+        found = [path.rpartition("/")[2] for path in machine.matching(f"{place}/device/msi_irqs/*")]
+    return sorted(map(int, found))
+
+
+def device_name(machine: Machine, place: str) -> str:
+    """virtio3 for a paravirtual card, whose interrupts have that name."""
+    device = machine.path(f"{place}/device")
+    return device.resolve().name if device.exists() else ""
+
+
+def carriers(machine: Machine, numbers: list[int]) -> dict[int, frozenset[int]]:
+    """The CPUs each interrupt may go to; those that do not tell are left out."""
+    lists = {
+        number: machine.text(f"/proc/irq/{number}/effective_affinity_list")
+        or machine.text(f"/proc/irq/{number}/smp_affinity_list")
+        for number in numbers
+    }
+    return {number: cpu_list(text) for number, text in lists.items() if cpu_list(text)}
+
+
+def interrupts(machine: Machine, card: Card) -> Check:
+    """Documentation/core-api/irq/irq-affinity.rst"""
+    id = "nic-interrupts"
+    affinities = carriers(machine, card_interrupts(machine, card))
+    if not affinities:
+        return skipped(id, f"/proc/interrupts names none of {card.name}")
+    allowed = {n: cpu_list(machine.text(f"/proc/irq/{n}/smp_affinity_list")) for n in affinities}
+    wide = [n for n, cpus in allowed.items() if len(cpus) > 1 and len(machine.cpus) > 1]
+    where = as_list(frozenset().union(*affinities.values()))
+    if "irqbalance" in machine.processes:
+        return warned(
+            id,
+            f"irqbalance moves them about (now on CPU {where})",
+            "sudo systemctl disable --now irqbalance",
+        )
+    if wide:
+        home = min(machine.other_cpus or machine.cpus)
+        paths = [f"/proc/irq/{number}/smp_affinity_list" for number in wide]
+        return warned(
+            id,
+            f"{as_list(wide)}: on CPU {where} now, free to move",
+            f"echo {home} | sudo tee {' '.join(paths)}",
+            tuple(Change(path, str(home)) for path in paths),
+        )
+    return passed(id, f"{as_list(affinities)}: bound to CPU {where}")
+
+
+def spinning(machine: Machine, card: Card) -> Check:
+    """A loop that spins (`receive="spin"`) on the CPU that is to bring the answer loses every
+    frame: the interrupt's work never gets its turn."""
+    id, cpu = "spin", machine.loop_cpu
+    if len(machine.cpus) < 2:
+        return warned(id, "unsafe: one CPU", 'the default, receive="wait"')
+    affinities = carriers(machine, card_interrupts(machine, card))
+    if not affinities:
+        return warned(id, "unsafe: who carries the answers is not known", 'receive="wait"')
+    if any(cpu in cpus for cpus in affinities.values()):
+        return warned(
+            id,
+            f"unsafe: CPU {cpu}, the loop's, also carries the card's answers",
+            'receive="wait" (the default), or the interrupts elsewhere (nic-interrupts)',
+        )
+    if cpu not in machine.isolated_cpus:
+        return warned(
+            id,
+            f"unsafe: CPU {cpu} is also everybody else's (cpu-isolated)",
+            'receive="wait" (the default)',
+        )
+    if (machine.number("/proc/sys/kernel/sched_rt_runtime_us") or 0) >= 0:
+        return warned(
+            id,
+            "a thread that never sleeps is stopped by the real-time limit",
+            "with a CPU of its own for it: sudo sysctl kernel.sched_rt_runtime_us=-1",
+        )
+    return passed(id, f"safe on CPU {cpu}: the answers come by CPU {others(affinities)}")
+
+
+def others(affinities: dict[int, frozenset[int]]) -> str:
+    return as_list(frozenset().union(*affinities.values()))
+
+
+CHECKS = (interrupts, spinning)

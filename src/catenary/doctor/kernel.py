@@ -1,0 +1,113 @@
+"""The kernel: how it lets a thread go first, limits real-time threads, keeps time; and what is
+below it."""
+
+from __future__ import annotations
+
+import re
+
+from catenary.doctor.check import Check, failed, passed, skipped, warned
+from catenary.doctor.machine import Machine
+
+CONFIGURED = {  # the default of the kernel's configuration: kernel/Kconfig.preempt
+    "CONFIG_PREEMPT_RT": "rt",
+    "CONFIG_PREEMPT": "full",
+    "CONFIG_PREEMPT_LAZY": "lazy",
+    "CONFIG_PREEMPT_VOLUNTARY": "voluntary",
+    "CONFIG_PREEMPT_NONE": "none",
+}
+DEBIAN_ARCHITECTURES = {"x86_64": "amd64", "aarch64": "arm64"}
+SHARP_TIMERS = 1e-6  # [s]
+
+
+def preemption_model(machine: Machine) -> str:
+    """rt, full, lazy, voluntary or none; empty where the kernel does not tell."""
+    version = machine.text("/proc/version") or ""
+    if machine.number("/sys/kernel/realtime") == 1 or re.search(r"PREEMPT[_ ]RT", version):
+        return "rt"
+    if chosen := re.search(r"\((\w+)\)", machine.text("/sys/kernel/debug/sched/preempt") or ""):
+        return chosen[1]
+    if machine.command_line.get("preempt"):
+        return machine.command_line["preempt"]
+    for option, model in CONFIGURED.items():
+        if machine.configuration.get(option) == "y":
+            return model
+    return "full" if re.search(r"\bPREEMPT\b", version) else ""
+
+
+def preemption(machine: Machine) -> Check:
+    id = "kernel-preemption"
+    release = machine.text("/proc/sys/kernel/osrelease") or "this kernel"
+    model = preemption_model(machine)
+    if model == "rt":
+        return passed(id, f"PREEMPT_RT ({release})")
+    if model == "full":
+        return warned(id, f"full preemption, not PREEMPT_RT ({release})", realtime_kernel(machine))
+    if model:
+        return failed(id, f"preemption {model} ({release})", realtime_kernel(machine))
+    return warned(id, f"not PREEMPT_RT, model not told ({release})", realtime_kernel(machine))
+
+
+def realtime_kernel(machine: Machine) -> str:
+    """How this distribution gives one."""
+    if machine.virtual or machine.container:
+        return "a PREEMPT_RT kernel on the host; figures of a guest or container follow its host's"
+    found = re.search(r'^ID="?(\w+)', machine.text("/etc/os-release") or "", re.MULTILINE)
+    distribution = found[1] if found else ""
+    if distribution == "debian":
+        architecture = DEBIAN_ARCHITECTURES.get(machine.architecture, machine.architecture)
+        return f"sudo apt install linux-image-rt-{architecture}; then reboot into it"
+    if distribution == "ubuntu":
+        return "sudo pro enable realtime-kernel (Ubuntu Pro, free for personal use); then reboot"
+    return "a kernel with CONFIG_PREEMPT_RT=y: your distribution's, or mainline from 6.12"
+
+
+def throttling(machine: Machine) -> Check:
+    """sched(7): real-time threads together get `runtime` of each `period`."""
+    id, path = "kernel-rt-throttling", "/proc/sys/kernel/sched_rt_runtime_us"
+    runtime = machine.number(path)
+    if runtime is None:
+        return skipped(id, machine.lack(path))
+    period = machine.number("/proc/sys/kernel/sched_rt_period_us") or 1_000_000
+    if runtime < 0:
+        return passed(id, "real-time threads are not limited")
+    share = 100 * runtime / period
+    if share >= 90:
+        return passed(
+            id,
+            f"real-time threads are stopped past {share:.0f} % of {period / 1e6:g} s: enough for a "
+            "loop that sleeps, not for one that spins (see spin)",
+        )
+    return failed(
+        id,
+        f"real-time threads are stopped past {share:.0f} % of {period / 1e6:g} s",
+        "sudo sysctl kernel.sched_rt_runtime_us=950000",
+    )
+
+
+def timers(machine: Machine) -> Check:
+    id = "kernel-timers"
+    if machine.clock is None:
+        return skipped(id, "the kernel does not tell its timers' resolution")
+    resolution = machine.clock.resolution
+    if resolution <= SHARP_TIMERS:
+        return passed(id, f"high resolution ({resolution * 1e9:.0f} ns)")
+    return failed(
+        id,
+        f"timers are {resolution * 1e3:g} ms coarse: no period shorter than that is kept",
+        "a kernel with CONFIG_HIGH_RES_TIMERS=y, started without highres=off",
+    )
+
+
+def virtual_machine(machine: Machine) -> Check:
+    id = "virtual-machine"
+    if not machine.virtual:
+        return passed(id, "none seen")
+    return warned(
+        id,
+        f"this is a virtual machine: {machine.virtual}; its host may stop it for milliseconds",
+        "run the loop on real hardware; a guest is good for programs on virtual segments "
+        '(cat.MainDevice("virtual"))',
+    )
+
+
+CHECKS = (preemption, throttling, timers, virtual_machine)

@@ -1,0 +1,89 @@
+"""How late this machine wakes a thread, as cyclictest measures it: absolute instants, a histogram.
+
+The thread is a `realtime.Task` in a `realtime.session()`, as a user's would be: SCHED_FIFO, locked
+memory, processors kept awake. What of that was refused is said, and the figures are those without.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+from catenary.doctor.check import Check, failed, passed, skipped, warned
+from catenary.doctor.machine import Machine
+from catenary.realtime import Task, Tasks, session
+from catenary.realtime.running import Running
+from catenary.realtime.statistics import Figure
+from catenary.realtime.tasks import may_have
+
+GOOD_SHARE, BAD_SHARE = 0.1, 0.5  # of the period
+
+
+@dataclass(frozen=True, slots=True)
+class Latency:
+    """Of every wake-up: [s] from its instant until the thread ran (Python included).
+
+    histogram: (from, to, wake-ups), the buckets that are not empty.
+    """
+
+    seconds: float
+    period: float
+    cpu: int | None
+    lateness: Figure
+    missed: int  # wake-ups that came a whole period late
+    scheduling: str
+    histogram: tuple[tuple[float, float, int], ...]
+
+
+def wake_up(task: Running) -> None:
+    for _ in task:
+        pass
+
+
+def measure(seconds: float, *, period: float, priority: int, cpu: int | None) -> Latency:
+    """Wakes a thread for so long [s]. ValueError: there is no such CPU."""
+    task = Task(wake_up, period=period, priority=priority, cpu=cpu, name="latency")
+    with (
+        session(best_effort=True) as prepared,
+        Tasks(task, run="threads", best_effort=True) as tasks,
+    ):
+        tasks.join(seconds)
+    statistics = tasks["latency"].statistics
+    buckets = tasks["latency"].histogram("jitter")
+    return Latency(
+        seconds,
+        period,
+        cpu,
+        statistics.jitter,
+        statistics.misses,
+        ", ".join((statistics.scheduling, *prepared.refusals)),
+        tuple(buckets),
+    )
+
+
+def obtainable_cpu(machine: Machine) -> int | None:
+    """The loop's CPU; None where this container is not given it."""
+    cpu, ours = machine.loop_cpu, os.sched_getaffinity(0)
+    return cpu if cpu in ours or may_have(cpu, ours) else None
+
+
+def judge(latency: Latency | None, machine: Machine) -> Check:
+    """The worst against the period of the loop this machine is judged for."""
+    id = "latency"
+    if latency is None or latency.lateness.count == 0:
+        return skipped(id, "not measured", "catenary doctor --seconds 3")
+    figure, period = latency.lateness, latency.period
+    found = (
+        f"{figure.count} wake-ups of {period * 1e6:g} us: median {figure.p50 * 1e6:.1f}, "
+        f"p99.9 {figure.p999 * 1e6:.1f}, worst {figure.max * 1e6:.1f} us late "
+        f"({latency.scheduling})"
+    )
+    if figure.max <= GOOD_SHARE * period:
+        return passed(id, found)
+    advice = (
+        "first what failed above; then again for longer and under load: "
+        "`catenary doctor --seconds 600` beside `stress-ng --cpu 0 --vm 2 --hdd 1`"
+    )
+    if machine.virtual:
+        advice = "a virtual machine is late whenever its host is; measure on the real one"
+    return (warned if figure.max <= BAD_SHARE * period else failed)(id, found, advice)

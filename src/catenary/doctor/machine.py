@@ -1,0 +1,201 @@
+"""Machine: what the kernel says of itself in files, below a root that a test can make."""
+
+from __future__ import annotations
+
+import gzip
+import os
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+from catenary.doctor.card import Card
+from catenary.doctor.clock_state import ClockState
+from catenary.realtime.preparation import SET_CAPABILITIES
+
+INITIAL_USER_NAMESPACE = (0, 0, 2**32 - 1)  # /proc/self/uid_map, user_namespaces(7)
+CAP_NET_RAW, CAP_IPC_LOCK, CAP_SYS_NICE = 13, 14, 23  # linux/capability.h
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Reads, and changes nothing.
+
+    card: what the driver of the network card answered; None: none was asked for.
+    clock: how the kernel's clock is being adjusted; None: it does not say.
+    wanted_cpu: the CPU the loop is to run on, where the user said so.
+    period: [s] of the loop this machine is judged for. priority: SCHED_FIFO of its thread.
+    """
+
+    root: Path = Path("/")
+    card: Card | None = None
+    clock: ClockState | None = None
+    wanted_cpu: int | None = None
+    period: float = 1e-3
+    priority: int = 80
+    architecture: str = field(default_factory=lambda: os.uname().machine)
+    permission_command: str = SET_CAPABILITIES
+
+    # files
+
+    def path(self, path: str) -> Path:
+        return self.root / path.lstrip("/")
+
+    def text(self, path: str) -> str | None:
+        """Without white space around it; None: `lack(path)` says why."""
+        try:
+            return self.path(path).read_text(errors="replace").strip()
+        except OSError:
+            return None
+
+    def number(self, path: str) -> int | None:
+        text = self.text(path)
+        return int(text) if text is not None and re.fullmatch(r"-?\d+", text) else None
+
+    def lack(self, path: str) -> str:
+        """Why a file has no text."""
+        try:
+            self.path(path).read_bytes()
+        except PermissionError:
+            return f"{path} may not be read by this user"
+        except FileNotFoundError:
+            return f"this kernel has no {path}"
+        except OSError as error:
+            return f"{path}: {error.strerror}"
+        return f"{path} holds {self.text(path)!r}"
+
+    def matching(self, pattern: str) -> list[str]:
+        """Paths, as the kernel names them, in their natural order."""
+        found = (f"/{path.relative_to(self.root)}" for path in self.root.glob(pattern.lstrip("/")))
+        return sorted(found, key=natural)
+
+    def exists(self, path: str) -> bool:
+        return self.path(path).exists()
+
+    # what several checks ask for
+
+    @cached_property
+    def command_line(self) -> dict[str, str]:
+        """The kernel's, `name=value`; a bare word has the value ""."""
+        words = (self.text("/proc/cmdline") or "").split()
+        return {name: value for name, _, value in (word.partition("=") for word in words)}
+
+    @cached_property
+    def configuration(self) -> dict[str, str]:
+        """CONFIG_... of the kernel; empty where it is not kept."""
+        release = self.text("/proc/sys/kernel/osrelease") or ""
+        text = self.text(f"/boot/config-{release}") or self._packed("/proc/config.gz")
+        return dict(re.findall(r"^(CONFIG_\w+)=(\S+)", text, re.MULTILINE))
+
+    def _packed(self, path: str) -> str:
+        try:
+            return gzip.decompress(self.path(path).read_bytes()).decode(errors="replace")
+        except (OSError, EOFError):
+            return ""
+
+    @cached_property
+    def processes(self) -> frozenset[str]:
+        """Names of the programs that run, those that this container sees."""
+        names = (self.text(path) for path in self.matching("/proc/[0-9]*/comm"))
+        return frozenset(name for name in names if name)
+
+    @cached_property
+    def cpus(self) -> frozenset[int]:
+        online = self.text("/sys/devices/system/cpu/online")
+        return cpu_list(online) or self.allowed_cpus or frozenset({0})
+
+    @cached_property
+    def allowed_cpus(self) -> frozenset[int]:
+        """Those this process is scheduled on; isolated ones have to be asked for by number."""
+        return cpu_list(self.status_field("Cpus_allowed_list"))
+
+    @cached_property
+    def isolated_cpus(self) -> frozenset[int]:
+        by_command_line = cpu_list(self.text("/sys/devices/system/cpu/isolated"))
+        return by_command_line | cpu_list(self.text("/sys/fs/cgroup/cpuset.cpus.isolated"))
+
+    @cached_property
+    def loop_cpu(self) -> int:
+        """Where the loop would run best: as wanted, else the last isolated CPU, else the last."""
+        if self.wanted_cpu is not None:
+            return self.wanted_cpu
+        return max(self.isolated_cpus or self.allowed_cpus or self.cpus)
+
+    @cached_property
+    def other_cpus(self) -> frozenset[int]:
+        """For everything but the loop; empty where there is one CPU."""
+        return self.cpus - self.isolated_cpus - {self.loop_cpu}
+
+    def status_field(self, name: str) -> str | None:
+        found = re.search(rf"^{name}:\s*(.*)", self.text("/proc/self/status") or "", re.MULTILINE)
+        return found[1].strip() if found else None
+
+    def limit(self, name: str) -> str | None:
+        """The soft limit of /proc/self/limits, as it stands there."""
+        text = self.text("/proc/self/limits") or ""
+        found = re.search(rf"^{re.escape(name)}\s+(\S+)", text, re.MULTILINE)
+        return found[1] if found else None
+
+    def capable(self, capability: int) -> bool:
+        return bool(int(self.status_field("CapEff") or "0", 16) >> capability & 1)
+
+    @cached_property
+    def in_user_namespace(self) -> bool:
+        """Capabilities there are none for the machine's processors and memory."""
+        text = self.text("/proc/self/uid_map")
+        return text is not None and tuple(map(int, text.split())) != INITIAL_USER_NAMESPACE
+
+    @cached_property
+    def virtual(self) -> str:
+        """The hypervisor's name or kind; empty on real hardware."""
+        if kind := self.text("/sys/hypervisor/type"):
+            return kind
+        if self.exists("/proc/device-tree/hypervisor"):
+            return "a hypervisor (device tree)"
+        if re.search(r"^flags\s*:.*\bhypervisor\b", self.text("/proc/cpuinfo") or "", re.MULTILINE):
+            names = (self.text(f"/sys/class/dmi/id/{name}") for name in DMI_NAMES)
+            return " ".join(filter(None, names)) or "a hypervisor (/proc/cpuinfo)"
+        return ""
+
+    @cached_property
+    def container(self) -> str:
+        """What kind of container this is; empty: none that can be seen."""
+        for path, kind in CONTAINER_FILES.items():
+            if self.exists(path):
+                return kind or self.text(path) or "of some kind"
+        found = re.search(r"docker|kubepods|libpod|lxc", self.text("/proc/1/cgroup") or "")
+        return found[0] if found else ""
+
+
+DMI_NAMES = ("sys_vendor", "product_name")
+CONTAINER_FILES = {  # systemd's detect-virt looks at the same; "" : its text names the kind
+    "/run/systemd/container": "",
+    "/run/.containerenv": "podman",
+    "/.dockerenv": "docker",
+}
+
+
+def natural(text: str) -> list[tuple[int, str]]:
+    """cpu2 before cpu10."""
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", text)]
+
+
+def cpu_list(text: str | None) -> frozenset[int]:
+    """`0-3,8` as cpuset(7) writes it. Empty where there is none, and for nohz_full's `(null)`."""
+    cpus: set[int] = set()
+    for part in (text or "").split(","):
+        if found := re.fullmatch(r"\s*(\d+)(?:-(\d+))?\s*", part):
+            cpus |= set(range(int(found[1]), int(found[2] or found[1]) + 1))
+    return frozenset(cpus)
+
+
+def as_list(cpus: Iterable[int]) -> str:
+    """Shortest, as the kernel takes it: `0-3,8`."""
+    runs: list[list[int]] = []
+    for cpu in sorted(cpus):
+        if runs and cpu == runs[-1][1] + 1:
+            runs[-1][1] = cpu
+        else:
+            runs.append([cpu, cpu])
+    return ",".join(f"{first}" if first == last else f"{first}-{last}" for first, last in runs)

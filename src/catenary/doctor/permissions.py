@@ -1,0 +1,172 @@
+"""What this user and this interpreter may do: memory, priorities, raw frames; and what a container
+takes away."""
+
+from __future__ import annotations
+
+from catenary.doctor.change import Change
+from catenary.doctor.check import Check, failed, passed, skipped, warned
+from catenary.doctor.machine import (
+    CAP_IPC_LOCK,
+    CAP_NET_RAW,
+    CAP_SYS_NICE,
+    Machine,
+    as_list,
+)
+
+ENOUGH_LOCKED = 2**30  # [bytes] a Python with NumPy and Numba maps several hundred MiB
+HUGE_PAGES = "/sys/kernel/mm/transparent_hugepage/enabled"
+LIMITS = "/etc/security/limits.d/realtime.conf"
+UNLIMITED = "unlimited"
+
+
+def limits_line(what: str) -> str:
+    return f"`@realtime - {what}` in {LIMITS} (your user in that group; log in again)"
+
+
+def memory_lock(machine: Machine) -> Check:
+    id = "limit-memlock"
+    if machine.in_user_namespace:
+        return namespace(machine, id, "Max locked memory", ENOUGH_LOCKED)
+    if machine.capable(CAP_IPC_LOCK):
+        return passed(id, "all memory may be locked (CAP_IPC_LOCK)")
+    limit = machine.limit("Max locked memory")
+    if limit is None:
+        return skipped(id, machine.lack("/proc/self/limits"))
+    if limit == UNLIMITED or int(limit) >= ENOUGH_LOCKED:
+        return passed(id, f"{limit} may be locked")
+    return failed(
+        id,
+        f"{int(limit) // 1024} KiB may be locked: page faults will stop the loop",
+        f"once: {machine.permission_command}; or {limits_line('memlock unlimited')}",
+    )
+
+
+def priority(machine: Machine) -> Check:
+    """RLIMIT_RTPRIO and RLIMIT_RTTIME, setrlimit(2)."""
+    id = "limit-rtprio"
+    if machine.in_user_namespace:
+        return namespace(machine, id, "Max realtime priority", machine.priority)
+    timeout = machine.limit("Max realtime timeout") or UNLIMITED
+    if machine.capable(CAP_SYS_NICE):
+        return passed(id, "any real-time priority (CAP_SYS_NICE)")
+    limit = machine.limit("Max realtime priority")
+    if limit is None:
+        return skipped(id, machine.lack("/proc/self/limits"))
+    if limit != UNLIMITED and int(limit) < machine.priority:
+        return failed(
+            id,
+            f"priorities up to {limit}, and the loop wants SCHED_FIFO {machine.priority}",
+            f"once: {machine.permission_command}; or {limits_line('rtprio 95')}",
+        )
+    if timeout != UNLIMITED:
+        return warned(
+            id,
+            f"the kernel ends a real-time thread that runs {timeout} us without sleeping",
+            "ulimit -R unlimited",
+        )
+    return passed(id, f"real-time priorities up to {limit}")
+
+
+def namespace(machine: Machine, id: str, limit: str, wanted: int) -> Check:
+    """user_namespaces(7): root there has no capability over the machine; its limits hold."""
+    value = machine.limit(limit) or "0"
+    if value == UNLIMITED or int(value) >= wanted:
+        return passed(id, f"{value}, by a limit (user namespace)")
+    return failed(
+        id,
+        f"this is a user namespace, whose root is none for this ({limit.lower()}: {value})",
+        "run outside of it; rootful containers: --cap-add SYS_NICE --cap-add IPC_LOCK",
+    )
+
+
+def raw_frames(machine: Machine) -> Check:
+    id = "permission-raw-socket"
+    if machine.capable(CAP_NET_RAW):
+        return passed(id, "raw Ethernet frames are permitted (CAP_NET_RAW)")
+    return failed(
+        id,
+        "no raw Ethernet frames: a network interface cannot be opened",
+        f"without root, once: {machine.permission_command}",
+    )
+
+
+def huge_pages(machine: Machine) -> Check:
+    """Documentation/admin-guide/mm/transhuge.rst"""
+    id = "memory-huge-pages"
+    text = machine.text(HUGE_PAGES)
+    if text is None:
+        return skipped(id, machine.lack(HUGE_PAGES))
+    if "[always]" not in text:
+        return passed(id, "only where a program asks for them")
+    return warned(
+        id,
+        "transparent huge pages everywhere: the kernel moves memory about while programs run",
+        f"echo madvise | sudo tee {HUGE_PAGES}",
+        (Change(HUGE_PAGES, "madvise"),),
+    )
+
+
+def container(machine: Machine) -> Check:
+    """The limits that a control group puts on processors."""
+    id = "container"
+    if quota := processor_quota(machine):
+        return failed(
+            id,
+            f"{quota}: the loop stands still for the rest",
+            "no CPU limit for it: docker run without --cpus, Kubernetes: no limits.cpu; "
+            "systemd: CPUQuota=",
+        )
+    if realtime_runtime(machine) == 0:
+        return failed(
+            id,
+            "this control group has no real-time runtime (CONFIG_RT_GROUP_SCHED), so SCHED_FIFO is "
+            "refused even to root",
+            "docker run --cpu-rt-runtime=950000 --ulimit rtprio=95, or "
+            "rt_group_sched=0 on the kernel's command line (from 6.13)",
+        )
+    where = f"in a container ({machine.container})" if machine.container else "none seen"
+    few = machine.cpus - machine.allowed_cpus - machine.isolated_cpus
+    if few and machine.allowed_cpus:
+        where += f"; this process runs on CPU {as_list(machine.allowed_cpus)} only"
+    return passed(id, where)
+
+
+def groups(machine: Machine, controller: str) -> list[str]:
+    """Folders of this process's control group and those above, cgroups(7): version 2, then 1."""
+    folders = []
+    for line in (machine.text("/proc/self/cgroup") or "").splitlines():
+        number, controllers, path = line.split(":", 2)
+        if number == "0":
+            top = "/sys/fs/cgroup"
+        elif controller in controllers.split(","):
+            top = f"/sys/fs/cgroup/{controllers}"
+        else:
+            continue
+        parts = [part for part in path.split("/") if part]
+        folders += ["/".join([top, *parts[:depth]]) for depth in range(len(parts), -1, -1)]
+    return folders
+
+
+def processor_quota(machine: Machine) -> str:
+    """In words; empty: none."""
+    for folder in groups(machine, "cpu"):
+        quota, _, period = (machine.text(f"{folder}/cpu.max") or "max").partition(" ")
+        if quota != "max":
+            return f"{int(quota) / 1e3:g} ms of processor in every {int(period) / 1e3:g} ms"
+        old = machine.number(f"{folder}/cpu.cfs_quota_us") or -1
+        if old > 0:
+            length = machine.number(f"{folder}/cpu.cfs_period_us") or 100_000
+            return f"{old / 1e3:g} ms of processor in every {length / 1e3:g} ms"
+    return ""
+
+
+def realtime_runtime(machine: Machine) -> int | None:
+    """[us] of the process's own group, version 1; None: it does not say."""
+    for folder in groups(machine, "cpu"):
+        runtime = machine.number(f"{folder}/cpu.rt_runtime_us")
+        if runtime is not None:
+            return runtime
+    return None
+
+
+CHECKS = (memory_lock, priority, raw_frames, huge_pages, container)

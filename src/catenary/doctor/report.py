@@ -1,0 +1,137 @@
+"""The examination for people (a line a check, the advice below it) and for programs."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from collections import Counter
+from collections.abc import Iterator, Sequence
+
+from catenary.doctor.change import Change, Ground
+from catenary.doctor.check import Check, Status
+from catenary.doctor.examination import Examination
+from catenary.doctor.latency import Latency
+
+COLOURS = {"PASS": "\033[32m", "WARN": "\033[33m", "FAIL": "\033[31m", "SKIP": "\033[2m"}
+PLAIN = "\033[0m"
+WIDTH = 100
+ID_WIDTH = 22
+INDENT = " " * (2 + 6 + ID_WIDTH)
+BAR = 40  # characters
+STEPS_US = (2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 50_000)
+BEYOND = 10**9  # the step of all that is above the last
+NOUNS: dict[Status, str] = {"PASS": "passed", "WARN": "warnings", "FAIL": "failed", "SKIP": "not known"}
+
+
+def as_text(examination: Examination, *, colour: bool = False) -> str:
+    lines = []
+    for title, checks in examination.groups:
+        lines += ["", title[:1].upper() + title[1:]]
+        for check in checks:
+            lines += check_lines(check, colour)
+    if examination.latency is not None:
+        lines += histogram_lines(examination.latency)
+    return "\n".join([*lines[1:], "", *summary_lines(examination)])
+
+
+def check_lines(check: Check, colour: bool) -> Iterator[str]:
+    status = f"{COLOURS[check.status]}{check.status}{PLAIN}" if colour else check.status
+    first, *rest = wrap(check.found)
+    yield f"  {status}  {check.id:{ID_WIDTH}}{first}"
+    yield from (INDENT + line for line in rest)
+    if check.advice:
+        first, *rest = wrap(check.advice, margin=2)
+        yield f"{INDENT}> {first}"
+        yield from (f"{INDENT}  {line}" for line in rest)
+
+
+def wrap(text: str, margin: int = 0) -> list[str]:
+    width = WIDTH - len(INDENT) - margin
+    return textwrap.wrap(text, width, break_long_words=False, break_on_hyphens=False) or [""]
+
+
+def histogram_lines(latency: Latency) -> Iterator[str]:
+    """Wake-ups by how late they were, in steps of 1, 2, 5."""
+    counts = by_steps(latency)
+    most = max(counts.values(), default=0)
+    for step in sorted(counts):
+        bar = "#" * max(1, round(counts[step] / most * BAR))
+        yield f"{INDENT}{step_words(step):>18}  {counts[step]:8d}  {bar}"
+
+
+def step_words(step: int) -> str:
+    if step == BEYOND:
+        return f"more than {STEPS_US[-1]} us"
+    lower = max((below for below in STEPS_US if below < step), default=0)
+    return f"{lower} to {step} us"
+
+
+def by_steps(latency: Latency) -> dict[int, int]:
+    """Each bucket counts where its upper end lies."""
+    counts: dict[int, int] = {}
+    for _, above, count in latency.histogram:
+        step = next((step for step in STEPS_US if above * 1e6 <= step), BEYOND)
+        counts[step] = counts.get(step, 0) + count
+    return counts
+
+
+def summary_lines(examination: Examination) -> Iterator[str]:
+    counted = Counter(check.status for check in examination.checks)
+    counts = ", ".join(f"{counted[status]} {noun}" for status, noun in NOUNS.items())
+    yield f"{len(examination.checks)} checks: {counts}"
+    if failed := [check.id for check in examination.checks if check.status == "FAIL"]:
+        yield f"Not fit for a real-time loop as it is; first: {', '.join(failed)}"
+    elif counted["WARN"]:
+        yield "A loop will run here; the warnings are where its late cycles may come from."
+    else:
+        yield "Fit for a real-time loop, as far as can be seen."
+    if examination.changes:
+        yield f"--apply can change {len(examination.changes)} settings, until the next start"
+    yield "What each check means, and why: docs/doctor.md"
+
+
+def change_lines(changes: Sequence[Change], ground: Ground) -> Iterator[str]:
+    """Each with what is there now."""
+    for change in changes:
+        try:
+            now = ground.read(change.target)
+        except OSError as error:
+            now = f"({error.strerror})"
+        yield f"  {change.target}: {now} -> {change.after}"
+
+
+def as_json(examination: Examination) -> str:
+    """`latency_us` is empty where nothing was measured; its times are in us, but for `seconds`."""
+    return json.dumps(
+        {
+            "checks": [
+                {
+                    "id": check.id,
+                    "status": check.status,
+                    "found": check.found,
+                    "advice": check.advice,
+                }
+                for check in examination.checks
+            ],
+            "latency_us": latency_us(examination.latency) if examination.latency else {},
+        },
+        indent=2,
+    )
+
+
+def latency_us(latency: Latency) -> dict[str, object]:
+    figure = latency.lateness
+    times = ("mean", "min", "max", "sd", "p50", "p99", "p999")
+    return {
+        "seconds": latency.seconds,
+        "period": latency.period * 1e6,
+        "cpu": latency.cpu,
+        "scheduling": latency.scheduling,
+        "count": figure.count,
+        "missed": latency.missed,
+        **{name: round(getattr(figure, name) * 1e6, 3) for name in times},
+        "histogram": [
+            [round(low * 1e6, 3), round(above * 1e6, 3), count]
+            for low, above, count in latency.histogram
+        ],
+    }
