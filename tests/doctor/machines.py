@@ -28,7 +28,9 @@ def make(root: Path, files: Files, **facts: object) -> Machine:
 
 
 def status(*, capabilities: int = 0, cpus: str = "0-3") -> str:
-    return f"Name:\tpython\nCapEff:\t{capabilities:016x}\nCpus_allowed:\tf\nCpus_allowed_list:\t{cpus}"
+    return (
+        f"Name:\tpython\nCapEff:\t{capabilities:016x}\nCpus_allowed:\tf\nCpus_allowed_list:\t{cpus}"
+    )
 
 
 def limits(*, memlock: str, rtprio: str, timeout: str = "unlimited") -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 
 import pytest
 
@@ -72,6 +73,17 @@ def test_a_set_refuses():
             Task(idle, name="a", period=1e-3, trigger=alarm),
             Task(idle, name="b", period=1e-3, trigger=alarm),
         )
+
+
+def test_a_cpu_that_is_kept_free_may_be_asked_for():
+    """isolcpus takes it out of everybody's set, and sched_setaffinity gives it."""
+    ours = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(ours)})
+    try:
+        assert len(Tasks(Task(idle, period=1e-3, cpu=max(ours)))) == 1
+        assert os.sched_getaffinity(0) == {min(ours)}
+    finally:
+        os.sched_setaffinity(0, ours)
 
 
 def test_a_function_that_a_process_cannot_import_is_refused_before_anything_starts():

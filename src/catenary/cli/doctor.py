@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import sys
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
@@ -11,6 +12,8 @@ from typing import TYPE_CHECKING
 from catenary.cli.arguments import number, positive_seconds
 from catenary.cli.failure import FAILED, UsageError
 from catenary.cli.parsers import Commands, add_command, add_json
+
+WIDTH = 100  # of the report, where the terminal is not narrower
 
 if TYPE_CHECKING:
     from catenary.doctor import Change, Examination
@@ -67,7 +70,10 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print(as_json(examination))
     else:
-        print(as_text(examination, colour=sys.stdout.isatty() and "NO_COLOR" not in os.environ))
+        terminal = sys.stdout.isatty()
+        columns = shutil.get_terminal_size().columns if terminal else WIDTH
+        colour = terminal and "NO_COLOR" not in os.environ
+        print(as_text(examination, colour=colour, width=min(columns, WIDTH)))
     if arguments.apply:
         return apply(examination.changes, ask=not arguments.yes)
     return FAILED if examination.failed else 0
@@ -75,10 +81,16 @@ def run(arguments: argparse.Namespace) -> int:
 
 def look(arguments: argparse.Namespace) -> Examination:
     from catenary.doctor import examine, measure, obtainable_cpu, this_machine
+    from catenary.errors import LinkError
 
-    machine = this_machine(
-        arguments.nic, cpu=arguments.cpu, period=arguments.period, priority=arguments.priority
-    )
+    try:
+        machine = this_machine(
+            arguments.nic, cpu=arguments.cpu, period=arguments.period, priority=arguments.priority
+        )
+    except LinkError as error:  # 1 is for checks that failed
+        raise UsageError(error.message, hint=error.hint) from error
+    except ValueError as error:
+        raise UsageError(str(error)) from error
     if not arguments.seconds:
         return examine(machine)
     if not arguments.json and sys.stderr.isatty():

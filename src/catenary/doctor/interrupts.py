@@ -86,12 +86,6 @@ def spinning(machine: Machine, card: Card) -> Check:
             f"unsafe: CPU {cpu} is also everybody else's (cpu-isolated)",
             'receive="wait" (the default)',
         )
-    if (machine.number("/proc/sys/kernel/sched_rt_runtime_us") or 0) >= 0:
-        return warned(
-            id,
-            "a thread that never sleeps is stopped by the real-time limit",
-            "with a CPU of its own for it: sudo sysctl kernel.sched_rt_runtime_us=-1",
-        )
     return passed(id, f"safe on CPU {cpu}: the answers come by CPU {others(affinities)}")
 
 

@@ -74,12 +74,12 @@ def throttling(machine: Machine) -> Check:
     if share >= 90:
         return passed(
             id,
-            f"real-time threads are stopped past {share:.0f} % of {period / 1e6:g} s: enough for a "
-            "loop that sleeps, not for one that spins (see spin)",
+            f"real-time threads get up to {share:.0f} % of {period / 1e6:g} s: enough for a loop, "
+            "which sleeps in every cycle",
         )
     return failed(
         id,
-        f"real-time threads are stopped past {share:.0f} % of {period / 1e6:g} s",
+        f"real-time threads are stopped after {share:.0f} % of {period / 1e6:g} s",
         "sudo sysctl kernel.sched_rt_runtime_us=950000",
     )
 

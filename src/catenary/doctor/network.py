@@ -172,7 +172,8 @@ def eee(machine: Machine, card: Card) -> Check:
         return passed(id, "off")
     return warned(
         id,
-        "energy-efficient Ethernet is on" + (" and agreed: waking takes 17 us" * card.eee.active),
+        "energy-efficient Ethernet is on"
+        + (" and agreed: waking the link takes about 20 us" * card.eee.active),
         f"sudo ethtool --set-eee {card.name} eee off",
         (Change(f"{ETHTOOL}{card.name}/eee", "0"),),
     )

@@ -14,39 +14,44 @@ from catenary.doctor.latency import Latency
 
 COLOURS = {"PASS": "\033[32m", "WARN": "\033[33m", "FAIL": "\033[31m", "SKIP": "\033[2m"}
 PLAIN = "\033[0m"
-WIDTH = 100
+WIDTH, NARROWEST = 100, 60
 ID_WIDTH = 22
 INDENT = " " * (2 + 6 + ID_WIDTH)
 BAR = 40  # characters
 STEPS_US = (2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 50_000)
 BEYOND = 10**9  # the step of all that is above the last
-NOUNS: dict[Status, str] = {"PASS": "passed", "WARN": "warnings", "FAIL": "failed", "SKIP": "not known"}
+NOUNS: dict[Status, str] = {
+    "PASS": "passed",
+    "WARN": "warnings",
+    "FAIL": "failed",
+    "SKIP": "not known",
+}
 
 
-def as_text(examination: Examination, *, colour: bool = False) -> str:
+def as_text(examination: Examination, *, colour: bool = False, width: int = WIDTH) -> str:
     lines = []
     for title, checks in examination.groups:
         lines += ["", title[:1].upper() + title[1:]]
         for check in checks:
-            lines += check_lines(check, colour)
+            lines += check_lines(check, colour, max(width, NARROWEST))
     if examination.latency is not None:
         lines += histogram_lines(examination.latency)
-    return "\n".join([*lines[1:], "", *summary_lines(examination)])
+    return "\n".join([*lines[1:], "", *summary_lines(examination, width)])
 
 
-def check_lines(check: Check, colour: bool) -> Iterator[str]:
+def check_lines(check: Check, colour: bool, width: int) -> Iterator[str]:
     status = f"{COLOURS[check.status]}{check.status}{PLAIN}" if colour else check.status
-    first, *rest = wrap(check.found)
+    first, *rest = wrap(check.found, width - len(INDENT))
     yield f"  {status}  {check.id:{ID_WIDTH}}{first}"
     yield from (INDENT + line for line in rest)
     if check.advice:
-        first, *rest = wrap(check.advice, margin=2)
+        first, *rest = wrap(check.advice, width - len(INDENT) - 2)
         yield f"{INDENT}> {first}"
         yield from (f"{INDENT}  {line}" for line in rest)
 
 
-def wrap(text: str, margin: int = 0) -> list[str]:
-    width = WIDTH - len(INDENT) - margin
+def wrap(text: str, width: int) -> list[str]:
+    """Commands and paths stay whole, however long."""
     return textwrap.wrap(text, width, break_long_words=False, break_on_hyphens=False) or [""]
 
 
@@ -75,12 +80,13 @@ def by_steps(latency: Latency) -> dict[int, int]:
     return counts
 
 
-def summary_lines(examination: Examination) -> Iterator[str]:
+def summary_lines(examination: Examination, width: int) -> Iterator[str]:
     counted = Counter(check.status for check in examination.checks)
     counts = ", ".join(f"{counted[status]} {noun}" for status, noun in NOUNS.items())
     yield f"{len(examination.checks)} checks: {counts}"
     if failed := [check.id for check in examination.checks if check.status == "FAIL"]:
-        yield f"Not fit for a real-time loop as it is; first: {', '.join(failed)}"
+        words = f"Not fit for a real-time loop as it is; first: {', '.join(failed)}"
+        yield from wrap(words, width)
     elif counted["WARN"]:
         yield "A loop will run here; the warnings are where its late cycles may come from."
     else:

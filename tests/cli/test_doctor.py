@@ -1,0 +1,115 @@
+"""`catenary doctor`: on this machine, whatever it is; and on made ones."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from catenary import doctor
+from catenary.cli import main
+from tests.doctor import machines
+
+
+@pytest.fixture
+def machine(tmp_path, monkeypatch):
+    """The laptop, whose changes go to its own files, instead of this machine."""
+    root = tmp_path / "laptop"
+    laptop = machines.make(root, machines.LAPTOP)
+    monkeypatch.setattr(doctor, "this_machine", lambda *_, **__: laptop)
+    monkeypatch.setattr(doctor, "MachineGround", lambda: doctor.change.MachineGround(root))
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    return laptop
+
+
+def test_this_machine(capsys):
+    status = main(["doctor", "--seconds", "0.1"])
+    out = capsys.readouterr().out
+    assert out.startswith("Kernel\n")
+    assert " wake-ups of 1000 us: median " in " ".join(out.split())
+    assert status == (1 if "\nNot fit " in out else 0)
+
+
+def test_json(capsys):
+    main(["doctor", "lo", "--json", "--seconds", "0.1", "--period", "0.002"])
+    told = json.loads(capsys.readouterr().out)
+    statuses = {check["id"]: check["status"] for check in told["checks"]}
+    assert statuses["nic-driver"] == "FAIL"
+    assert told["latency_us"]["period"] == 2000.0
+    assert told["latency_us"]["count"] > 0
+
+
+def test_a_wire(veth, capsys):
+    main(["doctor", veth[0], "--seconds", "0"])
+    out = capsys.readouterr().out
+    assert "veth: not a card but software" in out
+    assert "not measured" in out
+
+
+def test_the_statuses(machine, tmp_path, monkeypatch, capsys):
+    assert main(["doctor", "--seconds", "0"]) == 1
+    good = machines.controller(tmp_path / "controller")
+    monkeypatch.setattr(doctor, "this_machine", lambda *_, **__: good)
+    assert main(["doctor", "--seconds", "0"]) == 0
+
+
+def test_a_card_there_is_none_of(capsys):
+    assert main(["doctor", "nope"]) == 2
+    err = capsys.readouterr().err
+    assert "there is no network interface 'nope'" in err
+    assert "hint: there are: " in err
+
+
+def test_a_cpu_there_is_none_of(capsys):
+    assert main(["doctor", "--cpu", "5000"]) == 2
+    assert "CPU 5000 does not exist" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--apply", "--undo"], "not allowed with"),
+        (["--seconds", "-1"], "is not between"),
+        (["--period", "1e-9"], "the shortest is 20 us"),
+        (["--priority", "100"], "priority 100 is not within 1 to 99"),
+    ],
+)
+def test_usage(capsys, arguments, words):
+    with pytest.raises(SystemExit) as exit:
+        main(["doctor", *arguments])
+    assert exit.value.code == 2
+    assert words in capsys.readouterr().err
+
+
+def test_json_changes_nothing(capsys):
+    assert main(["doctor", "--json", "--apply"]) == 2
+    assert "--json only looks" in capsys.readouterr().err
+
+
+def test_apply_lists_first_and_undo_takes_back(machine, capsys):
+    pages = machine.path("/sys/kernel/mm/transparent_hugepage/enabled")
+    assert main(["doctor", "--seconds", "0", "--apply", "--yes"]) == 0
+    out = capsys.readouterr().out
+    target = "/sys/kernel/mm/transparent_hugepage/enabled"
+    listed, done = out.index(f"{target}: always -> madvise"), out.index(f"done: {target}")
+    assert listed < done
+    assert pages.read_text() == "madvise"
+    assert main(["doctor", "--undo"]) == 0
+    assert f"undone: {target} = always" in capsys.readouterr().out
+    assert pages.read_text() == "always"
+    assert main(["doctor", "--undo"]) == 0
+    assert "Nothing to undo" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("answer", "after"), [("y", "madvise"), ("", "[always] madvise never\n")])
+def test_apply_asks(machine, monkeypatch, capsys, answer, after):
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
+    monkeypatch.setattr("builtins.input", lambda _: answer)
+    assert main(["doctor", "--seconds", "0", "--apply"]) == 0
+    assert machine.path("/sys/kernel/mm/transparent_hugepage/enabled").read_text() == after
+
+
+def test_nobody_to_ask(machine, monkeypatch, capsys):
+    monkeypatch.setattr("sys.stdin.isatty", lambda: False, raising=False)
+    assert main(["doctor", "--seconds", "0", "--apply"]) == 2
+    assert "hint: --apply --yes" in capsys.readouterr().err

@@ -1,0 +1,72 @@
+"""Permissions and containers."""
+
+from __future__ import annotations
+
+import pytest
+
+from catenary.doctor.permissions import container, memory_lock, priority, raw_frames
+from tests.doctor.machines import ROOT_USERS, limits, make, status
+
+ALL = 2**41 - 1
+
+
+def user(root, capabilities=0, uid_map=ROOT_USERS, **files):
+    given = {"/proc/self/status": status(capabilities=capabilities), "/proc/self/uid_map": uid_map}
+    return make(root, {**given, **files})
+
+
+@pytest.mark.parametrize(
+    ("memlock", "rtprio", "verdicts"),
+    [
+        ("8388608", "0", "FAIL FAIL"),
+        ("unlimited", "95", "PASS PASS"),
+        ("4294967296", "80", "PASS PASS"),
+        ("unlimited", "79", "PASS FAIL"),  # the loop's thread wants 80
+    ],
+)
+def test_limits_of_an_ordinary_user(tmp_path, memlock, rtprio, verdicts):
+    machine = user(tmp_path, **{"/proc/self/limits": limits(memlock=memlock, rtprio=rtprio)})
+    assert f"{memory_lock(machine).status} {priority(machine).status}" == verdicts
+
+
+def test_capabilities_make_up_for_limits(tmp_path):
+    machine = user(tmp_path, ALL, **{"/proc/self/limits": limits(memlock="0", rtprio="0")})
+    checks = (memory_lock(machine), priority(machine), raw_frames(machine))
+    assert {check.status for check in checks} == {"PASS"}
+
+
+def test_root_of_a_user_namespace_has_raw_frames_alone(tmp_path):
+    machine = user(
+        tmp_path, ALL, "0 1000 1", **{"/proc/self/limits": limits(memlock="8388608", rtprio="0")}
+    )
+    assert raw_frames(machine).status == "PASS"
+    for check in (memory_lock(machine), priority(machine)):
+        assert (check.status, "user namespace" in check.found) == ("FAIL", True)
+
+
+def test_a_limit_of_running_time(tmp_path):
+    limit = limits(memlock="0", rtprio="95", timeout="200000")
+    check = priority(user(tmp_path, **{"/proc/self/limits": limit}))
+    assert (check.status, "200000 us" in check.found) == ("WARN", True)
+
+
+def test_without_permission_the_command_is_given(tmp_path):
+    check = raw_frames(user(tmp_path))
+    assert (check.status, check.advice) == ("FAIL", "without root, once: sudo setcap ... python")
+
+
+@pytest.mark.parametrize(
+    ("files", "status", "words"),
+    [
+        ({"/sys/fs/cgroup/a/b/cpu.max": "max 100000"}, "PASS", "none seen"),
+        ({"/sys/fs/cgroup/a/cpu.max": "50000 100000"}, "FAIL", "50 ms of processor in every 100"),
+        ({"/sys/fs/cgroup/cpu,cpuacct/d/cpu.cfs_quota_us": "-1"}, "PASS", "none seen"),
+        ({"/sys/fs/cgroup/cpu,cpuacct/d/cpu.cfs_quota_us": "20000"}, "FAIL", "20 ms of processor"),
+        ({"/sys/fs/cgroup/cpu,cpuacct/d/cpu.rt_runtime_us": "0"}, "FAIL", "SCHED_FIFO is refused"),
+        ({"/sys/fs/cgroup/cpu,cpuacct/d/cpu.rt_runtime_us": "950000"}, "PASS", "none seen"),
+    ],
+)
+def test_control_groups(tmp_path, files, status, words):
+    groups = {"/proc/self/cgroup": "4:memory:/x\n2:cpu,cpuacct:/d\n0::/a/b"}
+    check = container(make(tmp_path, {**groups, **files}))
+    assert (check.status, words in check.found) == (status, True)

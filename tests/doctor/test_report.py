@@ -1,0 +1,75 @@
+"""The report for people and for programs."""
+
+from __future__ import annotations
+
+import json
+
+from catenary.doctor.examination import examine
+from catenary.doctor.report import as_json, as_text
+from tests.doctor import machines
+from tests.doctor.test_latency import latency
+
+
+def test_a_line_a_check_with_the_advice_below(tmp_path):
+    lines = as_text(examine(machines.laptop(tmp_path))).splitlines()
+    assert lines[:2] == [
+        "Kernel",
+        "  FAIL  kernel-preemption     preemption voluntary (6.8.0-45-generic)",
+    ]
+    assert lines[2].strip().startswith("> sudo pro enable realtime-kernel")
+    assert max(map(len, lines)) <= 100
+
+
+def test_the_summary_is_last(tmp_path):
+    bad = as_text(examine(machines.laptop(tmp_path / "a"))).splitlines()
+    assert bad[-5] == "27 checks: 6 passed, 16 warnings, 4 failed, 1 not known"
+    assert bad[-4].startswith("Not fit for a real-time loop as it is; first: kernel-preemption")
+    assert bad[-2] == "--apply can change 12 settings, until the next start"
+    good = as_text(examine(machines.controller(tmp_path / "b"), latency(30e-6))).splitlines()
+    assert good[-3] == "27 checks: 27 passed, 0 warnings, 0 failed, 0 not known"
+    assert good[-2] == "Fit for a real-time loop, as far as can be seen."
+
+
+def test_a_narrow_terminal(tmp_path):
+    words = as_text(examine(machines.laptop(tmp_path)), width=80)
+    long = [line for line in words.splitlines() if len(line) > 80]
+    assert all(" " not in line.split("> ")[-1].strip() for line in long)  # a path alone
+
+
+def test_colour_only_where_it_is_wanted(tmp_path):
+    examination = examine(machines.laptop(tmp_path))
+    assert "\033[" not in as_text(examination)
+    assert "\033[31mFAIL\033[0m" in as_text(examination, colour=True)
+
+
+def test_the_histogram(tmp_path):
+    text = as_text(examine(machines.controller(tmp_path), latency(0.3)))
+    rows = [line.split() for line in text.splitlines() if line.endswith("#")]
+    assert rows == [
+        ["2", "to", "5", "us", "2999", "#" * 40],
+        ["more", "than", "50000", "us", "1", "#"],
+    ]
+
+
+def test_json_is_as_promised(tmp_path):
+    examination = examine(machines.controller(tmp_path), latency(30e-6))
+    told = json.loads(as_json(examination))
+    assert set(told) == {"checks", "latency_us"}
+    assert all(list(check) == ["id", "status", "found", "advice"] for check in told["checks"])
+    assert [check["id"] for check in told["checks"]] == [check.id for check in examination.checks]
+    assert told["latency_us"]["p50"] == 4.0
+    assert told["latency_us"]["max"] == 30.0
+    assert told["latency_us"]["histogram"] == [[2.0, 4.0, 2999], [30.0, 30.0, 1]]
+    assert json.loads(as_json(examine(machines.controller(tmp_path))))["latency_us"] == {}
+
+
+def test_ids_are_the_headings_of_the_manual(tmp_path):
+    from tests.conftest import ROOT
+
+    manual = (ROOT / "docs" / "doctor.md").read_text()
+    ids = {check.id for check in examine(machines.controller(tmp_path / "a")).checks}
+    ids |= {check.id for check in examine(machines.make(tmp_path / "b", {})).checks}
+    headings = {
+        line.removeprefix("### ") for line in manual.splitlines() if line.startswith("### ")
+    }
+    assert headings == ids
