@@ -38,6 +38,12 @@ def test_a_guest_is_told_to_measure_elsewhere(tmp_path):
     assert check.advice.startswith("a virtual machine is late")
 
 
+def test_without_priority_that_is_to_be_had_first(tmp_path):
+    refused = replace(latency(0.5), scheduling="SCHED_OTHER, SCHED_FIFO 80 refused")
+    check = judge(refused, make(tmp_path, GUEST))
+    assert check.advice.startswith("first the permissions (limit-rtprio")
+
+
 def test_nothing_measured_is_no_verdict(tmp_path):
     machine = make(tmp_path, {})
     assert judge(None, machine).status == "SKIP"

@@ -8,7 +8,7 @@ from tests.doctor.machines import CPU, controller, each_cpu, laptop, make
 
 def test_the_boot_line_leaves_the_last_cpu_to_the_loop(tmp_path):
     check = isolated(laptop(tmp_path))
-    assert check.advice.startswith("isolcpus=3 rcu_nocbs=3 irqaffinity=0-2 in GRUB_CMDLINE_LINUX")
+    assert check.advice.startswith("`isolcpus=3 rcu_nocbs=3 irqaffinity=0-2` in GRUB_CMDLINE_LINUX")
 
 
 def test_a_loop_beside_the_cpu_kept_free(tmp_path):

@@ -58,7 +58,7 @@ def slewing(machine: Machine) -> Check:
         return warned(
             id,
             f"{' and '.join(strong)} may bend the clock by up to {daemons[strong[0]]:.0f} ppm",
-            "chrony: `maxslewrate 100` in /etc/chrony/chrony.conf, sudo systemctl restart chrony"
+            "chrony: `maxslewrate 100` in /etc/chrony/chrony.conf; sudo systemctl restart chrony"
             if "chronyd" in strong
             else "`max_frequency 500000` (ppb) in its configuration file",
         )

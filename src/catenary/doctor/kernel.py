@@ -57,7 +57,7 @@ def realtime_kernel(machine: Machine) -> str:
         architecture = DEBIAN_ARCHITECTURES.get(machine.architecture, machine.architecture)
         return f"sudo apt install linux-image-rt-{architecture}; then reboot into it"
     if distribution == "ubuntu":
-        return "sudo pro enable realtime-kernel (Ubuntu Pro, free for personal use); then reboot"
+        return "sudo pro enable realtime-kernel; then reboot (Ubuntu Pro, free for personal use)"
     return "a kernel with CONFIG_PREEMPT_RT=y: your distribution's, or mainline from 6.12"
 
 

@@ -84,6 +84,8 @@ def judge(latency: Latency | None, machine: Machine) -> Check:
         "first what failed above; then again for longer and under load: "
         "`catenary doctor --seconds 600` beside `stress-ng --cpu 0 --vm 2 --hdd 1`"
     )
-    if machine.virtual:
+    if "SCHED_FIFO" not in latency.scheduling or "refused" in latency.scheduling:
+        advice = "first the permissions (limit-rtprio, limit-memlock), then again"
+    elif machine.virtual:
         advice = "a virtual machine is late whenever its host is; measure on the real one"
     return (warned if figure.max <= BAD_SHARE * period else failed)(id, found, advice)

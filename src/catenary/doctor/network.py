@@ -131,7 +131,7 @@ def managed(machine: Machine, card: Card) -> Check:
     if not who and not neighbours:
         return passed(id, "no program seen that would send on it")
     advice = {
-        "NetworkManager": f"sudo nmcli device set {card.name} managed no (until reboot)",
+        "NetworkManager": f"sudo nmcli device set {card.name} managed no # until the next start",
         "systemd-networkd": f"`[Match] Name={card.name} [Link] Unmanaged=yes` in "
         "/etc/systemd/network/10-ethercat.network",
     }

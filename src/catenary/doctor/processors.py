@@ -11,10 +11,11 @@ SLOW_WAKE_US = 10  # to leave an idle state; a tenth of what 10 kHz have
 REBOOT = "in GRUB_CMDLINE_LINUX of /etc/default/grub; sudo update-grub; reboot"
 
 
-def boot_words(machine: Machine, *names: str) -> str:
-    """What to add to the kernel's command line for the loop's CPU."""
+def boot_words(machine: Machine, *names: str, **others: str) -> str:
+    """What to add to the kernel's command line: `names` for the loop's CPU, and others."""
     words = [f"{name}={machine.loop_cpu}" for name in names]
-    return f"{' '.join(words)} {REBOOT}"
+    words += [f"{name}={cpus}" for name, cpus in others.items()]
+    return f"`{' '.join(words)}` {REBOOT}"
 
 
 def isolated(machine: Machine) -> Check:
@@ -30,13 +31,10 @@ def isolated(machine: Machine) -> Check:
         )
     if not machine.other_cpus:
         return warned(id, "one CPU for the loop and everything else", "a machine with two or more")
-    others = as_list(machine.other_cpus)
     return warned(
         id,
         f"none of {len(machine.cpus)} CPUs is kept free of other programs",
-        boot_words(machine, "isolcpus", "rcu_nocbs").replace(
-            REBOOT, f"irqaffinity={others} {REBOOT}"
-        ),
+        boot_words(machine, "isolcpus", "rcu_nocbs", irqaffinity=as_list(machine.other_cpus)),
     )
 
 
@@ -70,8 +68,8 @@ def smt(machine: Machine) -> Check:
     return warned(
         id,
         f"CPU {machine.loop_cpu} shares its core with CPU {as_list(beside)}",
-        f"echo 0 | sudo tee {CPU}/cpu{min(beside)}/online, or SMT off in the BIOS or by nosmt "
-        f"{REBOOT}",  # not by --apply: a CPU that comes back has lost its interrupts and cpusets
+        f"echo 0 | sudo tee {CPU}/cpu{min(beside)}/online; or off in the BIOS; or `nosmt` {REBOOT}",
+        # not by --apply: a CPU that comes back has lost its interrupts and cpusets
     )
 
 
@@ -118,7 +116,7 @@ def idle_states(machine: Machine) -> Check:
         f"idle CPUs sleep so deeply ({machine.text(f'{deepest}/name')}) that waking takes "
         f"{slow[deepest]} us",
         "`with realtime.session():` in the program keeps them awake while it runs; for all: "
-        f"intel_idle.max_cstate=1 processor.max_cstate=1 {REBOOT}",
+        f"`intel_idle.max_cstate=1 processor.max_cstate=1` {REBOOT}",
         tuple(Change(f"{state}/disable", "1") for state in slow),
     )
 

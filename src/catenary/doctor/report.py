@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import textwrap
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -19,6 +20,8 @@ ID_WIDTH = 22
 INDENT = " " * (2 + 6 + ID_WIDTH)
 BAR = 40  # characters
 STEPS_US = (2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 50_000)
+COMMAND = re.compile(r"`[^`]*`|(?:\bsudo|\becho) [^;]*")
+UNBROKEN = "\0"
 BEYOND = 10**9  # the step of all that is above the last
 NOUNS: dict[Status, str] = {
     "PASS": "passed",
@@ -51,8 +54,10 @@ def check_lines(check: Check, colour: bool, width: int) -> Iterator[str]:
 
 
 def wrap(text: str, width: int) -> list[str]:
-    """Commands and paths stay whole, however long."""
-    return textwrap.wrap(text, width, break_long_words=False, break_on_hyphens=False) or [""]
+    """Commands and what is quoted stay on one line, however long: they are to be copied."""
+    kept = COMMAND.sub(lambda found: found[0].replace(" ", UNBROKEN), text)
+    lines = textwrap.wrap(kept, width, break_long_words=False, break_on_hyphens=False) or [""]
+    return [line.replace(UNBROKEN, " ") for line in lines]
 
 
 def histogram_lines(latency: Latency) -> Iterator[str]:
@@ -89,10 +94,15 @@ def summary_lines(examination: Examination, width: int) -> Iterator[str]:
         yield from wrap(words, width)
     elif counted["WARN"]:
         yield "A loop will run here; the warnings are where its late cycles may come from."
+    elif examination.latency is None:
+        yield "Nothing is against a real-time loop; how late threads wake was not measured."
     else:
         yield "Fit for a real-time loop, as far as can be seen."
     if examination.changes:
-        yield f"--apply can change {len(examination.changes)} settings, until the next start"
+        settings = (
+            "1 setting" if len(examination.changes) == 1 else f"{len(examination.changes)} settings"
+        )
+        yield f"--apply can change {settings}, until the next start"
     yield "What each check means, and why: docs/doctor.md"
 
 
