@@ -54,7 +54,7 @@ def places(stream: BinaryIO) -> Iterator[Place]:
         stream.seek(at)
         opcode, length = HEAD.unpack(stream.read(HEAD.size))
         end = at + HEAD.size + length
-        if end > size or opcode == 0:
+        if end > size or not HEADER <= opcode <= DATA_END:
             return
         yield Place(opcode, at, end)
         if opcode == DATA_END:
@@ -63,9 +63,13 @@ def places(stream: BinaryIO) -> Iterator[Place]:
 
 
 def read_record(stream: BinaryIO, place: Place) -> Any:
-    """The library's record at a place of the file: Metadata, Chunk, Schema or Channel."""
+    """The library's record at a place of the file: Metadata or Chunk; None where it is damaged."""
+    exceptions: Any = require("mcap.exceptions")
     stream.seek(place.offset)
-    return decode_record(stream.read(place.end - place.offset))
+    try:
+        return decode_record(stream.read(place.end - place.offset))
+    except (exceptions.McapError, struct.error, ValueError, OverflowError, MemoryError):
+        return None
 
 
 def decode_record(data: bytes) -> Any:

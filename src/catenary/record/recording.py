@@ -7,6 +7,7 @@ import os
 from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import reduce
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -109,17 +110,21 @@ class _Reader:
         self._part = (start, end)  # [s] after the first cycle
         self._metadata: dict[str, dict[str, str]] = {}
         self._topics: dict[int, str] = {}  # by channel id
-        self._messages: dict[str, list[bytes]] = defaultdict(list)  # by topic
+        self._messages: dict[str, list[ChunkMessage]] = defaultdict(list)  # by topic
         self._wanted = (-math.inf, math.inf)  # log time [ns]; known with the first cycle
         self._complete = False  # the data section ends as it should
 
     def read(self) -> Recording:
         for place in places(self._stream):
             self._complete = place.opcode == DATA_END
+            if place.opcode not in (METADATA, CHUNK):
+                continue
+            record = read_record(self._stream, place)
+            if record is None:
+                break
             if place.opcode == METADATA:
-                record = read_record(self._stream, place)
                 self._metadata[record.name] = record.metadata
-            if place.opcode == CHUNK and not self._read_chunk(read_record(self._stream, place)):
+            elif not self._read_chunk(record):
                 break
         return self._make()
 
@@ -133,6 +138,8 @@ class _Reader:
             return False
         self._read_channels(data)
         for message in chunk_messages(data):
+            if message.channel not in self._topics:
+                return False  # the first chunk is missing
             self._read_message(self._topics[message.channel], message)
         return True
 
@@ -142,7 +149,7 @@ class _Reader:
             low = message.time_ns + round(start * 1e9) if start > 0 else -math.inf
             self._wanted = (low, message.time_ns + round(min(end, LONGEST) * 1e9))
         if self._wanted[0] <= message.time_ns <= self._wanted[1]:
-            self._messages[topic].append(message.data)
+            self._messages[topic].append(message)
 
     def _read_channels(self, data: bytes) -> None:
         for opcode, at, end in chunk_records(data):
@@ -157,24 +164,42 @@ class _Reader:
                 f"{self._stream.name} is no recording of Catenary's (format {FORMAT})",
                 hint="other MCAP files are read with the packages mcap and mcap-ros2-support",
             )
-        layout = msgspec.json.decode(head["layout"], type=Layout)
+        layout = self._layout(head.get("layout", ""))
         tail = self._metadata.get(END_RECORD, {})
-        texts = map(decode_text, self._messages[topic(layout, "events")])
+        messages = self._messages[topic(layout, "events")]
+        texts = [decode_text(message.data) for message in messages]
         events = (msgspec.json.decode(text, type=SharedEvent) for text in texts)
         first = self._wanted[0]  # those before the first cycle were met before it was known
         return Recording(
             layout=layout,
             rows=_rows(layout, self._messages),
             events=tuple(e for e in events if e.time * 1e9 + layout.utc_offset_ns >= first),
-            lost=int(tail.get("lost", 0)),
+            lost=int(lost) if (lost := tail.get("lost", "0")).isdecimal() else 0,
             ended=tail.get("ended", "cut off") if self._complete else "cut off",
         )
 
+    def _layout(self, text: str) -> Layout:
+        try:
+            layout = msgspec.json.decode(text, type=Layout)
+            make_channels(layout)
+        except (msgspec.MsgspecError, TypeError, ValueError, OverflowError, MemoryError) as error:
+            raise RecordingError(
+                f"{self._stream.name}: the description of its cycles is damaged: {error}"
+            ) from error
+        return layout
 
-def _rows(layout: Layout, messages: Mapping[str, list[bytes]]) -> Rows:
+
+def _rows(layout: Layout, messages: Mapping[str, list[ChunkMessage]]) -> Rows:
+    """The cycles that are there with all their messages: a cut may divide one."""
     channels = make_channels(layout)
-    count = min(len(messages[channel.topic]) for channel in channels)  # a cut may divide a cycle
-    rows = np.zeros(count, layout.dtype)
-    for channel in channels:
-        channel.decode(b"".join(messages[channel.topic][:count]), rows)
+    numbers = [
+        np.array([message.sequence for message in messages[channel.topic]], np.int64)
+        for channel in channels
+    ]
+    whole = reduce(np.intersect1d, numbers)
+    rows = np.zeros(len(whole), layout.dtype)
+    for channel, present in zip(channels, numbers, strict=True):
+        chosen = np.flatnonzero(np.isin(present, whole))
+        data = b"".join(messages[channel.topic][place].data for place in chosen)
+        channel.decode(data, rows)
     return rows

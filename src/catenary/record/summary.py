@@ -81,6 +81,8 @@ def find_whole(stream: BinaryIO) -> Summary:
             continue
         if first.opcode == METADATA:
             record = read_record(stream, first)
+            if record is None:
+                break
             if record.name == END_RECORD:
                 summary.ended = record.metadata
             length = first.end - first.offset
@@ -113,7 +115,7 @@ def _add_chunk(summary: Summary, stream: BinaryIO, place: Place, indexes: list[P
     """False: the chunk is not whole, or the index behind it, so that nothing else can follow."""
     records: Any = require("mcap.records")
     chunk = read_record(stream, place)
-    data = chunk_bytes(chunk)
+    data = chunk_bytes(chunk) if chunk is not None else None
     if data is None:
         return False
     counts = Counter(message.channel for message in chunk_messages(data))
