@@ -13,7 +13,7 @@ import catenary as cat
 from catenary.bus import event
 from catenary.errors import WorkingCounterError
 from catenary.virtual import Coupler, Segment, Servo
-from catenary.virtual.faults import cut, join
+from catenary.virtual.faults import cut, join, power_cycle
 
 COUNT = 6  # devices; the servos are 1 to 5
 CABLES = [(None, 0), *((k, k + 1) for k in range(COUNT - 1)), (COUNT - 1, None)]
@@ -117,6 +117,24 @@ def test_cut_twice_an_island_that_is_not_required_is_named_and_comes_back(
         lost = [e for e in main.events if isinstance(e, event.LinkLost)]
     assert [e.between for e in lost] == [(2, 3), (4, 5)]
     assert all("3 to 4 are an island" in e.message for e in lost)
+
+
+def test_before_a_cut_a_device_that_was_switched_off_comes_back(segment: Segment) -> None:
+    """Positions count from the first port: who is behind the cut has none just now."""
+    with cat.MainDevice(segment.first, segment.second) as main:
+        subs = main.scan()
+        arm = cat.Drives([subs[k] for k in (1, 2, 5)], counts_per_turn=2**20)
+        others = cat.Drives([subs[3], subs[4]], counts_per_turn=2**20, required=False)
+        with cat.Loop(arm, others) as loop:
+            for cycle in loop:
+                assert cycle.ok
+                if cycle.number == 50:
+                    segment.inject(cut(between=(4, 5), at=0))
+                if cycle.number == 100:
+                    segment.inject(power_cycle(3, at=0, for_=0.3))
+                if cycle.number == 1500:
+                    assert others.present.all()
+                    break
 
 
 @pytest.mark.parametrize(("detection", "at_most"), [("enhanced", 1), ("standard", 5)])

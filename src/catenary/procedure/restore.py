@@ -40,7 +40,8 @@ class Presence(NamedTuple):
 
 
 def look_around(at_most: int) -> Procedure[list[Presence]]:
-    """Who is there, by position. Devices that come or go meanwhile are left for the next look."""
+    """Who is there, by position. Devices that come or go meanwhile are left for the next look;
+    those behind the cut of a ring are counted and have no position."""
     [counted] = yield [read(Command.BRD, 0, AL_STATUS)]
     count = min(counted.working_counter, at_most)
     if counted.lost or count == 0:
@@ -53,8 +54,11 @@ def look_around(at_most: int) -> Procedure[list[Presence]]:
             read(Command.APRD, -rank, STATION_ALIAS),
         )
     ]
-    if any(reply.lost or reply.working_counter != 1 for reply in replies):
+    there = [not reply.lost and reply.working_counter == 1 for reply in replies]
+    reached = there.index(False) if False in there else len(there)
+    if reached % 2 or any(there[reached:]) or any(reply.lost for reply in replies):
         return []
+    replies = replies[:reached]
     addresses = [STATION_ADDRESS.unpack(reply.data) for reply in replies[0::2]]
     aliases = [STATION_ALIAS.unpack(reply.data) for reply in replies[1::2]]
     return [Presence(rank, *each) for rank, each in enumerate(zip(addresses, aliases, strict=True))]
