@@ -13,6 +13,7 @@ import catenary as cat
 from catenary.errors import StateError, WorkingCounterError
 from catenary.realtime import VirtualClock
 from catenary.virtual import Coupler, Crystal, Segment, Servo
+from catenary.virtual.faults import power_cycle
 
 
 @dataclass
@@ -205,6 +206,30 @@ def test_clocks_that_nobody_wished_for_cannot_be_waited_for(body: Body) -> None:
         pytest.raises(RuntimeError, match="dc=True"),
     ):
         loop.wait_locked()
+
+
+def test_a_device_is_released_in_its_own_network(body: Body) -> None:
+    """Both have a device at that position, switched off and on, and held."""
+    upper, lower = [
+        cat.Drives(main.subs.drives, counts_per_turn=2**20, required=False)
+        for main in (body.upper_main, body.lower_main)
+    ]
+    with cat.Loop(upper, lower, on_return="hold") as loop:
+        for cycle in loop:
+            if cycle.number == 20:
+                for segment in (body.upper, body.lower):
+                    segment.inject(power_cycle(2, at=0, for_=0.2))
+            if cycle.number == 1500:
+                assert [s[2].state for s in (body.upper, body.lower)] == [2, 2]
+                loop.restore(body.lower_main.subs[2])
+            if cycle.number == 2500:
+                break
+        assert [s[2].state for s in (body.upper, body.lower)] == [2, 8]
+        with (
+            cat.MainDevice(Segment([Coupler(), Servo(), Servo()])) as other,
+            pytest.raises(ValueError, match="no device of this loop"),
+        ):
+            loop.restore(other.scan()[2])
 
 
 def test_what_several_networks_cannot_have(body: Body) -> None:

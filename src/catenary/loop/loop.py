@@ -285,8 +285,12 @@ class Loop:
 
     def restore(self, sub: SubDevice) -> None:
         """Lets a device that is held (event DeviceHeld or DeviceReplaced) go to OP: from now on,
-        beside the cycle. Returns at once; `sub.state` and the events tell."""
-        self._opened.watch.release(sub)
+        beside the cycle. Returns at once; `sub.state` and the events tell. ValueError for a device
+        of another loop."""
+        for running in self._runnings:
+            if running.main is sub.main:
+                return running.watch.release(sub)
+        raise ValueError(f"{sub.station} is no device of this loop: it is on another MainDevice")
 
     def _judge(self, flags: int) -> None:
         running = self._opened
@@ -335,6 +339,11 @@ class Loop:
     def histogram(self, phase: str) -> list[tuple[float, float, int]]:
         """(lower, upper, count) in us of every bucket of a phase of `timing` that is not empty."""
         return self._opened.engine.histogram_counts(phase)
+
+    @property
+    def _runnings(self) -> Sequence[Running]:
+        """What runs of each network."""
+        return [self._opened]
 
     @property
     def _opened(self) -> Running:

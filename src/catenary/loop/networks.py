@@ -138,6 +138,8 @@ class NetworksLoop(Loop):
                     running.enable()
             for running in self._all:
                 running.engine.reset_histograms()
+                if running.clocks is not None:
+                    running.clocks.reset()
             return self
         except BaseException as error:
             self._tell_end(error)
@@ -231,6 +233,10 @@ class NetworksLoop(Loop):
     def stream(self, capacity: int = 1000) -> Any:
         """Streams belong to one network: `loop.networks[i].stream(...)`."""
         raise ValueError("a stream belongs to one network: loop.networks[i].stream(...)")
+
+    @property
+    def _runnings(self) -> Sequence[Running]:
+        return self._all
 
     @property
     def _opened(self) -> Running:
