@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from catenary.errors import CatenaryError, ConfigurationError
+from catenary.igh import Master
 from catenary.link import Interface, Ring
 from catenary.target import MainDevice, parse
 from catenary.virtual import Coupler, Segment
@@ -43,9 +44,12 @@ def test_what_is_no_target(target: str) -> None:
         parse(target)
 
 
-def test_what_this_version_cannot_do_says_so() -> None:
-    with pytest.raises(ConfigurationError, match="IgH"):
-        parse("igh:0")
+def test_a_master_of_the_kernel_module_has_a_number() -> None:
+    source = parse("igh:1")
+    assert isinstance(source, Master)
+    assert source.index == 1
+    with pytest.raises(ConfigurationError, match="has a number"):
+        parse("igh:eth0")
 
 
 def test_a_ring_of_two_interfaces() -> None:

@@ -9,6 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Self, TypeVar
 
 from catenary.bus import event
+from catenary.bus.carrier import Carrier
 from catenary.bus.events import Callback, Callbacks, Events
 from catenary.bus.pending import Pending
 from catenary.bus.runner import BlockingRunner, FrameCounts, LinkLent, Runner
@@ -58,6 +59,7 @@ class MainDevice:
         self.notes: tuple[str, ...] = ()  # what the last scan found odd
         self.clock_delays_ns: tuple[int | None, ...] = ()  # behind the first clock, by position
         self.clock_epoch_ns = 0  # system time of the clocks less the link's
+        self.carrier: Carrier | None = None  # who exchanges the images; None: our own frames
         self.events = Events()  # what happened: iterate, or get(timeout=)
         self._callbacks = Callbacks()
         self.events.listen(self._callbacks.tell)

@@ -14,10 +14,12 @@ class Engine:
 
     `plan` is a catenary.plan.CyclePlan (read by attribute; ValueError names a number that cannot
     be); `link` a capsule "catenary.link". The caller keeps the link object alive until `stop`.
+    `image`: a capsule "catenary.image", of somebody else who exchanges the process images: then
+    the link is asked for the time alone, the plan's frames do not matter, and the lane is dead.
     On a link in virtual time every order runs in the caller's thread.
     """
 
-    def __init__(self, plan: object, link: object) -> None: ...
+    def __init__(self, plan: object, link: object, image: object = None) -> None: ...
     @property
     def buffers(self) -> dict[str, memoryview]:
         """The private buffers, one per name of plan.wish.Views, typed ("d", "q", "I", "H", "b",

@@ -109,7 +109,7 @@ cdef inline int wait_native(cycle_t *c) noexcept nogil:
 
 @cython.no_gc_clear  # its parts must outlive the native thread
 cdef class Engine(Parts):
-    def __cinit__(self, plan, link):
+    def __cinit__(self, plan, link, image=None):
         self.laws = []
         self.streams = []
         self.native = self.e.cycle.order != INLINE and not self.virtual
@@ -121,7 +121,8 @@ cdef class Engine(Parts):
         cdef int rc
         if self.running:
             raise RuntimeError("the engine is running")
-        frames_flush(&self.frames.c)
+        if self.frames is not None:
+            frames_flush(&self.frames.c)
         self.e.error = 0
         self.e.done = 0
         self.left = -1

@@ -47,6 +47,7 @@ cdef extern from "link.h" nogil:
 
 
 cdef extern from "image.h" nogil:
+    const char *CAT_IMAGE_CAPSULE
     const uint32_t CAT_IMAGE_VERSION
 
     ctypedef struct cat_image:

@@ -7,6 +7,7 @@ from catenary.core._frames cimport Frames
 from catenary.core._handover cimport Handover, actual_header_t, handover_t
 from catenary.core._histogram cimport histogram_t
 from catenary.core._lane cimport Lane
+from catenary.core._native cimport cat_image, cat_link
 from catenary.core._thread cimport thread_t
 
 cdef struct engine_t:
@@ -18,7 +19,10 @@ cdef struct engine_t:
 cdef class Parts:
     cdef engine_t e
     cdef handover_t *h
-    cdef Frames frames
+    cdef Frames frames         # None: the image table came from outside
+    cdef cat_image *image
+    cdef const cat_link *link
+    cdef tuple owners          # of the two tables
     cdef Lane lane
     cdef Axes axes
     cdef readonly Clock clock  # None: no distributed clocks

@@ -2,6 +2,7 @@
 """Parts: owns all parts of one cyclic exchange, lets them know each other, and tells their figures.
 """
 
+from cpython.pycapsule cimport PyCapsule_GetPointer
 from libc.stdint cimport int64_t, uint32_t, uint64_t
 from libc.stdlib cimport calloc, free
 
@@ -25,7 +26,17 @@ from catenary.core._histogram cimport (
     histogram_t,
 )
 from catenary.core._lane cimport Lane
-from catenary.core._native cimport CAT_LINK_SHARED_TIME, CAT_LINK_VIRTUAL_TIME, cat_fence
+from catenary.core._native cimport (
+    CAT_IMAGE_CAPSULE,
+    CAT_IMAGE_VERSION,
+    CAT_LINK_CAPSULE,
+    CAT_LINK_SHARED_TIME,
+    CAT_LINK_VERSION,
+    CAT_LINK_VIRTUAL_TIME,
+    cat_fence,
+    cat_image,
+    cat_link,
+)
 
 
 cdef enum:
@@ -37,8 +48,30 @@ def columns_by_bank(columns):
     return [sum(column.bank == bank for column in columns) for bank in range(3)]
 
 
+cdef const cat_link *link_in(object capsule) except NULL:
+    """The checked link table of a capsule."""
+    cdef const cat_link *link = <const cat_link *>PyCapsule_GetPointer(capsule, CAT_LINK_CAPSULE)
+    if link.version != CAT_LINK_VERSION:
+        raise ValueError(f"link: table version {link.version}, expected {CAT_LINK_VERSION}")
+    return link
+
+
+cdef cat_image *image_in(object capsule, plan) except NULL:
+    """The checked image table of a capsule, made for this plan."""
+    cdef cat_image *image = <cat_image *>PyCapsule_GetPointer(capsule, CAT_IMAGE_CAPSULE)
+    if image.version != CAT_IMAGE_VERSION:
+        raise ValueError(f"image: table version {image.version}, expected {CAT_IMAGE_VERSION}")
+    mine = (image.output_size, image.input_size, image.unit_count)
+    wanted = (plan.output_size, plan.input_size, len(plan.sync_units))
+    if mine != wanted:
+        raise ValueError(f"image: (output, input bytes, sync units) {mine}, the plan has {wanted}")
+    if plan.clock is not None:
+        raise ValueError("clock: whoever exchanges the images keeps the clocks")
+    return image
+
+
 cdef class Parts:
-    def __cinit__(self, plan, link):
+    def __cinit__(self, plan, link, image=None):
         if plan.order not in ORDERS:
             raise ValueError(f"order: {plan.order!r}, must be one of {', '.join(ORDERS)}")
         if not 1000 <= plan.period_ns <= 1 << 40:
@@ -57,7 +90,14 @@ cdef class Parts:
         self.e.thread.priority = plan.priority or 0
         self.e.thread.cpu = -1 if plan.cpu is None else plan.cpu
         self.device_count = plan.device_count
-        self.frames = Frames(plan, link)
+        self.owners = (link, image)
+        if image is None:
+            self.frames = Frames(plan, link)
+            self.image = &self.frames.c.image
+            self.link = self.frames.c.link
+        else:
+            self.image = image_in(image, plan)
+            self.link = link_in(link)
         self.lane = Lane(plan.period_ns)
         self.axes = Axes(plan)
         if plan.clock is not None:
@@ -81,13 +121,14 @@ cdef class Parts:
         self.spare_histograms = <histogram_t *>calloc(PHASES, sizeof(histogram_t))
         if not (c.records and c.histograms and self.spare_histograms):
             raise MemoryError
-        self.frames.c.lane = &self.lane.c
-        self.axes.c.image = &self.frames.c.image
+        if self.frames is not None:
+            self.frames.c.lane = &self.lane.c
+        self.axes.c.image = self.image
         if self.clock is not None:
             self.frames.carry_time(&self.clock.c)
             c.clock = &self.clock.c
-        c.link = self.frames.c.link
-        c.image = &self.frames.c.image
+        c.link = self.link
+        c.image = self.image
         c.axes = &self.axes.c
         c.lane = &self.lane.c
         c.handover = &self.handover.c
@@ -173,7 +214,7 @@ cdef class Parts:
     @property
     def disturbed(self):
         cdef uint32_t unit
-        image = &self.frames.c.image
+        image = self.image
         for unit in range(image.unit_count):
             if not image.unit_valid[unit]:
                 return True
@@ -183,22 +224,23 @@ cdef class Parts:
 
     @property
     def counters(self):
-        frames = self.frames.c.counters
+        frames = {} if self.frames is None else self.frames.c.counters
         return {
             "cycles": self.e.cycle.number,
             "lost": self.e.cycle.lost,
             "late": self.e.cycle.late,
             "uncommitted": self.e.cycle.uncommitted,
-            "stale": frames.stale,
-            "alien": frames.alien,
-            "corrupt": frames.corrupt,
-            "duplicate": frames.duplicate,
-            "unprocessed": frames.unprocessed,
+            "stale": 0,
+            "alien": 0,
+            "corrupt": 0,
+            "duplicate": 0,
+            "unprocessed": 0,
             "lane_sent": self.lane.c.sent,
             "lane_received": self.lane.c.received,
             "lane_dropped": self.lane.c.dropped,
-            "send_errors": frames.send_errors,
-            "receive_errors": frames.receive_errors,
+            "send_errors": 0,
+            "receive_errors": 0,
+            **frames,
         }
 
     def histograms(self):

@@ -24,6 +24,7 @@ from catenary.core import (
     Iteration,
 )
 from catenary.errors import LawError
+from catenary.loop.carried import CarriedRunning, carried
 from catenary.loop.clocks import Clocks
 from catenary.loop.devices import DeviceWish, by_network, main_device_of
 from catenary.loop.laws.law import Law
@@ -175,9 +176,10 @@ class Loop:
         """All devices in SAFE-OP, all laws compiled."""
         plan = self._make_plan()
         self._main.configure(plan)
-        running = Running(
+        is_carried = self._main.carrier is not None
+        running = (CarriedRunning if is_carried else Running)(
             self._main,
-            plan,
+            carried(plan) if is_carried else plan,
             self._wishes,
             abandon=abandon,
             on_return=self._on_return,

@@ -39,7 +39,7 @@ from catenary.loop.publishing import Publisher
 from catenary.loop.rehearsal import make_rehearsal
 from catenary.loop.service import Service
 from catenary.loop.signals import SignalGuard
-from catenary.loop.watch import Policy, Watch
+from catenary.loop.watch import Attendance, Policy, Watch
 from catenary.model.device import Direction
 from catenary.model.silence import judge_silence
 from catenary.plan.make import Plan
@@ -77,7 +77,7 @@ class Running:
     ) -> None:
         self.main = main
         self.plan = plan
-        self.engine = Engine(plan.cycle, main.link.capsule)
+        self.engine = self._make_engine()
         self.views = bind_wishes(wishes, plan.tables, self.engine.buffers)
         if plan.cycle.lead_ns and plan.cycle.order == "inline":
             self.engine.set_rehearsal(make_rehearsal(self.views))
@@ -85,18 +85,9 @@ class Running:
         clock = plan.cycle.clock
         self.clocks = None if clock is None else Clocks(main, self.engine, clock, self.cycle)
         self.service = Service(main, self.engine, plan)
-        self.watch = Watch(
-            main,
-            plan,
-            disturbed=lambda: self.engine.disturbed,
-            submit=self.service.runner.submit,
-            now=lambda: self.engine.now() * 1e-9,
-            rejoin=None if self.clocks is None else self.clocks.rejoin,
-            cables_seen=self._announce_clocks,
-            on_return=on_return,
-            on_replacement=on_replacement,
-        )
-        self.errors = ErrorWatch(main, now=lambda: self.engine.now() * 1e-9)
+        self._on_return: Policy = on_return
+        self._on_replacement: Policy = on_replacement
+        self._attend()
         self._attached = ExitStack()
         self._opened = self._left = False
         self._abandon = abandon  # leaves the loop, when the MainDevice is closed round it
@@ -105,6 +96,24 @@ class Running:
         self._watches: list[Pending[None]] = []
         self._publisher: Publisher | None = None
         self.service.cycle = self.cycle
+
+    def _make_engine(self) -> Engine:
+        return Engine(self.plan.cycle, self.main.link.capsule)
+
+    def _attend(self) -> None:
+        """Who watches over the devices beside the cycle."""
+        self.watch: Attendance = Watch(
+            self.main,
+            self.plan,
+            disturbed=lambda: self.engine.disturbed,
+            submit=self.service.runner.submit,
+            now=lambda: self.engine.now() * 1e-9,
+            rejoin=None if self.clocks is None else self.clocks.rejoin,
+            cables_seen=self._announce_clocks,
+            on_return=self._on_return,
+            on_replacement=self._on_replacement,
+        )
+        self.errors = ErrorWatch(self.main, now=lambda: self.engine.now() * 1e-9)
 
     # Opening
 
@@ -143,6 +152,9 @@ class Running:
         self.engine.start(origin_ns)
         self._opened = True
         self.service.start()
+        self._bring_to_op()
+
+    def _bring_to_op(self) -> None:
         self._settle()
         if self.clocks is not None:
             self.clocks.settle(self._raise_ended)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 from catenary.bus import MainDevice, SubDevice
 from catenary.bus.event import (
@@ -42,6 +42,16 @@ Submit = Callable[[Procedure[None]], Pending[None]]
 LOOK = 0.010  # [s] between two looks at the core's flag, and between two surveys
 STRANGERS_MAX = 16  # devices more than were scanned that are still told apart
 FAILURES_MAX = 3  # tries to bring a device back in one presence
+
+
+class Attendance(Protocol):
+    """Who watches over the devices of a running loop."""
+
+    @property
+    def excuses(self) -> bool: ...
+    def run(self) -> Procedure[None]: ...
+    def requires(self, position: int) -> bool: ...
+    def release(self, sub: SubDevice) -> None: ...
 
 
 class Standing(Enum):

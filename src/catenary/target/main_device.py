@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 from catenary import bus
 from catenary.link import LinkSource, Ring
-from catenary.target.parse import parse
+from catenary.target.parse import IGH, parse
 
 
 class MainDevice(bus.MainDevice):
     """Owns the link to one segment: `MainDevice("eth0")`, `MainDevice("virtual")`,
     `MainDevice(Segment([...]))`; `MainDevice("eth0", "eth1")` where the segment is a ring between
-    two ports.
+    two ports; `MainDevice("igh:0")` on the IgH kernel master (docs/igh.md).
 
         with cat.MainDevice("eth0") as main:
             for sub in main.scan():
@@ -18,6 +20,15 @@ class MainDevice(bus.MainDevice):
 
     Leaving the block brings all devices to INIT, whatever happened in it.
     """
+
+    def __new__(cls, target: str | LinkSource, second: str | LinkSource | None = None) -> Self:
+        """A source may bring a MainDevice of its own: the IgH kernel master does."""
+        named = isinstance(target, str) and target.strip().startswith(f"{IGH}:")
+        make = getattr(source_of(target) if named else target, "main_device", None)
+        if make is not None:
+            own: Self = make()
+            return own
+        return super().__new__(cls)
 
     def __init__(self, target: str | LinkSource, second: str | LinkSource | None = None) -> None:
         source = source_of(target)

@@ -1,4 +1,4 @@
-"""Names of segments: "eth0", "eth0,eth1" (a ring), "virtual", "virtual:FILE.toml"."""
+"""Names of segments: "eth0", "eth0,eth1" (a ring), "virtual", "virtual:FILE.toml", "igh:0"."""
 
 from __future__ import annotations
 
@@ -18,16 +18,23 @@ def parse(target: str) -> LinkSource:
     if "," in target:
         return _ring(target)
     if kind == IGH:
-        raise ConfigurationError(
-            f"{target!r} names a master of the IgH kernel module, which this version cannot use",
-            hint="give the network interface itself, for instance eth0",
-        )
+        return _kernel_master(target, rest)
     if not kind or colon or any(letter.isspace() or letter == "/" for letter in kind):
         raise ConfigurationError(
             f"{target!r} is no target",
             hint="give a network interface (eth0), virtual, or virtual:FILE.toml",
         )
     return Interface(kind)
+
+
+def _kernel_master(target: str, rest: str) -> LinkSource:
+    from catenary.igh import Master
+
+    if not rest.isdecimal():
+        raise ConfigurationError(
+            f"{target!r}: a master of the IgH kernel module has a number", hint="give igh:0"
+        )
+    return Master(int(rest))
 
 
 def _ring(target: str) -> LinkSource:

@@ -1,0 +1,206 @@
+"""A plan → slave configurations, domains and requests of the kernel master, then its activation."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from catenary.errors import SdoAbort
+from catenary.igh import abi
+from catenary.igh._ecrt import Exchange
+from catenary.igh.master import Reservation
+from catenary.model.device import Direction, Pdo
+from catenary.plan.cycle import ClockPlan
+from catenary.plan.layout import UnitLayout
+from catenary.plan.make import Plan
+from catenary.plan.start_up import WATCHDOG_DIVIDER, DevicePlan
+
+EMERGENCIES = 16  # kept by the master for each device
+REQUEST_SIZE = 256  # bytes of an object that is read in operation; longer ones are read blocking
+REGISTER_SIZE = 64
+
+Copy = tuple[int, int, int]  # offset in the domain, in the image, bytes
+
+
+@dataclass(slots=True)
+class Domain:
+    """Owns the place of one sync unit in the master's memory."""
+
+    domain: int
+    every: int
+    phase: int
+    optional: bool
+    data: int = 0
+    size: int = 0
+    outputs: list[Copy] = field(default_factory=list)
+    inputs: list[Copy] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceConfiguration:
+    """The master's handles for one device; they live until the master is deactivated."""
+
+    position: int
+    config: int
+    sdo_request: int  # 0: it speaks no CoE
+    register_request: int
+
+
+@dataclass(frozen=True, slots=True)
+class Configuration:
+    """What runs on an activated master."""
+
+    devices: tuple[DeviceConfiguration, ...]
+    domains: tuple[Domain, ...]
+    exchange: Exchange
+
+
+def configure(master: Reservation, plan: Plan, coe: Sequence[bool], epoch_ns: int) -> Configuration:
+    """Tells the master everything and activates it. `coe`: which devices have objects. After an
+    error or an interruption the master is reserved as before, and nothing of it is left."""
+    try:
+        return _configured(master, plan, coe, epoch_ns)
+    except BaseException:
+        master.renew()
+        raise
+
+
+def _configured(
+    master: Reservation, plan: Plan, coe: Sequence[bool], epoch_ns: int
+) -> Configuration:
+    domains = [_domain(master, unit) for unit in plan.layout.units]
+    devices = [
+        _device(master, device, domains, plan, speaks)
+        for device, speaks in zip(plan.devices, coe, strict=True)
+    ]
+    clock = plan.cycle.clock
+    if clock is not None and clock.reference:
+        config = devices[clock.reference].config
+        master.ask("ecrt_master_select_reference_clock", config, what="the reference clock")
+    interval_us = max(1, plan.cycle.period_ns // 1000)
+    master.ask("ecrt_master_set_send_interval", interval_us, what="the send interval")
+    master.ask("ecrt_master_activate", what=f"activating master {master.index}")
+    for domain in domains:
+        domain.data = master.library.ecrt_domain_data(domain.domain) or 0
+        domain.size = master.library.ecrt_domain_size(domain.domain)
+    sizes = (plan.cycle.output_size, plan.cycle.input_size)
+    exchange = Exchange(master.time, master.library, master.handle, domains, *sizes)
+    if clock is not None:
+        limit = clock.rate_limit_ns
+        exchange.keep_clocks(clock.follow, plan.cycle.period_ns, epoch_ns, clock.bandwidth, limit)
+    return Configuration(tuple(devices), tuple(domains), exchange)
+
+
+def _domain(master: Reservation, unit: UnitLayout) -> Domain:
+    handle = master.library.ecrt_master_create_domain(master.handle)
+    if not handle:
+        raise _no_handle(f"no domain for {unit.name}")
+    return Domain(handle, unit.every, unit.phase, unit.optional)
+
+
+def _device(
+    master: Reservation, plan: DevicePlan, domains: Sequence[Domain], whole: Plan, coe: bool
+) -> DeviceConfiguration:
+    library = master.library
+    identity = plan.identity
+    config = library.ecrt_master_slave_config(
+        master.handle, 0, plan.position, identity.vendor, identity.product
+    )
+    who = f"device {plan.position} ({plan.name})"
+    if not config:
+        raise _no_handle(f"{who}: no configuration")
+    _tell_process_data(master, plan, config, who)
+    for download in plan.start_up:
+        data = ctypes.create_string_buffer(download.data, len(download.data))
+        if download.optional:  # the master gives a device up that refuses one of its list
+            with contextlib.suppress(SdoAbort):
+                master.download(plan.position, download.index, download.subindex, download.data)
+            continue
+        place = (download.index, download.subindex, ctypes.addressof(data), len(data))
+        what = f"{who}: start-up SDO 0x{download.index:04X}:{download.subindex:02X}"
+        library.ask("ecrt_slave_config_sdo", config, *place, what=what)
+    _tell_clock(master, plan, whole.cycle.clock, config, who)
+    _register(master, plan, domains, config, who)
+    library.ask("ecrt_slave_config_emerg_size", config, EMERGENCIES, what=f"{who}: emergencies")
+    sdo = 0
+    if coe:
+        sdo = library.ecrt_slave_config_create_sdo_request(config, 0x1000, 0, REQUEST_SIZE)
+    register = library.ecrt_slave_config_create_reg_request(config, REGISTER_SIZE)
+    return DeviceConfiguration(plan.position, config, sdo or 0, register or 0)
+
+
+def _tell_process_data(master: Reservation, plan: DevicePlan, config: int, who: str) -> None:
+    """PDOs and watchdogs: what the device has already the master does not write again."""
+    mode = abi.WATCHDOG_ENABLE if plan.watchdog_ns else abi.WATCHDOG_DISABLE
+    if plan.watchdog_ns:
+        master.library.ask(
+            "ecrt_slave_config_watchdog",
+            *(config, WATCHDOG_DIVIDER, plan.watchdog_count),
+            what=f"{who}: watchdog",
+        )
+    syncs = []
+    for direction in Direction:
+        output = direction is Direction.OUTPUT
+        for assignment in plan.assignments(direction):
+            pdos = (abi.PdoInfo * len(assignment.pdos))(*map(_pdo_info, assignment.pdos))
+            sync = abi.SyncInfo(
+                index=assignment.sync_manager,
+                dir=abi.DIRECTION_OUTPUT if output else abi.DIRECTION_INPUT,
+                n_pdos=len(pdos),
+                pdos=pdos,
+                watchdog_mode=mode if output else abi.WATCHDOG_DISABLE,
+            )
+            syncs.append(sync)
+    if syncs:
+        records = (abi.SyncInfo * len(syncs))(*syncs)
+        at = ctypes.addressof(records)
+        what = f"{who}: its PDOs"
+        master.library.ask("ecrt_slave_config_pdos", config, len(syncs), at, what=what)
+
+
+def _pdo_info(pdo: Pdo) -> abi.PdoInfo:
+    entries = (abi.PdoEntryInfo * len(pdo.entries))(
+        *(abi.PdoEntryInfo(e.index, e.subindex, e.bit_length) for e in pdo.entries)
+    )
+    return abi.PdoInfo(index=pdo.index, n_entries=len(entries), entries=entries)
+
+
+def _tell_clock(
+    master: Reservation, plan: DevicePlan, clock: ClockPlan | None, config: int, who: str
+) -> None:
+    """SYNC0 fires where the frames have gone through: so long after the application time."""
+    if plan.sync is None or clock is None:
+        return
+    shift_ns = plan.sync.shift_ns + clock.wire_ns + clock.allowance_ns
+    sync = (plan.sync.assign_activate, plan.sync.cycle_ns, shift_ns % plan.sync.cycle_ns)
+    what = f"{who}: distributed clocks"
+    master.library.ask("ecrt_slave_config_dc", config, *sync, plan.sync.sync1_ns, 0, what=what)
+
+
+def _register(
+    master: Reservation, plan: DevicePlan, domains: Sequence[Domain], config: int, who: str
+) -> None:
+    """Every SyncManager into its sync unit's domain; where its bytes are there and in the image."""
+    place = plan.layout
+    for direction in Direction:
+        output = direction is Direction.OUTPUT
+        offset = place.output_offset if output else place.input_offset
+        for assignment in plan.assignments(direction):
+            if assignment.byte_length == 0:
+                continue
+            domain = domains[place.sync_unit]
+            first = next(rank for rank, pdo in enumerate(assignment.pdos) if pdo.entries)
+            bit = ctypes.c_uint32()
+            at = (assignment.sync_manager, first, 0, domain.domain, ctypes.byref(bit))
+            what = f"{who}: SyncManager {assignment.sync_manager} into a domain"
+            call = "ecrt_slave_config_reg_pdo_entry_pos"
+            found = master.library.ask(call, config, *at, what=what)
+            copies = domain.outputs if output else domain.inputs
+            copies.append((found, offset, assignment.byte_length))
+            offset += assignment.byte_length
+
+
+def _no_handle(what: str) -> MemoryError:
+    return MemoryError(f"{what}: the kernel has no memory for it; dmesg | tail says more")

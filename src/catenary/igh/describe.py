@@ -1,0 +1,154 @@
+"""What the master knows of a device → its description, as a scan of our own would give it.
+
+The library does not tell everything: entries have no names and no types, SyncManagers no addresses,
+and whether a device has distributed clocks is not said. What is left open here the master decides.
+"""
+
+from __future__ import annotations
+
+from catenary.errors import MailboxError, SdoAbort
+from catenary.igh import abi
+from catenary.igh.master import Reservation
+from catenary.model.describe import assignments
+from catenary.model.device import (
+    DeviceDescription,
+    Entry,
+    Identity,
+    MailboxLayout,
+    ObjectInformation,
+    Pdo,
+    SyncManager,
+)
+from catenary.wire.features import Feature, Information, PortKind
+from catenary.wire.sii import MailboxProtocol
+from catenary.wire.sii_categories import SyncManagerUse
+
+DEVICE_TYPE, MODULE_PROFILES = 0x1000, 0xF010
+STATUSWORD, SLOT_STRIDE, SLOTS_MAX = 0x6041, 0x800, 16
+PROFILE_DRIVE, PROFILE_MODULAR = 402, 5001
+MAILBOXES = 2  # SyncManagers 0 and 1 of a device with a mailbox
+STATION_BASE = 0x03E9  # 1001, as our own scans: the master keeps its addresses to itself
+
+# FMMUs are the master's: "byte-oriented" keeps the plan from giving one to the mailbox.
+CONTROLLER = Information(
+    type=0,
+    revision=0,
+    build=0,
+    fmmu_count=abi.SYNC_MANAGERS_MAX,
+    sync_manager_count=abi.SYNC_MANAGERS_MAX,
+    ram_size=0,
+    ports=(PortKind.MII, PortKind.MII, PortKind.ABSENT, PortKind.ABSENT),
+    features=Feature.DISTRIBUTED_CLOCKS
+    | Feature.DISTRIBUTED_CLOCKS_64_BIT
+    | Feature.FMMU_BYTE_ORIENTED,
+)
+MAILBOX = MailboxLayout(0, 0, 0, 0, MailboxProtocol.COE, pdo_assign=True, pdo_configuration=True)
+
+
+def describe(master: Reservation, position: int) -> DeviceDescription:
+    """The description of one device."""
+    info = master.slave(position)
+    device_type = read_if_there(master, position, DEVICE_TYPE)
+    coe = device_type is not None
+    managers, outputs, inputs = _process_data(master, info, coe)
+    number = None if not device_type else int.from_bytes(device_type[:4], "little")
+    identity = Identity(info.vendor_id, info.product_code, info.revision_number, info.serial_number)
+    name = info.name.decode("latin-1").strip()
+    links = [bool(port.link.link_up) for port in info.ports]
+    return DeviceDescription(
+        position=position,
+        station_address=STATION_BASE + position,
+        alias=info.alias,
+        identity=identity,
+        name=name or f"0x{identity.vendor:08X}:0x{identity.product:08X}",
+        controller=CONTROLLER,
+        mailbox=MAILBOX if coe else None,
+        sync_managers=managers,
+        outputs=assignments(outputs),
+        inputs=assignments(inputs),
+        output_pdos=outputs,
+        input_pdos=inputs,
+        open_ports=(links[0], links[1], links[2], links[3]),
+        system_time=True,
+        device_type=number,
+        slots=_slots(master, position, number),
+        mapping_source="IgH master",
+    )
+
+
+def read_if_there(
+    master: Reservation, position: int, index: int, subindex: int = 0
+) -> bytes | None:
+    """An object; empty where the device refuses it, None where it speaks no CoE."""
+    try:
+        return master.upload(position, index, subindex)
+    except SdoAbort:
+        return b""
+    except MailboxError:
+        return None
+
+
+def object_information(
+    master: Reservation, position: int, index: int, subindex: int
+) -> ObjectInformation:
+    """How long an object is, found by reading it. Bit length 0: it is not there."""
+    data = read_if_there(master, position, index, subindex)
+    return ObjectInformation(index, subindex, 8 * len(data or b""))
+
+
+def _process_data(
+    master: Reservation, info: abi.SlaveInfo, coe: bool
+) -> tuple[tuple[SyncManager, ...], tuple[Pdo, ...], tuple[Pdo, ...]]:
+    """SyncManagers, and the PDOs assigned to those of outputs and of inputs."""
+    managers = []
+    pdos: dict[SyncManagerUse, list[Pdo]] = {SyncManagerUse.OUTPUTS: [], SyncManagerUse.INPUTS: []}
+    for index in range(info.sync_count):
+        sync = master.sync_manager(info.position, index)
+        use = SyncManagerUse.OUTPUTS
+        if sync.dir == abi.DIRECTION_INPUT:
+            use = SyncManagerUse.INPUTS
+        if coe and index < MAILBOXES:
+            use = SyncManagerUse(index + 1)
+        else:
+            pdos[use] += _pdos(master, info.position, index, sync.n_pdos)
+        managers.append(SyncManager(index, use, start=0, length=0, control=0))
+    outputs, inputs = pdos.values()
+    return tuple(managers), tuple(outputs), tuple(inputs)
+
+
+def _pdos(master: Reservation, position: int, index: int, count: int) -> list[Pdo]:
+    found = []
+    for rank in range(count):
+        pdo = master.pdo(position, index, rank)
+        entries = (master.pdo_entry(position, index, rank, e) for e in range(pdo.n_entries))
+        found.append(Pdo(pdo.index, tuple(_entry(entry) for entry in entries), index))
+    return found
+
+
+def _entry(info: abi.PdoEntryInfo) -> Entry:
+    name = f"0x{info.index:04X}:{info.subindex:02X}" if info.index else ""
+    return Entry(info.index, info.subindex, info.bit_length, name)
+
+
+def _slots(master: Reservation, position: int, device_type: int | None) -> tuple[int, ...]:
+    """Its CiA 402 axes: as `procedure/profile.py` finds them."""
+    profile = 0 if device_type is None else device_type & 0xFFFF
+    if profile == PROFILE_DRIVE:
+        there = [0]
+        while len(there) < SLOTS_MAX and read_if_there(
+            master, position, STATUSWORD + SLOT_STRIDE * len(there)
+        ):
+            there.append(len(there))
+        return tuple(there)
+    if profile != PROFILE_MODULAR:
+        return ()
+    count = read_if_there(master, position, MODULE_PROFILES) or b"\0"
+    profiles = [
+        read_if_there(master, position, MODULE_PROFILES, slot + 1) or b""
+        for slot in range(min(count[0], SLOTS_MAX))
+    ]
+    return tuple(
+        slot
+        for slot, data in enumerate(profiles)
+        if int.from_bytes(data[:2], "little") == PROFILE_DRIVE
+    )

@@ -1,0 +1,114 @@
+"""Library: owns libethercat, found and checked at run time; every call by its name."""
+
+from __future__ import annotations
+
+import ctypes
+import ctypes.util
+import os
+from pathlib import Path
+
+from catenary.errors import CatenaryError, LinkError
+from catenary.igh import abi
+
+VARIABLE = "CATENARY_LIBETHERCAT"  # path of another library
+PLACES = (
+    "libethercat.so.1",
+    "/usr/local/lib/libethercat.so.1",
+    "/opt/etherlab/lib/libethercat.so.1",
+    "/usr/local/etherlab/lib/libethercat.so.1",
+)
+INSTALL = (
+    "install IgH's EtherCAT master (docs/igh.md), or give the library's path: "
+    f"{VARIABLE}=/opt/etherlab/lib/libethercat.so.1"
+)
+
+
+class Library:
+    """Owns one loaded libethercat.
+
+    `returns`: calls that once returned nothing return 0 or -errno (1.6.0 and later); else what
+    stands in the register is never read.
+    """
+
+    def __init__(self, path: str | os.PathLike[str] | None = None) -> None:
+        """LinkError where there is none, or none that is known here."""
+        self._loaded, self.path = _load(path)
+        self.returns = hasattr(self._loaded, abi.RETURNS_SINCE)
+        self.addresses: dict[str, int] = {}
+        missing = []
+        for name, types in abi.CALLS.items():
+            try:
+                function = getattr(self._loaded, name)
+            except AttributeError:
+                if name not in abi.NOT_IN_ALL:
+                    missing.append(name)
+                continue
+            result, *arguments = types.split()
+            if result == "r":
+                result = "s32" if self.returns else "v"
+            function.restype = abi.TYPES[result]
+            function.argtypes = [abi.TYPES[each] for each in arguments]
+            self.addresses[name] = ctypes.cast(function, ctypes.c_void_p).value or 0
+        self._check(missing)
+
+    def __getattr__(self, name: str) -> ctypes._FuncPointer:
+        """A call, declared: `library.ecrt_master_activate(master)`."""
+        if not name.startswith("ecrt_") or name not in self.addresses:
+            raise AttributeError(name)
+        function: ctypes._FuncPointer = getattr(self._loaded, name)
+        return function
+
+    def ask(self, name: str, *arguments: object, what: str, hint: str = "") -> int:
+        """Makes a call that returns 0 or more, or -errno: then CatenaryError says `what` failed."""
+        result = getattr(self, name)(*arguments)
+        if result is None:
+            return 0
+        if result < 0:
+            raise CatenaryError(
+                f"{what}: {name} returned {result} ({os.strerror(-result)})",
+                hint=hint or "the kernel's log says more: dmesg | tail",
+            )
+        return int(result)
+
+    def has(self, name: str) -> bool:
+        """Whether this release has the call."""
+        return name in self.addresses
+
+    @property
+    def version(self) -> str:
+        """What the version magic says: "1.6"."""
+        magic = int(self.ecrt_version_magic())
+        return f"{magic >> 8}.{magic & 0xFF}"
+
+    def _check(self, missing: list[str]) -> None:
+        if "ecrt_version_magic" in missing:
+            raise LinkError(f"{self.path} is no libethercat", hint=INSTALL)
+        magic = int(self.ecrt_version_magic())
+        if magic not in abi.MAGICS:
+            known = " and ".join(f"{each >> 8}.{each & 0xFF}" for each in abi.MAGICS)
+            raise LinkError(
+                f"{self.path} is libethercat {magic >> 8}.{magic & 0xFF} (version magic "
+                f"0x{magic:04X}); known are {known}, from 1.5.2 on",
+                hint="its structures may lie elsewhere: install a release that is known here",
+            )
+        if missing:
+            raise LinkError(
+                f"{self.path}, libethercat {self.version}, lacks {', '.join(missing)}",
+                hint="install release 1.5.2 or later",
+            )
+
+
+def _load(path: str | os.PathLike[str] | None) -> tuple[ctypes.CDLL, str]:
+    given = os.fspath(path) if path is not None else os.environ.get(VARIABLE)
+    found = ctypes.util.find_library("ethercat")
+    tried = [given] if given else [*([found] if found else []), *PLACES]
+    reasons = []
+    for each in tried:
+        try:
+            return ctypes.CDLL(each, use_errno=True), each
+        except OSError as error:
+            reasons.append(str(error))
+    if given:
+        hint = "look at the path" if not Path(given).exists() else INSTALL
+        raise LinkError(f"libethercat cannot be loaded: {reasons[0]}", hint=hint)
+    raise LinkError(f"no libethercat on this machine (tried {', '.join(tried)})", hint=INSTALL)

@@ -1,0 +1,197 @@
+"""MainDevice on a kernel master: the same handles and loops, the master does the talking."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, NoReturn
+
+from catenary import bus
+from catenary.bus import SubDevices, event
+from catenary.bus.main_device import LEAVE_TIMEOUT
+from catenary.errors import ConfigurationError, LoopError, NoDeviceError
+from catenary.igh.carrier import KernelCarrier
+from catenary.igh.configure import Configuration, DeviceConfiguration, configure
+from catenary.igh.describe import describe, object_information
+from catenary.igh.master import Master, Reservation
+from catenary.igh.sub_device import SubDevice
+from catenary.model.device import DeviceDescription, Direction, Identity, mapped_entries
+from catenary.wire.al import State
+from catenary.wire.coe import Emergency
+
+if TYPE_CHECKING:  # plan needs NumPy, a scan does not
+    from catenary.bus.states import Outcome
+    from catenary.plan.make import Plan
+    from catenary.plan.wish import PdoWish, Wish
+
+_EMERGENCY = struct.Struct("<HB5s")
+
+
+class MainDevice(bus.MainDevice):
+    """Owns a reserved kernel master: `MainDevice("igh:0")`.
+
+    The kernel brings devices up, talks to their mailboxes and leads those back that were away; a
+    `Loop` exchanges the process images. Leaving the block gives the master back.
+    """
+
+    def __init__(self, source: Master) -> None:
+        super().__init__(source)
+        self._kernel: KernelCarrier | None = None
+
+    @property
+    def reservation(self) -> Reservation:
+        """The reserved master."""
+        link = self.link
+        assert isinstance(link, Reservation)
+        return link
+
+    @property
+    def cycling(self) -> bool:
+        """Whether a loop runs: requests are answered in operation only."""
+        return self._attached is not None
+
+    def scan(
+        self,
+        *,
+        expected: Sequence[Identity | tuple[int, int] | None] | None = None,
+        strict: bool = True,
+    ) -> SubDevices:
+        """The devices that the master has found; it has brought them to PRE-OP. NoDeviceError where
+        there are none. Handles of devices that are still there stay the same objects."""
+        self._refuse_beside_loop()
+        found = [describe(self.reservation, p) for p in range(self.reservation.device_count())]
+        if not found:
+            raise NoDeviceError(
+                f"{self.reservation.name}: the master finds no device",
+                hint="look at cable and power; ethercat slaves lists what it sees",
+            )
+        self.subs = SubDevices([self._kernel_handle(description) for description in found])
+        for sub in self.subs:
+            sub.read_state()
+        if expected is not None:
+            self._check_expected(expected)
+        return self.subs
+
+    def read_mappings(self, *wishes: Wish, period: float = 1e-3) -> None:
+        """Brings the descriptions up to date: what is mapped, and how long objects are that are
+        wished for and not mapped."""
+        from catenary.plan.make import gather_wishes
+
+        asked = gather_wishes(wishes, round(period * 1e9))
+        for sub in self.subs:
+            renewed = describe(self.reservation, sub.position)
+            _check_same(sub.description, renewed)
+            objects = [
+                object_information(self.reservation, sub.position, index, subindex)
+                for index, subindex in _unmapped(renewed, asked.get(sub.position))
+                if renewed.coe
+            ]
+            sub.description = replace(renewed, objects=tuple(objects))
+
+    def configure(self, plan: Plan) -> None:
+        """Tells the master the plan and activates it: from here on it waits for cycles."""
+        self._refuse_beside_loop()
+        if self._kernel is not None:
+            raise ConfigurationError(
+                f"{self.reservation.name} is activated already: nothing can be configured any more",
+                hint="leave the loop that runs, or main.leave()",
+            )
+        coe = [sub.description.coe for sub in self.subs]
+        self.clock_epoch_ns = self._epoch_ns()
+        configuration = configure(self.reservation, plan, coe, self.clock_epoch_ns)
+        self._kernel = KernelCarrier(self, configuration)
+        self.carrier = self._kernel
+
+    def leave(self, *, timeout: float = LEAVE_TIMEOUT) -> None:
+        """Ends the operation of the master: it brings the devices back to PRE-OP by itself."""
+        kernel, self._kernel, self.carrier = self._kernel, None, None
+        if kernel is None:
+            return
+        kernel.end()
+        what = f"deactivating master {self.reservation.index}"
+        self.reservation.ask("ecrt_master_deactivate", what=what)
+        for sub in self.subs:
+            sub.state = State.PRE_OP
+
+    def _bring_down(self, state: State, timeout: float = LEAVE_TIMEOUT) -> None:
+        """INIT is not ours to ask for: giving the master back leaves the devices in PRE-OP."""
+        self._detach()
+        self.leave()
+
+    def configuration_of(self, position: int) -> DeviceConfiguration | None:
+        """The master's handles for a device; None: it is not activated."""
+        return None if self._kernel is None else self._kernel.configuration.devices[position]
+
+    def same_configuration(self, device: DeviceConfiguration) -> None:
+        """LoopError where the handles are gone: the loop has ended meanwhile."""
+        if self.configuration_of(device.position) is not device:
+            raise LoopError("the loop has ended before the device answered", hint="ask again")
+
+    @property
+    def configuration(self) -> Configuration:
+        """What runs. RuntimeError before a loop is open."""
+        if self._kernel is None:
+            raise RuntimeError("the master is not activated: with Loop(...) as loop:")
+        return self._kernel.configuration
+
+    def hear(self, position: int, message: bytes) -> None:
+        """An emergency that the master kept for a device, 8 bytes."""
+        sub = self.subs[position]
+        heard = Emergency(*_EMERGENCY.unpack(message))
+        if isinstance(sub, SubDevice):
+            sub.hear(heard)
+        self.events.put(event.emergency(self.link.now() * 1e-9, sub, heard))
+
+    # What the master keeps to itself
+
+    def look(self, *, names: bool = True) -> SubDevices:
+        """ConfigurationError: the state of a segment that is not ours is the master's to tell."""
+        self._cannot("look at devices without taking them over", "ethercat slaves -v")
+
+    def diagnose(self, **options: object) -> NoReturn:
+        """ConfigurationError: error counters are read by the master's own tool."""
+        self._cannot("read the error counters of all devices", "ethercat crc, ethercat graph CRC")
+
+    def request_states(
+        self, subs: Sequence[bus.SubDevice], positions: Sequence[int], state: State
+    ) -> dict[int, Outcome]:
+        """ConfigurationError: the master leads the states."""
+        self._cannot("ask single devices for a state", f"ethercat states {state}")
+
+    def _cannot(self, what: str, command: str) -> NoReturn:
+        raise ConfigurationError(f"libethercat cannot {what}", hint=f"its tool does: {command}")
+
+    def _refuse_beside_loop(self) -> None:
+        if self._attached is not None:
+            raise RuntimeError("not possible while a loop runs on this MainDevice")
+
+    def _kernel_handle(self, description: DeviceDescription) -> SubDevice:
+        position = description.position
+        known = self.subs[position] if position < len(self.subs) else None
+        if not isinstance(known, SubDevice) or known.identity != description.identity:
+            return SubDevice(self, description)
+        known.description = description
+        return known
+
+
+def _check_same(before: DeviceDescription, now: DeviceDescription) -> None:
+    from catenary.bus.segment_scan import check_identity
+
+    check_identity(now, before.identity)
+
+
+def _unmapped(device: DeviceDescription, wish: PdoWish | None) -> Collection[tuple[int, int]]:
+    """Objects wished for that the device has not mapped."""
+    if wish is None:
+        return ()
+    sides = ((Direction.OUTPUT, wish.outputs), (Direction.INPUT, wish.inputs))
+    missing: dict[tuple[int, int], None] = {}
+    for direction, references in sides:
+        mapped = {(e.index, e.subindex) for e in mapped_entries(device.assignments(direction))}
+        missing.update(
+            ((each.index, each.subindex), None)
+            for each in references
+            if (each.index, each.subindex) not in mapped
+        )
+    return tuple(missing)

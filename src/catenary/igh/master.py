@@ -1,0 +1,270 @@
+"""Master: a kernel master by its number; Reservation: owns it while it is ours."""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Self
+
+from catenary.errors import CatenaryError, LinkError, MailboxError, SdoAbort, SegmentError
+from catenary.igh import abi
+from catenary.igh._ecrt import KernelTime
+from catenary.igh.library import Library
+from catenary.wire.abort import abort_code
+
+if TYPE_CHECKING:
+    from catenary.igh.main_device import MainDevice
+
+NODE = "/dev/EtherCAT{}"
+MODULE = Path("/sys/module/ec_master")
+SCAN_TIMEOUT = 30.0  # [s]: some devices answer their first SDO after seconds
+LOOK = 0.010  # [s] between two looks
+UPLOAD_LIMIT = 1 << 16  # bytes of an object
+
+
+class Master:
+    """A kernel master, not yet reserved: what `MainDevice("igh:0")` opens.
+
+    `library`: path of libethercat; None: found. `virtual_time`: time passes only where it is
+    waited for, so that a library that simulates its devices runs faster than life.
+    """
+
+    def __init__(
+        self,
+        index: int = 0,
+        *,
+        library: str | os.PathLike[str] | None = None,
+        virtual_time: bool = False,
+    ) -> None:
+        if index < 0:
+            raise ValueError(f"master {index}: they are counted from 0")
+        self.index = index
+        self._library = library
+        self._virtual_time = virtual_time
+
+    def open_link(self) -> Reservation:
+        """Reserves the master. LinkError says what is in the way, and how to mend it."""
+        return Reservation(Library(self._library), self.index, KernelTime(self._virtual_time))
+
+    def main_device(self) -> MainDevice:
+        """The MainDevice for it."""
+        from catenary.igh.main_device import MainDevice
+
+        return MainDevice(self)
+
+
+class Reservation:
+    """Owns one kernel master that is reserved for this process. A `Link` that has a clock and
+    carries no frames: the master sends its own."""
+
+    def __init__(self, library: Library, index: int, time: KernelTime) -> None:
+        self.library = library
+        self.index = index
+        self.time = time
+        self.handle = 0
+        self.reserve()
+
+    @property
+    def name(self) -> str:
+        return f"igh:{self.index}"
+
+    @property
+    def capsule(self) -> object:
+        return self.time.capsule
+
+    def send(self, frame: bytes) -> None:
+        self.time.send(frame)
+
+    def receive(self) -> bytes | None:
+        return None
+
+    def now(self) -> int:
+        return self.time.now()
+
+    def wait_until(self, deadline_ns: int, wake_on_frame: bool) -> bool:
+        return self.time.wait_until(deadline_ns, wake_on_frame)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc_info: object) -> None:
+        self.close()
+
+    def reserve(self) -> None:
+        """Takes the master. LinkError where it cannot be had."""
+        ctypes.set_errno(0)
+        self.handle = self.library.ecrt_request_master(self.index) or 0
+        if not self.handle:
+            raise _refused(self.index, ctypes.get_errno(), self.library)
+
+    def close(self) -> None:
+        """Gives the master back: its devices go to PRE-OP."""
+        handle, self.handle = self.handle, 0
+        if handle:
+            self.library.ecrt_release_master(handle)
+
+    def renew(self) -> None:
+        """Gives it back and takes it again: nothing of a configuration is left."""
+        self.close()
+        self.reserve()
+
+    def ask(self, name: str, *arguments: object, what: str, hint: str = "") -> int:
+        """A call with the master as its first argument."""
+        if not self.handle:
+            raise RuntimeError("the master is not reserved any more")
+        return self.library.ask(name, self.handle, *arguments, what=what, hint=hint)
+
+    # What the master knows of its devices
+
+    def device_count(self) -> int:
+        """Devices found, once the master has done scanning. LinkError without a cable."""
+        deadline = self.now() + round(SCAN_TIMEOUT * 1e9)
+        info = abi.MasterInfo()
+        while True:
+            self.ask("ecrt_master", ctypes.byref(info), what=f"master {self.index}")
+            if not info.scan_busy and (info.slave_count or self.now() >= deadline):
+                break
+            if not info.link_up and not info.scan_busy:
+                break
+            if self.now() >= deadline:
+                raise SegmentError(
+                    f"master {self.index} is still scanning after {SCAN_TIMEOUT:g} s",
+                    hint="ethercat slaves shows how far it is; dmesg what it waits for",
+                )
+            self.wait_until(self.now() + round(LOOK * 1e9), False)
+        if not info.link_up:
+            raise LinkError(
+                f"master {self.index}: its network interface has no link",
+                hint="plug the cable in and switch the first device on; ethercat master shows it",
+            )
+        return int(info.slave_count)
+
+    def slave(self, position: int) -> abi.SlaveInfo:
+        """One device."""
+        info = abi.SlaveInfo()
+        self.ask("ecrt_master_get_slave", position, ctypes.byref(info), what=f"device {position}")
+        return info
+
+    def sync_manager(self, position: int, index: int) -> abi.SyncInfo:
+        """A SyncManager, without its PDOs."""
+        info = abi.SyncInfo()
+        what = f"device {position}, SyncManager {index}"
+        self.ask("ecrt_master_get_sync_manager", position, index, ctypes.byref(info), what=what)
+        return info
+
+    def pdo(self, position: int, index: int, rank: int) -> abi.PdoInfo:
+        """A PDO of a SyncManager, without its entries."""
+        info = abi.PdoInfo()
+        what = f"device {position}, SyncManager {index}, PDO {rank}"
+        self.ask("ecrt_master_get_pdo", position, index, rank, ctypes.byref(info), what=what)
+        return info
+
+    def pdo_entry(self, position: int, index: int, rank: int, place: int) -> abi.PdoEntryInfo:
+        """An entry of a PDO."""
+        info = abi.PdoEntryInfo()
+        what = f"device {position}, SyncManager {index}, PDO {rank}, entry {place}"
+        call = "ecrt_master_get_pdo_entry"
+        self.ask(call, position, index, rank, place, ctypes.byref(info), what=what)
+        return info
+
+    # Objects; both block, without the GIL
+
+    def upload(self, position: int, index: int, subindex: int, limit: int = UPLOAD_LIMIT) -> bytes:
+        """Reads an object. SdoAbort, or MailboxError where no answer came."""
+        buffer = ctypes.create_string_buffer(min(limit, UPLOAD_LIMIT))
+        size, code = ctypes.c_uint64(), ctypes.c_uint32()
+        result = self.library.ecrt_master_sdo_upload(
+            *(self.handle, position, index, subindex),
+            *(ctypes.addressof(buffer), len(buffer), ctypes.byref(size), ctypes.byref(code)),
+        )
+        if result < 0:
+            raise self._refused_sdo(position, index, subindex, result, code.value)
+        return buffer.raw[: size.value]
+
+    def download(
+        self, position: int, index: int, subindex: int, data: bytes, *, complete: bool = False
+    ) -> None:
+        """Writes an object; `complete`: all subindices, from 0 on."""
+        buffer = ctypes.create_string_buffer(data, len(data))
+        code = ctypes.c_uint32()
+        call: Callable[..., int] = self.library.ecrt_master_sdo_download
+        place: tuple[int, ...] = (index, subindex)
+        if complete:
+            call, place = self.library.ecrt_master_sdo_download_complete, (index,)
+        at = (ctypes.addressof(buffer), len(data), ctypes.byref(code))
+        result = call(self.handle, position, *place, *at)
+        if result < 0:
+            raise self._refused_sdo(position, index, subindex, result, code.value)
+
+    def _refused_sdo(
+        self, position: int, index: int, subindex: int, result: int, code: int
+    ) -> CatenaryError:
+        return sdo_error(f"device {position}", position, index, subindex, result, code)
+
+
+def sdo_error(
+    who: str, position: int, index: int, subindex: int, result: int, code: int
+) -> CatenaryError:
+    """The error for an SDO that failed with -errno, and the device's abort code if it sent one."""
+    what = f"{who}: SDO 0x{index:04X}:{subindex:02X}"
+    if code:
+        known = abort_code(code)
+        return SdoAbort(
+            f"{what} refused with 0x{code:08X}: {known.text}",
+            position=position,
+            index=index,
+            subindex=subindex,
+            code=code,
+            hint=known.hint or "the manual of the device lists its objects",
+        )
+    if -result in (errno.EOVERFLOW, errno.ENOBUFS):
+        return MailboxError(f"{what} is longer than expected", hint="give a larger limit=")
+    return MailboxError(
+        f"{what}: no answer ({os.strerror(-result)})",
+        hint="a device without CoE has no objects; else the kernel's log says more: dmesg | tail",
+    )
+
+
+def _refused(index: int, number: int, library: Library) -> LinkError:
+    """Why a master could not be reserved, as far as can be seen from outside the kernel."""
+    node = NODE.format(index)
+    if not os.path.exists(node) and number != errno.EBUSY:
+        if not MODULE.exists():
+            return LinkError(
+                f"master {index}: the kernel module ec_master is not loaded, {node} is not there",
+                hint="sudo systemctl start ethercat; where that fails, the module was not built "
+                "for this kernel: docs/igh.md",
+            )
+        return LinkError(
+            f"master {index}: the module ec_master is loaded, but {node} is not there",
+            hint=f"give MASTER{index}_DEVICE in /etc/ethercat.conf, then "
+            "sudo systemctl restart ethercat",
+        )
+    if number != errno.EBUSY and not os.access(node, os.R_OK | os.W_OK):
+        return LinkError(
+            f"master {index}: no permission to open {node}",
+            hint='echo \'KERNEL=="EtherCAT[0-9]*", MODE="0660", GROUP="realtime"\' | sudo tee '
+            "/etc/udev/rules.d/99-ethercat.rules; sudo udevadm control --reload; sudo udevadm "
+            "trigger; and be in that group: sudo usermod -aG realtime $USER",
+        )
+    if number == errno.EBUSY:
+        return LinkError(
+            f"master {index} is reserved by another application",
+            hint=f"end it first: sudo fuser -v {node} names it",
+        )
+    return LinkError(
+        f"master {index}: {library.path} (version {library.version}) and the kernel module "
+        f"(version {_module_version()}) do not work together",
+        hint="they come from two builds, and the version of their ioctl() differs: ethercat "
+        "version tells; install both from one source, then sudo systemctl restart ethercat",
+    )
+
+
+def _module_version() -> str:
+    try:
+        return (MODULE / "version").read_text().strip()
+    except OSError:
+        return "unknown"

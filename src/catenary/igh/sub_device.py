@@ -1,0 +1,222 @@
+"""SubDevice and Sdo on the kernel master: the same handles, another way to the device."""
+
+from __future__ import annotations
+
+import ctypes
+from collections import deque
+from typing import TYPE_CHECKING, NoReturn, TypeVar
+
+from catenary import bus
+from catenary.bus import ListType
+from catenary.errors import ConfigurationError, MailboxError, RegisterError
+from catenary.igh import abi
+from catenary.igh.configure import REGISTER_SIZE, REQUEST_SIZE, DeviceConfiguration
+from catenary.model.device import DeviceDescription
+from catenary.procedure.al_state import DeviceState
+from catenary.procedure.exchange import Procedure, after
+from catenary.procedure.sdo_information import DescribedObject
+from catenary.types import DataType
+from catenary.wire.al import State
+from catenary.wire.coe import Emergency
+from catenary.wire.sdo_information import ObjectDescription
+
+if TYPE_CHECKING:
+    from catenary.igh.main_device import MainDevice
+
+T = TypeVar("T")
+
+LOOK = 0.001  # [s] between two looks at a request
+REQUEST_TIMEOUT = 5.0  # [s]
+EMERGENCIES_KEPT = 32
+
+
+class SubDevice(bus.SubDevice):
+    """Owns what is known of one device of the kernel master."""
+
+    def __init__(self, main: MainDevice, description: DeviceDescription) -> None:
+        super().__init__(main, description, None)
+        self.sdo: Sdo = Sdo(self)
+        self.kernel = main
+        self._heard: deque[Emergency] = deque(maxlen=EMERGENCIES_KEPT)
+        self._asking = False  # its register request is in use
+
+    @property
+    def emergencies(self) -> tuple[Emergency, ...]:
+        """The last emergencies it sent, oldest first."""
+        return tuple(self._heard)
+
+    def hear(self, emergency: Emergency) -> None:
+        """The master has taken an emergency from it."""
+        self._heard.append(emergency)
+
+    def read_state(self) -> DeviceState:
+        """What the master saw last of its EtherCAT state."""
+        info = self.kernel.reservation.slave(self.position)
+        word = info.al_state | (0x10 if info.error_flag else 0)
+        known = word & 0xF in tuple(State)
+        self.state = State(word & 0xF) if known else None
+        return DeviceState(self.state, bool(info.error_flag), 0, word)
+
+    def read_register(self, address: int, size: int) -> Procedure[bytes]:
+        """A conversation that reads registers, while a loop runs: `main.request(...)` takes it.
+        RegisterError where no answer comes."""
+        device = self._checked(address, size)
+        library = self.kernel.reservation.library
+        request = device.register_request
+        yield from self._exclusively()
+        try:
+            self.kernel.same_configuration(device)
+            library.ecrt_reg_request_read(request, address, size)
+            yield from self._answered(device, f"register 0x{address:04X}")
+            return ctypes.string_at(library.ecrt_reg_request_data(request), size)
+        finally:
+            self._asking = False
+
+    def write_register(self, address: int, data: bytes) -> Procedure[None]:
+        """The same, writing."""
+        device = self._checked(address, len(data))
+        library = self.kernel.reservation.library
+        request = device.register_request
+        yield from self._exclusively()
+        try:
+            self.kernel.same_configuration(device)
+            ctypes.memmove(library.ecrt_reg_request_data(request), data, len(data))
+            library.ecrt_reg_request_write(request, address, len(data))
+            yield from self._answered(device, f"register 0x{address:04X}")
+        finally:
+            self._asking = False
+
+    def _checked(self, address: int, size: int) -> DeviceConfiguration:
+        if not 0 <= address <= 0xFFFF or not 1 <= size <= REGISTER_SIZE:
+            raise ValueError(f"{size} bytes at 0x{address:X}: 1 to {REGISTER_SIZE} at 16 bits")
+        device = self.kernel.configuration_of(self.position)
+        if device is None or not device.register_request:
+            raise ConfigurationError(
+                f"{self.station}: registers are read by a request of an activated master",
+                hint="read them while a loop runs; else: ethercat reg_read "
+                f"-p {self.position} 0x{address:04X} {size}",
+            )
+        return device
+
+    def _exclusively(self) -> Procedure[None]:
+        while self._asking:
+            yield after(LOOK)
+        self._asking = True
+
+    def _answered(self, device: DeviceConfiguration, what: str) -> Procedure[None]:
+        state = self.kernel.reservation.library.ecrt_reg_request_state
+        for _ in range(round(REQUEST_TIMEOUT / LOOK)):
+            self.kernel.same_configuration(device)
+            found = state(device.register_request)
+            if found == abi.REQUEST_SUCCESS:
+                return
+            if found == abi.REQUEST_ERROR:
+                break
+            yield after(LOOK)
+        raise RegisterError(f"{self.station}: {what} was not answered")
+
+
+class Sdo(bus.Sdo):
+    """Owns the way to the object dictionary of one device, by the kernel master.
+
+    In operation an object is read by a request object, which takes a few cycles and no thread; one
+    longer than 256 bytes, and writing, by a call that blocks the service thread, not the cycle.
+    """
+
+    def __init__(self, sub: SubDevice) -> None:
+        super().__init__(sub)
+        self._device = sub
+        self._busy = False  # its request object is in use
+
+    def list(self, kind: ListType = ListType.ALL) -> tuple[ObjectDescription, ...]:
+        """ConfigurationError: libethercat does not list dictionaries."""
+        self._cannot("list", "sdos")
+
+    def describe(self, index: int) -> DescribedObject:
+        """ConfigurationError: libethercat does not describe objects."""
+        self._cannot("describe", "sdos")
+
+    def _cannot(self, what: str, command: str) -> NoReturn:
+        raise ConfigurationError(
+            f"{self._device.station}: libethercat cannot {what} the objects of a device",
+            hint=f"ethercat {command} -p {self._device.position} does; reading and writing them "
+            "works",
+        )
+
+    def _upload(self, index: int, subindex: int, complete: bool, limit: int) -> Procedure[bytes]:
+        self._check(index, subindex, complete)
+        if complete:
+            raise ConfigurationError(
+                f"{self._device.station}: libethercat has no upload with complete access",
+                hint="read the subindices one by one",
+            )
+        return self._uploaded(index, subindex, limit)
+
+    def _uploaded(self, index: int, subindex: int, limit: int) -> Procedure[bytes]:
+        kernel, position = self._device.kernel, self._device.position
+        device = kernel.configuration_of(position)
+        if device is None or not device.sdo_request or not kernel.cycling:
+            return kernel.reservation.upload(position, index, subindex, limit)
+        while self._busy:
+            yield after(LOOK)
+        self._busy = True
+        try:
+            return (yield from self._requested(device, index, subindex, limit))
+        finally:
+            self._busy = False
+
+    def _requested(
+        self, device: DeviceConfiguration, index: int, subindex: int, limit: int
+    ) -> Procedure[bytes]:
+        kernel, position = self._device.kernel, self._device.position
+        library, request = kernel.reservation.library, device.sdo_request
+        kernel.same_configuration(device)
+        library.ecrt_sdo_request_index(request, index, subindex)
+        library.ecrt_sdo_request_timeout(request, round(REQUEST_TIMEOUT * 1000))
+        library.ecrt_sdo_request_read(request)
+        state = abi.REQUEST_BUSY
+        while state == abi.REQUEST_BUSY:
+            yield after(LOOK)
+            kernel.same_configuration(device)
+            state = library.ecrt_sdo_request_state(request)
+        if state == abi.REQUEST_SUCCESS:
+            size = library.ecrt_sdo_request_data_size(request)
+            if size <= min(limit, REQUEST_SIZE):
+                return ctypes.string_at(library.ecrt_sdo_request_data(request), size)
+        # Too long for the request, or refused: the blocking call says which, and with what code.
+        return kernel.reservation.upload(position, index, subindex, limit)
+
+    def _download(
+        self, index: int, subindex: int, value: object, type: DataType[T] | None, complete: bool
+    ) -> Procedure[None]:
+        self._check(index, subindex, complete)
+        data = value if type is None else type.encode(value)  # type: ignore[arg-type]
+        if not isinstance(data, bytes):
+            raise TypeError(f"give a type for {value!r}, or bytes: type=catenary.types.UDINT")
+        if complete and subindex:
+            raise ConfigurationError(
+                f"{self._device.station}: libethercat writes complete objects from subindex 0 on",
+                hint="begin the data with subindex 0, in 16 bits",
+            )
+        return self._downloaded(index, subindex, data, complete)
+
+    def _downloaded(
+        self, index: int, subindex: int, data: bytes, complete: bool
+    ) -> Procedure[None]:
+        yield after(0)
+        reservation = self._device.kernel.reservation
+        reservation.download(self._device.position, index, subindex, data, complete=complete)
+
+    def _check(self, index: int, subindex: int, complete: bool) -> None:
+        if not 0 <= index <= 0xFFFF or not 0 <= subindex <= 0xFF:
+            raise ValueError(f"object 0x{index:X}:{subindex:X}: an index has 16 bits, a subindex 8")
+        if complete and subindex > 1:
+            raise ValueError(f"complete access begins with subindex 0 or 1, not {subindex}")
+        if self._device.error is not None:
+            raise self._device.error
+        if not self._device.description.coe:
+            raise MailboxError(
+                f"{self._device.station} does not speak CoE: object 0x{index:04X}:{subindex:02X} "
+                "is out of reach",
+                hint="couplers and simple terminals have no object dictionary",
+            )

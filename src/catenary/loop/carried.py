@@ -1,0 +1,148 @@
+"""A loop whose images another master exchanges (`bus.Carrier`): that one leads the devices."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from catenary.bus import Carrier, MainDevice, SubDevice
+from catenary.bus.event import DeviceLost, DeviceReturned, StateLost
+from catenary.core import Engine
+from catenary.errors import CatenaryError
+from catenary.loop.diagnosis import described, is_astray, silence_error, state_error
+from catenary.loop.running import FATAL, Running
+from catenary.loop.watch import LOOK
+from catenary.plan.make import Plan
+from catenary.procedure.exchange import Procedure, after
+from catenary.procedure.survey import Answer
+from catenary.types import UINT
+from catenary.wire.al import State
+from catenary.wire.cia402 import SLOT_OFFSET, Object
+
+
+class CarriedRunning(Running):
+    """Owns the engine of a MainDevice with a carrier while its loop is open."""
+
+    def _make_engine(self) -> Engine:
+        return Engine(self.plan.cycle, self.main.link.capsule, self._carrier.image)
+
+    def _attend(self) -> None:
+        optional = {
+            position
+            for unit in self.plan.cycle.sync_units
+            if unit.optional
+            for position in unit.devices
+        }
+        self.watch = CarriedWatch(self.main, self._carrier, self.engine, optional)
+
+    @property
+    def _carrier(self) -> Carrier:
+        carrier = self.main.carrier
+        if carrier is None:
+            raise RuntimeError("the MainDevice is closed")
+        return carrier
+
+    def _bring_to_op(self) -> None:
+        """The carrier leads the devices while cycles flow; until then nobody need answer."""
+        required = [sub.position for sub in self.main.subs if self.watch.requires(sub.position)]
+        self.service.converse(self._carrier.bring_to_op(required))
+        self._settle()
+        for sub in self.main.subs:
+            sub.state = State.OP
+        self._watches = [self.service.runner.submit(self.watch.run())]
+
+    def _silence_error(self) -> CatenaryError:
+        lost, log = self.engine.lost_in_row, self.log()
+        suspects = [
+            position
+            for unit, valid in zip(self.plan.cycle.sync_units, self._valid_units(), strict=True)
+            if not valid and not unit.optional
+            for position in unit.devices
+        ]
+        self.stop_axes_at_once()
+        [answers] = self.service.converse(self._carrier.survey())
+        return silence_error(answers, suspects, lost, log)
+
+    def _raise_astray(self) -> None:
+        log = self.log()
+        [answers] = self.service.converse(self._carrier.survey())
+        error = state_error([a for a in answers if self.watch.requires(a.station.position)], log)
+        if error is not None:
+            raise error
+
+    def _error_code(self, axis: int) -> int | None:
+        plan = self.plan.cycle.axes[axis]
+        sub = self.main.subs[plan.device]
+        try:
+            answer = sub.sdo.request(Object.ERROR_CODE + SLOT_OFFSET * plan.slot, type=UINT)
+            while not answer.done:
+                if self.cycle() & FATAL:
+                    return None
+                if self.service.beside is not None:
+                    self.service.step()
+            return answer.result()
+        except CatenaryError:
+            return None  # a drive in trouble may not talk; the error says that the code is unknown
+
+
+class CarriedWatch:
+    """Owns the last standing of every device, and tells when it changes."""
+
+    def __init__(
+        self, main: MainDevice, carrier: Carrier, engine: Engine, optional: set[int]
+    ) -> None:
+        self._main = main
+        self._carrier = carrier
+        self._engine = engine
+        self._optional = optional
+        self._answers: Sequence[Answer] = ()
+
+    def run(self) -> Procedure[None]:
+        """Goes on until it is cancelled."""
+        while True:
+            yield from self._carrier.listen()
+            if self._engine.disturbed or any(a.word != State.OP for a in self._answers):
+                answers = yield from self._carrier.survey()
+                self._tell(answers)
+                self._answers = answers
+            yield after(LOOK)
+
+    @property
+    def excuses(self) -> bool:
+        """Whether only devices are out of OP that are not required, as of the last look."""
+        required = (a for a in self._answers if self.requires(a.station.position))
+        return bool(self._optional) and not any(is_astray(answer) for answer in required)
+
+    def requires(self, position: int) -> bool:
+        """Whether the loop ends without this device."""
+        return position not in self._optional
+
+    def release(self, sub: SubDevice) -> None:
+        """The carrier holds nobody: it leads devices back by itself."""
+        raise ValueError(f"{sub.station} is not held: the kernel master leads devices back itself")
+
+    def _tell(self, answers: Sequence[Answer]) -> None:
+        before = {answer.station.position: answer.word for answer in self._answers}
+        now = self._engine.now() * 1e-9
+        for answer in answers:
+            position, word = answer.station.position, answer.word
+            was, sub = before.get(position, int(State.OP)), self._main.subs[position]
+            if word is None and was is not None:
+                message = f"{answer.station} does not answer any more"
+                self._main.events.put(DeviceLost(now, sub, message))
+                sub.state = None
+            elif word is not None and was is None:
+                message = f"{answer.station} answers again"
+                self._main.events.put(DeviceReturned(now, sub, message))
+            if word is not None and word != State.OP and was == State.OP:
+                message = f"{described(answer)}, out of OP"
+                lost = StateLost(now, sub, message, int(State.OP), word & 0xF, answer.code)
+                self._main.events.put(lost)
+                sub.state = None
+            elif word == State.OP:
+                sub.state = State.OP
+
+
+def carried(plan: Plan) -> Plan:
+    """The plan without what the carrier does itself: frames, clocks."""
+    return replace(plan, cycle=replace(plan.cycle, frames=(), clock=None))

@@ -1,0 +1,87 @@
+"""The steps of a cycle over a MainDevice of our own: an inline loop does them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from catenary.loop import Loop
+from catenary.model.device import Direction
+from catenary.plan.wish import Integers
+from catenary.pyigh.slaves import Cell, SlaveBase
+from catenary.wire.al import State
+
+if TYPE_CHECKING:
+    from catenary.pyigh.master import Wish
+
+
+class ArrayCell(NamedTuple):
+    """A mapped object in one of the loop's arrays."""
+
+    array: Integers
+    place: int
+
+    def read(self) -> int:
+        return int(self.array.item(self.place))
+
+    def write(self, value: int) -> None:
+        self.array[self.place] = value
+
+
+class OwnSteps:
+    """Owns the loop. `receive` sends what was written, waits for the instant and takes the answers:
+    a loop's cycle begins where a program's ends."""
+
+    def __init__(self, wish: Wish, slaves: list[SlaveBase], period: float) -> None:
+        self._wish = wish
+        self._loop = Loop(wish, period=period, run="inline", enable=False)
+        self._loop.__enter__()
+        self._cycle = next(self._loop)
+        for slave in slaves:
+            slave.bind(self._cells(slave))
+
+    def receive(self) -> None:
+        self._cycle = next(self._loop)
+
+    def process(self) -> bool:
+        return bool(self._cycle.ok)
+
+    def queue(self) -> None:
+        """The loop does it on its way round."""
+
+    def write_time(self, time_ns: int) -> None:
+        """The loop has its own."""
+
+    def send(self) -> None:
+        """The loop does it on its way round."""
+
+    def wait(self) -> None:
+        """`receive` does."""
+
+    def status(self) -> tuple[int, int, bool]:
+        last = self._loop.log[-1]
+        return int(last["al_counter"]), int(last["al_status"]) & 0xF, bool(last["al_counter"])
+
+    def state(self, position: int) -> tuple[bool, bool, int]:
+        sub = self._wish.main.subs[position]
+        return sub.state is not None, sub.state is State.OP, int(sub.state or 0)
+
+    def close(self) -> None:
+        self._loop.__exit__(None, None, None)
+
+    def _cells(self, slave: SlaveBase) -> dict[tuple[int, int], Cell]:
+        views, made = self._wish.views, self._wish.tables_made
+        assert views is not None
+        sides = (
+            (Direction.OUTPUT, made.output_columns, views.output_integers),
+            (Direction.INPUT, made.input_columns, views.input_integers),
+        )
+        names = {
+            f"{slave.position} 0x{each.index:04X}:{each.subindex:02X}": each
+            for each in slave.objects
+        }
+        return {
+            names[column.name].place: ArrayCell(array, place)
+            for direction, columns, array in sides
+            for place, column in enumerate(columns)
+            if column.name in names and names[column.name].direction is direction
+        }

@@ -1,0 +1,88 @@
+"""Distributed clocks on a kernel master: SYNC0, and who follows whom."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import catenary as cat
+from catenary import igh
+from catenary.igh import Master
+from tests.igh.double import Double
+
+PERIOD_NS = 1_000_000
+
+
+@pytest.fixture
+def main(double: Double) -> Iterator[cat.MainDevice]:
+    with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
+        main.scan()
+        yield main
+
+
+def loop_of(main: cat.MainDevice, **options: object) -> cat.Loop:
+    return cat.Loop(cat.Drives(main.subs.drives, counts_per_turn=1000, dc=True), **options)
+
+
+def times_of(calls: list[str], name: str) -> list[int]:
+    return [int(call.split()[1]) for call in calls if call.startswith(f"{name} ")]
+
+
+def test_sync0_fires_behind_the_frames(main: cat.MainDevice, double: Double) -> None:
+    with loop_of(main, margin=100e-6):
+        pass
+    [first, second] = [call for call in double.calls() if call.startswith("dc ")]
+    position, assign, cycle, shift, *_ = first.split()[1:]
+    assert (position, assign, int(cycle)) == ("0", "0300", PERIOD_NS)
+    assert 100_000 < int(shift) < 200_000  # the margin, the wire and two devices
+    assert second.split()[2:] == first.split()[2:]
+
+
+def test_application_time_keeps_to_the_grid(main: cat.MainDevice, double: Double) -> None:
+    with loop_of(main, clock="main") as loop:
+        double.forget()
+        for _ in range(5):
+            next(loop)
+        times = times_of(double.calls(), "application_time")
+    assert {b - a for a, b in itertools.pairwise(times)} == {PERIOD_NS}
+
+
+def test_the_reference_follows_the_machine(main: cat.MainDevice, double: Double) -> None:
+    """1.5.2 has no call that takes the time: the application time is taken."""
+    with loop_of(main, clock="main") as loop:
+        double.forget()
+        next(loop)
+        calls = double.calls()
+    asked = next(call for call in calls if call.startswith("sync_reference_clock"))
+    assert asked.startswith("sync_reference_clock_to ") is ("1.6.1" in double.path.name)
+    assert calls.index(asked) < calls.index("sync_slave_clocks") < calls.index("queue 0")
+
+
+@pytest.mark.parametrize("ppm", [40, -40])
+def test_the_machine_follows_the_reference(doubles: dict[str, Path], ppm: int) -> None:
+    """A reference clock that is 40 ppm off: the instants go its way, and stay in phase with it."""
+    double = Double(doubles["1.6.1"])
+    with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
+        main.scan()
+        assert isinstance(main, igh.MainDevice)
+        with loop_of(main, run="inline") as loop:
+            exchange = main.configuration.exchange
+            begin = main.link.now()
+            for _ in range(4000):
+                machine = main.link.now() - int(exchange.figures["offset_ns"]) - begin
+                double.reference(begin + machine + machine * ppm // 1_000_000)
+                next(loop)
+            figures = exchange.figures
+    assert "sync_reference_clock" not in double.calls()
+    assert abs(figures["phase_error_ns"]) < 100
+    assert figures["rate_ns"] == pytest.approx(ppm, abs=2)
+
+
+def test_a_reference_clock_can_be_chosen(main: cat.MainDevice, double: Double) -> None:
+    arm = cat.Drives([main.subs[1]], counts_per_turn=1000, dc=True)
+    with cat.Loop(arm, reference=main.subs[1]):
+        pass
+    assert "select_reference_clock 1" in double.calls()

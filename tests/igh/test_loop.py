@@ -1,0 +1,209 @@
+"""Loops on a kernel master: the double's drives enable, follow and stop; calls in their order."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import catenary as cat
+from catenary.igh import Master
+from tests.igh.double import Double
+
+TURN = 2 * math.pi
+
+
+@pytest.fixture
+def main(double: Double) -> Iterator[cat.MainDevice]:
+    with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
+        main.scan()
+        yield main
+
+
+def arm_of(main: cat.MainDevice, **options: object) -> cat.Drives:
+    return cat.Drives(main.subs.drives, counts_per_turn=1000, **options)
+
+
+def test_a_scan_finds_drives(main: cat.MainDevice) -> None:
+    first, second = main.subs
+    assert (first.name, first.identity[:2]) == ("Doubled Drive", (0xAA, 0x402))
+    assert second.alias == 7
+    assert first.is_drive
+    assert str(first.state) == "PRE-OP"
+    assert first.description.outputs[0].pdos[0].index == 0x1600
+    assert [entry.index for entry in first.description.inputs[0].pdos[0].entries] == [
+        *(0x6041, 0x6064, 0x6077, 0x6061)
+    ]
+
+
+@pytest.mark.parametrize("run", ["threaded", "inline"])
+def test_drives_follow(main: cat.MainDevice, double: Double, run: str) -> None:
+    arm = arm_of(main)
+    with cat.Loop(arm, run=run) as loop:
+        assert arm.enabled.all()
+        home = arm.actual.position.copy()
+        np.testing.assert_allclose(home, [0.0, TURN])
+        for cycle in loop:
+            assert cycle.ok
+            arm.target.position[:] = home + 0.1 * min(1.0, 10 * cycle.time)
+            if cycle.time > 0.2:
+                break
+        np.testing.assert_allclose(arm.actual.position, home + 0.1, atol=TURN / 1000)
+    assert double.value(0, 0x6041, 0) & 0x6F != 0x27
+    assert double.calls()[-1] == "deactivate"
+    assert main.subs[0].state == 2
+
+
+def test_a_law_runs_natively(main: cat.MainDevice) -> None:
+    pytest.importorskip("numba")
+
+    @cat.law
+    def ramp(actual, target, memory, time):  # type: ignore[no-untyped-def]
+        for i in range(actual.n):
+            target.position[i] = memory[i] + time
+        return time > 0.05
+
+    arm = arm_of(main)
+    with cat.Loop(arm, laws=[ramp]) as loop:
+        home = arm.actual.position.copy()
+        loop.run(ramp, memory=home.tolist())
+        assert next(loop).ok
+        np.testing.assert_allclose(arm.actual.position, home + 0.05, atol=0.01)
+
+
+def test_the_calls_of_a_cycle_and_their_order(main: cat.MainDevice, double: Double) -> None:
+    with cat.Loop(arm_of(main), run="inline") as loop:
+        next(loop)
+        double.forget()
+        for _ in range(3):
+            next(loop)
+        calls = [call for call in double.calls() if not call.startswith("reg_request")]
+    one = ["queue 0", "send", "receive", "process 0", "domain_state 0", "master_state"]
+    assert calls[: 3 * len(one)] == 3 * one
+
+
+def test_the_calls_before_operation(main: cat.MainDevice, double: Double) -> None:
+    double.forget()
+    with cat.Loop(arm_of(main), watchdog=0.05):
+        pass
+    calls = double.calls()
+    first = calls.index("create_domain")
+    told = [c for c in calls[first : calls.index("activate") + 1] if "entry " not in c]
+    assert told[:4] == [
+        "create_domain",
+        "slave_config 0 0 aa 402",
+        "watchdog 0 2498 500",
+        "pdos 0 sync 2 dir 1 pdos 1 watchdog 1",
+    ]
+    assert "pdos 0 sync 3 dir 2 pdos 1 watchdog 2" in told
+    assert told.index("reg_pdo_entry_pos 1 2 0 0") < told.index("reg_pdo_entry_pos 1 3 0 0")
+    assert told[-2:] == ["set_send_interval 1000", "activate"]
+
+
+def test_the_mapping_is_changed_where_something_is_missing(
+    main: cat.MainDevice, double: Double
+) -> None:
+    """Torque control needs 0x6071, which is not mapped: the master is told a new mapping."""
+    arm = cat.Drives(main.subs.drives, mode="cst", counts_per_turn=1000)
+    with cat.Loop(arm) as loop:
+        for cycle in loop:
+            arm.target.torque[:] = 0.25
+            if cycle.number > 20:
+                break
+        assert arm.enabled.all()
+        np.testing.assert_allclose(arm.actual.torque, 0.25, atol=0.01)
+    assert "entry 1600 6071:00 16" in double.calls()
+
+
+def test_sync_units_are_domains(main: cat.MainDevice, double: Double) -> None:
+    left, right = main.subs.drives
+    one = cat.Drives([left], counts_per_turn=1000)
+    two = cat.Drives([right], counts_per_turn=1000, required=False, every=2)
+    with cat.Loop(one, two, run="inline") as loop:
+        next(loop)
+        double.forget()
+        for _ in range(4):
+            next(loop)
+        calls = double.calls()
+    assert calls.count("queue 0") == 4
+    assert calls.count("queue 1") == 2
+
+
+def test_a_cable_pulled_ends_the_loop(main: cat.MainDevice, double: Double) -> None:
+    def run() -> None:
+        with cat.Loop(arm_of(main)) as loop:
+            for cycle in loop:
+                assert cycle.ok is (cycle.number <= 5)
+                if cycle.number == 5:
+                    double.cable(0)
+
+    with pytest.raises(cat.errors.WorkingCounterError, match="no device answers"):
+        run()
+    assert any("main interface does not carry" in str(event) for event in main.events)
+
+
+def test_a_device_that_need_not_be_there_comes_back(main: cat.MainDevice, double: Double) -> None:
+    left, right = main.subs.drives
+    one = cat.Drives([left], counts_per_turn=1000)
+    two = cat.Drives([right], counts_per_turn=1000, required=False)
+    seen = []
+    with cat.Loop(one, two) as loop:
+        for cycle in loop:
+            assert cycle.ok
+            seen.append(bool(two.present[0]))
+            if cycle.number == 20:
+                double.online(1, 0)
+            if cycle.number == 60:
+                double.online(1, 1)
+            if cycle.number == 120:
+                break
+    assert (seen[10], seen[40], seen[-1]) == (True, False, True)
+    kinds = [type(event).__name__ for event in main.events]
+    assert "DeviceLost" in kinds
+    assert "DeviceReturned" in kinds
+
+
+def test_a_device_that_refuses_op_is_named(main: cat.MainDevice, double: Double) -> None:
+    double.register(1, 0x0134, 0x001D)
+    arm = arm_of(main)
+    double.state(1, 4, 1)
+    said = r"device 1 .*SAFE-OP \(AL status code 0x001D"
+    with pytest.raises(cat.errors.StateError, match=said) as caught, cat.Loop(arm):
+        pass
+    assert caught.value.code == 0x001D
+    assert double.calls()[-1] == "deactivate"
+
+
+def test_leaving_op_ends_the_loop(main: cat.MainDevice, double: Double) -> None:
+    double.register(0, 0x0134, 0x001B)
+
+    def run() -> None:
+        with cat.Loop(arm_of(main)) as loop:
+            for cycle in loop:
+                if cycle.number == 5:
+                    double.state(0, 4, 1)
+
+    with pytest.raises(cat.errors.CatenaryError, match="watchdog") as caught:
+        run()
+    assert "device 0" in str(caught.value)
+
+
+def test_the_real_clock(doubles: dict[str, Path]) -> None:
+    """A native thread, and Python that may be late: what is asserted holds on any machine."""
+    double = Double(doubles["1.6.1"])
+    with cat.MainDevice(Master(library=double.path)) as main:
+        main.scan()
+        arm = arm_of(main)
+        with cat.Loop(arm, period=2e-3, late_limit=0, priority=None) as loop:
+            for cycle in loop:
+                arm.target.position[:] = arm.actual.position
+                if cycle.number > 20:
+                    break
+            assert main.subs[0].sdo.request(0x6076).cancelled is False
+            assert loop.timing is not None
+        double.forget()
+    assert double.calls() == ["release_master"]
+    assert double.reserved() == 0

@@ -1,0 +1,140 @@
+"""Objects, registers and emergencies of devices on a kernel master."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import catenary as cat
+from catenary.errors import ConfigurationError, MailboxError, SdoAbort
+from catenary.igh import Master, SubDevice
+from catenary.types import UDINT, UINT
+from tests.igh.double import Double
+
+
+@pytest.fixture
+def main(double: Double) -> Iterator[cat.MainDevice]:
+    with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
+        main.scan()
+        yield main
+
+
+def loop_of(main: cat.MainDevice, **options: object) -> cat.Loop:
+    return cat.Loop(cat.Drives(main.subs.drives, counts_per_turn=1000), **options)
+
+
+def test_objects_before_a_loop(main: cat.MainDevice, double: Double) -> None:
+    sub = main.subs[1]
+    assert sub.sdo.read(0x6076, type=UDINT) == 1000
+    sub.sdo.write(0x605A, 0, 5, type=UINT)
+    assert double.value(1, 0x605A, 0) == 5
+    with pytest.raises(
+        SdoAbort, match=r"device 1: SDO 0x2000:01 refused with 0x06020000"
+    ) as caught:
+        sub.sdo.read(0x2000, 1)
+    assert (caught.value.position, caught.value.code) == (1, 0x06020000)
+
+
+def test_objects_in_operation_go_by_request_objects(main: cat.MainDevice, double: Double) -> None:
+    sub = main.subs[0]
+    with loop_of(main) as loop:
+        next(loop)
+        double.forget()
+        answers = [sub.sdo.request(0x6076, type=UDINT), sub.sdo.request(0x1018, 1, type=UDINT)]
+        written = sub.sdo.request_write(0x605A, 0, 6, type=UINT)
+        for _ in range(30):
+            next(loop)
+        assert [answer.result() for answer in answers] == [1000, 0xAA]
+        written.result()
+        calls = double.calls()
+        assert calls.count("sdo_request_read 0") == 2
+        assert not any(call.startswith("sdo_upload") for call in calls)
+    assert double.value(0, 0x605A, 0) == 6
+
+
+def test_a_refused_request_says_why(main: cat.MainDevice) -> None:
+    with loop_of(main) as loop:
+        next(loop)
+        answer = main.subs[0].sdo.request(0x2000)
+        for _ in range(30):
+            next(loop)
+        with pytest.raises(SdoAbort, match="0x06020000"):
+            answer.result()
+        with pytest.raises(RuntimeError, match="inside the loop's own thread"):
+            main.subs[0].sdo.read(0x6076)
+
+
+def test_registers_in_operation(main: cat.MainDevice, double: Double) -> None:
+    sub = main.subs[1]
+    assert isinstance(sub, SubDevice)
+    double.register(1, 0x0990, 0x1234)
+    with loop_of(main) as loop:
+        next(loop)
+        read = main.request(sub.read_register(0x0990, 2))
+        write = main.request(sub.write_register(0x0F80, b"\x05"))
+        for _ in range(30):
+            next(loop)
+        assert read.result() == b"\x34\x12"
+        write.result()
+    assert double.register_at(1, 0x0F80) == 5
+    with pytest.raises(ConfigurationError, match="ethercat reg_read -p 1 0x0990 2"):
+        main.converse(sub.read_register(0x0990, 2))
+
+
+def test_emergencies_are_events(main: cat.MainDevice, double: Double) -> None:
+    with loop_of(main) as loop:
+        next(loop)
+        double.emergency(1, bytes.fromhex("10 42 09 01 02 03 04 05"))
+        for _ in range(30):
+            next(loop)
+    [heard] = [event for event in main.events if isinstance(event, cat.events.Emergency)]
+    assert (heard.sub, heard.error_code, heard.error_register) == (main.subs[1], 0x4210, 9)
+    assert main.subs[1].emergencies[0].data == b"\1\2\3\4\5"
+
+
+def test_what_the_library_cannot_do_says_so(main: cat.MainDevice) -> None:
+    sub = main.subs[0]
+    for ask, command in (
+        (sub.sdo.list, "ethercat sdos -p 0"),
+        (lambda: sub.sdo.describe(0x6040), "ethercat sdos -p 0"),
+        (main.look, "ethercat slaves"),
+        (main.diagnose, "ethercat crc"),
+        (lambda: sub.sdo.read(0x1018, complete=True), "one by one"),
+    ):
+        with pytest.raises(ConfigurationError, match="libethercat") as caught:
+            ask()
+        assert command in str(caught.value)
+
+
+def test_a_device_without_objects(main: cat.MainDevice, double: Double) -> None:
+    sub = main.subs[0]
+    sub.description = type(sub.description)(
+        **{
+            name: getattr(sub.description, name)
+            for name in sub.description.__dataclass_fields__
+            if name != "mailbox"
+        },
+        mailbox=None,
+    )
+    with pytest.raises(MailboxError, match="does not speak CoE"):
+        sub.sdo.read(0x1018)
+
+
+def test_another_thread_asks_while_the_loop_runs(doubles: dict[str, Path]) -> None:
+    """In real time a call that blocks waits in its own thread."""
+    double = Double(doubles["1.6.1"])
+    found: list[int] = []
+    with cat.MainDevice(Master(library=double.path)) as main:
+        sub = main.scan()[0]
+        asking = threading.Thread(target=lambda: found.append(sub.sdo.read(0x6076, type=UDINT)))
+        with loop_of(main, late_limit=0, priority=None) as loop:
+            for cycle in loop:
+                if cycle.number == 1:
+                    asking.start()
+                if found:
+                    break
+            asking.join()
+    assert found == [1000]
