@@ -752,6 +752,7 @@ __attribute__((constructor)) static void double_begin(void)
     const char *slaves = getenv("DOUBLE_SLAVES");
     if (slaves)
         double_reset(atoi(slaves));
+    bus.recording = getenv("DOUBLE_SILENT") == NULL;
 }
 
 void double_reset(int slaves)

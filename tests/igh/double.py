@@ -1,10 +1,14 @@
-"""The double of libethercat: built once a session for each interface, arranged by its test."""
+"""The double of libethercat: built once a session for each interface, arranged by its test.
+
+python -m tests.igh.double FOLDER       builds that of 1.6.1 and prints its path
+"""
 
 from __future__ import annotations
 
 import ctypes
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -50,3 +54,7 @@ class Double:
 
     def __getattr__(self, name: str) -> ctypes._FuncPointer:
         return getattr(self._library, f"double_{name}")
+
+
+if __name__ == "__main__":
+    print(build(Path(sys.argv[1]), "1.6.1"))

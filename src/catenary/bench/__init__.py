@@ -115,6 +115,13 @@ def measure_clocks(
     return clocks.measure(devices=devices, minutes=minutes, jitter=jitter, seed=seed, file=file)
 
 
+def measure_igh(*, library: Path | None, file: Path | None = None) -> None:
+    """Prints what a cycle over libethercat takes, beside C and beside one call after the other."""
+    from catenary.bench import igh
+
+    igh.measure(library=library, file=file)
+
+
 def measure_networks(
     *, rates: Sequence[int], seconds: float, rounds: int, file: Path | None = None
 ) -> None:

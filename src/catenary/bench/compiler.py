@@ -20,17 +20,28 @@ class CompilerError(CatenaryError):
 def compile_peer(name: str, folder: Path) -> Path:
     """The program of the C peer `name`, in `folder`; compiled once."""
     program = folder / name
-    if program.exists():
-        return program
+    if not program.exists():
+        sources = [SOURCES / "peer.c", SOURCES / RECEIVERS[name]]
+        _compile(name, [*FLAGS, "-o", str(program), *map(str, sources), "-lm"])
+    return program
+
+
+def compile_library(name: str, folder: Path) -> Path:
+    """The C peer `name`.c as a library that this process can load."""
+    library = folder / f"{name}.so"
+    _compile(name, [*FLAGS, "-shared", "-fPIC", "-o", str(library), str(SOURCES / f"{name}.c")])
+    return library
+
+
+def _compile(name: str, arguments: list[str]) -> None:
     compiler = shutil.which("cc")
     if compiler is None:
         raise CompilerError(
             f"the peer {name} needs a C compiler, and there is no `cc`",
             hint="sudo apt install gcc libc6-dev, or leave it out: --peers pysoem",
         )
-    sources = [SOURCES / "peer.c", SOURCES / RECEIVERS[name]]
     done = subprocess.run(
-        [compiler, *FLAGS, "-o", program, *sources, "-lm"],
+        [compiler, *arguments],
         capture_output=True,
         text=True,
         check=False,
@@ -38,4 +49,3 @@ def compile_peer(name: str, folder: Path) -> Path:
     if done.returncode != 0:
         first = next(iter(done.stderr.splitlines()), f"{compiler} failed")
         raise CompilerError(f"the peer {name} does not compile: {first}")
-    return program

@@ -29,6 +29,7 @@ def add_parser(commands: Commands) -> None:
     _add_soak(group)
     _add_clocks(group)
     _add_networks(group)
+    _add_igh(group)
 
 
 def _add_loop(group: Commands) -> None:
@@ -237,6 +238,22 @@ def _add_networks(group: Commands) -> None:
     parser.set_defaults(run=run_networks)
 
 
+def _add_igh(group: Commands) -> None:
+    parser = add_command(
+        group,
+        "igh",
+        help="a cycle over the IgH kernel master's library, beside C",
+        description="Runs our step, the same calls hand-written in C and one ctypes call for each "
+        "function on one activated master, in turns. All devices go to OP; drives stay disabled.",
+        example="catenary bench igh --library libethercat-1.6.1.so.1 --json igh.json",
+    )
+    parser.add_argument(
+        "--library", type=Path, metavar="FILE", help="another libethercat than the machine's"
+    )
+    _add_file(parser)
+    parser.set_defaults(run=run_igh)
+
+
 def _add_file(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there")
 
@@ -343,6 +360,13 @@ def run_clocks(arguments: argparse.Namespace) -> int:
         file=arguments.json,
     )
     return 0 if held else 1
+
+
+def run_igh(arguments: argparse.Namespace) -> int:
+    from catenary import bench
+
+    bench.measure_igh(library=arguments.library, file=arguments.json)
+    return 0
 
 
 def run_networks(arguments: argparse.Namespace) -> int:
