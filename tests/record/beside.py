@@ -33,7 +33,7 @@ class SharedLoop:
 
 
 @contextmanager
-def shared_loop(name: str, *, axes: int = 3, history: float = 60.0) -> Iterator[SharedLoop]:
+def shared_loop(name: str, *, axes: int = 3, history: float = 30.0) -> Iterator[SharedLoop]:
     """Remembers so much that a recorder that starts late, or is slow, loses nothing."""
     segment = cat.Segment([cat.Coupler(), *(cat.Servo() for _ in range(axes))])
     with cat.MainDevice(segment) as main:

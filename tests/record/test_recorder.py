@@ -220,3 +220,11 @@ def test_without_the_extra_it_is_named(
         record.Recorder(name, tmp_path / "x.mcap")
     assert caught.value.hint == "pip install 'catenary[log]'"
     assert not (tmp_path / "x.mcap").exists()
+
+
+def test_the_package_is_imported_without_the_extra() -> None:
+    script = (
+        "import sys, catenary.record; print(*{'mcap', 'matplotlib', 'zstandard'} & {*sys.modules})"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert (done.returncode, done.stdout.strip()) == (0, "")

@@ -30,7 +30,7 @@ segment = cat.Segment([cat.Servo() for _ in range({AXES})], clock="monotonic")
 with cat.MainDevice(segment) as main:
     arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
     with (
-        cat.Share(sys.argv[1], history=30.0) as share,
+        cat.Share(sys.argv[1], history=8.0) as share,
         cat.Loop(arm, period=1e-3, sink=share, lost_limit=10**6, late_limit=0) as loop,
     ):
         home = arm.actual.position.copy()
