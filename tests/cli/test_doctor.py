@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import socket
 
 import pytest
 
 from catenary import doctor
 from catenary.cli import main
+from catenary.doctor import examination
 from tests.doctor import machines
 
 
@@ -37,6 +39,22 @@ def test_json(capsys):
     assert statuses["nic-driver"] == "FAIL"
     assert told["latency_us"]["period"] == 2000.0
     assert told["latency_us"]["count"] > 0
+
+
+def test_frames_of_others_are_seen(veth, monkeypatch, capsys):
+    measure = examination.measure
+
+    def send_meanwhile(*arguments, **options):
+        with socket.socket(socket.AF_PACKET, socket.SOCK_RAW) as sender:
+            sender.bind((veth[0], 0))
+            sender.send(bytes(60))
+        return measure(*arguments, **options)
+
+    monkeypatch.setattr(examination, "measure", send_meanwhile)
+    main(["doctor", veth[0], "--seconds", "0.1", "--json"])
+    checks = {check["id"]: check for check in json.loads(capsys.readouterr().out)["checks"]}
+    assert checks["nic-traffic"]["status"] == "WARN"
+    assert "none was the doctor's" in checks["nic-traffic"]["found"]
 
 
 def test_a_wire(veth, capsys):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import subprocess
 
 import pytest
 
@@ -58,6 +59,26 @@ def test_what_a_driver_cannot_do_is_an_oserror(veth):
         read_setting(veth[0], "eee")
     with pytest.raises(OSError, match="Operation not supported"):
         write_setting(veth[0], "rx-usecs", 0)
+
+
+@pytest.fixture
+def tap(veth):
+    """A driver that knows coalescing, of one kind only: drivers/net/tun.c."""
+    made = subprocess.run(
+        ["ip", "tuntap", "add", "dev", "catenary0", "mode", "tap"], capture_output=True, text=True
+    )
+    if made.returncode != 0:
+        pytest.skip(f"no tap: {made.stderr.strip()}")
+    yield "catenary0"
+    subprocess.run(["ip", "tuntap", "del", "dev", "catenary0", "mode", "tap"], check=True)
+
+
+def test_a_setting_is_written_and_what_the_driver_lacks_is_refused(tap):
+    assert read_setting(tap, "rx-usecs") == 0
+    write_setting(tap, "rx-usecs", 0)
+    with pytest.raises(OSError, match=r"not supported|Invalid"):
+        write_setting(tap, "rx-usecs", 5)
+    assert read_card(tap).coalescing == Coalescing(0, 0, False)
 
 
 def test_loopback_has_no_driver():

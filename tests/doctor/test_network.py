@@ -7,7 +7,17 @@ from dataclasses import replace
 import pytest
 
 from catenary.doctor.card import Coalescing, Link
-from catenary.doctor.network import coalescing, driver, eee, ipv6, link, managed, offloads, use
+from catenary.doctor.network import (
+    coalescing,
+    driver,
+    eee,
+    ipv6,
+    link,
+    managed,
+    offloads,
+    traffic,
+    use,
+)
 from tests.doctor.machines import I210, I219, controller, laptop, make
 
 PLACE = "/sys/class/net/enp2s0"
@@ -81,6 +91,22 @@ def test_networkd(tmp_path):
     }
     check = managed(make(tmp_path, files), I210)
     assert (check.status, "Unmanaged=yes" in check.advice) == ("WARN", True)
+
+
+def test_frames_that_somebody_sent(tmp_path):
+    machine = controller(tmp_path)
+    quiet, loud = (replace(machine, watched=3.0, sent=sent) for sent in (0, 7))
+    assert traffic(quiet, I210).found == "no frame went out in 3 s"
+    check = traffic(loud, I210)
+    assert (check.status, "7 frames went out in 3 s" in check.found) == ("WARN", True)
+
+
+def test_frames_are_counted_by_the_kernel(tmp_path):
+    """The columns of /proc/net/dev: eight of what came, then bytes and packets that went."""
+    line = "enp2s0:  3193  29  0  0  0  0  0  0  4711  31  0  0  0  0  0  0"
+    machine = controller(tmp_path, **{"/proc/net/dev": f"Inter-|\n face |\nenp2s00: 1 1\n{line}"})
+    assert machine.frames_sent() == 31
+    assert make(tmp_path / "other", {}).frames_sent() is None
 
 
 def test_ipv6_addresses_that_would_not_come_back_are_not_taken(tmp_path):

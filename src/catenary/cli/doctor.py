@@ -80,7 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def look(arguments: argparse.Namespace) -> Examination:
-    from catenary.doctor import examine, measure, obtainable_cpu, this_machine
+    from catenary.doctor import examine, obtainable_cpu, this_machine, watch
     from catenary.errors import LinkError
 
     try:
@@ -96,10 +96,7 @@ def look(arguments: argparse.Namespace) -> Examination:
     if not arguments.json and sys.stderr.isatty():
         print(f"measuring for {arguments.seconds:g} s ...", file=sys.stderr)
     cpu = obtainable_cpu(machine) if arguments.cpu is None else arguments.cpu
-    latency = measure(
-        arguments.seconds, period=arguments.period, priority=arguments.priority, cpu=cpu
-    )
-    return examine(machine, latency)
+    return examine(*watch(machine, arguments.seconds, cpu=cpu))
 
 
 def apply(changes: tuple[Change, ...], *, ask: bool) -> int:

@@ -1,7 +1,8 @@
 """Whether this machine is fit for a real-time EtherCAT loop: `catenary doctor`, docs/doctor.md.
 
     machine = this_machine("eth0")              # asks the kernel and the driver, changes nothing
-    examination = examine(machine)              # pure: from a Machine to verdicts
+    machine, latency = watch(machine, 3.0, cpu=None)
+    examination = examine(machine, latency)     # pure: from a Machine to verdicts
     print(as_text(examination))
 
 It sends no frame and changes nothing; `apply` and `undo` are called by those who were asked.
@@ -9,8 +10,8 @@ It sends no frame and changes nothing; `apply` and `undo` are called by those wh
 
 from catenary.doctor.change import Change, MachineGround, State, StateError, apply, open_state, undo
 from catenary.doctor.check import Check
-from catenary.doctor.examination import Examination, examine, this_machine
-from catenary.doctor.latency import Latency, measure, obtainable_cpu
+from catenary.doctor.examination import Examination, examine, this_machine, watch
+from catenary.doctor.latency import Latency, obtainable_cpu
 from catenary.doctor.machine import Machine
 from catenary.doctor.report import as_json, as_text, change_lines
 
@@ -28,9 +29,9 @@ __all__ = [
     "as_text",
     "change_lines",
     "examine",
-    "measure",
     "obtainable_cpu",
     "open_state",
     "this_machine",
     "undo",
+    "watch",
 ]

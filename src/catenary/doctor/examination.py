@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from catenary.doctor import clocks, interrupts, kernel, network, permissions, processors
@@ -13,7 +13,7 @@ from catenary.doctor.change import Change
 from catenary.doctor.check import Check, skipped
 from catenary.doctor.clock_state import read_clock_state
 from catenary.doctor.ethtool import read_card
-from catenary.doctor.latency import Latency, judge
+from catenary.doctor.latency import Latency, judge, measure
 from catenary.doctor.machine import Machine
 from catenary.errors import LinkError
 
@@ -72,6 +72,15 @@ def no_card(machine: Machine) -> Check:
     cards = [name for name in names if machine.exists(f"/sys/class/net/{name}/device")]
     there = f"there is {', '.join(cards)}" if cards else "there is no card here"
     return skipped("nic", f"none was named; {there}", "catenary doctor NIC")
+
+
+def watch(machine: Machine, seconds: float, *, cpu: int | None) -> tuple[Machine, Latency]:
+    """Measures how late threads wake, and what goes out on the port meanwhile."""
+    before = machine.frames_sent()
+    latency = measure(seconds, period=machine.period, priority=machine.priority, cpu=cpu)
+    after = machine.frames_sent()
+    sent = None if before is None or after is None else after - before
+    return replace(machine, watched=seconds, sent=sent), latency
 
 
 def this_machine(

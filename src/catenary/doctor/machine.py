@@ -26,6 +26,7 @@ class Machine:
     clock: how the kernel's clock is being adjusted; None: it does not say.
     wanted_cpu: the CPU the loop is to run on, where the user said so.
     period: [s] of the loop this machine is judged for. priority: SCHED_FIFO of its thread.
+    watched: [s] for which the card's port was watched, and sent: frames that went out meanwhile.
     """
 
     root: Path = Path("/")
@@ -34,6 +35,8 @@ class Machine:
     wanted_cpu: int | None = None
     period: float = 1e-3
     priority: int = 80
+    watched: float = 0.0
+    sent: int | None = None
     architecture: str = field(default_factory=lambda: os.uname().machine)
     permission_command: str = SET_CAPABILITIES
 
@@ -99,6 +102,15 @@ class Machine:
         """Names of the programs that run, those that this container sees."""
         names = (self.text(path) for path in self.matching("/proc/[0-9]*/comm"))
         return frozenset(name for name in names if name)
+
+    def frames_sent(self) -> int | None:
+        """By the card, until now: /proc/net/dev of this network namespace, proc(5)."""
+        if self.card is None:
+            return None
+        name = re.escape(self.card.name)
+        text = self.text("/proc/net/dev") or ""
+        found = re.search(rf"^\s*{name}:(?:\s*\d+){{8}}\s+\d+\s+(\d+)", text, re.MULTILINE)
+        return int(found[1]) if found else None
 
     @cached_property
     def cpus(self) -> frozenset[int]:

@@ -145,6 +145,20 @@ def managed(machine: Machine, card: Card) -> Check:
     )
 
 
+def traffic(machine: Machine, card: Card) -> Check:
+    """What really went out while nobody had a reason to send."""
+    id = "nic-traffic"
+    if machine.sent is None or not machine.watched:
+        return skipped(id, "not watched", f"catenary doctor {card.name} --seconds 60")
+    if machine.sent == 0:
+        return passed(id, f"no frame went out in {machine.watched:g} s")
+    return warned(
+        id,
+        f"{machine.sent} frames went out in {machine.watched:g} s, and none was the doctor's",
+        f"sudo tcpdump -eni {card.name} -Q out # tells whose they are",
+    )
+
+
 def ipv6(machine: Machine, card: Card) -> Check:
     id = "nic-ipv6"
     path = f"/proc/sys/net/ipv6/conf/{card.name}/disable_ipv6"
@@ -222,4 +236,4 @@ def offloads(machine: Machine, card: Card) -> Check:
     return passed(id, "GRO is on, and leaves EtherCAT frames alone" if card.gro else "none matters")
 
 
-CHECKS = (driver, link, use, managed, ipv6, eee, coalescing, offloads)
+CHECKS = (driver, link, use, managed, traffic, ipv6, eee, coalescing, offloads)
