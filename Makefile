@@ -1,10 +1,11 @@
 # Two commands for a newcomer: `make demo` and `make test`. Both do all the set-up, once.
 #
 # PYTHON=/path/to/python3.12 takes another interpreter, and makes .venv anew for it.
-# TEST="-k axis" passes options to pytest.
+# TEST="-k axis" passes options to pytest, COBOT=--realtime to `make cobot`.
 PYTHON ?= python3
 VENV := .venv
 TEST ?=
+COBOT ?=
 SOURCES := CMakeLists.txt pyproject.toml \
            $(shell find src -name '*.pyx' -o -name '*.pxd' -o -name '*.pxi' -o -name '*.h')
 CHECKED := src tests tools examples
@@ -23,10 +24,13 @@ ifeq ($(wildcard $(VENV)/.built)$(filter clean,$(MAKECMDGOALS)),)
   endif
 endif
 
-.PHONY: demo test lint build clean
+.PHONY: demo cobot test lint build clean
 
 demo: $(VENV)/.built
 	@$(VENV)/bin/catenary demo
+
+cobot: $(VENV)/.with-cobot
+	@$(VENV)/bin/python -m catenary.realtime.private_network examples/cobot/cobot.py $(COBOT)
 
 test: $(VENV)/.with-test
 	@$(VENV)/bin/python -m catenary.realtime.private_network -m pytest $(TEST)

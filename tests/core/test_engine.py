@@ -103,9 +103,12 @@ def test_the_lane_and_its_waiting_thread(engine: Engine) -> None:
     assert engine.counters["alien"] == engine.counters["stale"] == 0
 
 
-def test_time_is_not_to_be_spent_on_a_real_clock(engine: Engine) -> None:
-    with pytest.raises(RuntimeError, match="by itself"):
-        engine.spend(1)
+def test_on_a_real_clock_time_that_is_spent_is_computed_away(engine: Engine) -> None:
+    before = engine.now()
+    engine.spend(2_000_000)
+    assert engine.now() - before >= 2_000_000
+    with pytest.raises(ValueError, match="duration_ns"):
+        engine.spend(-1)
 
 
 def test_stop_and_start_again(engine: Engine) -> None:

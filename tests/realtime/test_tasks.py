@@ -261,3 +261,46 @@ def test_a_stack_of_its_own_size(run):
     if run == "processes":
         assert found.read()[1] == 256 * 1024
     assert (threading.stack_size(), resource.getrlimit(resource.RLIMIT_STACK)) == before
+
+
+# what runs beside them
+
+
+@BOTH
+def test_a_loop_beside_tasks_has_a_place_on_their_clock(run):
+    """1 ms of every 10 is the task's, of higher priority, on the same processor."""
+    notes = Queue("i8", 3, length=100)
+    task = Task(bodies.spend_and_note, (1e-3, notes), period=10e-3, priority=50)
+
+    def work(place, times):
+        ends = []
+        for number in range(times):
+            place.wait_until(number * 10 * MS)
+            place.spend(2e-3)
+            ends.append(place.now_ns)
+        return ends
+
+    with VirtualClock() as clock, Tasks(task, run=run, clock=clock, best_effort=True) as tasks:
+        ends = tasks.beside(work, 3, priority=40, cpu=0)
+    assert [end % (10 * MS) for end in ends] == [3 * MS] * 3
+    assert len(records(notes)) >= 3
+
+
+def test_what_it_raises_comes_out():
+    def fails(place):
+        raise LookupError("beside")
+
+    task = Task(bodies.idle, period=10e-3)
+    with VirtualClock() as clock, Tasks(task, clock=clock) as tasks:
+        with pytest.raises(LookupError, match="beside"):
+            tasks.beside(fails)
+        tasks.join(20e-3)  # time goes on
+
+
+def test_on_the_machines_clock_it_runs_here():
+    with Tasks(Task(bodies.idle, period=10e-3)) as tasks:
+        assert tasks.beside(lambda place, x: (place, x, threading.get_ident()), 3) == (
+            None,
+            3,
+            threading.get_ident(),
+        )

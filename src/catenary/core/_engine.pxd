@@ -45,5 +45,6 @@ cdef class Engine(Parts):
     cdef void take_commanded(self) noexcept
     cdef int interrupted(self, int rc) except -1
     cdef int spend_cycle(self) except -1
+    cdef void compute(self, int64_t duration_ns) noexcept
     cdef int pass_time(self, int64_t duration) except -1
     cdef void ask_law(self, law_t *law) noexcept

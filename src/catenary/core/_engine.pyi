@@ -70,8 +70,8 @@ class Engine:
 
     def spend(self, duration_ns: int) -> None:
         """In virtual time: lets time pass as if the application computed that long. The instants
-        that fall into it happen without it (threaded, law) or are missed (inline). RuntimeError
-        on a link whose time passes by itself."""
+        that fall into it happen without it (threaded, law) or are missed (inline). On a link
+        whose time passes by itself: computes that long, without the GIL."""
 
     def quick_stop_all(self) -> None:
         """Every axis' goal becomes quick stop, then disabled, from the next emit on; what follows

@@ -44,7 +44,7 @@ class Cycle:
 
     def spend(self, seconds: float) -> None:
         """In virtual time: lets time pass as if the body took that long [s]. On a NIC time passes
-        by itself, and this raises RuntimeError."""
+        by itself: computes that long, as `task.spend` does."""
 
 class Iteration:
     """Steps the engine once for every `next`, and hands out its one Cycle.

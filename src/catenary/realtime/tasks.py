@@ -10,14 +10,15 @@ import contextlib
 import os
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
-from typing import Self
+from typing import Self, TypeVar
 
 from catenary.errors import TaskError
 from catenary.realtime import libc
 from catenary.realtime._task import NEW
-from catenary.realtime.analysis import Verdict, analyse
+from catenary.realtime.analysis import Demand, Verdict, analyse
 from catenary.realtime.clock import VirtualClock
 from catenary.realtime.handle import Handle
 from catenary.realtime.preparation import Session
@@ -29,6 +30,9 @@ from catenary.realtime.worker import ProcessWorker, Run, ThreadWorker, Worker, c
 
 LEAD_SECONDS = 0.01  # from the last task's start to the first release of all
 STOP_SECONDS = 5.0
+LOOK_NS = 1_000_000_000  # of virtual time
+
+T = TypeVar("T")
 
 
 class Tasks:
@@ -136,9 +140,34 @@ class Tasks:
         if raising:
             supervisor.raise_failure()
 
-    def verdict(self) -> Verdict:
-        """Whether these tasks are schedulable, by the longest execution times measured so far."""
-        return analyse([measured_demand(handle.task, handle.statistics) for handle in self])
+    def beside(
+        self,
+        function: Callable[..., T],
+        *arguments: object,
+        priority: int = 0,
+        cpu: int | None = None,
+    ) -> T:
+        """Runs `function(place, *arguments)` beside the tasks until it returns; its result.
+
+        On the machine's clock it runs here, and `place` is None. On a virtual clock it runs in a
+        thread of its own, at `place` on the clock, with that priority and processor
+        (`Segment(..., clock=place)`), and time passes meanwhile. What it raises comes out; a task
+        that failed meanwhile is a TaskError afterwards, and in `failures` at once.
+        """
+        supervisor = self._started()
+        result = (
+            function(None, *arguments)
+            if self._clock is None
+            else run_at(self._clock, priority, cpu, function, arguments)
+        )
+        supervisor.raise_failure()
+        return result
+
+    def verdict(self, *others: Demand) -> Verdict:
+        """Whether these tasks are schedulable, by the longest execution times measured so far;
+        `others`: what else runs beside them, a loop for one."""
+        measured = [measured_demand(handle.task, handle.statistics) for handle in self]
+        return analyse([*measured, *others])
 
     def __str__(self) -> str:
         return as_table(handle.statistics for handle in self)
@@ -185,6 +214,30 @@ class Tasks:
         """A failure ends `join`."""
         if self._clock is not None:
             self._clock.home.wake()
+
+
+def run_at(
+    clock: VirtualClock,
+    priority: int,
+    cpu: int | None,
+    function: Callable[..., T],
+    arguments: tuple[object, ...],
+) -> T:
+    """Runs the function in a thread of its own while time passes."""
+    place = clock.participate(priority=priority, cpu=cpu)
+
+    def work() -> T:
+        try:
+            return function(place, *arguments)
+        finally:
+            place.leave()
+
+    with ThreadPoolExecutor(1, "beside tasks") as pool:
+        future = pool.submit(work)
+        future.add_done_callback(lambda _: clock.home.wake())
+        while not future.done():
+            clock.wait_until(clock.now_ns + LOOK_NS)
+    return future.result()
 
 
 def share_one_cpu(undo: contextlib.ExitStack) -> None:

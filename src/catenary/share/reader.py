@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from types import TracebackType
 from typing import Literal
 
@@ -22,17 +22,29 @@ from catenary.share.memory import Segment
 LOOK_NS = 250_000_000  # between two looks whether the writer still lives
 FOR_EVER = 1 << 62
 CYCLES, EVENTS = 0, 1
+END = object()
 
 Rows = npt.NDArray[np.void]
 State = Literal["running", "ended", "dead"]
 
 
-def attach(name: str, *, stale: bool = False) -> Reader:
+def attach(name: str, *, stale: bool = False, patience: Iterable[object] = ()) -> Reader:
     """The cycles that another process shares as `name`, for reading; leave it by `with`.
 
-    `stale`: also one whose writer has died, to see its last cycles. ShareError: there is none, it
-    may not be read, its writer is dead, or it has the layout of another version.
+    `stale`: also one whose writer has died, to see its last cycles. `patience`: it is tried again
+    after each item, a task's jobs for one (`attach(name, patience=task)`). ShareError: there is
+    none, it may not be read, its writer is dead, or it has the layout of another version.
     """
+    waiting = iter(patience)
+    while True:
+        try:
+            return _attached(name, stale)
+        except ShareError:
+            if next(waiting, END) is END:
+                raise
+
+
+def _attached(name: str, stale: bool) -> Reader:
     path = memory.path_of(name)
     try:
         segment = memory.open_segment(path)

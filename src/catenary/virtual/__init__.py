@@ -1,6 +1,7 @@
 """A virtual EtherCAT segment at register level: in this process, in virtual time, or on a NIC."""
 
 from catenary.virtual import faults
+from catenary.virtual.configuration import read_segment
 from catenary.virtual.crystal import Crystal
 from catenary.virtual.devices import (
     AnalogInputs,
@@ -36,5 +37,6 @@ __all__ = [
     "Servo",
     "demo_segment",
     "faults",
+    "read_segment",
     "serve",
 ]

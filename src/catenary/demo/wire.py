@@ -1,0 +1,48 @@
+"""A segment from a file, on a wire: served on one end of a pair of interfaces by another process.
+
+`python -m catenary.demo.wire NIC FILE` is that process.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from catenary.errors import LinkError
+from catenary.link import Interface, LinkSource
+from catenary.realtime.child import start_python
+from catenary.realtime.private_network import Private, state, veth_pair
+from catenary.realtime.scheduling import request_scheduling
+from catenary.virtual import read_segment, serve
+
+START_SECONDS = 20.0
+PRIORITY = 80  # as a loop: devices do not wait for their MainDevice
+
+
+@contextmanager
+def on_a_wire(path: str | Path) -> Iterator[LinkSource]:
+    """The end of a cable to the virtual segment of a file, by the machine's clock: real frames
+    where the program runs in a private network (`python -m catenary.realtime.private_network
+    program.py`); else the segment in this process."""
+    if not isinstance(state(), Private):
+        yield read_segment(path, clock="monotonic")
+        return
+    with (
+        veth_pair() as (ours, theirs),
+        start_python(["-m", "catenary.demo.wire", theirs, str(path)]) as server,
+    ):
+        if server.read_line(START_SECONDS) is None:
+            raise LinkError("the virtual segment did not start", hint="its own message is above")
+        yield Interface(ours)
+
+
+def main(interface: str, path: str) -> None:
+    segment = read_segment(path, clock="monotonic")
+    request_scheduling(priority=PRIORITY)  # refused to ordinary users: it then answers later
+    serve(segment, interface, ready=lambda: print("ready", flush=True))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
