@@ -21,8 +21,8 @@ def move(name, started):
 
 
 def read_and_command(name):
-    with cat.attach(name) as arm, arm.lease(axes=[0], for_=5.0) as command:
-        while arm.wait(timeout=1.0) and (now := arm.read())["position"][0] < 0.1:
+    with cat.attach(name) as arm, arm.lease(axes=[0], for_=30.0) as command:
+        while arm.wait(timeout=10.0) and (now := arm.read())["position"][0] < 0.1:
             command.send(position=now["commanded_position"][:1] + 1e-4)
         print(f"cycle {now['number']}: {arm.layout.axes[0]} at {now['position'][0]:.3f} rad")
         rows, lost = arm.rows(after=now["number"] - 100)

@@ -2,6 +2,8 @@
 The loop goes on without a missing cycle, other readers too, and nothing is left behind.
 """
 
+import signal
+
 import numpy as np
 import pytest
 
@@ -28,6 +30,23 @@ print("sleeping", flush=True)
 while True:
     arm.wait()
 """
+
+
+def test_nobody_waits_for_one_that_is_stopped() -> None:
+    """A reader that was woken hands the wake-up on; one that is stopped just then does not."""
+    with own_name("stopped") as name, started(LOOP, name) as loop:
+        assert loop.line() == "running"
+        with (
+            cat.attach(name) as arm,
+            started(SLEEPING, name) as one,
+            started(SLEEPING, name) as two,
+        ):
+            assert one.line() == two.line() == "sleeping"
+            for _ in range(20):
+                one.process.send_signal(signal.SIGSTOP)
+                for _ in range(100):
+                    assert arm.wait(timeout=60.0)
+                one.process.send_signal(signal.SIGCONT)
 
 
 def has_every_cycle(arm: cat.share.Reader) -> bool:

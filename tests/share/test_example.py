@@ -16,7 +16,7 @@ def test_it_reads_and_commands() -> None:
     )
     assert done.returncode == 0, done.stderr
     first, second = done.stdout.splitlines()
-    assert "0 Catenary virtual servo at 0.1" in first
+    assert "0 Catenary virtual servo at 0.1" in first, done.stderr
     assert re.match(r"\d+ cycles, \d+ lost, fastest \d", second)
     assert len(EXAMPLE.read_text().splitlines()) <= 40
     assert not Path("/dev/shm/catenary-example").exists()

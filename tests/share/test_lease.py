@@ -4,6 +4,7 @@ its loop ends. (Clients that are killed: tests/scenario/72_client_killed_with_a_
 from __future__ import annotations
 
 import contextlib
+import threading
 from collections.abc import Iterator
 
 import numpy as np
@@ -173,6 +174,44 @@ def test_a_loop_that_does_not_take_commands_is_noticed(cell: Cell) -> None:
             command.send(position=0.0)
         cell.cycles()
         command.send(position=0.0)
+
+
+def test_a_client_that_was_stopped_with_the_desk_does_not_hold_others_for_ever(
+    cell: Cell, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(lease, "PATIENCE_NS", 10_000_000)
+    with cell.reader.lease(axes=[0], for_=LONG) as command:
+        mutex = command._desk.mutex
+        has_it, may_go = threading.Event(), threading.Event()
+
+        def hold() -> None:
+            mutex.lock(0)
+            has_it.set()
+            may_go.wait()
+            mutex.unlock()
+
+        other = threading.Thread(target=hold)
+        other.start()
+        has_it.wait()
+        with pytest.raises(LeaseError, match="another client has held the desk"):
+            command.send(position=0.0)
+        assert cell.cycles(3) == []  # the loop does not notice
+        may_go.set()
+        other.join()
+
+
+def test_axes_of_several_drives(name: str) -> None:
+    with cat.MainDevice(Segment([Servo(), Servo(), Servo()])) as main:
+        subs = main.scan().drives
+        left = cat.Drives(subs[:1], counts_per_turn=2**20)
+        right = cat.Drives(subs[1:], counts_per_turn=2**20)
+        with cat.Share(name) as share, cat.Loop(left, right, sink=share) as loop:
+            next(loop)
+            with cat.attach(name) as reader, reader.lease(for_=LONG) as command:
+                command.send(position=[0.001, 0.002, 0.003])
+                share.apply(left, right)
+                assert left.target.position.tolist() == [0.001]
+                assert right.target.position.tolist() == [0.002, 0.003]
 
 
 def test_as_many_clients_as_there_are_places(cell: Cell, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from types import TracebackType
 
 import numpy as np
@@ -14,7 +15,7 @@ from catenary.share.desk import COMMANDS, PLACES, QUANTITIES, Desk, Reason
 from catenary.share.layout import ShareLayout
 from catenary.share.process import this_process
 
-LOCK_NS = 1 << 62  # a dead owner's lock is recovered, a living one's block is short
+PATIENCE_NS = 2_000_000_000  # a dead owner's lock is recovered, a living one's block is short
 
 
 class Lease:
@@ -31,12 +32,9 @@ class Lease:
         self._desk = desk
         self._numbers = list(axes)
         self._for_ns = round(for_ * 1e9)
-        desk.mutex.lock(LOCK_NS)
-        try:
+        with locked(desk):
             self._place = self._take_place()
             self._serial = self._take_axes()
-        finally:
-            desk.mutex.unlock()
 
     def send(
         self,
@@ -66,12 +64,9 @@ class Lease:
 
     def release(self) -> None:
         """Gives the axes back; harmless when the lease is over."""
-        self._desk.mutex.lock(LOCK_NS)
-        try:
+        with locked(self._desk):
             if self._is_valid():
                 free(self._desk, self._place, Reason.RELEASED)
-        finally:
-            self._desk.mutex.unlock()
 
     def __enter__(self) -> Lease:
         return self
@@ -87,8 +82,7 @@ class Lease:
     def _renew(self, row: bytes | None) -> None:
         """All of it under the mutex: a place that has gone to another client is not written to."""
         desk, place = self._desk, self._desk.places[self._place]
-        desk.mutex.lock(LOCK_NS)
-        try:
+        with locked(desk):
             now = time.monotonic_ns()
             if not self._is_valid() or place["deadline_ns"] <= now:
                 raise LeaseError(
@@ -106,8 +100,6 @@ class Lease:
                     hint="its body has to call share.apply(drives) or share.commands()",
                 )
             ring.write(row)
-        finally:
-            desk.mutex.unlock()
 
     def _is_valid(self) -> bool:
         place = self._desk.places[self._place]
@@ -162,6 +154,20 @@ class Lease:
         desk.holders[self._numbers] = serial
         entry["lease"] = serial
         return serial
+
+
+@contextmanager
+def locked(desk: Desk) -> Iterator[None]:
+    """The desk for this client alone. LeaseError: another one was stopped while it had it."""
+    if desk.mutex.lock(PATIENCE_NS) is None:
+        raise LeaseError(
+            f"another client has held the desk for {PATIENCE_NS * 1e-9:g} s",
+            hint="it was stopped, by a debugger or SIGSTOP: let it go on, or end it",
+        )
+    try:
+        yield
+    finally:
+        desk.mutex.unlock()
 
 
 def free(desk: Desk, place: int, reason: Reason) -> None:

@@ -101,7 +101,7 @@ static inline int ring_wait(const ring_view *v, uint64_t seen, int64_t deadline)
         }
         if (cat_load_acquire32(&v->ring->ended)) return 0;
         rc = cat_futex_wait_shared(&v->ring->tick, tick, deadline);
-        if (rc == -ETIMEDOUT) return 0;
+        if (rc == -ETIMEDOUT) return __atomic_load_n(&v->ring->newest, __ATOMIC_ACQUIRE) > seen;
         if (rc < 0) return rc;
     }
 }
