@@ -23,7 +23,12 @@ def make(root: Path, files: Files, **facts: object) -> Machine:
         else:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text + "\n")
-    given = {"clock": STEADY, "permission_command": "sudo setcap ... python", **facts}
+    given = {
+        "clock": STEADY,
+        "permission_command": "sudo setcap ... python",
+        "own_interpreter": True,
+        **facts,
+    }
     return Machine(root=root, **given)  # type: ignore[arg-type]
 
 

@@ -55,6 +55,12 @@ def test_without_permission_the_command_is_given(tmp_path):
     assert (check.status, check.advice) == ("FAIL", "without root, once: sudo setcap ... python")
 
 
+def test_the_machines_own_python_is_not_to_get_it(tmp_path):
+    advice = raw_frames(make(tmp_path, {}, own_interpreter=False)).advice
+    assert "`python3 -m venv --copies`" in advice
+    assert advice.endswith("sudo setcap ... python")
+
+
 @pytest.mark.parametrize(
     ("files", "status", "words"),
     [

@@ -83,10 +83,14 @@ def raw_frames(machine: Machine) -> Check:
     id = "permission-raw-socket"
     if machine.capable(CAP_NET_RAW):
         return passed(id, "raw Ethernet frames are permitted (CAP_NET_RAW)")
+    shared = (
+        "first an environment with a Python of its own (this one is the whole machine's, and all "
+        "its programs would get the right): `python3 -m venv --copies`; then "
+    )
     return failed(
         id,
         "no raw Ethernet frames: a network interface cannot be opened",
-        f"without root, once: {machine.permission_command}",
+        f"{shared * (not machine.own_interpreter)}without root, once: {machine.permission_command}",
     )
 
 
