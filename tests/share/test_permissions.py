@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 import catenary as cat
+from catenary.errors import ShareError
 from catenary.virtual import Segment, Servo
 
 NOBODY = 65534
@@ -64,6 +67,30 @@ def test_another_user(name: str, mode: int, verb: str, said: list[str]) -> None:
     assert len(found) == len(said)
     for line, part in zip(found, said, strict=True):
         assert part in line
+
+
+@pytest.mark.parametrize("room", [0, 1])  # for so many files
+def test_a_full_disk_is_told_and_nothing_is_left(
+    name: str, room: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left = [room]
+
+    def allocate(descriptor: int, offset: int, size: int) -> None:
+        left[0] -= 1
+        if left[0] < 0:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        os.ftruncate(descriptor, size)
+
+    monkeypatch.setattr("catenary.share.memory.os.posix_fallocate", allocate)
+    segment = Segment([Servo()])
+    with cat.MainDevice(segment) as main:
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        share = cat.Share(name)
+        no_room = pytest.raises(ShareError, match=r"/dev/shm has no room for .* MiB")
+        with no_room, share, cat.Loop(arm, sink=share):
+            pass
+        assert segment[0].state & 0x0F == 2  # PRE-OP
+    assert not list(Path("/dev/shm").glob(f"*{name}*"))
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")

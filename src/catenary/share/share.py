@@ -134,15 +134,12 @@ class Share:
             opened=time.time(),
             writer=this_process(),
         )
-        segment = memory.create(self.path, made.size, self._mode)
-        head = encode_head(made)
-        segment.memory[: len(head)] = head
+        segment, desk = self._make_files(made)
         blocks = (layout.record_size, layout.actual_size, layout.target_size)
         rows, events = made.rows, made.events
         cycles = CycleWriter(
             segment.memory, rows.offset, rows.count, rows.size, blocks, writable=True
         )
-        desk = make_desk(made, self._mode)
         self._publish(segment, desk.segment)
         self._segment, self._layout, self._cycles = segment, made, cycles
         self._dtype = made.dtype
@@ -167,6 +164,17 @@ class Share:
             self._cycles = self._events = None
             if self._desk is not None:
                 self._desk.end_all()
+
+    def _make_files(self, made: ShareLayout) -> tuple[Segment, Desk]:
+        """Whole, and seen by nobody yet. ShareError: no room."""
+        segment = memory.create(self.path, made.size, self._mode)
+        head = encode_head(made)
+        segment.memory[: len(head)] = head
+        try:
+            return segment, make_desk(made, self._mode)
+        except BaseException:
+            segment.path.unlink()
+            raise
 
     def _publish(self, segment: Segment, desk: Segment) -> None:
         """The desk first: who finds the segment finds its desk."""
