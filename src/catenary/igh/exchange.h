@@ -18,6 +18,7 @@
 #include "image.h"
 #include "link.h"
 
+#define IGH_OP 8                      /* al_states of ec_master_state_t: all in OP */
 #define IGH_COMPLETE 2u               /* wc_state of ec_domain_state_t */
 #define IGH_NAP_NS 20000              /* between two looks for what has not come back */
 #define IGH_PATIENCE_FIRST_NS 50000
@@ -201,8 +202,15 @@ static void igh_tell_clocks(igh_exchange *x)
     igh_do(calls, calls->sync_slave_clocks, x->master);
 }
 
+static double igh_limited(double value, double limit)
+{
+    return value > limit ? limit : value < -limit ? -limit : value;
+}
+
 /* The reference clock's time came back: 32 bits of it. Our clock runs after it, by a critically
- * damped loop of which neither the rate nor the correction of one period leaves the limit. */
+ * damped loop of which neither the rate nor the correction of one period leaves the limit.
+ * An error beyond an eighth of the period is no drift: the master has not set the clocks yet, which
+ * it has done by OP; after that it is gone after, as fast as the limit lets, and nothing learnt. */
 static void igh_follow(igh_exchange *x)
 {
     uint32_t time;
@@ -216,16 +224,13 @@ static void igh_follow(igh_exchange *x)
     if (x->clock != IGH_FOLLOW_REFERENCE)
         return;
     error = (double)x->phase_error;
-    x->rate += x->bandwidth * x->bandwidth * error;
-    if (x->rate > x->rate_limit)
-        x->rate = x->rate_limit;
-    if (x->rate < -x->rate_limit)
-        x->rate = -x->rate_limit;
-    correction = x->rate + 2 * x->bandwidth * error;
-    if (correction > x->rate_limit)
-        correction = x->rate_limit;
-    if (correction < -x->rate_limit)
-        correction = -x->rate_limit;
+    if (8 * llabs(x->phase_error) <= x->period) {
+        x->rate += x->bandwidth * x->bandwidth * error;
+        x->rate = igh_limited(x->rate, x->rate_limit);
+    } else if (x->al_status != IGH_OP) {
+        return;
+    }
+    correction = igh_limited(x->rate + 2 * x->bandwidth * error, x->rate_limit);
     x->time->offset += (int64_t)correction;
 }
 

@@ -147,7 +147,10 @@ class MainDevice(bus.MainDevice):
 
     def look(self, *, names: bool = True) -> SubDevices:
         """ConfigurationError: the state of a segment that is not ours is the master's to tell."""
-        self._cannot("look at devices without taking them over", "ethercat slaves -v")
+        self._cannot(
+            "look at devices without taking them over",
+            "ethercat slaves -v, and states, reg_read, sii_read, alias, graph, crc",
+        )
 
     def diagnose(self, **options: object) -> NoReturn:
         """ConfigurationError: error counters are read by the master's own tool."""
