@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import catenary as cat
+from catenary import igh
 from catenary.igh import Master
 from tests.igh.double import Double
 
@@ -207,3 +208,38 @@ def test_the_real_clock(doubles: dict[str, Path]) -> None:
         double.forget()
     assert double.calls() == ["release_master"]
     assert double.reserved() == 0
+
+
+def test_a_ring_of_the_masters(main: cat.MainDevice, double: Double) -> None:
+    assert isinstance(main, igh.MainDevice)
+    with cat.Loop(arm_of(main)) as loop:
+        next(loop)
+        exchange = main.configuration.exchange
+        assert exchange.figures["redundancy"] is False
+        double.redundancy(1)
+        next(loop)
+        next(loop)
+        assert exchange.figures["redundancy"] is True
+        assert exchange.figures["link_up"] is True
+
+
+def test_the_plan_is_printed_and_clocks_are_the_masters(main: cat.MainDevice) -> None:
+    with cat.Loop(arm_of(main, dc=True)) as loop:
+        assert "SyncManager 2" in str(loop.plan)
+        assert loop.timing.counters["lost"] >= 0
+        with pytest.raises(RuntimeError, match="the kernel master keeps the clocks"):
+            _ = loop.clocks
+
+
+def test_send_errors_of_new_libraries_are_counted(doubles: dict[str, Path]) -> None:
+    double = Double(doubles["1.6.1"])
+    with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
+        main.scan()
+        assert isinstance(main, igh.MainDevice)
+        with cat.Loop(arm_of(main)) as loop:
+            next(loop)
+            double.fail(b"send", -5)
+            next(loop)
+            next(loop)
+            double.fail(b"", 0)
+            assert main.configuration.exchange.figures["send_errors"] >= 1

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 NODE = "/dev/EtherCAT{}"
 MODULE = Path("/sys/module/ec_master")
 SCAN_TIMEOUT = 30.0  # [s]: some devices answer their first SDO after seconds
+EMPTY_TIMEOUT = 3.0  # [s]: a link that has just come up finds its devices within a second
 LOOK = 0.010  # [s] between two looks
 UPLOAD_LIMIT = 1 << 16  # bytes of an object
 
@@ -121,15 +122,14 @@ class Reservation:
 
     def device_count(self) -> int:
         """Devices found, once the master has done scanning. LinkError without a cable."""
-        deadline = self.now() + round(SCAN_TIMEOUT * 1e9)
-        info = abi.MasterInfo()
+        begun, info = self.now(), abi.MasterInfo()
         while True:
             self.ask("ecrt_master", ctypes.byref(info), what=f"master {self.index}")
-            if not info.scan_busy and (info.slave_count or self.now() >= deadline):
+            waited = (self.now() - begun) * 1e-9
+            settled = info.slave_count or not info.link_up or waited >= EMPTY_TIMEOUT
+            if settled and not info.scan_busy:
                 break
-            if not info.link_up and not info.scan_busy:
-                break
-            if self.now() >= deadline:
+            if waited >= SCAN_TIMEOUT:
                 raise SegmentError(
                     f"master {self.index} is still scanning after {SCAN_TIMEOUT:g} s",
                     hint="ethercat slaves shows how far it is; dmesg what it waits for",

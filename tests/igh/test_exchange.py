@@ -1,0 +1,87 @@
+"""The image table: what leaves a domain or an image is refused, nothing is called after its end."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import catenary as cat
+from catenary import igh
+from catenary.core import Engine
+from catenary.igh._ecrt import Exchange, KernelTime
+from catenary.igh.configure import Domain
+from catenary.igh.library import Library
+from catenary.igh.master import Master
+from catenary.loop.carried import carried
+from tests.igh.double import Double
+
+
+@pytest.fixture
+def library(doubles: dict[str, Path]) -> Library:
+    Double(doubles["1.6.1"])
+    return Library(doubles["1.6.1"])
+
+
+@pytest.mark.parametrize(
+    ("outputs", "inputs", "said"),
+    [
+        ([(6, 0, 4)], [], "leave a domain of 8"),
+        ([(0, 14, 4)], [], "leave an image of 16"),
+        ([], [(0, 0, 0)], "leave a domain"),
+        ([], [(-1, 0, 2)], "leave a domain"),
+        ([], [(0, -1, 2)], "leave an image"),
+    ],
+)
+def test_a_copy_stays_in_its_place(
+    library: Library, outputs: list[object], inputs: list[object], said: str
+) -> None:
+    domain = Domain(1, 1, 0, False, data=1, size=8, outputs=outputs, inputs=inputs)
+    with pytest.raises(ValueError, match=said):
+        Exchange(KernelTime(True), library, 1, [domain], 16, 16)
+
+
+def test_time_passes_where_it_is_waited_for() -> None:
+    time = KernelTime(True)
+    begin = time.now()
+    assert time.wait_until(begin + 5_000_000, True) is False
+    assert time.now() == begin + 5_000_000
+    machine = KernelTime()
+    assert machine.now() <= machine.now()
+    assert machine.receive() is None
+    with pytest.raises(cat.CatenaryError, match="sends no frames of others"):
+        machine.send(bytes(60))
+
+
+def test_an_engine_takes_an_image_made_for_its_plan(doubles: dict[str, Path]) -> None:
+    double = Double(doubles["1.6.1"])
+    with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
+        main.scan()
+        assert isinstance(main, igh.MainDevice)
+        both = cat.Drives(main.subs.drives, counts_per_turn=1000)
+        plan = carried(main.plan(both))
+        other = carried(main.plan(cat.Drives([main.subs[0]], counts_per_turn=1000, mode="cst")))
+        main.configure(plan)
+        image, link = main.configuration.exchange.capsule, main.link.capsule
+        Engine(plan.cycle, link, image)
+        with pytest.raises(ValueError, match=r"image: .*the plan has"):
+            Engine(other.cycle, link, image)
+        with pytest.raises(ValueError, match=r"capsule|incorrect name"):
+            Engine(plan.cycle, link, link)
+
+
+def test_nothing_is_called_behind_the_end(doubles: dict[str, Path]) -> None:
+    double = Double(doubles["1.6.1"])
+    with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
+        main.scan()
+        assert isinstance(main, igh.MainDevice)
+        plan = carried(main.plan(cat.Drives(main.subs.drives, counts_per_turn=1000)))
+        main.configure(plan)
+        engine = Engine(plan.cycle, main.link.capsule, main.configuration.exchange.capsule)
+        engine.start()
+        engine.run(3)
+        main.leave()
+        double.forget()
+        engine.run(3)
+        assert double.calls() == []
+        engine.stop()
