@@ -1,6 +1,7 @@
 """Gravity and inverse dynamics: against a pendulum's formula and MuJoCo's own Python."""
 
 import math
+import sys
 from pathlib import Path
 
 import mujoco
@@ -132,6 +133,12 @@ def test_a_file_that_is_not_there_or_no_model(tmp_path: Path) -> None:
         (tmp_path / "page.xml").write_text(text)
         with pytest.raises(ConfigurationError, match=r"page\.xml"):
             control.Dynamics(tmp_path / "page.xml")
+
+
+def test_without_mujoco_the_extra_is_named(monkeypatch: pytest.MonkeyPatch, three: Path) -> None:
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    with pytest.raises(ConfigurationError, match=r"pip install 'catenary\[sim\]'"):
+        control.Dynamics(three)
 
 
 def test_vectors_of_another_length_and_another_memory(three: Path) -> None:

@@ -145,6 +145,38 @@ def test_every_block_is_the_same_compiled_and_allocates_nothing() -> None:
     assert control.part(ends[0], 8).any()  # homing
 
 
+@cat.law
+def observed(memory, parameters):
+    """The model's residual, on signals of its own."""
+    count, q, v = control.part(memory, 0), control.part(memory, 3), control.part(memory, 4)
+    count[0] += 1.0
+    for i in range(3):
+        q[i], v[i] = 1e-3 * count[0] * (i + 1), 0.5 * i - 1e-3 * count[0]
+    external = control.part(memory, 5)
+    control.model_residual(
+        control.part(memory, 1), parameters, control.part(memory, 2), v, q, v, 1e-3, external
+    )
+    return count[0] > 100.0
+
+
+def test_the_models_residual_is_the_same_compiled(tmp_path: Path) -> None:
+    path = tmp_path / "three.xml"
+    path.write_text(THREE)
+    dynamics, block, still = (
+        control.Dynamics(path, joints=JOINTS),
+        control.Residual(3, 50.0),
+        [0.0] * 3,
+    )
+    ends = []
+    for compiled in (True, False):
+        memory = control.join([0.0], block.memory, dynamics.memory, still, still, still)
+        with opened("csp") as (_, loop):
+            memory = loop.run(observed, memory, block.parameters, compiled=compiled)
+        ends.append(control.part(memory, 5))
+    assert ends[0] == pytest.approx(ends[1], rel=1e-12)
+    assert abs(ends[0]).min() > 0.01
+
+
 def test_a_rehearsal_leaves_nothing_behind_in_the_model(tmp_path: Path) -> None:
     """With a lead each step is rehearsed on a copy of the memory, but in the same workspace."""
     path = tmp_path / "three.xml"

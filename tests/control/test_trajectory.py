@@ -1,9 +1,12 @@
 """Trajectories: every sample within every limit, by finite differences; what cannot be is named."""
 
+import sys
+
 import numpy as np
 import pytest
 
 from catenary import control
+from catenary.errors import ConfigurationError
 
 PERIOD = 1e-3
 LIMITS = control.MotionLimits(velocity=[1.5, 1.0, 2.0], acceleration=[6.0, 5.0, 9.0], jerk=60.0)
@@ -81,6 +84,12 @@ def test_where_it_stands_already_it_is_one_row() -> None:
     motion = control.trajectory(HOME, HOME, LIMITS, PERIOD)
     assert motion.position.tolist() == [[0.0, 0.0, 0.0]]
     assert motion.duration == 0.0
+
+
+def test_without_ruckig_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "ruckig", None)
+    with pytest.raises(ConfigurationError, match=r"pip install 'catenary\[traj\]'"):
+        control.trajectory(HOME, HOME, LIMITS, PERIOD)
 
 
 def bounded(low: float, high: float) -> control.MotionLimits:

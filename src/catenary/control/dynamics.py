@@ -45,7 +45,8 @@ class Dynamics:
         armature: PerAxis = 0.0,
     ) -> None:
         self._model: Model = load_model(Path(path), joints, axes, armature)
-        self._own = self.memory
+        self._data = self._model.workspace()
+        self._coordinates, self._degrees = np.array(self._model.places).T
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -68,17 +69,20 @@ class Dynamics:
 
     def gravity(self, position: Vector) -> Row:
         """(n,) [N·m] that holds the arm still at `position` (n,) [rad]."""
-        q = self._checked("position", position)
-        torque = np.empty(len(q))
-        gravity(self._own, q, torque)
-        return torque
+        return self._solve(self._checked("position", position), 0.0, 0.0)
 
     def inverse(self, position: Vector, velocity: Vector, acceleration: Vector) -> Row:
         """(n,) [N·m] for this motion: (n,) [rad], [rad/s], [rad/s²]."""
         named = {"position": position, "velocity": velocity, "acceleration": acceleration}
-        q, v, a = (self._checked(name, values) for name, values in named.items())
-        torque = np.empty(len(q))
-        inverse(self._own, q, v, a, torque)
+        return self._solve(*(self._checked(name, values) for name, values in named.items()))
+
+    def _solve(self, position: Row, velocity: Row | float, acceleration: Row | float) -> Row:
+        model, data = self._model, self._data
+        data.qpos[self._coordinates] = position
+        data.qvel[self._degrees] = velocity
+        data.qacc[self._degrees] = acceleration
+        model.mujoco.mj_inverse(model.native, data)
+        torque: Row = data.qfrc_inverse[self._degrees]
         return torque
 
     def _checked(self, name: str, values: Vector) -> Row:
