@@ -1,7 +1,7 @@
-"""The next goal of a moving arm lies beyond a limit, and then the arm is too fast to stop before one.
+"""The next goal of a moving arm lies beyond a limit; then it is too fast to stop before one.
 
-Both are errors that name axis and limit before a row is written; the motion under way goes on to its
-end, and the arm holds there, enabled.
+Both are errors that name axis and limit before a row is written; the motion under way goes on to
+its end, and the arm holds there, enabled.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ def test_the_arm_ends_the_motion_it_had_and_holds() -> None:
             motion = control.trajectory(home, [0.8, -0.8], LIMITS, 1e-3)
             stream = loop.stream(len(motion))
             stream.write(motion.position)
-            for cycle in loop:
+            for _ in loop:
                 if stream.taken == len(motion) // 2:
                     break
-            with pytest.raises(ValueError, match="goal of axis 1: -1.2 beyond its position_min -1"):
+            with pytest.raises(ValueError, match=r"goal of axis 1: -1\.2 beyond its position_min"):
                 control.trajectory(arm.actual.position, [0.0, -1.2], LIMITS, 1e-3)
             fast = control.MotionState([0.95, 0.0], [1.9, 0.0])
-            with pytest.raises(ValueError, match="highest position of axis 0: 1.* position_max 1"):
+            with pytest.raises(ValueError, match=r"highest position of axis 0: 1.* position_max 1"):
                 control.trajectory(fast, [0.0, 0.0], LIMITS, 1e-3)
             for cycle in loop:
                 if cycle.number > len(motion) + 500:

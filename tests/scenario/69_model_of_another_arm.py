@@ -1,7 +1,7 @@
-"""The model for gravity compensation is another arm's: joints too few, misnamed, or of no single axis.
+"""The model for gravity compensation is another arm's: joints too many, misnamed, of no one axis.
 
-All of it is told, with the joints there are, before a drive is enabled. A law that gets a model of fewer
-joints than there are axes all the same stops the drives instead of reading beyond.
+All of it is told, with the joints there are, before a drive is enabled. A law that gets a model of
+another number of joints all the same stops the drives instead of reading beyond.
 """
 
 from __future__ import annotations
