@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -243,3 +244,16 @@ def test_send_errors_of_new_libraries_are_counted(doubles: dict[str, Path]) -> N
             next(loop)
             double.fail(b"", 0)
             assert main.configuration.exchange.figures["send_errors"] >= 1
+
+
+def test_others_read_along_and_set_points_are_streamed(main: cat.MainDevice) -> None:
+    arm = arm_of(main)
+    with cat.Share(f"igh-{os.getpid()}") as share, cat.Loop(arm, sink=share) as loop:
+        home = arm.actual.position.copy()
+        stream = loop.stream(50)
+        stream.write(home + np.linspace(0.0, 0.2, 50)[:, None])
+        for _ in range(60):
+            next(loop)
+        with cat.attach(f"igh-{os.getpid()}") as reader:
+            last = reader.read()
+        np.testing.assert_allclose(last["position"], home + 0.2, atol=0.01)

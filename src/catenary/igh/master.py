@@ -259,7 +259,8 @@ def _refused(index: int, number: int, library: Library) -> LinkError:
         f"master {index}: {library.path} (version {library.version}) and the kernel module "
         f"(version {_module_version()}) do not work together",
         hint="they come from two builds, and the version of their ioctl() differs: ethercat "
-        "version tells; install both from one source, then sudo systemctl restart ethercat",
+        "version tells; install both from one source, then sudo systemctl restart ethercat. Where "
+        f"they agree, another application may hold the master: sudo fuser -v {node}",
     )
 
 
