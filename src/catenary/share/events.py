@@ -33,10 +33,10 @@ def encode_event(incident: Incident, serial: int, number: int) -> bytes:
         serial,
         number,
         incident.kind,
-        incident.message,
+        str(encodable(incident.message)),
         incident.time,
         incident.position,
-        incident.details,
+        {key: encodable(value) for key, value in incident.details.items()},
     )
     line = msgspec.json.encode(event)
     if len(line) > EVENT_SIZE:
@@ -47,6 +47,11 @@ def encode_event(incident: Incident, serial: int, number: int) -> bytes:
         event = msgspec.structs.replace(event, message=event.message[:kept] + CUT_OFF)
         line = msgspec.json.encode(event)
     return line
+
+
+def encodable(value: object) -> object:
+    """Texts that no UTF-8 has become '?': what a device says must not end who passes it on."""
+    return value.encode(errors="replace").decode() if isinstance(value, str) else value
 
 
 def decode_event(row: bytes | bytearray) -> SharedEvent:
