@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -257,3 +258,21 @@ def test_others_read_along_and_set_points_are_streamed(main: cat.MainDevice) -> 
         with cat.attach(f"igh-{os.getpid()}") as reader:
             last = reader.read()
         np.testing.assert_allclose(last["position"], home + 0.2, atol=0.01)
+
+
+def test_two_masters_in_one_loop(doubles: dict[str, Path], tmp_path: Path) -> None:
+    """Each library has its own devices; a native thread for each."""
+    paths = [doubles["1.6.1"], Path(shutil.copy(doubles["1.6.1"], tmp_path / "second.so"))]
+    for path in paths:
+        Double(path)
+    sources = [Master(number, library=path) for number, path in enumerate(paths)]
+    with cat.MainDevice(sources[0]) as first, cat.MainDevice(sources[1]) as second:
+        arms = [cat.Drives(main.scan().drives, counts_per_turn=1000) for main in (first, second)]
+        with cat.Loop(*arms, period=5e-3, late_limit=0, priority=None) as loop:
+            for cycle in loop:
+                assert cycle.ok
+                for arm in arms:
+                    arm.target.position[:] = arm.actual.position
+                if cycle.number > 20:
+                    break
+            assert all(arm.enabled.all() for arm in arms)
