@@ -90,8 +90,20 @@ def storm(subs: Sequence[cat.SubDevice]) -> Iterator[list[int]]:
             thread.join()
 
 
-def measure(loop: cat.Loop, arm: cat.Drives, job: Job, answers: Sequence[int]) -> Round:
-    body = _sine(arm, job) if job.body is Body.SINE else _pd(arm, job)
+def body_of(arm: cat.Drives, job: Job) -> Callable[[float], None]:
+    """What is computed in a cycle, from where the axes are now."""
+    return _sine(arm, job) if job.body is Body.SINE else _pd(arm, job)
+
+
+def measure(
+    loop: cat.Loop,
+    arm: cat.Drives,
+    job: Job,
+    answers: Sequence[int],
+    body: Callable[[float], None] | None = None,
+) -> Round:
+    """`body`: one that runs already."""
+    body = body or body_of(arm, job)
     before, cpu, answered = loop.timing.counters, 0, 0
     last_unmeasured, end = job.warm_up - 1, job.warm_up + job.cycles
     for number, cycle in enumerate(loop):

@@ -7,11 +7,11 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import catenary as cat
 from catenary.bench.job import Job, Round
-from catenary.bench.peers.with_catenary import measure, opened
+from catenary.bench.peers.with_catenary import body_of, measure, opened
 from catenary.errors import ShareError
 from catenary.realtime.child import Child, start_python
 from catenary.realtime.libc import signal_on_parents_death
@@ -32,15 +32,17 @@ def run(job: Job) -> Round:
         cat.Share(name) as share,
         opened(job, share) as (loop, arm),
     ):
-        attend(loop, child)
-        return measure(loop, arm, job, [])
+        body = body_of(arm, job)
+        attend(loop, child, body)
+        return measure(loop, arm, job, [], body)
 
 
-def attend(loop: cat.Loop, child: Child) -> None:
+def attend(loop: cat.Loop, child: Child, body: Callable[[float], None]) -> None:
     """Cycles until every reader has read: a loop must not stand still for them."""
     missing = READERS
     deadline = time.monotonic() + START_SECONDS
-    for _ in loop:
+    for cycle in loop:
+        body(cycle.time)
         if child.read_line(0.0) is not None:
             missing -= 1
         if missing == 0:
