@@ -117,7 +117,7 @@ def why_stop(cycle, arm, wanted, key, silence):
 def main_control(place, cost, target, share, compensate, state, torque, phase, rows, done, stops):
     """The bus, and the cascade of every joint. Returns its timing, its stops (cycle, [s], reason)
     and how many times faster than real time it was."""
-    memory, parameters, nothing = GAINS.memory, GAINS.parameters, np.zeros(JOINTS)
+    parameters, nothing = GAINS.parameters.tolist(), np.zeros(JOINTS)  # lists are faster here
     now, stopped, heard, silence, handled = STARTING, [], 0, 0, 0
     options = {"run": "inline", "period": PERIOD, "priority": 90, "raise_faults": False}
     with cat.MainDevice(read_segment(target, clock=place) if place else target) as main:
@@ -129,18 +129,18 @@ def main_control(place, cost, target, share, compensate, state, torque, phase, r
                 row = rows.take()
                 speed = acceleration = nothing  # where no row is there: hold
                 if now != MOVING:
-                    wanted = q.copy()
-                    memory[:] = 0.0
+                    wanted, memory = q.copy(), GAINS.memory.tolist()  # of now
                 elif row is not None:
                     wanted, speed, acceleration = row
                 state.write([q, v, speed, acceleration, wanted])
                 silence, heard = (silence + 1) * (torque.number == heard), torque.number
                 feed = torque.read() if compensate else nothing
                 arm.target.position[:] = wanted  # for the recording: the mode is torque
-                for i in range(JOINTS):
-                    arm.target.torque[i] = control.cascade(
-                        *(memory, parameters, i, wanted[i], speed[i], feed[i], q[i], v[i], PERIOD)
-                    )
+                joints = zip(*(each.tolist() for each in (wanted, speed, feed, q, v)), strict=True)
+                arm.target.torque[:] = [
+                    control.cascade(memory, parameters, i, *joint, PERIOD)
+                    for i, joint in enumerate(joints)
+                ]
                 cycle.spend(cost)
                 asked = int(stops.read())
                 reason = why_stop(cycle, arm, wanted, asked > handled, silence)

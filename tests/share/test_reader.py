@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -288,3 +288,23 @@ def test_in_real_time_too(name: str, order: str) -> None:
             assert lost == 0
             assert (rows["number"] == np.arange(1, len(rows) + 1)).all()
             assert (rows["wake_ns"] >= rows["scheduled_ns"]).all()
+
+
+def test_patience_waits_for_a_share_to_come(name: str) -> None:
+    tried: list[int] = []
+
+    def jobs() -> Iterator[int]:
+        for number in range(3):
+            tried.append(number)
+            yield number
+
+    with pytest.raises(ShareError, match="there is no share"):
+        cat.attach(name, patience=jobs())
+    assert tried == [0, 1, 2]
+
+    def body(loop: cat.Loop, arm: cat.Drives, reader: Reader) -> None:
+        with cat.attach(name, patience=jobs()) as again:
+            assert again.layout == reader.layout
+
+    run(name, "threaded", body)
+    assert tried == [0, 1, 2]  # it was there at once
