@@ -16,16 +16,17 @@ def run(name: str, phase_ns: int) -> Run:
 
 
 def test_readers_stand_beside_a_share_without_and_that_beside_none() -> None:
-    cost = {"-shared": 1100, "-readers": 1210}
+    cost = {"-shared": 1100, "-readers": 1210, "-bystanders": 1200}
     runs = [run(name, cost.get(name[name.rindex("-") :], 1000)) for name in NAMES]
     ratios = share_ratios(runs)
     assert ratios["in_controller: catenary-inline-readers / catenary-inline-shared"] == 1.1
+    assert ratios["tail: catenary-threaded-readers / catenary-threaded-bystanders"] == 1.008
     assert ratios["tail: catenary-threaded-shared / catenary-threaded"] == 1.1
     assert set(NAMES) <= set(MODULES)
 
 
 def test_aims_stand_beside_what_was_found() -> None:
-    name = "tail: catenary-inline-readers / catenary-inline-shared"
+    name = "tail: catenary-inline-readers / catenary-inline-bystanders"
     told = as_aims([Reading(3, 472, read=1.5, copy=0.25)], {name: 1.02, "x / y": 3.0})
     assert told.splitlines() == [
         "  read 472 bytes (3 axes): 1.50 us, the copy alone 0.25 us: 1.25 beyond it, aim <= 1: "

@@ -18,6 +18,8 @@ MODULES = {
     "catenary-threaded-shared": "with_catenary_share",
     "catenary-inline-readers": "with_catenary_share",
     "catenary-threaded-readers": "with_catenary_share",
+    "catenary-inline-bystanders": "with_catenary_share",
+    "catenary-threaded-bystanders": "with_catenary_share",
     "catenary-law": "with_catenary_law",
     "catenary-law-storm": "with_catenary_law",
     "c": "with_c",

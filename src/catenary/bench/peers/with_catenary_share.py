@@ -1,4 +1,5 @@
-"""Catenary with a share: nobody reads it, or 16 processes do, a hundred times a second each."""
+"""Catenary with a share: nobody reads it; 16 processes do, a hundred times a second each; or they
+do as much with memory of their own: a busy neighbour of a processor slows it, share or not."""
 
 from __future__ import annotations
 
@@ -8,6 +9,8 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
 
 import catenary as cat
 from catenary.bench.job import Job, Round
@@ -19,7 +22,7 @@ from catenary.realtime.libc import signal_on_parents_death
 READERS = 16
 PAUSE = 0.010  # [s]
 START_SECONDS = 60.0
-WITH_READERS = "-readers"
+WITH_READERS = ("-readers", "-bystanders")
 
 
 def run(job: Job) -> Round:
@@ -28,7 +31,7 @@ def run(job: Job) -> Round:
         with cat.Share(name) as share, opened(job, share) as (loop, arm):
             return measure(loop, arm, job, [])
     with (
-        readers(name) as child,
+        readers(name, job.peer.endswith("-readers")) as child,
         cat.Share(name) as share,
         opened(job, share) as (loop, arm),
     ):
@@ -52,12 +55,12 @@ def attend(loop: cat.Loop, child: Child, body: Callable[[float], None]) -> None:
 
 
 @contextlib.contextmanager
-def readers(name: str) -> Iterator[Child]:
+def readers(name: str, reading: bool) -> Iterator[Child]:
     """They look for the loop before it is there. They run anywhere but where the loop was put, with
     ordinary scheduling."""
     here = os.sched_getaffinity(0)
     elsewhere = os.sched_getaffinity(os.getppid()) - here or here  # of who leads the benchmark
-    arguments = ["-m", __name__, name, ",".join(map(str, elsewhere))]
+    arguments = ["-m", __name__, name, ",".join(map(str, elsewhere)), str(int(reading))]
     with start_python(arguments) as child:
         if child.read_line(START_SECONDS) is None:
             raise RuntimeError("the readers did not start")
@@ -66,7 +69,7 @@ def readers(name: str) -> Iterator[Child]:
 
 def main(arguments: Sequence[str]) -> None:
     """All readers: one process each, of one start of the interpreter. They end with the loop."""
-    name, cpus = arguments
+    name, cpus, reading = arguments
     os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
     os.sched_setaffinity(0, map(int, cpus.split(",")))
     print("ready", flush=True)
@@ -78,8 +81,9 @@ def main(arguments: Sequence[str]) -> None:
         arm.wait(timeout=START_SECONDS)
         arm.read()
         os.write(sys.stdout.fileno(), b"reading\n")
-        while arm.wait(timeout=START_SECONDS):
-            arm.read()
+        own = bytes(arm.dtype.itemsize)
+        while arm.alive if reading == "0" else arm.wait(timeout=START_SECONDS):
+            _ = np.frombuffer(bytearray(own), arm.dtype)[0] if reading == "0" else arm.read()
             time.sleep(PAUSE)
 
 
