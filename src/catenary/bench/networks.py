@@ -12,11 +12,12 @@ import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import msgspec
 import numpy as np
+import numpy.typing as npt
 
 import catenary as cat
 from catenary.bench.job import PHASES, Body, Job, Nanoseconds
@@ -27,8 +28,11 @@ from catenary.bench.segment import COUNTS_PER_TURN, make_segment, served
 from catenary.realtime import VirtualClock
 from catenary.realtime.child import start_python
 
+Positions = npt.NDArray[np.float64]  # [rad]
+
 DRIVES = (18, 15)  # of the published humanoid's upper and lower network
 OURS, C = "catenary", "c"
+BRING_UP = 2.0  # [s] that two programs together take at most
 LATENESS = PHASES.index("lateness")
 
 
@@ -40,7 +44,7 @@ class Tally:
     network: int
     cycles: int
     lost: int
-    late: int  # instants that passed without a cycle, or cycles begun a period too late
+    late: int  # instants that passed without a cycle (ours), cycles begun a period late (C's)
     lateness_us: dict[str, float]  # p50, p99, max
 
 
@@ -86,7 +90,10 @@ def on_wires(rate: int, seconds: float, rounds: int) -> list[Tally]:
 
 
 def run_c(jobs: Sequence[Job], folder: Path) -> list[NetworkRound]:
-    """One program for each network, at the same time."""
+    """One program for each network, at the same time. Each is brought up by Python on the masters'
+    processor: what is counted begins once all of them run."""
+    start = round(BRING_UP / (jobs[0].period_ns * 1e-9))
+    jobs = [replace(job, warm_up=start) for job in jobs]
     places = [folder / str(number) for number in range(len(jobs))]
     for place in places:
         place.mkdir(exist_ok=True)
@@ -97,7 +104,7 @@ def run_c(jobs: Sequence[Job], folder: Path) -> list[NetworkRound]:
 
 def of_samples(lost: int, samples: Nanoseconds, period_ns: int) -> NetworkRound:
     lateness = samples[:, LATENESS]
-    late = int((np.maximum(lateness, 0) // period_ns).sum())
+    late = int(np.count_nonzero(lateness >= period_ns))
     return NetworkRound(lost, late, lateness.tolist())
 
 
@@ -156,17 +163,22 @@ def in_virtual_time(rate: int, seconds: float) -> tuple[int, int]:
             for main in mains
         ]
         loop = stack.enter_context(cat.Loop(*bodies, period=1 / rate))
+        homes = homes_of(bodies)
         for cycle in loop:
             incomplete += not cycle.ok
-            follow(bodies, cycle.time)
+            follow(bodies, homes, cycle.time)
             if cycle.number + 1 >= cycles:
                 break
     return cycles, incomplete
 
 
-def follow(bodies: Sequence[cat.Drives], t: float) -> None:
-    for body in bodies:
-        body.target.position[:] = 0.1 * np.sin(np.pi * t)
+def homes_of(bodies: Sequence[cat.Drives]) -> list[Positions]:
+    return [body.actual.position.copy() for body in bodies]
+
+
+def follow(bodies: Sequence[cat.Drives], homes: Sequence[Positions], t: float) -> None:
+    for body, home in zip(bodies, homes, strict=True):
+        body.target.position[:] = home + 0.1 * np.sin(np.pi * t)
 
 
 # ---- the process of one round
@@ -203,8 +215,9 @@ def follow_and_count(loop: cat.Loop, bodies: Sequence[cat.Drives], job: Job) -> 
     networks = loop.networks  # type: ignore[attr-defined]
     before = [network.timing.counters for network in networks]
     rows: list[list[np.ndarray]] = [[] for _ in networks]
+    homes = homes_of(bodies)
     for cycle in loop:
-        follow(bodies, cycle.time)
+        follow(bodies, homes, cycle.time)
         if cycle.number == job.warm_up:
             before = [network.timing.counters for network in networks]
         elif cycle.number > job.warm_up and cycle.number % 500 == 0:
