@@ -118,7 +118,7 @@ def main_control(place, cost, target, share, compensate, state, torque, phase, r
     """The bus, and the cascade of every joint. Returns its timing, its stops (cycle, [s], reason)
     and how many times faster than real time it was."""
     parameters, nothing = GAINS.parameters.tolist(), np.zeros(JOINTS)  # lists are faster here
-    now, stopped, heard, silence, handled = STARTING, [], 0, 0, 0
+    now, since, stopped, heard, silence, handled = STARTING, 0.0, [], 0, 0, 0
     options = {"run": "inline", "period": PERIOD, "priority": 90, "raise_faults": False}
     with cat.MainDevice(read_segment(target, clock=place) if place else target) as main:
         arm = cat.Drives(main.scan().drives, mode="cst", **AXES)
@@ -133,7 +133,8 @@ def main_control(place, cost, target, share, compensate, state, torque, phase, r
                 elif row is not None:
                     wanted, speed, acceleration = row
                 state.write([q, v, speed, acceleration, wanted])
-                silence, heard = (silence + 1) * (torque.number == heard), torque.number
+                news = torque.number
+                silence, heard = (silence + 1) * (news == heard), news
                 feed = torque.read() if compensate else nothing
                 arm.target.position[:] = wanted  # for the recording: the mode is torque
                 joints = zip(*(each.tolist() for each in (wanted, speed, feed, q, v)), strict=True)
@@ -143,18 +144,25 @@ def main_control(place, cost, target, share, compensate, state, torque, phase, r
                 ]
                 cycle.spend(cost)
                 asked = int(stops.read())
-                reason = why_stop(cycle, arm, wanted, asked > handled, silence)
-                if now == MOVING and reason:
+                reason = why_stop(cycle, arm, wanted, asked > handled, silence if heard else 0)
+                if now != STOPPED and reason:
                     arm.quick_stop()
-                    now = STOPPED
+                    now, since, handled = STOPPED, cycle.time, asked
                     stopped.append((cycle.number, cycle.time, reason))
                     print(f"{cycle.time:5.1f} s  stopped: {reason}")
-                elif now == STOPPED and cycle.time > stopped[-1][1] + 1.0 and not silence:
-                    arm.reset_faults()
+                elif reason:  # the wait begins anew; a reset is an edge, again and again
+                    since, handled = cycle.time, asked
+                    if cycle.number % 100 == 0:
+                        (arm.disable, arm.reset_faults)[cycle.number // 100 % 2]()
+                elif now == STOPPED and cycle.time > since + 1.0:
                     arm.enable()
-                    now, handled = STARTING, asked
-                elif now == STARTING and arm.enabled.all() and heard and not silence:
+                    now, since = STARTING, cycle.time
+                elif now == STARTING and arm.enabled.all() and heard:
                     now = MOVING
+                elif now == STARTING and cycle.time > since + 5.0:
+                    raise RuntimeError(
+                        "the drives cannot be enabled: safe torque off, main supply?"
+                    )
                 phase.write(now)
                 if done.read() >= len(GOALS) or silence > PATIENCE:
                     break
@@ -177,7 +185,7 @@ def run(target, *, virtual, compensate, arm, folder):
         ),
         realtime.Task(monitor, (c[3], name, key), period=10e-3, priority=80, **kept),
         realtime.Task(log, (c[4], name, path), period=0.1, priority=75, **lost),
-        realtime.Task(stop, (c[5], stops), period=1.0, priority=99, trigger=key, **kept),
+        realtime.Task(stop, (c[5], stops), period=0.01, priority=99, trigger=key, **kept),
         clock=realtime.VirtualClock() if virtual else None,
         session=realtime.session(best_effort=True),
         best_effort=True,
@@ -197,6 +205,8 @@ if __name__ == "__main__":  # the tasks' processes import this file
     parser.add_argument("--segment", default=str(HERE / "segment.toml"), help="the virtual drives")
     parser.add_argument("--out", type=Path, default=Path("out"), help="where files go")
     a = parser.parse_args()
+    if a.target and not a.realtime:
+        parser.error(f"{a.target} lives by the machine's clock: add --realtime")
     a.out.mkdir(exist_ok=True)
     options = {"virtual": not a.realtime, "arm": a.arm, "folder": a.out}
     given = contextlib.nullcontext(a.target or a.segment)

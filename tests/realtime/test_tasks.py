@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import resource
+import signal
 import threading
 
 import pytest
@@ -295,6 +296,22 @@ def test_what_it_raises_comes_out():
         with pytest.raises(LookupError, match="beside"):
             tasks.beside(fails)
         tasks.join(20e-3)  # time goes on
+
+
+def test_ctrl_c_waits_for_its_end_and_time_goes_on():
+    ends = []
+
+    def work(place):
+        place.wait_until(10 * MS)  # time has passed: the other thread lets it
+        os.kill(os.getpid(), signal.SIGINT)
+        place.wait_until(5_000 * MS)
+        ends.append(place.now_ns)
+
+    task = Task(bodies.idle, period=10e-3)
+    with VirtualClock() as clock, Tasks(task, clock=clock) as tasks:
+        with pytest.raises(KeyboardInterrupt):
+            tasks.beside(work)
+        assert ends == [5_000 * MS]
 
 
 def test_on_the_machines_clock_it_runs_here():

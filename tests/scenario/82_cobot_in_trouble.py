@@ -136,14 +136,15 @@ def test_without_the_log_the_arm_knows_nothing_of_it(
     assert len(recording["number"]) <= AT
 
 
+@pytest.mark.parametrize("lasting", [0.3, 2.5])
 def test_a_drive_in_fault_stops_all_and_the_motion_goes_on_after_it(
-    cobot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    cobot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lasting: float
 ) -> None:
     read_segment = cobot.read_segment
 
     def with_fault(path: str, **options: Any) -> Any:
         segment = read_segment(path, **options)
-        segment.inject(drive_fault(2, at=1.5, for_=0.3))
+        segment.inject(drive_fault(2, at=1.5, for_=lasting))
         return segment
 
     monkeypatch.setattr(cobot, "read_segment", with_fault)

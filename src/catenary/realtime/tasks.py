@@ -11,7 +11,7 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from types import TracebackType
 from typing import Self, TypeVar
 
@@ -152,7 +152,8 @@ class Tasks:
         On the machine's clock it runs here, and `place` is None. On a virtual clock it runs in a
         thread of its own, at `place` on the clock, with that priority and processor
         (`Segment(..., clock=place)`), and time passes meanwhile. What it raises comes out; a task
-        that failed meanwhile is a TaskError afterwards, and in `failures` at once.
+        that failed meanwhile is a TaskError afterwards, and in `failures` at once. Ctrl-C is told
+        once the function has ended: a thread cannot be ended against its will.
         """
         supervisor = self._started()
         result = (
@@ -235,8 +236,14 @@ def run_at(
     with ThreadPoolExecutor(1, "beside tasks") as pool:
         future = pool.submit(work)
         future.add_done_callback(lambda _: clock.home.wake())
-        while not future.done():
-            clock.wait_until(clock.now_ns + LOOK_NS)
+        try:
+            while not future.done():
+                clock.wait_until(clock.now_ns + LOOK_NS)
+        except BaseException:  # Ctrl-C: time goes on, so that the function can come to its end
+            clock.home.step_aside()
+            wait([future])
+            clock.home.return_to()
+            raise
     return future.result()
 
 
