@@ -180,3 +180,13 @@ def test_pulses_follow_the_system_time_that_is_steered() -> None:
     free = main.segment.core.pulses(DEVICE)[0]
     main.let_pass(10_000)  # nobody steers now: the loop keeps the speed it found
     assert main.segment.core.pulses(DEVICE)[0] - free == pytest.approx(10_000, abs=1)
+
+
+def test_pulses_follow_a_crystal_that_slows_down_while_nobody_steers() -> None:
+    """At the instant computed from its rate so far the pulse is still ahead, and comes all the same."""
+    main = clocks(Crystal(drift_ppm=200, drift_period=1.0))
+    main.let_pass(240)
+    main.burst(1)
+    first = start(main, 10 * MS, MS)
+    main.let_pass(500)
+    assert abs(pulses(main)[0] - (main.system_time(DEVICE) - first) / MS) <= 1.01

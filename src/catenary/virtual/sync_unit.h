@@ -124,9 +124,12 @@ static int sync_pulse0(controller *c) {
     return shown;
 }
 
-/* What is due at the segment's present. 1: the device gets a SYNC0 pulse. */
+/* What is due at the segment's present. 1: the device gets a SYNC0 pulse.
+ * The rate swings and a product of it is rounded, so that a pulse may still be a hair away at the
+ * instant computed for it: counted from here on, it is at least 1 ns ahead and comes nearer. */
 static int sync_advance(controller *c) {
     sync_unit *u = &c->sync;
+    dc_anchor(c, c->segment->now);
     int64_t now = dc_system_time(c, c->segment->now);
     int pulse = 0;
     if (u->next1 <= now)
