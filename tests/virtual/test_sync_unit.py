@@ -183,7 +183,7 @@ def test_pulses_follow_the_system_time_that_is_steered() -> None:
 
 
 def test_pulses_follow_a_crystal_that_slows_down_while_nobody_steers() -> None:
-    """At the instant computed from its rate so far the pulse is still ahead, and comes all the same."""
+    """At the instant computed from its rate so far the pulse is still ahead, and comes."""
     main = clocks(Crystal(drift_ppm=200, drift_period=1.0))
     main.let_pass(240)
     main.burst(1)
