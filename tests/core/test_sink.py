@@ -101,6 +101,27 @@ def test_it_comes_behind_the_frames_of_its_cycle(order: str) -> None:
     assert frames[-1] == len(sent)
 
 
+@pytest.mark.parametrize("order", ["threaded", "inline", "law"])
+def test_the_controlword_is_that_of_the_frames_of_its_cycle(order: str) -> None:
+    on_the_wire: list[list[int]] = []
+
+    def look() -> int:
+        on_the_wire.append([drive.controlword for drive in b.drives])
+        return 0
+
+    b, sink = opened(order, look=look)
+    b.enable()
+    b.steps(3)
+    b.controlword_bits[0] = 0x0010  # of the mode, in OPERATION_ENABLED
+    b.steps(3)
+    b.ask(2)
+    b.steps(3)
+    assert sink.field("controlword", 0).tolist() == on_the_wire
+    words = [words[0] for words in on_the_wire]
+    assert {0x06, 0x07, 0x0F, 0x1F, 0x02} <= set(words)
+    assert on_the_wire[words.index(0x1F)] == [0x1F, 0x0F]
+
+
 def test_an_inline_cycle_has_its_own_commands_and_not_those_before() -> None:
     b, sink = opened("inline")
     b.enable()

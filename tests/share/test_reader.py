@@ -86,6 +86,25 @@ def test_a_law_is_read_along(name: str, order: str) -> None:
     run(name, order, body)
 
 
+@pytest.mark.parametrize("order", ["threaded", "inline"])
+def test_a_quick_stop_is_in_the_cycle_that_sends_it(name: str, order: str) -> None:
+    def body(loop: cat.Loop, arm: cat.Drives, reader: Reader) -> None:
+        arm.enable()
+        for _ in loop:
+            if arm.enabled.all():
+                arm.quick_stop()
+                asked = int(loop.log["number"][-1])
+                break
+        loop.run(hold, memory=[0.0, 0.0])
+        rows, _ = reader.rows(after=asked - 2)
+        words = dict(zip(rows["number"].tolist(), rows["controlword"].tolist(), strict=True))
+        assert words[asked - 1] == [0x0F, 0x0F]
+        # inline: the frames of the cycle itself; threaded: those of the next, which go first
+        assert words[asked + (order == "threaded")] == [0x02, 0x02]
+
+    run(name, order, body)
+
+
 def test_the_layout_describes_itself(name: str) -> None:
     def body(loop: cat.Loop, arm: cat.Drives, reader: Reader) -> None:
         layout = reader.layout
@@ -96,7 +115,8 @@ def test_the_layout_describes_itself(name: str) -> None:
         assert units["position"] == "rad"
         assert units["commanded_torque"] == "N·m"
         assert units["lateness_ns"] == "ns"
-        assert {f.name for f in layout.fields if f.per_axis} >= {"position", "state", "goal"}
+        per_axis = {f.name: f.dtype for f in layout.fields if f.per_axis}
+        assert per_axis.items() >= {"position": "<f8", "state": "u1", "controlword": "<u2"}.items()
         assert reader.dtype["position"].shape == (2,)
         assert reader.read()["following_error"].shape == (2,)
 

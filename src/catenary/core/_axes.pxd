@@ -68,6 +68,7 @@ cdef struct axis_t:
     uint32_t refused_cycles    # in a row, the target was not finite
     uint32_t beyond_cycles     # in a row, outside a position limit and leaving
     # sent
+    uint16_t controlword_sent  # all of its bits
     double commanded_position
     double commanded_velocity
     double commanded_torque

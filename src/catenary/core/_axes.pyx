@@ -109,6 +109,14 @@ cdef void read_columns(const axes_t *x, actual_t *out) noexcept nogil:
             out.input_bits[c.rank] = number_bits(&c.number, x.image.inputs) != 0
 
 
+cdef inline void tell_axis(const axis_t *a, actual_t *out, uint32_t i) noexcept nogil:
+    """What was sent last."""
+    out.controlword[i] = a.controlword_sent
+    out.commanded_position[i] = a.commanded_position
+    out.commanded_velocity[i] = a.commanded_velocity
+    out.commanded_torque[i] = a.commanded_torque
+
+
 cdef void axes_read(axes_t *x, actual_t *out, uint64_t number, int64_t instant) noexcept nogil:
     """After collect of cycle `number`, whose instant is `instant` [ns]: the input image → actual values."""
     cdef axis_t *a
@@ -128,9 +136,7 @@ cdef void axes_read(axes_t *x, actual_t *out, uint64_t number, int64_t instant) 
         out.position[i] = a.position
         out.velocity[i] = a.velocity
         out.torque[i] = a.torque
-        out.commanded_position[i] = a.commanded_position
-        out.commanded_velocity[i] = a.commanded_velocity
-        out.commanded_torque[i] = a.commanded_torque
+        tell_axis(a, out, i)
         out.followed_since[i] = a.followed_since
         out.statusword[i] = a.status
         out.mode[i] = a.mode_shown
@@ -145,6 +151,7 @@ cdef void axes_read(axes_t *x, actual_t *out, uint64_t number, int64_t instant) 
 cdef void write_axis(axes_t *x, axis_t *a, uint16_t controlword) noexcept nogil:
     cdef uint8_t *outputs = x.image.outputs
     cdef bint cut = False
+    a.controlword_sent = controlword
     number_put_bits(&a.controlword, outputs, controlword)
     if a.mode_target.present:
         number_put_bits(&a.mode_target, outputs, <uint64_t><int64_t>a.mode)
@@ -227,9 +234,7 @@ cdef void axes_tell(const axes_t *x, actual_t *out) noexcept nogil:
     """What was commanded by the last write, where the values of `axes_read` are already there."""
     cdef uint32_t i
     for i in range(x.axis_count):
-        out.commanded_position[i] = x.axes[i].commanded_position
-        out.commanded_velocity[i] = x.axes[i].commanded_velocity
-        out.commanded_torque[i] = x.axes[i].commanded_torque
+        tell_axis(&x.axes[i], out, i)
 
 
 cdef void axes_follow(const axes_t *x, const actual_t *actual, target_t *target) noexcept nogil:

@@ -43,6 +43,7 @@ cdef struct actual_t:
     int64_t *input_integers
     uint64_t *followed_since   # the cycle; of axes that are followed
     uint16_t *statusword
+    uint16_t *controlword      # as sent last
     uint16_t *unit_counter
     int8_t *mode
     uint8_t *state

@@ -48,6 +48,7 @@ cdef size_t lay_actual(actual_t *a, uint8_t *block, const counts_t *n) noexcept:
     a.input_integers = <int64_t *>carve(&place, n.input_integers, 8)
     a.followed_since = <uint64_t *>carve(&place, n.axes, 8)
     a.statusword = <uint16_t *>carve(&place, n.axes, 2)
+    a.controlword = <uint16_t *>carve(&place, n.axes, 2)
     a.unit_counter = <uint16_t *>carve(&place, n.units, 2)
     a.mode = <int8_t *>carve(&place, n.axes, 1)
     a.state = carve(&place, n.axes, 1)
@@ -249,6 +250,7 @@ cdef class Handover:
             "commanded_velocity": (<char *>a.commanded_velocity - of_actual, "<f8", n.axes),
             "commanded_torque": (<char *>a.commanded_torque - of_actual, "<f8", n.axes),
             "statusword": (<char *>a.statusword - of_actual, "<u2", n.axes),
+            "controlword": (<char *>a.controlword - of_actual, "<u2", n.axes),
             "mode": (<char *>a.mode - of_actual, "i1", n.axes),
             "state": (<char *>a.state - of_actual, "u1", n.axes),
             "axis_flags": (<char *>a.flags - of_actual, "u1", n.axes),

@@ -24,7 +24,7 @@ from catenary.share import _rows
 from catenary.share.process import Process
 
 MAGIC = b"CATSHARE"
-VERSION = 1
+VERSION = 2
 HEADER = struct.Struct("<8sIIQ")
 ALIGNMENT = 4096
 EVENT_SIZE = 1024  # bytes of an event
