@@ -7,19 +7,26 @@ import pytest
 
 from catenary.bench import networks
 from catenary.bench.job import PHASES
-from catenary.bench.networks import NetworkRound, lateness_of, of_samples, tally
+from catenary.bench.networks import KEPT, NetworkRound, of_samples, phases_of, tally
 
 
 def test_a_cycle_begun_a_period_late_is_late() -> None:
     samples = np.zeros((4, len(PHASES)), dtype=np.int64)
     samples[:, PHASES.index("lateness")] = [-5, 200_000, 250_000, 1_000_000]
-    assert of_samples(2, samples, 250_000) == NetworkRound(2, 2, [-5, 200_000, 250_000, 1_000_000])
+    found = of_samples(2, samples, 250_000)
+    assert (found.lost, found.late) == (2, 2)
+    assert found.phases_ns["lateness"] == [-5, 200_000, 250_000, 1_000_000]
+    assert found.phases_ns["send"] == [0, 0, 0, 0]
+
+
+def lateness(lost: int, late: int, values: list[int]) -> NetworkRound:
+    return NetworkRound(lost, late, {name: values for name in KEPT})
 
 
 def test_the_networks_are_tallied_apart() -> None:
     rounds = [
-        [NetworkRound(1, 0, [1000, 2000]), NetworkRound(0, 3, [4000])],
-        [NetworkRound(1, 1, [3000]), NetworkRound(0, 0, [4000])],
+        [lateness(1, 0, [1000, 2000]), lateness(0, 3, [4000])],
+        [lateness(1, 1, [3000]), lateness(0, 0, [4000])],
     ]
     first, second = tally("x", 2, rounds)
     assert (first.lost, first.late, first.cycles, first.lateness_us["p50"]) == (2, 1, 4, 2.0)
@@ -27,8 +34,11 @@ def test_the_networks_are_tallied_apart() -> None:
 
 
 def test_logs_that_overlap_count_a_cycle_once() -> None:
-    log = np.array([(n, 10 * n) for n in range(6)], dtype=[("number", "u8"), ("lateness_ns", "i4")])
-    assert lateness_of([log[:4], log[2:]], 5) == [10, 20, 30, 40, 50]
+    columns = [("number", "u8"), *((f"{name}_ns", "i4") for name in KEPT)]
+    log = np.array([(n, 10 * n, n, 2 * n) for n in range(6)], dtype=columns)
+    found = phases_of([log[:4], log[2:]], 5)
+    assert found["lateness"] == [10, 20, 30, 40, 50]
+    assert found["send"] == [2, 4, 6, 8, 10]
 
 
 def test_virtual_networks_are_complete() -> None:

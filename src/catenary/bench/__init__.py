@@ -129,3 +129,41 @@ def measure_networks(
     from catenary.bench import networks
 
     networks.measure(rates=rates, seconds=seconds, rounds=rounds, file=file)
+
+
+def measure_table(
+    name: str,
+    *,
+    seconds: float | None = None,
+    rounds: int | None = None,
+    rates: Sequence[int] | None = None,
+    ring: bool = False,
+    lead: float | None = None,
+    file: Path | None = None,
+) -> None:
+    """Prints a published table with ours beside it; `None`: as the table has it. What this machine
+    lacks is left out, and said. `ValueError`: no such table."""
+    from catenary.bench import tables
+
+    tables.check(name)
+    refused = ""
+    if tables.TABLES[name].wires:
+        from catenary.realtime import private_network
+
+        state = private_network.enter()
+        refused = state.reason if isinstance(state, private_network.Refused) else ""
+    from catenary.bench.tables import sheet
+
+    options = sheet.Options(
+        seconds=seconds,
+        rounds=rounds,
+        rates=None if rates is None else tuple(rates),
+        ring=ring,
+        lead=lead,
+        refused=refused,
+    )
+    made = tables.measure(name, options)
+    print(sheet.show(made))
+    if file is not None:
+        file.write_text(sheet.as_json(name, made) + "\n")
+        print(f"wrote {file}")

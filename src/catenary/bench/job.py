@@ -43,6 +43,12 @@ class Job:
     amplitude: float = 3.0  # of the sine [rad]
     stiffness: float = 0.5  # PD [N·m/rad]
     damping: float = 0.02  # PD [N·m/(rad/s)]
+    second: str = ""  # interface of a ring's other end
+    lead: float | None = None  # [s] of inline loops and laws; None: a loop's own, 0: none
+
+    @property
+    def interfaces(self) -> tuple[str, ...]:
+        return (self.interface, self.second) if self.second else (self.interface,)
 
     @property
     def counts_per_rad(self) -> float:

@@ -133,6 +133,7 @@ def make_jobs(
             rated_torque=RATED_TORQUE,
             spin=spin or name == STORM,
             storm=name == STORM,
+            second=segment.second,
         )
         for name in names
     ]

@@ -33,7 +33,7 @@ Positions = npt.NDArray[np.float64]  # [rad]
 DRIVES = (18, 15)  # of the published humanoid's upper and lower network
 OURS, C = "catenary", "c"
 BRING_UP = 2.0  # [s] that two programs together take at most
-LATENESS = PHASES.index("lateness")
+KEPT = ("lateness", "receive", "send")  # phases
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class NetworkRound:
 
     lost: int
     late: int
-    lateness_ns: list[int]
+    phases_ns: dict[str, list[int]]  # of KEPT; -1: did not occur in that cycle
 
 
 def measure(*, rates: Sequence[int], seconds: float, rounds: int, file: Path | None) -> None:
@@ -103,9 +103,9 @@ def run_c(jobs: Sequence[Job], folder: Path) -> list[NetworkRound]:
 
 
 def of_samples(lost: int, samples: Nanoseconds, period_ns: int) -> NetworkRound:
-    lateness = samples[:, LATENESS]
-    late = int(np.count_nonzero(lateness >= period_ns))
-    return NetworkRound(lost, late, lateness.tolist())
+    phases = {name: samples[:, PHASES.index(name)] for name in KEPT}
+    late = int(np.count_nonzero(phases["lateness"] >= period_ns))
+    return NetworkRound(lost, late, {name: column.tolist() for name, column in phases.items()})
 
 
 def run_ours(jobs: Sequence[Job]) -> list[NetworkRound]:
@@ -121,7 +121,7 @@ def run_ours(jobs: Sequence[Job]) -> list[NetworkRound]:
 
 def tally(name: str, cycles: int, rounds: Sequence[Sequence[NetworkRound]]) -> Iterator[Tally]:
     for network, mine in enumerate(zip(*rounds, strict=True)):
-        lateness = np.concatenate([each.lateness_ns for each in mine]) * 1e-3
+        lateness = np.concatenate([each.phases_ns["lateness"] for each in mine]) * 1e-3
         p50, p99 = np.percentile(lateness, [50.0, 99.0])
         yield Tally(
             name=name,
@@ -192,7 +192,7 @@ def main(arguments: Sequence[str]) -> None:
 def run_loop(jobs: Sequence[Job]) -> list[NetworkRound]:
     first = jobs[0]
     with contextlib.ExitStack() as stack:
-        mains = [stack.enter_context(cat.MainDevice(job.interface)) for job in jobs]
+        mains = [stack.enter_context(cat.MainDevice(*job.interfaces)) for job in jobs]
         bodies = [
             cat.Drives(main.scan().drives, mode="csp", counts_per_turn=COUNTS_PER_TURN)
             for main in mains
@@ -229,7 +229,7 @@ def follow_and_count(loop: cat.Loop, bodies: Sequence[cat.Drives], job: Job) -> 
         NetworkRound(
             lost=after["lost"] - then["lost"],
             late=after["late"] - then["late"],
-            lateness_ns=lateness_of(mine, job.cycles),
+            phases_ns=phases_of(mine, job.cycles),
         )
         for mine, then, after in zip(
             rows, before, (network.timing.counters for network in networks), strict=True
@@ -239,14 +239,15 @@ def follow_and_count(loop: cat.Loop, bodies: Sequence[cat.Drives], job: Job) -> 
 
 def take(rows: list[list[np.ndarray]], networks: Sequence[cat.Loop]) -> None:
     for mine, network in zip(rows, networks, strict=True):
-        mine.append(network.log[["number", "lateness_ns"]].copy())
+        mine.append(network.log[["number", *(f"{name}_ns" for name in KEPT)]].copy())
 
 
-def lateness_of(logs: Sequence[np.ndarray], cycles: int) -> list[int]:
+def phases_of(logs: Sequence[np.ndarray], cycles: int) -> dict[str, list[int]]:
     """Of each cycle once, the last ones."""
     together = np.concatenate(logs)
     _, first = np.unique(together["number"], return_index=True)
-    return [int(lateness) for lateness in together["lateness_ns"][first][-cycles:]]
+    last = together[first][-cycles:]
+    return {name: last[f"{name}_ns"].tolist() for name in KEPT}
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
-"""Runs peers in short rounds, one after the other (A B C A B C ...), each round in a fresh process:
-what the machine does meanwhile meets all of them alike."""
+"""Runs peers in short rounds, one after the other (A B C B C A ...), each round in a fresh process:
+what the machine does meanwhile meets all of them alike, and none is always the first."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ def interleave(jobs: Sequence[Job], rounds: int, progress: Progress) -> Mapping[
     found: dict[str, list[Round]] = {job.peer: [] for job in jobs}
     with tempfile.TemporaryDirectory(prefix="catenary-bench-") as name:
         for number in range(rounds):
-            for job in jobs:
+            first = number % max(len(jobs), 1)
+            for job in (*jobs[first:], *jobs[:first]):
                 progress(job.peer, number + 1, rounds)
                 found[job.peer].append(run_round(job, Path(name)))
     return found

@@ -1,13 +1,15 @@
 """The segment of the benchmarks: a coupler and drives, served on a network interface by a process
-of its own: `python -m catenary.bench.segment NIC DRIVES INPUTS AXES CPU`."""
+of its own: `python -m catenary.bench.segment NIC SECOND DRIVES INPUTS AXES CPU`; SECOND is a ring's
+other end, or empty."""
 
 from __future__ import annotations
 
 import os
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 from catenary.errors import LinkError
@@ -21,6 +23,7 @@ START_SECONDS = 30.0
 COUNTS_PER_TURN = 2**20
 RATED_TORQUE = 2.0  # [N·m]
 PRIORITY = 80
+BELOW = 10  # the segment's priority is so much lower where it shares the only processor
 ANALOG_CHANNELS = 4  # of one input terminal
 
 
@@ -28,6 +31,7 @@ ANALOG_CHANNELS = 4  # of one input terminal
 class Served:
     interface: str  # of the MainDevice
     drives: tuple[int, ...]  # positions
+    second: str = ""  # of the MainDevice, where the segment is a ring
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +55,7 @@ def make_segment(
     *,
     axes: int = 1,
     clock: Literal["virtual", "monotonic"] | VirtualClock = "monotonic",
+    ring: bool = False,
 ) -> Segment:
     """A coupler, `drives` servos of `axes` axes each, and `inputs` terminals of analogue inputs:
     bytes without axes."""
@@ -59,27 +64,36 @@ def make_segment(
         for _ in range(drives)
     ]
     terminals = [AnalogInputs(channels=ANALOG_CHANNELS) for _ in range(inputs)]
-    return Segment([Coupler(), *servos, *terminals], clock=clock)
+    return Segment([Coupler(), *servos, *terminals], clock=clock, ring=ring)
 
 
 @contextmanager
-def served(drives: int, inputs: int = 0, axes: int = 1) -> Iterator[Served]:
-    """The segment on one end of a pair of interfaces, for as long as the block lasts."""
+def served(drives: int, inputs: int = 0, axes: int = 1, *, ring: bool = False) -> Iterator[Served]:
+    """The segment on one end of a pair of interfaces, for as long as the block lasts; a ring on two
+    pairs."""
     cpu = processors().segment
-    with veth_pair() as (ours, theirs):
+    with ExitStack() as stack:
+        ours, theirs = stack.enter_context(veth_pair())
+        second = their_second = ""
+        if ring:
+            second, their_second = stack.enter_context(veth_pair())
         numbers = map(str, (drives, inputs, axes))
-        arguments = [theirs, *numbers, "" if cpu is None else str(cpu)]
-        with start_python(["-m", "catenary.bench.segment", *arguments]) as server:
-            if server.read_line(START_SECONDS) is None:
-                raise LinkError("the segment of the benchmark did not start")
-            yield Served(ours, tuple(range(1, drives + 1)))
+        arguments = [theirs, their_second, *numbers, "" if cpu is None else str(cpu)]
+        server = stack.enter_context(start_python(["-m", "catenary.bench.segment", *arguments]))
+        if server.read_line(START_SECONDS) is None:
+            raise LinkError("the segment of the benchmark did not start")
+        yield Served(ours, tuple(range(1, drives + 1)), second)
 
 
 def main(arguments: Sequence[str]) -> None:
-    interface, drives, inputs, axes, cpu = arguments
-    segment = make_segment(int(drives), int(inputs), axes=int(axes))
-    request_scheduling(priority=PRIORITY, cpu=int(cpu) if cpu else None)
-    serve(segment, interface, ready=lambda: print("ready", flush=True))
+    interface, second, drives, inputs, axes, cpu = arguments
+    segment = make_segment(int(drives), int(inputs), axes=int(axes), ring=bool(second))
+    if cpu:
+        request_scheduling(priority=PRIORITY, cpu=int(cpu))
+    else:
+        request_scheduling(priority=PRIORITY - BELOW)
+    ready = partial(print, "ready", flush=True)
+    serve(segment, interface, second=second or None, ready=ready)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ import argparse
 from pathlib import Path
 
 from catenary.cli.arguments import positive_number, positive_seconds
+from catenary.cli.bench_table import add_table
 from catenary.cli.parsers import Commands, add_command
 
 
@@ -30,6 +31,7 @@ def add_parser(commands: Commands) -> None:
     _add_clocks(group)
     _add_networks(group)
     _add_igh(group)
+    add_table(group)
 
 
 def _add_loop(group: Commands) -> None:

@@ -54,6 +54,7 @@ def opened(job: Job, sink: cat.Share | None = None) -> Iterator[tuple[cat.Loop, 
             priority=job.priority,
             lost_limit=LOST_LIMIT,
             late_limit=LATE_LIMIT,
+            lead=job.lead,
             sink=sink,
         ) as loop:
             yield loop, arm

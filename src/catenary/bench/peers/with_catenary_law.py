@@ -49,6 +49,7 @@ def run(job: Job) -> Round:
             priority=job.priority,
             lost_limit=LOST_LIMIT,
             late_limit=LATE_LIMIT,
+            lead=job.lead,
             laws=[law],
         ) as loop:
             return _measure(loop, law, arm.actual.position.copy(), job)

@@ -1,0 +1,130 @@
+"""The published figures, with the conditions they were taken under. Spreads are mean, max, min, sd;
+None: not published."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+FIGURES = ("mean", "max", "min", "sd")
+
+
+class Spread(NamedTuple):
+    mean: float
+    max: float
+    min: float
+    sd: float | None = None
+
+
+def spread_of(figures: Mapping[str, float], scale: float = 1.0) -> Spread:
+    return Spread(*(figures[name] * scale for name in FIGURES))
+
+
+# ---- PyIgH, section 1: in-controller delay
+
+
+class Phases(NamedTuple):
+    """Period [ms], the others [us]."""
+
+    period: Spread
+    receive: Spread
+    process: Spread
+    send: Spread
+    in_controller: Spread
+
+
+PYIGH_CONDITIONS = (
+    "theirs: i7-6600U, Linux 5.15.79-rt54, IgH with the generic driver, 3 servo drives, 1 kHz, "
+    "600 000 cycles"
+)
+PYIGH: Mapping[str, Phases] = {
+    "IgH, C++": Phases(
+        Spread(1.000000, 1.027, 0.972, 0.000297),
+        Spread(8.849, 44, 7, 0.446),
+        Spread(0.001, 5, 0, 0.031),
+        Spread(8.963, 64, 5, 0.287),
+        Spread(17.812, 113, 12),
+    ),
+    "PyIgH": Phases(
+        Spread(1.000000, 1.017, 0.984, 0.000518),
+        Spread(46.772, 61, 43, 0.817),
+        Spread(2.998, 19, 2, 0.158),
+        Spread(31.341, 57, 29, 0.541),
+        Spread(81.110, 137, 74),
+    ),
+    "PySOEM": Phases(
+        Spread(1.000000, 1.063, 0.936, 0.000717),
+        Spread(49.325, 120, 48, 0.886),
+        Spread(2.988, 17, 2, 0.189),
+        Spread(36.904, 102, 35, 0.910),
+        Spread(89.217, 239, 85),
+    ),
+}
+PYIGH_C = "IgH, C++"
+PYIGH_CHI_SQUARED = {"PyIgH": 48.94, "PySOEM": 55.75}  # 29 degrees, critical 49.59 at 0.01
+
+# ---- TOCABI, section 4: two networks, 33 axes
+
+
+class Channel(NamedTuple):
+    """[us], as avg, max, min, sd; `overflows` in three hours."""
+
+    latency: Spread
+    send: Spread
+    receive: Spread
+    overflows: str
+
+
+TOCABI_CONDITIONS = (
+    "theirs: i7-10700, Xenomai, SOEM, a process and a core for each network, rings, 3 h"
+)
+TOCABI: Mapping[tuple[int, str], Channel] = {
+    (4000, "upper, RTnet"): Channel(
+        Spread(0.76, 10.64, -0.32, 0.34),
+        Spread(2.94, 9.45, 1.88, 0.47),
+        Spread(87.57, 105.57, 74.71, 2.69),
+        "0",
+    ),
+    (4000, "upper, generic"): Channel(
+        Spread(0.76, 136.12, -0.50, 0.43),
+        Spread(16.46, 70.10, 9.63, 3.13),
+        Spread(77.74, 305.33, 37.07, 2.94),
+        "717",
+    ),
+    (4000, "lower, RTnet"): Channel(
+        Spread(2.40, 13.30, -0.23, 0.70),
+        Spread(5.40, 16.57, 2.16, 0.98),
+        Spread(74.76, 91.10, 63.66, 2.43),
+        "0",
+    ),
+    (4000, "lower, generic"): Channel(
+        Spread(1.13, 33.27, -0.17, 0.61),
+        Spread(15.26, 155.93, 10.07, 1.71),
+        Spread(69.02, 251.26, 27.51, 2.91),
+        "1",
+    ),
+    (8000, "upper, RTnet"): Channel(
+        Spread(1.46, 15.48, -0.30, 0.66),
+        Spread(4.68, 18.05, 2.13, 1.15),
+        Spread(88.24, 107.30, 74.52, 2.88),
+        "0",
+    ),
+    (8000, "upper, generic"): Channel(
+        Spread(11.96, 495.57, -0.49, 42.15),
+        Spread(13.26, 113.19, 8.67, 2.15),
+        Spread(88.16, 516.77, 6.14, 34.72),
+        "7.28 million",
+    ),
+    (8000, "lower, RTnet"): Channel(
+        Spread(1.44, 13.54, -0.30, 0.66),
+        Spread(4.81, 22.47, 2.13, 0.66),
+        Spread(75.69, 125.28, 61.19, 2.75),
+        "0",
+    ),
+    (8000, "lower, generic"): Channel(
+        Spread(0.74, 172.83, -0.50, 0.62),
+        Spread(12.47, 197.65, 9.08, 1.59),
+        Spread(69.70, 278.65, 24.93, 1.77),
+        "9102",
+    ),
+}

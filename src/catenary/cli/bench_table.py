@@ -1,0 +1,72 @@
+"""`catenary bench table`: published tables with ours beside them."""
+
+from __future__ import annotations
+
+import argparse
+import textwrap
+from pathlib import Path
+
+from catenary.cli.arguments import positive_number, positive_seconds, seconds
+from catenary.cli.failure import UsageError
+from catenary.cli.parsers import Commands, add_command
+
+EXAMPLE = """\
+catenary bench table pyigh --seconds 5
+catenary bench table pyigh --rounds 20 --json pyigh.json"""
+
+
+def add_table(group: Commands) -> None:
+    from catenary.bench.tables import TABLES
+
+    width = max(map(len, TABLES))
+    lines = "\n".join(f"  {name:{width}}  {table.help}" for name, table in TABLES.items())
+    parser = add_command(
+        group,
+        "table",
+        help="a published table, and ours beside it",
+        description="Prints a published table with ours beside it, both with their conditions. "
+        "What this machine\nlacks (a compiler, PySOEM, permissions) is left out, and said.\n\n"
+        f"tables:\n{lines}",
+        example=textwrap.dedent(EXAMPLE),
+    )
+    parser.add_argument("name", metavar="NAME", help=f"one of {', '.join(TABLES)}")
+    parser.add_argument(
+        "--seconds", type=positive_seconds, metavar="S", help="of each column (the table's own)"
+    )
+    parser.add_argument(
+        "--rounds",
+        type=positive_number,
+        metavar="N",
+        help="in which programs take turns, each in a fresh process; tests want 8 (pyigh: 10)",
+    )
+    parser.add_argument("--rates", metavar="HZ,HZ", help="of networks (tocabi: 4000,8000)")
+    parser.add_argument("--ring", action="store_true", help="each network a ring, not a line")
+    parser.add_argument(
+        "--lead",
+        type=seconds,
+        metavar="S",
+        help="how long before its instant a loop wakes, and waits without sleep; 0: it does not",
+    )
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there")
+    parser.set_defaults(run=run_table)
+
+
+def run_table(arguments: argparse.Namespace) -> int:
+    from catenary import bench
+    from catenary.bench import tables
+
+    try:
+        tables.check(arguments.name)
+    except ValueError as error:
+        raise UsageError(str(error), hint="catenary bench table --help") from None
+    rates = arguments.rates
+    bench.measure_table(
+        arguments.name,
+        seconds=arguments.seconds,
+        rounds=arguments.rounds,
+        rates=None if rates is None else [positive_number(each) for each in rates.split(",")],
+        ring=arguments.ring,
+        lead=arguments.lead,
+        file=arguments.json,
+    )
+    return 0
