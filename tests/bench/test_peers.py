@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import contextlib
 import importlib.util
 import shutil
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from catenary.bench.job import PHASES, Body, Job, Round
+from catenary.bench.job import PHASES, Body, Job
 from catenary.bench.peers import MODULES
-from catenary.bench.rounds import RoundError, run_round
+from catenary.bench.rounds import run_round
 from catenary.bench.segment import COUNTS_PER_TURN, RATED_TORQUE, Served, served
+from tests.bench.patience import patiently
 
 CYCLES = 50
-ATTEMPTS = 10
 RECEIVE = PHASES.index("receive")
 
 
@@ -34,7 +34,8 @@ def present() -> list[str]:
 def test_peers_measure_what_they_were_asked(body: Body, tmp_path: Path) -> None:
     with served(2) as segment:
         for name in present():
-            found = patiently(make_job(name, body, segment), tmp_path)
+            job = make_job(name, body, segment)
+            found = patiently(partial(run_round, job, tmp_path))
             count, figures = found.samples.shape
             assert 1 <= count <= CYCLES, name  # a law leaves instants out that have passed
             assert figures == len(PHASES), name
@@ -42,14 +43,6 @@ def test_peers_measure_what_they_were_asked(body: Body, tmp_path: Path) -> None:
             assert (found.samples[:, 0] >= 0).all(), name
             assert 0 <= found.lost <= CYCLES, name
             assert found.cpu_ns > 0, name
-
-
-def patiently(job: Job, folder: Path) -> Round:
-    """A machine that stops for longer than the devices' watchdog ends a round: then once more."""
-    for _ in range(ATTEMPTS - 1):
-        with contextlib.suppress(RoundError):
-            return run_round(job, folder)
-    return run_round(job, folder)
 
 
 def make_job(peer: str, body: Body, segment: Served) -> Job:

@@ -12,7 +12,7 @@ from catenary.cli.parsers import Commands, add_command
 
 EXAMPLE = """\
 catenary bench table pyigh --seconds 5
-catenary bench table pyigh --rounds 20 --json pyigh.json"""
+catenary bench table tocabi --rates 4000 --ring --json tocabi.json"""
 
 
 def add_table(group: Commands) -> None:

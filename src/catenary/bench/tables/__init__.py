@@ -21,6 +21,7 @@ class Table(NamedTuple):
 
 TABLES = {
     "pyigh": Table("one loop, three drives, 1 kHz: Python beside C, and whether they differ", True),
+    "tocabi": Table("18 + 15 axes on two networks, 4 and 8 kHz: latency, send, receive", True),
 }
 
 

@@ -1,0 +1,74 @@
+"""One network's loop with a law, in a process of its own, as the published humanoid has one for
+each network: `python -m catenary.bench.network_law JOB`. It says "ready" once the law runs,
+measures from SIGUSR1 on, and says what it came to."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import time
+from collections.abc import Sequence
+
+import msgspec
+import numpy as np
+
+import catenary as cat
+from catenary.bench.job import Job
+from catenary.bench.networks import NetworkRound, phases_of, take
+from catenary.bench.peers.with_catenary import LATE_LIMIT, LOST_LIMIT
+from catenary.bench.peers.with_catenary_law import sine
+from catenary.errors import CatenaryError
+
+GO = signal.SIGUSR1
+PATIENCE = 60.0  # [s] for the others to be ready
+LOOK = 500  # cycles from one look at the log, which has 1000, to the next
+NEVER = 1e9  # [s]
+
+
+def run_law(job: Job) -> NetworkRound:
+    with cat.MainDevice(*job.interfaces) as main:
+        arm = cat.Drives(main.scan().drives, mode="csp", counts_per_turn=job.counts_per_turn)
+        with cat.Loop(
+            arm,
+            period=job.period_ns * 1e-9,
+            cpu=job.cpu,
+            priority=job.priority,
+            lost_limit=LOST_LIMIT,
+            late_limit=LATE_LIMIT,
+            lead=job.lead,
+            laws=[sine],
+        ) as loop:
+            home = arm.actual.position.copy()
+            parameters = [job.amplitude, job.stiffness, job.damping, NEVER]
+            loop.start(sine, memory=home, parameters=parameters, budget=0)
+            print("ready", flush=True)
+            if signal.sigtimedwait({GO}, PATIENCE) is None:
+                raise CatenaryError(f"nobody said go within {PATIENCE:.0f} s")
+            return count(loop, job)
+
+
+def count(loop: cat.Loop, job: Job) -> NetworkRound:
+    """Looks at the log as it fills; the law needs nobody meanwhile."""
+    before = loop.timing.counters
+    first = before["cycles"]
+    rows: list[list[np.ndarray]] = [[]]
+    while loop.timing.counters["cycles"] < first + job.cycles:
+        left = first + job.cycles - loop.timing.counters["cycles"]
+        time.sleep(max(min(left, LOOK), 1) * job.period_ns * 1e-9)
+        take(rows, [loop])
+    after = loop.timing.counters
+    return NetworkRound(
+        lost=after["lost"] - before["lost"],
+        late=after["late"] - before["late"],
+        phases_ns=phases_of(rows[0], after["cycles"] - first),
+    )
+
+
+def main(arguments: Sequence[str]) -> None:
+    signal.pthread_sigmask(signal.SIG_BLOCK, {GO})  # before any thread is there
+    job = msgspec.json.decode(arguments[0], type=Job)
+    print(msgspec.json.encode(run_law(job)).decode(), flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,237 @@
+"""`catenary bench table tocabi`: 18 + 15 axes on two networks, 4 and 8 kHz.
+
+Three ways in turn: one loop over both networks, whose Python body gives targets in every cycle; a
+loop with a law for each network in a process of its own, with a Python task of 1 kHz beside; and
+two C programs. Theirs waits in the cycle for the answer to its frame, ours takes up at an instant
+what was sent at the one before: compare `receive` among ours only."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from importlib.util import find_spec
+from pathlib import Path
+from shutil import which
+
+import msgspec
+import numpy as np
+
+from catenary.bench.job import Body, Job
+from catenary.bench.loop import make_jobs, show_progress
+from catenary.bench.network_law import GO, PATIENCE
+from catenary.bench.networks import DRIVES, C, NetworkRound, run_c, run_ours
+from catenary.bench.rounds import BRING_UP_SECONDS, RoundError
+from catenary.bench.segment import processors, served
+from catenary.bench.statistics import summarise
+from catenary.bench.tables.published import TOCABI, TOCABI_CONDITIONS, Channel, spread_of
+from catenary.bench.tables.sheet import Options, Sheet, grid, slashed
+from catenary.bench.tasks import compute_little
+from catenary.realtime import Statistics, Task, Tasks, session
+from catenary.realtime.child import Child, start_python
+
+RATES, SECONDS, ROUNDS = (4000, 8000), 10.0, 2
+NETWORKS = ("upper", "lower")
+LOOP, LAW = "loop", "law + 1 kHz task"
+TASK_PERIOD, TASK_PRIORITY = 1e-3, 60  # below loops and segments
+HEADER = ("avg/max/min/sd [us]", "latency", "send", "receive", "overflows", "lost")
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One network of one way, over all rounds."""
+
+    name: str
+    cycles: int
+    lost: int
+    overflows: int  # instants that passed without a cycle; C: cycles begun a period late
+    timing_us: dict[str, dict[str, float]]
+
+    def channel(self) -> Channel:
+        latency, send, receive = (
+            spread_of(self.timing_us[name]) for name in ("lateness", "send", "receive")
+        )
+        return Channel(latency, send, receive, str(self.overflows))
+
+
+def measure(options: Options) -> Sheet:
+    rates = options.rates or RATES
+    seconds, rounds = options.seconds or SECONDS, options.rounds or ROUNDS
+    ways, left_out = ways_for(options)
+    found = {rate: run(rate, seconds, rounds, ways, options) if ways else {} for rate in rates}
+    shape = "rings" if options.ring else "lines"
+    blocks = [as_table(rate, *in_columns(of_ways)) for rate, of_ways in found.items()]
+    return Sheet(
+        title=f"TOCABI, 18 + 15 axes on two networks; {TOCABI_CONDITIONS}",
+        conditions=f"ours: virtual drives, two {shape} of veth, {rounds} x {seconds / rounds:g} s",
+        text="\n\n".join(blocks),
+        figures={
+            "published": {f"{rate}, {name}": c._asdict() for (rate, name), c in TOCABI.items()},
+            "ring": options.ring,
+            "seconds": seconds,
+            "rounds": rounds,
+            "rates": [as_figures(rate, *in_columns(ways)) for rate, ways in found.items()],
+        },
+        left_out=left_out,
+    )
+
+
+@dataclass(slots=True)
+class WayRounds:
+    """Owns what one way came to, round by round."""
+
+    networks: list[list[NetworkRound]]
+    task: list[Statistics]  # of the task beside, where there is one
+
+
+Way = Callable[[Sequence[Job], Path, WayRounds], None]
+
+
+def ways_for(options: Options) -> tuple[dict[str, Way], list[str]]:
+    if options.refused:
+        return {}, [f"all of ours: no private network ({options.refused})"]
+    ways: dict[str, Way] = {LOOP: one_loop, LAW: two_laws, C: two_programs}
+    left_out = []
+    if find_spec("numba") is None:
+        del ways[LAW]
+        left_out.append(f"{LAW}: Numba is not installed (pip install 'catenary[law]')")
+    if options.ring:
+        del ways[C]
+        left_out.append("c: the C programs know one wire, not the two of a ring")
+    elif which("cc") is None:
+        del ways[C]
+        left_out.append("c: no C compiler (sudo apt install gcc libc6-dev)")
+    return ways, left_out
+
+
+def run(
+    rate: int, seconds: float, rounds: int, ways: Mapping[str, Way], options: Options
+) -> dict[str, WayRounds]:
+    """All ways in turn, round by round."""
+    found = {name: WayRounds([], []) for name in ways}
+    with contextlib.ExitStack() as stack:
+        segments = [stack.enter_context(served(n, ring=options.ring)) for n in DRIVES]
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="catenary-bench-")))
+        cycles = round(seconds * rate / rounds)
+        jobs = [
+            replace(
+                make_jobs([C], segment, rate, cycles, Body.SINE, spin=False)[0], lead=options.lead
+            )
+            for segment in segments
+        ]
+        for number in range(rounds):
+            for name, way in ways.items():
+                show_progress(name, number + 1, rounds)
+                way(jobs, folder, found[name])
+    return found
+
+
+def one_loop(jobs: Sequence[Job], _folder: Path, found: WayRounds) -> None:
+    found.networks.append(run_ours(jobs))
+
+
+def two_programs(jobs: Sequence[Job], folder: Path, found: WayRounds) -> None:
+    found.networks.append(run_c(jobs, folder))
+
+
+def two_laws(jobs: Sequence[Job], _folder: Path, found: WayRounds) -> None:
+    """Both are measured while the task runs."""
+    seconds = BRING_UP_SECONDS + jobs[0].cycles * jobs[0].period_ns * 1e-9
+    with contextlib.ExitStack() as stack:
+        children = [stack.enter_context(start_law(job)) for job in jobs]
+        for child in children:
+            expect(child, PATIENCE, "ready")
+        tasks = stack.enter_context(beside())
+        for child in children:
+            os.kill(child.pid, GO)
+        said = [expect(child, seconds, "{") for child in children]
+        found.task.append(tasks["python"].statistics)
+    found.networks.append([msgspec.json.decode(each, type=NetworkRound) for each in said])
+
+
+def start_law(job: Job) -> Child:
+    arguments = ["-m", "catenary.bench.network_law", msgspec.json.encode(job).decode()]
+    return start_python(arguments)
+
+
+def beside() -> Tasks:
+    return Tasks(
+        Task(
+            compute_little,
+            name="python",
+            period=TASK_PERIOD,
+            priority=TASK_PRIORITY,
+            cpu=processors().masters,
+        ),
+        run="processes",
+        session=session(best_effort=True),
+        best_effort=True,
+    )
+
+
+def expect(child: Child, seconds: float, start: str) -> str:
+    said = child.read_line(seconds)
+    if said is None or not said.startswith(start):
+        raise RoundError(f"a loop with a law failed: {said or 'it said nothing'}")
+    return said
+
+
+# ---- for people and programs
+
+
+def in_columns(found: Mapping[str, WayRounds]) -> tuple[list[Column], list[Statistics]]:
+    columns = [
+        column(f"{name}, {NETWORKS[network]}", mine)
+        for name, way in found.items()
+        for network, mine in enumerate(zip(*way.networks, strict=True))
+    ]
+    return columns, [statistics for way in found.values() for statistics in way.task]
+
+
+def column(name: str, rounds: Sequence[NetworkRound]) -> Column:
+    phases = {
+        phase: np.concatenate([each.phases_ns[phase] for each in rounds]) * 1e-3
+        for phase in rounds[0].phases_ns
+    }
+    return Column(
+        name=name,
+        cycles=len(phases["lateness"]),
+        lost=sum(each.lost for each in rounds),
+        overflows=sum(each.late for each in rounds),
+        # -1 ns: the phase did not occur in that cycle
+        timing_us={
+            phase: summarise(values if phase == "lateness" else values[values >= 0])
+            for phase, values in phases.items()
+        },
+    )
+
+
+def as_table(rate: int, columns: Sequence[Column], task: Sequence[Statistics]) -> str:
+    rows = [
+        row(f"theirs: {name}", channel, "-")
+        for (published, name), channel in TOCABI.items()
+        if published == rate
+    ]
+    rows += [row(each.name, each.channel(), f"{each.lost} of {each.cycles}") for each in columns]
+    lines = [f"{rate} Hz", grid(HEADER, rows)]
+    if task:
+        jobs, missed = sum(each.jobs for each in task), sum(each.misses for each in task)
+        lines.append(f"the Python task of 1 kHz beside the laws: {missed} of {jobs} jobs missed")
+    return "\n".join(lines)
+
+
+def row(name: str, channel: Channel, lost: str) -> list[str]:
+    texts = [slashed(each, 2) for each in (channel.latency, channel.send, channel.receive)]
+    return [name, *texts, channel.overflows, lost]
+
+
+def as_figures(
+    rate: int, columns: Sequence[Column], task: Sequence[Statistics]
+) -> dict[str, object]:
+    return {
+        "rate": rate,
+        "columns": [asdict(each) for each in columns],
+        "task_beside": [asdict(each) for each in task],
+    }
