@@ -22,6 +22,7 @@ class SharedLoop:
 
     loop: cat.Loop
     arm: cat.Drives
+    share: cat.Share
 
     def run(self, cycles: int) -> None:
         home = self.arm.actual.position.copy()
@@ -42,7 +43,7 @@ def shared_loop(name: str, *, axes: int = 3, history: float = 30.0) -> Iterator[
             cat.Share(name, history=history) as share,
             cat.Loop(arm, period=PERIOD, sink=share) as loop,
         ):
-            yield SharedLoop(loop, arm)
+            yield SharedLoop(loop, arm, share)
 
 
 def command(*arguments: object) -> list[str]:

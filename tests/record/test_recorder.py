@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
@@ -15,6 +16,10 @@ import pytest
 import catenary as cat
 from catenary import record
 from catenary.errors import RecordingError, ShareError, WorkingCounterError
+from catenary.plan.sink import Incident
+from catenary.record.cdr import Rows
+from catenary.share.layout import EVENT_COUNT
+from catenary.share.reader import Reader
 from tests.record.beside import DEADLINE, has_bytes, recorder, shared_loop, until
 from tests.share.names import own_name
 
@@ -100,6 +105,68 @@ def test_cycles_that_were_overwritten_are_counted_and_said(name: str, tmp_path: 
     before = int(np.flatnonzero(gaps)[0])
     assert numbers[before] < event.number < numbers[before + 1]
     assert back.time[before] < event.time - back.start_ns * 1e-9 < back.time[before + 1]
+
+
+class Overtaken:
+    """A reader of a loop that goes on while rows are copied: some of them are overwritten."""
+
+    def __init__(self, reader: Reader, gone: set[int]) -> None:
+        self._reader = reader
+        self._gone = gone
+
+    def rows(self, after: int) -> tuple[Rows, int]:
+        rows, lost = self._reader.rows(after)
+        there = rows[~np.isin(rows["number"], list(self._gone))]
+        return there, lost + int(there["number"][-1]) - int(rows["number"][0]) + 1 - len(there)
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self._reader, name)
+
+
+def test_each_gap_is_said_where_it_is(name: str, tmp_path: Path) -> None:
+    with shared_loop(name) as shared, cat.attach(name) as reader:
+        shared.run(10)
+        first = reader.number
+        gone = {*range(first + 21, first + 31), *range(first + 41, first + 46)}
+        overtaken = cast(Reader, Overtaken(reader, gone))
+        with record.Recorder(overtaken, tmp_path / "x.mcap"):
+            shared.run(100)
+    back = record.read(tmp_path / "x.mcap")
+    said = [(e.number, e.details["cycles"]) for e in back.events if e.kind == "CyclesLost"]
+    assert said == [(first + 30, 10), (first + 45, 5)]
+    assert back.lost == 15
+    times = {n: t for n, t in zip(back["number"].tolist(), back.time.tolist(), strict=True)}
+    for event in back.events:
+        at = event.time - back.start_ns * 1e-9
+        assert at == pytest.approx(times[event.number + 1] - back.period, abs=1e-6)
+
+
+def test_events_that_were_overwritten_are_counted_and_said(name: str, tmp_path: Path) -> None:
+    with shared_loop(name) as shared, record.Recorder(name, tmp_path / "x.mcap"):
+        for number in range(EVENT_COUNT + 44):
+            shared.share.tell(Incident("Emergency", f"the {number}th", 1.0))
+    back = record.read(tmp_path / "x.mcap")
+    assert len(back.events) == 1 + EVENT_COUNT
+    assert (back.events[0].kind, back.events[0].details) == ("EventsLost", {"events": 44})
+
+
+def test_what_comes_while_it_ends_is_not_called_the_end(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A loop that ends between the last look and the question has cycles that were not taken."""
+    with shared_loop(name) as shared, cat.attach(name) as reader:
+        recorder = record.Recorder(reader, tmp_path / "x.mcap")
+        take = recorder.take
+
+        def take_and_end() -> int:
+            taken = take()
+            shared.loop.__exit__(None, None, None)
+            return taken
+
+        monkeypatch.setattr(recorder, "take", take_and_end)
+        recorder.close()
+        assert recorder.cycles < reader.number
+        assert recorder.ended == "stopped"
 
 
 def test_what_was_forgotten_before_it_began_is_not_lost(name: str, tmp_path: Path) -> None:

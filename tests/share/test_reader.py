@@ -159,6 +159,26 @@ def test_waiting_ends_with_the_loop(name: str) -> None:
             assert reader.read()["number"] > 1
 
 
+def test_the_last_cycles_are_seen_where_the_loop_ends_while_it_is_asked(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("catenary.share.reader.LOOK_NS", 1_000_000)
+
+    def body(loop: cat.Loop, arm: cat.Drives, reader: Reader) -> None:
+        reader.read()
+
+        def alive(reader: Reader) -> bool:
+            """One more cycle comes, and then the end, before the answer."""
+            next(loop)
+            return False
+
+        monkeypatch.setattr(Reader, "alive", property(alive))
+        assert reader.wait()
+        assert reader.read()["number"] == loop.log["number"][-1]
+
+    run(name, "threaded", body)
+
+
 def test_a_second_loop_begins_a_share_of_its_own(name: str) -> None:
     segment = Segment([Servo()])
     with cat.MainDevice(segment) as main, cat.Share(name) as share:

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Self, TypeVar
+
+import numpy as np
 
 from catenary.errors import RecordingError
 from catenary.record.cdr import Rows
@@ -63,8 +65,8 @@ class Recorder:
         self._file: RecordingFile | None = None
         try:
             self._file = RecordingFile(path, describe(self._share.layout), force=force)
-            rows, _ = self._share.rows(0)  # what is forgotten already was before our time
-            self._write(rows)
+            (rows, _), (events, _) = self._share.rows(0), self._share.events()
+            self._write(rows, events)  # what is forgotten already was before our time
         except BaseException:
             self._let_go()
             raise
@@ -88,10 +90,13 @@ class Recorder:
         """Writes every cycle and event since the last time; how many cycles. RecordingError: the
         disk is full, or fails otherwise; the file was made whole as far as it got."""
         rows, lost = self._share.rows(self._number)
+        events, events_lost = self._share.events(self._serial)
         if lost:
             self.lost += lost
-            self._tell_lost(lost, rows)
-        self._write(rows)
+            self._tell_lost_cycles(rows)
+        if events_lost:
+            self._tell_lost_events(events_lost, events[0])
+        self._write(rows, events)
         return len(rows)
 
     def run(self, *, seconds: float | None = None, stop: threading.Event | None = None) -> None:
@@ -116,8 +121,9 @@ class Recorder:
         if self._file is None:
             return
         try:
+            state = self._share.state  # before what is left is taken: that is all of it then
             self.take()
-            self.ended = ENDINGS[self._share.state]
+            self.ended = ENDINGS[state]
             words = {"ended": self.ended, "cycles": self.cycles, "lost": self.lost}
             self._on_disk(RecordingFile.finish, words)
         finally:
@@ -128,8 +134,7 @@ class Recorder:
         layout = self._share.layout
         return min(PACE, layout.rows.count * layout.period / LOOKS_PER_HISTORY)
 
-    def _write(self, rows: Rows) -> None:
-        events, _ = self._share.events(self._serial)
+    def _write(self, rows: Rows, events: Sequence[SharedEvent]) -> None:
         for event in events:
             self._serial = event.serial
             self._on_disk(RecordingFile.write_event, event)
@@ -138,13 +143,24 @@ class Recorder:
             self._on_disk(RecordingFile.write, rows)
             self.cycles += len(rows)
 
-    def _tell_lost(self, lost: int, rows: Rows) -> None:
-        """An event of our own, where the gap is."""
-        layout = self._share.layout
-        number = self._number + lost
-        time = float(rows[TIME][0]) * 1e-9 - layout.period if len(rows) else 0.0
-        message = f"{lost} cycles were overwritten before they could be recorded"
-        event = SharedEvent(0, number, "CyclesLost", message, time, None, {"cycles": lost})
+    def _tell_lost_cycles(self, rows: Rows) -> None:
+        """An event of our own in each gap, before the rows or among them."""
+        numbers = rows[NUMBER].astype(np.int64)
+        missing = np.diff(numbers, prepend=self._number) - 1
+        for row in np.flatnonzero(missing).tolist():
+            time = float(rows[TIME][row]) * 1e-9 - self._share.layout.period
+            number, lost = int(numbers[row]) - 1, int(missing[row])
+            self._tell(number, "CyclesLost", f"{lost} cycles", time, {"cycles": lost})
+
+    def _tell_lost_events(self, lost: int, first: SharedEvent) -> None:
+        what = f"{lost} events before this"
+        self._tell(first.number, "EventsLost", what, first.time, {"events": lost})
+
+    def _tell(
+        self, number: int, kind: str, what: str, time: float, details: Mapping[str, object]
+    ) -> None:
+        message = f"{what} were overwritten before they could be recorded"
+        event = SharedEvent(0, number, kind, message, time, None, details)
         self._on_disk(RecordingFile.write_event, event)
 
     def _on_disk(self, write: Callable[[RecordingFile, T], None], value: T) -> None:

@@ -13,12 +13,15 @@ cdef extern from "ring.h" nogil:
         uint64_t size
 
     uint64_t ring_stride(uint64_t size)
+    uint64_t ring_newest(const ring_view *v)
+    int ring_is_ended(const ring_view *v)
     uint8_t *ring_begin(const ring_view *v, uint64_t number)
     void ring_publish(const ring_view *v, uint64_t number)
     void ring_end(const ring_view *v)
     int ring_copy(const ring_view *v, uint64_t number, uint8_t *bytes)
     uint64_t ring_copy_newest(const ring_view *v, uint8_t *bytes)
-    uint64_t ring_copy_rows(const ring_view *v, uint64_t first, uint64_t last, uint8_t *bytes)
+    uint64_t ring_copy_rows(const ring_view *v, uint64_t first, uint64_t last, uint8_t *bytes,
+                            uint64_t *end)
     int ring_wait(const ring_view *v, uint64_t seen, int64_t deadline)
 
 cdef extern from "sink.h" nogil:

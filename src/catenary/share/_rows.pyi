@@ -25,7 +25,8 @@ class Ring:
         """The newest row and its number; 0: there is none."""
 
     def copy_after(self, after: int) -> tuple[bytearray, int]:
-        """The rows behind `after` that are still there, oldest first, and how many are not."""
+        """The rows behind `after` that are still there, oldest first, and how many are missing before
+        the last of them."""
 
     def wait(self, seen: int, deadline_ns: int) -> bool:
         """Sleeps without the GIL until there is a row behind `seen`: True; or until the deadline

@@ -53,11 +53,11 @@ cdef class Ring:
 
     @property
     def newest(self):
-        return self.view.ring.newest
+        return ring_newest(&self.view)
 
     @property
     def ended(self):
-        return self.view.ring.ended != 0
+        return ring_is_ended(&self.view) != 0
 
     # ---- reading
 
@@ -67,8 +67,8 @@ cdef class Ring:
         return number, row
 
     def copy_after(self, uint64_t after):
-        cdef uint64_t newest = self.view.ring.newest
-        cdef uint64_t first, copied
+        cdef uint64_t newest = ring_newest(&self.view)
+        cdef uint64_t first, copied, end
         cdef uint8_t *place
         if newest <= after:
             return bytearray(), 0
@@ -78,9 +78,10 @@ cdef class Ring:
         rows = bytearray((newest - first + 1) * self.view.size)
         place = <uint8_t *>PyByteArray_AS_STRING(rows)
         with nogil:
-            copied = ring_copy_rows(&self.view, first, newest, place)
+            copied = ring_copy_rows(&self.view, first, newest, place, &end)
         del rows[copied * self.view.size :]
-        return rows, newest - after - copied
+        # What was overwritten behind the last row copied is for the next call to count.
+        return rows, end - after - copied if copied else 0
 
     def wait(self, uint64_t seen, int64_t deadline_ns):
         cdef int rc

@@ -95,7 +95,7 @@ class CommandReader:
         desk = self._desk
         entry = desk.places[place]
         rows, lost = desk.rings[place].copy_after(int(entry["taken"]))
-        if not rows and not lost:
+        if not rows:
             return []
         array = np.frombuffer(rows, desk.row)
         entry["taken"] += len(array) + lost

@@ -133,13 +133,12 @@ class Reader:
         """Sleeps until there is a cycle newer than the last one that `read` or `wait` has seen.
         False: `timeout` [s] has passed, or no more will come: see `alive`."""
         deadline = FOR_EVER if timeout is None else time.monotonic_ns() + round(timeout * 1e9)
-        while True:
-            slice_end = min(deadline, time.monotonic_ns() + LOOK_NS)
-            if self._ring(CYCLES).wait(self._seen, slice_end):
-                self._seen = self._ring(CYCLES).newest
-                return True
-            if slice_end == deadline or not self.alive:
+        while not self._has_news(min(deadline, time.monotonic_ns() + LOOK_NS)):
+            if time.monotonic_ns() >= deadline:
                 return False
+            if not self.alive:
+                return self._has_news(0)  # the last ones may have come before we asked
+        return True
 
     def read(self) -> np.void:
         """The newest cycle: a record of `dtype`, copied whole. ShareError: there is none yet."""
@@ -154,13 +153,13 @@ class Reader:
 
     def rows(self, after: int) -> tuple[Rows, int]:
         """Every cycle behind number `after` that is still there, oldest first, as an array of
-        `dtype`; and how many there were that have been overwritten."""
+        `dtype`; and how many are missing before the last of them, since they were overwritten."""
         rows, lost = self._ring(CYCLES).copy_after(after)
         return np.frombuffer(rows, self.dtype), lost
 
     def events(self, after: int = 0) -> tuple[list[SharedEvent], int]:
-        """Every event behind serial `after` that is still there, oldest first; and how many have
-        been overwritten."""
+        """Every event behind serial `after` that is still there, oldest first; and how many are
+        missing before the last of them, since they were overwritten."""
         rows, lost = self._ring(EVENTS).copy_after(after)
         size = self.layout.events.size
         return [decode_event(rows[at : at + size]) for at in range(0, len(rows), size)], lost
@@ -174,6 +173,13 @@ class Reader:
         if self._desk is None:
             self._desk = open_desk(self.layout)
         return lease_of(self._desk, self.layout, axes, for_)
+
+    def _has_news(self, deadline_ns: int) -> bool:
+        """Waits so long for a cycle that was not seen yet."""
+        if not self._ring(CYCLES).wait(self._seen, deadline_ns):
+            return False
+        self._seen = self.number
+        return True
 
     def _ring(self, which: int) -> Ring:
         if self._rings is None:

@@ -40,6 +40,13 @@ static inline uint64_t *ring_slot(const ring_view *v, uint64_t number) {
     return (uint64_t *)(v->ring->slots + (number & (v->count - 1)) * v->stride);
 }
 
+static inline uint64_t ring_newest(const ring_view *v) {
+    return __atomic_load_n(&v->ring->newest, __ATOMIC_ACQUIRE);
+}
+
+/* Read before `newest`: then that was the last. */
+static inline int ring_is_ended(const ring_view *v) { return cat_load_acquire32(&v->ring->ended) != 0; }
+
 /* Where the bytes of row `number` go: between this and ring_publish nobody reads them. */
 static inline uint8_t *ring_begin(const ring_view *v, uint64_t number) {
     uint64_t *slot = ring_slot(v, number);
@@ -75,17 +82,23 @@ static inline int ring_copy(const ring_view *v, uint64_t number, uint8_t *bytes)
  * during one copy for a second try. */
 static inline uint64_t ring_copy_newest(const ring_view *v, uint8_t *bytes) {
     for (int k = 0; k < RING_TRIES; k++) {
-        uint64_t number = __atomic_load_n(&v->ring->newest, __ATOMIC_ACQUIRE);
+        uint64_t number = ring_newest(v);
         if (number == 0 || ring_copy(v, number, bytes)) return number;
     }
     return 0;
 }
 
-/* Rows `first` to `last`, one behind the other, those that are still there; how many. */
-static inline uint64_t ring_copy_rows(const ring_view *v, uint64_t first, uint64_t last, uint8_t *bytes) {
+/* Rows `first` to `last`, one behind the other, those that are still there; how many. `end`: the
+ * number of the last one copied, first - 1 where there was none. */
+static inline uint64_t ring_copy_rows(const ring_view *v, uint64_t first, uint64_t last, uint8_t *bytes,
+                                      uint64_t *end) {
     uint64_t copied = 0;
-    for (uint64_t number = first; number <= last; number++)
-        copied += (uint64_t)ring_copy(v, number, bytes + copied * v->size);
+    *end = first - 1;
+    for (uint64_t number = first; number <= last; number++) {
+        if (!ring_copy(v, number, bytes + copied * v->size)) continue;
+        copied++;
+        *end = number;
+    }
     return copied;
 }
 
@@ -94,14 +107,14 @@ static inline uint64_t ring_copy_rows(const ring_view *v, uint64_t first, uint64
 static inline int ring_wait(const ring_view *v, uint64_t seen, int64_t deadline) {
     for (;;) {
         uint32_t tick = __atomic_load_n(&v->ring->tick, __ATOMIC_SEQ_CST);
-        int rc;
-        if (__atomic_load_n(&v->ring->newest, __ATOMIC_ACQUIRE) > seen) {
+        int rc, ended = ring_is_ended(v);
+        if (ring_newest(v) > seen) {
             cat_futex_wake_some_shared(&v->ring->tick, RING_WOKEN_BY_READER);
             return 1;
         }
-        if (cat_load_acquire32(&v->ring->ended)) return 0;
+        if (ended) return 0;
         rc = cat_futex_wait_shared(&v->ring->tick, tick, deadline);
-        if (rc == -ETIMEDOUT) return __atomic_load_n(&v->ring->newest, __ATOMIC_ACQUIRE) > seen;
+        if (rc == -ETIMEDOUT) return ring_newest(v) > seen;
         if (rc < 0) return rc;
     }
 }
