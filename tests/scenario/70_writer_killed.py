@@ -1,13 +1,14 @@
 """A loop is killed (kill -9) in the middle of its cycles, while other processes read along.
-They are told, whether asleep or not; every cycle that was shared can still be read, and is whole.
-A new loop takes the name; who was attached to the old one sees its last cycles, not the new ones.
+They are told, whether asleep or not, and a client with its next command; every cycle that was
+shared can still be read, and is whole. A new loop takes the name; who was attached to the old one
+sees its last cycles, not the new ones.
 """
 
 import numpy as np
 import pytest
 
 import catenary as cat
-from catenary.errors import ShareError
+from catenary.errors import LeaseError, ShareError
 from catenary.virtual import Segment, Servo
 from tests.share.names import own_name
 from tests.share.processes import LOOP, started
@@ -42,6 +43,17 @@ def test_readers_are_told_and_keep_what_was_shared() -> None:
             steps = np.diff(rows["commanded_position"], axis=0)
             assert steps == pytest.approx(1e-6, abs=1e-9)
             assert_replaced(name, arm)
+
+
+def test_a_client_is_told() -> None:
+    with own_name("commanded") as name, started(LOOP, name) as loop:
+        assert loop.line() == "running"
+        with cat.attach(name) as arm:
+            command = arm.lease(axes=[0], for_=3600.0)
+            command.send(position=0.1)
+            loop.kill()
+            with pytest.raises(LeaseError, match=f"has died: process {loop.process.pid}"):
+                command.send(position=0.2)
 
 
 def assert_replaced(name: str, old: cat.share.Reader) -> None:

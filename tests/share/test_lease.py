@@ -13,7 +13,9 @@ import pytest
 import catenary as cat
 from catenary.errors import LeaseError, ShareError
 from catenary.share import Reason, lease
-from catenary.share.desk import COMMANDS, PLACES
+from catenary.share.commands import CommandReader
+from catenary.share.desk import COMMANDS, PLACES, Desk
+from catenary.share.process import Process
 from catenary.share.reader import Reader
 from catenary.virtual import Segment, Servo
 
@@ -221,6 +223,64 @@ def test_as_many_clients_as_there_are_places(cell: Cell, monkeypatch: pytest.Mon
         cell.reader.lease(for_=LONG)
     leases[3].release()
     cell.reader.lease(for_=LONG)
+
+
+def test_a_place_that_changes_hands_while_the_loop_looks(
+    cell: Cell, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The loop takes no lock: a lease it reads may be given back and its place taken by another
+    client meanwhile. It must not make one lease of the two, nor lose what the other sends."""
+    leases = [cell.reader.lease(axes=[0], for_=LONG)]
+    client_of = Desk.client
+
+    def changes_hands(desk: Desk, place: int) -> Process:
+        if len(leases) == 1:
+            leases[0].release()
+            leases.append(cell.reader.lease(axes=[1, 2], for_=LONG))
+        return client_of(desk, place)
+
+    monkeypatch.setattr(Desk, "client", changes_hands)
+    assert cell.share.commands() == []  # nothing was sent
+    leases[1].send(position=[0.001, 0.002])
+    monkeypatch.undo()
+    [command] = cell.share.commands()
+    assert command.axes == (1, 2)
+    leases[1].release()
+    cell.share.commands()
+    assert [end.axes for end in cell.share.ended()] == [cell.names[1:]]
+
+
+def test_a_command_of_a_lease_that_the_loop_has_not_seen_yet_stays(
+    cell: Cell, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = cell.reader.lease(axes=[0], for_=LONG)
+    cell.share.commands()
+    follow = CommandReader._follow_leases
+
+    def and_then_another_takes_it(reader: CommandReader) -> None:
+        follow(reader)
+        first.release()
+        cell.reader.lease(axes=[0], for_=LONG).send(position=0.001)
+
+    monkeypatch.setattr(CommandReader, "_follow_leases", and_then_another_takes_it)
+    assert cell.share.commands() == []
+    monkeypatch.undo()
+    [command] = cell.share.commands()
+    assert command.position == pytest.approx([0.001])
+
+
+def test_a_lease_taken_while_the_loop_ends_is_over(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with cell_of(name) as cell:
+        cell.reader.lease()  # opens the desk
+        cell.cycles()
+    monkeypatch.setattr(Reader, "alive", True)  # as it was when it was asked
+    with (
+        pytest.raises(LeaseError, match="the loop has ended"),
+        cell.reader.lease(for_=LONG) as command,
+    ):
+        command.send(position=0.0)
 
 
 def test_the_end_of_the_loop_ends_all_leases(name: str) -> None:

@@ -93,12 +93,13 @@ class CommandReader:
 
     def _read(self, place: int, known: _Known) -> list[Command]:
         desk = self._desk
-        entry = desk.places[place]
-        rows, lost = desk.rings[place].copy_after(int(entry["taken"]))
-        if not rows:
-            return []
+        taken = desk.taken.load(place)
+        rows, lost = desk.rings[place].copy_after(taken)
         array = np.frombuffer(rows, desk.row)
-        entry["taken"] += len(array) + lost
+        array = array[array["lease"] <= known.serial]  # a later one, of a lease not seen yet, stays
+        if not len(array):
+            return []
+        desk.taken.store(place, taken + lost + len(array))
         return [self._command(row, known) for row in array if row["lease"] == known.serial]
 
     def _command(self, row: np.void, known: _Known) -> Command:
@@ -111,37 +112,37 @@ class CommandReader:
 
     def _follow_leases(self) -> None:
         """Notes new leases, and ends those that are over."""
-        places = self._desk.places
-        if not self._known and not places["lease"].any():
+        leases = self._desk.leases.load_all()
+        if not self._known and not any(leases):
             return
         now = time.monotonic_ns()
         ask = now >= self._look_ns
         if ask:
             self._look_ns = now + LOOK_NS
-        valid = (places["lease"] != 0) & (places["ended"] != places["lease"])
-        for place in np.flatnonzero(valid).tolist():
-            self._follow(place, now, ask)
-        for place in [place for place in self._known if not valid[place]]:
-            self._forget(place, self._desk.reason(place))
+        for place, serial in enumerate(leases):
+            known = self._known.get(place)
+            if known is not None and known.serial != serial:
+                self._forget(place, self._desk.reason(place, known.serial))
+            if serial and self._desk.is_valid(place, serial) and self._knows(place, serial):
+                self._end_if_over(place, serial, now, ask)
 
-    def _follow(self, place: int, now: int, ask: bool) -> None:
-        entry = self._desk.places[place]
-        serial = int(entry["lease"])
-        known = self._known.get(place)
-        if known is not None and known.serial != serial:
-            self._forget(place, self._desk.reason(place))
-            known = None
-        if known is None:
-            axes = tuple(np.flatnonzero(self._desk.holders == serial).tolist())
-            if len(axes) != entry["axes"]:
-                return  # its axes are being given to it this moment
-            known = self._known[place] = _Known(serial, axes, self._desk.client(place))
-        if entry["deadline_ns"] > now and not ask:
+    def _knows(self, place: int, serial: int) -> bool:
+        """Whether the lease is known, or can be now."""
+        if place in self._known:
+            return True
+        axes = tuple(np.flatnonzero(self._desk.holders == serial).tolist())
+        client = self._desk.client(place)
+        if self._desk.leases.load(place) != serial:
+            return False  # given back just now: what was read may be another one's
+        self._known[place] = _Known(serial, axes, client)
+        return True
+
+    def _end_if_over(self, place: int, serial: int, now: int, ask: bool) -> None:
+        if self._desk.deadlines_ns.load(place) > now and not ask:
             return
         reason = self._desk.ending(place, now)
         if reason is not None:
-            entry["reason"] = reason
-            entry["ended"] = serial  # from here on it cannot be renewed
+            self._desk.end(place, serial, reason)
             self._forget(place, reason)
 
     def _forget(self, place: int, reason: Reason) -> None:

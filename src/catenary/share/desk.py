@@ -2,8 +2,9 @@
 
 A file of its own, since clients write in it. Behind the head lie the mutex, the holders (for every
 axis the serial of the lease it belongs to, 0: nobody's), the places (one for each client) and the
-ring of each place. Clients change it under the mutex alone; the loop never takes the mutex, and
-writes two words of a place only: how far it has read, and which lease it has ended.
+ring of each place. Clients change it under the mutex alone. The loop never takes the mutex: it
+learns of a lease by the word that publishes it (`_words.pyx`), and writes two words of a place only,
+how far it has read and which lease it has ended, and in the end that it is closed.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from catenary.errors import ShareError
 from catenary.share import _rows, memory
 from catenary.share._mutex import MUTEX_SIZE, SharedMutex
 from catenary.share._rows import Ring
+from catenary.share._words import Words
 from catenary.share.layout import VERSION, ShareLayout
 from catenary.share.memory import Segment
 from catenary.share.process import Process
@@ -31,15 +33,16 @@ QUANTITIES = ("position", "velocity", "torque")
 
 PLACE = np.dtype(
     [
-        ("lease", "<u8"),  # serial; 0: the place is free
-        ("ended", "<u8"),  # the lease that the loop has ended
+        # Words: both sides look at them, the loop without the mutex.
+        ("lease", "<u8"),  # serial; 0: the place is free. Publishes the client and its axes.
+        ("ended", "<u8"),  # the lease that the loop has ended. Publishes the reason.
         ("taken", "<u8"),  # commands that the loop has read
-        ("deadline_ns", "<i8"),  # CLOCK_MONOTONIC
+        ("deadline_ns", "<u8"),  # CLOCK_MONOTONIC
+        # The rest is published by them.
         ("last", "<u8"),  # the lease before, and why it ended
         ("reason", "<u8"),
         ("start_time", "<u8"),  # the client
         ("pid", "<i8"),
-        ("axes", "<u8"),  # how many: the loop waits until it sees all of them
         ("command", "S64"),
     ]
 )
@@ -70,6 +73,7 @@ REASONS = {
 class Geometry(NamedTuple):
     """Where things lie in the file."""
 
+    closed: int
     holders: int
     places: int
     rings: int
@@ -85,11 +89,12 @@ def row_dtype(axes: int) -> np.dtype[np.void]:
 
 
 def geometry(axes: int) -> Geometry:
-    holders = memory_aligned(HEAD.size) + MUTEX_SIZE
+    closed = memory_aligned(HEAD.size) + MUTEX_SIZE
+    holders = memory_aligned(closed + 8)
     places = memory_aligned(holders + 8 * axes)
     rings = memory_aligned(places + PLACES * PLACE.itemsize)
     ring_size = memory_aligned(_rows.memory_size(COMMANDS, row_dtype(axes).itemsize))
-    return Geometry(holders, places, rings, ring_size, rings + PLACES * ring_size)
+    return Geometry(closed, holders, places, rings, ring_size, rings + PLACES * ring_size)
 
 
 def memory_aligned(offset: int) -> int:
@@ -108,6 +113,10 @@ class Desk:
         self.mutex = SharedMutex(segment.memory, memory_aligned(HEAD.size), fresh=fresh)
         self.holders = np.frombuffer(segment.memory, "<u8", axes, where.holders)
         self.places = np.frombuffer(segment.memory, PLACE, PLACES, where.places)
+        self.leases, self.ended, self.taken, self.deadlines_ns = (
+            self._words(where.places, name) for name in ("lease", "ended", "taken", "deadline_ns")
+        )
+        self._closed = Words(segment.memory, where.closed, 1)
         self.rings = [
             Ring(
                 segment.memory,
@@ -129,22 +138,41 @@ class Desk:
             bytes(entry["command"]).decode(errors="replace"),
         )
 
-    def reason(self, place: int) -> Reason:
-        """Why its last lease has ended."""
+    def is_valid(self, place: int, serial: int) -> bool:
+        """Whether the lease still stands, as far as anybody has looked."""
+        return (
+            self.leases.load(place) == serial
+            and self.ended.load(place) != serial
+            and not self._closed.load(0)
+        )
+
+    def reason(self, place: int, serial: int) -> Reason:
+        """Why a lease of the place is over."""
+        if self._closed.load(0):
+            return Reason.LOOP_ENDED
+        told = serial in (self.ended.load(place), int(self.places[place]["last"]))
         reason = int(self.places[place]["reason"])
-        return Reason(reason) if reason in tuple(Reason) else Reason.EXPIRED
+        return Reason(reason) if told and reason in tuple(Reason) else Reason.EXPIRED
+
+    def end(self, place: int, serial: int, reason: Reason) -> None:
+        """The loop's side: the lease cannot be renewed any more."""
+        self.places[place]["reason"] = reason
+        self.ended.store(place, serial)
 
     def end_all(self) -> None:
-        """The loop's side: no lease can be renewed any more."""
-        self.places["reason"] = Reason.LOOP_ENDED
-        self.places["ended"] = self.places["lease"]
+        """The loop's side: no lease can be renewed or taken any more."""
+        self._closed.store(0, 1)
 
     def ending(self, place: int, now_ns: int) -> Reason | None:
         """Why the lease of a place is over; None: it is not. Asks the kernel for the process."""
-        entry = self.places[place]
-        if entry["deadline_ns"] <= now_ns:
+        if self.deadlines_ns.load(place) <= now_ns:
             return Reason.EXPIRED if self.client(place).is_alive else Reason.DIED
         return None if self.client(place).is_alive else Reason.DIED
+
+    def _words(self, places: int, name: str) -> Words:
+        """A field of every place."""
+        assert PLACE.fields is not None
+        return Words(self.segment.memory, places + PLACE.fields[name][1], PLACES, PLACE.itemsize)
 
 
 def make_desk(layout: ShareLayout, mode: int) -> Desk:

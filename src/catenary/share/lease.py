@@ -81,34 +81,35 @@ class Lease:
 
     def _renew(self, row: bytes | None) -> None:
         """All of it under the mutex: a place that has gone to another client is not written to."""
-        desk, place = self._desk, self._desk.places[self._place]
+        desk, place = self._desk, self._place
         with locked(desk):
             now = time.monotonic_ns()
-            if not self._is_valid() or place["deadline_ns"] <= now:
+            if not self._is_valid() or desk.deadlines_ns.load(place) <= now:
                 raise LeaseError(
-                    f"the lease on {', '.join(self.axes)} is over: {self._why()}",
+                    f"the lease on {', '.join(self.axes)} is over: "
+                    f"{desk.reason(place, self._serial)}",
                     hint="take it again; send() or renew() more often than every "
                     f"{self._for_ns * 1e-9:g} s, or ask for longer",
                 )
-            place["deadline_ns"] = now + self._for_ns
+            desk.deadlines_ns.store(place, now + self._for_ns)
             if row is None:
                 return
-            ring = desk.rings[self._place]
-            if ring.newest - int(place["taken"]) >= COMMANDS:
-                raise LeaseError(
-                    f"the loop has not taken the last {COMMANDS} commands",
-                    hint="its body has to call share.apply(drives) or share.commands()",
-                )
-            ring.write(row)
+            self._check_taken()
+            desk.rings[place].write(row)
+
+    def _check_taken(self) -> None:
+        """Whether somebody takes the commands. The kernel is asked only where some are waiting."""
+        waiting = self._desk.rings[self._place].newest - self._desk.taken.load(self._place)
+        if waiting and not self._layout.writer.is_alive:
+            raise LeaseError(f"the loop's process has died: {self._layout.writer}")
+        if waiting >= COMMANDS:
+            raise LeaseError(
+                f"the loop has not taken the last {COMMANDS} commands",
+                hint="its body has to call share.apply(drives) or share.commands()",
+            )
 
     def _is_valid(self) -> bool:
-        place = self._desk.places[self._place]
-        return bool(place["lease"] == self._serial and place["ended"] != self._serial)
-
-    def _why(self) -> str:
-        place = self._desk.places[self._place]
-        told = self._serial in (place["last"], place["ended"])
-        return str(self._desk.reason(self._place) if told else Reason.EXPIRED)
+        return self._desk.is_valid(self._place, self._serial)
 
     def _checked(self, name: str, given: npt.ArrayLike) -> npt.NDArray[np.float64]:
         values = np.asarray(given, dtype=np.float64)
@@ -121,16 +122,16 @@ class Lease:
     def _take_place(self) -> int:
         """A free place, or one whose lease is over. Under the mutex."""
         desk, now = self._desk, time.monotonic_ns()
-        for place, entry in enumerate(desk.places):
-            if entry["lease"] and entry["ended"] == entry["lease"]:
-                free(desk, place, desk.reason(place))
-            elif entry["lease"] and (reason := desk.ending(place, now)):
+        for place, serial in enumerate(desk.leases.load_all()):
+            if serial and not desk.is_valid(place, serial):
+                free(desk, place, desk.reason(place, serial))
+            elif serial and (reason := desk.ending(place, now)):
                 free(desk, place, reason)
-        orphans = ~np.isin(desk.holders, desk.places["lease"])  # of a client killed while it took
+        leases = desk.leases.load_all()
+        orphans = ~np.isin(desk.holders, leases)  # of a client killed while it took or gave back
         desk.holders[orphans] = 0
-        for place, entry in enumerate(desk.places):
-            if not entry["lease"]:
-                return place
+        if 0 in leases:
+            return leases.index(0)
         raise LeaseError(f"{PLACES} clients command the share {self._layout.name!r} already")
 
     def _take_axes(self) -> int:
@@ -138,21 +139,20 @@ class Lease:
         desk = self._desk
         for axis in self._numbers:
             if holder := desk.holders[axis]:
-                [place] = np.flatnonzero(desk.places["lease"] == holder)
-                left = (int(desk.places[place]["deadline_ns"]) - time.monotonic_ns()) * 1e-9
+                place = desk.leases.load_all().index(int(holder))
+                left = (desk.deadlines_ns.load(place) - time.monotonic_ns()) * 1e-9
                 raise LeaseError(
-                    f"axis {self._layout.axes[axis]!r} is leased to {desk.client(int(place))} for "
+                    f"axis {self._layout.axes[axis]!r} is leased to {desk.client(place)} for "
                     f"another {max(left, 0.0):.3f} s",
                     hint="wait until that lease is released or over",
                 )
-        serial = int(max(desk.places["lease"].max(), desk.places["last"].max())) + 1
+        serial = max(*desk.leases.load_all(), int(desk.places["last"].max())) + 1
         me, entry = this_process(), desk.places[self._place]
         entry["pid"], entry["start_time"] = me.pid, me.start_time
         entry["command"] = me.command.encode()[:64]
-        entry["axes"] = len(self._numbers)
-        entry["deadline_ns"] = time.monotonic_ns() + self._for_ns
         desk.holders[self._numbers] = serial
-        entry["lease"] = serial
+        desk.deadlines_ns.store(self._place, time.monotonic_ns() + self._for_ns)
+        desk.leases.store(self._place, serial)  # from here on the loop sees it, and all of it
         return serial
 
 
@@ -172,12 +172,11 @@ def locked(desk: Desk) -> Iterator[None]:
 
 def free(desk: Desk, place: int, reason: Reason) -> None:
     """The place and its axes are nobody's. Under the mutex."""
-    entry = desk.places[place]
-    serial = entry["lease"]
-    desk.holders[desk.holders == serial] = 0
+    entry, serial = desk.places[place], desk.leases.load(place)
     entry["reason"] = reason
     entry["last"] = serial
-    entry["lease"] = 0
+    desk.leases.store(place, 0)  # before the axes: whoever saw them looks at this again
+    desk.holders[desk.holders == serial] = 0
 
 
 def axis_numbers(layout: ShareLayout, axes: Sequence[str | int] | None) -> list[int]:

@@ -1,0 +1,56 @@
+# cython: boundscheck=False, wraparound=False
+"""64-bit words in shared memory that one process publishes and another looks at without a lock.
+
+Between a store and the load that sees it lies an order, on every processor: what was written
+before the store is there behind the load, and what is written behind the store is not seen by
+whom a later load still shows the old value. x86 keeps the first half by itself; AArch64 neither.
+"""
+
+from cpython.buffer cimport PyBUF_WRITABLE, PyBuffer_Release, PyObject_GetBuffer
+from libc.stdint cimport uint8_t, uint64_t
+
+cdef extern from "atomics.h" nogil:
+    uint64_t cat_load_acquire64(const uint64_t *p)
+    void cat_store_release64(uint64_t *p, uint64_t v)
+    void cat_fence()
+
+cdef enum:
+    COUNT_MAX = 1 << 16
+
+
+cdef class Words:
+    cdef Py_buffer buffer
+    cdef uint8_t *first
+    cdef uint64_t stride
+    cdef uint64_t count
+
+    def __cinit__(self, memory, uint64_t offset, uint64_t count, uint64_t stride=8):
+        PyObject_GetBuffer(memory, &self.buffer, PyBUF_WRITABLE)
+        size = <uint64_t>self.buffer.len
+        if not 1 <= count <= COUNT_MAX or offset % 8 or stride % 8 or not 8 <= stride <= size:
+            raise ValueError(f"{count} words at {offset}, {stride} bytes apart")
+        if offset > size or (count - 1) * stride + 8 > size - offset:
+            raise ValueError(f"{count} words at {offset}, {stride} bytes apart, of {size} bytes")
+        self.first = <uint8_t *>self.buffer.buf + offset
+        self.stride = stride
+        self.count = count
+
+    cdef uint64_t *place(self, uint64_t k) except NULL:
+        if k >= self.count:
+            raise IndexError(f"word {k} of {self.count}")
+        return <uint64_t *>(self.first + k * self.stride)
+
+    def load(self, uint64_t k):
+        cdef uint64_t *word = self.place(k)
+        cat_fence()
+        return cat_load_acquire64(word)
+
+    def load_all(self):
+        return [self.load(k) for k in range(self.count)]
+
+    def store(self, uint64_t k, uint64_t value):
+        cat_store_release64(self.place(k), value)
+        cat_fence()
+
+    def __dealloc__(self):
+        PyBuffer_Release(&self.buffer)
