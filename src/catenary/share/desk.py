@@ -3,8 +3,8 @@
 A file of its own, since clients write in it. Behind the head lie the mutex, the holders (for every
 axis the serial of the lease it belongs to, 0: nobody's), the places (one for each client) and the
 ring of each place. Clients change it under the mutex alone. The loop never takes the mutex: it
-learns of a lease by the word that publishes it (`_words.pyx`), and writes two words of a place only,
-how far it has read and which lease it has ended, and in the end that it is closed.
+learns of a lease by the word that publishes it (`_words.pyx`), writes two words of a place only,
+how far it has read and which lease it has ended, and says in the end that it is closed.
 """
 
 from __future__ import annotations
