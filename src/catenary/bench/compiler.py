@@ -9,7 +9,11 @@ from pathlib import Path
 from catenary.errors import CatenaryError
 
 SOURCES = Path(__file__).parent / "peers"
-RECEIVERS = {"c": "receive_recv.c", "c-ring": "receive_ring.c"}
+PROGRAMS = {
+    "c": ("peer.c", "receive_recv.c"),
+    "c-ring": ("peer.c", "receive_ring.c"),
+    "three_tasks": ("three_tasks.c",),
+}
 FLAGS = ("-O2", "-std=gnu11")
 
 
@@ -21,8 +25,8 @@ def compile_peer(name: str, folder: Path) -> Path:
     """The program of the C peer `name`, in `folder`; compiled once."""
     program = folder / name
     if not program.exists():
-        sources = [SOURCES / "peer.c", SOURCES / RECEIVERS[name]]
-        _compile(name, [*FLAGS, "-o", str(program), *map(str, sources), "-lm"])
+        sources = [str(SOURCES / source) for source in PROGRAMS[name]]
+        _compile(name, [*FLAGS, "-pthread", "-o", str(program), *sources, "-lm"])
     return program
 
 

@@ -128,3 +128,40 @@ TOCABI: Mapping[tuple[int, str], Channel] = {
         "9102",
     ),
 }
+
+# ---- Real-time tasks in Python, section 3: three spinning tasks
+
+
+class Times(NamedTuple):
+    """[ms]"""
+
+    period: Spread
+    response: Spread
+
+
+TASKS_CONDITIONS = (
+    "theirs: Raspberry Pi 4, RT-Preempt, one isolated core, 10 min; stress-ng 100 % CPU, 70 % "
+    "memory"
+)
+TASKS: Mapping[tuple[str, str], tuple[Times, Times, Times]] = {
+    ("idle", "C"): (
+        Times(Spread(10.000, 10.048, 9.954, 0.003), Spread(3.008, 3.056, 3.006, 0.002)),
+        Times(Spread(20.000, 20.051, 19.948, 0.004), Spread(8.017, 8.067, 8.014, 0.003)),
+        Times(Spread(40.000, 40.051, 39.949, 0.004), Spread(29.021, 29.068, 29.019, 0.003)),
+    ),
+    ("idle", "Python"): (
+        Times(Spread(10.000, 10.088, 9.918, 0.023), Spread(3.064, 3.190, 3.041, 0.016)),
+        Times(Spread(20.000, 20.222, 19.783, 0.038), Spread(8.136, 8.399, 8.106, 0.020)),
+        Times(Spread(40.000, 40.312, 39.693, 0.013), Spread(29.184, 29.441, 29.135, 0.013)),
+    ),
+    ("stress", "C"): (
+        Times(Spread(10.000, 10.068, 9.935, 0.009), Spread(3.018, 3.082, 3.007, 0.007)),
+        Times(Spread(19.999, 20.068, 19.929, 0.014), Spread(8.035, 8.100, 8.018, 0.008)),
+        Times(Spread(40.000, 40.058, 39.935, 0.010), Spread(29.041, 29.101, 29.028, 0.007)),
+    ),
+    ("stress", "Python"): (
+        Times(Spread(10.000, 10.262, 9.715, 0.064), Spread(3.216, 3.459, 3.060, 0.066)),
+        Times(Spread(20.000, 20.298, 19.646, 0.082), Spread(8.474, 8.751, 8.219, 0.067)),
+        Times(Spread(40.000, 40.282, 39.702, 0.066), Spread(29.636, 29.871, 29.287, 0.069)),
+    ),
+}

@@ -1,0 +1,106 @@
+/* Three tasks that spin, as the published experiment has them, in C.
+ *
+ *     three_tasks CPU SECONDS FILE  PERIOD_NS EXECUTION_NS PRIORITY ...
+ *
+ * CPU -1: any. Each task is a thread under SCHED_FIFO, where that is permitted, and spins for so much
+ * of its own processor time in every job. FILE gets, task by task, the number of its jobs and four
+ * int64 [ns] for each: start to start, release to start, release to end, and its processor time from
+ * this start to the next, with what waiting and waking take (the last job: to its end). */
+#define _GNU_SOURCE
+#include <errno.h>
+#include <pthread.h>
+#include <sched.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <time.h>
+
+enum { TASKS_MAX = 8, FIGURES = 4, LEAD_NS = 10000000 };
+
+struct task {
+    int64_t period, execution, origin, jobs, done;
+    int priority;
+    int64_t *samples;
+};
+
+static int64_t now_ns(clockid_t clock) {
+    struct timespec t;
+    clock_gettime(clock, &t);
+    return t.tv_sec * 1000000000LL + t.tv_nsec;
+}
+
+static void wait_until(int64_t instant) {
+    struct timespec t = {instant / 1000000000LL, instant % 1000000000LL};
+    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, NULL) == EINTR) {}
+}
+
+static void *run(void *argument) {
+    struct task *task = argument;
+    struct sched_param parameter = {.sched_priority = task->priority};
+    if (pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameter))
+        fprintf(stderr, "SCHED_FIFO %d refused\n", task->priority);
+    int64_t before = 0, began = 0;
+    for (int64_t job = 0; job < task->jobs; job++) {
+        int64_t release = task->origin + job * task->period;
+        wait_until(release);
+        int64_t start = now_ns(CLOCK_MONOTONIC);
+        int64_t begun = now_ns(CLOCK_THREAD_CPUTIME_ID), used;
+        do used = now_ns(CLOCK_THREAD_CPUTIME_ID) - begun;
+        while (used < task->execution);
+        int64_t *s = task->samples + job * FIGURES;
+        if (job) s[3 - FIGURES] = begun - began;
+        began = begun;
+        s[0] = job ? start - before : task->period;
+        s[1] = start - release;
+        s[2] = now_ns(CLOCK_MONOTONIC) - release;
+        s[3] = used;
+        before = start;
+        task->done++;
+    }
+    return NULL;
+}
+
+int main(int count, char **words) {
+    static struct task tasks[TASKS_MAX];
+    pthread_t threads[TASKS_MAX];
+    int n = (count - 4) / 3, cpu = count > 4 ? atoi(words[1]) : -1;
+    if (count < 7 || n > TASKS_MAX || (count - 4) % 3) {
+        fprintf(stderr, "three_tasks CPU SECONDS FILE  PERIOD_NS EXECUTION_NS PRIORITY ...\n");
+        return 2;
+    }
+    if (cpu >= 0) {
+        cpu_set_t only;
+        CPU_ZERO(&only);
+        CPU_SET(cpu, &only);
+        if (sched_setaffinity(0, sizeof only, &only)) perror("CPU");
+    }
+    mlockall(MCL_CURRENT | MCL_FUTURE); /* refused to ordinary users: it goes on without */
+    int64_t origin = now_ns(CLOCK_MONOTONIC) + LEAD_NS;
+    for (int i = 0; i < n; i++) {
+        struct task *task = &tasks[i];
+        task->period = atoll(words[4 + 3 * i]);
+        task->execution = atoll(words[5 + 3 * i]);
+        task->priority = atoi(words[6 + 3 * i]);
+        task->origin = origin;
+        if (task->period <= 0) return 2;
+        task->jobs = (int64_t)(atof(words[2]) * 1e9) / task->period;
+        if (task->jobs < 1) task->jobs = 1;
+        size_t size = (size_t)(task->jobs * FIGURES) * sizeof *task->samples;
+        task->samples = malloc(size);
+        if (!task->samples) return 1;
+        memset(task->samples, 1, size); /* touch the pages */
+    }
+    for (int i = 0; i < n; i++)
+        if (pthread_create(&threads[i], NULL, run, &tasks[i])) { perror("thread"); return 1; }
+    for (int i = 0; i < n; i++) pthread_join(threads[i], NULL);
+    FILE *file = fopen(words[3], "wb");
+    for (int i = 0; file && i < n; i++) {
+        size_t size = (size_t)(tasks[i].done * FIGURES);
+        if (fwrite(&tasks[i].done, sizeof tasks[i].done, 1, file) != 1
+            || fwrite(tasks[i].samples, sizeof *tasks[i].samples, size, file) != size) break;
+    }
+    if (!file || fclose(file)) { perror(words[3]); return 1; }
+    return 0;
+}
