@@ -4,11 +4,11 @@
     python cobot.py --realtime         the same on the machine's clock
     python cobot.py --realtime eth0    the robot
 
-Twice all joints go from 0 to 90 degrees and back; the second time the key is hit on the way.
+Twice all joints go from 0 to 90 degrees and back. Enter is the emergency stop's key; on virtual
+drives somebody hits it the second time.
 """
 
 import argparse
-import contextlib
 import time
 from pathlib import Path
 
@@ -17,7 +17,8 @@ import numpy as np
 import catenary as cat
 from catenary import control, realtime, record
 from catenary.bench.cobot import Outcome, report
-from catenary.demo.wire import on_a_wire
+from catenary.demo.terminal import on_enter
+from catenary.demo.wire import program_target
 from catenary.virtual import read_segment
 
 HERE = Path(__file__).parent
@@ -29,7 +30,7 @@ AXES = {  # as the data sheets of drives and gears say; limits [rad/s]
     "direction": [1, 1, -1, 1, -1, 1],
     "velocity_limit": [2.6, 2.6, 2.6, 3.1, 3.1, 3.1],
 }
-LIMITS = control.MotionLimits(velocity=1.5, acceleration=4.0, jerk=40.0)
+LIMITS = control.MotionLimits(1.5, 4.0, 40.0, -3.05, 3.05)  # [rad/s], ... to [rad]
 GAINS = control.Cascade(
     position=control.Pid(JOINTS, 12.0, limit=2.5),  # [1/s] → rad/s
     velocity=control.Pid(JOINTS, [150, 150, 60, 15, 15, 8], limit=[430, 430, 195, 79, 79, 79]),
@@ -37,50 +38,52 @@ GAINS = control.Cascade(
 # [N·m·s/rad], [N·m], [kg·m²]: at the joints, as identified
 FRICTION = control.Friction(JOINTS, [7.3, 7.3, 4.4, 1.5, 1.5, 1.5], [7.3, 7.3, 3.6, 1.5, 1.5, 1.5])
 ROTORS = control.FeedForward(JOINTS, inertia=[1.46, 1.46, 0.59, 0.15, 0.15, 0.15])
-FOLLOWING_ERROR, REACH = 0.2, 3.05  # [rad]
-SILENCE, PATIENCE = 5, 3000  # cycles without news from the dynamics: stop, give up
-COST = (40e-6, 130e-6, 25e-6, 300e-6, 5e-3, 10e-6)  # [s] declared in virtual time, in that order
-STARTING, MOVING, STOPPED = range(3)
+FOLLOWING_ERROR, REACH = 0.2, 2.9  # [rad]
+SILENCE, PATIENCE = 5, 3000  # cycles without news from a task, from the bus: stop, give up
 
 
-def dynamics(task, cost, state, torque, arm):
+def dynamics(task, cost, state, torque, arm, gravity):
     """What the motion takes [N·m]: gravity, Coriolis, inertia, friction."""
     model, axes = control.Dynamics(arm, axes=JOINTS), range(JOINTS)
     friction, rotors = FRICTION.parameters, ROTORS.parameters
     for _ in task:
-        q, v, speed, acceleration, _ = state.read()
-        feed = model.inverse(q, v, acceleration)
+        _, speed, acceleration, q, v = state.read()
+        feed = model.inverse(q, v, acceleration) - (0 if gravity else model.gravity(q))
         feed += [control.friction(friction, i, speed[i]) for i in axes]
         feed += [control.feed_forward(rotors, i, speed[i], acceleration[i]) for i in axes]
         torque.write(feed)
         task.spend(cost)
 
 
-def trajectory(task, cost, state, phase, rows, done):
+def trajectory(task, cost, state, phase, rows, done, goals):
     """Motions to the goals, one after the other, a few rows ahead of the main control."""
-    left = None
+    left, number = None, int(done.read())
     for _ in task:
         task.spend(cost)
-        number = int(done.read())
-        if phase.read() != MOVING or number == len(GOALS):
+        if phase.read() != cat.Phase.RUNNING or number == len(goals):
             left = None
-        elif left is None and not len(rows):  # begins where the reference stands
-            motion = control.trajectory(state.read()[4], GOALS[number], LIMITS, PERIOD)
+        elif left is None and not len(rows):  # begins as the reference moves; mostly it stands
+            begin = control.MotionState(*state.read()[:3])
+            motion = control.trajectory(begin, goals[number], LIMITS, PERIOD)
             left = list(np.stack([motion.position, motion.velocity, motion.acceleration], 1))
         while left and rows.put(left[0]):
             left.pop(0)
         if left == [] and not len(rows):
-            left = None
-            done.write(number + 1)
+            left, number = None, number + 1
+        done.write(number)  # also says: still here
 
 
-def monitor(task, cost, name, key):
-    """What an operator sees; here also who hits the key."""
+def monitor(task, cost, name, key, key_at):
+    """What an operator sees; on virtual drives also who hits the key."""
+    seen = 0
     with cat.attach(name, patience=task) as arm:
         for job in task:
             if job.number % 100 == 0:
                 print(f"{job.time:5.1f} s  joints {np.degrees(arm.read()['position']).round(1)}")
-            if abs(job.time - KEY_AT) < task.period / 2:
+            for event in arm.events(after=seen)[0]:
+                print(f"{job.time:5.1f} s  {event.message}")
+                seen = event.serial
+            if key_at and abs(job.time - key_at) < task.period / 2:
                 key.set()
             task.spend(cost)
 
@@ -93,106 +96,88 @@ def log(task, cost, name, path):
             task.spend(cost)
 
 
-def stop(task, cost, stops):
+def stop(task, cost, hit):
     """Above all others, and asleep until the key is hit."""
     for job in task:
-        stops.write(job.number + 1)
+        hit.write(job.release_ns)
         task.spend(cost)
 
 
-def why_stop(cycle, arm, wanted, key, silence):
-    """What the arm must not go on with; None: nothing."""
-    q = arm.actual.position
-    reasons = {
-        "key": key,
-        "lost bus": cycle.lost > 1,
-        "drive fault": arm.faults,
-        "limit": max(abs(q)) > REACH,
-        "following error": max(abs(wanted - q)) > FOLLOWING_ERROR,
-        "silent dynamics": silence > SILENCE,
-    }
-    return next((reason for reason, there in reasons.items() if there), None)
+def why_stop(arm, wanted, signs):
+    """What the arm must not go on with, these signs among it; None: nothing."""
+    q, v = arm.actual.position, arm.actual.velocity
+    signs["drive fault"] = arm.faults
+    signs["limit"] = any((abs(q) > REACH) & (q * v > 0.01))  # back from it is no reason
+    signs["following error"] = max(abs(wanted - q)) > FOLLOWING_ERROR
+    return next((sign for sign, there in signs.items() if there), None)
 
 
-def main_control(place, cost, target, share, compensate, state, torque, phase, rows, done, stops):
-    """The bus, and the cascade of every joint. Returns its timing, its stops (cycle, [s], reason)
-    and how many times faster than real time it was."""
-    parameters, nothing = GAINS.parameters.tolist(), np.zeros(JOINTS)  # lists are faster here
-    now, since, stopped, heard, silence, handled = STARTING, 0.0, [], 0, 0, 0
+def main_control(place, cost, target, share, state, torque, phase, rows, done, goals, hit):
+    """The bus, waited for when it is lost, and the cascades. Timing, stops, times real time."""
+    parameters = GAINS.parameters.tolist()  # lists are faster here
+    wanted = speed = nothing = np.zeros(JOINTS)
+    handled = lost = 0
+    silences = realtime.Silence(torque), realtime.Silence(done)
     options = {"run": "inline", "period": PERIOD, "priority": 90, "raise_faults": False}
     with cat.MainDevice(read_segment(target, clock=place) if place else target) as main:
-        arm = cat.Drives(main.scan().drives, mode="cst", **AXES)
-        with cat.Loop(arm, sink=share, lost_limit=50, **options) as loop:
+        arm = cat.Drives(main.scan().drives, mode="cst", required=False, **AXES)
+        recovery = cat.Recovery(arm)
+        with cat.Loop(arm, sink=share, lost_limit=PATIENCE, watchdog=0.02, **options) as loop:
             began = time.perf_counter()
             for cycle in loop:
                 q, v = arm.actual.position, arm.actual.velocity
                 row = rows.take()
-                speed = acceleration = nothing  # where no row is there: hold
-                if now != MOVING:
-                    wanted, memory = q.copy(), GAINS.memory.tolist()  # of now
-                elif row is not None:
-                    wanted, speed, acceleration = row
-                state.write([q, v, speed, acceleration, wanted])
-                news = torque.number
-                silence, heard = (silence + 1) * (news == heard), news
-                feed = torque.read() if compensate else nothing
+                dry = row is None and recovery.phase == cat.Phase.RUNNING and speed.any()
+                if recovery.phase != cat.Phase.RUNNING:  # follows the arm
+                    row, memory = (q.copy(), nothing, nothing), GAINS.memory.tolist()
+                wanted, speed, acceleration = (wanted, nothing, nothing) if row is None else row
+                state.write([wanted, speed, acceleration, q, v])
+                feed = torque.read()
                 arm.target.position[:] = wanted  # for the recording: the mode is torque
                 joints = zip(*(each.tolist() for each in (wanted, speed, feed, q, v)), strict=True)
-                arm.target.torque[:] = [
-                    control.cascade(memory, parameters, i, *joint, PERIOD)
-                    for i, joint in enumerate(joints)
-                ]
+                for i, joint in enumerate(joints):
+                    arm.target.torque[i] = control.cascade(memory, parameters, i, *joint, PERIOD)
                 cycle.spend(cost)
-                asked = int(stops.read())
-                reason = why_stop(cycle, arm, wanted, asked > handled, silence if heard else 0)
-                if now != STOPPED and reason:
-                    arm.quick_stop()
-                    now, since, handled = STOPPED, cycle.time, asked
-                    stopped.append((cycle.number, cycle.time, reason))
-                    print(f"{cycle.time:5.1f} s  stopped: {reason}")
-                elif reason:  # the wait begins anew; a reset is an edge, again and again
-                    since, handled = cycle.time, asked
-                    if cycle.number % 100 == 0:
-                        (arm.disable, arm.reset_faults)[cycle.number // 100 % 2]()
-                elif now == STOPPED and cycle.time > since + 1.0:
-                    arm.enable()
-                    now, since = STARTING, cycle.time
-                elif now == STARTING and arm.enabled.all() and heard:
-                    now = MOVING
-                elif now == STARTING and cycle.time > since + 5.0:
-                    raise RuntimeError(
-                        "the drives cannot be enabled: safe torque off, main supply?"
-                    )
-                phase.write(now)
-                if done.read() >= len(GOALS) or silence > PATIENCE:
+                lost = 0 if arm.present.all() else lost + 1
+                silence = [each.look() for each in silences]
+                before, handled = handled, hit.number
+                signs = {"key": handled > before, "lost bus": lost > 1, "dry set-points": dry}
+                signs["silent dynamics"] = silence[0] > SILENCE
+                reason = why_stop(arm, wanted, signs)
+                phase.write(recovery.step(cycle, reason, ready=torque.number > 0))
+                if recovery.just_stopped:
+                    when = hit.read() * 1e-9 if reason == "key" else None
+                    main.mark(f"stop: {reason}", time=when)
+                if done.read() == len(goals) or max(silence) > PATIENCE:
                     break
-            return loop.timing, stopped, cycle.time / (time.perf_counter() - began)
+            return loop.timing, recovery.stops, cycle.time / (time.perf_counter() - began)
 
 
-def run(target, *, virtual, compensate, arm, folder):
-    """One run of the whole program."""
+def run(target, *, virtual, gravity, arm, folder, key_at=KEY_AT, goals=GOALS):
+    """One run of the whole program, with gravity compensated or not."""
     state, torque = realtime.Value("f8", (5, JOINTS)), realtime.Value("f8", JOINTS)
     rows, key = realtime.Queue("f8", (3, JOINTS), length=8), realtime.Signal()
-    phase, done, stops = (realtime.Value("i4") for _ in range(3))
-    name = "cobot" if compensate else "cobot-without"
+    phase, done, hit = (realtime.Value("i8") for _ in range(3))
+    name = "cobot" if gravity else "cobot-without"
     path = folder / f"{name}.mcap"
-    c, cpu = (COST, 0) if virtual else ((0.0,) * 6, None)
-    kept, lost = ({"cpu": cpu, "on_failure": policy} for policy in ("restart", "continue"))
+
+    def task(function, cost, *arguments, on_failure="restart", **more):  # [s], in virtual time
+        more |= {"cpu": 0 if virtual else None, "on_failure": on_failure}
+        return realtime.Task(function, (cost * virtual, *arguments), **more)
+
     tasks = realtime.Tasks(
-        realtime.Task(dynamics, (c[0], state, torque, arm), period=1e-3, priority=95, **kept),
-        realtime.Task(
-            trajectory, (c[2], state, phase, rows, done), period=2e-3, priority=85, **kept
-        ),
-        realtime.Task(monitor, (c[3], name, key), period=10e-3, priority=80, **kept),
-        realtime.Task(log, (c[4], name, path), period=0.1, priority=75, **lost),
-        realtime.Task(stop, (c[5], stops), period=0.01, priority=99, trigger=key, **kept),
+        task(dynamics, 40e-6, state, torque, arm, gravity, period=1e-3, priority=95),
+        task(trajectory, 25e-6, state, phase, rows, done, goals, period=2e-3, priority=85),
+        task(monitor, 300e-6, name, key, key_at, period=10e-3, priority=80),
+        task(log, 5e-3, name, path, period=0.1, priority=75, on_failure="continue"),
+        task(stop, 10e-6, hit, period=0.01, priority=99, trigger=key),
         clock=realtime.VirtualClock() if virtual else None,
         session=realtime.session(best_effort=True),
         best_effort=True,
     )
-    with cat.Share(name) as share, tasks:
-        given = (c[1], target, share, compensate, state, torque, phase, rows, done, stops)
-        outcome = tasks.beside(main_control, *given, priority=90, cpu=cpu)
+    with cat.Share(name) as share, tasks, on_enter(key.set):
+        given = (130e-6 * virtual, target, share, state, torque, phase, rows, done, goals, hit)
+        outcome = tasks.beside(main_control, *given, priority=90, cpu=0 if virtual else None)
     return Outcome(path, *outcome, tasks)
 
 
@@ -209,7 +194,7 @@ if __name__ == "__main__":  # the tasks' processes import this file
         parser.error(f"{a.target} lives by the machine's clock: add --realtime")
     a.out.mkdir(exist_ok=True)
     options = {"virtual": not a.realtime, "arm": a.arm, "folder": a.out}
-    given = contextlib.nullcontext(a.target or a.segment)
-    with on_a_wire(a.segment) if a.realtime and not a.target else given as target:
-        outcomes = [run(target, compensate=each, **options) for each in (True, False)]
+    options["key_at"] = None if a.target else KEY_AT
+    with program_target(a.segment, a.target, realtime=a.realtime) as target:
+        outcomes = [run(target, gravity=each, **options) for each in (True, False)]
     report(*outcomes, a.out, plots=not a.headless)

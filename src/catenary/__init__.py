@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from catenary import control, realtime, share, types
     from catenary.bus import SubDevice
     from catenary.bus import event as events
-    from catenary.drive import DC, Drives, Inputs, Outputs
+    from catenary.drive import DC, Drives, Inputs, Outputs, Phase, Recovery
     from catenary.errors import CatenaryError
     from catenary.loop import Cycle, Loop, law
     from catenary.share import Share, attach
@@ -51,6 +51,8 @@ __all__ = [
     "Loop",
     "MainDevice",
     "Outputs",
+    "Phase",
+    "Recovery",
     "Segment",
     "Servo",
     "Share",
@@ -75,6 +77,8 @@ _HOMES = {
     "law": "catenary.loop",
     "MainDevice": "catenary.target",
     "Outputs": "catenary.drive",
+    "Phase": "catenary.drive",
+    "Recovery": "catenary.drive",
     "Share": "catenary.share",
     "SubDevice": "catenary.bus",
     "attach": "catenary.share",

@@ -170,3 +170,15 @@ def test_a_drive_that_faults_tells_by_the_next_reading_of_its_mailbox() -> None:
         assert isinstance(event, Emergency)
         assert event.error_code == 0x7305
         assert told == [event]
+
+
+def test_the_application_marks_an_instant() -> None:
+    with cat.MainDevice(demo_segment()) as main:
+        before = main.link.now() * 1e-9
+        main.mark("gripper closed")
+        main.mark("button", time=before - 1.5)
+        now, then = main.events
+    assert isinstance(now, cat.events.Marker)
+    assert (now.message, now.sub) == ("gripper closed", None)
+    assert now.time >= before
+    assert (then.message, then.time) == ("button", before - 1.5)

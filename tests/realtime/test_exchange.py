@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from catenary.realtime import Queue, Task, Tasks, Value
+from catenary.realtime import Queue, Silence, Task, Tasks, Value
 from tests.realtime.bodies import put_forever, write_forever
 
 
@@ -24,6 +24,16 @@ def test_a_value_is_zeros_until_it_is_written():
     value.write(np.arange(3))
     assert value.number == 2
     assert value.read().tolist() == [0.0, 1.0, 2.0]
+
+
+def test_silence_counts_looks_without_news_once_there_was_some():
+    value = Value("f8")
+    silence = Silence(value)
+    assert [silence.look() for _ in range(3)] == [0, 0, 0]
+    value.write(1.0)
+    assert [silence.look() for _ in range(3)] == [0, 1, 2]
+    value.write(1.0)  # the same again is news
+    assert [silence.look() for _ in range(2)] == [0, 1]
 
 
 def test_a_value_may_be_a_single_number_or_a_structure():

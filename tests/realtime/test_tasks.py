@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import resource
 import signal
@@ -17,6 +18,7 @@ from catenary.realtime import (
     Tasks,
     Value,
     VirtualClock,
+    session,
 )
 from tests.realtime import bodies
 from tests.realtime.test_clock import MS, records
@@ -321,3 +323,13 @@ def test_on_the_machines_clock_it_runs_here():
             3,
             threading.get_ident(),
         )
+
+
+@BOTH
+def test_on_the_machines_clock_it_is_in_the_session_too(run):
+    collects = gc.isenabled()
+    prepared = session(best_effort=True)
+    with Tasks(Task(bodies.idle, period=10e-3), run=run, session=prepared) as tasks:
+        assert tasks.beside(lambda place: gc.isenabled()) is False
+        assert gc.isenabled() == (collects and run == "processes")
+    assert gc.isenabled() == collects

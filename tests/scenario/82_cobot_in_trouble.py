@@ -1,5 +1,6 @@
 """What befalls the cobot's program in mid-motion: its tasks are killed one by one (`kill -9`), a
-drive reports a fault. The arm holds or stops, says so, and comes home when what was lost is back.
+drive reports a fault, the bus is lost, a joint does not follow. The arm holds or stops within a
+cycle, says so, and comes home when what was lost is back.
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ import importlib
 import os
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +21,10 @@ pytest.importorskip("ruckig", reason="motions are made by ruckig: pip install 'c
 pytest.importorskip("mcap", reason="recordings are MCAP files: pip install 'catenary[log]'")
 
 from catenary import record
-from catenary.errors import TaskError
-from catenary.virtual.faults import drive_fault
+from catenary.bench.cobot import reactions
+from catenary.drive import Phase, Recovery
+from catenary.errors import TaskError, WorkingCounterError
+from catenary.virtual.faults import Fault, cut, drive_fault, safe_torque_off
 
 FOLDER = Path(__file__).resolve().parents[2] / "examples" / "cobot"
 AT = 1000  # cycle: half-way up
@@ -31,15 +34,18 @@ AT = 1000  # cycle: half-way up
 def cobot(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.syspath_prepend(str(FOLDER))
     module = importlib.import_module("cobot")
-    monkeypatch.setattr(module, "GOALS", module.GOALS[:2])  # home before the key is hit
     yield module
     sys.modules.pop("cobot", None)
 
 
 def run(
-    cobot: Any, folder: Path, monkeypatch: pytest.MonkeyPatch, befalls: Callable[[Any], None]
+    cobot: Any,
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    befalls: Callable[[int, Any], None],
+    goals: Sequence[float] = (np.pi / 2, 0.0),
 ) -> Any:
-    """One run; `befalls(tasks)` in cycle AT."""
+    """One run, up and home; `befalls(number, tasks)` in every cycle."""
     running: list[Any] = []
     tasks_class = cobot.realtime.Tasks
 
@@ -47,21 +53,40 @@ def run(
         running.append(tasks_class(*arguments, **options))
         return running[0]
 
-    why_stop = cobot.why_stop
-
-    def watched(cycle: Any, *more: Any) -> Any:
-        if cycle.number == AT:
-            befalls(running[0])
-        return why_stop(cycle, *more)
+    class Watched(Recovery):
+        def step(self, cycle: Any, reason: str | None = None, *, ready: bool = True) -> Phase:
+            befalls(cycle.number, running[0])
+            return super().step(cycle, reason, ready=ready)
 
     monkeypatch.setattr(cobot.realtime, "Tasks", tasks)
-    monkeypatch.setattr(cobot, "why_stop", watched)
-    files = {"target": str(FOLDER / "segment.toml"), "arm": str(FOLDER / "arm.xml")}
-    return cobot.run(virtual=True, compensate=True, folder=folder, **files)
+    monkeypatch.setattr(cobot.cat, "Recovery", Watched, raising=False)
+    options = {"arm": str(FOLDER / "arm.xml"), "goals": [np.full(6, goal) for goal in goals]}
+    target = str(FOLDER / "segment.toml")
+    return cobot.run(target, virtual=True, gravity=True, folder=folder, key_at=None, **options)
 
 
-def kill(name: str) -> Callable[[Any], None]:
-    return lambda tasks: os.kill(tasks[name].process, signal.SIGKILL)
+def with_fault(cobot: Any, monkeypatch: pytest.MonkeyPatch, fault: Fault) -> None:
+    """The segment of the run has it coming."""
+    read_segment = cobot.read_segment
+
+    def faulty(path: str, **options: Any) -> Any:
+        segment = read_segment(path, **options)
+        segment.inject(fault)
+        return segment
+
+    monkeypatch.setattr(cobot, "read_segment", faulty)
+
+
+def nothing(number: int, tasks: Any) -> None:
+    """A run in which no task suffers."""
+
+
+def kill(name: str, at: Collection[int] = (AT,)) -> Callable[[int, Any], None]:
+    def befalls(number: int, tasks: Any) -> None:
+        if number in at and tasks[name].running:
+            os.kill(tasks[name].process, signal.SIGKILL)
+
+    return befalls
 
 
 def came_home(outcome: Any) -> bool:
@@ -69,60 +94,89 @@ def came_home(outcome: Any) -> bool:
     return bool(abs(recording["target_position"][-1]).max() < 1e-6)
 
 
+def reasons(outcome: Any) -> list[str]:
+    """Of its stops; each was told to the drives within a cycle."""
+    answers = reactions(record.read(outcome.path))
+    assert [answer.reason for answer in answers] == [stop.reason for stop in outcome.stopped]
+    assert all(answer.cycles <= 1 for answer in answers)
+    return [stop.reason for stop in outcome.stopped]
+
+
 def test_dynamics_that_are_killed_are_back_before_they_are_missed(
     cobot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     outcome = run(cobot, tmp_path, monkeypatch, kill("dynamics"))
-    assert outcome.stopped == []
+    assert reasons(outcome) == []
     assert "dynamics" in str(outcome.tasks.failures[0])
     assert came_home(outcome)
 
 
 def test_without_dynamics_it_stops_and_gives_up(
-    cobot: Any,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
+    cobot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Killed more often than a task is restarted."""
-    why_stop, kills = cobot.why_stop, []
-
-    def again(cycle: Any, *more: Any) -> Any:
-        if cycle.number in range(AT + 50, AT + 250, 50):
-            kills[0]()
-        return why_stop(cycle, *more)
-
-    monkeypatch.setattr(cobot, "why_stop", again)
+    """Killed more often than a task is restarted. That ends all tasks, the log among them."""
     read_segment, segments = cobot.read_segment, []
+    reasons: list[str | None] = []
 
     def kept(path: str, **options: Any) -> Any:
         segments.append(read_segment(path, **options))
         return segments[0]
 
+    def watched(*arguments: Any) -> Any:
+        reasons.append(why_stop(*arguments))
+        return reasons[-1]
+
+    why_stop = cobot.why_stop
+    monkeypatch.setattr(cobot, "why_stop", watched)
     monkeypatch.setattr(cobot, "read_segment", kept)
-
-    def befalls(tasks: Any) -> None:
-        kills.append(lambda: tasks["dynamics"].running and kill("dynamics")(tasks))
-        kills[0]()
-
     with pytest.raises(TaskError, match="dynamics"):
-        run(cobot, tmp_path, monkeypatch, befalls)
-    assert "stopped: silent dynamics" in capfd.readouterr().out
+        run(cobot, tmp_path, monkeypatch, kill("dynamics", range(AT, AT + 250, 50)))
+    assert set(reasons) == {None, "silent dynamics"}
     assert "OPERATION ENABLED" not in {servo.drive_state() for servo in segments[0]}
 
 
-def test_without_the_trajectory_it_holds(
+def test_a_trajectory_that_is_killed_goes_on_where_it_was(
     cobot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Its successor begins with the speed that the reference has when the last row is taken."""
     outcome = run(cobot, tmp_path, monkeypatch, kill("trajectory"))
     assert "trajectory" in str(outcome.tasks.failures[0])
-    recording = record.read(outcome.path)
-    way = abs(np.diff(recording["target_position"], axis=0)).max(axis=1)
-    middle = (recording["target_position"][1:, 0] > 0.5) & (
-        recording["target_position"][1:, 0] < 1.5
-    )
-    assert (way[middle] < 1e-6).any()  # nothing was left to follow: the next motion begins at rest
+    assert reasons(outcome) == []
+    reference = record.read(outcome.path)["target_position"]
+    assert abs(np.diff(reference, 2, axis=0)).max() <= 4.0 * 1e-6 * 1.001  # [rad] a cycle squared
     assert came_home(outcome)
+
+
+def test_set_points_that_run_dry_stop_it_and_it_goes_on_with_the_next(
+    cobot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The trajectory's rows are lost for a while in full motion."""
+    take = cobot.realtime.Queue.take
+    number = 0
+
+    def befalls(now: int, tasks: Any) -> None:
+        nonlocal number
+        number = now
+
+    def lossy(queue: Any) -> Any:
+        row = take(queue)
+        return None if AT < number < AT + 20 else row
+
+    monkeypatch.setattr(cobot.realtime.Queue, "take", lossy)
+    outcome = run(cobot, tmp_path, monkeypatch, befalls)
+    assert reasons(outcome) == ["dry set-points"]
+    assert AT < outcome.stopped[0].number < AT + 3
+    assert came_home(outcome)
+
+
+def test_a_goal_out_of_reach_is_said_and_the_arm_holds(
+    cobot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No motion begins: the trajectory's error comes out, once it was restarted in vain."""
+    with pytest.raises(TaskError, match=r"trajectory(.|\n)*position_max"):
+        run(cobot, tmp_path, monkeypatch, nothing, goals=[4.0])
+    recording = record.read(tmp_path / "cobot.mcap")
+    assert abs(recording["position"]).max() < 0.01
 
 
 def test_without_the_log_the_arm_knows_nothing_of_it(
@@ -140,14 +194,57 @@ def test_without_the_log_the_arm_knows_nothing_of_it(
 def test_a_drive_in_fault_stops_all_and_the_motion_goes_on_after_it(
     cobot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lasting: float
 ) -> None:
-    read_segment = cobot.read_segment
+    with_fault(cobot, monkeypatch, drive_fault(2, at=1.5, for_=lasting))
+    outcome = run(cobot, tmp_path, monkeypatch, nothing)
+    assert reasons(outcome) == ["drive fault"]
+    assert came_home(outcome)
 
-    def with_fault(path: str, **options: Any) -> Any:
-        segment = read_segment(path, **options)
-        segment.inject(drive_fault(2, at=1.5, for_=lasting))
-        return segment
 
-    monkeypatch.setattr(cobot, "read_segment", with_fault)
-    outcome = run(cobot, tmp_path, monkeypatch, lambda tasks: None)
-    assert outcome.stopped[0][2] == "drive fault"
+@pytest.mark.parametrize("between", [("main", 0), (2, 3)], ids=["all", "the wrist"])
+@pytest.mark.parametrize("lasting", [0.01, 0.7])
+def test_a_bus_that_is_lost_is_waited_for(
+    cobot: Any,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    between: tuple[int, int],
+    lasting: float,
+) -> None:
+    """Shorter than the drives' watchdogs, and so long that they have left OP and are in fault."""
+    with_fault(cobot, monkeypatch, cut(between=between, at=1.5, for_=lasting))
+    outcome = run(cobot, tmp_path, monkeypatch, nothing)
+    assert reasons(outcome) == ["lost bus"]
+    assert came_home(outcome)
+
+
+def test_a_bus_that_stays_lost_ends_it(
+    cobot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with_fault(cobot, monkeypatch, cut(between=("main", 0), at=1.5))
+    with pytest.raises(WorkingCounterError, match="no device answers"):
+        run(cobot, tmp_path, monkeypatch, nothing)
+
+
+def test_a_joint_that_does_not_follow_stops_all(
+    cobot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its torque is off for a moment, and its brake closed."""
+    with_fault(cobot, monkeypatch, safe_torque_off(1, at=1.5, for_=0.8))
+    outcome = run(cobot, tmp_path, monkeypatch, nothing)
+    assert reasons(outcome) == ["following error"]
+    assert came_home(outcome)
+
+
+def test_a_joint_beyond_its_reach_comes_back(
+    cobot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Everything beyond 1 rad is out of reach, from mid-motion on until the arm stands."""
+    reach = cobot.REACH
+
+    def befalls(number: int, tasks: Any) -> None:
+        cobot.REACH = 1.0 if AT - 400 < number < AT + 900 else reach
+
+    outcome = run(cobot, tmp_path, monkeypatch, befalls)
+    assert reasons(outcome) == ["limit"]
+    recording = record.read(outcome.path)
+    assert recording["position"].max() > 1.5  # and it went where it was to go
     assert came_home(outcome)

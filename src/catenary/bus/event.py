@@ -124,6 +124,11 @@ class ClockLocked(Event):
     bound: float  # [s]
 
 
+@dataclass(frozen=True, slots=True)
+class Marker(Event):
+    """The application marks an instant, to be found again among the cycles: `MainDevice.mark`."""
+
+
 def emergency(time: float, sub: SubDevice, message: coe.Emergency) -> Emergency:
     """The event for a device's emergency message."""
     code, register = message.error_code, message.error_register

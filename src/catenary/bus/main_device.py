@@ -113,6 +113,12 @@ class MainDevice:
         spends the time, between two steps. What it raises is logged."""
         self._callbacks.add(callback)
 
+    def mark(self, message: str, *, time: float | None = None) -> None:
+        """Puts a `Marker` among the events, and so into what is shared and recorded. `time`
+        [s of the link's clock]: when it was; None: now. Never waits; any thread may."""
+        when = self.link.now() * 1e-9 if time is None else float(time)
+        self.events.put(event.Marker(when, None, message))
+
     def deliver_events(self) -> None:
         """In virtual time: calls the callbacks with what has happened. Else a thread does."""
         self._callbacks.deliver()

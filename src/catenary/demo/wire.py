@@ -38,6 +38,19 @@ def on_a_wire(path: str | Path) -> Iterator[LinkSource]:
         yield Interface(ours)
 
 
+@contextmanager
+def program_target(
+    segment: str | Path, interface: str | None = None, *, realtime: bool
+) -> Iterator[LinkSource | str]:
+    """Where a program runs: on an interface; else on the virtual segment of a file, on a wire by
+    the machine's clock, or in virtual time, and then it is the file's path."""
+    if interface or not realtime:
+        yield interface or str(segment)
+        return
+    with on_a_wire(segment) as source:
+        yield source
+
+
 def main(interface: str, path: str) -> None:
     segment = read_segment(path, clock="monotonic")
     request_scheduling(priority=PRIORITY)  # refused to ordinary users: it then answers later

@@ -3,6 +3,7 @@
 from catenary.drive.drives import Drives
 from catenary.drive.homing import HomingMethod
 from catenary.drive.io import Inputs, Outputs
+from catenary.drive.recovery import Phase, Recovery, Stop
 from catenary.plan.wish import DC
 
-__all__ = ["DC", "Drives", "HomingMethod", "Inputs", "Outputs"]
+__all__ = ["DC", "Drives", "HomingMethod", "Inputs", "Outputs", "Phase", "Recovery", "Stop"]

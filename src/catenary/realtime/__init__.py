@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from catenary.realtime.analysis import Demand, Verdict, analyse
     from catenary.realtime.analysis_file import read_demands
     from catenary.realtime.clock import Participant, VirtualClock
-    from catenary.realtime.exchange import Queue, Value
+    from catenary.realtime.exchange import Queue, Silence, Value
     from catenary.realtime.preparation import Session, session
     from catenary.realtime.running import Job, Running
     from catenary.realtime.statistics import Statistics
@@ -35,6 +35,7 @@ __all__ = [
     "Running",
     "Session",
     "Signal",
+    "Silence",
     "Statistics",
     "Task",
     "Tasks",
@@ -54,6 +55,7 @@ _HOMES = {
     "Running": "running",
     "Session": "preparation",
     "Signal": "trigger",
+    "Silence": "exchange",
     "Statistics": "statistics",
     "Task": "task",
     "Tasks": "tasks",

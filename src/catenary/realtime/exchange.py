@@ -103,6 +103,21 @@ class Value:
         return array
 
 
+class Silence:
+    """Counts how often a periodic reader finds nothing new in a value: its writer may be gone."""
+
+    def __init__(self, value: Value) -> None:
+        self._value = value
+        self._number = 0
+        self._looks = 0
+
+    def look(self) -> int:
+        """Looks since the last that found a new value; 0 before the first value."""
+        before, self._number = self._number, self._value.number
+        self._looks = self._looks + 1 if before == self._number > 0 else 0
+        return self._looks
+
+
 class Queue:
     """Owns a bounded row of records, from one producer to one consumer. A producer that is killed
     in mid-put leaves no record; a consumer that is killed in mid-take finds its record again."""

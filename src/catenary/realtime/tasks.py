@@ -149,18 +149,19 @@ class Tasks:
     ) -> T:
         """Runs `function(place, *arguments)` beside the tasks until it returns; its result.
 
-        On the machine's clock it runs here, and `place` is None. On a virtual clock it runs in a
-        thread of its own, at `place` on the clock, with that priority and processor
-        (`Segment(..., clock=place)`), and time passes meanwhile. What it raises comes out; a task
+        On the machine's clock it runs here, and `place` is None; where the tasks are processes,
+        this one is in the session too meanwhile. On a virtual clock it runs in a thread of its
+        own, at `place` on the clock, with that priority and processor (`Segment(...,
+        clock=place)`), and time passes meanwhile. What it raises comes out; a task
         that failed meanwhile is a TaskError afterwards, and in `failures` at once. Ctrl-C is told
         once the function has ended: a thread cannot be ended against its will.
         """
         supervisor = self._started()
-        result = (
-            function(None, *arguments)
-            if self._clock is None
-            else run_at(self._clock, priority, cpu, function, arguments)
-        )
+        if self._clock is not None:
+            result = run_at(self._clock, priority, cpu, function, arguments)
+        else:
+            with self._own_session():
+                result = function(None, *arguments)
         supervisor.raise_failure()
         return result
 
@@ -184,6 +185,12 @@ class Tasks:
         trace: TracebackType | None,
     ) -> None:
         self.stop(raising=error is None)
+
+    def _own_session(self) -> contextlib.AbstractContextManager[object]:
+        """What prepares this process, where the tasks have theirs elsewhere; threads have it."""
+        if self._session is None or self.run == "threads":
+            return contextlib.nullcontext()
+        return self._session
 
     def _started(self) -> Supervisor:
         if self._supervisor is None:

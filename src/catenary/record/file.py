@@ -33,7 +33,7 @@ from catenary.record.output import Output
 from catenary.share import SharedEvent
 
 FORMAT = "1"
-GOOD_NEWS = ("DeviceReturned", "LinkRestored", "ClockLocked")
+GOOD_NEWS = ("DeviceReturned", "LinkRestored", "ClockLocked", "Marker")
 CHUNK_SECONDS = 0.5  # what a killed recorder loses at most
 SMALLEST_CHUNK, LARGEST_CHUNK = 1 << 14, 1 << 22  # [bytes]
 SEQUENCE_MASK = 0xFFFFFFFF

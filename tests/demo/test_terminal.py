@@ -1,0 +1,39 @@
+"""Enter, hit while a program runs."""
+
+from __future__ import annotations
+
+import os
+import pty
+import threading
+
+from catenary.demo.terminal import on_enter
+
+
+def test_enter_at_a_terminal_is_heard_and_leaving_does_not_wait() -> None:
+    person, program = pty.openpty()
+    heard = threading.Semaphore(0)
+    with on_enter(heard.release, source=program) as listening:
+        assert listening
+        for _ in range(2):
+            os.write(person, b"\n")
+            assert heard.acquire(timeout=20)
+    os.write(person, b"\n")
+    assert not heard.acquire(blocking=False)
+    os.close(person)
+    os.close(program)
+
+
+def test_letters_are_no_key_and_a_terminal_that_hangs_up_ends_it() -> None:
+    person, program = os.pipe(), threading.Event()
+    with on_enter(program.set, source=person[0]) as listening:
+        assert listening
+        os.write(person[1], b"abc")
+        os.close(person[1])
+    assert not program.is_set()
+    os.close(person[0])
+
+
+def test_without_a_terminal_nothing_is_read() -> None:
+    heard = threading.Event()
+    with on_enter(heard.set) as listening:  # pytest's standard input is none
+        assert not listening
