@@ -1,11 +1,15 @@
 # Two commands for a newcomer: `make demo` and `make test`. Both do all the set-up, once.
 #
 # PYTHON=/path/to/python3.12 takes another interpreter, and makes .venv anew for it.
-# TEST="-k axis" passes options to pytest, COBOT=--realtime to `make cobot`.
+# TEST="-k axis" passes options to pytest, COBOT=--realtime to `make cobot`. `make rtlab` runs the
+# benchmarks on a real-time kernel in QEMU: TABLE=quick or TABLE=pyigh,tasks instead of all of them,
+# RTLAB="--out docs/benchmarks" keeps the results there.
 PYTHON ?= python3
 VENV := .venv
 TEST ?=
 COBOT ?=
+TABLE ?= all
+RTLAB ?=
 SOURCES := CMakeLists.txt pyproject.toml \
            $(shell find src -name '*.pyx' -o -name '*.pxd' -o -name '*.pxi' -o -name '*.h')
 CHECKED := src tests tools examples
@@ -24,13 +28,16 @@ ifeq ($(wildcard $(VENV)/.built)$(filter clean,$(MAKECMDGOALS)),)
   endif
 endif
 
-.PHONY: demo cobot test lint build clean
+.PHONY: demo cobot rtlab test lint build clean
 
 demo: $(VENV)/.built
 	@$(VENV)/bin/catenary demo
 
 cobot: $(VENV)/.with-cobot
 	@$(VENV)/bin/python -m catenary.realtime.private_network examples/cobot/cobot.py $(COBOT)
+
+rtlab: $(VENV)/.with-test
+	@$(VENV)/bin/python -m tools.rtlab $(TABLE) $(RTLAB)
 
 test: $(VENV)/.with-test
 	@$(VENV)/bin/python -m catenary.realtime.private_network -m pytest $(TEST)

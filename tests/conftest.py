@@ -1,8 +1,8 @@
-"""What tests stand on: shared data, wires of our own, tshark.
+"""What tests stand on: shared data, wires of our own, tshark, a machine of the laboratory.
 
-A test that uses `shared_data`, `veth` or `tshark` is skipped, with the reason, where there is none,
-and is marked `shared_data`, `wire` or `tshark`. `--require MARKER` turns those skips into failures,
-and fails when no test so marked passed: what CI asks for.
+A test that uses `shared_data`, `veth`, `tshark` or `rtlab` is skipped, with the reason, where there
+is none, and is marked `shared_data`, `wire`, `tshark` or `rtlab`. `--require MARKER` turns those
+skips into failures, and fails when no test so marked passed: what CI asks for.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ import pytest
 from catenary.realtime import private_network
 
 ROOT = Path(__file__).resolve().parent.parent
-FIXTURE_OF = {"shared_data": "shared_data", "wire": "veth", "tshark": "tshark"}  # marker: fixture
+# marker: fixture
+FIXTURE_OF = {"shared_data": "shared_data", "wire": "veth", "tshark": "tshark", "rtlab": "rtlab"}
 
 # no deadlines: nothing timed is asserted; the same examples each time where CI says so
 hypothesis.settings.register_profile(
@@ -39,7 +40,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         default=[],
         choices=sorted(FIXTURE_OF),
         metavar="MARKER",
-        help="fail unless tests with this marker ran (shared_data, wire, tshark)",
+        help="fail unless tests with this marker ran (shared_data, wire, tshark, rtlab)",
     )
 
 

@@ -158,6 +158,19 @@ def test_the_log_holds_the_last_thousand_cycles(order: str) -> None:
     assert (log["al_counter"] == 1).all()
 
 
+@pytest.mark.parametrize("reach", [1, 1000, 1001, 1100])
+def test_the_log_reaches_back_as_far_as_planned(reach: int) -> None:
+    b = bench(axis(0), order="inline", log_cycles=reach)
+    b.engine.run(1200)
+    assert records(b)["number"].tolist() == list(range(1201 - reach, 1201))
+
+
+@pytest.mark.parametrize("reach", [0, 1 << 25])
+def test_a_log_of_nothing_or_of_gigabytes_is_refused(reach: int) -> None:
+    with pytest.raises(ValueError, match="log_cycles"):
+        bench(axis(0), order="inline", log_cycles=reach)
+
+
 def test_the_log_shows_a_lost_cycle() -> None:
     b = bench(axis(0))
     b.engine.run(5)

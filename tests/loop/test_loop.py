@@ -33,6 +33,18 @@ def test_the_lead_is_bounded_by_the_period() -> None:
             assert loop.plan.cycle.lead_ns == 0
 
 
+def test_the_log_reaches_back_as_far_as_asked() -> None:
+    with cat.MainDevice(Segment([Servo()])) as main:
+        arm = cat.Drives(main.scan().drives, mode="csp", counts_per_turn=2**20)
+        with cat.Loop(arm, period=1e-3, run="inline", log=1500) as loop:
+            for cycle in loop:
+                if cycle.time >= 2.0:
+                    break
+            assert len(loop.log) == 1500
+        with pytest.raises(ValueError, match="log=0 cycles"):
+            cat.Loop(arm, period=1e-3, log=0)
+
+
 def test_a_main_device_that_is_closed_round_an_open_loop_leaves_it_first() -> None:
     segment = Segment([Servo()])
     main = cat.MainDevice(segment)

@@ -31,13 +31,21 @@ def measure_loop(
     peers: Sequence[str],
     body: str = "sine",
     spin: bool = False,
+    rounds: int | None = None,
     file: Path | None = None,
 ) -> None:
     """Prints the phases of the cycle of every peer, and writes them to `file` as JSON."""
     from catenary.bench import loop
 
     loop.measure(
-        drives=drives, rate=rate, seconds=seconds, peers=peers, body=body, spin=spin, file=file
+        drives=drives,
+        rate=rate,
+        seconds=seconds,
+        peers=peers,
+        body=body,
+        spin=spin,
+        rounds=rounds,
+        file=file,
     )
 
 

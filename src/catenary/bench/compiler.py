@@ -1,7 +1,11 @@
-"""Compiles the C peers on the spot, from the package's own data, with the machine's compiler."""
+"""Compiles the C peers on the spot, from the package's own data, with the machine's compiler.
+
+For a machine without one, `compile_all` makes them elsewhere: the folder they lie in goes into the
+variable CATENARY_BENCH_PROGRAMS."""
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -15,15 +19,26 @@ PROGRAMS = {
     "three_tasks": ("three_tasks.c",),
 }
 FLAGS = ("-O2", "-std=gnu11")
+VARIABLE = "CATENARY_BENCH_PROGRAMS"
 
 
 class CompilerError(CatenaryError):
     """A C peer cannot be compiled here."""
 
 
+def has_programs() -> bool:
+    """Whether `compile_peer` can do something here."""
+    return VARIABLE in os.environ or shutil.which("cc") is not None
+
+
+def compile_all(folder: Path) -> list[Path]:
+    """Programs of all C peers, in `folder`, for a machine that has no compiler."""
+    return [compile_peer(name, folder) for name in RECEIVERS]
+
+
 def compile_peer(name: str, folder: Path) -> Path:
-    """The program of the C peer `name`, in `folder`; compiled once."""
-    program = folder / name
+    """The program of the C peer `name`, in `folder` or brought along; compiled once."""
+    program = Path(os.environ.get(VARIABLE, folder), name)
     if not program.exists():
         sources = [str(SOURCES / source) for source in PROGRAMS[name]]
         _compile(name, [*FLAGS, "-pthread", "-o", str(program), *sources, "-lm"])

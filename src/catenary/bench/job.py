@@ -51,6 +51,11 @@ class Job:
         return (self.interface, self.second) if self.second else (self.interface,)
 
     @property
+    def log(self) -> int:
+        """Cycles that a loop is to remember: those of the round, and what follows them."""
+        return self.warm_up + self.cycles + 100
+
+    @property
     def counts_per_rad(self) -> float:
         return self.counts_per_turn / math.tau
 

@@ -41,8 +41,7 @@ cdef enum:  # phases
     PHASES = 8
 
 cdef enum:
-    LOG_LENGTH = 1000
-    RECORDS = 1024             # the writer is not overtaken while the last 1000 are copied
+    LOG_MARGIN = 24            # the writer is not overtaken while the log is copied
 
 cdef struct record_t:
     uint64_t number
@@ -104,6 +103,7 @@ cdef struct cycle_t:
     uint64_t uncommitted
     uint64_t begun             # wakes since the start: the first has no period
     record_t *records
+    uint64_t records_mask      # of them there are so many and one: a power of two
     histogram_t *histograms    # PHASES of them
 
 cdef void cycle_start(cycle_t *c, int64_t origin) noexcept nogil

@@ -99,12 +99,12 @@ cdef inline int64_t now(const cycle_t *c) noexcept nogil:
 
 
 cdef inline record_t *record_of(cycle_t *c) noexcept nogil:
-    return &c.records[c.number % RECORDS]
+    return &c.records[c.number & c.records_mask]
 
 
 cdef void clear_next_record(cycle_t *c) noexcept nogil:
     """Behind a cycle, and not at the head of the next one."""
-    cdef record_t *record = &c.records[(c.number + 1) % RECORDS]
+    cdef record_t *record = &c.records[(c.number + 1) & c.records_mask]
     memset(record, 0, sizeof(record_t))
     record.period_ns = -1
     record.receive_ns = -1
@@ -175,7 +175,7 @@ cdef void cycle_prepare(cycle_t *c) noexcept nogil:
     if c.law != NULL and 2 * c.process < left:  # a long step would be late; it is also warm sooner
         law_rehearse(c.law, actual, scratch, c.next)
     axes_rehearse(c.axes, scratch)
-    c.records[(c.number + 1) % RECORDS].wake_ns = 0  # fetched
+    c.records[(c.number + 1) & c.records_mask].wake_ns = 0  # fetched
     if c.image.rehearse != NULL:
         c.image.rehearse(c.image.self)
     c.image.collect(c.image.self, 0)

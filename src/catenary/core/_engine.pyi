@@ -134,7 +134,7 @@ class Engine:
         """Forgets the figures so far (start-up, say)."""
 
     def log(self) -> bytes:
-        """The last cycles, at most 1000, oldest first: records of RECORD_FIELDS."""
+        """The last cycles, at most the plan's log_cycles, oldest first: records of RECORD_FIELDS."""
 
     @property
     def scheduling(self) -> str:

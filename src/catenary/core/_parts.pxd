@@ -1,4 +1,4 @@
-from libc.stdint cimport int64_t, uint16_t, uint32_t
+from libc.stdint cimport int64_t, uint16_t, uint32_t, uint64_t
 
 from catenary.core._axes cimport Axes
 from catenary.core._clocks cimport Clock
@@ -31,6 +31,7 @@ cdef class Parts:
     cdef histogram_t *spare_histograms
     cdef bint virtual          # the link's time is virtual: everything in the caller's thread
     cdef uint16_t device_count
+    cdef uint64_t log_cycles
     cdef bint alone            # nobody else lives by that time: waits keep the GIL
 
     cdef connect(self, plan)

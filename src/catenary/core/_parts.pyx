@@ -9,9 +9,8 @@ from libc.stdlib cimport calloc, free
 from catenary.core._axes cimport Axes
 from catenary.core._clocks cimport Clock
 from catenary.core._cycle cimport (
-    LOG_LENGTH,
+    LOG_MARGIN,
     PHASES,
-    RECORDS,
     cycle_await_lane,
     cycle_t,
     record_t,
@@ -87,6 +86,8 @@ cdef class Parts:
             raise ValueError(f"cpu: {plan.cpu}")
         if not 0 <= plan.lead_ns < plan.period_ns:
             raise ValueError(f"lead_ns: {plan.lead_ns}, must be less than the period")
+        if not 1 <= plan.log_cycles <= 1 << 24:
+            raise ValueError(f"log_cycles: {plan.log_cycles}, must be 1 to {1 << 24}")
         self.e.thread.priority = plan.priority or 0
         self.e.thread.cpu = -1 if plan.cpu is None else plan.cpu
         self.device_count = plan.device_count
@@ -116,7 +117,9 @@ cdef class Parts:
         cdef cycle_t *c = &self.e.cycle
         cdef uint32_t i
         cdef int slot
-        c.records = <record_t *>calloc(RECORDS, sizeof(record_t))
+        self.log_cycles = plan.log_cycles
+        c.records_mask = (1 << (plan.log_cycles + LOG_MARGIN - 1).bit_length()) - 1
+        c.records = <record_t *>calloc(c.records_mask + 1, sizeof(record_t))
         c.histograms = <histogram_t *>calloc(PHASES, sizeof(histogram_t))
         self.spare_histograms = <histogram_t *>calloc(PHASES, sizeof(histogram_t))
         if not (c.records and c.histograms and self.spare_histograms):
@@ -267,14 +270,14 @@ cdef class Parts:
     def log(self):
         """A record that the native thread has written over meanwhile is left out."""
         cdef uint64_t last = self.e.cycle.number
-        cdef uint64_t count = min(last, <uint64_t>LOG_LENGTH)
+        cdef uint64_t count = min(last, self.log_cycles)
         cdef uint64_t number
         cdef record_t record
         parts = []
         for number in range(last - count + 1, last + 1):
-            record = self.e.cycle.records[number % RECORDS]
+            record = self.e.cycle.records[number & self.e.cycle.records_mask]
             cat_fence()
-            if record.number == number and self.e.cycle.records[number % RECORDS].number == number:
+            if record.number == number and self.e.cycle.records[number & self.e.cycle.records_mask].number == number:
                 parts.append((<char *>&record)[: sizeof(record_t)])
         return b"".join(parts)
 

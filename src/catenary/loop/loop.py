@@ -47,6 +47,7 @@ TROUBLE = ENDING | CYCLE_CLOCKS
 LATE_LIMIT_POSITION = 0.050  # [s], CSP
 LATE_LIMIT_VELOCITY = 0.010  # [s], CSV and CST
 LEAD = 50e-6  # [s]: what a wake-up is late on an ordinary kernel, and the time to use it
+LOG_LIMIT = 2**24  # cycles: a gigabyte
 LEAD_SHARE = 0.1  # of the period, at most
 
 
@@ -63,6 +64,7 @@ class Loop:
     devices' outputs. `lead` [s], of an inline loop and of laws: how long before each instant the
     thread wakes, to take what has come back and fetch what is needed next into the caches (costs
     that much processor time a cycle); None: 50 us, at most a tenth of the period; 0: a plain sleep.
+    `log`: how many cycles the log, and that of an error, reaches back.
     `raise_faults`: a drive in fault
     raises DriveError; else see `Drives.faults`. `on_return`: what becomes of a device that no wish
     requires and that comes back: "restore", its start-up list is replayed and it goes to OP; or
@@ -102,6 +104,7 @@ class Loop:
         stop_deadline: float = 2.0,
         watchdog: float | None = 0.1,
         lead: float | None = None,
+        log: int = 1000,
         raise_faults: bool = True,
         on_return: Policy = "restore",
         on_replacement: Policy = "hold",
@@ -132,6 +135,9 @@ class Loop:
         self._stop_deadline = stop_deadline
         self._watchdog = watchdog
         self._lead = min(LEAD, LEAD_SHARE * period) if lead is None else lead
+        if not 1 <= log <= LOG_LIMIT:
+            raise ValueError(f"log={log} cycles: must be 1 to {LOG_LIMIT}")
+        self._log = log
         self._raise_faults = raise_faults
         for name, policy in (("on_return", on_return), ("on_replacement", on_replacement)):
             if policy not in ("restore", "hold"):
@@ -340,7 +346,7 @@ class Loop:
 
     @property
     def log(self) -> LogArray:
-        """The last 1000 cycles, oldest first, as a structured array."""
+        """The last cycles (1000, or `log`), oldest first, as a structured array."""
         return self._opened.log()
 
     def histogram(self, phase: str) -> list[tuple[float, float, int]]:
@@ -374,6 +380,7 @@ class Loop:
             late_limit_velocity=LATE_LIMIT_VELOCITY if late is None else late,
             stop_deadline=self._stop_deadline,
             lead=self._lead,
+            log=self._log,
             clock=self._clock,
             reference=None if self._reference is None else self._reference.position,
             margin=self._margin,

@@ -182,6 +182,7 @@ class CyclePlan:
     late_limit_velocity_ns: int = 10_000_000  # CSV and CST; 0: off
     stop_deadline_ns: int = 2_000_000_000  # quick stop to standstill, at most
     lead_ns: int = 0  # inline, law: awake that long before the instant
+    log_cycles: int = 1000  # how far the log reaches back
     cpu: int | None = None  # of the native thread
     priority: int | None = 80  # SCHED_FIFO; None: leave the scheduling as it is
     clock: ClockPlan | None = None  # None: no distributed clocks

@@ -55,6 +55,7 @@ def make_plan(
     late_limit_velocity: float = 0.010,
     stop_deadline: float = 2.0,
     lead: float = 0.0,
+    log: int = 1000,
     cpu: int | None = None,
     priority: int | None = 80,
     clock: FollowedClock = "reference",
@@ -66,7 +67,8 @@ def make_plan(
 
     `period` [s]; `watchdog` [s] of process data, None: off; `collect_share`: when threaded,
     the part of the period in which frames may come back; `late_limit_*`, `stop_deadline` [s];
-    `lead` [s]: inline and with a law, awake that long before the instant. Where a wish asks for
+    `lead` [s]: inline and with a law, awake that long before the instant; `log`: cycles that are
+    remembered. Where a wish asks for
     distributed clocks: `clock`, whom the others follow; `reference`, position of the reference
     clock (None: the first there is); `margin` [s] between the instant and the frames (None: by the
     order); `burst`, frames that bring the clocks together before the cycle. `optional`: positions
@@ -110,6 +112,7 @@ def make_plan(
         late_limit_velocity_ns=round(late_limit_velocity * 1e9),
         stop_deadline_ns=round(stop_deadline * 1e9),
         lead_ns=round(lead * 1e9),
+        log_cycles=log,
         cpu=cpu,
         priority=priority,
         clock=None

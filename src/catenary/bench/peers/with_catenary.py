@@ -55,6 +55,7 @@ def opened(job: Job, sink: cat.Share | None = None) -> Iterator[tuple[cat.Loop, 
             lost_limit=LOST_LIMIT,
             late_limit=LATE_LIMIT,
             lead=job.lead,
+            log=job.log,
             sink=sink,
         ) as loop:
             yield loop, arm

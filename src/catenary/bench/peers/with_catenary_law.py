@@ -50,6 +50,7 @@ def run(job: Job) -> Round:
             lost_limit=LOST_LIMIT,
             late_limit=LATE_LIMIT,
             lead=job.lead,
+            log=job.log,
             laws=[law],
         ) as loop:
             return _measure(loop, law, arm.actual.position.copy(), job)

@@ -1,0 +1,45 @@
+"""A guest to boot, where this machine can."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.conftest import lacking
+from tools.rtlab import __main__ as lab
+from tools.rtlab import archive, kernel, machine, root
+from tools.rtlab.errors import LabError
+
+
+@dataclass(frozen=True, slots=True)
+class Lab:
+    """Boots a guest with this interpreter and nothing of Catenary: it is up sooner."""
+
+    kernel: kernel.Kernel
+    folder: Path
+
+    def run(self, script: str, seconds: float) -> tuple[list[str], dict[str, Any]]:
+        """What `script` prints, and what it leaves in the file it is given."""
+        image = self.folder / "root.cpio"
+        with image.open("wb") as file:
+            archive.write(root.entries(self.kernel, [*root.interpreter(), *root.programs()]), file)
+        python = str(next(iter(root.interpreter())))
+        job = {"folder": "/", "name": "test", "arguments": [python, "-c", script, "FILE"]}
+        with machine.started(self.kernel, image, job, self.folder, seconds) as guest:
+            return list(guest.lines()), guest.answer()
+
+
+@pytest.fixture
+def rtlab(pytestconfig: pytest.Config, tmp_path: Path) -> Lab:
+    """With the kernel that `make rtlab` has left: a test downloads nothing."""
+    try:
+        machine.program()
+    except LabError as error:
+        lacking(pytestconfig, "rtlab", str(error))
+    kept = sorted(lab.cache().glob("linux-image-*/unpacked"))
+    if not kept:
+        lacking(pytestconfig, "rtlab", f"no kernel in {lab.cache()}: `make rtlab TABLE=quick`")
+    return Lab(kernel.found_in(kept[-1].parent), tmp_path)

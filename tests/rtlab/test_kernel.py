@@ -1,0 +1,131 @@
+"""Debian's kernel: what apt prints, what modules say, and every failure in one line."""
+
+from __future__ import annotations
+
+import lzma
+from pathlib import Path
+
+import pytest
+
+from tools.rtlab import kernel
+from tools.rtlab.errors import LabError
+
+# printed by apt-cache of Debian 12, 2026-11-21
+DEPENDS = "linux-image-rt-amd64\n  Depends: linux-image-6.1.0-56-rt-amd64\n"
+POLICY = """linux-image-6.1.0-56-rt-amd64:
+  Installed: (none)
+  Candidate: 6.1.192-2
+  Version table:
+     6.1.192-2 500
+"""
+NAME = "linux-image-6.1.0-56-rt-amd64_6.1.192-2"
+
+
+def unpacked(cache: Path, name: str = NAME) -> Path:
+    """As `download` leaves it, with modules that need each other."""
+    top = cache / name
+    modules = top / "lib" / "modules" / "6.1.0-56-rt-amd64" / "kernel" / "drivers" / "net"
+    modules.mkdir(parents=True)
+    (modules / "veth.ko").write_bytes(b"x\0depends=under,over\0name=veth\0")
+    (modules / "under.ko").write_bytes(b"x\0depends=\0")
+    (modules / "over.ko.xz").write_bytes(lzma.compress(b"x\0depends=under\0"))
+    (top / "boot").mkdir()
+    (top / "boot" / "vmlinuz-6.1.0-56-rt-amd64").touch()
+    (top / "unpacked").touch()
+    return top
+
+
+@pytest.fixture
+def apt(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A machine whose programs are what a test writes into the folder."""
+    programs = tmp_path / "programs"
+    programs.mkdir()
+    write(programs / "apt-cache", f"""[ $1 = depends ] && echo '{DEPENDS}' || echo '{POLICY}'""")
+    write(programs / "apt-get", "echo 'W: unsandboxed' >&2; echo 'E: no network' >&2; exit 100")
+    write(programs / "dpkg-deb", "exit 1")
+    monkeypatch.setenv("PATH", str(programs))
+    return programs
+
+
+def write(program: Path, script: str) -> None:
+    program.write_text(f"#!/bin/sh\n{script}\n")
+    program.chmod(0o755)
+
+
+def test_the_package_is_the_newest_that_apt_knows(apt: Path) -> None:
+    assert kernel.wanted() == NAME
+
+
+@pytest.mark.parametrize("shown", ["", "  Depends: linux-base\n"])
+def test_an_apt_that_does_not_know_it_is_told_what_to_do(shown: str) -> None:
+    with pytest.raises(LabError, match="apt-get update"):
+        kernel.first_dependency(shown)
+
+
+@pytest.mark.parametrize("shown", ["", "  Candidate: (none)\n"])
+def test_a_package_without_a_version_is_told_what_to_do(shown: str) -> None:
+    with pytest.raises(LabError, match="apt-get update"):
+        kernel.candidate(shown)
+
+
+def test_a_download_that_fails_says_why_in_a_line_and_leaves_nothing(
+    apt: Path, tmp_path: Path
+) -> None:
+    cache = tmp_path / "cache"
+    cache.mkdir()
+    with pytest.raises(LabError) as caught:
+        kernel.provide(cache)
+    assert "E: no network" in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert list(cache.iterdir()) == []
+
+
+def test_without_apt_it_says_whose_packages_it_takes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(LabError, match="there is no apt here"):
+        kernel.provide(tmp_path)
+
+
+def test_an_older_kernel_does_where_the_newest_cannot_be_had(apt: Path, tmp_path: Path) -> None:
+    unpacked(tmp_path, "linux-image-6.1.0-50-rt-amd64_6.1.170-1")
+    assert kernel.provide(tmp_path).package == "linux-image-6.1.0-50-rt-amd64_6.1.170-1"
+
+
+def test_what_lies_there_is_not_downloaded_again(apt: Path, tmp_path: Path) -> None:
+    unpacked(tmp_path)
+    found = kernel.provide(tmp_path)
+    assert found.package == NAME
+    assert found.image.name == "vmlinuz-6.1.0-56-rt-amd64"
+    assert found.release == "6.1.0-56-rt-amd64"
+
+
+def test_modules_come_behind_those_they_need(tmp_path: Path) -> None:
+    found = kernel.found_in(unpacked(tmp_path)).with_dependencies(("veth",))
+    assert [path.name for path in found] == ["under.ko", "over.ko.xz", "veth.ko"]
+
+
+def test_a_compressed_module_is_unpacked(tmp_path: Path) -> None:
+    over = kernel.found_in(unpacked(tmp_path)).with_dependencies(("over",))[-1]
+    assert kernel.read_module(over) == b"x\0depends=under\0"
+
+
+def test_a_module_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(LabError, match=r"no module .*9p"):
+        kernel.found_in(unpacked(tmp_path)).with_dependencies(("9p",))
+
+
+def test_half_a_kernel_is_told(tmp_path: Path) -> None:
+    with pytest.raises(LabError, match="delete it"):
+        kernel.found_in(tmp_path)
+
+
+def test_what_no_benchmark_needs_is_dropped(tmp_path: Path) -> None:
+    top = unpacked(tmp_path)
+    others = top / "lib" / "modules" / "6.1.0-56-rt-amd64" / "kernel"
+    for name in ("fs/ext4", "drivers/gpu"):
+        (others / name).mkdir(parents=True)
+    kernel.drop_what_is_not_used(top)
+    assert sorted(path.name for path in others.iterdir()) == ["drivers"]
+    assert [path.name for path in (others / "drivers").iterdir()] == ["net"]

@@ -1,0 +1,100 @@
+"""`make rtlab`: benchmarks on Debian's PREEMPT_RT kernel, in a machine that counts instructions.
+
+    python -m tools.rtlab [TABLE ...]     from the repository's root, with the interpreter of .venv
+
+The same software gives the same figures, whatever this machine does meanwhile. It compares software
+and shows schedules; it is no latency measurement of hardware (docs/benchmarks.md, "rtlab").
+"""
+
+from __future__ import annotations
+
+import argparse
+import errno
+import json
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from tools.rtlab import image, kernel, machine, record, tables
+from tools.rtlab.errors import LabError
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+WORK = REPOSITORY / "build" / "rtlab"
+
+
+def main(arguments: Sequence[str]) -> int:
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # leaves through every `finally`
+    try:
+        run(parse(arguments))
+    except LabError as error:
+        return fail(str(error))
+    except OSError as error:
+        return fail(in_one_line(error))
+    except KeyboardInterrupt:
+        return fail("interrupted; nothing is left running", 130)
+    return 0
+
+
+def fail(why: str, status: int = 1) -> int:
+    print(f"rtlab: {why}", file=sys.stderr)
+    return status
+
+
+def in_one_line(error: OSError) -> str:
+    where = f" ({error.filename})" if error.filename else ""
+    if error.errno == errno.ENOSPC:
+        return f"the disk is full{where}: the lab needs about 1.5 GB in {WORK} and {cache()}"
+    return f"{error.strerror or error}{where}"
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    known = "\n".join(f"  {name:9}{table.help}" for name, table in tables.TABLES.items())
+    parser = argparse.ArgumentParser(
+        prog="python -m tools.rtlab",
+        description=f"tables:\n{known}\n  all      all but quick",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("tables", nargs="*", default=["all"], metavar="TABLE")
+    parser.add_argument("--out", type=Path, default=WORK / "results", help="where results are kept")
+    parser.add_argument("--minutes", type=float, help="the deadline of a table (its own)")
+    return parser.parse_args(arguments)
+
+
+def cache() -> Path:
+    top = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(top, "catenary", "rtlab")
+
+
+def run(arguments: argparse.Namespace) -> None:
+    chosen = tables.choose(arguments.tables)
+    machine.program()  # said before anything is downloaded
+    for folder in (cache(), WORK, arguments.out):
+        folder.mkdir(parents=True, exist_ok=True)
+    system = kernel.provide(cache())
+    root = image.provide(system, REPOSITORY, WORK)
+    for name, table in chosen.items():
+        found = run_table(name, table, system, root, arguments.minutes)
+        file = arguments.out / f"rtlab-{name}.json"
+        file.write_text(json.dumps(found, indent=1) + "\n")
+        print(f"wrote {file}", flush=True)
+
+
+def run_table(
+    name: str, table: tables.Table, system: kernel.Kernel, root: Path, minutes: float | None
+) -> dict[str, object]:
+    """The record of one guest. LabError: it did not do it."""
+    print(f"rtlab: {name}: catenary {table.command}", flush=True)
+    command = [str(Path(sys.executable).with_name("catenary")), *table.arguments]
+    job = {"folder": str(REPOSITORY), "name": name, "arguments": command}
+    deadline = (minutes or table.minutes) * 60
+    with machine.started(system, root, job, WORK, deadline) as guest:
+        for text in guest.lines():
+            print(text, flush=True)
+        answer = guest.answer()
+    return record.make(answer, table, system, REPOSITORY, guest.seconds)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,49 @@
+"""The guest's root as one file, made anew when the kernel, Python or a package changes.
+
+Kept beside the repository's builds: another working copy has another one."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+from collections.abc import Iterable
+from pathlib import Path
+
+from catenary.bench.compiler import compile_all
+from tools.rtlab import archive, root
+from tools.rtlab.archive import Entry
+from tools.rtlab.kernel import Kernel
+
+
+def provide(kernel: Kernel, repository: Path, folder: Path) -> Path:
+    """The image in `folder`. OSError: no room; CatenaryError: the C peers do not compile."""
+    programs = folder / "programs"
+    programs.mkdir(exist_ok=True)
+    entries = root.entries(kernel, root.everything(repository), compile_all(programs))
+    image, said = folder / "root.cpio", folder / "root.fingerprint"
+    fingerprint = fingerprint_of(entries, kernel)
+    if not (image.exists() and said.exists() and said.read_text() == fingerprint):
+        print("rtlab: making the guest's root", flush=True)
+        said.unlink(missing_ok=True)
+        write(entries, image)
+        said.write_text(fingerprint)
+    return image
+
+
+def write(entries: Iterable[Entry], image: Path) -> None:
+    """All of it or nothing."""
+    part = image.with_suffix(".part")
+    try:
+        with part.open("wb") as file:
+            archive.write(entries, file)
+        part.replace(image)
+    finally:
+        with contextlib.suppress(FileNotFoundError):
+            part.unlink()
+
+
+def fingerprint_of(entries: Iterable[Entry], kernel: Kernel) -> str:
+    digest = hashlib.sha256(kernel.package.encode())
+    for entry in entries:
+        digest.update(archive.fingerprint_of(entry).encode() + b"\n")
+    return digest.hexdigest()

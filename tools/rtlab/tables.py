@@ -1,0 +1,51 @@
+"""What the lab runs: one command of `catenary` a table, each in a guest of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from tools.rtlab.errors import LabError
+
+RESULT = "FILE"  # the guest puts the path of the result in its place
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    command: str  # of `catenary`; it understands --json
+    minutes: float  # at most, of the host's time
+    help: str
+    of_all: bool = True  # whether "all" runs it
+
+    @property
+    def arguments(self) -> list[str]:
+        return [*self.command.split(), "--json", RESULT]
+
+
+TABLES: Mapping[str, Table] = {
+    "quick": Table(
+        "bench loop --seconds 2 --rounds 1 --peers c",
+        10,
+        "two seconds of the loop beside C: shows that the lab works",
+        of_all=False,
+    ),
+    "loop": Table(
+        "bench loop --seconds 60 --rounds 10 --peers c,c-ring,pysoem",
+        90,
+        "the loop beside C and PySOEM, three drives at 1 kHz",
+    ),
+    "law": Table("bench law", 20, "what one call of a compiled law takes"),
+}
+
+
+def choose(names: Sequence[str]) -> dict[str, Table]:
+    """Lists with commas as well; "all" is all that it runs. LabError: no such table."""
+    chosen: dict[str, Table] = {}
+    for name in ",".join(names).split(","):
+        if name == "all":
+            chosen.update({each: table for each, table in TABLES.items() if table.of_all})
+        elif name in TABLES:
+            chosen[name] = TABLES[name]
+        else:
+            raise LabError(f"the lab has no table {name!r}: {', '.join(TABLES)}, all")
+    return chosen
