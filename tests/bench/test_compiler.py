@@ -22,3 +22,14 @@ def test_a_missing_compiler_is_one_clear_line(tmp_path: Path, monkeypatch) -> No
         compile_peer("c", tmp_path)
     assert "no `cc`" in caught.value.message
     assert "apt install gcc" in caught.value.hint
+
+
+@needs_compiler
+def test_programs_made_elsewhere_do_where_no_compiler_is(tmp_path: Path, monkeypatch) -> None:
+    made = compiler.compile_all(tmp_path)
+    assert sorted(path.name for path in made) == sorted(compiler.PROGRAMS)
+    monkeypatch.setenv("PATH", "")
+    assert not compiler.has_programs()
+    monkeypatch.setenv(compiler.VARIABLE, str(tmp_path))
+    assert compiler.has_programs()
+    assert compile_peer("c", tmp_path / "elsewhere") == tmp_path / "c"

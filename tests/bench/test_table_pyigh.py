@@ -40,7 +40,7 @@ def test_ratios_are_over_c() -> None:
 
 def test_what_a_peer_lacks_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pyigh, "find_spec", lambda _name: None)
-    monkeypatch.setattr(pyigh, "which", lambda _name: None)
+    monkeypatch.setattr(pyigh, "has_programs", lambda: False)
     names, left_out = pyigh.peers()
     assert names == ["catenary-inline", "catenary-threaded"]
     assert [each.split(":")[0] for each in left_out] == ["catenary-law", "pysoem", "c, c-ring"]

@@ -17,6 +17,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from catenary.errors import CatenaryError
 from tools.rtlab import image, kernel, machine, record, tables
 from tools.rtlab.errors import LabError
 
@@ -28,8 +29,8 @@ def main(arguments: Sequence[str]) -> int:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # leaves through every `finally`
     try:
         run(parse(arguments))
-    except LabError as error:
-        return fail(str(error))
+    except (LabError, CatenaryError) as error:
+        return fail(" ".join(str(error).split()))
     except OSError as error:
         return fail(in_one_line(error))
     except KeyboardInterrupt:

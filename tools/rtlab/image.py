@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -17,9 +18,9 @@ from tools.rtlab.kernel import Kernel
 
 def provide(kernel: Kernel, repository: Path, folder: Path) -> Path:
     """The image in `folder`. OSError: no room; CatenaryError: the C peers do not compile."""
-    programs = folder / "programs"
-    programs.mkdir(exist_ok=True)
-    entries = root.entries(kernel, root.everything(repository), compile_all(programs))
+    with tempfile.TemporaryDirectory(dir=folder) as programs:
+        compiled = compile_all(Path(programs))
+        entries = root.entries(kernel, root.everything(repository), compiled)
     image, said = folder / "root.cpio", folder / "root.fingerprint"
     fingerprint = fingerprint_of(entries, kernel)
     if not (image.exists() and said.exists() and said.read_text() == fingerprint):

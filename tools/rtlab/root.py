@@ -46,7 +46,7 @@ def entries(kernel: Kernel, files: Sequence[Path], compiled: Iterable[Path] = ()
         *modules(kernel),
         *map(archive.copy_of, files),
         *map(archive.copy_of, libraries(files)),
-        *(archive.copy_of(path, f"{COMPILED}/{path.name}") for path in compiled),
+        *(Entry(f"{COMPILED}/{path.name}", 0o100755, data=path.read_bytes()) for path in compiled),
     ]
 
 

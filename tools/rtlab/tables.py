@@ -34,6 +34,21 @@ TABLES: Mapping[str, Table] = {
         90,
         "the loop beside C and PySOEM, three drives at 1 kHz",
     ),
+    "pyigh": Table(
+        "bench table pyigh --seconds 60 --rounds 10 --lead 0",
+        90,
+        "in-controller delay: C, PySOEM and ours, three drives at 1 kHz",
+    ),
+    "tasks": Table(
+        "bench table tasks --seconds 10",
+        60,
+        "three spinning tasks beside their analysis",
+    ),
+    "tocabi": Table(
+        "bench table tocabi --seconds 4 --lead 0",
+        90,
+        "33 axes on two networks, 4 and 8 kHz",
+    ),
     "law": Table("bench law", 20, "what one call of a compiled law takes"),
 }
 

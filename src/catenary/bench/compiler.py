@@ -33,7 +33,7 @@ def has_programs() -> bool:
 
 def compile_all(folder: Path) -> list[Path]:
     """Programs of all C peers, in `folder`, for a machine that has no compiler."""
-    return [compile_peer(name, folder) for name in RECEIVERS]
+    return [compile_peer(name, folder) for name in PROGRAMS]
 
 
 def compile_peer(name: str, folder: Path) -> Path:

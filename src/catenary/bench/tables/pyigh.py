@@ -14,10 +14,10 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from importlib.util import find_spec
-from shutil import which
 
 import numpy as np
 
+from catenary.bench.compiler import has_programs
 from catenary.bench.job import PHASES, Body, Job, Round
 from catenary.bench.loop import LAW, OURS, ROUND_CYCLES, make_jobs, show_progress
 from catenary.bench.rounds import interleave
@@ -88,14 +88,14 @@ def peers() -> tuple[list[str], list[str]]:
         names.append(PYSOEM)
     else:
         left_out.append(f"{PYSOEM}: not installed (pip install 'catenary[peers]')")
-    if which("cc"):
+    if has_programs():
         return [C, C_RING, *names], left_out
     return names, [*left_out, f"{C}, {C_RING}: no C compiler (sudo apt install gcc libc6-dev)"]
 
 
 def run(names: Sequence[str], seconds: float, options: Options) -> Mapping[str, list[Round]]:
     cycles = round(seconds * RATE)
-    rounds = max(options.rounds or ROUNDS, math.ceil(cycles / ROUND_CYCLES))
+    rounds = options.rounds or max(ROUNDS, math.ceil(cycles / ROUND_CYCLES))
     with served(DRIVES) as segment:
         jobs = make_jobs(names, segment, RATE, math.ceil(cycles / rounds), Body.SINE, spin=False)
         return interleave(

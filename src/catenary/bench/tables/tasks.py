@@ -21,7 +21,7 @@ from typing import Literal
 
 import numpy as np
 
-from catenary.bench.compiler import compile_peer
+from catenary.bench.compiler import compile_peer, has_programs
 from catenary.bench.loop import show_progress
 from catenary.bench.segment import processors
 from catenary.bench.tables.published import TASKS, TASKS_CONDITIONS, Times, spread_of
@@ -66,7 +66,7 @@ class Found:
 def measure(options: Options) -> Sheet:
     seconds = options.seconds or SECONDS
     ways, left_out = [C, PROCESSES, THREADS], []
-    if which("cc") is None:
+    if not has_programs():
         ways.remove(C)
         left_out.append("C: no C compiler (sudo apt install gcc libc6-dev)")
     loads = [IDLE, STRESS]

@@ -14,11 +14,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
-from shutil import which
 
 import msgspec
 import numpy as np
 
+from catenary.bench.compiler import has_programs
 from catenary.bench.job import Body, Job
 from catenary.bench.loop import make_jobs, show_progress
 from catenary.bench.network_law import GO, PATIENCE
@@ -100,7 +100,7 @@ def ways_for(options: Options) -> tuple[dict[str, Way], list[str]]:
     if options.ring:
         del ways[C]
         left_out.append("c: the C programs know one wire, not the two of a ring")
-    elif which("cc") is None:
+    elif not has_programs():
         del ways[C]
         left_out.append("c: no C compiler (sudo apt install gcc libc6-dev)")
     return ways, left_out
