@@ -97,6 +97,7 @@ cdef extern from "segment_memory.h" nogil:
         sync_unit sync
         synchronous_cycle synchronous
         mapping outputs, inputs
+        int64_t outputs_ns
         int64_t *slots
         int slot_count, axis_count
         servo_axis *axes

@@ -338,6 +338,15 @@ cdef class Core:
     def outputs_seen(self, int position):
         return bool(self._at(position).outputs_seen)
 
+    def outputs_at(self, int position):
+        """Segment time [ns] at which outputs were last taken over; `FOREVER`: not yet."""
+        cdef controller *c = self._at(position)
+        cdef int64_t when
+        lock(self._segment)
+        when = c.outputs_ns
+        unlock(self._segment)
+        return when
+
     def output_image(self, int position, int n):
         """The last complete outputs, without taking them; empty where there are none."""
         cdef controller *c = self._at(position)

@@ -88,13 +88,21 @@ class JunctionTable(_Table, tag="junction", frozen=True, kw_only=True):
         )
 
 
-class DigitalOutputsTable(_Table, tag="digital_outputs", frozen=True, kw_only=True):
+class DigitalOutputsTable(_ClockedTable, tag="digital_outputs", frozen=True, kw_only=True):
     bits: int = 4
     lrw: bool = True
+    dc: bool = False
 
     def device(self) -> Device:
         return DigitalOutputs(
-            bits=self.bits, name=self.name, alias=self.alias, serial=self.serial, lrw=self.lrw
+            bits=self.bits,
+            name=self.name,
+            alias=self.alias,
+            serial=self.serial,
+            lrw=self.lrw,
+            dc=self.dc,
+            crystal=self.crystal.crystal(),
+            clock_bits=self.clock_bits,
         )
 
 

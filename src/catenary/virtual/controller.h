@@ -138,6 +138,7 @@ typedef struct controller {
     uint8_t frozen;                  /* injected: the application stands still */
     uint8_t outputs_valid;           /* the application takes the outputs: OP and fed */
     uint8_t outputs_seen, outputs_taken;            /* EVENT_OUTPUTS was raised since the last arming */
+    int64_t outputs_ns;              /* segment time at which they were last taken over, NEVER: not yet */
     uint8_t inputs_stale;            /* the model stepped; its inputs are not in memory yet */
     uint8_t slots_stale;             /* and not in the slots */
     uint8_t powered;

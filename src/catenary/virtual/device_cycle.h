@@ -36,6 +36,7 @@ static inline uint8_t *outputs_status(controller *c) { return sm_registers(c, c-
 static inline void outputs_accept(controller *c) {
     uint8_t *status = outputs_status(c);
     *status = (uint8_t)((*status & ~SM_STATUS_WRITTEN) | SM_STATUS_READ);
+    c->outputs_ns = c->segment->now;
     outputs_take(c);
 }
 
@@ -111,10 +112,19 @@ static void outputs_missed(controller *c) {
     raise_event(c, EVENT_SYNC_MISSED);
 }
 
+/* A terminal without microcontroller: its controller lays the outputs on the pins at SYNC0 by itself
+ * (Beckhoff, EtherCAT Slave Controller, section II, 0x0150 digital I/O: "outputs updated at SYNC0"). */
+static void pins_sync0(controller *c) {
+    if (c->outputs.sm >= 0 && c->outputs_valid)
+        outputs_accept(c);
+}
+
 /* A SYNC0 pulse, now. */
 static void model_sync0(controller *c) {
     synchronous_cycle *d = &c->synchronous;
     int64_t now = c->segment->now;
+    if (c->emulation)
+        pins_sync0(c);
     if (!d->active || c->frozen)
         return;
     d->exceeded += d->seen && now - d->last < d->minimum;

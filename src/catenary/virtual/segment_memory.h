@@ -27,6 +27,7 @@ static void controller_forget(controller *c) {
     c->logical_end = 0;
     c->events = 0;
     c->al_unread = c->outputs_valid = c->outputs_seen = c->outputs_taken = c->inputs_stale = 0;
+    c->outputs_ns = NEVER;
     c->watchdog_armed = c->watchdog_expired = 0;
     c->is_protected = c->reset_step = 0;
     c->sii.pending = 0;

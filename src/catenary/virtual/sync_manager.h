@@ -86,6 +86,8 @@ static inline void sm_write_completed(controller *c, int n) {
         const cat_segment *s = c->segment;
         sm->latest = sm->using;
         sm->completed = s->frame_end > s->now ? s->frame_end + c->passage - s->passage : s->now;
+        if (c->emulation && !c->sync.active)
+            c->outputs_ns = sm->completed;
         if (!c->outputs_seen) {
             c->outputs_seen = 1;
             if (!c->emulation)

@@ -23,6 +23,7 @@ TABLES = {
     "pyigh": Table("one loop, three drives, 1 kHz: Python beside C, and whether they differ", True),
     "tocabi": Table("18 + 15 axes on two networks, 4 and 8 kHz: latency, send, receive", True),
     "tasks": Table("three spinning tasks: C, Python as processes and threads; the analysis", False),
+    "skew": Table("two digital outputs at both ends of the line, with and without SYNC0", False),
 }
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from catenary.virtual._segment import Core
+from catenary.virtual._segment import FOREVER, Core
 from catenary.virtual.crystal import EXACT, ClockBits, Crystal
 from catenary.virtual.description import Description
 from catenary.virtual.scheduler import Agenda, Scheduler
@@ -121,6 +121,13 @@ class Device:
         """The AL state shown: 1 INIT, 2 PRE-OP, 4 SAFE-OP, 8 OP; bit 4 is the error flag; 0: it
         has no power."""
         return self.core.peek(self.position, AL_STATUS, 1)[0] & 0x1F
+
+    @property
+    def outputs_taken_ns(self) -> int | None:
+        """When it last took its outputs over, on the segment's clock (`segment.now_ns`): with the
+        frame, at its own cycle, or at SYNC0; None: not since it was switched on."""
+        when = self.core.outputs_at(self.position)
+        return None if when == FOREVER else when
 
     @property
     def crystal(self) -> Crystal:

@@ -1,18 +1,22 @@
 """Digital outputs: a terminal without mailbox, 1 to 16 bits, mapped bit by bit.
 
-Its outputs are on in OP only and fall when the process data watchdog expires.
+Its outputs are on in OP only and fall when the process data watchdog expires. They switch with the
+frame, or with SYNC0 where the terminal has a clock and was told to.
 """
 
 from __future__ import annotations
 
+from catenary.virtual.crystal import EXACT, ClockBits, Crystal
 from catenary.virtual.description import Description, MappedEntry, Pdo, SyncManagerDefault
 from catenary.virtual.devices.device import Device
+from catenary.virtual.scheduler import Scheduler
 
 BOOLEAN = 1
+ACTIVATION, SYNC0_ACTIVE = 0x0981, 0x03
 
 
 class DigitalOutputs(Device):
-    """Owns a terminal of 1 to 16 digital outputs."""
+    """Owns a terminal of 1 to 16 digital outputs. `dc`: with a clock, 1 to 8 of them."""
 
     kind = "digital_outputs"
 
@@ -24,16 +28,24 @@ class DigitalOutputs(Device):
         alias: int = 0,
         serial: int = 0,
         lrw: bool = True,
+        dc: bool = False,
+        crystal: Crystal = EXACT,
+        clock_bits: ClockBits = 64,
     ) -> None:
         if not 1 <= bits <= 16:
             raise ValueError(f"digital outputs have 1 to 16 bits, not {bits}")
+        if dc and bits > 8:
+            raise ValueError(f"digital outputs with a clock have 1 to 8 bits, not {bits}")
         super().__init__(
             name=name or f"Catenary virtual {bits}-channel output",
             alias=alias,
             serial=serial,
             lrw=lrw,
+            crystal=crystal,
+            clock_bits=clock_bits,
         )
         self.bits = bits
+        self.dc = dc
 
     def description(self) -> Description:
         # one SyncManager for each byte, as such terminals have
@@ -65,17 +77,29 @@ class DigitalOutputs(Device):
             fmmus=(1,) * len(managers),
             rx_pdos=channels,
             tx_pdos=(),
-            clock=False,
+            clock=self.dc,
             ram=0x0400,
+            slots=int(self.dc),
             current_milliampere=100,
         )
+
+    def started(self, scheduler: Scheduler) -> None:
+        if self.dc:
+            self.core.map_process_data(self.position, True, 0, [(0, self.bits, 0, False)])
 
     @property
     def outputs(self) -> int:
         """The outputs as they stand at the terminals: bit 0 is channel 1."""
         if not self.core.outputs_valid(self.position):
             return 0
+        if self._by_sync0:
+            return self.core.slot(self.position, 0)
         value = 0
         for k in range((self.bits + 7) // 8):
             value |= int.from_bytes(self.core.output_image(self.position, k), "little") << 8 * k
         return value & ((1 << self.bits) - 1)
+
+    @property
+    def _by_sync0(self) -> bool:
+        activation = self.core.peek(self.position, ACTIVATION, 1)[0]
+        return self.dc and activation & SYNC0_ACTIVE == SYNC0_ACTIVE
