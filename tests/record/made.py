@@ -34,7 +34,11 @@ def make_layout(axes: int, *, period: float = 1e-3) -> Layout:
             for kind in ("", "commanded_")
             for name, unit in (("position", "rad"), ("velocity", "rad/s"), ("torque", "N·m"))
         ]
-        fields += [per_axis("statusword", "<u2"), per_axis("mode_actual", "|i1")]
+        fields += [
+            per_axis("statusword", "<u2"),
+            per_axis("controlword", "<u2"),
+            per_axis("mode_actual", "|i1"),
+        ]
     fields += [Field("door closed of device 4", "|b1"), Field("Pressure/bar", "<f4")]
     names = tuple(f"joint{n}" for n in range(axes))
     return Layout("cell-1", period, names, tuple(fields), "monotonic", MONDAY_NS)
@@ -59,6 +63,8 @@ def _values(field: Field, n: npt.NDArray[np.int64], random: np.random.Generator)
         phase = np.arange(int(np.prod(field.shape, initial=1))).reshape(field.shape)
         wave = np.sin(n.reshape(-1, *[1] * len(field.shape)) * 2e-3 + phase)
         return (wave + random.normal(0.0, 1e-4, shape)).astype(dtype)
+    if field.name == "controlword":
+        return np.full(shape, 0x0F, dtype)
     if field.name == "period_ns":
         return random.normal(1e6, 5e3, shape).astype(dtype)
     if dtype.kind == "b":

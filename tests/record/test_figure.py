@@ -16,6 +16,7 @@ from catenary import record
 from catenary.errors import RecordingError
 from catenary.record.figure import draw
 from catenary.record.recording import Recording
+from catenary.record.timeline import quick_stops
 from tests.record.made import make_event, make_layout, make_rows
 
 
@@ -28,7 +29,7 @@ def make_recording(axes: int, count: int = 400) -> Recording:
 @pytest.mark.parametrize("axes", [1, 6, 33])
 def test_each_axis_has_position_error_and_torque(axes: int) -> None:
     recording = make_recording(axes)
-    upper, lower = draw(recording).subfigs
+    upper, _, lower = draw(recording).subfigs
     assert len(upper.axes) == 3 * axes
     assert len(lower.axes) == 3
     titles = [plot.get_title(loc="left") for plot in upper.axes[:3]]
@@ -42,7 +43,7 @@ def test_each_axis_has_position_error_and_torque(axes: int) -> None:
 
 def test_degrees_and_a_choice_of_axes() -> None:
     recording = make_recording(6)
-    upper, _ = draw(recording, axes=["joint4"], unit="deg").subfigs
+    upper, *_ = draw(recording, axes=["joint4"], unit="deg").subfigs
     assert [plot.get_title(loc="left") for plot in upper.axes][:2] == [
         "position [°]",
         "tracking error [°]",
@@ -57,8 +58,46 @@ def test_events_are_marked_at_their_time() -> None:
     assert plot.lines[-1].get_xdata() == pytest.approx([0.099, 0.099])
 
 
+def named(recording: Recording) -> list[str]:
+    """What the timeline calls by name."""
+    return [text.get_text() for text in draw(recording).subfigs[1].axes[0].texts]
+
+
+def test_events_are_named_on_the_timeline() -> None:
+    recording = make_recording(1)
+    assert named(recording) == ["DeviceLost"]
+    many = replace(recording, events=tuple(make_event(n) for n in range(1, 101)))
+    assert named(many)[-1] == "and 76 more"
+
+
+def test_quick_stops_are_marked_in_the_cycle_that_sends_them() -> None:
+    """IEC 61800-7-201: bit 7 and bit 2 of the controlword clear, bit 1 set."""
+    recording = make_recording(3)
+    words = recording.rows["controlword"]
+    words[:] = 0x0F
+    words[200:, 1] = 0x02
+    words[250:260] = 0x8012  # of the manufacturer and of the mode: theirs
+    words[300:, 0] = 0x06  # to be switched off is no quick stop
+    assert quick_stops(recording) == [(200, [1]), (250, [0, 2])]
+    assert named(recording) == ["DeviceLost", "quick stop: joint1", "quick stop: 2 axes"]
+    lines = draw(recording).subfigs[0].axes[0].lines[-3:]
+    assert [line.get_xdata()[0] for line in lines] == pytest.approx([0.099, 0.2, 0.25])
+
+
+def test_a_late_cycle_is_seen_on_the_timeline_of_a_long_recording() -> None:
+    recording = make_recording(1, 20_000)
+    recording.rows["lateness_ns"][12_345] = 800_000
+    recording.rows["process_ns"][::2] = -1  # not known in every other cycle
+    lateness, controller = draw(recording).subfigs[1].axes[0].lines[:2]
+    assert len(lateness.get_xdata()) == 1400
+    assert lateness.get_ydata().max() == 800.0
+    assert abs(lateness.get_xdata()[lateness.get_ydata().argmax()] - 12.345) < 0.02
+    assert np.isfinite(controller.get_ydata()).all()
+
+
 def test_a_loop_without_axes_has_its_timing() -> None:
-    upper, lower = draw(make_recording(0)).subfigs
+    upper, middle, lower = draw(make_recording(0)).subfigs
+    assert [line.get_label() for line in middle.axes[0].lines][:2] == ["lateness", "in controller"]
     assert not upper.axes
     assert [plot.get_title(loc="left").split(":")[0] for plot in lower.axes] == [
         "period",

@@ -28,24 +28,18 @@ from catenary.record.series import (
     tracking_error,
     with_gaps,
 )
+from catenary.record.timeline import Mark, draw_marks, draw_timeline, marks_of
 
-POINTS = 700  # of each line: about two for each pixel of a column
+POINTS, FEW_POINTS = 700, 350  # of each line: about two for each pixel of a column; of many axes
 WIDTH = 14.0  # [inch]
-HEAD_HEIGHT, TIMING_HEIGHT = 0.9, 2.5
+HEAD_HEIGHT, TIMELINE_HEIGHT, TIMING_HEIGHT = 0.9, 2.1, 2.5
 ROOMY, TIGHT, MANY = 1.75, 1.2, 8  # the height of a row, for up to so many axes and for more
+TIMES_EVERY = 8  # rows the times are written below, where there are many
 WIDE, NARROW = 3.4, 1.0  # of lines [points]
 RESOLUTION = 110  # [pixels per inch]
-MARKED_EVENTS = 40  # more would hide the lines
 
 INK, SOFT, RULE = "#1d2430", "#5f6b7a", "#dfe3e8"
-REFERENCE, POSITION, ERROR, TORQUE, BAR, MARK = (
-    "#b9c2cc",
-    "#0f6cbd",
-    "#c2410c",
-    "#15803d",
-    "#2f6f9f",
-    "#b42318",
-)
+REFERENCE, POSITION, ERROR, TORQUE, BAR = "#b9c2cc", "#0f6cbd", "#c2410c", "#15803d", "#2f6f9f"
 STYLE = {
     "font.family": "sans-serif",
     "font.size": 9.0,
@@ -127,15 +121,18 @@ def draw(
     columns = make_columns(recording, reference, unit)
     rows = len(chosen) if columns else 0
     row_height = ROOMY if rows <= MANY else TIGHT
-    heights = [rows * row_height, TIMING_HEIGHT]
+    heights = [rows * row_height, TIMELINE_HEIGHT, TIMING_HEIGHT]
+    marks = marks_of(recording)
     figure = require("matplotlib.figure").Figure(
         figsize=(WIDTH, HEAD_HEIGHT + sum(heights)), dpi=RESOLUTION, layout="constrained"
     )
     figure.get_layout_engine().set(h_pad=0.05, w_pad=0.08, hspace=0.02, wspace=0.02)
     figure.suptitle(headline(recording), x=0.012, ha="left", fontsize=11.0)
-    upper, lower = figure.subfigures(2, 1, height_ratios=[max(heights[0], 0.01), heights[1]])
+    heights[0] = max(heights[0], 0.01)
+    upper, middle, lower = figure.subfigures(3, 1, height_ratios=heights)
     if rows:
-        _draw_axes(upper, recording, columns, chosen)
+        _draw_axes(upper, recording, columns, chosen, marks)
+    draw_timeline(middle.subplots(), recording, marks, 2 * POINTS)
     _draw_timing(lower, recording)
     return figure
 
@@ -227,7 +224,7 @@ def headline(recording: Recording) -> str:
     seconds = float(recording.time[-1]) if len(recording) else 0.0
     lost = f"{recording.lost} lost" if recording.lost else "none lost"
     count = len(recording.events)
-    events = f", {count_of(count, 'event', 'events')} (dashed)" if count else ""
+    events = f", {count_of(count, 'event', 'events')}" if count else ""
     axes = count_of(len(recording.axes), "axis", "axes")
     return (
         f"{recording.name}: {axes} at {1.0 / recording.period:.6g} Hz\n"
@@ -235,25 +232,33 @@ def headline(recording: Recording) -> str:
     )
 
 
-def _draw_axes(part: Any, recording: Recording, columns: list[Column], chosen: list[int]) -> None:
+def _draw_axes(
+    part: Any, recording: Recording, columns: list[Column], chosen: list[int], marks: list[Mark]
+) -> None:
     """A row of plots for each axis, a column for each quantity."""
     grid = part.subplots(len(chosen), len(columns), sharex=True, squeeze=False)
+    points = POINTS if len(chosen) <= MANY else FEW_POINTS
     for place, column in enumerate(columns):
         drawn = [
-            (line, thin(*with_gaps(recording, line.values[:, chosen]), POINTS))
+            (line, thin(*with_gaps(recording, line.values[:, chosen]), points))
             for line in column.lines
         ]
         for row, plot in enumerate(grid[:, place]):
             for line, (time, values) in drawn:
                 plot.plot(time, values[:, row], color=line.color, lw=line.width, label=line.name)
-            _mark_events(plot, recording)
+            draw_marks(plot, marks)
             plot.margins(x=0.01)
         _head(grid[0, place], column)
         grid[-1, place].set_xlabel("time [s]")
     for row, axis in enumerate(chosen):
         grid[row, 0].set_ylabel(
-            recording.axes[axis], rotation=0, ha="right", va="center", color=INK, weight="bold"
-        )
+            recording.axes[axis], rotation=0, ha="right", va="center", color=INK, weight="bold",
+            labelpad=10.0,
+        )  # fmt: skip
+    part.align_ylabels(grid[:, 0])
+    for row in range(TIMES_EVERY - 1, len(chosen), TIMES_EVERY):
+        for plot in grid[row]:
+            plot.tick_params(axis="x", labelbottom=True)
 
 
 def _head(plot: Any, column: Column) -> None:
@@ -263,12 +268,6 @@ def _head(plot: Any, column: Column) -> None:
         loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(column.lines), fontsize=8.0,
         borderaxespad=0.1, handlelength=1.6, columnspacing=1.2,
     )  # fmt: skip
-
-
-def _mark_events(plot: Any, recording: Recording) -> None:
-    for event in recording.events[:MARKED_EVENTS]:
-        at = event.time - recording.start_ns * 1e-9
-        plot.axvline(at, color=MARK, lw=0.9, ls=(0, (3, 2)), zorder=1.5)
 
 
 def _draw_timing(part: Any, recording: Recording) -> None:

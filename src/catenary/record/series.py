@@ -48,14 +48,23 @@ def largest(values: Floats) -> Floats:
     return np.asarray(np.abs(values).max(axis=0, where=np.isfinite(values), initial=0.0))
 
 
-def timing_us(recording: Recording, phase: str) -> Floats | None:
-    """A phase of every cycle where it is known [us]; in_controller is the sum of three."""
+def phase_us(recording: Recording, phase: str) -> Floats | None:
+    """A phase of every cycle [us], NaN where it is not known; in_controller is the sum of three.
+    None: it was not recorded."""
     names = ("receive", "process", "send") if phase == "in_controller" else (phase,)
     if any(recording.layout.field(f"{name}_ns") is None for name in names):
         return None
     parts = np.array([recording[f"{name}_ns"] for name in names], np.float64)
-    known = parts.sum(axis=0)[(parts >= UNKNOWN_BELOW).all(axis=0)]
-    return known * 1e-3 if len(known) else None
+    known = (parts >= UNKNOWN_BELOW).all(axis=0)
+    return np.where(known, parts.sum(axis=0) * 1e-3, np.nan)
+
+
+def timing_us(recording: Recording, phase: str) -> Floats | None:
+    """A phase of the cycles where it is known [us]; None: nowhere."""
+    values = phase_us(recording, phase)
+    if values is None or not np.isfinite(values).any():
+        return None
+    return values[np.isfinite(values)]
 
 
 def with_gaps(recording: Recording, values: Floats) -> tuple[Floats, Floats]:
@@ -75,6 +84,12 @@ def thin(time: Floats, values: Floats, most: int) -> tuple[Floats, Floats]:
     high = np.maximum.reduceat(values, starts, axis=0)
     both = np.stack([low, high], axis=1).reshape(2 * most, *values.shape[1:])
     return np.repeat(np.fmin.reduceat(time, starts), 2), both
+
+
+def peaks(time: Floats, values: Floats, most: int) -> tuple[Floats, Floats]:
+    """At most so many points: the greatest known value of equal parts, where there is one."""
+    starts = np.linspace(0, len(time), min(most, len(time)), endpoint=False).astype(np.intp)
+    return time[starts], np.fmax.reduceat(values, starts)
 
 
 def prefix_for(values: Floats) -> tuple[float, str]:

@@ -1,0 +1,97 @@
+"""What happened when: the timing of the cycles over time, with events and quick stops by name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from catenary.record.layout import NUMBER
+from catenary.record.recording import Recording
+from catenary.record.series import count_of, peaks, phase_us
+
+QUICK_STOP_BITS, QUICK_STOP = 0x86, 0x02  # of the controlword, IEC 61800-7-201 table 28
+MARKED = 40  # more would hide the lines
+NAMED, LEVELS = 24, 4  # names beyond are in the page's table; they lie on so many lines
+LEVEL_HEIGHT = 0.12  # of the plot
+EVENT, STOP = "#b42318", "#1d2430"
+COLORS = {"lateness": "#b9c2cc", "in_controller": "#2f6f9f"}
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """Something at an instant."""
+
+    time: float  # from the first cycle on [s]
+    text: str
+    color: str
+    dashes: tuple[float, ...]
+
+
+def marks_of(recording: Recording) -> list[Mark]:
+    """Events, and the cycles whose frames were the first with a quick stop, by time."""
+    start = recording.start_ns * 1e-9
+    events = [Mark(e.time - start, e.kind, EVENT, (3, 2)) for e in recording.events]
+    stops = [
+        Mark(float(recording.time[row]), stop_text(recording, axes), STOP, (1, 1.5))
+        for row, axes in quick_stops(recording)
+    ]
+    return sorted(events + stops, key=lambda mark: mark.time)
+
+
+def quick_stops(recording: Recording) -> list[tuple[int, list[int]]]:
+    """Rows in which a quick stop is sent to axes that had none sent the cycle before, and these."""
+    if recording.layout.field("controlword") is None or len(recording) < 2:
+        return []
+    stop = recording["controlword"] & QUICK_STOP_BITS == QUICK_STOP
+    begins = stop[1:] & ~stop[:-1] & (np.diff(recording[NUMBER].astype(np.int64)) == 1)[:, None]
+    rows = np.flatnonzero(begins.any(axis=1))
+    return [(int(row) + 1, np.flatnonzero(begins[row]).tolist()) for row in rows]
+
+
+def stop_text(recording: Recording, axes: list[int]) -> str:
+    one = recording.axes[axes[0]]
+    return f"quick stop: {one if len(axes) == 1 else count_of(len(axes), 'axis', 'axes')}"
+
+
+def draw_marks(plot: Any, marks: list[Mark]) -> None:
+    for mark in marks[:MARKED]:
+        plot.axvline(mark.time, color=mark.color, lw=0.9, ls=(0, mark.dashes), zorder=1.5)
+
+
+def draw_timeline(plot: Any, recording: Recording, marks: list[Mark], points: int) -> None:
+    """The greatest values of each pixel, so that a single late cycle is seen."""
+    for phase, color in COLORS.items():
+        values = phase_us(recording, phase)
+        if values is not None and len(recording):
+            time, top = peaks(recording.time, values, points)
+            plot.plot(time, top, color=color, lw=0.9, label=phase.replace("_", " "))
+    plot.set_title("cycles, greatest of each pixel [µs]", loc="left", fontsize=10.0)
+    if plot.lines:
+        plot.legend(
+            loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, fontsize=8.0, borderaxespad=0.1
+        )
+    draw_marks(plot, marks)
+    _name_marks(plot, marks)
+    plot.margins(x=0.01)
+    plot.set_xlabel("time [s]")
+
+
+def _name_marks(plot: Any, marks: list[Mark]) -> None:
+    """Names beside the lines, those that follow each other below one another."""
+    room = 1.0 + LEVEL_HEIGHT * (1 + min(len(marks), LEVELS)) if marks else 1.0
+    low, high = plot.get_ylim()
+    plot.set_ylim(min(low, 0.0), max(high, 1.0) * room)
+    for place, mark in enumerate(marks[:NAMED]):
+        is_late = mark.time > 0.8 * plot.get_xlim()[1]
+        plot.annotate(
+            mark.text, (mark.time, 0.99 - LEVEL_HEIGHT * (place % LEVELS)),
+            xycoords=("data", "axes fraction"), color=mark.color, fontsize=8.0,
+            xytext=(-3 if is_late else 3, 0), textcoords="offset points",
+            ha="right" if is_late else "left", va="top",
+        )  # fmt: skip
+    if len(marks) > NAMED:
+        plot.annotate(
+            f"and {len(marks) - NAMED} more", (1.0, 0.5), xycoords="axes fraction", ha="right"
+        )
