@@ -17,6 +17,7 @@ PROGRAMS = {
     "c": ("peer.c", "receive_recv.c"),
     "c-ring": ("peer.c", "receive_ring.c"),
     "three_tasks": ("three_tasks.c",),
+    "reaction": ("reaction.c",),
 }
 FLAGS = ("-O2", "-std=gnu11")
 VARIABLE = "CATENARY_BENCH_PROGRAMS"

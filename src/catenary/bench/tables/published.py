@@ -170,3 +170,8 @@ TASKS: Mapping[tuple[str, str], tuple[Times, Times, Times]] = {
 
 SKEW_CONDITIONS = "theirs: Raspberry Pi 4, RT-Preempt, 3 servo drives and 2 digital outputs, 1 kHz"
 SKEW = Spread(1.45, 2.5, 0.68, 0.18)  # [us]
+
+# ---- RtEML, section 5
+
+RTEML_CONDITIONS = "theirs: INtime on Windows, frames of 60 bytes, 5702 captured packets"
+RTEML_PACKETS, RTEML_INTERVAL_US = 5702, 200.0  # on average
