@@ -34,7 +34,7 @@ def test_every_way_reacts() -> None:
 
 
 def test_without_a_compiler_python_remains(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(interrupt, "which", lambda _name: None)
+    monkeypatch.setattr(interrupt, "has_programs", lambda: False)
     monkeypatch.setattr(interrupt, "run", lambda *_: interrupt.of_samples(np.array([1000, 2000])))
     sheet = interrupt.measure(Options())
     assert sheet.left_out == ["C: no C compiler (sudo apt install gcc libc6-dev)"]

@@ -147,6 +147,8 @@ def measure_table(
     rates: Sequence[int] | None = None,
     ring: bool = False,
     lead: float | None = None,
+    example: Path | None = None,
+    realtime: bool = False,
     file: Path | None = None,
 ) -> None:
     """Prints a published table with ours beside it; `None`: as the table has it. What this machine
@@ -168,6 +170,8 @@ def measure_table(
         rates=None if rates is None else tuple(rates),
         ring=ring,
         lead=lead,
+        example=example,
+        realtime=realtime,
         refused=refused,
     )
     made = tables.measure(name, options)

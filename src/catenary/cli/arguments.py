@@ -54,6 +54,11 @@ def positive_number(text: str) -> int:
     return value
 
 
+def positive_numbers(text: str) -> list[int]:
+    """`4000,8000`"""
+    return [positive_number(each) for each in text.split(",")]
+
+
 def positive_seconds(text: str) -> float:
     try:
         value = float(text)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from catenary.cli.arguments import positive_number, positive_seconds
+from catenary.cli.arguments import positive_number, positive_numbers, positive_seconds
 from catenary.cli.bench_table import add_table
 from catenary.cli.parsers import Commands, add_command
 
@@ -211,7 +211,11 @@ def _add_clocks(group: Commands) -> None:
         example="catenary bench clocks --devices 10,33 --minutes 10",
     )
     parser.add_argument(
-        "--devices", default="10,33", metavar="N,M", help="segments of so many drives (10,33)"
+        "--devices",
+        type=positive_numbers,
+        default="10,33",
+        metavar="N,M",
+        help="segments of so many drives (10,33)",
     )
     parser.add_argument(
         "--minutes", type=positive_seconds, default=10.0, metavar="M", help="of virtual time (10)"
@@ -237,7 +241,13 @@ def _add_networks(group: Commands) -> None:
         "turn: cycles lost, instants missed. Then the loop in virtual time.",
         example="catenary bench networks --rates 4000,8000 --seconds 10 --json networks.json",
     )
-    parser.add_argument("--rates", default="4000,8000", metavar="HZ,HZ", help="(4000,8000)")
+    parser.add_argument(
+        "--rates",
+        type=positive_numbers,
+        default="4000,8000",
+        metavar="HZ,HZ",
+        help="(4000,8000)",
+    )
     parser.add_argument(
         "--seconds", type=positive_seconds, default=10.0, metavar="S", help="of each (10)"
     )
@@ -362,7 +372,7 @@ def run_clocks(arguments: argparse.Namespace) -> int:
     from catenary import bench
 
     held = bench.measure_clocks(
-        devices=[positive_number(each) for each in arguments.devices.split(",")],
+        devices=arguments.devices,
         minutes=arguments.minutes,
         jitter=arguments.jitter,
         seed=arguments.seed,
@@ -383,7 +393,7 @@ def run_networks(arguments: argparse.Namespace) -> int:
 
     bench.enter_private_network()
     bench.measure_networks(
-        rates=[positive_number(each) for each in arguments.rates.split(",")],
+        rates=arguments.rates,
         seconds=arguments.seconds,
         rounds=arguments.rounds,
         file=arguments.json,

@@ -6,7 +6,7 @@ import argparse
 import textwrap
 from pathlib import Path
 
-from catenary.cli.arguments import positive_number, positive_seconds, seconds
+from catenary.cli.arguments import positive_number, positive_numbers, positive_seconds, seconds
 from catenary.cli.failure import UsageError
 from catenary.cli.parsers import Commands, add_command
 
@@ -39,13 +39,24 @@ def add_table(group: Commands) -> None:
         metavar="N",
         help="in which programs take turns, each in a fresh process; tests want 8 (pyigh: 10)",
     )
-    parser.add_argument("--rates", metavar="HZ,HZ", help="of networks (tocabi: 4000,8000)")
+    parser.add_argument(
+        "--rates",
+        type=positive_numbers,
+        metavar="HZ,HZ",
+        help="of loops (tocabi: 4000,8000; rteml: 5000)",
+    )
     parser.add_argument("--ring", action="store_true", help="each network a ring, not a line")
     parser.add_argument(
         "--lead",
         type=seconds,
         metavar="S",
         help="how long before its instant a loop wakes, and waits without sleep; 0: it does not",
+    )
+    parser.add_argument(
+        "--example", type=Path, metavar="FILE", help="of cobot (examples/cobot/cobot.py)"
+    )
+    parser.add_argument(
+        "--realtime", action="store_true", help="cobot on the machine's clock, not in virtual time"
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there")
     parser.set_defaults(run=run_table)
@@ -59,14 +70,15 @@ def run_table(arguments: argparse.Namespace) -> int:
         tables.check(arguments.name)
     except ValueError as error:
         raise UsageError(str(error), hint="catenary bench table --help") from None
-    rates = arguments.rates
     bench.measure_table(
         arguments.name,
         seconds=arguments.seconds,
         rounds=arguments.rounds,
-        rates=None if rates is None else [positive_number(each) for each in rates.split(",")],
+        rates=arguments.rates,
         ring=arguments.ring,
         lead=arguments.lead,
+        example=arguments.example,
+        realtime=arguments.realtime,
         file=arguments.json,
     )
     return 0

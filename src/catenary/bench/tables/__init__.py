@@ -22,6 +22,7 @@ class Table(NamedTuple):
 TABLES = {
     "pyigh": Table("one loop, three drives, 1 kHz: Python beside C, and whether they differ", True),
     "tocabi": Table("18 + 15 axes on two networks, 4 and 8 kHz: latency, send, receive", True),
+    "cobot": Table("six tasks of a six-axis cobot, by the program of examples/cobot", False),
     "tasks": Table("three spinning tasks: C, Python as processes and threads; the analysis", False),
     "rteml": Table("intervals of cyclic frames in a capture at 5 kHz", True),
     "skew": Table("two digital outputs at both ends of the line, with and without SYNC0", False),

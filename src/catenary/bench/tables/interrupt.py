@@ -16,12 +16,11 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from shutil import which
 
 import numpy as np
 import numpy.typing as npt
 
-from catenary.bench.compiler import compile_peer
+from catenary.bench.compiler import compile_peer, has_programs
 from catenary.bench.loop import show_progress
 from catenary.bench.segment import processors
 from catenary.bench.statistics import summarise
@@ -53,7 +52,7 @@ def measure(options: Options) -> Sheet:
     count = max(round(seconds / PERIOD), 2)
     ways = [(C, EVENT), (PYTHON, EVENT), (TASK, SIGNAL), (C, TIMER), (PYTHON, TIMER)]
     left_out = []
-    if which("cc") is None:
+    if not has_programs():
         ways = [way for way in ways if way[0] != C]
         left_out.append("C: no C compiler (sudo apt install gcc libc6-dev)")
     found = {}

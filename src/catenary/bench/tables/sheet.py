@@ -28,6 +28,8 @@ class Options:
     rates: tuple[int, ...] | None = None  # [Hz]
     ring: bool = False
     lead: float | None = None  # [s] of inline loops and laws; 0: a plain sleep
+    example: Path | None = None  # the program of examples/cobot
+    realtime: bool = False  # on the machine's clock, where virtual time is the default
     refused: str = ""  # why there is no private network
 
 

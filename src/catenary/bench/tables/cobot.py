@@ -1,0 +1,105 @@
+"""`catenary bench table cobot`: six tasks of a six-axis cobot, by the program of `examples/cobot`,
+which is run and writes what it came to.
+
+In virtual time execution is declared: the table shows the schedule. On the machine's clock
+(`--realtime`) it is measured, on real frames over a pair of interfaces.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import catenary
+from catenary.bench.published import COBOT, COBOT_UTILISATION, TaskTimes, as_table
+from catenary.bench.tables.sheet import Options, Sheet
+from catenary.errors import CatenaryError
+
+PROGRAM = Path("examples", "cobot", "cobot.py")
+NEEDS = ("mujoco", "ruckig", "mcap")
+SECONDS = 3600.0  # at most; it ends by itself
+CONDITIONS = (
+    "theirs: PyIgH on an Indy7, cyclic torque at 1 kHz, PREEMPT_RT, 5 min, joints 0 to 90 degrees"
+)
+
+
+def measure(options: Options) -> Sheet:
+    reason = why_not(options)
+    found = {} if reason else run(program(options), realtime=options.realtime)
+    ours = {each["name"]: times_of(each) for each in found.get("tasks", ())}
+    theirs = {f"{name} (theirs)": times for name, times in COBOT.items()}
+    lines = [as_table(ours, COBOT) if ours else as_table(theirs, {})]
+    lines.append(f"theirs: utilisation {COBOT_UTILISATION:.1%}, schedulable")
+    clock = "the machine's clock" if options.realtime else "virtual time, execution declared"
+    return Sheet(
+        title=f"Six tasks of a six-axis cobot; {CONDITIONS}",
+        conditions=f"ours: examples/cobot, a simulated arm, twice there and back; {clock}",
+        text="\n".join([*lines, *as_lines(found)]),
+        figures={
+            "published": {name: times._asdict() for name, times in COBOT.items()},
+            "published_utilisation": COBOT_UTILISATION,
+            "realtime": options.realtime,
+            "ours": found,
+        },
+        left_out=[reason] if reason else [],
+    )
+
+
+def program(options: Options) -> Path:
+    """As given, else beside the repository this package is of, else below the working folder."""
+    if options.example is not None:
+        return options.example
+    repository = Path(catenary.__file__).resolve().parents[2]
+    return next((p for p in (repository / PROGRAM, PROGRAM) if p.exists()), repository / PROGRAM)
+
+
+def why_not(options: Options) -> str:
+    path = program(options)
+    if not path.exists():
+        return f"all of ours: there is no {path} (--example says where it is)"
+    missing = [name for name in NEEDS if find_spec(name) is None]
+    if missing:
+        return f"all of ours: {', '.join(missing)} not installed (pip install 'catenary[cobot]')"
+    return ""
+
+
+def run(path: Path, *, realtime: bool) -> dict[str, Any]:
+    """What the program wrote: `catenary.bench.cobot.report`. CatenaryError: it failed."""
+    with tempfile.TemporaryDirectory(prefix="catenary-bench-") as name:
+        words = [str(path), "--headless", "--out", name]
+        if realtime:
+            words = ["-m", "catenary.realtime.private_network", *words, "--realtime"]
+        done = subprocess.run(
+            [sys.executable, *words], capture_output=True, text=True, timeout=SECONDS, check=False
+        )
+        file = Path(name, "cobot.json")
+        if done.returncode or not file.exists():
+            last = (done.stderr.strip() or done.stdout.strip() or "it said nothing").splitlines()
+            raise CatenaryError(
+                f"{path} failed: {last[-1]}", hint=f"run it by itself: {sys.executable} {path}"
+            )
+        found: dict[str, Any] = json.loads(file.read_text())
+        return found
+
+
+def times_of(task: Mapping[str, Any]) -> TaskTimes:
+    period, jitter, response = (tuple(task[name]) for name in ("period", "jitter", "response"))
+    return TaskTimes(period, jitter, response)
+
+
+def as_lines(found: Mapping[str, Any]) -> Sequence[str]:
+    if not found:
+        return []
+    word = "schedulable" if found["schedulable"] else "NOT schedulable"
+    return [
+        f"ours: utilisation {found['utilisation']:.1%}, {word}; "
+        f"tracking {found['rms_deg']:.3f} deg rms, "
+        f"without compensation {found['rms_deg_without']:.3f}; "
+        f"{found['times_real_time']:.1f} times real time",
+    ]
