@@ -4,8 +4,7 @@
     python cobot.py --realtime         the same on the machine's clock
     python cobot.py --realtime eth0    the robot
 
-Twice all joints go from 0 to 90 degrees and back. Enter is the emergency stop's key; on virtual
-drives somebody hits it the second time.
+All joints go to 90 degrees and back, twice. Enter stops them; on virtual drives somebody hits it.
 """
 
 import argparse
@@ -153,13 +152,13 @@ def main_control(place, cost, target, share, state, torque, phase, rows, done, g
             return loop.timing, recovery.stops, cycle.time / (time.perf_counter() - began)
 
 
-def run(target, *, virtual, gravity, arm, folder, key_at=KEY_AT, goals=GOALS):
+def run(target, *, virtual, gravity, arm, folder, name="cobot", key_at=KEY_AT, goals=GOALS):
     """One run of the whole program, with gravity compensated or not."""
     state, torque = realtime.Value("f8", (5, JOINTS)), realtime.Value("f8", JOINTS)
     rows, key = realtime.Queue("f8", (3, JOINTS), length=8), realtime.Signal()
     phase, done, hit = (realtime.Value("i8") for _ in range(3))
-    name = "cobot" if gravity else "cobot-without"
-    path = folder / f"{name}.mcap"
+    without = "" if gravity else "-without"
+    name, path = name + without, folder / f"cobot{without}.mcap"
 
     def task(function, cost, *arguments, on_failure="restart", **more):  # [s], in virtual time
         more |= {"cpu": 0 if virtual else None, "on_failure": on_failure}
@@ -188,12 +187,13 @@ if __name__ == "__main__":  # the tasks' processes import this file
     parser.add_argument("--headless", action="store_true", help="writes no plots")
     parser.add_argument("--arm", default=str(HERE / "arm.xml"), help="MJCF or URDF of the arm")
     parser.add_argument("--segment", default=str(HERE / "segment.toml"), help="the virtual drives")
+    parser.add_argument("--name", default="cobot", help="of what it shares with other processes")
     parser.add_argument("--out", type=Path, default=Path("out"), help="where files go")
     a = parser.parse_args()
     if a.target and not a.realtime:
         parser.error(f"{a.target} lives by the machine's clock: add --realtime")
     a.out.mkdir(exist_ok=True)
-    options = {"virtual": not a.realtime, "arm": a.arm, "folder": a.out}
+    options = {"virtual": not a.realtime, "arm": a.arm, "folder": a.out, "name": a.name}
     options["key_at"] = None if a.target else KEY_AT
     with program_target(a.segment, a.target, realtime=a.realtime) as target:
         outcomes = [run(target, gravity=each, **options) for each in (True, False)]

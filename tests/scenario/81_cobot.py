@@ -6,6 +6,7 @@ back. The whole program runs as a user runs it, in virtual time.
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -30,18 +31,25 @@ OPERATION_ENABLED = 0x27  # statusword, masked by 0x6F
 PERIOD = 1e-3
 
 
-@pytest.fixture(scope="module")
-def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("cobot")
+def run(folder: Path, *options: str) -> str:
+    """The whole program, in virtual time; what it printed."""
+    program = [sys.executable, str(COBOT), "--name", f"cobot-of-{os.getpid()}"]
     done = subprocess.run(
-        [sys.executable, str(COBOT), "--headless", "--out", str(folder)],
+        [*program, "--headless", "--out", str(folder), *options],
         capture_output=True,
         text=True,
         timeout=300,
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    assert "published: utilisation 73.7%" in done.stdout
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("cobot")
+    printed = run(folder)
+    assert "published: utilisation 73.7%" in printed
     return folder
 
 
@@ -112,3 +120,22 @@ def test_the_stop_is_on_the_wire_within_a_cycle_and_the_arm_goes_on(out: Path) -
     assert 0 < reaction["seconds"] <= PERIOD + 130e-6  # and the execution declared
     assert (abs(recording["velocity"][-1]) < 0.05).all()
     assert abs(recording["target_position"][-1]).max() < 1e-6  # it came home all the same
+
+
+@pytest.mark.shared_data
+def test_the_published_arm_by_the_path_of_its_description(
+    shared_data: Path, tmp_path: Path
+) -> None:
+    """The Indy7's own URDF, for the plant and for the model: masses as identified by its maker."""
+    description = shared_data / "robots/indy7/derived_indy7_flat.urdf"
+    plant, devices = (COBOT.parent / "segment.toml").read_text().split("[[device]]", 1)
+    plant = plant.replace('model = "arm.xml"', f'model = "{description}"\ncontacts = false')
+    for n, name in enumerate(("base", "shoulder", "elbow", "wrist1", "wrist2", "wrist3")):
+        plant = plant.replace(f'name = "{name}"', f'name = "joint{n}"')
+    segment = tmp_path / "indy7.toml"
+    segment.write_text(f"{plant}[[device]]{devices}")
+    run(tmp_path, "--arm", str(description), "--segment", str(segment))
+    found = json.loads((tmp_path / "cobot.json").read_text())
+    assert found["rms_deg"] <= 0.5
+    assert found["rms_deg_without"] >= 5 * found["rms_deg"]
+    assert [each["cycles"] <= 1 for each in found["reactions"]] == [True]

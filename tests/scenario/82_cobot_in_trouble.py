@@ -60,9 +60,14 @@ def run(
 
     monkeypatch.setattr(cobot.realtime, "Tasks", tasks)
     monkeypatch.setattr(cobot.cat, "Recovery", Watched, raising=False)
-    options = {"arm": str(FOLDER / "arm.xml"), "goals": [np.full(6, goal) for goal in goals]}
-    target = str(FOLDER / "segment.toml")
-    return cobot.run(target, virtual=True, gravity=True, folder=folder, key_at=None, **options)
+    options = {
+        "arm": str(FOLDER / "arm.xml"),
+        "folder": folder,
+        "name": f"cobot-of-{os.getpid()}",
+        "goals": [np.full(6, goal) for goal in goals],
+    }
+    segment = str(FOLDER / "segment.toml")
+    return cobot.run(segment, virtual=True, gravity=True, key_at=None, **options)
 
 
 def with_fault(cobot: Any, monkeypatch: pytest.MonkeyPatch, fault: Fault) -> None:
