@@ -12,6 +12,7 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
 from catenary.errors import RecordingError
+from catenary.record.channels import OLD_FORMAT, make_channels
 from catenary.record.file import LARGEST_CHUNK, SMALLEST_CHUNK, RecordingFile, chunk_size
 from catenary.record.layout import Field, Layout
 from catenary.record.recording import read
@@ -62,6 +63,36 @@ def test_mcap_ros2_support_reads_it(tmp_path: Path, axes: int) -> None:
                 assert list(decoded.statusword) == row["statusword"].tolist()
             seen += 1
     assert seen == 700
+
+
+def test_plotjuggler_reads_it_on_a_machine_that_is_up_for_a_year(tmp_path: Path) -> None:
+    """Its parser throws "Floating point truncated" where an integer is no double, unless a
+    preference says otherwise (rosx_introspection, conversion_impl.hpp, checkTruncation)."""
+    layout = make_layout(1)
+    rows = make_rows(layout, 10)
+    rows["scheduled_ns"] += 1 << 53
+    file = RecordingFile(tmp_path / "x.mcap", layout)
+    file.write(rows)
+    file.finish({})
+    assert (read(tmp_path / "x.mcap")["scheduled_ns"] == rows["scheduled_ns"]).all()
+    with (tmp_path / "x.mcap").open("rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        messages = [m for _, c, _, m in reader.iter_decoded_messages() if c.topic.endswith("cycle")]
+    times = [m.scheduled.sec * 10**9 + m.scheduled.nanosec for m in messages]
+    assert times == rows["scheduled_ns"].tolist()
+    for message in messages:
+        numbers = [getattr(message, name) for name in message.__slots__ if name != "header"]
+        assert all(int(float(n)) == n for n in numbers if isinstance(n, int))
+
+
+def test_a_recording_of_format_1_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("catenary.record.file.FORMAT", OLD_FORMAT)
+    monkeypatch.setattr(
+        "catenary.record.file.make_channels", lambda layout: make_channels(layout, OLD_FORMAT)
+    )
+    rows = write(tmp_path / "x.mcap", make_layout(2))
+    back = read(tmp_path / "x.mcap")
+    assert all(np.array_equal(back[name], rows[name]) for name in rows.dtype.names)
 
 
 @pytest.mark.parametrize("axes", AXES[1:])
@@ -120,7 +151,6 @@ def test_it_is_compressed_in_chunks_with_an_index(tmp_path: Path) -> None:
 def test_a_chunk_is_neither_tiny_nor_huge() -> None:
     assert chunk_size(make_layout(0, period=0.1), []) == SMALLEST_CHUNK
     many = make_layout(300, period=125e-6)
-    from catenary.record.channels import make_channels
 
     assert chunk_size(many, make_channels(many)) == LARGEST_CHUNK
 

@@ -38,23 +38,28 @@ JOINT_CHANNELS = {  # topic: ROS's name → the row's
         "effort": "commanded_torque",
     },
 }
+FORMAT, OLD_FORMAT = "2", "1"
 SECOND_NS = 1_000_000_000
 INFO, WARNING, ERROR = 20, 30, 40  # of rcl_interfaces/Log
 
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """One message of every row. `fields`: of the message → of the row."""
+    """One message of every row. `fields`: of the message → of the row; `instants`: those that are
+    a builtin_interfaces/Time."""
 
     topic: str
     definition: Definition
     message: CdrMessage
     fields: dict[str, str]
+    instants: dict[str, str]
 
     def encode(self, rows: Rows, times_ns: np.ndarray[tuple[int], np.dtype[np.int64]]) -> bytes:
         """One message of each row, one behind the other. times_ns: UTC, one of each row."""
         columns = {name: rows[source] for name, source in self.fields.items()}
         columns["sec"], columns["nanosec"] = np.divmod(times_ns, SECOND_NS)
+        for name, source in self.instants.items():
+            columns[f"{name}.sec"], columns[f"{name}.nanosec"] = np.divmod(rows[source], SECOND_NS)
         return self.message.encode(columns, len(rows))
 
     def decode(self, messages: bytes, rows: Rows) -> None:
@@ -62,6 +67,9 @@ class Channel:
         values = self.message.decode(messages)
         for name, source in self.fields.items():
             rows[source] = values[name]
+        for name, source in self.instants.items():
+            seconds = values[f"{name}.sec"].astype(np.int64)
+            rows[source] = seconds * SECOND_NS + values[f"{name}.nanosec"]
 
 
 def topic(layout: Layout, name: str) -> str:
@@ -73,8 +81,9 @@ def is_event(topic: str) -> bool:
     return topic.endswith(("/log", "/events"))
 
 
-def make_channels(layout: Layout) -> list[Channel]:
-    """The channels that carry every field of the layout, each in one of them."""
+def make_channels(layout: Layout, format_: str = FORMAT) -> list[Channel]:
+    """The channels that carry every field of the layout, each in one of them. In format 1 instants
+    were integers: PlotJuggler refuses those beyond 2^53, of a machine that is up for 104 days."""
     joints = [
         _joint_channel(layout, name, fields)
         for name, wanted in JOINT_CHANNELS.items()
@@ -82,7 +91,7 @@ def make_channels(layout: Layout) -> list[Channel]:
     ]
     carried = {row for channel in joints for row in channel.fields.values()}
     rest = [field for field in layout.fields if field.name not in carried]
-    return [*joints, _cycle_channel(layout, rest)]
+    return [*joints, _cycle_channel(layout, rest, has_instants=format_ != OLD_FORMAT)]
 
 
 def encode_log(time_ns: int, level: int, name: str, message: str, number: int) -> bytes:
@@ -124,21 +133,29 @@ def _joint_channel(layout: Layout, name: str, fields: dict[str, str]) -> Channel
     message.texts(layout.axes)
     for quantity in ("position", "velocity", "effort"):
         message.sequence(quantity, "<f8", len(layout.axes) if quantity in fields else 0)
-    return Channel(topic(layout, name), JOINT_STATE, message.make(), fields)
+    return Channel(topic(layout, name), JOINT_STATE, message.make(), fields, {})
 
 
-def _cycle_channel(layout: Layout, rest: list[Field]) -> Channel:
+def _cycle_channel(layout: Layout, rest: list[Field], *, has_instants: bool) -> Channel:
     message = _with_header(layout)
     fields: dict[str, str] = {}
+    instants: dict[str, str] = {}
     lines: list[tuple[str, str, int | None, str]] = []
     for field in rest:
-        name = _unused(_ros_name(field.name), fields)
+        if has_instants and (field.dtype, field.shape, field.unit) == ("<i8", (), "ns"):
+            name = _unused(_ros_name(field.name.removesuffix("_ns")), {**fields, **instants})
+            message.field(f"{name}.sec", "<i4")
+            message.field(f"{name}.nanosec", "<u4")
+            instants[name] = field.name
+            lines.append((name, "builtin_interfaces/Time", None, "of the loop's clock"))
+            continue
+        name = _unused(_ros_name(field.name), {**fields, **instants})
         length = prod(field.shape) if field.shape else None
         message.field(name, field.dtype, field.shape)
         fields[name] = field.name
         lines.append((name, _ros_type(layout, field), length, _comment(field)))
     definition = make_definition("catenary_msgs/msg/Cycle", lines)
-    return Channel(topic(layout, "cycle"), definition, message.make(), fields)
+    return Channel(topic(layout, "cycle"), definition, message.make(), fields, instants)
 
 
 def _ros_type(layout: Layout, field: Field) -> str:

@@ -17,6 +17,7 @@ from catenary.errors import RecordingError
 from catenary.record.cdr import Rows
 from catenary.record.channels import (
     ERROR,
+    FORMAT,
     INFO,
     WARNING,
     Channel,
@@ -32,7 +33,6 @@ from catenary.record.mcap_records import END_RECORD, LAYOUT_RECORD
 from catenary.record.output import Output
 from catenary.share import SharedEvent
 
-FORMAT = "1"
 GOOD_NEWS = ("DeviceReturned", "LinkRestored", "ClockLocked", "Marker")
 CHUNK_SECONDS = 0.5  # what a killed recorder loses at most
 SMALLEST_CHUNK, LARGEST_CHUNK = 1 << 14, 1 << 22  # [bytes]

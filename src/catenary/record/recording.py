@@ -17,8 +17,14 @@ import numpy.typing as npt
 
 from catenary.errors import RecordingError
 from catenary.record.cdr import Rows
-from catenary.record.channels import decode_text, is_event, make_channels, topic
-from catenary.record.file import FORMAT
+from catenary.record.channels import (
+    FORMAT,
+    OLD_FORMAT,
+    decode_text,
+    is_event,
+    make_channels,
+    topic,
+)
 from catenary.record.layout import TIME, Layout
 from catenary.record.mcap_records import (
     CHANNEL,
@@ -159,7 +165,7 @@ class _Reader:
 
     def _make(self) -> Recording:
         head = self._metadata.get(LAYOUT_RECORD)
-        if head is None or head.get("format") != FORMAT:
+        if head is None or head.get("format") not in (FORMAT, OLD_FORMAT):
             raise RecordingError(
                 f"{self._stream.name} is no recording of Catenary's (format {FORMAT})",
                 hint="other MCAP files are read with the packages mcap and mcap-ros2-support",
@@ -172,7 +178,7 @@ class _Reader:
         first = self._wanted[0]  # those before the first cycle were met before it was known
         return Recording(
             layout=layout,
-            rows=_rows(layout, self._messages),
+            rows=_rows(layout, self._messages, head["format"]),
             events=tuple(e for e in events if e.time * 1e9 + layout.utc_offset_ns >= first),
             lost=int(lost) if (lost := tail.get("lost", "0")).isdecimal() else 0,
             ended=tail.get("ended", "cut off") if self._complete else "cut off",
@@ -189,9 +195,9 @@ class _Reader:
         return layout
 
 
-def _rows(layout: Layout, messages: Mapping[str, list[ChunkMessage]]) -> Rows:
+def _rows(layout: Layout, messages: Mapping[str, list[ChunkMessage]], format_: str) -> Rows:
     """The cycles that are there with all their messages: a cut may divide one."""
-    channels = make_channels(layout)
+    channels = make_channels(layout, format_)
     numbers = [
         np.array([message.sequence for message in messages[channel.topic]], np.int64)
         for channel in channels
