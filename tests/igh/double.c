@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #pragma GCC diagnostic ignored "-Wreturn-type"
 #pragma GCC visibility push(default)
@@ -34,6 +35,9 @@ typedef struct {
     pdo_map maps[2];              /* SyncManager 2 and 3 */
     uint8_t registers[0x1000];
     int al, error, online, sends;
+    int alias, clockless, plain;  /* plain: no mailbox, its outputs in SyncManager 0 */
+    int unacknowledged;           /* sends until the master has acknowledged its error */
+    int booting;                  /* looks until the master has brought it to PRE-OP */
     uint8_t emergencies[16][8];
     int first_emergency, last_emergency;
 } slave;
@@ -42,11 +46,11 @@ struct double_domain {
     uint8_t data[8192];
     uint8_t input_copy[8192];
     size_t size;
-    int queued, arrived, expected, counter;
+    int queued, arrived, expected, counter, early;
 };
 
 struct double_config {
-    int position, used, wrong;
+    int position, used, wrong, alias, steps;
     struct { int registered, offset, domain; } syncs[2];
     size_t emergencies;
 };
@@ -61,12 +65,16 @@ struct double_master {
     struct double_config configs[SLAVES];
     struct double_sdo sdos[4 * SLAVES];
     struct double_register registers[SLAVES];
-    int domain_count, config_count, sdo_count, register_count, active;
+    int domain_count, config_count, sdo_count, register_count, active, monitoring, monitored;
     uint64_t app_time;
 };
 
 static struct {
     int slaves, reserved, absent, redundancy, scanning, cable;
+    uint32_t spread;              /* OR of all 0x092C */
+    int64_t delay, sent;          /* [ns] from send to the frames' return */
+    int early;                    /* domains processed before their frames were back */
+    volatile int blocked;         /* position whose objects do not answer, plus one */
     uint64_t reference;           /* the reference clock as the last frame found it; 0: as told */
     slave all[SLAVES];
     char *record;
@@ -100,6 +108,19 @@ static int failure(const char *name)
     return strcmp(bus.fail, name) == 0 ? bus.fail_with : 0;
 }
 
+static int64_t monotonic(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
+}
+
+static void pause_a_little(void)
+{
+    struct timespec nap = {0, 1000000};
+    nanosleep(&nap, NULL);
+}
+
 /* ---- objects and drives */
 
 static object *find(slave *s, uint16_t index, uint8_t subindex)
@@ -123,8 +144,11 @@ static void make_drive(slave *s, int position)
     memset(s, 0, sizeof *s);
     s->al = PREOP;
     s->online = 1;
+    s->alias = position == 1 ? 7 : 0;
     add(s, 0x1000, 0, 32, 0x00020192);
     add(s, 0x1018, 1, 32, 0x000000AA);
+    add(s, 0x1C32, 1, 16, 1);
+    add(s, 0x1C32, 2, 32, 0);
     add(s, 0x603F, 0, 16, 0);
     add(s, 0x6040, 0, 16, 0);
     add(s, 0x6041, 0, 16, 0x0240);
@@ -205,7 +229,7 @@ ec_master_t *ecrt_request_master(unsigned int index)
 {
     note("request_master %u", index);
     if (bus.absent || bus.reserved) {
-        errno = bus.absent ? ENOENT : EBUSY;
+        errno = bus.absent ? bus.absent : EBUSY;
         return NULL;
     }
     bus.reserved = 1;
@@ -240,6 +264,21 @@ ec_domain_t *ecrt_master_create_domain(ec_master_t *m)
     return &m->domains[m->domain_count++];
 }
 
+static void find_slave(ec_slave_config_t *c)
+{
+    c->position = c->steps;
+    if (c->alias) {
+        for (c->position = 0; c->position < bus.slaves; c->position++)
+            if (bus.all[c->position].alias == c->alias)
+                break;
+        c->position += c->steps;
+    }
+    if (c->position >= bus.slaves) {
+        c->position = 0;
+        c->wrong = 1;
+    }
+}
+
 ec_slave_config_t *ecrt_master_slave_config(ec_master_t *m, uint16_t alias, uint16_t position,
                                             uint32_t vendor, uint32_t product)
 {
@@ -247,8 +286,9 @@ ec_slave_config_t *ecrt_master_slave_config(ec_master_t *m, uint16_t alias, uint
     note("slave_config %u %u %x %x", alias, position, vendor, product);
     if (failure("slave_config") || m->active)
         return NULL;
-    *c = (ec_slave_config_t){.position = position, .used = 1};
-    c->wrong = position >= bus.slaves || vendor != 0xAA || product != 0x402;
+    *c = (ec_slave_config_t){.used = 1, .alias = alias, .steps = position};
+    c->wrong = vendor != 0xAA || product != 0x402;
+    find_slave(c);
     return c;
 }
 
@@ -281,11 +321,15 @@ int ecrt_master_get_slave(ec_master_t *m, uint16_t position, ec_slave_info_t *in
     info->product_code = 0x402;
     info->revision_number = 1;
     info->serial_number = 100 + position;
-    info->alias = position == 1 ? 7 : 0;
+    info->alias = bus.all[position].alias;
+    if (bus.all[position].booting && --bus.all[position].booting == 0)
+        bus.all[position].al = PREOP;
     info->al_state = bus.all[position].al;
     info->error_flag = bus.all[position].error;
-    info->sync_count = 4;
+    info->sync_count = bus.all[position].plain ? 1 : 4;
     info->sdo_count = bus.all[position].count;
+    for (int k = 0; k < 2 && !bus.all[position].clockless; k++)
+        info->ports[k].receive_time = 1000 + k;
     info->ports[0].link.link_up = 1;
     info->ports[1].link.link_up = position + 1 < bus.slaves;
     strcpy(info->name, "Doubled Drive");
@@ -299,7 +343,7 @@ int ecrt_master_get_sync_manager(ec_master_t *m, uint16_t position, uint8_t sync
     if (position >= bus.slaves || sync >= 4)
         return -EINVAL;
     *info = (ec_sync_info_t){.index = sync, .dir = sync & 1 ? EC_DIR_INPUT : EC_DIR_OUTPUT,
-                             .n_pdos = sync >= 2};
+                             .n_pdos = sync >= 2 || bus.all[position].plain};
     return 0;
 }
 
@@ -307,6 +351,8 @@ int ecrt_master_get_pdo(ec_master_t *m, uint16_t position, uint8_t sync, uint16_
                         ec_pdo_info_t *info)
 {
     (void)m;
+    if (position < bus.slaves && bus.all[position].plain && sync == 0)
+        sync = 2;
     if (position >= bus.slaves || sync < 2 || sync > 3 || rank)
         return -EINVAL;
     *info = (ec_pdo_info_t){.index = bus.all[position].maps[sync - 2].pdo,
@@ -318,6 +364,8 @@ int ecrt_master_get_pdo_entry(ec_master_t *m, uint16_t position, uint8_t sync, u
                               uint16_t rank, ec_pdo_entry_info_t *info)
 {
     (void)m;
+    if (position < bus.slaves && bus.all[position].plain && sync == 0)
+        sync = 2;
     if (position >= bus.slaves || sync < 2 || sync > 3 || pdo)
         return -EINVAL;
     if (rank >= bus.all[position].maps[sync - 2].count)
@@ -333,6 +381,10 @@ static int upload(int position, uint16_t index, uint8_t subindex, uint8_t *targe
     *abort_code = 0;
     if (position >= bus.slaves)
         return -EINVAL;
+    if (bus.all[position].plain)
+        return -EPROTONOSUPPORT;
+    if (bus.all[position].al < PREOP)  /* as the real one: nobody answers in INIT */
+        return -EIO;
     if (o == NULL) {
         *abort_code = 0x06020000;
         return -EIO;
@@ -349,6 +401,8 @@ int ecrt_master_sdo_upload(ec_master_t *m, uint16_t position, uint16_t index, ui
 {
     (void)m;
     note("sdo_upload %u %04x:%02x", position, index, subindex);
+    while (bus.blocked == position + 1)
+        pause_a_little();
     return upload(position, index, subindex, target, size, result, abort_code);
 }
 
@@ -358,6 +412,8 @@ int ecrt_master_sdo_download(ec_master_t *m, uint16_t position, uint16_t index, 
     object *o = position < bus.slaves ? find(&bus.all[position], index, subindex) : NULL;
     (void)m;
     note("sdo_download %u %04x:%02x %zu", position, index, subindex, size);
+    while (bus.blocked == position + 1)
+        pause_a_little();
     *abort_code = 0;
     if (o == NULL || size != (size_t)(o->bits + 7) / 8) {
         *abort_code = o == NULL ? 0x06020000 : 0x06070010;
@@ -404,6 +460,8 @@ static void answer_requests(ec_master_t *m)
     for (int k = 0; k < m->sdo_count; k++) {
         ec_sdo_request_t *r = &m->sdos[k];
         uint32_t code;
+        if (!bus.all[r->position].online)
+            continue;             /* nobody looks at the requests of a device that is not there */
         if (r->state == EC_REQUEST_BUSY && --r->pending == 0)
             r->state = upload(r->position, r->index, r->subindex, r->data, r->room, &r->size, &code)
                 ? EC_REQUEST_ERROR : EC_REQUEST_SUCCESS;
@@ -413,6 +471,10 @@ static void answer_requests(ec_master_t *m)
         uint8_t *at = bus.all[r->position].registers + r->address % 0x1000;
         if (r->state != EC_REQUEST_BUSY || --r->pending)
             continue;
+        if (bus.all[r->position].unacknowledged) {
+            r->state = EC_REQUEST_ERROR;
+            continue;
+        }
         memcpy(r->write ? at : r->data, r->write ? r->data : at, r->size);
         r->state = EC_REQUEST_SUCCESS;
     }
@@ -429,6 +491,11 @@ static void climb(slave *s, int configured)
 status ecrt_master_send(ec_master_t *m)
 {
     note("send");
+    bus.sent = monotonic();
+    m->monitored = m->monitoring && bus.cable;
+    m->monitoring = 0;
+    for (int k = 0; k < bus.slaves; k++)
+        bus.all[k].unacknowledged -= bus.all[k].unacknowledged > 0;
     for (int k = 0; k < m->domain_count; k++) {
         ec_domain_t *d = &m->domains[k];
         d->counter = 0;
@@ -484,6 +551,7 @@ status ecrt_master_state(const ec_master_t *m, ec_master_state_t *state)
 int ecrt_master_link_state(const ec_master_t *m, unsigned int device, ec_master_link_state_t *state)
 {
     (void)m;
+    note("link_state %u", device);
     if (device > (bus.redundancy ? 1U : 0U))
         return -EINVAL;
     memset(state, 0, sizeof *state);
@@ -526,6 +594,19 @@ int ecrt_master_reference_clock_time(ec_master_t *m, uint32_t *time)
     note("reference_clock_time");
     *time = (uint32_t)(bus.reference ? bus.reference : m->app_time);
     return failure("reference_clock_time");
+}
+
+status ecrt_master_sync_monitor_queue(ec_master_t *m)
+{
+    note("sync_monitor_queue");
+    m->monitoring = 1;
+    DONE(0);
+}
+
+uint32_t ecrt_master_sync_monitor_process(ec_master_t *m)
+{
+    note("sync_monitor_process");
+    return m->monitored ? bus.spread & 0x7FFFFFFF : UINT32_MAX;
 }
 
 /* ---- configurations */
@@ -656,6 +737,10 @@ size_t ecrt_domain_size(const ec_domain_t *d) { return d->size; }
 status ecrt_domain_process(ec_domain_t *d)
 {
     note("process %d", (int)(d - the_master->domains));
+    d->early = bus.delay && monotonic() - bus.sent < bus.delay;
+    bus.early += d->early;
+    if (d->early)
+        DONE(0);
     for (int k = 0; k < the_master->config_count && d->arrived; k++) {
         ec_slave_config_t *c = &the_master->configs[k];
         if (c->syncs[1].registered && &the_master->domains[c->syncs[1].domain] == d)
@@ -675,9 +760,10 @@ status ecrt_domain_queue(ec_domain_t *d)
 status ecrt_domain_state(const ec_domain_t *d, ec_domain_state_t *state)
 {
     note("domain_state %d", (int)(d - the_master->domains));
-    state->working_counter = d->counter;
-    state->wc_state = d->counter == d->expected && d->expected ? EC_WC_COMPLETE
-                    : d->counter ? EC_WC_INCOMPLETE : EC_WC_ZERO;
+    int counter = d->early ? 0 : d->counter;
+    state->working_counter = counter;
+    state->wc_state = counter == d->expected && d->expected ? EC_WC_COMPLETE
+                    : counter ? EC_WC_INCOMPLETE : EC_WC_ZERO;
     state->redundancy_active = bus.redundancy;
     DONE(0);
 }
@@ -777,7 +863,35 @@ void double_cable(int plugged) { bus.cable = plugged; }
 void double_redundancy(int active) { bus.redundancy = active; }
 void double_reference(uint64_t time) { bus.reference = time; }
 int double_reserved(void) { return bus.reserved; }
-void double_state(int position, int al, int error) { bus.all[position].al = al; bus.all[position].error = error; }
+void double_state(int position, int al, int error)
+{
+    bus.all[position].al = al;
+    bus.all[position].error = error;
+    bus.all[position].unacknowledged = error ? 8 : 0;
+}
+void double_spread(uint32_t spread) { bus.spread = spread; }
+void double_delay(int microseconds) { bus.delay = 1000LL * microseconds; }
+int double_early(void) { int count = bus.early; bus.early = 0; return count; }
+void double_block(int position) { bus.blocked = position + 1; }
+void double_clockless(int position) { bus.all[position].clockless = 1; }
+void double_plain(int position) { bus.all[position].plain = 1; }
+void double_boot(int looks)
+{
+    for (int k = 0; k < bus.slaves; k++) {
+        bus.all[k].al = 1;
+        bus.all[k].booting = looks;
+    }
+}
+void double_alias(int position, int alias) { bus.all[position].alias = alias; }
+/* Two devices are plugged in the other way round. */
+void double_swap(int a, int b)
+{
+    slave between = bus.all[a];
+    bus.all[a] = bus.all[b];
+    bus.all[b] = between;
+    for (int k = 0; the_master && k < the_master->config_count; k++)
+        find_slave(&the_master->configs[k]);
+}
 void double_online(int position, int online)
 {
     bus.all[position].online = online;

@@ -139,6 +139,8 @@ status ecrt_master_sync_reference_clock_to(ec_master_t *m, uint64_t time);
 #endif
 status ecrt_master_sync_slave_clocks(ec_master_t *m);
 int ecrt_master_reference_clock_time(ec_master_t *m, uint32_t *time);
+status ecrt_master_sync_monitor_queue(ec_master_t *m);
+uint32_t ecrt_master_sync_monitor_process(ec_master_t *m);
 int ecrt_slave_config_sync_manager(ec_slave_config_t *c, uint8_t sync, ec_direction_t direction,
                                    ec_watchdog_mode_t watchdog);
 status ecrt_slave_config_watchdog(ec_slave_config_t *c, uint16_t divider, uint16_t intervals);

@@ -16,7 +16,7 @@ from catenary.errors import (
     NoDeviceError,
 )
 from catenary.igh import Master
-from catenary.igh import master as module
+from catenary.igh import refusal as module
 from tests.igh.double import Double
 
 
@@ -33,8 +33,8 @@ def node(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return path
 
 
-def refusal(double: Double) -> str:
-    double.absent(1)
+def refusal(double: Double, number: int = errno.ENOENT) -> str:
+    double.absent(number)
     with pytest.raises(LinkError) as caught:
         cat.MainDevice(Master(library=double.path)).open()
     return str(caught.value)
@@ -60,6 +60,17 @@ def test_no_permission(double: Double, node: Path, monkeypatch: pytest.MonkeyPat
     said = refusal(double)
     assert "no permission" in said
     assert "udevadm trigger" in said
+
+
+def test_no_network_interface(double: Double, node: Path) -> None:
+    said = refusal(double, errno.ENODEV)
+    assert "waits for its network interface" in said
+    assert "MASTER0_DEVICE" in said
+    assert "sudo systemctl restart ethercat" in said
+
+
+def test_a_kernel_that_refuses(double: Double, node: Path) -> None:
+    assert "dmesg | tail" in refusal(double, errno.EIO)
 
 
 def test_library_and_module_of_two_builds(double: Double, node: Path) -> None:
@@ -150,4 +161,15 @@ def test_nothing_is_left_reserved(double: Double, error: type[BaseException]) ->
     with pytest.raises(error):
         run()
     assert double.calls()[-2:] == ["deactivate", "release_master"]
+    assert double.reserved() == 0
+
+
+def test_a_device_that_is_gone_when_the_loop_begins(double: Double) -> None:
+    """Its place is empty: the master has found fewer devices since."""
+    with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
+        main.scan()
+        arm = cat.Drives(main.subs.drives, counts_per_turn=1000)
+        double.online(1, 0)
+        with pytest.raises(CatenaryError, match="device 1"), cat.Loop(arm):
+            pass
     assert double.reserved() == 0

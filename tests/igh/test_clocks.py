@@ -102,3 +102,62 @@ def test_a_reference_clock_can_be_chosen(main: cat.MainDevice, double: Double) -
     with cat.Loop(arm, reference=main.subs[1]):
         pass
     assert "select_reference_clock 1" in double.calls()
+
+
+@pytest.mark.parametrize("clock", ["main", "reference"])
+def test_the_watch_of_the_clocks(main: cat.MainDevice, double: Double, clock: str) -> None:
+    """Phase and the largest difference of every cycle, single differences one after the other."""
+    double.spread(300)
+    double.register(1, 0x092C, 0x00FA)
+    with loop_of(main, clock=clock) as loop:
+        loop.wait_locked(within=1e-6)
+        assert loop.clocks.locked
+        for _ in range(60):
+            next(loop)
+        assert loop.clocks.reference is main.subs[0]
+        assert loop.clocks.differences == {1: pytest.approx(250e-9)}
+        assert abs(loop.clocks.phase_error) < 1e-6
+        assert "device 1" in str(loop.clocks)
+        assert any(isinstance(event, cat.events.ClockLocked) for event in main.events)
+        double.spread(20_000)
+        for _ in range(100):
+            next(loop)
+        assert not loop.clocks.locked
+        assert any(isinstance(event, cat.events.ClockUnlocked) for event in main.events)
+
+
+def test_clocks_that_do_not_come_together_are_told(main: cat.MainDevice, double: Double) -> None:
+    double.spread(50_000)
+    with (
+        loop_of(main) as loop,
+        pytest.raises(cat.errors.ClockError, match=r"not within 1 us after 0\.2 s"),
+    ):
+        loop.wait_locked(within=1e-6, timeout=0.2)
+
+
+def test_a_silent_reference_is_asked_seldom(main: cat.MainDevice, double: Double) -> None:
+    """libethercat writes a line on stderr for each question without an answer."""
+    with loop_of(main) as loop:
+        double.fail(b"reference_clock_time", -6)
+        double.forget()
+        for _ in range(200):
+            next(loop)
+        assert loop.clocks.missed <= 18
+        assert not loop.clocks.locked
+        assert double.calls().count("reference_clock_time") <= 18
+
+
+def test_without_clocks_there_is_nothing_to_watch(main: cat.MainDevice) -> None:
+    with (
+        cat.Loop(cat.Drives(main.subs.drives, counts_per_turn=1000)) as loop,
+        pytest.raises(RuntimeError, match="no distributed clocks"),
+    ):
+        _ = loop.clocks
+
+
+def test_a_loop_without_clocks_after_one_with_them(main: cat.MainDevice, double: Double) -> None:
+    """The devices keep time again as they did before: else they would wait for SYNC0."""
+    with loop_of(main):
+        assert double.value(0, 0x1C32, 1) == 2
+    with cat.Loop(cat.Drives(main.subs.drives, counts_per_turn=1000)):
+        assert double.value(0, 0x1C32, 1) == 1

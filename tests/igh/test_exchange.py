@@ -85,3 +85,20 @@ def test_nothing_is_called_behind_the_end(doubles: dict[str, Path]) -> None:
         engine.run(3)
         assert double.calls() == []
         engine.stop()
+
+
+def test_answers_are_looked_for_when_they_are_there(doubles: dict[str, Path]) -> None:
+    """A domain that is processed too early is a line in the kernel's log: the naps learn. (Frames
+    take 400 us; a machine that stalls only makes looks later.)"""
+    double = Double(doubles["1.6.1"])
+    double.delay(400)
+    with cat.MainDevice(Master(library=double.path)) as main:
+        main.scan()
+        arm = cat.Drives(main.subs.drives, counts_per_turn=1000)
+        with cat.Loop(arm, period=4e-3, late_limit=0, priority=None) as loop:
+            for _ in range(60):
+                next(loop)
+            assert double.early() > 5  # it had to learn
+            for _ in range(60):
+                next(loop)
+            assert double.early() <= 5

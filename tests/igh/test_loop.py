@@ -225,12 +225,38 @@ def test_a_ring_of_the_masters(main: cat.MainDevice, double: Double) -> None:
         assert exchange.figures["link_up"] is True
 
 
-def test_the_plan_is_printed_and_clocks_are_the_masters(main: cat.MainDevice) -> None:
-    with cat.Loop(arm_of(main, dc=True)) as loop:
+def test_the_plan_is_printed(main: cat.MainDevice) -> None:
+    with cat.Loop(arm_of(main)) as loop:
         assert "SyncManager 2" in str(loop.plan)
         assert loop.timing.counters["lost"] >= 0
-        with pytest.raises(RuntimeError, match="the kernel master keeps the clocks"):
-            _ = loop.clocks
+
+
+def test_the_second_interface_is_asked_for_once(main: cat.MainDevice, double: Double) -> None:
+    """libethercat writes a line on stderr each time there is none."""
+    with cat.Loop(arm_of(main)) as loop:
+        for _ in range(100):
+            next(loop)
+        calls = double.calls()
+    assert calls.count("link_state 1") == 1
+    assert calls.count("link_state 0") > 1
+
+
+def test_an_error_that_is_not_acknowledged_hides_its_code(
+    main: cat.MainDevice, double: Double
+) -> None:
+    """The master refuses requests to a device in an error state: asked again, it tells."""
+    double.register(0, 0x0134, 0x001B)
+
+    def run() -> None:
+        with cat.Loop(arm_of(main)) as loop:
+            for cycle in loop:
+                if cycle.number == 5:
+                    double.forget()
+                    double.state(0, 4, 1)
+
+    with pytest.raises(cat.errors.StateError, match="0x001B"):
+        run()
+    assert sum(call == "reg_request_read 0 0134 2" for call in double.calls()) > 1
 
 
 def test_send_errors_of_new_libraries_are_counted(doubles: dict[str, Path]) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 import catenary as cat
 from catenary.errors import ConfigurationError, MailboxError, SdoAbort
-from catenary.igh import Master, SubDevice
+from catenary.igh import MainDevice, Master, SubDevice
 from catenary.types import UDINT, UINT
 from tests.igh.double import Double
 
@@ -138,3 +138,66 @@ def test_another_thread_asks_while_the_loop_runs(doubles: dict[str, Path]) -> No
                     break
             asking.join()
     assert found == [1000]
+
+
+def test_an_activated_master_without_cycles_is_not_asked(
+    main: cat.MainDevice, double: Double
+) -> None:
+    """The real one would wait in the kernel for ever, and the process with it."""
+    plan = main.plan(cat.Drives(main.subs.drives, counts_per_turn=1000))
+    main.configure(plan)
+    double.forget()
+    for ask in (
+        lambda: main.subs[0].sdo.read(0x6076),
+        lambda: main.subs[0].sdo.write(0x605A, 0, 6, type=UINT),
+    ):
+        with pytest.raises(ConfigurationError, match="only while cycles flow"):
+            ask()
+    assert double.calls() == []
+
+
+def test_a_request_that_nobody_serves_has_an_end(main: cat.MainDevice, double: Double) -> None:
+    """A device that is not there: its request stays busy in the kernel."""
+    one, two = (
+        cat.Drives([drive], counts_per_turn=1000, required=required)
+        for drive, required in zip(main.subs.drives, (True, False), strict=True)
+    )
+    with cat.Loop(one, two) as loop:
+        next(loop)
+        double.online(1, 0)
+        asked = main.subs[1].sdo.request(0x6076)
+        while not asked.done:
+            next(loop)
+        with pytest.raises(MailboxError, match="no answer within 10 s"):
+            asked.result()
+        double.online(1, 1)
+        again = main.subs[1].sdo.request(0x6076, type=UDINT)
+        while not again.done:
+            next(loop)
+        assert again.result() == 1000
+
+
+def test_a_device_that_does_not_answer_holds_nobody_else_up(doubles: dict[str, Path]) -> None:
+    """Calls that block wait in a thread of their device's own, and not for ever."""
+    double = Double(doubles["1.6.1"])
+    with cat.MainDevice(Master(library=double.path)) as main:
+        main.scan()
+        assert isinstance(main, MainDevice)
+        main.reservation.beside.timeout = 0.2
+        with loop_of(main, late_limit=0, priority=None) as loop:
+            double.block(0)
+            stuck = main.subs[0].sdo.request_write(0x605A, 0, 6, type=UINT)
+            behind = main.subs[0].sdo.request_write(0x6060, 0, b"\x08")
+            other = main.subs[1].sdo.request_write(0x605A, 0, 5, type=UINT)
+            while not other.done:
+                next(loop)
+            other.result()
+            while not (stuck.done and behind.done):
+                next(loop)
+            with pytest.raises(MailboxError, match="the kernel has not come back"):
+                stuck.result()
+            with pytest.raises(MailboxError, match="is still busy with SDO 0x605A:00"):
+                behind.result()
+            double.block(-1)
+    assert double.value(1, 0x605A, 0) == 5
+    assert double.reserved() == 0

@@ -1,6 +1,6 @@
 """MainDevice and SubDevice, and the runners of procedures."""
 
-from catenary.bus.carrier import Carrier
+from catenary.bus.carrier import Carrier, CycleClock
 from catenary.bus.lane_runner import Lane, LaneRunner
 from catenary.bus.main_device import MainDevice
 from catenary.bus.pending import Pending
@@ -13,6 +13,7 @@ from catenary.wire.sdo_information import ListType
 __all__ = [
     "BlockingRunner",
     "Carrier",
+    "CycleClock",
     "FrameCounts",
     "Lane",
     "LaneRunner",

@@ -58,8 +58,19 @@ class Exchange:
         epoch_ns: int,
         bandwidth: float,
         rate_limit_ns: float,
+        bound_ns: int,
     ) -> None:
-        """Whom the clocks follow. Before the first cycle."""
+        """Whom the clocks follow, and how close counts as together. Before the first cycle."""
+
+    def clock_figures(self) -> dict[str, float]:
+        """As `core.Clock.figures`, as far as libethercat tells; spread, worst_spread: what all
+        devices together say of their difference [ns], at least the largest, below twice that."""
+
+    def keep_within(self, bound_ns: int) -> None: ...
+    def reset_clock_figures(self) -> None: ...
+    @property
+    def clock_changes(self) -> int:
+        """How often the clocks came together or apart."""
 
     @property
     def capsule(self) -> object: ...

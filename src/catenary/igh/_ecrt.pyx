@@ -66,6 +66,18 @@ cdef extern from "exchange.h" nogil:
         uint64_t clock_misses
         uint64_t send_errors
         uint64_t receive_errors
+        int64_t app_time
+        int64_t sent
+        int64_t bound
+        double mean_error
+        double mean_spread
+        int64_t worst_error
+        int64_t spread
+        int64_t worst_spread
+        uint64_t silent
+        uint64_t jumps
+        uint64_t changes
+        uint8_t locked
 
     int64_t igh_now(void *self)
     int igh_wait_until(void *self, int64_t deadline, int wake_on_frame)
@@ -93,6 +105,8 @@ cdef extern from *:
         c->domain_state.says = (int (*)(void *, void *))at[8];
         c->master_state.says = (int (*)(void *, void *))at[9];
         c->reference_clock_time = (int (*)(void *, uint32_t *))at[10];
+        c->monitor_queue.says = (int (*)(void *))at[11];
+        c->monitor_process = (uint32_t (*)(void *))at[12];
     }
     static void igh_exchange_calls(igh_exchange *x, int returns, void *const *at)
     {
@@ -106,10 +120,11 @@ CALLS = (
     "ecrt_master_sync_reference_clock", "ecrt_master_sync_slave_clocks",
     "ecrt_master_application_time", "ecrt_master_sync_reference_clock_to", "ecrt_domain_state",
     "ecrt_master_state", "ecrt_master_reference_clock_time",
+    "ecrt_master_sync_monitor_queue", "ecrt_master_sync_monitor_process",
 )
 CLOCKS = {None: IGH_NO_CLOCK, "reference": IGH_FOLLOW_REFERENCE, "main": IGH_FOLLOW_MAIN}
 cdef enum:
-    CALL_COUNT = 11
+    CALL_COUNT = 13
     PADDING = 16               # bytes behind an image, as core has
 
 
@@ -216,7 +231,8 @@ cdef class Exchange:
         return place + 1
 
     def keep_clocks(self, follow, int64_t period_ns, int64_t epoch_ns, double bandwidth,
-                    double rate_limit_ns):
+                    double rate_limit_ns, int64_t bound_ns):
+        self.c.bound = bound_ns
         self.c.clock = CLOCKS[follow]
         self.c.period = period_ns
         self.c.epoch = epoch_ns
@@ -240,6 +256,34 @@ cdef class Exchange:
             "rate_ns": self.c.rate,
             "offset_ns": self.c.time.offset,
         }
+
+    def clock_figures(self):
+        return {
+            "locked": bool(self.c.locked),
+            "bound": self.c.bound,
+            "time": self.c.app_time + self.c.epoch + self.c.phase_error,
+            "time_sent": self.c.sent,
+            "error": self.c.phase_error,
+            "mean_error": self.c.mean_error,
+            "worst_error": self.c.worst_error,
+            "rate": self.c.rate / max(1, self.c.period),
+            "samples": self.c.clock_reads,
+            "missed": self.c.clock_misses,
+            "silent": self.c.silent,
+            "jumps": self.c.jumps,
+            "spread": self.c.mean_spread,
+            "worst_spread": self.c.worst_spread,
+        }
+
+    def keep_within(self, int64_t bound_ns):
+        self.c.bound = bound_ns
+
+    def reset_clock_figures(self):
+        self.c.worst_error = self.c.worst_spread = 0
+
+    @property
+    def clock_changes(self):
+        return self.c.changes
 
     def step(self):
         """One collect and one emit in the caller's thread, GIL released: for the benchmark."""

@@ -177,6 +177,8 @@ CALLS: Final = MappingProxyType(
         "ecrt_master_sync_reference_clock_to": "r p u64",
         "ecrt_master_sync_slave_clocks": "r p",
         "ecrt_master_reference_clock_time": "s32 p p",
+        "ecrt_master_sync_monitor_queue": "r p",
+        "ecrt_master_sync_monitor_process": "u32 p",
         "ecrt_slave_config_sync_manager": "s32 p u8 u32 u32",
         "ecrt_slave_config_watchdog": "r p u16 u16",
         "ecrt_slave_config_pdos": "s32 p u32 p",

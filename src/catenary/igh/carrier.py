@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from catenary.bus.event import LinkLost, LinkRestored
-from catenary.errors import CatenaryError, IdentityError, StateError
+from catenary.errors import CatenaryError, IdentityError, RegisterError, StateError
 from catenary.igh import abi
+from catenary.igh.clock import KernelClock
 from catenary.igh.configure import Configuration
+from catenary.igh.sub_device import SubDevice
 from catenary.procedure.exchange import Procedure, after
 from catenary.procedure.survey import Answer
 from catenary.wire.al import State, status_code
-from catenary.wire.register import AL_STATUS_CODE
+from catenary.wire.register import AL_STATUS_CODE, SYSTEM_TIME_DIFFERENCE
 
 if TYPE_CHECKING:
     from catenary.igh.main_device import MainDevice
 
 OP_TIMEOUT = 20.0  # [s]: the master configures one device after the other
 LOOK = 0.005  # [s] between two looks
+CODE_TIMEOUT, CODE_LOOK = 0.5, 0.010  # [s]: how long, how often a device in error is asked why
 EMERGENCY_SIZE = 8
 LINKS = 2  # the main one and the backup
 
@@ -32,10 +36,18 @@ class KernelCarrier:
         self._main = main
         self._library = main.reservation.library
         self._links: list[bool | None] = [None] * LINKS
+        self._link_count = LINKS
+        clock = configuration.clock
+        self._clock = None if clock is None else KernelClock(configuration.exchange, clock)
 
     @property
     def image(self) -> object:
         return self.configuration.exchange.capsule
+
+    @property
+    def clock(self) -> KernelClock | None:
+        """What it knows of the clocks."""
+        return self._clock
 
     def end(self) -> None:
         """No call is made any more."""
@@ -57,12 +69,18 @@ class KernelCarrier:
             waiting = [p for p in waiting if not self.state(p).operational]
             if not waiting:
                 return
-            refusing = [p for p in waiting if self._main.reservation.slave(p).error_flag]
+            refusing = [p for p in waiting if self._refuses(p)]
             if refusing:
                 waiting = refusing
                 break
             yield after(LOOK)
         raise (yield from self._not_in_op(waiting))
+
+    def _refuses(self, position: int) -> bool:
+        """Whether the master has given it up."""
+        if not self.state(position).online:
+            return False
+        return bool(self._main.reservation.slave(self._main.place_of(position)).error_flag)
 
     def survey(self) -> Procedure[list[Answer]]:
         """Who answers, and from which state; the reason of those that are not in OP."""
@@ -88,14 +106,32 @@ class KernelCarrier:
             ):
                 self._main.hear(device.position, target.raw)
         self._look_at_links()
+        yield from self._read_difference()
+
+    def _read_difference(self) -> Procedure[None]:
+        """What one device differs from the reference clock, in turns."""
         yield after(0)
+        position = None if self._clock is None else self._clock.next_device()
+        if position is None or self._clock is None or not self.state(position).operational:
+            return
+        register = SYSTEM_TIME_DIFFERENCE
+        with contextlib.suppress(RegisterError):  # it has told nothing this time
+            self._clock.note(
+                position, (yield from self._sub(position).read_register(register.address, 4))
+            )
+
+    def _sub(self, position: int) -> SubDevice:
+        sub = self._main.subs[position]
+        assert isinstance(sub, SubDevice)  # as every scan of a kernel master makes them
+        return sub
 
     def _look_at_links(self) -> None:
         handle = self._main.reservation.handle
-        for number in range(LINKS):
+        for number in range(self._link_count):
             state = abi.MasterState()
             found = self._library.ecrt_master_link_state(handle, number, ctypes.byref(state))
-            if found < 0:  # there is no such interface
+            if found < 0:  # no such interface: asked once, for libethercat complains on stderr
+                self._link_count = number
                 return
             before, self._links[number] = self._links[number], bool(state.link_up)
             if before is None or before == bool(state.link_up):
@@ -108,19 +144,31 @@ class KernelCarrier:
             self._main.events.put(kind(now, None, message, (None, end)))
 
     def _status_code(self, position: int) -> Procedure[int]:
-        sub = self._main.subs[position]
-        try:
-            data = yield from sub.read_register(  # type: ignore[attr-defined]
-                AL_STATUS_CODE.address, AL_STATUS_CODE.size
-            )
-        except CatenaryError:
-            return 0  # it is told as unknown
-        return AL_STATUS_CODE.unpack(data)
+        """0: unknown. The master refuses requests until it has acknowledged the error."""
+        sub = self._sub(position)
+        deadline = self._main.link.now() + round(CODE_TIMEOUT * 1e9)
+        while self._main.link.now() < deadline:
+            try:
+                data = yield from sub.read_register(AL_STATUS_CODE.address, AL_STATUS_CODE.size)
+                return AL_STATUS_CODE.unpack(data)
+            except CatenaryError:
+                yield after(CODE_LOOK)
+        return 0
 
     def _not_in_op(self, waiting: Sequence[int]) -> Procedure[CatenaryError]:
         """Why the first of them is not there."""
         sub = self._main.subs[waiting[0]]
-        info = self._main.reservation.slave(sub.position)
+        try:
+            info = self._main.reservation.slave(self._main.place_of(sub.position))
+        except CatenaryError as error:
+            return StateError(
+                f"{sub.station} did not reach OP: it is not there any more ({error})",
+                position=sub.position,
+                requested=int(State.OP),
+                actual=0,
+                code=0,
+                hint="look at its cable and power: ethercat slaves",
+            )
         expected, found = sub.identity[:2], (info.vendor_id, info.product_code)
         if expected != found:
             return IdentityError(
@@ -142,6 +190,7 @@ class KernelCarrier:
             requested=int(State.OP),
             actual=state,
             code=code,
-            hint=status_code(code).cause
-            or f"ethercat config -v -p {sub.position} shows what was configured, dmesg what failed",
+            hint=(status_code(code).cause if code else "")
+            or "dmesg | grep EtherCAT has the AL status code, which libethercat does not tell of a "
+            f"device in error; ethercat config -v -p {sub.position} what was configured",
         )

@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 from catenary.errors import SdoAbort
 from catenary.igh import abi
 from catenary.igh._ecrt import Exchange
+from catenary.igh.address import Address, addresses
 from catenary.igh.master import Reservation
-from catenary.model.device import Direction, Pdo
+from catenary.model.device import DeviceDescription, Direction, Pdo
 from catenary.plan.cycle import ClockPlan
 from catenary.plan.layout import UnitLayout
 from catenary.plan.make import Plan
@@ -43,6 +44,7 @@ class DeviceConfiguration:
     """The master's handles for one device; they live until the master is deactivated."""
 
     position: int
+    address: Address
     config: int
     sdo_request: int  # 0: it speaks no CoE
     register_request: int
@@ -55,25 +57,29 @@ class Configuration:
     devices: tuple[DeviceConfiguration, ...]
     domains: tuple[Domain, ...]
     exchange: Exchange
+    clock: ClockPlan | None
 
 
-def configure(master: Reservation, plan: Plan, coe: Sequence[bool], epoch_ns: int) -> Configuration:
-    """Tells the master everything and activates it. `coe`: which devices have objects. After an
-    error or an interruption the master is reserved as before, and nothing of it is left."""
+def configure(
+    master: Reservation, plan: Plan, found: Sequence[DeviceDescription], epoch_ns: int
+) -> Configuration:
+    """Tells the master everything and activates it. `found`: all devices. After an error or an
+    interruption the master is reserved as before, and nothing of it is left."""
     try:
-        return _configured(master, plan, coe, epoch_ns)
+        return _configured(master, plan, found, epoch_ns)
     except BaseException:
         master.renew()
         raise
 
 
 def _configured(
-    master: Reservation, plan: Plan, coe: Sequence[bool], epoch_ns: int
+    master: Reservation, plan: Plan, found: Sequence[DeviceDescription], epoch_ns: int
 ) -> Configuration:
     domains = [_domain(master, unit) for unit in plan.layout.units]
+    named = addresses([each.alias for each in found])
     devices = [
-        _device(master, device, domains, plan, speaks)
-        for device, speaks in zip(plan.devices, coe, strict=True)
+        _device(master, device, named[device.position], domains, plan, there.coe)
+        for device, there in zip(plan.devices, found, strict=True)
     ]
     clock = plan.cycle.clock
     if clock is not None and clock.reference:
@@ -88,9 +94,9 @@ def _configured(
     sizes = (plan.cycle.output_size, plan.cycle.input_size)
     exchange = Exchange(master.time, master.library, master.handle, domains, *sizes)
     if clock is not None:
-        limit = clock.rate_limit_ns
-        exchange.keep_clocks(clock.follow, plan.cycle.period_ns, epoch_ns, clock.bandwidth, limit)
-    return Configuration(tuple(devices), tuple(domains), exchange)
+        bounds = (clock.bandwidth, clock.rate_limit_ns, clock.bound_ns)
+        exchange.keep_clocks(clock.follow, plan.cycle.period_ns, epoch_ns, *bounds)
+    return Configuration(tuple(devices), tuple(domains), exchange, clock)
 
 
 def _domain(master: Reservation, unit: UnitLayout) -> Domain:
@@ -101,12 +107,17 @@ def _domain(master: Reservation, unit: UnitLayout) -> Domain:
 
 
 def _device(
-    master: Reservation, plan: DevicePlan, domains: Sequence[Domain], whole: Plan, coe: bool
+    master: Reservation,
+    plan: DevicePlan,
+    address: Address,
+    domains: Sequence[Domain],
+    whole: Plan,
+    coe: bool,
 ) -> DeviceConfiguration:
     library = master.library
     identity = plan.identity
     config = library.ecrt_master_slave_config(
-        master.handle, 0, plan.position, identity.vendor, identity.product
+        master.handle, *address, identity.vendor, identity.product
     )
     who = f"device {plan.position} ({plan.name})"
     if not config:
@@ -128,7 +139,7 @@ def _device(
     if coe:
         sdo = library.ecrt_slave_config_create_sdo_request(config, 0x1000, 0, REQUEST_SIZE)
     register = library.ecrt_slave_config_create_reg_request(config, REGISTER_SIZE)
-    return DeviceConfiguration(plan.position, config, sdo or 0, register or 0)
+    return DeviceConfiguration(plan.position, address, config, sdo or 0, register or 0)
 
 
 def _tell_process_data(master: Reservation, plan: DevicePlan, config: int, who: str) -> None:

@@ -1,10 +1,12 @@
 """What the master knows of a device → its description, as a scan of our own would give it.
 
-The library does not tell everything: entries have no names and no types, SyncManagers no addresses,
-and whether a device has distributed clocks is not said. What is left open here the master decides.
+The library does not tell everything: entries have no names and no types, SyncManagers no addresses.
+What is left open here the master decides.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 from catenary.errors import MailboxError, SdoAbort
 from catenary.igh import abi
@@ -26,6 +28,7 @@ from catenary.wire.sii_categories import SyncManagerUse
 DEVICE_TYPE, MODULE_PROFILES = 0x1000, 0xF010
 STATUSWORD, SLOT_STRIDE, SLOTS_MAX = 0x6041, 0x800, 16
 PROFILE_DRIVE, PROFILE_MODULAR = 402, 5001
+SYNC_OBJECTS = (0x1C32, 0x1C33)  # :01 is how a device keeps time with the bus
 MAILBOXES = 2  # SyncManagers 0 and 1 of a device with a mailbox
 STATION_BASE = 0x03E9  # 1001, as our own scans: the master keeps its addresses to itself
 
@@ -48,9 +51,11 @@ MAILBOX = MailboxLayout(0, 0, 0, 0, MailboxProtocol.COE, pdo_assign=True, pdo_co
 def describe(master: Reservation, position: int) -> DeviceDescription:
     """The description of one device."""
     info = master.slave(position)
-    device_type = read_if_there(master, position, DEVICE_TYPE)
+    syncs = [master.sync_manager(position, index) for index in range(info.sync_count)]
+    mailbox = _may_have_mailbox(syncs)
+    device_type = read_if_there(master, position, DEVICE_TYPE) if mailbox else None
     coe = device_type is not None
-    managers, outputs, inputs = _process_data(master, info, coe)
+    managers, outputs, inputs = _process_data(master, position, syncs, coe)
     number = None if not device_type else int.from_bytes(device_type[:4], "little")
     identity = Identity(info.vendor_id, info.product_code, info.revision_number, info.serial_number)
     name = info.name.decode("latin-1").strip()
@@ -69,7 +74,7 @@ def describe(master: Reservation, position: int) -> DeviceDescription:
         output_pdos=outputs,
         input_pdos=inputs,
         open_ports=(links[0], links[1], links[2], links[3]),
-        system_time=True,
+        system_time=any(port.receive_time for port in info.ports),  # latched where there are clocks
         device_type=number,
         slots=_slots(master, position, number),
         mapping_source="IgH master",
@@ -96,21 +101,27 @@ def object_information(
     return ObjectInformation(index, subindex, 8 * len(data or b""))
 
 
+def _may_have_mailbox(syncs: Sequence[abi.SyncInfo]) -> bool:
+    """Whether the first two SyncManagers carry no PDOs: who is asked for an object without a
+    mailbox makes libethercat and the kernel complain, on stderr and in the log."""
+    directions = [sync.dir for sync in syncs[:MAILBOXES] if not sync.n_pdos]
+    return directions == [abi.DIRECTION_OUTPUT, abi.DIRECTION_INPUT]
+
+
 def _process_data(
-    master: Reservation, info: abi.SlaveInfo, coe: bool
+    master: Reservation, position: int, syncs: Sequence[abi.SyncInfo], coe: bool
 ) -> tuple[tuple[SyncManager, ...], tuple[Pdo, ...], tuple[Pdo, ...]]:
     """SyncManagers, and the PDOs assigned to those of outputs and of inputs."""
     managers = []
     pdos: dict[SyncManagerUse, list[Pdo]] = {SyncManagerUse.OUTPUTS: [], SyncManagerUse.INPUTS: []}
-    for index in range(info.sync_count):
-        sync = master.sync_manager(info.position, index)
+    for index, sync in enumerate(syncs):
         use = SyncManagerUse.OUTPUTS
         if sync.dir == abi.DIRECTION_INPUT:
             use = SyncManagerUse.INPUTS
         if coe and index < MAILBOXES:
             use = SyncManagerUse(index + 1)
         else:
-            pdos[use] += _pdos(master, info.position, index, sync.n_pdos)
+            pdos[use] += _pdos(master, position, index, sync.n_pdos)
         managers.append(SyncManager(index, use, start=0, length=0, control=0))
     outputs, inputs = pdos.values()
     return tuple(managers), tuple(outputs), tuple(inputs)

@@ -22,6 +22,9 @@
 #define IGH_COMPLETE 2u               /* wc_state of ec_domain_state_t */
 #define IGH_NAP_NS 20000              /* between two looks for what has not come back */
 #define IGH_PATIENCE_FIRST_NS 50000
+#define IGH_PATIENCE_DECAY 14         /* of patience, a cycle: 2^-14 */
+#define IGH_SILENT 16u                /* misses in a row: the reference clock is not there */
+#define IGH_SILENT_EVERY 1024u        /* cycles between two questions to one that is not */
 #define IGH_MISSED_MAX 1000000000u
 
 /* The calls of a cycle. Those that return nothing before 1.6.0 have two shapes. */
@@ -35,6 +38,8 @@ typedef struct igh_calls {
     igh_call_time application_time, sync_reference_clock_to;
     igh_call_state domain_state, master_state;
     int (*reference_clock_time)(void *, uint32_t *);
+    igh_call monitor_queue;
+    uint32_t (*monitor_process)(void *);
 } igh_calls;
 
 static inline int igh_do(const igh_calls *calls, igh_call call, void *who)
@@ -110,6 +115,12 @@ typedef struct igh_exchange {
     double rate, rate_limit, bandwidth;
     int64_t phase_error;              /* reference less application time, of the last cycle [ns] */
     uint64_t clock_reads, clock_misses, send_errors, receive_errors;
+
+    int64_t bound;                    /* of phase and differences, for `locked` [ns] */
+    double mean_error, mean_spread;   /* over some 16 cycles [ns] */
+    int64_t worst_error, spread, worst_spread;
+    uint64_t spread_reads, silent, jumps, changes;   /* silent: misses in a row */
+    uint8_t locked;
 } igh_exchange;
 
 /* ---- time */
@@ -200,6 +211,7 @@ static void igh_tell_clocks(igh_exchange *x)
             igh_do(calls, calls->sync_reference_clock, x->master);
     }
     igh_do(calls, calls->sync_slave_clocks, x->master);
+    igh_do(calls, calls->monitor_queue, x->master);
 }
 
 static double igh_limited(double value, double limit)
@@ -207,23 +219,50 @@ static double igh_limited(double value, double limit)
     return value > limit ? limit : value < -limit ? -limit : value;
 }
 
-/* The reference clock's time came back: 32 bits of it. Our clock runs after it, by a critically
- * damped loop of which neither the rate nor the correction of one period leaves the limit.
+/* Whether the reference clock's time is to be asked for: libethercat complains on stderr of every
+ * question that has no answer, so a clock that stays silent is asked now and then. */
+static int igh_asks_reference(const igh_exchange *x)
+{
+    return x->silent < IGH_SILENT || x->serial % IGH_SILENT_EVERY == 0;
+}
+
+static int64_t igh_larger(int64_t a, int64_t b)
+{
+    return llabs(a) > llabs(b) ? a : b;
+}
+
+/* What all devices together say of their difference (a broadcast of 0x092C: the OR of all, at least
+ * the largest, less than twice that). All ones: not back. */
+static void igh_note_spread(igh_exchange *x)
+{
+    uint32_t spread = x->calls.monitor_process(x->master);
+    if (spread == UINT32_MAX)
+        return;
+    x->spread = spread;
+    x->worst_spread = igh_larger(x->worst_spread, spread);
+    x->mean_spread = x->spread_reads ? x->mean_spread + (spread - x->mean_spread) / 16 : spread;
+    x->spread_reads++;
+}
+
+/* Together: differences, and where the instants follow their phase, within the bound. Where the
+ * reference follows, its own difference is among those of all devices. */
+static void igh_judge_clocks(igh_exchange *x)
+{
+    int in_phase = x->clock == IGH_FOLLOW_MAIN
+                   || (x->clock_reads >= 16 && llabs((int64_t)x->mean_error) <= x->bound);
+    int locked = in_phase && x->spread_reads >= 16 && x->mean_spread <= (double)x->bound
+                 && x->silent < IGH_SILENT;
+    x->changes += locked != x->locked;
+    x->locked = (uint8_t)locked;
+}
+
+/* Our clock runs after the reference, by a critically damped loop of which neither the rate nor the
+ * correction of one period leaves the limit.
  * An error beyond an eighth of the period is no drift: the master has not set the clocks yet, which
  * it has done by OP; after that it is gone after, as fast as the limit lets, and nothing learnt. */
 static void igh_follow(igh_exchange *x)
 {
-    uint32_t time;
-    double error, correction;
-    if (x->calls.reference_clock_time(x->master, &time) < 0) {
-        x->clock_misses++;
-        return;
-    }
-    x->clock_reads++;
-    x->phase_error = (int32_t)(time - (uint32_t)(x->app_time + x->epoch));
-    if (x->clock != IGH_FOLLOW_REFERENCE)
-        return;
-    error = (double)x->phase_error;
+    double error = (double)x->phase_error, correction;
     if (8 * llabs(x->phase_error) <= x->period) {
         x->rate += x->bandwidth * x->bandwidth * error;
         x->rate = igh_limited(x->rate, x->rate_limit);
@@ -232,6 +271,36 @@ static void igh_follow(igh_exchange *x)
     }
     correction = igh_limited(x->rate + 2 * x->bandwidth * error, x->rate_limit);
     x->time->offset += (int64_t)correction;
+}
+
+/* The reference clock's time came back: 32 bits of it. */
+static void igh_note_reference(igh_exchange *x, uint32_t time)
+{
+    x->phase_error = (int32_t)(time - (uint32_t)(x->app_time + x->epoch));
+    x->mean_error = x->clock_reads ? x->mean_error + ((double)x->phase_error - x->mean_error) / 16
+                                   : (double)x->phase_error;
+    x->worst_error = igh_larger(x->worst_error, x->phase_error);
+    x->clock_reads++;
+    x->silent = 0;
+    if (8 * llabs(x->phase_error) > x->period && x->al_status == IGH_OP)
+        x->jumps++;
+}
+
+static void igh_attend_clocks(igh_exchange *x)
+{
+    uint32_t time;
+    igh_note_spread(x);
+    if (igh_asks_reference(x)) {
+        if (x->calls.reference_clock_time(x->master, &time) < 0) {
+            x->clock_misses++;
+            x->silent++;
+        } else {
+            igh_note_reference(x, time);
+            if (x->clock == IGH_FOLLOW_REFERENCE)
+                igh_follow(x);
+        }
+    }
+    igh_judge_clocks(x);
 }
 
 /* ---- the image table */
@@ -330,7 +399,9 @@ static void igh_judge(igh_exchange *x)
     x->link_up = state.bits >> 4 & 1;
 }
 
-/* Threaded: naps as long as answers took lately, then looks now and then until the deadline. */
+/* Threaded: naps as long as answers take, then looks now and then until the deadline. A look that
+ * comes too early costs a line in the kernel's log ("working counter changes"): so one makes all
+ * later naps longer by a step, and only thousands of good ones make them shorter. */
 static int igh_collect(void *self, int64_t deadline)
 {
     igh_exchange *x = self;
@@ -344,17 +415,17 @@ static int igh_collect(void *self, int64_t deadline)
     }
     missing = igh_look(x);
     if (deadline != 0 && missing == 0)
-        x->patience -= x->patience >> 8;
+        x->patience -= x->patience >> IGH_PATIENCE_DECAY;
     while (missing > 0 && igh_now(x->time) < deadline) {
         look = igh_now(x->time) + IGH_NAP_NS;
         igh_wait_until(x->time, look < deadline ? look : deadline, 0);
         missing = igh_look(x);
-        if (missing == 0)
-            x->patience = x->frame_stamp - x->sent;
+        if (missing == 0 && x->patience < x->frame_stamp - x->sent)
+            x->patience += IGH_NAP_NS;
     }
     igh_judge(x);
     if (x->clock != IGH_NO_CLOCK && !x->collected && missing == 0)
-        igh_follow(x);
+        igh_attend_clocks(x);
     x->collected = missing == 0;
     return (int)missing;
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import struct
 from collections.abc import Collection, Sequence
 from dataclasses import replace
@@ -10,10 +11,11 @@ from typing import TYPE_CHECKING, NoReturn
 from catenary import bus
 from catenary.bus import SubDevices, event
 from catenary.bus.main_device import LEAVE_TIMEOUT
-from catenary.errors import ConfigurationError, LoopError, NoDeviceError
+from catenary.errors import ConfigurationError, LoopError, NoDeviceError, SdoAbort, SegmentError
+from catenary.igh.address import place
 from catenary.igh.carrier import KernelCarrier
 from catenary.igh.configure import Configuration, DeviceConfiguration, configure
-from catenary.igh.describe import describe, object_information
+from catenary.igh.describe import SYNC_OBJECTS, describe, object_information, read_if_there
 from catenary.igh.master import Master, Reservation
 from catenary.igh.sub_device import SubDevice
 from catenary.model.device import DeviceDescription, Direction, Identity, mapped_entries
@@ -60,7 +62,9 @@ class MainDevice(bus.MainDevice):
         """The devices that the master has found; it has brought them to PRE-OP. NoDeviceError where
         there are none. Handles of devices that are still there stay the same objects."""
         self._refuse_beside_loop()
-        found = [describe(self.reservation, p) for p in range(self.reservation.device_count())]
+        count = self.reservation.device_count()
+        self.reservation.wait_preop(count)
+        found = [describe(self.reservation, position) for position in range(count)]
         if not found:
             raise NoDeviceError(
                 f"{self.reservation.name}: the master finds no device",
@@ -97,11 +101,30 @@ class MainDevice(bus.MainDevice):
                 f"{self.reservation.name} is activated already: nothing can be configured any more",
                 hint="leave the loop that runs, or main.leave()",
             )
-        coe = [sub.description.coe for sub in self.subs]
+        for sub, device in zip(self.subs, plan.devices, strict=True):
+            self._keep_sync_types(sub, clocked=device.sync is not None)
+        found = [sub.description for sub in self.subs]
         self.clock_epoch_ns = self._epoch_ns()
-        configuration = configure(self.reservation, plan, coe, self.clock_epoch_ns)
+        configuration = configure(self.reservation, plan, found, self.clock_epoch_ns)
         self._kernel = KernelCarrier(self, configuration)
         self.carrier = self._kernel
+
+    def _keep_sync_types(self, sub: bus.SubDevice, *, clocked: bool) -> None:
+        """A device that was told to go by SYNC0 waits for it, in a loop without clocks too: how it
+        kept time before is remembered, and told it again."""
+        if not sub.description.coe:
+            return
+        if clocked and not sub.sync_types:
+            found = {
+                index: read_if_there(self.reservation, sub.position, index, 1) or b""
+                for index in SYNC_OBJECTS
+            }
+            sub.sync_types = {index: kind for index, kind in found.items() if kind}
+        elif not clocked:
+            for index, kind in sub.sync_types.items():
+                with contextlib.suppress(SdoAbort):  # it does not let it be written
+                    self.reservation.download(sub.position, index, 1, kind)
+            sub.sync_types = {}
 
     def leave(self, *, timeout: float = LEAVE_TIMEOUT) -> None:
         """Ends the operation of the master: it brings the devices back to PRE-OP by itself."""
@@ -111,6 +134,7 @@ class MainDevice(bus.MainDevice):
         kernel.end()
         what = f"deactivating master {self.reservation.index}"
         self.reservation.ask("ecrt_master_deactivate", what=what)
+        self.reservation.beside.end()
         for sub in self.subs:
             sub.state = State.PRE_OP
 
@@ -122,6 +146,30 @@ class MainDevice(bus.MainDevice):
     def configuration_of(self, position: int) -> DeviceConfiguration | None:
         """The master's handles for a device; None: it is not activated."""
         return None if self._kernel is None else self._kernel.configuration.devices[position]
+
+    def place_of(self, position: int) -> int:
+        """Where a device is now: in operation one that has an alias, or is behind one, may have
+        been plugged in elsewhere. SegmentError where it is nowhere."""
+        device = self.configuration_of(position)
+        if device is None or not device.address.alias:
+            return position
+        found = place(device.address, self.reservation.aliases())
+        if found is None:
+            raise SegmentError(
+                f"{self.subs[position].station} is nowhere on the segment: no device has the alias "
+                f"{device.address.alias} that leads to it",
+                hint="ethercat slaves shows the aliases; plug it in again",
+            )
+        return found
+
+    def refuse_blocking(self, position: int) -> None:
+        """ConfigurationError where a call would wait for ever: an activated master answers through
+        the frames of its application, and nobody sends them."""
+        if self._kernel is not None and not self.cycling:
+            raise ConfigurationError(
+                f"device {position}: the master is activated, and answers only while cycles flow",
+                hint="read and write objects before it is activated, or in a Loop",
+            )
 
     def same_configuration(self, device: DeviceConfiguration) -> None:
         """LoopError where the handles are gone: the loop has ended meanwhile."""

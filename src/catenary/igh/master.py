@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 import ctypes
-import errno
 import os
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
-from catenary.errors import CatenaryError, LinkError, MailboxError, SdoAbort, SegmentError
+from catenary.errors import CatenaryError, LinkError, SegmentError
 from catenary.igh import abi
 from catenary.igh._ecrt import KernelTime
+from catenary.igh.beside import Beside
 from catenary.igh.library import Library
-from catenary.wire.abort import abort_code
+from catenary.igh.refusal import refused, sdo_error
+from catenary.wire.al import State
 
 if TYPE_CHECKING:
     from catenary.igh.main_device import MainDevice
 
-NODE = "/dev/EtherCAT{}"
-MODULE = Path("/sys/module/ec_master")
 SCAN_TIMEOUT = 30.0  # [s]: some devices answer their first SDO after seconds
 EMPTY_TIMEOUT = 3.0  # [s]: a link that has just come up finds its devices within a second
+PREOP_TIMEOUT = 15.0  # [s] from the last user's OP back to PRE-OP; the master itself waits 10
 LOOK = 0.010  # [s] between two looks
 UPLOAD_LIMIT = 1 << 16  # bytes of an object
 
@@ -66,6 +65,7 @@ class Reservation:
         self.index = index
         self.time = time
         self.handle = 0
+        self.beside = Beside()
         self.reserve()
 
     @property
@@ -99,12 +99,13 @@ class Reservation:
         ctypes.set_errno(0)
         self.handle = self.library.ecrt_request_master(self.index) or 0
         if not self.handle:
-            raise _refused(self.index, ctypes.get_errno(), self.library)
+            raise refused(self.index, ctypes.get_errno(), self.library)
 
     def close(self) -> None:
         """Gives the master back: its devices go to PRE-OP."""
         handle, self.handle = self.handle, 0
         if handle:
+            self.beside.end()
             self.library.ecrt_release_master(handle)
 
     def renew(self) -> None:
@@ -147,6 +148,22 @@ class Reservation:
         info = abi.SlaveInfo()
         self.ask("ecrt_master_get_slave", position, ctypes.byref(info), what=f"device {position}")
         return info
+
+    def aliases(self) -> list[int]:
+        """Of all devices that are there now, by position; 0: none."""
+        info = abi.MasterInfo()
+        self.ask("ecrt_master", ctypes.byref(info), what=f"master {self.index}")
+        return [self.slave(position).alias for position in range(info.slave_count)]
+
+    def wait_preop(self, count: int) -> None:
+        """Until the master has brought its devices to PRE-OP, or has given them up: in INIT nobody
+        answers an SDO, and who has just given the master back leaves them on the way."""
+        deadline = self.now() + round(PREOP_TIMEOUT * 1e9)
+        while self.now() < deadline:
+            infos = (self.slave(position) for position in range(count))
+            if all(info.al_state & 0xF == State.PRE_OP or info.error_flag for info in infos):
+                return
+            self.wait_until(self.now() + round(LOOK * 1e9), False)
 
     def sync_manager(self, position: int, index: int) -> abi.SyncInfo:
         """A SyncManager, without its PDOs."""
@@ -203,69 +220,3 @@ class Reservation:
         self, position: int, index: int, subindex: int, result: int, code: int
     ) -> CatenaryError:
         return sdo_error(f"device {position}", position, index, subindex, result, code)
-
-
-def sdo_error(
-    who: str, position: int, index: int, subindex: int, result: int, code: int
-) -> CatenaryError:
-    """The error for an SDO that failed with -errno, and the device's abort code if it sent one."""
-    what = f"{who}: SDO 0x{index:04X}:{subindex:02X}"
-    if code:
-        known = abort_code(code)
-        return SdoAbort(
-            f"{what} refused with 0x{code:08X}: {known.text}",
-            position=position,
-            index=index,
-            subindex=subindex,
-            code=code,
-            hint=known.hint or "the manual of the device lists its objects",
-        )
-    if -result in (errno.EOVERFLOW, errno.ENOBUFS):
-        return MailboxError(f"{what} is longer than expected", hint="give a larger limit=")
-    return MailboxError(
-        f"{what}: no answer ({os.strerror(-result)})",
-        hint="a device without CoE has no objects; else the kernel's log says more: dmesg | tail",
-    )
-
-
-def _refused(index: int, number: int, library: Library) -> LinkError:
-    """Why a master could not be reserved, as far as can be seen from outside the kernel."""
-    node = NODE.format(index)
-    if not os.path.exists(node) and number != errno.EBUSY:
-        if not MODULE.exists():
-            return LinkError(
-                f"master {index}: the kernel module ec_master is not loaded, {node} is not there",
-                hint="sudo systemctl start ethercat; where that fails, the module was not built "
-                "for this kernel: docs/igh.md",
-            )
-        return LinkError(
-            f"master {index}: the module ec_master is loaded, but {node} is not there",
-            hint=f"give MASTER{index}_DEVICE in /etc/ethercat.conf, then "
-            "sudo systemctl restart ethercat",
-        )
-    if number != errno.EBUSY and not os.access(node, os.R_OK | os.W_OK):
-        return LinkError(
-            f"master {index}: no permission to open {node}",
-            hint='echo \'KERNEL=="EtherCAT[0-9]*", MODE="0660", GROUP="realtime"\' | sudo tee '
-            "/etc/udev/rules.d/99-ethercat.rules; sudo udevadm control --reload; sudo udevadm "
-            "trigger; and be in that group: sudo usermod -aG realtime $USER",
-        )
-    if number == errno.EBUSY:
-        return LinkError(
-            f"master {index} is reserved by another application",
-            hint=f"end it first: sudo fuser -v {node} names it",
-        )
-    return LinkError(
-        f"master {index}: {library.path} (version {library.version}) and the kernel module "
-        f"(version {_module_version()}) do not work together",
-        hint="they come from two builds, and the version of their ioctl() differs: ethercat "
-        "version tells; install both from one source, then sudo systemctl restart ethercat. Where "
-        f"they agree, another application may hold the master: sudo fuser -v {node}",
-    )
-
-
-def _module_version() -> str:
-    try:
-        return (MODULE / "version").read_text().strip()
-    except OSError:
-        return "unknown"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections import deque
+from collections.abc import Callable
 from typing import TYPE_CHECKING, NoReturn, TypeVar
 
 from catenary import bus
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from catenary.igh.main_device import MainDevice
 
 T = TypeVar("T")
+V = TypeVar("V")
 
 LOOK = 0.001  # [s] between two looks at a request
 REQUEST_TIMEOUT = 5.0  # [s]
@@ -51,7 +53,7 @@ class SubDevice(bus.SubDevice):
 
     def read_state(self) -> DeviceState:
         """What the master saw last of its EtherCAT state."""
-        info = self.kernel.reservation.slave(self.position)
+        info = self.kernel.reservation.slave(self.kernel.place_of(self.position))
         word = info.al_state | (0x10 if info.error_flag else 0)
         known = word & 0xF in tuple(State)
         self.state = State(word & 0xF) if known else None
@@ -113,14 +115,18 @@ class SubDevice(bus.SubDevice):
             if found == abi.REQUEST_ERROR:
                 break
             yield after(LOOK)
-        raise RegisterError(f"{self.station}: {what} was not answered")
+        raise RegisterError(
+            f"{self.station}: {what} was not answered",
+            hint="the master refuses requests to a device while it is in an error state",
+        )
 
 
 class Sdo(bus.Sdo):
     """Owns the way to the object dictionary of one device, by the kernel master.
 
     In operation an object is read by a request object, which takes a few cycles and no thread; one
-    longer than 256 bytes, and writing, by a call that blocks the service thread, not the cycle.
+    longer than 256 bytes, and writing, by a call that blocks a thread of the device's own, not the
+    cycle and nobody else. Everything has a deadline.
     """
 
     def __init__(self, sub: SubDevice) -> None:
@@ -156,35 +162,67 @@ class Sdo(bus.Sdo):
         kernel, position = self._device.kernel, self._device.position
         device = kernel.configuration_of(position)
         if device is None or not device.sdo_request or not kernel.cycling:
-            return kernel.reservation.upload(position, index, subindex, limit)
+            return (yield from self._uploaded_blocking(index, subindex, limit))
         while self._busy:
             yield after(LOOK)
         self._busy = True
         try:
-            return (yield from self._requested(device, index, subindex, limit))
+            data = yield from self._requested(device, index, subindex, limit)
         finally:
             self._busy = False
+        if data is None:  # too long for the request, or refused: the other call says which, and why
+            data = yield from self._uploaded_blocking(index, subindex, limit)
+        return data
+
+    def _uploaded_blocking(self, index: int, subindex: int, limit: int) -> Procedure[bytes]:
+        kernel = self._device.kernel
+
+        def call() -> bytes:
+            place = kernel.place_of(self._device.position)
+            return kernel.reservation.upload(place, index, subindex, limit)
+
+        return (yield from self._blocking(f"SDO 0x{index:04X}:{subindex:02X}", call))
+
+    def _blocking(self, what: str, call: Callable[[], V]) -> Procedure[V]:
+        """A call that waits in the kernel: in a thread while a loop runs in real time."""
+        kernel, position = self._device.kernel, self._device.position
+        kernel.refuse_blocking(position)
+        if not kernel.cycling or kernel.reservation.time.is_virtual:
+            return call()
+        return (yield from kernel.reservation.beside.run(position, what, call))
 
     def _requested(
         self, device: DeviceConfiguration, index: int, subindex: int, limit: int
-    ) -> Procedure[bytes]:
-        kernel, position = self._device.kernel, self._device.position
-        library, request = kernel.reservation.library, device.sdo_request
-        kernel.same_configuration(device)
+    ) -> Procedure[bytes | None]:
+        """What the request object brought; None where it did not."""
+        library, request = self._device.kernel.reservation.library, device.sdo_request
+        yield from self._idle(device)  # one that was given up may still be under way
         library.ecrt_sdo_request_index(request, index, subindex)
         library.ecrt_sdo_request_timeout(request, round(REQUEST_TIMEOUT * 1000))
         library.ecrt_sdo_request_read(request)
-        state = abi.REQUEST_BUSY
-        while state == abi.REQUEST_BUSY:
-            yield after(LOOK)
-            kernel.same_configuration(device)
-            state = library.ecrt_sdo_request_state(request)
-        if state == abi.REQUEST_SUCCESS:
+        yield after(LOOK)
+        if (yield from self._idle(device)) == abi.REQUEST_SUCCESS:
             size = library.ecrt_sdo_request_data_size(request)
             if size <= min(limit, REQUEST_SIZE):
                 return ctypes.string_at(library.ecrt_sdo_request_data(request), size)
-        # Too long for the request, or refused: the blocking call says which, and with what code.
-        return kernel.reservation.upload(position, index, subindex, limit)
+        return None
+
+    def _idle(self, device: DeviceConfiguration) -> Procedure[int]:
+        """The state of the request object once it is not under way. MailboxError: it stays so, as
+        that of a device that is not there does."""
+        kernel = self._device.kernel
+        state = kernel.reservation.library.ecrt_sdo_request_state
+        for _ in range(round(2 * REQUEST_TIMEOUT / LOOK)):
+            kernel.same_configuration(device)
+            found = int(state(device.sdo_request))
+            if found != abi.REQUEST_BUSY:
+                return found
+            yield after(LOOK)
+        raise MailboxError(
+            f"{self._device.station}: no answer within {2 * REQUEST_TIMEOUT:g} s: the master has "
+            "not served the request",
+            hint="is the device there? ethercat slaves; dmesg | tail",
+        )
 
     def _download(
         self, index: int, subindex: int, value: object, type: DataType[T] | None, complete: bool
@@ -203,9 +241,14 @@ class Sdo(bus.Sdo):
     def _downloaded(
         self, index: int, subindex: int, data: bytes, complete: bool
     ) -> Procedure[None]:
+        kernel = self._device.kernel
+
+        def call() -> None:
+            place = kernel.place_of(self._device.position)
+            kernel.reservation.download(place, index, subindex, data, complete=complete)
+
         yield after(0)
-        reservation = self._device.kernel.reservation
-        reservation.download(self._device.position, index, subindex, data, complete=complete)
+        yield from self._blocking(f"SDO 0x{index:04X}:{subindex:02X}", call)
 
     def _check(self, index: int, subindex: int, complete: bool) -> None:
         if not 0 <= index <= 0xFFFF or not 0 <= subindex <= 0xFF:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from catenary.bus import Carrier, MainDevice, SubDevice
+from catenary.bus import Carrier, CycleClock, MainDevice, SubDevice
 from catenary.bus.event import DeviceLost, DeviceReturned, StateLost
 from catenary.core import Engine
 from catenary.errors import CatenaryError
@@ -24,7 +24,13 @@ class CarriedRunning(Running):
     """Owns the engine of a MainDevice with a carrier while its loop is open."""
 
     def _make_engine(self) -> Engine:
-        return Engine(self.plan.cycle, self.main.link.capsule, self._carrier.image)
+        cycle = replace(self.plan.cycle, clock=None)  # which the carrier keeps
+        return Engine(cycle, self.main.link.capsule, self._carrier.image)
+
+    def _clock(self) -> CycleClock:
+        clock = self._carrier.clock
+        assert clock is not None  # it was configured by this plan
+        return clock
 
     def _attend(self) -> None:
         optional = {
@@ -33,7 +39,8 @@ class CarriedRunning(Running):
             if unit.optional
             for position in unit.devices
         }
-        self.watch = CarriedWatch(self.main, self._carrier, self.engine, optional)
+        announce = self._announce_clocks
+        self.watch = CarriedWatch(self.main, self._carrier, self.engine, optional, announce)
 
     @property
     def _carrier(self) -> Carrier:
@@ -89,8 +96,14 @@ class CarriedWatch:
     """Owns the last standing of every device, and tells when it changes."""
 
     def __init__(
-        self, main: MainDevice, carrier: Carrier, engine: Engine, optional: set[int]
+        self,
+        main: MainDevice,
+        carrier: Carrier,
+        engine: Engine,
+        optional: set[int],
+        announce: Callable[[], None],
     ) -> None:
+        self._announce = announce  # whether the clocks have come together or apart
         self._main = main
         self._carrier = carrier
         self._engine = engine
@@ -101,6 +114,7 @@ class CarriedWatch:
         """Goes on until it is cancelled."""
         while True:
             yield from self._carrier.listen()
+            self._announce()
             if self._engine.disturbed or any(a.word != State.OP for a in self._answers):
                 answers = yield from self._carrier.survey()
                 self._tell(answers)
@@ -144,5 +158,5 @@ class CarriedWatch:
 
 
 def carried(plan: Plan) -> Plan:
-    """The plan without what the carrier does itself: frames, clocks."""
-    return replace(plan, cycle=replace(plan.cycle, frames=(), clock=None))
+    """The plan without what the carrier does itself: frames."""
+    return replace(plan, cycle=replace(plan.cycle, frames=()))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping
 
-from catenary.bus import MainDevice, SubDevice
+from catenary.bus import CycleClock, MainDevice, SubDevice
 from catenary.bus.event import ClockLocked, ClockUnlocked
-from catenary.core import Clock, Engine
+from catenary.core import Engine
 from catenary.errors import ClockError
 from catenary.link import ring_of
 from catenary.plan.cycle import ClockPlan
@@ -27,14 +27,16 @@ class Clocks:
     """
 
     def __init__(
-        self, main: MainDevice, engine: Engine, plan: ClockPlan, cycle: Callable[[], int]
+        self,
+        main: MainDevice,
+        engine: Engine,
+        clock: CycleClock,
+        plan: ClockPlan,
+        cycle: Callable[[], int],
     ) -> None:
-        clock = engine.clock
-        assert clock is not None  # a plan with clocks makes an engine with clocks
-        clock.set_epoch(main.clock_epoch_ns)
         self._main = main
         self._engine = engine
-        self._clock: Clock = clock
+        self._clock = clock
         self._plan = plan
         self._cycle = cycle  # one without an application, of all who share the time
         self._ring = ring_of(main.link)

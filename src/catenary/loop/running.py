@@ -8,7 +8,7 @@ from contextlib import ExitStack
 import numpy as np
 import numpy.typing as npt
 
-from catenary.bus import MainDevice, Pending
+from catenary.bus import CycleClock, MainDevice, Pending
 from catenary.core import (
     AXIS_FOLLOWED,
     CYCLE_CLOCKS,
@@ -83,7 +83,9 @@ class Running:
             self.engine.set_rehearsal(make_rehearsal(self.views))
         self.laws = LawRunner(self.engine, plan)
         clock = plan.cycle.clock
-        self.clocks = None if clock is None else Clocks(main, self.engine, clock, self.cycle)
+        self.clocks: Clocks | None = None
+        if clock is not None:
+            self.clocks = Clocks(main, self.engine, self._clock(), clock, self.cycle)
         self.service = Service(main, self.engine, plan)
         self._on_return: Policy = on_return
         self._on_replacement: Policy = on_replacement
@@ -99,6 +101,13 @@ class Running:
 
     def _make_engine(self) -> Engine:
         return Engine(self.plan.cycle, self.main.link.capsule)
+
+    def _clock(self) -> CycleClock:
+        """What the cycle knows of the clocks, which there are."""
+        clock = self.engine.clock
+        assert clock is not None  # a plan with clocks makes an engine with clocks
+        clock.set_epoch(self.main.clock_epoch_ns)
+        return clock
 
     def _attend(self) -> None:
         """Who watches over the devices beside the cycle."""

@@ -1,0 +1,41 @@
+"""What a scan asks, and what it takes from what the master knows."""
+
+from __future__ import annotations
+
+import pytest
+
+import catenary as cat
+from catenary.errors import CatenaryError
+from catenary.igh import Master
+from tests.igh.double import Double
+
+
+def test_devices_that_are_on_their_way_are_waited_for(double: Double) -> None:
+    """In INIT nobody answers an SDO: they would pass for devices without objects."""
+    double.boot(12)
+    with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
+        subs = main.scan()
+        assert [str(sub.state) for sub in subs] == ["PRE-OP", "PRE-OP"]
+        assert all(sub.is_drive for sub in subs)
+
+
+def test_a_terminal_without_mailbox_is_not_asked_for_objects(double: Double) -> None:
+    """libethercat and the kernel would complain of it, on stderr and in the log."""
+    double.plain(1)
+    with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
+        drive, terminal = main.scan()
+        assert (drive.description.coe, terminal.description.coe) == (True, False)
+        assert terminal.description.outputs[0].sync_manager == 0
+    assert not any(call.startswith("sdo_upload 1 ") for call in double.calls())
+
+
+def test_clocks_are_where_receive_times_were_latched(double: Double) -> None:
+    double.clockless(0)
+    with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
+        first, second = main.scan()
+        assert (first.description.clock_bits, second.description.clock_bits) == (0, 64)
+        with pytest.raises(CatenaryError, match="device 0"):
+            main.plan(cat.Drives([first], counts_per_turn=1000, dc=True))
+        with cat.Loop(cat.Drives([second], counts_per_turn=1000, dc=True)) as loop:
+            assert loop.clocks.reference is second
+    assert "select_reference_clock 1" in double.calls()
