@@ -1,0 +1,67 @@
+"""The master under test: a double of libethercat, or the real one that CATENARY_IGH names.
+
+CATENARY_IGH=0          the kernel's master 0, by the library found, or CATENARY_LIBETHERCAT's
+CATENARY_IGH_PERIOD=    [s] of its loops, where the machine is slow: else 2 ms
+CATENARY_IGH_MOVE=1     drives may be enabled and moved by a tenth of a turn
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import catenary as cat
+from catenary.igh import Master
+from tests.igh.double import Double
+
+REAL = os.environ.get("CATENARY_IGH")
+PERIOD = 2e-3
+PATIENCE = 5000  # cycles
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A kernel master, and how a loop on it is to be."""
+
+    make: Callable[[], Master]
+    period: float
+    may_move: bool
+
+    def open(self) -> cat.MainDevice:
+        """A MainDevice that reserves it in its `with` block."""
+        return cat.MainDevice(self.make())
+
+    def loop(self, *wishes: object, **options: object) -> cat.Loop:
+        """One that no stalled machine stops."""
+        calm = {"watchdog": max(0.1, 50 * self.period), "late_limit": 0, "lost_limit": 100}
+        settings = {"period": self.period, "enable": False, **calm, **options}
+        return cat.Loop(*wishes, **settings)  # type: ignore[arg-type]
+
+    def inputs(self, main: cat.MainDevice) -> list[cat.Inputs]:
+        """All inputs of all devices."""
+        return [cat.Inputs(sub) for sub in main.subs if sub.description.inputs]
+
+
+def real() -> Subject:
+    """The one that the environment names."""
+    assert REAL is not None
+    period = float(os.environ.get("CATENARY_IGH_PERIOD", PERIOD))
+    move = os.environ.get("CATENARY_IGH_MOVE") == "1"
+    return Subject(lambda: Master(int(REAL)), period, move)
+
+
+def doubled(path: Path) -> Subject:
+    """Two drives of a double, in virtual time."""
+    Double(path)
+    return Subject(lambda: Master(library=path, virtual_time=True), PERIOD, may_move=True)
+
+
+def until(loop: cat.Loop, done: Callable[[], bool]) -> None:
+    """Cycles until something is so."""
+    for _ in range(PATIENCE):
+        if done():
+            return
+        next(loop)
+    raise AssertionError(f"not within {PATIENCE} cycles")
