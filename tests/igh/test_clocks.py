@@ -155,9 +155,13 @@ def test_without_clocks_there_is_nothing_to_watch(main: cat.MainDevice) -> None:
         _ = loop.clocks
 
 
-def test_a_loop_without_clocks_after_one_with_them(main: cat.MainDevice, double: Double) -> None:
-    """The devices keep time again as they did before: else they would wait for SYNC0."""
+def test_devices_keep_time_as_before_when_a_loop_with_clocks_ends(
+    main: cat.MainDevice, double: Double
+) -> None:
+    """Else the next program, without clocks, would find them waiting for SYNC0 (seen on a real
+    master: AL status 0x0030)."""
     with loop_of(main):
         assert double.value(0, 0x1C32, 1) == 2
-    with cat.Loop(cat.Drives(main.subs.drives, counts_per_turn=1000)):
-        assert double.value(0, 0x1C32, 1) == 1
+    assert double.value(0, 0x1C32, 1) == 1
+    with cat.Loop(cat.Drives(main.subs.drives, counts_per_turn=1000)) as loop:
+        assert next(loop).ok

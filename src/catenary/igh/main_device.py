@@ -11,7 +11,13 @@ from typing import TYPE_CHECKING, NoReturn
 from catenary import bus
 from catenary.bus import SubDevices, event
 from catenary.bus.main_device import LEAVE_TIMEOUT
-from catenary.errors import ConfigurationError, LoopError, NoDeviceError, SdoAbort, SegmentError
+from catenary.errors import (
+    CatenaryError,
+    ConfigurationError,
+    LoopError,
+    NoDeviceError,
+    SegmentError,
+)
 from catenary.igh.address import place
 from catenary.igh.carrier import KernelCarrier
 from catenary.igh.configure import Configuration, DeviceConfiguration, configure
@@ -102,29 +108,28 @@ class MainDevice(bus.MainDevice):
                 hint="leave the loop that runs, or main.leave()",
             )
         for sub, device in zip(self.subs, plan.devices, strict=True):
-            self._keep_sync_types(sub, clocked=device.sync is not None)
+            if device.sync is not None and sub.description.coe:
+                self._note_sync_types(sub)
         found = [sub.description for sub in self.subs]
         self.clock_epoch_ns = self._epoch_ns()
         configuration = configure(self.reservation, plan, found, self.clock_epoch_ns)
         self._kernel = KernelCarrier(self, configuration)
         self.carrier = self._kernel
 
-    def _keep_sync_types(self, sub: bus.SubDevice, *, clocked: bool) -> None:
-        """A device that was told to go by SYNC0 waits for it, in a loop without clocks too: how it
-        kept time before is remembered, and told it again."""
-        if not sub.description.coe:
-            return
-        if clocked and not sub.sync_types:
-            found = {
-                index: read_if_there(self.reservation, sub.position, index, 1) or b""
-                for index in SYNC_OBJECTS
-            }
-            sub.sync_types = {index: kind for index, kind in found.items() if kind}
-        elif not clocked:
-            for index, kind in sub.sync_types.items():
-                with contextlib.suppress(SdoAbort):  # it does not let it be written
-                    self.reservation.download(sub.position, index, 1, kind)
-            sub.sync_types = {}
+    def _note_sync_types(self, sub: bus.SubDevice) -> None:
+        """How a device keeps time with the bus, before it is told to go by SYNC0."""
+        found = {
+            index: read_if_there(self.reservation, sub.position, index, 1) or b""
+            for index in SYNC_OBJECTS
+        }
+        sub.sync_types = {index: kind for index, kind in found.items() if kind}
+
+    def _restore_sync_types(self, sub: bus.SubDevice) -> None:
+        """Told to go by SYNC0, a device would wait for it under the next program too."""
+        types, sub.sync_types = sub.sync_types, {}
+        for index, kind in types.items():
+            with contextlib.suppress(CatenaryError):  # not writable, or it is not there any more
+                self.reservation.download(sub.position, index, 1, kind)
 
     def leave(self, *, timeout: float = LEAVE_TIMEOUT) -> None:
         """Ends the operation of the master: it brings the devices back to PRE-OP by itself."""
@@ -136,6 +141,7 @@ class MainDevice(bus.MainDevice):
         self.reservation.ask("ecrt_master_deactivate", what=what)
         self.reservation.beside.end()
         for sub in self.subs:
+            self._restore_sync_types(sub)
             sub.state = State.PRE_OP
 
     def _bring_down(self, state: State, timeout: float = LEAVE_TIMEOUT) -> None:
