@@ -15,6 +15,7 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from catenary.errors import CatenaryError
@@ -59,6 +60,9 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     )
     parser.add_argument("tables", nargs="*", default=["all"], metavar="TABLE")
     parser.add_argument("--out", type=Path, default=WORK / "results", help="where results are kept")
+    parser.add_argument(
+        "--options", default="", metavar="'...'", help="more for the command: --options '--seconds 5'"
+    )
     parser.add_argument("--minutes", type=float, help="the deadline of a table (its own)")
     return parser.parse_args(arguments)
 
@@ -76,6 +80,7 @@ def run(arguments: argparse.Namespace) -> None:
     system = kernel.provide(cache())
     root = image.provide(system, REPOSITORY, WORK)
     for name, table in chosen.items():
+        table = replace(table, command=f"{table.command} {arguments.options}".rstrip())
         found = run_table(name, table, system, root, arguments.minutes)
         file = arguments.out / f"rtlab-{name}.json"
         file.write_text(json.dumps(found, indent=1) + "\n")

@@ -10,18 +10,17 @@ import time
 from collections.abc import Sequence
 
 import msgspec
-import numpy as np
 
 import catenary as cat
 from catenary.bench.job import Job
-from catenary.bench.networks import NetworkRound, phases_of, take
+from catenary.bench.networks import NetworkRound, phases_of
 from catenary.bench.peers.with_catenary import LATE_LIMIT, LOST_LIMIT
 from catenary.bench.peers.with_catenary_law import sine
 from catenary.errors import CatenaryError
 
 GO = signal.SIGUSR1
 PATIENCE = 60.0  # [s] for the others to be ready
-LOOK = 500  # cycles from one look at the log, which has 1000, to the next
+LOOK = 500  # cycles from one look at the counters to the next
 NEVER = 1e9  # [s]
 
 
@@ -36,6 +35,7 @@ def run_law(job: Job) -> NetworkRound:
             lost_limit=LOST_LIMIT,
             late_limit=LATE_LIMIT,
             lead=job.lead,
+            log=job.log,
             laws=[sine],
         ) as loop:
             home = arm.actual.position.copy()
@@ -48,19 +48,17 @@ def run_law(job: Job) -> NetworkRound:
 
 
 def count(loop: cat.Loop, job: Job) -> NetworkRound:
-    """Looks at the log as it fills; the law needs nobody meanwhile."""
+    """The law needs nobody meanwhile."""
     before = loop.timing.counters
     first = before["cycles"]
-    rows: list[list[np.ndarray]] = [[]]
     while loop.timing.counters["cycles"] < first + job.cycles:
         left = first + job.cycles - loop.timing.counters["cycles"]
         time.sleep(max(min(left, LOOK), 1) * job.period_ns * 1e-9)
-        take(rows, [loop])
     after = loop.timing.counters
     return NetworkRound(
         lost=after["lost"] - before["lost"],
         late=after["late"] - before["late"],
-        phases_ns=phases_of(rows[0], after["cycles"] - first),
+        phases_ns=phases_of(loop, after["cycles"] - first),
     )
 
 

@@ -205,48 +205,37 @@ def run_loop(jobs: Sequence[Job]) -> list[NetworkRound]:
                 priority=first.priority,
                 lost_limit=1000,
                 late_limit=0.0,
+                log=first.log,
             )
         )
         return follow_and_count(loop, bodies, first)
 
 
 def follow_and_count(loop: cat.Loop, bodies: Sequence[cat.Drives], job: Job) -> list[NetworkRound]:
-    """Counted from the end of the warm-up; lateness from each network's log, read as it fills."""
+    """Counted from the end of the warm-up; lateness from each network's log."""
     networks = loop.networks  # type: ignore[attr-defined]
     before = [network.timing.counters for network in networks]
-    rows: list[list[np.ndarray]] = [[] for _ in networks]
     homes = homes_of(bodies)
     for cycle in loop:
         follow(bodies, homes, cycle.time)
         if cycle.number == job.warm_up:
             before = [network.timing.counters for network in networks]
-        elif cycle.number > job.warm_up and cycle.number % 500 == 0:
-            take(rows, networks)
         if cycle.number >= job.warm_up + job.cycles:
             break
-    take(rows, networks)
+    after = [network.timing.counters for network in networks]
     return [
         NetworkRound(
-            lost=after["lost"] - then["lost"],
-            late=after["late"] - then["late"],
-            phases_ns=phases_of(mine, job.cycles),
+            lost=now["lost"] - then["lost"],
+            late=now["late"] - then["late"],
+            phases_ns=phases_of(network, job.cycles),
         )
-        for mine, then, after in zip(
-            rows, before, (network.timing.counters for network in networks), strict=True
-        )
+        for network, then, now in zip(networks, before, after, strict=True)
     ]
 
 
-def take(rows: list[list[np.ndarray]], networks: Sequence[cat.Loop]) -> None:
-    for mine, network in zip(rows, networks, strict=True):
-        mine.append(network.log[["number", *(f"{name}_ns" for name in KEPT)]].copy())
-
-
-def phases_of(logs: Sequence[np.ndarray], cycles: int) -> dict[str, list[int]]:
-    """Of each cycle once, the last ones."""
-    together = np.concatenate(logs)
-    _, first = np.unique(together["number"], return_index=True)
-    last = together[first][-cycles:]
+def phases_of(network: cat.Loop, cycles: int) -> dict[str, list[int]]:
+    """Of the last cycles."""
+    last = network.log[-cycles:]
     return {name: last[f"{name}_ns"].tolist() for name in KEPT}
 
 

@@ -97,6 +97,8 @@ def run(work: Work) -> bool:
         block.failure = reason(error)
         block.state = FAILED
         return False
+    finally:
+        leave_priority()
     block.state = ENDED
     return True
 
@@ -131,6 +133,13 @@ def schedule(task: Task, best_effort: bool) -> Scheduling:
             "/etc/security/limits.d; or best_effort=True does without",
         )
     return replace(what_scheduling(), refusals=tuple(refusals))
+
+
+def leave_priority() -> None:
+    """A task's last job is done: what ending a process takes (100 ms) is not to keep others from
+    their instants."""
+    with contextlib.suppress(OSError):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
 def iterate(work: Work, block: Block) -> None:
