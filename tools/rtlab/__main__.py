@@ -60,9 +60,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     )
     parser.add_argument("tables", nargs="*", default=["all"], metavar="TABLE")
     parser.add_argument("--out", type=Path, default=WORK / "results", help="where results are kept")
-    parser.add_argument(
-        "--options", default="", metavar="'...'", help="more for the command: --options '--seconds 5'"
-    )
+    parser.add_argument("--options", default="", metavar="'...'", help="more for the command")
     parser.add_argument("--minutes", type=float, help="the deadline of a table (its own)")
     return parser.parse_args(arguments)
 

@@ -32,7 +32,7 @@ def everything(repository: Path) -> list[Path]:
     """The files of a guest that runs benchmarks. LabError: something is not installed."""
     return [
         *interpreter(),
-        *(path for each in distributions("catenary", EXTRAS) for path in files_of(each)),
+        *(path for each in all_distributions() for path in files_of(each)),
         *package(repository),
         *programs(),
     ]
@@ -92,6 +92,11 @@ def under(folder: Path) -> Iterator[Path]:
             yield from under(path)
         elif path.is_file() and path.suffix != ".a":
             yield path
+
+
+def all_distributions() -> list[Distribution]:
+    """Of benchmarks and of the cobot, which records; nothing is drawn in a guest."""
+    return [*distributions("catenary", EXTRAS), *distributions("mcap")]
 
 
 def distributions(name: str, extras: Iterable[str] = ()) -> list[Distribution]:

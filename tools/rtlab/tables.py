@@ -49,6 +49,14 @@ TABLES: Mapping[str, Table] = {
         90,
         "33 axes on two networks, 4 and 8 kHz",
     ),
+    "cobot": Table(
+        "bench table cobot --realtime",
+        60,
+        "six tasks of a cobot beside their analysis",
+    ),
+    "rteml": Table("bench table rteml --lead 0", 60, "intervals of frames in a capture at 5 kHz"),
+    "skew": Table("bench table skew", 30, "two digital outputs at both ends of the line"),
+    "interrupt": Table("bench table interrupt", 60, "reaction of a waiting task to an event"),
     "law": Table("bench law", 20, "what one call of a compiled law takes"),
 }
 
