@@ -91,6 +91,7 @@ with cat.MainDevice(segment) as main:
         for stiffness in (2.0, 4.0):
             run.parameters = gripping(stiffness)  # changed while it runs
             print(f"stiffness [N·m/rad]: {stiffness}, seen", *seen_stiffness().round(2))
+        print("left by friction [mrad]:", *(1e3 * arm.actual.position).round(2))
 
         plant.data.mocap_pos[0] = 0.0, 0.1, 0.0  # somebody holds something between the fingers
         run.parameters = gripping(4.0, closing=1.0)

@@ -1,6 +1,7 @@
 """examples/gripper: what it promises, said by the example and seen in the model."""
 
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -13,9 +14,13 @@ FOLDER = Path(__file__).resolve().parents[2] / "examples" / "gripper"
 @pytest.fixture(scope="module")
 def said() -> dict[str, list[float]]:
     """The numbers behind each line's first word, colon or figure."""
+    return run(FOLDER / "gripper.py")
+
+
+def run(program: Path) -> dict[str, list[float]]:
     pytest.importorskip("numba", reason="laws are compiled by Numba: pip install 'catenary[law]'")
     done = subprocess.run(
-        [sys.executable, str(FOLDER / "gripper.py")],
+        [sys.executable, str(program)],
         capture_output=True,
         text=True,
         timeout=300,
@@ -40,6 +45,20 @@ def test_the_stiffness_seen_from_outside_is_the_one_asked_for(said) -> None:
     first, second = said["stiffness"][:3], said["stiffness"][3:]
     assert first == pytest.approx([2.0, 2.0, 2.0], rel=0.03)
     assert second == pytest.approx([4.0, 4.0, 4.0], rel=0.03)
+
+
+def test_the_observer_takes_the_friction_away(said, tmp_path: Path) -> None:
+    """Without it a finger that was pushed stays as far from its goal as dry friction holds the
+    spring: at most 0.01 N·m / 4 N·m/rad."""
+    text = (FOLDER / "gripper.py").read_text()
+    bandwidth = "VISCOUS, 100.0, COULOMB"
+    assert bandwidth in text
+    program = tmp_path / "gripper.py"
+    program.write_text(text.replace(bandwidth, "VISCOUS, 0.0, COULOMB"))
+    shutil.copy(FOLDER / "gripper.xml", tmp_path)
+    without = run(program)["left"]
+    assert all(1.0 < abs(x) <= 2.5 for x in without)
+    assert all(abs(x) < 0.2 for x in said["left"])
 
 
 def test_the_object_is_felt_soon_and_where_it_is(said) -> None:

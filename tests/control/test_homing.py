@@ -72,6 +72,28 @@ def test_without_stops_both_stand_and_say_so() -> None:
     assert asked == [0.0, 0.0]
 
 
+class Obstructed(Fingers):
+    """Something falls between finger 0 and its open stop once it has closed."""
+
+    closed = False
+
+    def outside(self, i: int) -> float:
+        self.closed |= bool(self.q[0] > SHUT[0] - 1e-3)
+        wall = min(self.q[0] - 0.2, 0.0) if self.closed and i == 0 else 0.0
+        return super().outside(i) - 2000 * wall - 1.0 * self.v[i] * (wall != 0)
+
+
+def test_an_axis_that_is_stopped_on_its_return_has_failed() -> None:
+    fingers = Obstructed()
+    memory, steps = home(fingers)
+    assert steps > 0
+    assert fingers.q[0] == pytest.approx(0.2, abs=0.01)
+    found = control.stops(memory)
+    assert found.failed.tolist() == [True, False]
+    assert found.closed[0] == pytest.approx(SHUT[0], abs=0.01)
+    assert np.isnan(found.meeting).all()
+
+
 def test_before_anything_is_found_all_is_nan() -> None:
     found = control.stops(control.Homing(2, 0.5, 0.3, 2.0).memory)
     assert np.isnan([found.open, found.closed, found.meeting]).all()

@@ -1,5 +1,7 @@
 """Rows of several blocks in one."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -39,3 +41,55 @@ def test_an_axis_begins_anew_and_leaves_the_others() -> None:
 def test_a_wrong_number_is_refused_where_it_is_written(options: dict, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         control.Pid(3, **options)
+
+
+def test_a_step_of_all_axes_at_once() -> None:
+    block = control.Cascade(control.Pid(3, 20.0, limit=2.0), control.Pid(3, [1.0, 2.0, 3.0], 4.0))
+    goal, q, v = np.array([0.1, 0.2, 0.3]), np.zeros(3), np.array([0.0, 0.1, 0.2])
+    one, other = block.memory, block.memory
+    for _ in range(5):
+        torque = control.every(control.cascade, (one, block.parameters), goal, 0.0, 0.5, q, v, 1e-3)
+        expected = [
+            control.cascade(other, block.parameters, i, goal[i], 0.0, 0.5, q[i], v[i], 1e-3)
+            for i in range(3)
+        ]
+        assert torque.tolist() == expected
+    assert one.tolist() == other.tolist()
+    rubbing = control.Friction(3, 1.0, 0.0)
+    assert control.every(control.friction, (rubbing.parameters,), v) == pytest.approx(v)
+
+
+@pytest.mark.parametrize("inputs", [(), (0.1, 0.2), (np.zeros(2), np.zeros(3))])
+def test_inputs_that_say_no_number_of_axes(inputs: tuple[float, ...]) -> None:
+    with pytest.raises(ValueError, match=r"every: at least one|broadcast"):
+        control.every(control.friction, (control.Friction(2, 1.0, 0.0).parameters,), *inputs)
+
+
+STEPS = {
+    "pid": (control.Pid(1, 2.0, 3.0, 0.1, limit=5.0, rate=9.0), control.pid, 3),
+    "cascade": (
+        control.Cascade(control.Pid(1, 9.0, limit=2.0), control.Pid(1, 2.0, limit=5.0)),
+        control.cascade,
+        5,
+    ),
+    "impedance": (control.Impedance(1, 2.0, 3.0, 0.1, 0.1, 99.0, 0.1, 5.0), control.impedance, 6),
+    "admittance": (
+        control.NaturalAdmittance(1, 0.1, 1.0, 2.0, 3.0, 5.0),
+        control.natural_admittance,
+        5,
+    ),
+    "residual": (control.Residual(1, 50.0, 0.1), control.residual, 2),
+}
+
+
+@pytest.mark.parametrize("name", STEPS)
+def test_what_is_no_number_never_becomes_a_limit(name: str) -> None:
+    block, step, inputs = STEPS[name]
+    for wrong in range(inputs):
+        memory = block.memory
+        step(memory, block.parameters, 0, *[0.5] * inputs, 1e-3)
+        values = [0.5] * inputs
+        values[wrong] = math.nan
+        assert math.isnan(step(memory, block.parameters, 0, *values, 1e-3))
+        control.restart(memory, 0, 1)
+        assert math.isfinite(step(memory, block.parameters, 0, *[0.5] * inputs, 1e-3))

@@ -14,7 +14,7 @@ from catenary.control.homing import Homing, Stops, homed, homing, stops
 from catenary.control.identification import Chirp, FrequencyResponse, chirp, frequency_response
 from catenary.control.impedance import Impedance, impedance
 from catenary.control.low_pass import LowPass, low_pass
-from catenary.control.parts import join, part, restart
+from catenary.control.parts import every, join, part, restart
 from catenary.control.pid import Pid, pid
 from catenary.control.trajectory import MotionLimits, MotionState, Trajectory, trajectory
 
@@ -38,6 +38,7 @@ __all__ = [
     "Trajectory",
     "cascade",
     "chirp",
+    "every",
     "feed_forward",
     "frequency_response",
     "friction",

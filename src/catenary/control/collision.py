@@ -73,8 +73,8 @@ def model_residual(
     external: Row,
 ) -> None:
     """One step of all axes with a model, `model` the memory of a `Dynamics`: external (n,) := the
-    torques from outside [N·m]. `torque` (n,) [N·m]: the motors', less friction; `position` (n,)
-    [rad], `velocity` (n,) [rad/s]."""
+    torques from outside [N·m]. `torque` (n,) [N·m]: the motors', less the friction that the model
+    does not have (it has its joints' `damping`); `position` (n,) [rad], `velocity` (n,) [rad/s]."""
     n = len(position)
     for i in range(n):
         external[i] = (velocity[i] - memory[RESIDUAL_STATES * i + 2]) / dt

@@ -20,7 +20,7 @@ FAILED = -1.0
 @dataclass(frozen=True, slots=True)
 class Stops:
     """What homing has found: (n,) [rad] of each axis, NaN where it has not been yet. `failed`: (n,)
-    which have gone their whole travel without a stop."""
+    which have gone their whole travel without a stop, or were stopped on their return."""
 
     open: Row
     closed: Row
@@ -35,8 +35,9 @@ class Homing:
 
     `velocity` [rad/s] of opening (its sign is the way to open). A stop is a commanded torque of at
     least `torque` [N·m] in the way of motion for `time` [s]. An axis has returned when it is within
-    `clearance` [rad] of its open stop. One that has gone `travel` [rad] without a stop has failed,
-    and all stand.
+    `clearance` [rad] of its open stop. One that has gone `travel` [rad] without a stop, or is
+    stopped on its return, has failed, and all stand. Give the loop that follows a torque limit
+    above `torque`: else no stop is ever found.
     """
 
     axes: int
@@ -117,7 +118,10 @@ def following(
         return FAILED
     if stage == RETURNING:
         near = abs(position - memory[m + 3]) <= parameters[p + 3]
-        return RETURNED if near else RETURNING
+        if near:
+            return RETURNED
+        blocked = pressed(memory, m, parameters, p, parameters[p] * torque, dt)
+        return FAILED if blocked else RETURNING
     if way != 0.0 and pressed(memory, m, parameters, p, way * parameters[p] * torque, dt):
         memory[m + 3 + int(stage == CLOSING) + 2 * int(stage == MEETING)] = position
         return stage + 1.0

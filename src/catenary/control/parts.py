@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +27,21 @@ def part(row: Row, k: int) -> Row:
     if k < 0 or k >= row[0]:
         raise IndexError("the row has no such part: see control.join")
     return row[int(row[1 + k]) : int(row[2 + k])]
+
+
+def every(step: Callable[..., float], rows: Sequence[Row], *inputs: PerAxis) -> Row:
+    """(n,) one step of all axes, in plain Python: what `step(*rows, i, ...)` says for each.
+
+        torque = every(cascade, (memory, parameters), goal, 0.0, gravity, position, velocity, dt)
+
+    `rows`: the block's memory and parameters, or its parameters where it has no memory. `inputs`:
+    one number for all axes, or (n,). ValueError: they do not fit each other, or none has n.
+    """
+    columns = np.broadcast_arrays(*(np.asarray(each, dtype=np.float64) for each in inputs))
+    if not columns or columns[0].ndim != 1:
+        raise ValueError("every: at least one of the inputs has a number for each axis, (n,)")
+    values = zip(*(column.tolist() for column in columns), strict=True)
+    return np.array([step(*rows, i, *axis) for i, axis in enumerate(values)])
 
 
 @compiles
