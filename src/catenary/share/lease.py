@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -32,6 +33,7 @@ class Lease:
         self._desk = desk
         self._numbers = list(axes)
         self._for_ns = round(for_ * 1e9)
+        self._pid = os.getpid()
         with locked(desk):
             self._place = self._take_place()
             self._serial = self._take_axes()
@@ -63,7 +65,10 @@ class Lease:
         self._renew(None)
 
     def release(self) -> None:
-        """Gives the axes back; harmless when the lease is over."""
+        """Gives the axes back; harmless when the lease is over, and in a child by fork: it is not
+        the child's."""
+        if os.getpid() != self._pid:
+            return
         with locked(self._desk):
             if self._is_valid():
                 free(self._desk, self._place, Reason.RELEASED)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from types import TracebackType
@@ -45,6 +46,7 @@ class Share:
         self._history = history
         self._mode = mode
         self._entered = False
+        self._pid = 0  # of the process that entered it
         self._segment: Segment | None = None
         self._desk: Desk | None = None
         self._commands: CommandReader | None = None
@@ -56,6 +58,7 @@ class Share:
     def __enter__(self) -> Share:
         self._refuse_taken()
         self._entered = True
+        self._pid = os.getpid()
         return self
 
     def __exit__(
@@ -65,6 +68,8 @@ class Share:
         traceback: TracebackType | None,
     ) -> None:
         self._entered = False
+        if self._is_a_copy():
+            return
         self.close()
         if self._segment is not None:
             self._segment.unlink()
@@ -157,6 +162,8 @@ class Share:
     def close(self) -> None:
         """The loop has ended; what it shared stays readable until the next one, or the block's
         end. Called by the loop."""
+        if self._is_a_copy():
+            return
         with self._telling:
             for ring in (self._events, self._cycles):
                 if ring is not None:
@@ -164,6 +171,10 @@ class Share:
             self._cycles = self._events = None
             if self._desk is not None:
                 self._desk.end_all()
+
+    def _is_a_copy(self) -> bool:
+        """Of the process that owns it, in a child by fork: its leaving ends nothing."""
+        return self._pid != os.getpid()
 
     def _make_files(self, made: ShareLayout) -> tuple[Segment, Desk]:
         """Whole, and seen by nobody yet. ShareError: no room."""

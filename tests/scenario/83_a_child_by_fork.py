@@ -1,0 +1,53 @@
+"""A program forks while its loop is open and a lease is held, and the child leaves the blocks it was
+copied in, by an exception or sys.exit. The loop, its share and the lease are the parent's: they go
+on, and nothing of theirs is removed.
+"""
+
+import subprocess
+import sys
+from pathlib import Path
+
+from tests.share.names import own_name
+
+PROGRAM = """
+import os, sys
+import catenary as cat
+
+name = sys.argv[1]
+with cat.MainDevice(cat.Segment([cat.Servo()])) as main:
+    arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+    loop = cat.Loop(arm, sink=(share := cat.Share(name)))
+    share.__enter__()
+    loop.__enter__()
+    next(loop)
+    reader = cat.attach(name)
+    command = reader.lease(for_=3600.0)
+    share.apply(arm)
+    child = os.fork()
+    if child == 0:
+        command.__exit__(None, None, None)
+        share.__exit__(None, None, None)
+        os._exit(0)  # the loop's threads are not in the child: its own block is not left
+    os.waitpid(child, 0)
+    before = reader.number
+    next(loop)
+    print(reader.state, reader.number > before, cat.attach(name).alive, share.apply(arm))
+    command.send(position=0.0)
+    loop.__exit__(None, None, None)
+    share.__exit__(None, None, None)
+    print(reader.state)
+"""
+
+
+def test_its_leaving_ends_nothing() -> None:
+    with own_name("fork") as name:
+        done = subprocess.run(
+            [sys.executable, "-W", "ignore", "-c", PROGRAM, name],
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        assert done.stdout.splitlines() == ["running True True []", "ended"]
+        assert not list(Path("/dev/shm").glob(f"*{name}*"))
