@@ -1,6 +1,6 @@
-"""A program forks while its loop is open and a lease is held, and the child leaves the blocks it was
-copied in, by an exception or sys.exit. The loop, its share and the lease are the parent's: they go
-on, and nothing of theirs is removed.
+"""A program forks while its loop is open and a lease is held, and the child leaves the blocks that
+it was copied in, by an exception or sys.exit. The loop, its share and the lease are the parent's:
+they go on, and nothing of theirs is removed.
 """
 
 import subprocess
