@@ -19,6 +19,15 @@ def test_devices_that_are_on_their_way_are_waited_for(double: Double) -> None:
         assert all(sub.is_drive for sub in subs)
 
 
+def test_a_device_that_the_master_keeps_in_op_holds_nobody_up(double: Double) -> None:
+    """As those with Ethernet over EtherCAT."""
+    double.state(1, 8, 0)
+    with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
+        begun = main.link.now()
+        assert [str(sub.state) for sub in main.scan()] == ["PRE-OP", "OP"]
+        assert (main.link.now() - begun) * 1e-9 < 3.0
+
+
 def test_a_terminal_without_mailbox_is_not_asked_for_objects(double: Double) -> None:
     """libethercat and the kernel would complain of it, on stderr and in the log."""
     double.plain(1)

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 SCAN_TIMEOUT = 30.0  # [s]: some devices answer their first SDO after seconds
 EMPTY_TIMEOUT = 3.0  # [s]: a link that has just come up finds its devices within a second
-PREOP_TIMEOUT = 15.0  # [s] from the last user's OP back to PRE-OP; the master itself waits 10
+PREOP_TIMEOUT = 15.0  # [s] from INIT; the master itself waits 10
+LEAVE_OP_TIMEOUT = 2.0  # [s] from the last user's OP back
 LOOK = 0.010  # [s] between two looks
 UPLOAD_LIMIT = 1 << 16  # bytes of an object
 
@@ -157,11 +158,15 @@ class Reservation:
 
     def wait_preop(self, count: int) -> None:
         """Until the master has brought its devices to PRE-OP, or has given them up: in INIT nobody
-        answers an SDO, and who has just given the master back leaves them on the way."""
-        deadline = self.now() + round(PREOP_TIMEOUT * 1e9)
-        while self.now() < deadline:
-            infos = (self.slave(position) for position in range(count))
-            if all(info.al_state & 0xF == State.PRE_OP or info.error_flag for info in infos):
+        answers an SDO, and who has just given the master back leaves them on the way. One with
+        Ethernet over EtherCAT the master may keep in OP: it answers there too."""
+        begun = self.now()
+        while (waited := (self.now() - begun) * 1e-9) < PREOP_TIMEOUT:
+            infos = [self.slave(position) for position in range(count)]
+            states = [info.al_state & 0xF for info in infos if not info.error_flag]
+            if all(state == State.PRE_OP for state in states):
+                return
+            if waited >= LEAVE_OP_TIMEOUT and State.INIT not in states:
                 return
             self.wait_until(self.now() + round(LOOK * 1e9), False)
 
