@@ -4,7 +4,7 @@
 Between a store and the load that sees it lies an order, on every processor: what was written
 before the store is there behind the load, and what is written behind the store is not seen by
 whom a later load still shows the old value. x86 keeps the first half by itself; AArch64 neither.
-Budget: 50 ns a word from Python, most of it the call and the fence.
+Budget: 0.1 us a call from Python, all words of a desk 0.3 us.
 """
 
 from cpython.buffer cimport PyBUF_WRITABLE, PyBuffer_Release, PyObject_GetBuffer
@@ -47,7 +47,9 @@ cdef class Words:
         return cat_load_acquire64(word)
 
     def load_all(self):
-        return [self.load(k) for k in range(self.count)]
+        cdef uint64_t k
+        cat_fence()
+        return [cat_load_acquire64(self.place(k)) for k in range(self.count)]
 
     def store(self, uint64_t k, uint64_t value):
         cat_store_release64(self.place(k), value)
