@@ -15,6 +15,7 @@ from matplotlib.image import imread
 from catenary import record
 from catenary.errors import RecordingError
 from catenary.record.figure import draw
+from catenary.record.file import RecordingFile
 from catenary.record.recording import Recording
 from catenary.record.timeline import quick_stops
 from tests.record.made import make_event, make_layout, make_rows
@@ -68,6 +69,21 @@ def test_events_are_named_on_the_timeline() -> None:
     assert named(recording) == ["DeviceLost"]
     many = replace(recording, events=tuple(make_event(n) for n in range(1, 101)))
     assert named(many)[-1] == "and 76 more"
+
+
+def test_a_part_is_drawn_at_the_times_of_the_whole(tmp_path: Path) -> None:
+    whole = make_recording(1)
+    path = tmp_path / "x.mcap"
+    file = RecordingFile(path, whole.layout)
+    file.write(whole.rows)
+    file.write_event(make_event(300))
+    file.finish({})
+    part = record.read(path, start=0.25, end=0.35)
+    upper = draw(part).subfigs[0]
+    actual, event = upper.axes[0].lines[1:3]
+    assert actual.get_xdata()[[0, -1]] == pytest.approx([0.25, 0.35])
+    assert event.get_xdata()[0] == pytest.approx(0.299)
+    assert "101 cycles in 0.100 s" in draw(part).get_suptitle()
 
 
 def test_quick_stops_are_marked_in_the_cycle_that_sends_them() -> None:

@@ -43,6 +43,9 @@ def test_a_part_is_read_by_its_seconds(
     whole, part = record.read(path), record.read(path, start=start, end=end)
     assert np.array_equal(part.rows, whole.rows[first - 1 : last] if first else whole.rows[:0])
     assert (part.ended, part.lost) == ("the loop ended", 0)
+    assert (
+        part.time.tolist() == (whole.time[first - 1 : last] if first else whole.time[:0]).tolist()
+    )
     at = 1500 * 1e-3 - 1e-3
     assert len(part.events) == (1 if start <= at <= end else 0)
 

@@ -221,7 +221,7 @@ def _top(values: Floats) -> float:
 
 def headline(recording: Recording) -> str:
     """What the recording is, in two lines."""
-    seconds = float(recording.time[-1]) if len(recording) else 0.0
+    seconds = float(np.ptp(recording.time)) if len(recording) else 0.0
     lost = f"{recording.lost} lost" if recording.lost else "none lost"
     count = len(recording.events)
     events = f", {count_of(count, 'event', 'events')}" if count else ""

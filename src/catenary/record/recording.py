@@ -60,6 +60,7 @@ class Recording:
     events: tuple[SharedEvent, ...]
     lost: int
     ended: str
+    began_ns: int | None = None  # of a part: the first cycle of the whole, in the loop's clock
 
     def __getitem__(self, field: str) -> npt.NDArray[Any]:
         if self.layout.field(field) is None:
@@ -86,12 +87,14 @@ class Recording:
 
     @property
     def time(self) -> npt.NDArray[np.float64]:
-        """Of each cycle, from the first one on [s]."""
+        """Of each cycle, from the recording's first one on, also in a part of it [s]."""
         return np.asarray((self.rows[TIME] - self.start_ns) * 1e-9)
 
     @property
     def start_ns(self) -> int:
         """When its first cycle was, in the loop's clock; + layout.utc_offset_ns: UTC."""
+        if self.began_ns is not None:
+            return self.began_ns
         return int(self.rows[TIME][0]) if len(self.rows) else 0
 
     def unit(self, field: str) -> str:
@@ -118,6 +121,7 @@ class _Reader:
         self._topics: dict[int, str] = {}  # by channel id
         self._messages: dict[str, list[ChunkMessage]] = defaultdict(list)  # by topic
         self._wanted = (-math.inf, math.inf)  # log time [ns]; known with the first cycle
+        self._began: int | None = None  # log time of the first cycle [ns]
         self._complete = False  # the data section ends as it should
 
     def read(self) -> Recording:
@@ -151,6 +155,7 @@ class _Reader:
 
     def _read_message(self, topic: str, message: ChunkMessage) -> None:
         if self._wanted == (-math.inf, math.inf) and not is_event(topic):
+            self._began = message.time_ns
             start, end = self._part  # events before the first cycle are of its first part
             low = message.time_ns + round(start * 1e9) if start > 0 else -math.inf
             self._wanted = (low, message.time_ns + round(min(end, LONGEST) * 1e9))
@@ -182,6 +187,7 @@ class _Reader:
             events=tuple(e for e in events if e.time * 1e9 + layout.utc_offset_ns >= first),
             lost=int(lost) if (lost := tail.get("lost", "0")).isdecimal() else 0,
             ended=tail.get("ended", "cut off") if self._complete else "cut off",
+            began_ns=None if self._began is None else self._began - layout.utc_offset_ns,
         )
 
     def _layout(self, text: str) -> Layout:
