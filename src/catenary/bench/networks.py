@@ -214,12 +214,12 @@ def run_loop(jobs: Sequence[Job]) -> list[NetworkRound]:
 def follow_and_count(loop: cat.Loop, bodies: Sequence[cat.Drives], job: Job) -> list[NetworkRound]:
     """Counted from the end of the warm-up; lateness from each network's log."""
     networks = loop.networks  # type: ignore[attr-defined]
-    before = [network.timing.counters for network in networks]
+    before, counted = [network.timing.counters for network in networks], False
     homes = homes_of(bodies)
     for cycle in loop:
         follow(bodies, homes, cycle.time)
-        if cycle.number == job.warm_up:
-            before = [network.timing.counters for network in networks]
+        if not counted and cycle.number >= job.warm_up:  # late, it skips numbers
+            before, counted = [network.timing.counters for network in networks], True
         if cycle.number >= job.warm_up + job.cycles:
             break
     after = [network.timing.counters for network in networks]

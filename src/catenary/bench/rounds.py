@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 from catenary.bench.job import Job, Round, read_round, write_job
 from catenary.errors import CatenaryError
@@ -14,6 +16,9 @@ from catenary.realtime.child import start_python
 WARM_UP_CYCLES = 200
 BRING_UP_SECONDS = 60.0  # at most, for bring-up and enabling in a round
 
+MOST_FAILED = 10  # rounds of one table that are begun anew
+
+T = TypeVar("T")
 Progress = Callable[[str, int, int], None]  # peer, round, rounds
 
 
@@ -21,15 +26,31 @@ class RoundError(CatenaryError):
     """A peer could not do its round."""
 
 
-def interleave(jobs: Sequence[Job], rounds: int, progress: Progress) -> Mapping[str, list[Round]]:
-    """All rounds of every job, by the peer's name."""
+def begin_anew(run: Callable[[], T], failed: list[str]) -> T:
+    """A machine that stops for longer than the devices' watchdog ends a round: it is done again,
+    and `failed` says why. RoundError: that has happened too often."""
+    while True:
+        try:
+            return run()
+        except RoundError as error:
+            if len(failed) >= MOST_FAILED:
+                raise
+            failed.append(error.message)
+
+
+def interleave(
+    jobs: Sequence[Job], rounds: int, progress: Progress, failed: list[str] | None = None
+) -> Mapping[str, list[Round]]:
+    """All rounds of every job, by the peer's name. With `failed` those that failed are done again,
+    and noted there."""
     found: dict[str, list[Round]] = {job.peer: [] for job in jobs}
     with tempfile.TemporaryDirectory(prefix="catenary-bench-") as name:
         for number in range(rounds):
             first = number % max(len(jobs), 1)
             for job in (*jobs[first:], *jobs[:first]):
                 progress(job.peer, number + 1, rounds)
-                found[job.peer].append(run_round(job, Path(name)))
+                run = partial(run_round, job, Path(name))
+                found[job.peer].append(run() if failed is None else begin_anew(run, failed))
     return found
 
 

@@ -31,7 +31,7 @@ from catenary.bench.tables.published import (
     Phases,
     spread_of,
 )
-from catenary.bench.tables.sheet import Options, Sheet, grid, slashed
+from catenary.bench.tables.sheet import Options, Sheet, as_failures, grid, slashed
 from catenary.bench.two_samples import (
     Effect,
     GoodnessOfFit,
@@ -55,19 +55,21 @@ def measure(options: Options) -> Sheet:
     seconds = options.seconds or SECONDS
     if options.refused:
         names, left_out = [], [f"all of ours: no private network ({options.refused})"]
-    found = run(names, seconds, options) if names else {}
+    failed: list[str] = []
+    found = run(names, seconds, options, failed) if names else {}
     runs = [combine(name, rounds) for name, rounds in found.items()]
     compared = compare(found)
     return Sheet(
         title=f"PyIgH, in-controller delay; {PYIGH_CONDITIONS}",
         conditions=f"ours: {DRIVES} virtual drives on a veth, {RATE} Hz, {seconds:g} s of each",
-        text=f"{as_table(runs)}\n\n{as_tests(compared)}",
+        text="\n".join([as_table(runs), *as_failures(failed), "", as_tests(compared)]),
         figures={
             "published": {name: phases._asdict() for name, phases in PYIGH.items()},
             "published_chi_squared": PYIGH_CHI_SQUARED,
             "seconds": seconds,
             "runs": [asdict(each) for each in runs],
             "ratios_over_c": ratios(runs),
+            "rounds_done_again": failed,
             "comparisons": [
                 {**asdict(each), "verdict": each.rounds.verdict, "within": each.within}
                 for each in compared
@@ -93,14 +95,15 @@ def peers() -> tuple[list[str], list[str]]:
     return names, [*left_out, f"{C}, {C_RING}: no C compiler (sudo apt install gcc libc6-dev)"]
 
 
-def run(names: Sequence[str], seconds: float, options: Options) -> Mapping[str, list[Round]]:
+def run(
+    names: Sequence[str], seconds: float, options: Options, failed: list[str]
+) -> Mapping[str, list[Round]]:
     cycles = round(seconds * RATE)
     rounds = options.rounds or max(ROUNDS, math.ceil(cycles / ROUND_CYCLES))
     with served(DRIVES) as segment:
         jobs = make_jobs(names, segment, RATE, math.ceil(cycles / rounds), Body.SINE, spin=False)
-        return interleave(
-            [published_body(job, options.lead) for job in jobs], rounds, show_progress
-        )
+        jobs = [published_body(job, options.lead) for job in jobs]
+        return interleave(jobs, rounds, show_progress, failed)
 
 
 def published_body(job: Job, lead: float | None) -> Job:

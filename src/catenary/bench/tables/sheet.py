@@ -81,6 +81,13 @@ def versions() -> dict[str, str]:
     return found
 
 
+def as_failures(failed: Sequence[str]) -> list[str]:
+    """Rounds that were done again, in a line: what befell them is missing in the figures."""
+    if not failed:
+        return []
+    return [f"rounds that failed and were done again: {len(failed)} (the first: {failed[0][:110]})"]
+
+
 def grid(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Columns as wide as their widest; the first one to the left."""
     table = [header, *rows]

@@ -12,6 +12,7 @@ import os
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -23,11 +24,11 @@ from catenary.bench.job import Body, Job
 from catenary.bench.loop import make_jobs, show_progress
 from catenary.bench.network_law import GO, PATIENCE
 from catenary.bench.networks import DRIVES, C, NetworkRound, run_c, run_ours
-from catenary.bench.rounds import BRING_UP_SECONDS, RoundError
+from catenary.bench.rounds import BRING_UP_SECONDS, RoundError, begin_anew
 from catenary.bench.segment import processors, served
 from catenary.bench.statistics import summarise
 from catenary.bench.tables.published import TOCABI, TOCABI_CONDITIONS, Channel, spread_of
-from catenary.bench.tables.sheet import Options, Sheet, grid, slashed
+from catenary.bench.tables.sheet import Options, Sheet, as_failures, grid, slashed
 from catenary.bench.tasks import compute_little
 from catenary.realtime import Statistics, Task, Tasks, session
 from catenary.realtime.child import Child, start_python
@@ -60,18 +61,22 @@ def measure(options: Options) -> Sheet:
     rates = options.rates or RATES
     seconds, rounds = options.seconds or SECONDS, options.rounds or ROUNDS
     ways, left_out = ways_for(options)
-    found = {rate: run(rate, seconds, rounds, ways, options) if ways else {} for rate in rates}
+    failed: list[str] = []
+    found = {
+        rate: run(rate, seconds, rounds, ways, options, failed) if ways else {} for rate in rates
+    }
     shape = "rings" if options.ring else "lines"
     blocks = [as_table(rate, *in_columns(of_ways)) for rate, of_ways in found.items()]
     return Sheet(
         title=f"TOCABI, 18 + 15 axes on two networks; {TOCABI_CONDITIONS}",
         conditions=f"ours: virtual drives, two {shape} of veth, {rounds} x {seconds / rounds:g} s",
-        text="\n\n".join(blocks),
+        text="\n\n".join([*blocks, *as_failures(failed)]),
         figures={
             "published": {f"{rate}, {name}": c._asdict() for (rate, name), c in TOCABI.items()},
             "ring": options.ring,
             "seconds": seconds,
             "rounds": rounds,
+            "rounds_done_again": failed,
             "rates": [as_figures(rate, *in_columns(ways)) for rate, ways in found.items()],
         },
         left_out=left_out,
@@ -107,7 +112,12 @@ def ways_for(options: Options) -> tuple[dict[str, Way], list[str]]:
 
 
 def run(
-    rate: int, seconds: float, rounds: int, ways: Mapping[str, Way], options: Options
+    rate: int,
+    seconds: float,
+    rounds: int,
+    ways: Mapping[str, Way],
+    options: Options,
+    failed: list[str],
 ) -> dict[str, WayRounds]:
     """All ways in turn, round by round."""
     found = {name: WayRounds([], []) for name in ways}
@@ -124,7 +134,7 @@ def run(
         for number in range(rounds):
             for name, way in ways.items():
                 show_progress(name, number + 1, rounds)
-                way(jobs, folder, found[name])
+                begin_anew(partial(way, jobs, folder, found[name]), failed)
     return found
 
 
@@ -147,7 +157,8 @@ def two_laws(jobs: Sequence[Job], _folder: Path, found: WayRounds) -> None:
         for child in children:
             os.kill(child.pid, GO)
         said = [expect(child, seconds, "{") for child in children]
-        found.task.append(tasks["python"].statistics)
+        statistics = tasks["python"].statistics
+    found.task.append(statistics)
     found.networks.append([msgspec.json.decode(each, type=NetworkRound) for each in said])
 
 
