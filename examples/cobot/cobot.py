@@ -102,12 +102,13 @@ def stop(task, cost, hit):
         task.spend(cost)
 
 
-def why_stop(arm, wanted, signs):
+def why_stop(wanted, q, v, signs):
     """What the arm must not go on with, these signs among it; None: nothing."""
-    q, v = arm.actual.position, arm.actual.velocity
-    signs["drive fault"] = arm.faults
-    signs["limit"] = any((abs(q) > REACH) & (q * v > 0.01))  # back from it is no reason
-    signs["following error"] = max(abs(wanted - q)) > FOLLOWING_ERROR
+    joints = list(zip(wanted, q, v, strict=True))
+    signs["limit"] = any(
+        abs(q) > REACH and q * v > 0.01 for _, q, v in joints
+    )  # not on the way back
+    signs["following error"] = any(abs(wanted - q) > FOLLOWING_ERROR for wanted, q, _ in joints)
     return next((sign for sign, there in signs.items() if there), None)
 
 
@@ -131,18 +132,17 @@ def main_control(place, cost, target, share, state, torque, phase, rows, done, g
                     row, memory = (q.copy(), nothing, nothing), GAINS.memory.tolist()
                 wanted, speed, acceleration = (wanted, nothing, nothing) if row is None else row
                 state.write([wanted, speed, acceleration, q, v])
-                feed = torque.read()
                 arm.target.position[:] = wanted  # for the recording: the mode is torque
-                joints = zip(*(each.tolist() for each in (wanted, speed, feed, q, v)), strict=True)
-                for i, joint in enumerate(joints):
+                each = [row.tolist() for row in (wanted, speed, torque.read(), q, v)]
+                for i, joint in enumerate(zip(*each, strict=True)):
                     arm.target.torque[i] = control.cascade(memory, parameters, i, *joint, PERIOD)
                 cycle.spend(cost)
                 lost = 0 if arm.present.all() else lost + 1
                 silence = [each.look() for each in silences]
                 before, handled = handled, hit.number
                 signs = {"key": handled > before, "lost bus": lost > 1, "dry set-points": dry}
-                signs["silent dynamics"] = silence[0] > SILENCE
-                reason = why_stop(arm, wanted, signs)
+                signs |= {"silent dynamics": silence[0] > SILENCE, "drive fault": arm.faults}
+                reason = why_stop(each[0], each[3], each[4], signs)
                 phase.write(recovery.step(cycle, reason, ready=torque.number > 0))
                 if recovery.just_stopped:
                     when = hit.read() * 1e-9 if reason == "key" else None

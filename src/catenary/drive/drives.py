@@ -37,7 +37,7 @@ PerAxis: TypeAlias = V | Sequence[V]
 Axes: TypeAlias = int | Sequence[int] | slice
 
 STATES = {int(state): state for state in State}
-IN_FAULT = (State.FAULT_REACTION_ACTIVE, State.FAULT)
+IN_FAULT = (int(State.FAULT_REACTION_ACTIVE), int(State.FAULT))
 ALL = slice(None)
 
 
@@ -142,7 +142,7 @@ class Drives:
         self.actual = AxisValues("actual")
         self.target = AxisValues("target")
         self._views: Views | None = None
-        self._units: list[int] = []
+        self._units: npt.NDArray[np.intp] = np.zeros(0, np.intp)
 
     def __len__(self) -> int:
         return len(self._axes)
@@ -178,7 +178,8 @@ class Drives:
     @property
     def faults(self) -> tuple[int, ...]:
         """The numbers of the axes that are in fault."""
-        return tuple(i for i, state in enumerate(self.state) if state in IN_FAULT)
+        states = self._bound().axis_state.tolist()
+        return tuple(i for i, state in enumerate(states) if state in IN_FAULT)
 
     # What follows is committed with the targets, by the next `next(loop)`.
 
@@ -240,7 +241,7 @@ class Drives:
 
     def tables(self, layout: ImageLayout) -> WishTables:
         """Axes in their order; columns by name, then by axis, so that a name is one array."""
-        self._units = [layout.sync_unit(axis.device) for axis in self._axes]
+        self._units = np.array([layout.sync_unit(axis.device) for axis in self._axes], np.intp)
         return WishTables(
             axes=tuple(axis.plan(layout) for axis in self._axes),
             output_columns=tuple(

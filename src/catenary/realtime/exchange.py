@@ -48,11 +48,11 @@ class Form:
         import numpy as np
 
         try:
-            array = np.ascontiguousarray(data, dtype=self.dtype)
+            array = np.asarray(data, self.dtype, order="C")
         except (TypeError, ValueError) as error:
             raise ValueError(f"{data!r} is no {self}: {error}") from error
-        if np.shape(data) != self.shape:
-            raise ValueError(f"an array of shape {np.shape(data)} is given, {self} is expected")
+        if array.shape != self.shape:
+            raise ValueError(f"an array of shape {array.shape} is given, {self} is expected")
         return array
 
     def empty(self) -> Array:
