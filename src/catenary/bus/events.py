@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
+from catenary.bus.background import step_behind
 from catenary.bus.event import Event
 
 if TYPE_CHECKING:
@@ -149,6 +150,7 @@ class Callbacks:
                     self._untold.get_nowait()
 
     def _serve(self) -> None:
+        step_behind()
         while (event := self._untold.get()) is not None:
             self._call(event)
 

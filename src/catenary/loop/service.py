@@ -8,6 +8,7 @@ from functools import partial
 from typing import TypeVar
 
 from catenary.bus import LaneRunner, MainDevice
+from catenary.bus.background import step_behind
 from catenary.core import Engine
 from catenary.errors import LoopError
 from catenary.loop.mailbox_watch import MailboxWatch
@@ -82,6 +83,7 @@ class Service:
         self.runner.close()
 
     def _serve(self) -> None:
+        step_behind()
         try:
             while not self._ended.is_set():
                 self.runner.asked.clear()

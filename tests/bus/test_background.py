@@ -1,0 +1,44 @@
+"""Threads beside the loop."""
+
+from __future__ import annotations
+
+import os
+import threading
+
+import pytest
+
+from catenary.bus.background import BEHIND, step_behind
+
+
+def scheduling_of_a_thread_started_with(policy: int, priority: int) -> tuple[int, int]:
+    """Policy and priority after `step_behind`."""
+    found: list[tuple[int, int]] = []
+
+    def inner() -> None:
+        step_behind()
+        found.append((os.sched_getscheduler(0), os.sched_getparam(0).sched_priority))
+
+    def outer() -> None:
+        try:
+            os.sched_setscheduler(0, policy, os.sched_param(priority))
+        except PermissionError:
+            return
+        thread = threading.Thread(target=inner)
+        thread.start()
+        thread.join()
+
+    thread = threading.Thread(target=outer)
+    thread.start()
+    thread.join()
+    if not found:
+        pytest.skip("needs real-time scheduling")
+    return found[0]
+
+
+@pytest.mark.parametrize("policy", [os.SCHED_FIFO, os.SCHED_RR])
+def test_it_does_not_keep_the_loop_s_priority(policy: int) -> None:
+    assert scheduling_of_a_thread_started_with(policy, 80) == (os.SCHED_FIFO, BEHIND)
+
+
+def test_in_an_ordinary_program_it_stays_ordinary() -> None:
+    assert scheduling_of_a_thread_started_with(os.SCHED_OTHER, 0) == (os.SCHED_OTHER, 0)
