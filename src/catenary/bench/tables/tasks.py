@@ -1,9 +1,10 @@
 """`catenary bench table tasks`: three spinning tasks, 3, 5 and 10 ms every 10, 20 and 40 ms, in C
 and in Python, idle and beside stress-ng; and what the analysis says of their responses.
 
-The bound is that of the response-time analysis. Execution is the most processor time that a task
-took from one start to the next, so with its waiting, waking and switching; its release is as late
-as the first task, which nobody preempts, ever started. The analysis is for fixed priorities:
+The bound is that of the response-time analysis. A job keeps the processor busy with its release
+(timer interrupt, wake-up, switch: nobody is charged for all of that), at most as long as the first
+task, which nobody preempts, was ever late to start; and with what its thread is charged, at most
+from one start to the next, so with its end and its waiting. The analysis is for fixed priorities:
 threads under one interpreter lock are served by the lock.
 """
 
@@ -214,11 +215,11 @@ def of_statistics(found: Statistics, most: float) -> Found:
 # ---- the analysis
 
 
-def bounds(executions: Sequence[float], jitter: float = 0.0) -> list[float | None]:
+def bounds(executions: Sequence[float]) -> list[float | None]:
     """The longest responses [ms], by the analysis."""
     verdict = analyse(
         [
-            Demand(name=name, period=period, execution=execution, priority=priority, jitter=jitter)
+            Demand(name=name, period=period, execution=execution, priority=priority)
             for name, period, execution, priority in zip(
                 NAMES, PERIODS, executions, PRIORITIES, strict=True
             )
@@ -229,8 +230,8 @@ def bounds(executions: Sequence[float], jitter: float = 0.0) -> list[float | Non
 
 
 def measured_bounds(tasks: Sequence[Found]) -> list[float | None]:
-    longest = [each.execution_ms * 1e-3 for each in tasks]
-    return bounds(longest, tasks[0].figures_ms["jitter"]["max"] * 1e-3)
+    release = tasks[0].figures_ms["jitter"]["max"]
+    return bounds([(each.execution_ms + release) * 1e-3 for each in tasks])
 
 
 # ---- for people
