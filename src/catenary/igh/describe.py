@@ -28,7 +28,6 @@ from catenary.wire.sii_categories import SyncManagerUse
 DEVICE_TYPE, MODULE_PROFILES = 0x1000, 0xF010
 STATUSWORD, SLOT_STRIDE, SLOTS_MAX = 0x6041, 0x800, 16
 PROFILE_DRIVE, PROFILE_MODULAR = 402, 5001
-SYNC_OBJECTS = (0x1C32, 0x1C33)  # :01 is how a device keeps time with the bus
 MAILBOXES = 2  # SyncManagers 0 and 1 of a device with a mailbox
 STATION_BASE = 0x03E9  # 1001, as our own scans: the master keeps its addresses to itself
 

@@ -21,7 +21,7 @@ from catenary.errors import (
 from catenary.igh.address import place
 from catenary.igh.carrier import KernelCarrier
 from catenary.igh.configure import Configuration, DeviceConfiguration, configure
-from catenary.igh.describe import SYNC_OBJECTS, describe, object_information, read_if_there
+from catenary.igh.describe import describe, object_information, read_if_there
 from catenary.igh.master import Master, Reservation
 from catenary.igh.sub_device import SubDevice
 from catenary.model.device import DeviceDescription, Direction, Identity, mapped_entries
@@ -118,6 +118,8 @@ class MainDevice(bus.MainDevice):
 
     def _note_sync_types(self, sub: bus.SubDevice) -> None:
         """How a device keeps time with the bus, before it is told to go by SYNC0."""
+        from catenary.plan.clocks import SYNC_OBJECTS
+
         found = {
             index: read_if_there(self.reservation, sub.position, index, 1) or b""
             for index in SYNC_OBJECTS
