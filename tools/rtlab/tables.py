@@ -30,22 +30,22 @@ TABLES: Mapping[str, Table] = {
         of_all=False,
     ),
     "loop": Table(
-        "bench loop --seconds 60 --rounds 10 --peers c,c-ring,pysoem",
+        "bench loop --seconds 5 --rounds 1 --peers c,c-ring,pysoem",
         90,
         "the loop beside C and PySOEM, three drives at 1 kHz",
     ),
     "pyigh": Table(
-        "bench table pyigh --seconds 60 --rounds 10 --lead 0",
+        "bench table pyigh --seconds 60 --rounds 8 --lead 0",
         90,
         "in-controller delay: C, PySOEM and ours, three drives at 1 kHz",
     ),
     "tasks": Table(
-        "bench table tasks --seconds 10",
+        "bench table tasks --seconds 4",
         60,
         "three spinning tasks beside their analysis",
     ),
     "tocabi": Table(
-        "bench table tocabi --seconds 4 --lead 0",
+        "bench table tocabi --seconds 1 --rounds 1 --lead 0",
         90,
         "33 axes on two networks, 4 and 8 kHz",
     ),
