@@ -72,6 +72,7 @@ struct double_master {
 static struct {
     int slaves, reserved, absent, redundancy, scanning, cable;
     uint32_t spread;              /* OR of all 0x092C */
+    int silent;                   /* uploads that get no answer */
     int64_t delay, sent;          /* [ns] from send to the frames' return */
     int early;                    /* domains processed before their frames were back */
     volatile int blocked;         /* position whose objects do not answer, plus one */
@@ -383,6 +384,8 @@ static int upload(int position, uint16_t index, uint8_t subindex, uint8_t *targe
         return -EINVAL;
     if (bus.all[position].plain)
         return -EPROTONOSUPPORT;
+    if (bus.silent > 0 && bus.silent--)
+        return -EIO;
     if (bus.all[position].al < PREOP)  /* as the real one: nobody answers in INIT */
         return -EIO;
     if (o == NULL) {
@@ -869,6 +872,7 @@ void double_state(int position, int al, int error)
     bus.all[position].error = error;
     bus.all[position].unacknowledged = error ? 8 : 0;
 }
+void double_silent(int uploads) { bus.silent = uploads; }
 void double_spread(uint32_t spread) { bus.spread = spread; }
 void double_delay(int microseconds) { bus.delay = 1000LL * microseconds; }
 int double_early(void) { int count = bus.early; bus.early = 0; return count; }

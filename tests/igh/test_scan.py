@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import catenary as cat
-from catenary.errors import CatenaryError
+from catenary.errors import CatenaryError, MailboxError
 from catenary.igh import Master
 from tests.igh.double import Double
 
@@ -26,6 +26,17 @@ def test_a_device_that_the_master_keeps_in_op_holds_nobody_up(double: Double) ->
         begun = main.link.now()
         assert [str(sub.state) for sub in main.scan()] == ["PRE-OP", "OP"]
         assert (main.link.now() - begun) * 1e-9 < 3.0
+
+
+def test_an_answer_that_was_lost_is_asked_for_again(double: Double) -> None:
+    """Else a drive whose answer a frame has lost would pass for a device without objects (seen on a
+    real master)."""
+    double.silent(2)
+    with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
+        assert all(sub.is_drive for sub in main.scan())
+        double.silent(100)
+        with pytest.raises(MailboxError, match="0x1000:00: no answer"):
+            main.scan()
 
 
 def test_a_terminal_without_mailbox_is_not_asked_for_objects(double: Double) -> None:

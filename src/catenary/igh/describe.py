@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from catenary.errors import MailboxError, SdoAbort
 from catenary.igh import abi
 from catenary.igh.master import Reservation
+from catenary.igh.refusal import NoMailboxError
 from catenary.model.describe import assignments
 from catenary.model.device import (
     DeviceDescription,
@@ -28,6 +29,7 @@ from catenary.wire.sii_categories import SyncManagerUse
 DEVICE_TYPE, MODULE_PROFILES = 0x1000, 0xF010
 STATUSWORD, SLOT_STRIDE, SLOTS_MAX = 0x6041, 0x800, 16
 PROFILE_DRIVE, PROFILE_MODULAR = 402, 5001
+ATTEMPTS = 3
 MAILBOXES = 2  # SyncManagers 0 and 1 of a device with a mailbox
 STATION_BASE = 0x03E9  # 1001, as our own scans: the master keeps its addresses to itself
 
@@ -83,13 +85,19 @@ def describe(master: Reservation, position: int) -> DeviceDescription:
 def read_if_there(
     master: Reservation, position: int, index: int, subindex: int = 0
 ) -> bytes | None:
-    """An object; empty where the device refuses it, None where it speaks no CoE."""
-    try:
-        return master.upload(position, index, subindex)
-    except SdoAbort:
-        return b""
-    except MailboxError:
-        return None
+    """An object; empty where the device refuses it, None where it speaks no CoE. MailboxError where
+    it does not answer: asked again, for the master repeats nothing that a frame has lost."""
+    for attempt in range(ATTEMPTS):
+        try:
+            return master.upload(position, index, subindex)
+        except SdoAbort:
+            return b""
+        except NoMailboxError:
+            return None
+        except MailboxError:
+            if attempt + 1 == ATTEMPTS:
+                raise
+    return None
 
 
 def object_information(

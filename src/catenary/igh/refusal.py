@@ -14,6 +14,10 @@ NODE = "/dev/EtherCAT{}"
 MODULE = Path("/sys/module/ec_master")
 
 
+class NoMailboxError(MailboxError):
+    """The device has no mailbox for objects."""
+
+
 def sdo_error(
     who: str, position: int, index: int, subindex: int, result: int, code: int
 ) -> CatenaryError:
@@ -29,6 +33,8 @@ def sdo_error(
             code=code,
             hint=known.hint or "the manual of the device lists its objects",
         )
+    if -result == errno.EPROTONOSUPPORT:
+        return NoMailboxError(f"{what}: the device has no objects", hint="it does not speak CoE")
     if -result in (errno.EOVERFLOW, errno.ENOBUFS):
         return MailboxError(f"{what} is longer than expected", hint="give a larger limit=")
     return MailboxError(
