@@ -24,10 +24,12 @@ class Lab:
     def run(self, script: str, seconds: float) -> tuple[list[str], dict[str, Any]]:
         """What `script` prints, and what it leaves in the file it is given."""
         image = self.folder / "root.cpio"
+        copy = archive.folder("/tmp/copy")  # CI's working copy lies there
+        files = root.entries(self.kernel, [*root.interpreter(), *root.programs()])
         with image.open("wb") as file:
-            archive.write(root.entries(self.kernel, [*root.interpreter(), *root.programs()]), file)
+            archive.write([*files, copy], file)
         python = str(next(iter(root.interpreter())))
-        job = {"folder": "/", "name": "test", "arguments": [python, "-c", script, "FILE"]}
+        job = {"folder": copy.path, "name": "test", "arguments": [python, "-c", script, "FILE"]}
         with machine.started(self.kernel, image, job, self.folder, seconds) as guest:
             return list(guest.lines()), guest.answer()
 

@@ -14,12 +14,11 @@ import tty
 from pathlib import Path
 from typing import Any
 
-MOUNTS = (
+MOUNTS = (  # /tmp is the root's own: the working copy may lie in it
     ("proc", "/proc"),
     ("sysfs", "/sys"),
     ("devtmpfs", "/dev"),
     ("tmpfs", "/dev/shm"),
-    ("tmpfs", "/tmp"),
 )
 RESULTS = "/dev/ttyS1"
 ENVIRONMENT = {
