@@ -43,13 +43,13 @@ SILENCE, PATIENCE = 5, 3000  # cycles without news from a task, from the bus: st
 
 def dynamics(task, cost, state, torque, arm, gravity):
     """What the motion takes [N·m]: gravity, Coriolis, inertia, friction."""
-    model, axes = control.Dynamics(arm, axes=JOINTS), range(JOINTS)
-    friction, rotors = FRICTION.parameters, ROTORS.parameters
+    model = control.Dynamics(arm, axes=JOINTS)
+    friction, rotors = FRICTION.parameters.tolist(), ROTORS.parameters.tolist()  # faster as lists
     for _ in task:
         _, speed, acceleration, q, v = state.read()
         feed = model.inverse(q, v, acceleration) - (0 if gravity else model.gravity(q))
-        feed += [control.friction(friction, i, speed[i]) for i in axes]
-        feed += [control.feed_forward(rotors, i, speed[i], acceleration[i]) for i in axes]
+        for i, (v, a) in enumerate(zip(speed.tolist(), acceleration.tolist(), strict=True)):
+            feed[i] += control.friction(friction, i, v) + control.feed_forward(rotors, i, v, a)
         torque.write(feed)
         task.spend(cost)
 
@@ -114,7 +114,7 @@ def why_stop(wanted, q, v, signs):
 
 def main_control(place, cost, target, share, state, torque, phase, rows, done, goals, hit):
     """The bus, waited for when it is lost, and the cascades. Timing, stops, times real time."""
-    parameters = GAINS.parameters.tolist()  # lists are faster here
+    parameters = GAINS.parameters.tolist()
     wanted = speed = nothing = np.zeros(JOINTS)
     handled = lost = 0
     silences = realtime.Silence(torque), realtime.Silence(done)

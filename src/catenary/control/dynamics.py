@@ -45,7 +45,8 @@ class Dynamics:
         armature: PerAxis = 0.0,
     ) -> None:
         self._model: Model = load_model(Path(path), joints, axes, armature)
-        self._data = self._model.workspace()
+        self._data = data = self._model.workspace()
+        self._rows = (data.qpos, data.qvel, data.qacc, data.qfrc_inverse)  # looked up once
         self._coordinates, self._degrees = np.array(self._model.places).T
 
     @property
@@ -77,12 +78,12 @@ class Dynamics:
         return self._solve(*(self._checked(name, values) for name, values in named.items()))
 
     def _solve(self, position: Row, velocity: Row | float, acceleration: Row | float) -> Row:
-        model, data = self._model, self._data
-        data.qpos[self._coordinates] = position
-        data.qvel[self._degrees] = velocity
-        data.qacc[self._degrees] = acceleration
-        model.mujoco.mj_inverse(model.native, data)
-        torque: Row = data.qfrc_inverse[self._degrees]
+        coordinates, velocities, accelerations, forces = self._rows
+        coordinates[self._coordinates] = position
+        velocities[self._degrees] = velocity
+        accelerations[self._degrees] = acceleration
+        self._model.mujoco.mj_inverse(self._model.native, self._data)
+        torque: Row = forces[self._degrees]
         return torque
 
     def _checked(self, name: str, values: Vector) -> Row:
