@@ -21,7 +21,8 @@ from catenary.bench.published import (
 )
 from catenary.drive import Stop
 from catenary.realtime import Demand, Tasks, Verdict
-from catenary.wire.cia402 import STATE_CODING, Control, State
+from catenary.record.timeline import braking
+from catenary.wire.cia402 import STATE_CODING, State
 
 MAIN = "main control"
 STOP = "stop: "  # how the markers of stops begin; the reason follows
@@ -79,11 +80,9 @@ class Reaction:
 def reactions(recording: record.Recording) -> list[Reaction]:
     """Of every stop that a marker tells of, by the controlwords that were sent. ValueError: no
     quick stop followed."""
-    words, states = recording["controlword"], recording["statusword"]
-    braking = (words & (Control.QUICK_STOP | Control.ENABLE_VOLTAGE)) == Control.ENABLE_VOLTAGE
     mask, value = STATE_CODING[State.OPERATION_ENABLED]
-    moving = (states & mask) == value
-    stopping = (braking | ~moving).all(axis=1)
+    moving = (recording["statusword"] & mask) == value
+    stopping = (braking(recording) | ~moving).all(axis=1)
     instants = recording["scheduled_ns"].astype(np.int64)
     found = []
     for event in recording.events:

@@ -14,7 +14,7 @@ import msgspec
 import catenary as cat
 from catenary.bench.job import Job
 from catenary.bench.networks import NetworkRound, phases_of
-from catenary.bench.peers.with_catenary import LATE_LIMIT, LOST_LIMIT
+from catenary.bench.peers.with_catenary import opened
 from catenary.bench.peers.with_catenary_law import sine
 from catenary.errors import CatenaryError
 
@@ -25,26 +25,14 @@ NEVER = 1e9  # [s]
 
 
 def run_law(job: Job) -> NetworkRound:
-    with cat.MainDevice(*job.interfaces) as main:
-        arm = cat.Drives(main.scan().drives, mode="csp", counts_per_turn=job.counts_per_turn)
-        with cat.Loop(
-            arm,
-            period=job.period_ns * 1e-9,
-            cpu=job.cpu,
-            priority=job.priority,
-            lost_limit=LOST_LIMIT,
-            late_limit=LATE_LIMIT,
-            lead=job.lead,
-            log=job.log,
-            laws=[sine],
-        ) as loop:
-            home = arm.actual.position.copy()
-            parameters = [job.amplitude, job.stiffness, job.damping, NEVER]
-            loop.start(sine, memory=home, parameters=parameters, budget=0)
-            print("ready", flush=True)
-            if signal.sigtimedwait({GO}, PATIENCE) is None:
-                raise CatenaryError(f"nobody said go within {PATIENCE:.0f} s")
-            return count(loop, job)
+    with opened(job, laws=[sine]) as (loop, arm):
+        home = arm.actual.position.copy()
+        parameters = [job.amplitude, job.stiffness, job.damping, NEVER]
+        loop.start(sine, memory=home, parameters=parameters, budget=0)
+        print("ready", flush=True)
+        if signal.sigtimedwait({GO}, PATIENCE) is None:
+            raise CatenaryError(f"nobody said go within {PATIENCE:.0f} s")
+        return count(loop, job)
 
 
 def count(loop: cat.Loop, job: Job) -> NetworkRound:

@@ -22,6 +22,7 @@ import numpy.typing as npt
 import catenary as cat
 from catenary.bench.job import PHASES, Body, Job, Nanoseconds
 from catenary.bench.loop import make_jobs, show_progress, write
+from catenary.bench.peers.with_catenary import LATE_LIMIT, LOST_LIMIT
 from catenary.bench.report import machine
 from catenary.bench.rounds import BRING_UP_SECONDS, RoundError, run_round
 from catenary.bench.segment import COUNTS_PER_TURN, make_segment, served
@@ -203,8 +204,8 @@ def run_loop(jobs: Sequence[Job]) -> list[NetworkRound]:
                 period=first.period_ns * 1e-9,
                 cpu=None if first.cpu is None else [first.cpu] * len(jobs),
                 priority=first.priority,
-                lost_limit=1000,
-                late_limit=0.0,
+                lost_limit=LOST_LIMIT,
+                late_limit=LATE_LIMIT,
                 log=first.log,
             )
         )

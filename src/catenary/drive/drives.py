@@ -30,14 +30,13 @@ from catenary.drive.units import AxisUnits, one_each, per_axis
 from catenary.drive.values import Array, AxisValues
 from catenary.plan.cycle import Bank
 from catenary.plan.wish import DC, ImageLayout, PdoWish, Views, WishTables
-from catenary.wire.cia402 import Mode, State
+from catenary.wire.cia402 import IN_FAULT, Mode, State
 
 V = TypeVar("V")
 PerAxis: TypeAlias = V | Sequence[V]
 Axes: TypeAlias = int | Sequence[int] | slice
 
 STATES = {int(state): state for state in State}
-IN_FAULT = (int(State.FAULT_REACTION_ACTIVE), int(State.FAULT))
 ALL = slice(None)
 
 

@@ -9,12 +9,12 @@ from catenary.errors import DriveError, StateError, WorkingCounterError
 from catenary.model.finding import Finding
 from catenary.procedure.survey import Answer
 from catenary.wire.al import State, status_code
+from catenary.wire.cia402 import IN_FAULT
 from catenary.wire.cia402 import State as DriveState
 from catenary.wire.drive_error import error_text
 
 STATE_BITS = 0x0F
 ERROR_BIT = 0x10
-IN_FAULT = (DriveState.FAULT_REACTION_ACTIVE, DriveState.FAULT)
 
 
 def silence_error(

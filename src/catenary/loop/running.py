@@ -26,7 +26,6 @@ from catenary.errors import CatenaryError, DriveError, LoopError
 from catenary.loop.buffers import bind_wishes
 from catenary.loop.clocks import Clocks
 from catenary.loop.diagnosis import (
-    IN_FAULT,
     AxisTrouble,
     drive_error,
     forgetful_error,
@@ -51,7 +50,7 @@ from catenary.procedure.sdo import upload
 from catenary.procedure.survey import survey
 from catenary.types import UINT
 from catenary.wire.al import State
-from catenary.wire.cia402 import SLOT_OFFSET, Mode, Object, state_of
+from catenary.wire.cia402 import IN_FAULT, SLOT_OFFSET, Mode, Object, state_of
 
 LogArray = npt.NDArray[np.void]
 

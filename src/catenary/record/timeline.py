@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from catenary.record.layout import NUMBER
 from catenary.record.recording import Recording
 from catenary.record.series import count_of, peaks, phase_us
+from catenary.wire.cia402 import QUICK_STOP_COMMAND
 
-QUICK_STOP_BITS, QUICK_STOP = 0x86, 0x02  # of the controlword, IEC 61800-7-201 table 28
 MARKED = 40  # more would hide the lines
 NAMED, LEVELS = 24, 4  # names beyond are in the page's table; they lie on so many lines
 LEVEL_HEIGHT = 0.12  # of the plot
@@ -44,10 +45,16 @@ def quick_stops(recording: Recording) -> list[tuple[int, list[int]]]:
     """Rows in which a quick stop is sent to axes that had none sent the cycle before, and these."""
     if recording.layout.field("controlword") is None or len(recording) < 2:
         return []
-    stop = recording["controlword"] & QUICK_STOP_BITS == QUICK_STOP
+    stop = braking(recording)
     begins = stop[1:] & ~stop[:-1] & (np.diff(recording[NUMBER].astype(np.int64)) == 1)[:, None]
     rows = np.flatnonzero(begins.any(axis=1))
     return [(int(row) + 1, np.flatnonzero(begins[row]).tolist()) for row in rows]
+
+
+def braking(recording: Recording) -> npt.NDArray[np.bool_]:
+    """(cycles, axes) whose frames said quick stop."""
+    mask, value = QUICK_STOP_COMMAND
+    return np.asarray(recording["controlword"] & mask == value)
 
 
 def stop_text(recording: Recording, axes: list[int]) -> str:

@@ -35,6 +35,9 @@ STATE_CODING = {
 }
 
 
+IN_FAULT = (State.FAULT_REACTION_ACTIVE, State.FAULT)
+
+
 def state_of(statusword: int) -> State | None:
     """The state a statusword codes; None if its bits code none."""
     for state, (mask, value) in STATE_CODING.items():
@@ -89,6 +92,7 @@ class Control(IntFlag):
     MANUFACTURER_15 = 1 << 15
 
 
+QUICK_STOP_COMMAND = (0x0086, 0x0002)  # (mask, value) of the controlword, IEC 61800-7-201 table 28
 MODE_CONTROL_BITS = 0xFA70  # bits 4, 5, 6, 9, 11 to 15: free of the state machine and halt
 
 

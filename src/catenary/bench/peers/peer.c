@@ -6,7 +6,6 @@
 #include "peer.h"
 
 #include <math.h>
-#include <sys/mman.h>
 
 static struct job job;
 static uint8_t sent[FRAME_MAX], received[FRAME_MAX + 64];
@@ -58,11 +57,6 @@ static void read_job(void) {
             exit(2);
         }
     }
-}
-
-static void wait_until(int64_t deadline) {
-    struct timespec t = {deadline / 1000000000LL, deadline % 1000000000LL};
-    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, NULL) == EINTR) {}
 }
 
 static void emit(void) {
@@ -154,7 +148,7 @@ int main(void) {
     if (!samples || job.datagram_count == 0) fail("job");
     memset(samples, 1, (size_t)(job.cycles * PHASES) * sizeof *samples); /* touch the pages */
     memcpy(sent, job.frame, job.length);
-    mlockall(MCL_CURRENT | MCL_FUTURE); /* refused to ordinary users: the run goes on without */
+    lock_memory();
 
     int64_t deadline = now_ns(CLOCK_MONOTONIC) + job.period_ns;
     for (unsigned i = 0; i + 1 < job.request_count; i++) { /* the last one is for leaving */

@@ -10,17 +10,15 @@
 #ifndef CATENARY_BENCH_PEER_H
 #define CATENARY_BENCH_PEER_H
 
+#include "machine.h" /* first: it asks for all that Linux has */
+
 #include <arpa/inet.h>
-#include <errno.h>
 #include <linux/if_ether.h>
 #include <linux/if_packet.h>
 #include <net/if.h>
-#include <stdint.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
-#include <time.h>
 
 #define ETHERCAT 0x88A4
 #define FRAME_MAX 1514
@@ -65,12 +63,6 @@ struct job {
  * arrived into `frame` and returns its length, or 0 at once when none is there. */
 int peer_open(unsigned interface_index);
 unsigned peer_receive(int socket, uint8_t *frame);
-
-static inline int64_t now_ns(clockid_t clock) {
-    struct timespec t;
-    clock_gettime(clock, &t);
-    return t.tv_sec * 1000000000LL + t.tv_nsec;
-}
 
 static inline uint16_t load16(const uint8_t *p) { return (uint16_t)(p[0] | p[1] << 8); }
 static inline int32_t load32(const uint8_t *p) {

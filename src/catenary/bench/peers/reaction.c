@@ -4,47 +4,23 @@
  *
  * eventfd: another thread of lower priority says the time in the event itself. timerfd: the kernel's
  * timer expires at a known instant. CPU -1: any. FILE gets one int64 [ns] for each event. */
-#define _GNU_SOURCE
-#include <errno.h>
-#include <pthread.h>
-#include <sched.h>
-#include <stdint.h>
-#include <stdio.h>
+#include "machine.h"
+
 #include <stdlib.h>
 #include <string.h>
 #include <sys/eventfd.h>
-#include <sys/mman.h>
 #include <sys/timerfd.h>
-#include <time.h>
 #include <unistd.h>
 
 static int event;
 static long count, period_ns;
 
-static int64_t now_ns(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return t.tv_sec * 1000000000LL + t.tv_nsec;
-}
-
-static struct timespec timespec_of(int64_t instant) {
-    struct timespec t = {instant / 1000000000LL, instant % 1000000000LL};
-    return t;
-}
-
-static void be_real_time(int priority) {
-    struct sched_param parameter = {.sched_priority = priority};
-    if (pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameter))
-        fprintf(stderr, "SCHED_FIFO %d refused\n", priority);
-}
-
 static void *trigger(void *priority) {
     be_real_time(*(int *)priority - 10);
-    int64_t instant = now_ns();
+    int64_t instant = now_ns(CLOCK_MONOTONIC);
     for (long i = 0; i < count; i++) {
-        struct timespec t = timespec_of(instant += period_ns);
-        while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, NULL) == EINTR) {}
-        uint64_t now = (uint64_t)now_ns();
+        wait_until(instant += period_ns);
+        uint64_t now = (uint64_t)now_ns(CLOCK_MONOTONIC);
         if (write(event, &now, sizeof now) != sizeof now) break;
     }
     return NULL;
@@ -58,16 +34,11 @@ int main(int words, char **word) {
     int64_t *samples = calloc((size_t)count, sizeof *samples);
     if (!samples || count < 1 || period_ns < 1) return 2;
     memset(samples, 1, (size_t)count * sizeof *samples); /* touch the pages */
-    if (cpu >= 0) {
-        cpu_set_t only;
-        CPU_ZERO(&only);
-        CPU_SET(cpu, &only);
-        if (sched_setaffinity(0, sizeof only, &only)) perror("CPU");
-    }
-    mlockall(MCL_CURRENT | MCL_FUTURE); /* refused to ordinary users: it goes on without */
+    stay_on(cpu);
+    lock_memory();
     be_real_time(priority);
     pthread_t thread;
-    int64_t expiry = now_ns();
+    int64_t expiry = now_ns(CLOCK_MONOTONIC);
     if (by_timer) {
         event = timerfd_create(CLOCK_MONOTONIC, 0);
         struct itimerspec t = {timespec_of(period_ns), timespec_of(expiry + period_ns)};
@@ -79,7 +50,7 @@ int main(int words, char **word) {
     for (long i = 0; i < count; i++) {
         uint64_t said;
         if (read(event, &said, sizeof said) != sizeof said) { perror("read"); return 1; }
-        int64_t now = now_ns();
+        int64_t now = now_ns(CLOCK_MONOTONIC);
         expiry += by_timer ? (int64_t)said * period_ns : 0; /* said: how many expired */
         samples[i] = now - (by_timer ? expiry : (int64_t)said);
     }

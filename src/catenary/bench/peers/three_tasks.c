@@ -6,16 +6,10 @@
  * of its own processor time in every job. FILE gets, task by task, the number of its jobs and four
  * int64 [ns] for each: start to start, release to start, release to end, and its processor time from
  * this start to the next, with what waiting and waking take (the last job: to its end). */
-#define _GNU_SOURCE
-#include <errno.h>
-#include <pthread.h>
-#include <sched.h>
-#include <stdint.h>
-#include <stdio.h>
+#include "machine.h"
+
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
-#include <time.h>
 
 enum { TASKS_MAX = 8, FIGURES = 4 };
 enum { LEAD_NS = 100000000 }; /* for threads, whose stacks are locked whole */
@@ -26,22 +20,9 @@ struct task {
     int64_t *samples;
 };
 
-static int64_t now_ns(clockid_t clock) {
-    struct timespec t;
-    clock_gettime(clock, &t);
-    return t.tv_sec * 1000000000LL + t.tv_nsec;
-}
-
-static void wait_until(int64_t instant) {
-    struct timespec t = {instant / 1000000000LL, instant % 1000000000LL};
-    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, NULL) == EINTR) {}
-}
-
 static void *run(void *argument) {
     struct task *task = argument;
-    struct sched_param parameter = {.sched_priority = task->priority};
-    if (pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameter))
-        fprintf(stderr, "SCHED_FIFO %d refused\n", task->priority);
+    be_real_time(task->priority);
     int64_t before = 0, began = 0;
     for (int64_t job = 0; job < task->jobs; job++) {
         int64_t release = task->origin + job * task->period;
@@ -71,13 +52,8 @@ int main(int count, char **words) {
         fprintf(stderr, "three_tasks CPU SECONDS FILE  PERIOD_NS EXECUTION_NS PRIORITY ...\n");
         return 2;
     }
-    if (cpu >= 0) {
-        cpu_set_t only;
-        CPU_ZERO(&only);
-        CPU_SET(cpu, &only);
-        if (sched_setaffinity(0, sizeof only, &only)) perror("CPU");
-    }
-    mlockall(MCL_CURRENT | MCL_FUTURE); /* refused to ordinary users: it goes on without */
+    stay_on(cpu);
+    lock_memory();
     /* Above all tasks, which inherit it: else the last would begin behind the spinning first. */
     struct sched_param above = {.sched_priority = sched_get_priority_max(SCHED_FIFO) - 1};
     if (sched_setscheduler(0, SCHED_FIFO, &above)) perror("SCHED_FIFO");

@@ -15,6 +15,7 @@ import numpy as np
 
 import catenary as cat
 from catenary.bench.job import PHASES, Body, Job, Round
+from catenary.loop.laws.law import Law
 
 STORM = "-sdo"
 IDENTITY, SERIAL = 0x1018, 4  # what the storm asks for
@@ -37,9 +38,11 @@ def order(job: Job) -> Literal["inline", "threaded"]:
 
 
 @contextlib.contextmanager
-def opened(job: Job, sink: cat.Share | None = None) -> Iterator[tuple[cat.Loop, cat.Drives]]:
+def opened(
+    job: Job, sink: cat.Share | None = None, laws: Sequence[Law] = ()
+) -> Iterator[tuple[cat.Loop, cat.Drives]]:
     """The loop of a round."""
-    with cat.MainDevice(job.interface) as main:
+    with cat.MainDevice(*job.interfaces) as main:
         subs = main.scan()
         arm = cat.Drives(
             [subs[position] for position in job.drives],
@@ -56,6 +59,7 @@ def opened(job: Job, sink: cat.Share | None = None) -> Iterator[tuple[cat.Loop, 
             late_limit=LATE_LIMIT,
             lead=job.lead,
             log=job.log,
+            laws=laws,
             sink=sink,
         ) as loop:
             yield loop, arm

@@ -10,7 +10,7 @@ import numpy as np
 
 import catenary as cat
 from catenary.bench.job import PHASES, Body, Job, Round
-from catenary.bench.peers.with_catenary import LATE_LIMIT, LOST_LIMIT, MODE
+from catenary.bench.peers.with_catenary import opened
 
 AMPLITUDE, STIFFNESS, DAMPING, END = range(4)  # of the parameters
 CYCLE_OK = 1  # bit of a record's flags
@@ -35,25 +35,8 @@ def pd(actual: Any, target: Any, memory: Any, time: Any, parameters: Any) -> boo
 
 def run(job: Job) -> Round:
     law = sine if job.body is Body.SINE else pd
-    with cat.MainDevice(job.interface) as main:
-        subs = main.scan()
-        arm = cat.Drives(
-            [subs[position] for position in job.drives],
-            mode=MODE[job.body],
-            counts_per_turn=job.counts_per_turn,
-        )
-        with cat.Loop(
-            arm,
-            period=job.period_ns * 1e-9,
-            cpu=job.cpu,
-            priority=job.priority,
-            lost_limit=LOST_LIMIT,
-            late_limit=LATE_LIMIT,
-            lead=job.lead,
-            log=job.log,
-            laws=[law],
-        ) as loop:
-            return _measure(loop, law, arm.actual.position.copy(), job)
+    with opened(job, laws=[law]) as (loop, arm):
+        return _measure(loop, law, arm.actual.position.copy(), job)
 
 
 def _measure(loop: cat.Loop, law: Any, home: Any, job: Job) -> Round:
