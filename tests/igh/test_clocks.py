@@ -147,6 +147,23 @@ def test_a_silent_reference_is_asked_seldom(main: cat.MainDevice, double: Double
         assert double.calls().count("reference_clock_time") <= 18
 
 
+def test_clocks_are_kept_while_a_device_is_away_that_need_not_be_there(
+    main: cat.MainDevice, double: Double
+) -> None:
+    """Its domain stays incomplete: that is no reason to let the instants of the others drift."""
+    arm = cat.Drives([main.subs[0]], counts_per_turn=1000, dc=True)
+    tool = cat.Drives([main.subs[1]], counts_per_turn=1000, required=False)
+    with cat.Loop(arm, tool) as loop:
+        for _ in range(50):
+            next(loop)
+        double.online(1, 0)
+        double.spread(20_000)
+        for _ in range(100):
+            next(loop)
+        assert not tool.present.any()
+        assert not loop.clocks.locked
+
+
 def test_without_clocks_there_is_nothing_to_watch(main: cat.MainDevice) -> None:
     with (
         cat.Loop(cat.Drives(main.subs.drives, counts_per_turn=1000)) as loop,

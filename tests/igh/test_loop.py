@@ -169,6 +169,22 @@ def test_a_device_that_need_not_be_there_comes_back(main: cat.MainDevice, double
     assert "DeviceReturned" in kinds
 
 
+def test_a_device_that_is_away_holds_no_cycle_up(main: cat.MainDevice, double: Double) -> None:
+    """Answers of those that are there are not kept until frames might still come back."""
+    left, right = main.subs.drives
+    one = cat.Drives([left], counts_per_turn=1000)
+    two = cat.Drives([right], counts_per_turn=1000, required=False)
+    with cat.Loop(one, two) as loop:
+        next(loop)
+        double.online(1, 0)
+        for _ in range(10):
+            next(loop)
+        double.forget()
+        for _ in range(10):
+            assert next(loop).ok
+        assert double.calls().count("receive") < 60
+
+
 def test_a_device_that_refuses_op_is_named(main: cat.MainDevice, double: Double) -> None:
     double.register(1, 0x0134, 0x001D)
     arm = arm_of(main)

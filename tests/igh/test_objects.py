@@ -201,3 +201,15 @@ def test_a_device_that_does_not_answer_holds_nobody_else_up(doubles: dict[str, P
             double.block(-1)
     assert double.value(1, 0x605A, 0) == 5
     assert double.reserved() == 0
+
+
+def test_a_thread_that_comes_too_late_calls_nothing(double: Double) -> None:
+    """libethercat does not look at the handle it is given: none of a master that was given back."""
+    reservation = Master(library=double.path).open_link()
+    reservation.close()
+    double.forget()
+    with pytest.raises(RuntimeError, match="not reserved any more"):
+        reservation.upload(0, 0x1000, 0)
+    with pytest.raises(RuntimeError, match="not reserved any more"):
+        reservation.download(0, 0x6060, 0, b"\x08")
+    assert double.calls() == []

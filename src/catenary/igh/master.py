@@ -116,9 +116,13 @@ class Reservation:
 
     def ask(self, name: str, *arguments: object, what: str, hint: str = "") -> int:
         """A call with the master as its first argument."""
-        if not self.handle:
+        return self.library.ask(name, self._held(), *arguments, what=what, hint=hint)
+
+    def _held(self) -> int:
+        """The handle, which libethercat never checks: a thread may come too late for it."""
+        if not (handle := self.handle):
             raise RuntimeError("the master is not reserved any more")
-        return self.library.ask(name, self.handle, *arguments, what=what, hint=hint)
+        return handle
 
     # What the master knows of its devices
 
@@ -199,7 +203,7 @@ class Reservation:
         buffer = ctypes.create_string_buffer(min(limit, UPLOAD_LIMIT))
         size, code = ctypes.c_uint64(), ctypes.c_uint32()
         result = self.library.ecrt_master_sdo_upload(
-            *(self.handle, position, index, subindex),
+            *(self._held(), position, index, subindex),
             *(ctypes.addressof(buffer), len(buffer), ctypes.byref(size), ctypes.byref(code)),
         )
         if result < 0:
@@ -217,7 +221,7 @@ class Reservation:
         if complete:
             call, place = self.library.ecrt_master_sdo_download_complete, (index,)
         at = (ctypes.addressof(buffer), len(data), ctypes.byref(code))
-        result = call(self.handle, position, *place, *at)
+        result = call(self._held(), position, *place, *at)
         if result < 0:
             raise self._refused_sdo(position, index, subindex, result, code.value)
 
