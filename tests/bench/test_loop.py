@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from catenary.bench import law_call, needed, scan, storm
 from catenary.bench.job import PHASES, Round
 from catenary.bench.loop import peer_names
 from catenary.bench.report import as_json, as_text, machine
@@ -23,6 +24,19 @@ def test_ours_run_beside_the_chosen_peers() -> None:
 def test_an_unknown_peer_is_named() -> None:
     with pytest.raises(ValueError, match=r"no peer 'soem'; known: .*c, c-ring, pysoem"):
         peer_names(["soem"])
+
+
+def test_what_is_not_installed_is_told_before_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(needed, "find_spec", lambda name: None)
+    with pytest.raises(needed.PackageError, match="needs pysoem") as caught:
+        peer_names(["c", "pysoem"])
+    assert "or leave pysoem out" in caught.value.hint
+    with pytest.raises(needed.PackageError, match="needs pysoem"):
+        scan.measure(drives=1, file=None)
+    with pytest.raises(needed.PackageError, match="needs pysoem"):
+        storm.measure(drives=1, rate=1000, seconds=1.0, file=None)
+    with pytest.raises(needed.PackageError, match="needs numba"):
+        law_call.measure(axes=1, file=None)
 
 
 def test_json_has_the_published_form(tmp_path: Path) -> None:

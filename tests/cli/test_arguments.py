@@ -1,8 +1,17 @@
 import argparse
+from pathlib import Path
 
 import pytest
 
-from catenary.cli.arguments import Entry, entry, number, position, positive_seconds
+from catenary.cli.arguments import (
+    Entry,
+    entry,
+    number,
+    position,
+    positive_minutes,
+    positive_seconds,
+    result_file,
+)
 
 
 @pytest.mark.parametrize(
@@ -47,3 +56,22 @@ def test_position_refuses_what_is_outside(text: str) -> None:
 def test_seconds_are_positive_and_finite(text: str) -> None:
     with pytest.raises(argparse.ArgumentTypeError):
         positive_seconds(text)
+
+
+def test_minutes_are_called_so() -> None:
+    assert positive_minutes("0.5") == 0.5
+    with pytest.raises(argparse.ArgumentTypeError, match="no number of minutes"):
+        positive_minutes("N")
+
+
+def test_a_result_that_cannot_be_written_is_refused_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert result_file(str(tmp_path / "new.json")) == tmp_path / "new.json"
+    with pytest.raises(argparse.ArgumentTypeError, match="is a folder"):
+        result_file(str(tmp_path))
+    with pytest.raises(argparse.ArgumentTypeError, match="there is no folder"):
+        result_file(str(tmp_path / "nowhere" / "new.json"))
+    monkeypatch.setattr("os.access", lambda path, mode: False)  # root may write everything
+    with pytest.raises(argparse.ArgumentTypeError, match="may not be written"):
+        result_file(str(tmp_path / "new.json"))

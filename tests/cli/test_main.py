@@ -12,6 +12,7 @@ from collections.abc import Iterator
 import pytest
 
 from catenary.cli import scan
+from catenary.cli.failure import describe
 from catenary.cli.main import main, make_parser
 from catenary.errors import LinkError
 
@@ -72,6 +73,7 @@ def test_every_help_has_an_example_that_parses(name: str) -> None:
         "demo --seconds -1",
         "bench loop --drives 0",
         "virtual serve",
+        "bench soak --minutes 1 --json nowhere/soak.json",
     ],
 )
 def test_a_wrong_command_line_is_one_line_a_hint_and_status_2(
@@ -83,6 +85,36 @@ def test_a_wrong_command_line_is_one_line_a_hint_and_status_2(
     message, hint = capsys.readouterr().err.splitlines()
     assert message.startswith("catenary")
     assert hint.startswith("  hint: ")
+
+
+@pytest.mark.parametrize(
+    ("line", "command"),
+    [("demo eth0", "demo"), ("sdo read virtual 2 0x1018 --sub 1", "sdo read")],
+)
+def test_what_is_too_much_is_told_by_its_command(
+    line: str, command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        main(line.split())
+    assert f"hint: catenary {command} --help" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_help_fills_the_terminal(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A terminal breaks long lines within words."""
+    monkeypatch.setenv("COLUMNS", "80")
+    text = dict(parsers(make_parser()))[name].format_help()
+    assert max(map(len, text.partition("options:")[0].splitlines())) <= 84  # tables of their own
+
+
+@pytest.mark.parametrize(
+    ("error", "hint"),
+    [(FileExistsError, "a folder is wanted"), (PermissionError, "another user's")],
+)
+def test_a_file_in_the_way_has_a_hint(error: type[OSError], hint: str) -> None:
+    message, found = describe(error(1, "no", "place"))
+    assert message == "place: no"
+    assert hint in found
 
 
 @pytest.mark.parametrize(

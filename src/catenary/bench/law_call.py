@@ -15,6 +15,7 @@ import numpy as np
 
 from catenary import control
 from catenary.bench.loop import write
+from catenary.bench.needed import need
 from catenary.bench.report import machine
 from catenary.loop import law
 from catenary.loop.laws.compiler import compile_law
@@ -46,6 +47,7 @@ def cascade(actual, target, memory, parameters):  # type: ignore[no-untyped-def]
 
 
 def measure(*, axes: int, file: Path | None) -> None:
+    need("numba")
     print(f"{machine()}\n{axes} axes, {CALLS} calls, {ROUNDS} times")
     figures: dict[str, object] = {"machine": machine(), "axes": axes}
     for name, of_law in {"pd": pd, "cascade": cascade}.items():

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from catenary.bench.cost import Point, fit
 from catenary.bench.job import Body, Job, Round
+from catenary.bench.needed import need
 from catenary.bench.peers import MODULES
 from catenary.bench.report import as_json, as_text, machine
 from catenary.bench.rounds import WARM_UP_CYCLES, interleave
@@ -28,6 +29,7 @@ from catenary.bench.statistics import Run, combine, ratios
 OURS = ("catenary-inline", "catenary-threaded")
 LAW = "catenary-law"  # where Numba is installed
 STORM = "catenary-law-storm"  # beside a thread that spins and makes garbage
+NEEDS = {"pysoem": "pysoem", LAW: "numba", STORM: "numba"}  # packages
 ROUND_CYCLES = 900  # less than a second at 1 kHz: what the machine does meets all peers alike
 DRIVE_BYTES = 26  # both ways
 INPUT_BYTES = 4 * ANALOG_CHANNELS  # of one terminal
@@ -98,11 +100,13 @@ def measure_cost(*, seconds: float, file: Path | None) -> None:
 
 
 def peer_names(peers: Sequence[str]) -> list[str]:
-    """Ours and the chosen ones. ValueError names one that is unknown."""
+    """Ours and the chosen ones. ValueError: an unknown one; PackageError: it needs a package."""
     for name in peers:
         if name not in MODULES:
             known = ", ".join(name for name in MODULES if name not in (*OURS, LAW))
             raise ValueError(f"there is no peer {name!r}; known: {known}")
+        if name in NEEDS:
+            need(NEEDS[name], instead=f"; or leave {name} out: --peers c")
     ours = [*OURS, LAW] if find_spec("numba") else list(OURS)
     return [*ours, *(name for name in peers if name not in ours)]
 

@@ -12,10 +12,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import msgspec
-import pysoem
 
 import catenary as cat
 from catenary.bench.loop import write
+from catenary.bench.needed import need
 from catenary.bench.report import machine
 from catenary.bench.segment import served
 from catenary.errors import CatenaryError
@@ -34,6 +34,7 @@ class BringUp:
 
 
 def measure(*, drives: int, file: Path | None) -> None:
+    need("pysoem")
     with served(drives) as segment:
         found = {name: repeat(name, segment.interface) for name in WAYS}
     ours, theirs = found["catenary"], found["pysoem"]
@@ -72,6 +73,8 @@ def with_catenary(interface: str) -> Iterator[int]:
 
 @contextmanager
 def with_pysoem(interface: str) -> Iterator[int]:
+    import pysoem
+
     master = pysoem.Master()
     master.open(interface)
     try:

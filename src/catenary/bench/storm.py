@@ -9,6 +9,7 @@ from pathlib import Path
 
 from catenary.bench.job import Body
 from catenary.bench.loop import run_all, write
+from catenary.bench.needed import need
 from catenary.bench.report import as_json, as_text, machine
 from catenary.bench.segment import served
 from catenary.bench.statistics import Run
@@ -24,6 +25,7 @@ NAMES = (
 
 
 def measure(*, drives: int, rate: int, seconds: float, file: Path | None) -> None:
+    need("pysoem")
     with served(drives) as segment:
         runs = run_all(NAMES, segment, rate=rate, seconds=seconds, body=Body.SINE, spin=False)
         uploads = measure_uploads(segment.interface, segment.drives[0])

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import os
 from dataclasses import dataclass
+from pathlib import Path
 
 FIRST_OBJECT = 0x1000  # below are data types, not objects: ETG.1000.6 §5.6.7.1
 
@@ -60,13 +62,33 @@ def positive_numbers(text: str) -> list[int]:
 
 
 def positive_seconds(text: str) -> float:
+    return _positive_time(text, "seconds")
+
+
+def positive_minutes(text: str) -> float:
+    return _positive_time(text, "minutes")
+
+
+def _positive_time(text: str, unit: str) -> float:
     try:
         value = float(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number of seconds") from None
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of {unit}") from None
     if not 0.0 < value < 1e6:
-        raise argparse.ArgumentTypeError(f"{text} s is not between 0 and a million")
+        raise argparse.ArgumentTypeError(f"{text} {unit} is not between 0 and a million")
     return value
+
+
+def result_file(text: str) -> Path:
+    """A file that is written in the end: what stands in the way is said before the work."""
+    path = Path(text)
+    if path.is_dir():
+        raise argparse.ArgumentTypeError(f"{text} is a folder")
+    if not path.parent.is_dir():
+        raise argparse.ArgumentTypeError(f"there is no folder {path.parent}")
+    if not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise argparse.ArgumentTypeError(f"{text} may not be written")
+    return path
 
 
 def seconds(text: str) -> float:

@@ -1,13 +1,21 @@
-"""`catenary bench`: measures the loop beside its peers, the bring-up, virtual time and
-tasks."""
+"""`catenary bench`: measures the loop beside its peers and the bring-up, on wires; the rest is in
+`bench_without_wires.py` and `bench_table.py`."""
 
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
-from catenary.cli.arguments import positive_number, positive_numbers, positive_seconds
+from catenary.cli.arguments import positive_number, positive_numbers
+from catenary.cli.bench_options import add_drives, add_file, add_rate, add_seconds
 from catenary.cli.bench_table import add_table
+from catenary.cli.bench_without_wires import (
+    add_clocks,
+    add_igh,
+    add_law,
+    add_soak,
+    add_tasks,
+    add_virtual,
+)
 from catenary.cli.parsers import Commands, add_command
 
 
@@ -24,13 +32,13 @@ def add_parser(commands: Commands) -> None:
     _add_share(group)
     _add_cost(group)
     _add_scan(group)
-    _add_virtual(group)
-    _add_tasks(group)
-    _add_law(group)
-    _add_soak(group)
-    _add_clocks(group)
+    add_virtual(group)
+    add_tasks(group)
+    add_law(group)
+    add_soak(group)
+    add_clocks(group)
     _add_networks(group)
-    _add_igh(group)
+    add_igh(group)
     add_table(group)
 
 
@@ -45,11 +53,9 @@ def _add_loop(group: Commands) -> None:
         example="catenary bench loop --seconds 10 --peers c,c-ring,pysoem --json loop.json\n"
         "catenary bench loop --drives 33 --body pd --peers pysoem",
     )
-    parser.add_argument("--drives", type=positive_number, default=3, metavar="N")
-    parser.add_argument("--rate", type=positive_number, default=1000, metavar="HZ")
-    parser.add_argument(
-        "--seconds", type=positive_seconds, default=10.0, metavar="S", help="of every peer (10)"
-    )
+    add_drives(parser)
+    add_rate(parser)
+    add_seconds(parser, 10.0, "of every peer")
     parser.add_argument(
         "--peers",
         default="c,pysoem",
@@ -68,7 +74,7 @@ def _add_loop(group: Commands) -> None:
         metavar="N",
         help="of every peer, each in a fresh process (so many that each takes 0.9 s at 1 kHz)",
     )
-    _add_file(parser)
+    add_file(parser)
     parser.set_defaults(run=run_loop)
 
 
@@ -81,12 +87,10 @@ def _add_storm(group: Commands) -> None:
         "turn; then reads a large object on an idle bus, beside PySOEM.",
         example="catenary bench storm --drives 3 --seconds 10 --json storm.json",
     )
-    parser.add_argument("--drives", type=positive_number, default=3, metavar="N")
-    parser.add_argument("--rate", type=positive_number, default=1000, metavar="HZ")
-    parser.add_argument(
-        "--seconds", type=positive_seconds, default=10.0, metavar="S", help="of every way (10)"
-    )
-    _add_file(parser)
+    add_drives(parser)
+    add_rate(parser)
+    add_seconds(parser, 10.0, "of every way")
+    add_file(parser)
     parser.set_defaults(run=run_storm)
 
 
@@ -99,12 +103,10 @@ def _add_share(group: Commands) -> None:
         "without a share, with one, and with 16 readers in processes of their own, in turn.",
         example="catenary bench share --seconds 5 --json share.json",
     )
-    parser.add_argument("--drives", type=positive_number, default=3, metavar="N")
-    parser.add_argument("--rate", type=positive_number, default=1000, metavar="HZ")
-    parser.add_argument(
-        "--seconds", type=positive_seconds, default=5.0, metavar="S", help="of every way (5)"
-    )
-    _add_file(parser)
+    add_drives(parser)
+    add_rate(parser)
+    add_seconds(parser, 5.0, "of every way")
+    add_file(parser)
     parser.set_defaults(run=run_share)
 
 
@@ -117,8 +119,8 @@ def _add_cost(group: Commands) -> None:
         "a + b·axes + c·bytes.",
         example="catenary bench cost --seconds 3",
     )
-    parser.add_argument("--seconds", type=positive_seconds, default=3.0, metavar="S")
-    _add_file(parser)
+    add_seconds(parser, 3.0, "of every segment")
+    add_file(parser)
     parser.set_defaults(run=run_cost)
 
 
@@ -130,106 +132,9 @@ def _add_scan(group: Commands) -> None:
         description="Brings a segment to PRE-OP with Catenary and with PySOEM and counts frames.",
         example="catenary bench scan --drives 100",
     )
-    parser.add_argument("--drives", type=positive_number, default=100, metavar="N")
-    _add_file(parser)
+    add_drives(parser, 100)
+    add_file(parser)
     parser.set_defaults(run=run_scan)
-
-
-def _add_virtual(group: Commands) -> None:
-    parser = add_command(
-        group,
-        "virtual",
-        help="how much faster than real time a virtual segment runs",
-        description="Runs a loop on a segment in this process, in virtual time.",
-        example="catenary bench virtual --drives 3 --seconds 20",
-    )
-    parser.add_argument("--drives", type=positive_number, default=3, metavar="N")
-    parser.add_argument(
-        "--config", type=Path, metavar="FILE.toml", help="the drives of this segment, and its arm"
-    )
-    parser.add_argument(
-        "--seconds", type=positive_seconds, default=20.0, metavar="S", help="of virtual time (20)"
-    )
-    _add_file(parser)
-    parser.set_defaults(run=run_virtual)
-
-
-def _add_law(group: Commands) -> None:
-    parser = add_command(
-        group,
-        "law",
-        help="what a call of a compiled law takes",
-        description="Calls a compiled PD law again and again from native code (needs Numba).",
-        example="catenary bench law --axes 12",
-    )
-    parser.add_argument("--axes", type=positive_number, default=12, metavar="N")
-    _add_file(parser)
-    parser.set_defaults(run=run_law)
-
-
-def _add_tasks(group: Commands) -> None:
-    parser = add_command(
-        group,
-        "tasks",
-        help="a task beside a busy one: processes and threads",
-        description="Measures the response of a 1 kHz task of high priority: alone, beside a "
-        "process that is busy at low priority, and beside a thread that is.",
-        example="catenary bench tasks --seconds 10",
-    )
-    parser.add_argument(
-        "--seconds", type=positive_seconds, default=10.0, metavar="S", help="of every way (10)"
-    )
-    _add_file(parser)
-    parser.set_defaults(run=run_tasks)
-
-
-def _add_soak(group: Commands) -> None:
-    parser = add_command(
-        group,
-        "soak",
-        help="random faults in virtual time, invariants checked in every cycle",
-        description="Runs a loop on a segment in this process while faults of all kinds befall it, "
-        "and judges by the virtual devices' own truth. The same seed gives the same run. Exit "
-        "status 1 if anything happened that must not.",
-        example="catenary bench soak --minutes 10 --seed 7 --json soak.json",
-    )
-    parser.add_argument(
-        "--minutes", type=positive_seconds, default=1.0, metavar="N", help="of virtual time (1)"
-    )
-    parser.add_argument("--seed", type=int, default=1, metavar="S", help="of chance (1)")
-    _add_file(parser)
-    parser.set_defaults(run=run_soak)
-
-
-def _add_clocks(group: Commands) -> None:
-    parser = add_command(
-        group,
-        "clocks",
-        help="how soon distributed clocks come together, and how long they stay",
-        description="Lets crystals differ, drift and scatter, in virtual time, and compares what "
-        "each clock says with the reference. Exit status 1 where one was beyond 1 us.",
-        example="catenary bench clocks --devices 10,33 --minutes 10",
-    )
-    parser.add_argument(
-        "--devices",
-        type=positive_numbers,
-        default="10,33",
-        metavar="N,M",
-        help="segments of so many drives (10,33)",
-    )
-    parser.add_argument(
-        "--minutes", type=positive_seconds, default=10.0, metavar="M", help="of virtual time (10)"
-    )
-    parser.add_argument(
-        "--jitter",
-        type=positive_seconds,
-        default=0.5e-6,
-        metavar="S",
-        help="over which a time stamp scatters; a difference is made of two (0.5e-6)",
-    )
-    parser.add_argument("--seed", type=int, default=1, metavar="N")
-    _add_file(parser)
-    parser.set_defaults(run=run_clocks)
 
 
 def _add_networks(group: Commands) -> None:
@@ -246,34 +151,18 @@ def _add_networks(group: Commands) -> None:
         type=positive_numbers,
         default="4000,8000",
         metavar="HZ,HZ",
-        help="(4000,8000)",
+        help="of the loops, one after the other (4000,8000)",
     )
+    add_seconds(parser, 10.0, "of each")
     parser.add_argument(
-        "--seconds", type=positive_seconds, default=10.0, metavar="S", help="of each (10)"
+        "--rounds",
+        type=positive_number,
+        default=5,
+        metavar="N",
+        help="in which the programs take turns, each in a fresh process (5)",
     )
-    parser.add_argument("--rounds", type=positive_number, default=5, metavar="N", help="(5)")
-    _add_file(parser)
+    add_file(parser)
     parser.set_defaults(run=run_networks)
-
-
-def _add_igh(group: Commands) -> None:
-    parser = add_command(
-        group,
-        "igh",
-        help="a cycle over the IgH kernel master's library, beside C",
-        description="Runs our step, the same calls hand-written in C and one ctypes call for each "
-        "function on one activated master, in turns. All devices go to OP; drives stay disabled.",
-        example="catenary bench igh --library libethercat-1.6.1.so.1 --json igh.json",
-    )
-    parser.add_argument(
-        "--library", type=Path, metavar="FILE", help="another libethercat than the machine's"
-    )
-    _add_file(parser)
-    parser.set_defaults(run=run_igh)
-
-
-def _add_file(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there")
 
 
 def run_loop(arguments: argparse.Namespace) -> int:
@@ -332,59 +221,6 @@ def run_scan(arguments: argparse.Namespace) -> int:
 
     bench.enter_private_network()
     bench.measure_scan(drives=arguments.drives, file=arguments.json)
-    return 0
-
-
-def run_virtual(arguments: argparse.Namespace) -> int:
-    from catenary import bench
-
-    bench.measure_virtual(
-        drives=arguments.drives,
-        seconds=arguments.seconds,
-        file=arguments.json,
-        config=arguments.config,
-    )
-    return 0
-
-
-def run_tasks(arguments: argparse.Namespace) -> int:
-    from catenary import bench
-
-    bench.measure_tasks(seconds=arguments.seconds, file=arguments.json)
-    return 0
-
-
-def run_law(arguments: argparse.Namespace) -> int:
-    from catenary import bench
-
-    bench.measure_law(axes=arguments.axes, file=arguments.json)
-    return 0
-
-
-def run_soak(arguments: argparse.Namespace) -> int:
-    from catenary import bench
-
-    held = bench.measure_soak(minutes=arguments.minutes, seed=arguments.seed, file=arguments.json)
-    return 0 if held else 1
-
-
-def run_clocks(arguments: argparse.Namespace) -> int:
-    from catenary import bench
-
-    held = bench.measure_clocks(
-        devices=arguments.devices,
-        minutes=arguments.minutes,
-        jitter=arguments.jitter,
-        seed=arguments.seed,
-        file=arguments.json,
-    )
-    return 0 if held else 1
-
-
-def run_igh(arguments: argparse.Namespace) -> int:
-    from catenary import bench
-
-    bench.measure_igh(library=arguments.library, file=arguments.json)
     return 0
 
 

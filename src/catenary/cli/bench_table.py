@@ -7,6 +7,7 @@ import textwrap
 from pathlib import Path
 
 from catenary.cli.arguments import positive_number, positive_numbers, positive_seconds, seconds
+from catenary.cli.bench_options import add_file
 from catenary.cli.failure import UsageError
 from catenary.cli.parsers import Commands, add_command
 
@@ -25,7 +26,7 @@ def add_table(group: Commands) -> None:
         "table",
         help="a published table, and ours beside it",
         description="Prints a published table with ours beside it, both with their conditions. "
-        "What this machine\nlacks (a compiler, PySOEM, permissions) is left out, and said.\n\n"
+        "What this machine lacks (a compiler, PySOEM, permissions) is left out, and said.\n\n"
         f"tables:\n{lines}",
         example=textwrap.dedent(EXAMPLE),
     )
@@ -58,7 +59,7 @@ def add_table(group: Commands) -> None:
     parser.add_argument(
         "--realtime", action="store_true", help="cobot on the machine's clock, not in virtual time"
     )
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there")
+    add_file(parser)
     parser.set_defaults(run=run_table)
 
 

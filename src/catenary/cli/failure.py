@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Mapping
 
 from catenary.errors import CatenaryError
 
@@ -11,6 +12,12 @@ FAILED = 1
 USAGE = 2
 INTERRUPTED = 130  # 128 + SIGINT
 BROKEN_PIPE = 141  # 128 + SIGPIPE
+FILE_HINTS: Mapping[type[OSError], str] = {
+    FileExistsError: "a folder is wanted, and there is a file of that name",
+    NotADirectoryError: "a part of the path is a file",
+    IsADirectoryError: "a file is wanted, and that is a folder",
+    PermissionError: "it is another user's: ls -l",
+}
 
 
 class UsageError(Exception):
@@ -37,7 +44,7 @@ def describe(error: Exception) -> tuple[str, str]:
     if isinstance(error, UsageError):
         return one_line(str(error)), error.hint
     if isinstance(error, OSError) and error.filename is not None:
-        return f"{error.filename}: {error.strerror}", ""
+        return f"{error.filename}: {error.strerror}", FILE_HINTS.get(type(error), "")
     if isinstance(error, ValueError | OSError):
         return one_line(str(error)), ""
     kind = type(error).__name__

@@ -32,7 +32,12 @@ COMMANDS = (
     *(demo, doctor, bench, virtual, realtime, record, plot),
 )
 EPILOG = """\
-TARGET is a network interface (eth0) or a virtual segment (virtual, virtual:FILE.toml).
+TARGET is one of
+  eth0               a network interface; `ip link` lists them
+  eth0,eth1          two of them, where the segment is a ring between both
+  virtual            a virtual segment: coupler, outputs, three servos, outputs
+  virtual:FILE.toml  another one (docs/virtual.md)
+  igh:0              the IgH kernel master of that number (docs/igh.md): scan and sdo
 
 example:
   catenary demo
@@ -90,7 +95,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def run(arguments: Sequence[str]) -> int:
     try:
-        parsed = make_parser().parse_args(arguments)
+        parsed, unknown = make_parser().parse_known_args(arguments)
+        if unknown:
+            parsed.parser.error(f"unrecognized arguments: {' '.join(unknown)}")
         return int(parsed.run(parsed))
     finally:
         sys.stdout.flush()  # here, where a reader that went away can still be handled

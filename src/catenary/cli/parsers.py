@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shutil
 import textwrap
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -17,13 +18,23 @@ else:
 def add_command(
     commands: Commands, name: str, *, help: str, description: str, example: str
 ) -> argparse.ArgumentParser:
-    return commands.add_parser(
+    """`description`: its lines are filled, blank ones and those that are indented stay."""
+    parser = commands.add_parser(
         name,
         help=help,
-        description=description,
+        description=filled(description),
         epilog="example:\n" + textwrap.indent(example, "  "),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    parser.set_defaults(parser=parser)
+    return parser
+
+
+def filled(text: str) -> str:
+    """As wide as the terminal, like what argparse writes itself."""
+    width = shutil.get_terminal_size().columns - 2
+    lines = text.splitlines()
+    return "\n".join(line if line.startswith(" ") else textwrap.fill(line, width) for line in lines)
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:
@@ -31,7 +42,9 @@ def add_json(parser: argparse.ArgumentParser) -> None:
 
 
 def add_target(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("target", metavar="TARGET", help="eth0, virtual or virtual:FILE.toml")
+    parser.add_argument(
+        "target", metavar="TARGET", help="eth0, virtual, virtual:FILE.toml ...: catenary --help"
+    )
 
 
 def add_position(parser: argparse.ArgumentParser) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from catenary.cli.parsers import Commands, add_command, add_json
+from catenary.cli.parsers import Commands, add_command, add_json, add_target
 
 
 def add_parser(commands: Commands) -> None:
@@ -16,7 +16,7 @@ def add_parser(commands: Commands) -> None:
         description="Brings all devices to PRE-OP and lists them.",
         example="catenary scan eth0\ncatenary scan virtual --json",
     )
-    parser.add_argument("target", metavar="TARGET", help="eth0, virtual or virtual:FILE.toml")
+    add_target(parser)
     add_json(parser)
     parser.set_defaults(run=run)
 

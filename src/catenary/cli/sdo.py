@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from catenary.cli.arguments import Entry, entry, position
 from catenary.cli.failure import UsageError
-from catenary.cli.parsers import Commands, add_command, add_json
+from catenary.cli.parsers import Commands, add_command, add_json, add_target
 
 if TYPE_CHECKING:
     from catenary.types import DataType, Value
@@ -68,7 +68,7 @@ def add_parser(commands: Commands) -> None:
 
 
 def _add_device(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("target", metavar="TARGET", help="eth0, virtual or virtual:FILE.toml")
+    add_target(parser)
     parser.add_argument("position", metavar="POSITION", type=position, help="0 is the first device")
 
 

@@ -1,1 +1,1 @@
-"""(being built)"""
+"""Conversations with devices, as generators: no I/O, no clock, no retry (docs/objects.md)."""

@@ -22,7 +22,8 @@ def parse(target: str) -> LinkSource:
     if not kind or colon or any(letter.isspace() or letter == "/" for letter in kind):
         raise ConfigurationError(
             f"{target!r} is no target",
-            hint="give a network interface (eth0), virtual, or virtual:FILE.toml",
+            hint="give a network interface (eth0), two (eth0,eth1), virtual, virtual:FILE.toml, "
+            "or igh:0",
         )
     return Interface(kind)
 
