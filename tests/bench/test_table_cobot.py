@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from catenary.bench.published import COBOT
 from catenary.bench.tables import cobot
+from catenary.bench.tables.published import COBOT
 from catenary.bench.tables.sheet import Options, as_json, show
 from catenary.errors import CatenaryError
 

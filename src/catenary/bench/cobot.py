@@ -11,14 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from catenary import record
-from catenary.bench.published import (
-    COBOT,
-    COBOT_UTILISATION,
-    TaskTimes,
-    as_table,
-    of_loop,
-    of_task,
-)
+from catenary.bench.tables.published import COBOT, COBOT_UTILISATION
+from catenary.bench.task_times import TaskTimes, as_table, of_loop, of_task
 from catenary.drive import Stop
 from catenary.realtime import Demand, Tasks, Verdict
 from catenary.record.timeline import braking

@@ -17,8 +17,9 @@ from pathlib import Path
 from typing import Any
 
 import catenary
-from catenary.bench.published import COBOT, COBOT_UTILISATION, TaskTimes, as_table
+from catenary.bench.tables.published import COBOT, COBOT_UTILISATION
 from catenary.bench.tables.sheet import Options, Sheet
+from catenary.bench.task_times import TaskTimes, as_table
 from catenary.errors import CatenaryError
 
 PROGRAM = Path("examples", "cobot", "cobot.py")

@@ -1,4 +1,5 @@
-"""Published tables, and ours beside them. Other machines: compare shapes, not numbers."""
+"""What tasks and a loop among them came to, as a table. Other machines: compare shapes, not
+numbers."""
 
 from __future__ import annotations
 
@@ -17,43 +18,6 @@ class TaskTimes(NamedTuple):
     period: Row
     jitter: Row
     response: Row
-
-
-# Six tasks of a six-axis cobot under cyclic torque control, 5 minutes, PREEMPT_RT: PyIgH, section 2
-# of the publication. "stop" is its sporadic error task, "monitor" its ROS 2 node.
-COBOT: Mapping[str, TaskTimes] = {
-    "dynamics": TaskTimes(
-        (0.959, 1.041, 1.0, 0.007),
-        (1.086, 48.328, 16.811, 4.346),
-        (39.624, 165.733, 97.555, 17.978),
-    ),
-    "main control": TaskTimes(
-        (0.975, 1.025, 1.0, 0.001),
-        (1.028, 22.405, 1.686, 0.795),
-        (133.508, 339.378, 225.162, 19.356),
-    ),
-    "trajectory": TaskTimes(
-        (1.965, 2.035, 2.0, 0.002),
-        (1.171, 32.46, 2.064, 1.216),
-        (4.732, 455.232, 24.338, 46.769),
-    ),
-    "monitor": TaskTimes(
-        (9.883, 10.116, 10.0, 0.026),
-        (6.309, 198.234, 97.859, 19.451),
-        (9.272, 836.576, 326.594, 82.731),
-    ),
-    "log": TaskTimes(
-        (99.554, 100.502, 100.0, 0.082),
-        (1.454, 504.362, 56.924, 60.639),
-        (3.832, 513.557, 61.772, 61.281),
-    ),
-    "stop": TaskTimes(
-        (999.292, 1000.642, 1000.0, 0.028426),
-        (1.766, 352.268, 8.338, 28.426),
-        (4.735, 358.615, 12.633, 28.872),
-    ),
-}
-COBOT_UTILISATION = 0.737  # schedulable by rate-monotonic analysis
 
 
 def of_task(statistics: Statistics) -> TaskTimes:

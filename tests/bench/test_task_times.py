@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from catenary.bench.published import COBOT, as_table, of_loop
+from catenary.bench.tables.published import COBOT
+from catenary.bench.task_times import as_table, of_loop
 
 TIMING = {
     "period": {"min": 990.0, "max": 1010.0, "mean": 1000.0, "sd": 2.0},
