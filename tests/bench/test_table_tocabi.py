@@ -52,6 +52,24 @@ def test_what_is_left_out_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "Numba" in left_out[0]
 
 
+def test_only_the_peers_asked_for_run_or_are_missed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tocabi, "has_programs", lambda: False)
+    ways, left_out = tocabi.ways_for(Options(peers=(tocabi.LAW,)))
+    assert (list(ways), left_out) == ([tocabi.LAW], [])
+    with pytest.raises(ValueError, match="no peer 'rust'; it has loop, law, c"):
+        tocabi.ways_for(Options(peers=("rust",)))
+
+
+def test_the_rates_that_hold_are_named() -> None:
+    def way(lost: int = 0, late: int = 0) -> tocabi.WayRounds:
+        rounds = [network_round([1000], lost, late), network_round([1000])]
+        return tocabi.WayRounds([rounds], [], [])
+
+    found = {4000: way(), 5000: way(), 6000: way(lost=1), 8000: way(late=1)}
+    lines = tocabi.as_verdicts({rate: {tocabi.LAW: each} for rate, each in found.items()})
+    assert lines == ["law: nothing lost, late or missed at 4000, 5000 Hz; not so at 6000, 8000 Hz"]
+
+
 @pytest.mark.usefixtures("veth")
 @pytest.mark.parametrize("ring", [False, True])
 def test_all_ways_run_briefly(ring: bool) -> None:
@@ -65,3 +83,7 @@ def test_all_ways_run_briefly(ring: bool) -> None:
     assert names == [f"{way}, {network}" for way in ways for network in ("upper", "lower")]
     assert all(column["cycles"] > 0 for column in rate["columns"])
     assert [task["name"] for task in rate["task_beside"]] == ["python"]
+    [shares] = rate["shares"][tocabi.LAW]
+    assert {name for name, share in shares.items() if share > 0} == {
+        f"{what}, {network}" for what in ("law", "segment") for network in tocabi.NETWORKS
+    }

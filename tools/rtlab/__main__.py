@@ -1,6 +1,7 @@
 """`make rtlab`: benchmarks on Debian's PREEMPT_RT kernel, in a machine that counts instructions.
 
     python -m tools.rtlab [TABLE ...]     from the repository's root, with the interpreter of .venv
+    python -m tools.rtlab --compare A B   how far the medians of two results, or folders, are apart
 
 The same software gives the same figures, whatever this machine does meanwhile. It compares software
 and shows schedules; it is no latency measurement of hardware (docs/benchmarks.md, "rtlab").
@@ -19,7 +20,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from catenary.errors import CatenaryError
-from tools.rtlab import image, kernel, machine, record, tables
+from tools.rtlab import compare, image, kernel, machine, record, tables
 from tools.rtlab.errors import LabError
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -29,7 +30,11 @@ WORK = REPOSITORY / "build" / "rtlab"
 def main(arguments: Sequence[str]) -> int:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # leaves through every `finally`
     try:
-        run(parse(arguments))
+        asked = parse(arguments)
+        if asked.compare:
+            print(compare.compare(*asked.compare))
+        else:
+            run(asked)
     except (LabError, CatenaryError) as error:
         return fail(" ".join(str(error).split()))
     except OSError as error:
@@ -61,6 +66,9 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("tables", nargs="*", default=["all"], metavar="TABLE")
     parser.add_argument("--out", type=Path, default=WORK / "results", help="where results are kept")
     parser.add_argument("--options", default="", metavar="'...'", help="more for the command")
+    parser.add_argument(
+        "--compare", nargs=2, type=Path, metavar=("A", "B"), help="the medians of two runs"
+    )
     parser.add_argument("--minutes", type=float, help="the deadline of a table (its own)")
     return parser.parse_args(arguments)
 

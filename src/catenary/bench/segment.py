@@ -33,6 +33,7 @@ class Served:
     drives: tuple[int, ...]  # positions
     second: str = ""  # of the MainDevice, where the segment is a ring
     far: str = ""  # of the segment
+    pid: int = 0  # of the process that serves it
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +84,7 @@ def served(drives: int, inputs: int = 0, axes: int = 1, *, ring: bool = False) -
         server = stack.enter_context(start_python(["-m", "catenary.bench.segment", *arguments]))
         if server.read_line(START_SECONDS) is None:
             raise LinkError("the segment of the benchmark did not start")
-        yield Served(ours, tuple(range(1, drives + 1)), second, theirs)
+        yield Served(ours, tuple(range(1, drives + 1)), second, theirs, server.pid)
 
 
 def main(arguments: Sequence[str]) -> None:

@@ -13,7 +13,7 @@ from catenary.cli.parsers import Commands, add_command
 
 EXAMPLE = """\
 catenary bench table pyigh --seconds 5
-catenary bench table tocabi --rates 4000 --ring --json tocabi.json"""
+catenary bench table tocabi --rates 4000 --peers law --json tocabi.json"""
 
 
 def add_table(group: Commands) -> None:
@@ -46,6 +46,9 @@ def add_table(group: Commands) -> None:
         metavar="HZ,HZ",
         help="of loops (tocabi: 4000,8000; rteml: 5000)",
     )
+    parser.add_argument(
+        "--peers", metavar="A,B", help="of tocabi: loop, law, c (those that this machine can)"
+    )
     parser.add_argument("--ring", action="store_true", help="each network a ring, not a line")
     parser.add_argument(
         "--lead",
@@ -76,6 +79,7 @@ def run_table(arguments: argparse.Namespace) -> int:
         seconds=arguments.seconds,
         rounds=arguments.rounds,
         rates=arguments.rates,
+        peers=arguments.peers and [name for name in arguments.peers.split(",") if name],
         ring=arguments.ring,
         lead=arguments.lead,
         example=arguments.example,

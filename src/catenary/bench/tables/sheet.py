@@ -26,6 +26,7 @@ class Options:
     seconds: float | None = None
     rounds: int | None = None  # of programs that take turns, at least
     rates: tuple[int, ...] | None = None  # [Hz]
+    peers: tuple[str, ...] | None = None  # of those that the table compares
     ring: bool = False
     lead: float | None = None  # [s] of inline loops and laws; 0: a plain sleep
     example: Path | None = None  # the program of examples/cobot

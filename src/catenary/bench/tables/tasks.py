@@ -52,7 +52,7 @@ HEADER = ("mean/max/min/sd [ms]", "", "period", "response", "bound", "within", "
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """One task of one way; figures in ms: mean, max, min, sd."""
+    """One task of one way; figures in ms: mean, max, min, sd, p50."""
 
     name: str
     jobs: int
@@ -162,6 +162,7 @@ def read_samples(numbers: np.ndarray) -> list[Found]:
 
 def figures(values: np.ndarray) -> dict[str, float]:
     found = {"mean": values.mean(), "max": values.max(), "min": values.min(), "sd": values.std()}
+    found["p50"] = np.median(values)
     return {name: round(float(value), 6) for name, value in found.items()}
 
 
@@ -204,7 +205,7 @@ def of_statistics(found: Statistics, most: float) -> Found:
     of_ms = {
         figure: {
             each: round(getattr(getattr(found, figure), each) * 1e3, 6)
-            for each in ("mean", "max", "min", "sd")
+            for each in ("mean", "max", "min", "sd", "p50")
         }
         for figure in FIGURES
     }

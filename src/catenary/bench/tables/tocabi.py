@@ -3,13 +3,17 @@
 Three ways in turn: one loop over both networks, whose Python body gives targets in every cycle; a
 loop with a law for each network in a process of its own, with a Python task of 1 kHz beside; and
 two C programs. Theirs waits in the cycle for the answer to its frame, ours takes up at an instant
-what was sent at the one before: compare `receive` among ours only."""
+what was sent at the one before: compare `receive` among ours only.
+
+A rate holds for a way where nothing was lost, no instant passed without a cycle and no job of the
+task was missed. `--peers law --rates 4000,5000,6000` looks for the highest."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import tempfile
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -25,7 +29,7 @@ from catenary.bench.loop import make_jobs, show_progress
 from catenary.bench.network_law import GO, PATIENCE
 from catenary.bench.networks import DRIVES, C, NetworkRound, run_c, run_ours
 from catenary.bench.rounds import BRING_UP_SECONDS, RoundError, begin_anew
-from catenary.bench.segment import processors, served
+from catenary.bench.segment import Served, processors, served
 from catenary.bench.statistics import summarise
 from catenary.bench.tables.published import TOCABI, TOCABI_CONDITIONS, Channel, spread_of
 from catenary.bench.tables.sheet import Options, Sheet, as_failures, grid, slashed
@@ -35,7 +39,9 @@ from catenary.realtime.child import Child, start_python
 
 RATES, SECONDS, ROUNDS = (4000, 8000), 10.0, 2
 NETWORKS = ("upper", "lower")
-LOOP, LAW = "loop", "law + 1 kHz task"
+LOOKED_AT = 0.8  # of what is measured: shares of the processor
+CPUCLOCK_SCHED = 2  # linux/posix-timers.h
+LOOP, LAW = "loop", "law"
 TASK_PERIOD, TASK_PRIORITY = 1e-3, 60  # below loops and segments
 HEADER = ("avg/max/min/sd [us]", "latency", "send", "receive", "overflows", "lost")
 
@@ -66,18 +72,18 @@ def measure(options: Options) -> Sheet:
         rate: run(rate, seconds, rounds, ways, options, failed) if ways else {} for rate in rates
     }
     shape = "rings" if options.ring else "lines"
-    blocks = [as_table(rate, *in_columns(of_ways)) for rate, of_ways in found.items()]
+    blocks = [as_table(rate, of_ways) for rate, of_ways in found.items()]
     return Sheet(
         title=f"TOCABI, 18 + 15 axes on two networks; {TOCABI_CONDITIONS}",
         conditions=f"ours: virtual drives, two {shape} of veth, {rounds} x {seconds / rounds:g} s",
-        text="\n\n".join([*blocks, *as_failures(failed)]),
+        text="\n\n".join([*blocks, "\n".join(as_verdicts(found)), *as_failures(failed)]),
         figures={
             "published": {f"{rate}, {name}": c._asdict() for (rate, name), c in TOCABI.items()},
             "ring": options.ring,
             "seconds": seconds,
             "rounds": rounds,
             "rounds_done_again": failed,
-            "rates": [as_figures(rate, *in_columns(ways)) for rate, ways in found.items()],
+            "rates": [as_figures(rate, of_ways) for rate, of_ways in found.items()],
         },
         left_out=left_out,
     )
@@ -89,26 +95,44 @@ class WayRounds:
 
     networks: list[list[NetworkRound]]
     task: list[Statistics]  # of the task beside, where there is one
+    shares: list[dict[str, float]]  # of a processor, by process, where it was looked at
 
 
-Way = Callable[[Sequence[Job], Path, WayRounds], None]
+Way = Callable[[Sequence[Job], "Places", WayRounds], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Places:
+    """Where a way runs."""
+
+    segments: Sequence[Served]
+    folder: Path
 
 
 def ways_for(options: Options) -> tuple[dict[str, Way], list[str]]:
+    """Those asked for that this machine can; why others are left out. ValueError: no such way."""
+    ways: dict[str, Way] = {LOOP: one_loop, LAW: two_laws, C: two_programs}
+    asked = options.peers or tuple(ways)
+    for name in asked:
+        if name not in ways:
+            raise ValueError(f"tocabi has no peer {name!r}; it has {', '.join(ways)}")
     if options.refused:
         return {}, [f"all of ours: no private network ({options.refused})"]
-    ways: dict[str, Way] = {LOOP: one_loop, LAW: two_laws, C: two_programs}
-    left_out = []
+    reasons = why_not(options)
+    left_out = [f"{name}: {reason}" for name, reason in reasons.items() if name in asked]
+    return {name: ways[name] for name in asked if name not in reasons}, left_out
+
+
+def why_not(options: Options) -> dict[str, str]:
+    """Ways that cannot be gone here."""
+    reasons = {}
     if find_spec("numba") is None:
-        del ways[LAW]
-        left_out.append(f"{LAW}: Numba is not installed (pip install 'catenary[law]')")
+        reasons[LAW] = "Numba is not installed (pip install 'catenary[law]')"
     if options.ring:
-        del ways[C]
-        left_out.append("c: the C programs know one wire, not the two of a ring")
+        reasons[C] = "the C programs know one wire, not the two of a ring"
     elif not has_programs():
-        del ways[C]
-        left_out.append("c: no C compiler (sudo apt install gcc libc6-dev)")
-    return ways, left_out
+        reasons[C] = "no C compiler (sudo apt install gcc libc6-dev)"
+    return reasons
 
 
 def run(
@@ -120,7 +144,7 @@ def run(
     failed: list[str],
 ) -> dict[str, WayRounds]:
     """All ways in turn, round by round."""
-    found = {name: WayRounds([], []) for name in ways}
+    found = {name: WayRounds([], [], []) for name in ways}
     with contextlib.ExitStack() as stack:
         segments = [stack.enter_context(served(n, ring=options.ring)) for n in DRIVES]
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="catenary-bench-")))
@@ -133,33 +157,59 @@ def run(
         ]
         for number in range(rounds):
             for name, way in ways.items():
-                show_progress(name, number + 1, rounds)
-                begin_anew(partial(way, jobs, folder, found[name]), failed)
+                show_progress(f"{name}, {rate} Hz", number + 1, rounds)
+                begin_anew(partial(way, jobs, Places(segments, folder), found[name]), failed)
     return found
 
 
-def one_loop(jobs: Sequence[Job], _folder: Path, found: WayRounds) -> None:
+def one_loop(jobs: Sequence[Job], _places: Places, found: WayRounds) -> None:
     found.networks.append(run_ours(jobs))
 
 
-def two_programs(jobs: Sequence[Job], folder: Path, found: WayRounds) -> None:
-    found.networks.append(run_c(jobs, folder))
+def two_programs(jobs: Sequence[Job], places: Places, found: WayRounds) -> None:
+    found.networks.append(run_c(jobs, places.folder))
 
 
-def two_laws(jobs: Sequence[Job], _folder: Path, found: WayRounds) -> None:
+def two_laws(jobs: Sequence[Job], places: Places, found: WayRounds) -> None:
     """Both are measured while the task runs."""
-    seconds = BRING_UP_SECONDS + jobs[0].cycles * jobs[0].period_ns * 1e-9
+    measured = jobs[0].cycles * jobs[0].period_ns * 1e-9
     with contextlib.ExitStack() as stack:
         children = [stack.enter_context(start_law(job)) for job in jobs]
         for child in children:
             expect(child, PATIENCE, "ready")
         tasks = stack.enter_context(beside())
+        processes = {
+            f"{what}, {network}": pid
+            for what, pids in (
+                (LAW, [child.pid for child in children]),
+                ("segment", [segment.pid for segment in places.segments]),
+            )
+            for network, pid in zip(NETWORKS, pids, strict=True)
+        }
         for child in children:
             os.kill(child.pid, GO)
-        said = [expect(child, seconds, "{") for child in children]
+        found.shares.append(shares(processes, LOOKED_AT * measured))
+        said = [expect(child, BRING_UP_SECONDS + measured, "{") for child in children]
         statistics = tasks["python"].statistics
     found.task.append(statistics)
     found.networks.append([msgspec.json.decode(each, type=NetworkRound) for each in said])
+
+
+def shares(processes: Mapping[str, int], seconds: float) -> dict[str, float]:
+    """How much of a processor each took, by its number, while these seconds passed."""
+    before = {name: processor_time(pid) for name, pid in processes.items()}
+    start = time.monotonic()
+    time.sleep(seconds)
+    passed = time.monotonic() - start
+    return {
+        name: round((processor_time(pid) - before[name]) / passed, 4)
+        for name, pid in processes.items()
+    }
+
+
+def processor_time(pid: int) -> float:
+    """[s] of all threads of a process (clock_getcpuclockid(3), Linux)."""
+    return time.clock_gettime(~pid << 3 | CPUCLOCK_SCHED)
 
 
 def start_law(job: Job) -> Child:
@@ -219,7 +269,8 @@ def column(name: str, rounds: Sequence[NetworkRound]) -> Column:
     )
 
 
-def as_table(rate: int, columns: Sequence[Column], task: Sequence[Statistics]) -> str:
+def as_table(rate: int, found: Mapping[str, WayRounds]) -> str:
+    columns, task = in_columns(found)
     rows = [
         row(f"theirs: {name}", channel, "-")
         for (published, name), channel in TOCABI.items()
@@ -230,7 +281,32 @@ def as_table(rate: int, columns: Sequence[Column], task: Sequence[Statistics]) -
     if task:
         jobs, missed = sum(each.jobs for each in task), sum(each.misses for each in task)
         lines.append(f"the Python task of 1 kHz beside the laws: {missed} of {jobs} jobs missed")
+    for each in (shares for way in found.values() for shares in way.shares):
+        took = ", ".join(f"{name} {share:.1%}" for name, share in each.items())
+        lines.append(f"of a processor: {took}")
     return "\n".join(lines)
+
+
+def as_verdicts(found: Mapping[int, Mapping[str, WayRounds]]) -> list[str]:
+    """A line for each way: the rates that hold, and those that do not."""
+    lines = []
+    for name in next(iter(found.values()), {}):
+        held = [rate for rate, ways in found.items() if holds(name, ways[name])]
+        others = [rate for rate in found if rate not in held]
+        lines.append(f"{name}: nothing lost, late or missed at {in_hertz(held)}")
+        lines[-1] += f"; not so at {in_hertz(others)}" if others else ""
+    return lines
+
+
+def in_hertz(rates: Sequence[int]) -> str:
+    return f"{', '.join(map(str, rates))} Hz" if rates else "no rate"
+
+
+def holds(name: str, way: WayRounds) -> bool:
+    columns, task = in_columns({name: way})
+    return not any(each.lost or each.overflows for each in columns) and not any(
+        each.misses for each in task
+    )
 
 
 def row(name: str, channel: Channel, lost: str) -> list[str]:
@@ -238,11 +314,12 @@ def row(name: str, channel: Channel, lost: str) -> list[str]:
     return [name, *texts, channel.overflows, lost]
 
 
-def as_figures(
-    rate: int, columns: Sequence[Column], task: Sequence[Statistics]
-) -> dict[str, object]:
+def as_figures(rate: int, found: Mapping[str, WayRounds]) -> dict[str, object]:
+    columns, task = in_columns(found)
     return {
         "rate": rate,
         "columns": [asdict(each) for each in columns],
         "task_beside": [asdict(each) for each in task],
+        "shares": {name: way.shares for name, way in found.items() if way.shares},
+        "holds": {name: holds(name, way) for name, way in found.items()},
     }
