@@ -1,5 +1,6 @@
 """The compiled segment: controllers, clock, and accessors for the application's side. The frame
-path is in the headers, one for each mechanism; nothing of it runs under the GIL.
+path is in the headers, one for each mechanism; nothing of it runs under the GIL. SyncManagers from
+inside are in `_buffers.pyx`, motors in `_motors.pyx`.
 """
 
 from cpython.bytes cimport PyBytes_FromStringAndSize
@@ -74,6 +75,12 @@ cdef class Core:
         if not 0 <= n < c.sm_count:
             raise IndexError(f"no SyncManager {n} at position {position}")
         return &c.sm[n]
+
+    cdef servo_axis *_axis(self, int position, int axis) except NULL:
+        cdef controller *c = self._at(position)
+        if not 0 <= axis < c.axis_count:
+            raise IndexError(f"the device at position {position} has no axis {axis}")
+        return &c.axes[axis]
 
     # -- making ---------------------------------------------------------------------------------
 
@@ -260,71 +267,6 @@ cdef class Core:
         al_show(c, status, code)
         unlock(self._segment)
 
-    def sync_manager(self, int position, int n):
-        """(start, length, control, enabled, full)"""
-        cdef sync_manager *sm = self._sync_manager_at(position, n)
-        cdef controller *c = self._at(position)
-        return sm.start, sm.length, sm_registers(c, n)[4], bool(sm.enabled), bool(sm.full)
-
-    def block_sync_manager(self, int position, int n, bint blocked):
-        """The PDI's own switch: a blocked SyncManager lets nobody pass."""
-        cdef controller *c = self._at(position)
-        cdef uint8_t *r
-        self._sync_manager_at(position, n)
-        lock(self._segment)
-        r = sm_registers(c, n)
-        r[7] = (r[7] & ~SM_PDI_DEACTIVATE) | (SM_PDI_DEACTIVATE if blocked else 0)
-        sm_configured(c, n)
-        unlock(self._segment)
-
-    def acknowledge_repeat(self, int position, int n):
-        cdef controller *c = self._at(position)
-        cdef uint8_t *r
-        self._sync_manager_at(position, n)
-        lock(self._segment)
-        r = sm_registers(c, n)
-        r[7] = (r[7] & ~SM_PDI_REPEAT_ACK) | (r[6] & SM_ACTIVATE_REPEAT)
-        unlock(self._segment)
-
-    def repeat_requested(self, int position, int n):
-        cdef controller *c = self._at(position)
-        self._sync_manager_at(position, n)
-        return bool((sm_registers(c, n)[6] ^ sm_registers(c, n)[7]) & SM_ACTIVATE_REPEAT)
-
-    def read_buffer(self, int position, int n):
-        """A complete buffer the MainDevice wrote (a mailbox is emptied by it), or None."""
-        cdef uint8_t buffer[4096]
-        cdef controller *c = self._at(position)
-        cdef int size
-        self._sync_manager_at(position, n)
-        lock(self._segment)
-        size = sm_pdi_read(c, n, buffer, 4096)
-        unlock(self._segment)
-        return None if size < 0 else PyBytes_FromStringAndSize(<char *>buffer, size)
-
-    def write_buffer(self, int position, int n, bytes data):
-        """False: the mailbox is full, or the SyncManager does not let it pass."""
-        cdef controller *c = self._at(position)
-        cdef int size
-        self._sync_manager_at(position, n)
-        lock(self._segment)
-        size = sm_pdi_write(c, n, <const uint8_t *><const char *>data, len(data))
-        unlock(self._segment)
-        return size >= 0
-
-    def take_back(self, int position, int n):
-        """What still lies in a mailbox for the MainDevice is taken out again, or None."""
-        cdef controller *c = self._at(position)
-        cdef sync_manager *sm = self._sync_manager_at(position, n)
-        data = None
-        lock(self._segment)
-        if sm.enabled and sm.mailbox and sm.full:
-            data = PyBytes_FromStringAndSize(<char *>c.memory + sm.start, sm.length)
-            sm.full = 0
-            sm_registers(c, n)[5] &= 0xF6
-        unlock(self._segment)
-        return data
-
     def outputs_valid(self, int position):
         return bool(self._at(position).outputs_valid)
 
@@ -447,50 +389,6 @@ cdef class Core:
         if not 0 <= number < c.slot_count:
             raise IndexError(f"no slot {number}")
         c.slots[number] = value
-
-    cdef servo_axis *_axis(self, int position, int axis) except NULL:
-        cdef controller *c = self._at(position)
-        if not 0 <= axis < c.axis_count:
-            raise IndexError(f"the device at position {position} has no axis {axis}")
-        return &c.axes[axis]
-
-    def make_axis(self, int position, int axis, *, double inertia, double viscous, double coulomb,
-                  double rated_torque, double velocity_limit, double counts_per_radian,
-                  double velocity_per_radian, double position_gain, double velocity_gain,
-                  double integral_gain, double boot):
-        cdef servo_axis *a = self._axis(position, axis)
-        a.inertia, a.viscous, a.coulomb = inertia, viscous, coulomb
-        a.rated_torque, a.velocity_limit = rated_torque, velocity_limit
-        a.counts_per_radian, a.velocity_per_radian = counts_per_radian, velocity_per_radian
-        a.radian_per_count, a.radian_per_velocity = 1 / counts_per_radian, 1 / velocity_per_radian
-        a.per_inertia, a.per_torque = 1 / inertia, 1 / rated_torque
-        a.position_gain, a.velocity_gain = position_gain, velocity_gain
-        a.integral_gain, a.boot = integral_gain, boot
-
-    def axis(self, int position, int axis):
-        """(position [rad], velocity [rad/s], torque [N m], state)"""
-        cdef servo_axis *a = self._axis(position, axis)
-        return a.position, a.velocity, a.torque, a.state
-
-    def tune_axis(self, int position, int axis, *, double velocity_gain, double integral_gain):
-        """The velocity loop's gains [N m s/rad], [N m/rad]."""
-        cdef servo_axis *a = self._axis(position, axis)
-        a.velocity_gain, a.integral_gain = velocity_gain, integral_gain
-
-    def move_axis(self, int position, int axis, double to):
-        cdef servo_axis *a = self._axis(position, axis)
-        lock(self._segment)
-        servo_place(a, to)
-        unlock(self._segment)
-
-    def load_axis(self, int position, int axis, double load):
-        self._axis(position, axis).load = load
-
-    def inject_axis(self, int position, int axis, int code):
-        self._axis(position, axis).injected = code
-
-    def stop_torque(self, int position, int axis, bint active):
-        self._axis(position, axis).sto = active
 
     def emergency(self, int position):
         return self._at(position).emergency

@@ -9,6 +9,7 @@ import struct
 from collections.abc import Iterable, Sequence
 
 from catenary.virtual import _segment
+from catenary.virtual._buffers import Buffers
 from catenary.virtual._segment import Core
 from catenary.virtual.coe.dictionary import (
     ARRAY,
@@ -104,6 +105,7 @@ class Application:
         if box is None:
             raise ValueError("an application needs a mailbox")
         self._core = core
+        self._buffers = Buffers(core)
         self._position = position
         self._box = box
         self.synchronisation: Synchronisation | None = None  # a device that can keep time by SYNC0
@@ -195,16 +197,16 @@ class Application:
     # -- what the mailbox needs ----------------------------------------------------------------
 
     def fetch_request(self) -> bytes | None:
-        return self._core.read_buffer(self._position, 0)
+        return self._buffers.read(self._position, 0)
 
     def put_answer(self, data: bytes) -> bool:
-        return self._core.write_buffer(self._position, 1, data)
+        return self._buffers.write(self._position, 1, data)
 
     def take_back_answer(self) -> bytes | None:
-        return self._core.take_back(self._position, 1)
+        return self._buffers.take_back(self._position, 1)
 
     def acknowledge_repeat(self) -> None:
-        self._core.acknowledge_repeat(self._position, 1)
+        self._buffers.acknowledge_repeat(self._position, 1)
 
     # -- what the state machine needs ----------------------------------------------------------
 
@@ -234,14 +236,14 @@ class Application:
             (box.send_offset, box.send_size, 0x02),
         )
         for n, (offset, size, control) in enumerate(expected):
-            start, length, found, enabled, _full = self._core.sync_manager(self._position, n)
+            start, length, found, enabled, _full = self._buffers.settings(self._position, n)
             if (start, length, found & ENABLE_AND_MODE, enabled) != (offset, size, control, True):
                 return False
         return True
 
     def _buffer_is_configured(self, n: int, assignment: int, control: int) -> bool:
         size = self.pdos.size(assignment)
-        start, length, found, enabled, _full = self._core.sync_manager(self._position, n)
+        start, length, found, enabled, _full = self._buffers.settings(self._position, n)
         if size == 0:
             return not enabled or length == 0
         area = self._areas[n - 2]
@@ -273,7 +275,7 @@ class Application:
 
     def _gate(self, *, mailbox: bool, process_data: bool) -> None:
         for n, opened in ((0, mailbox), (1, mailbox), (2, process_data), (3, process_data)):
-            self._core.block_sync_manager(self._position, n, not opened)
+            self._buffers.block(self._position, n, not opened)
 
     def _map_process_data(self) -> None:
         for n, assignment, flag in ((2, RX_ASSIGNMENT, MAP_RX), (3, TX_ASSIGNMENT, MAP_TX)):

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from catenary.virtual import _segment
+from catenary.virtual._motors import Motors
 from catenary.virtual.coe.dictionary import (
     ARRAY,
     INTEGER8,
@@ -185,7 +186,7 @@ class Servo(AppliedDevice):
         counts_per_radian = self.counts_per_turn / (2 * math.pi)
         for axis in range(self.axes):
             velocity_gain, integral_gain = self._gains(axis)
-            self.core.make_axis(
+            self._motors.make(
                 self.position,
                 axis,
                 inertia=self.inertia,
@@ -212,7 +213,7 @@ class Servo(AppliedDevice):
         """Tunes the velocity loop for what the motor turns, its own inertia included [kg·m²]."""
         self._inertias[axis] = inertia
         velocity_gain, integral_gain = self._gains(axis)
-        self.core.tune_axis(
+        self._motors.tune(
             self.position, axis, velocity_gain=velocity_gain, integral_gain=integral_gain
         )
 
@@ -316,11 +317,15 @@ class Servo(AppliedDevice):
             entry.name, entry.data_type, entry.bits, entry.access, entry.read, checked, entry.slot
         )
 
+    @property
+    def _motors(self) -> Motors:
+        return Motors(self.core)
+
     # -- what tests look at and turn -----------------------------------------------------------
 
     def axis_position(self, axis: int = 0) -> float:
         """The motor's true position [rad]."""
-        return self.core.axis(self.position, axis)[0]
+        return self._motors.state(self.position, axis)[0]
 
     @property
     def position_rad(self) -> float:
@@ -330,29 +335,29 @@ class Servo(AppliedDevice):
     @property
     def velocity_rad_s(self) -> float:
         """The first axis' true velocity [rad/s]."""
-        return self.core.axis(self.position, 0)[1]
+        return self._motors.state(self.position, 0)[1]
 
     @property
     def torque_nm(self) -> float:
         """The first axis' motor torque [N·m]."""
-        return self.core.axis(self.position, 0)[2]
+        return self._motors.state(self.position, 0)[2]
 
     def drive_state(self, axis: int = 0) -> str:
         """The state of the CiA 402 machine, in the standard's words."""
-        return STATES[self.core.axis(self.position, axis)[3]]
+        return STATES[self._motors.state(self.position, axis)[3]]
 
     def move_to(self, position: float, axis: int = 0) -> None:
         """Turns the shaft by hand [rad]."""
-        self.core.move_axis(self.position, axis, position)
+        self._motors.place(self.position, axis, position)
 
     def apply_load(self, torque: float, axis: int = 0) -> None:
         """A torque on the shaft from outside [N·m]."""
-        self.core.load_axis(self.position, axis, torque)
+        self._motors.load(self.position, axis, torque)
 
     def inject_fault(self, code: int, axis: int = 0) -> None:
         """A fault with this error code (0x603F); 0: its cause is gone and it can be reset."""
-        self.core.inject_axis(self.position, axis, code)
+        self._motors.inject(self.position, axis, code)
 
     def switch_sto(self, active: bool, axis: int = 0) -> None:
         """Safe torque off."""
-        self.core.stop_torque(self.position, axis, active)
+        self._motors.stop_torque(self.position, axis, active)

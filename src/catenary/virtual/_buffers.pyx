@@ -1,0 +1,91 @@
+"""The application's side of SyncManagers: mailboxes and buffers, and its own switch of each."""
+
+from cpython.bytes cimport PyBytes_FromStringAndSize
+from libc.stdint cimport uint8_t
+
+from catenary.virtual._segment cimport (
+    SM_ACTIVATE_REPEAT,
+    SM_PDI_DEACTIVATE,
+    SM_PDI_REPEAT_ACK,
+    Core,
+    cat_segment,
+    controller,
+    lock,
+    sm_configured,
+    sm_pdi_read,
+    sm_pdi_write,
+    sm_registers,
+    sync_manager,
+    unlock,
+)
+
+
+cdef class Buffers:
+    """Those of the controllers of `core`. `position` and `n`: the device's and the SyncManager's."""
+
+    cdef Core _core
+    cdef cat_segment *_segment
+
+    def __init__(self, Core core not None):
+        self._core, self._segment = core, core._segment
+
+    def settings(self, int position, int n):
+        """(start, length, control, enabled, full)"""
+        cdef sync_manager *sm = self._core._sync_manager_at(position, n)
+        cdef controller *c = self._core._at(position)
+        return sm.start, sm.length, sm_registers(c, n)[4], bool(sm.enabled), bool(sm.full)
+
+    def block(self, int position, int n, bint blocked):
+        """The PDI's own switch: a blocked SyncManager lets nobody pass."""
+        cdef controller *c = self._core._at(position)
+        cdef uint8_t *r
+        self._core._sync_manager_at(position, n)
+        lock(self._segment)
+        r = sm_registers(c, n)
+        r[7] = (r[7] & ~SM_PDI_DEACTIVATE) | (SM_PDI_DEACTIVATE if blocked else 0)
+        sm_configured(c, n)
+        unlock(self._segment)
+
+    def acknowledge_repeat(self, int position, int n):
+        """The last answer is there again: the MainDevice asked for it."""
+        cdef controller *c = self._core._at(position)
+        cdef uint8_t *r
+        self._core._sync_manager_at(position, n)
+        lock(self._segment)
+        r = sm_registers(c, n)
+        r[7] = (r[7] & ~SM_PDI_REPEAT_ACK) | (r[6] & SM_ACTIVATE_REPEAT)
+        unlock(self._segment)
+
+    def read(self, int position, int n):
+        """A complete buffer the MainDevice wrote (a mailbox is emptied by it), or None."""
+        cdef uint8_t buffer[4096]
+        cdef controller *c = self._core._at(position)
+        cdef int size
+        self._core._sync_manager_at(position, n)
+        lock(self._segment)
+        size = sm_pdi_read(c, n, buffer, 4096)
+        unlock(self._segment)
+        return None if size < 0 else PyBytes_FromStringAndSize(<char *>buffer, size)
+
+    def write(self, int position, int n, bytes data):
+        """False: the mailbox is full, or the SyncManager does not let it pass."""
+        cdef controller *c = self._core._at(position)
+        cdef int size
+        self._core._sync_manager_at(position, n)
+        lock(self._segment)
+        size = sm_pdi_write(c, n, <const uint8_t *><const char *>data, len(data))
+        unlock(self._segment)
+        return size >= 0
+
+    def take_back(self, int position, int n):
+        """What still lies in a mailbox for the MainDevice is taken out again, or None."""
+        cdef controller *c = self._core._at(position)
+        cdef sync_manager *sm = self._core._sync_manager_at(position, n)
+        data = None
+        lock(self._segment)
+        if sm.enabled and sm.mailbox and sm.full:
+            data = PyBytes_FromStringAndSize(<char *>c.memory + sm.start, sm.length)
+            sm.full = 0
+            sm_registers(c, n)[5] &= 0xF6
+        unlock(self._segment)
+        return data

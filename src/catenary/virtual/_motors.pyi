@@ -1,0 +1,29 @@
+from catenary.virtual._segment import Core
+
+class Motors:
+    def __init__(self, core: Core) -> None: ...
+    def make(
+        self,
+        position: int,
+        axis: int,
+        *,
+        inertia: float,
+        viscous: float,
+        coulomb: float,
+        rated_torque: float,
+        velocity_limit: float,
+        counts_per_radian: float,
+        velocity_per_radian: float,
+        position_gain: float,
+        velocity_gain: float,
+        integral_gain: float,
+        boot: float,
+    ) -> None: ...
+    def state(self, position: int, axis: int) -> tuple[float, float, float, int]: ...
+    def tune(
+        self, position: int, axis: int, *, velocity_gain: float, integral_gain: float
+    ) -> None: ...
+    def place(self, position: int, axis: int, to: float) -> None: ...
+    def load(self, position: int, axis: int, load: float) -> None: ...
+    def inject(self, position: int, axis: int, code: int) -> None: ...
+    def stop_torque(self, position: int, axis: int, active: bool) -> None: ...

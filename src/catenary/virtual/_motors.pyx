@@ -1,0 +1,62 @@
+"""The motors of virtual servos: what they are made of, where they are, what befalls them (servo.h)."""
+
+from catenary.virtual._segment cimport (
+    Core,
+    cat_segment,
+    lock,
+    servo_axis,
+    servo_place,
+    unlock,
+)
+
+
+cdef class Motors:
+    """Those of the devices of `core`, by the device's position and the number of its axis."""
+
+    cdef Core _core
+    cdef cat_segment *_segment
+
+    def __init__(self, Core core not None):
+        self._core, self._segment = core, core._segment
+
+    def make(self, int position, int axis, *, double inertia, double viscous, double coulomb,
+             double rated_torque, double velocity_limit, double counts_per_radian,
+             double velocity_per_radian, double position_gain, double velocity_gain,
+             double integral_gain, double boot):
+        cdef servo_axis *a = self._core._axis(position, axis)
+        a.inertia, a.viscous, a.coulomb = inertia, viscous, coulomb
+        a.rated_torque, a.velocity_limit = rated_torque, velocity_limit
+        a.counts_per_radian, a.velocity_per_radian = counts_per_radian, velocity_per_radian
+        a.radian_per_count, a.radian_per_velocity = 1 / counts_per_radian, 1 / velocity_per_radian
+        a.per_inertia, a.per_torque = 1 / inertia, 1 / rated_torque
+        a.position_gain, a.velocity_gain = position_gain, velocity_gain
+        a.integral_gain, a.boot = integral_gain, boot
+
+    def state(self, int position, int axis):
+        """(position [rad], velocity [rad/s], torque [N m], state)"""
+        cdef servo_axis *a = self._core._axis(position, axis)
+        return a.position, a.velocity, a.torque, a.state
+
+    def tune(self, int position, int axis, *, double velocity_gain, double integral_gain):
+        """The velocity loop's gains [N m s/rad], [N m/rad]."""
+        cdef servo_axis *a = self._core._axis(position, axis)
+        a.velocity_gain, a.integral_gain = velocity_gain, integral_gain
+
+    def place(self, int position, int axis, double to):
+        """Turns the shaft [rad]."""
+        cdef servo_axis *a = self._core._axis(position, axis)
+        lock(self._segment)
+        servo_place(a, to)
+        unlock(self._segment)
+
+    def load(self, int position, int axis, double load):
+        """A torque from outside [N m]."""
+        self._core._axis(position, axis).load = load
+
+    def inject(self, int position, int axis, int code):
+        """A fault with this code; 0: its cause is gone."""
+        self._core._axis(position, axis).injected = code
+
+    def stop_torque(self, int position, int axis, bint active):
+        """Safe torque off."""
+        self._core._axis(position, axis).sto = active
