@@ -1,4 +1,6 @@
-"""A tool that may be plugged off and on while the arm moves: its devices carry the alias 20."""
+"""A tool that may be plugged off and on while the arm moves: `python tool.py eth0`. The first of
+its devices has the alias 20: `catenary alias eth0 POSITION 20`, then switch it off and on.
+"""
 
 import sys
 

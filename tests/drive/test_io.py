@@ -109,3 +109,9 @@ def test_mistakes_name_the_channel() -> None:
         Outputs(sub, scale={"Value": 1.0})
     with pytest.raises(ValueError, match="no output process data"):
         Outputs(terminal(1, Direction.INPUT, 2, "Input"))
+
+
+def test_no_device_at_all_is_another_mistake() -> None:
+    """A group of which nobody has the alias is empty."""
+    with pytest.raises(ValueError, match="no device is given whose output process data"):
+        Outputs()

@@ -92,6 +92,44 @@ def test_pairs_carry_no_ipv6_and_go_away(veth):
     assert {name for _, name in socket.if_nameindex()} == names
 
 
+@pytest.mark.parametrize(("late", "looks"), [(0, 1), (3, 4), (10**9, 2000)])
+def test_a_pair_is_there_when_the_kernel_knows_of_both_ends(monkeypatch, late, looks):
+    """Until then frames are dropped, and a probe by one frame said that there is no network."""
+    asked, now = [], 0.0
+
+    def run_ip(*arguments):
+        asked.append(arguments)
+        return (
+            f"7: cat0a@cat0b: mtu 1500 state {'UP' if len(asked) > late else 'LOWERLAYERDOWN'} mode"
+        )
+
+    def sleep(seconds):
+        nonlocal now
+        now += seconds
+
+    monkeypatch.setattr(private_network, "run_ip", run_ip)
+    monkeypatch.setattr(private_network.time, "sleep", sleep)
+    monkeypatch.setattr(private_network.time, "monotonic", lambda: now)
+    private_network.await_carrier("cat0a")
+    assert asked[-1] == ("-o", "link", "show", "cat0a")
+    assert len(asked) == pytest.approx(looks, rel=0.01)
+
+
+def test_the_first_frame_of_a_pair_arrives(veth):
+    frame = b"\xff" * 6 + bytes(6) + b"\x88\xa4" + bytes(46)
+    for _ in range(20):
+        with (
+            private_network.veth_pair() as (first, second),
+            socket.socket(socket.AF_PACKET, socket.SOCK_RAW, 0) as sender,
+            socket.socket(socket.AF_PACKET, socket.SOCK_RAW, 0) as receiver,
+        ):
+            sender.bind((first, private_network.ETHERTYPE))
+            receiver.bind((second, private_network.ETHERTYPE))
+            receiver.settimeout(20.0)
+            sender.send(frame)
+            assert receiver.recv(2048) == frame
+
+
 def test_an_error_of_ip_is_raised_with_its_words():
     with pytest.raises(OSError, match=r"ip link delete none0: .*none0"):
         private_network.run_ip("link", "delete", "none0")

@@ -170,7 +170,13 @@ class Outputs(_Channels):
 def channels(
     devices: Iterable[DeviceDescription], direction: Direction, scale: Mapping[str, float]
 ) -> tuple[Channel, ...]:
-    """All channels of the devices, each with a name of its own."""
+    """All channels of the devices, each with a name of its own. ValueError: there are none."""
+    devices = list(devices)
+    if not devices:
+        raise ValueError(
+            f"no device is given whose {direction.name.lower()} process data are meant: was one "
+            "found? main.subs shows all; a group is empty where no device has its alias"
+        )
     found = [
         (device, pdo, entry)
         for device in devices

@@ -16,6 +16,7 @@ import shutil
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +26,8 @@ INSIDE = "inside"
 MODULE = "catenary.realtime.private_network"
 PROBE_SECONDS = 30.0  # a refusal is prompt, a busy machine is not
 ETHERTYPE = 0x88A4
+CARRIER_SECONDS, LOOK_SECONDS = 2.0, 0.001  # at most; between two looks
+STATE_UP = " state UP "
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +131,7 @@ def veth_pair() -> Iterator[tuple[str, str]]:
 
 
 def make_veth_pair() -> tuple[str, str]:
-    """As `veth_pair`, for as long as the namespace lives."""
+    """As `veth_pair`, for as long as the namespace lives. What is sent on either is taken."""
     taken = {name for _, name in socket.if_nameindex()}
     number = next(n for n in range(len(taken) + 1) if f"cat{n}a" not in taken)
     names = f"cat{number}a", f"cat{number}b"
@@ -136,7 +139,17 @@ def make_veth_pair() -> tuple[str, str]:
     for name in names:
         silence(name)
         run_ip("link", "set", name, "up")
+    for name in names:
+        await_carrier(name)
     return names
+
+
+def await_carrier(name: str) -> None:
+    """The kernel notices beside us that both ends are up; until then it drops what is sent on the
+    first, without a word. Where it does not say so in time, it may do without."""
+    until = time.monotonic() + CARRIER_SECONDS
+    while STATE_UP not in run_ip("-o", "link", "show", name) and time.monotonic() < until:
+        time.sleep(LOOK_SECONDS)
 
 
 def silence(name: str) -> None:
@@ -145,10 +158,12 @@ def silence(name: str) -> None:
         Path("/proc/sys/net/ipv6/conf", name, "disable_ipv6").write_text("1")
 
 
-def run_ip(*arguments: str) -> None:
+def run_ip(*arguments: str) -> str:
+    """What it prints. OSError: it failed, in its words."""
     done = subprocess.run(["ip", *arguments], capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise OSError(f"ip {' '.join(arguments)}: {done.stderr.strip()}")
+    return done.stdout
 
 
 def main(arguments: Sequence[str]) -> None:
