@@ -7,9 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from catenary.bench import networks
+import catenary as cat
+from catenary.bench import network_law, networks
 from catenary.bench.job import PHASES
 from catenary.bench.networks import KEPT, NetworkRound, of_samples, phases_of, tally
+from catenary.bench.segment import make_segment
+from catenary.errors import WorkingCounterError
 
 
 def test_a_cycle_begun_a_period_late_is_late() -> None:
@@ -45,6 +48,22 @@ def test_the_last_cycles_of_a_log_are_taken() -> None:
 
 def test_virtual_networks_are_complete() -> None:
     assert networks.in_virtual_time(8000, 0.05) == (400, 0)
+
+
+def test_a_loop_that_stands_still_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(network_law.time, "sleep", lambda seconds: None)
+    segment = make_segment(2, clock="virtual")
+    job = SimpleNamespace(cycles=1000, period_ns=1_000_000)
+
+    def run() -> None:
+        with cat.MainDevice(segment) as main:
+            arm = cat.Drives(main.scan().drives, counts_per_turn=1000)
+            with cat.Loop(arm) as loop:
+                segment.unplug()
+                network_law.count(loop, job)
+
+    with pytest.raises(WorkingCounterError, match="no device answers"):
+        run()
 
 
 @pytest.mark.wire
