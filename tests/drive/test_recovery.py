@@ -105,6 +105,16 @@ def test_what_is_waited_for_is_said() -> None:
         there.run(1000, lambda now: None, ready=False)
 
 
+def test_patience_begins_with_the_first_step() -> None:
+    """Not with the loop, which may have run for long before."""
+    with rig(patience=0.2) as there:
+        for cycle in there.loop:
+            if cycle.number == 500:
+                break
+        there.run(600, lambda now: None, ready=False)
+        assert there.phases == [STARTING]
+
+
 @pytest.mark.parametrize("options", [{"after": -1.0}, {"patience": 0.0}])
 def test_times_must_be_possible(options: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="must be positive"), rig(**options):

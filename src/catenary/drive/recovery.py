@@ -62,7 +62,7 @@ class Recovery:
         self._drives = drives
         self._after = after
         self._patience = patience
-        self._since = 0.0  # [s] the last reason, or the last request to be enabled
+        self._since: float | None = None  # [s] the last reason, or request to be enabled
         self._next_reset = 0.0
         self._resetting = False
 
@@ -70,16 +70,17 @@ class Recovery:
         """The phase from now on. `reason`: why the drives must not move; None: they may. Where not
         `ready`, they are kept in STARTING though enabled."""
         now, self.just_stopped = cycle.time, False
+        since = self._since = now if self._since is None else self._since
         if reason and self.phase != Phase.STOPPED:
             self._stop(cycle, reason)
         elif reason:
             self._since = now
             self._reset(now)
-        elif self.phase == Phase.STOPPED and now > self._since + self._after:
+        elif self.phase == Phase.STOPPED and now > since + self._after:
             self._drives.enable()
             self.phase, self._since = Phase.STARTING, now
         elif self.phase == Phase.STARTING:
-            self._start(now, ready)
+            self._start(now - since, ready)
         return self.phase
 
     def _stop(self, cycle: CycleNow, reason: str) -> None:
@@ -98,10 +99,10 @@ class Recovery:
         else:
             self._drives.disable()
 
-    def _start(self, now: float, ready: bool) -> None:
+    def _start(self, waited: float, ready: bool) -> None:
         if ready and self._drives.enabled.all():
             self.phase = Phase.RUNNING
-        elif now > self._since + self._patience:
+        elif waited > self._patience:
             names = zip(self._drives.names, self._drives.enabled, strict=True)
             missing = [name for name, enabled in names if not enabled]
             raise DriveError(
