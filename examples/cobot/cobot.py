@@ -8,14 +8,14 @@ All joints go to 90 degrees and back, twice. Enter stops them; on virtual drives
 """
 
 import argparse
-import time
 from pathlib import Path
 
 import numpy as np
+import ruckig  # noqa: F401  of trajectories: not in the first of them
 
 import catenary as cat
 from catenary import control, realtime, record
-from catenary.bench.cobot import Outcome, report
+from catenary.bench.cobot import Measured, Outcome, report
 from catenary.demo.terminal import on_enter
 from catenary.demo.wire import program_target
 from catenary.virtual import read_segment
@@ -41,9 +41,8 @@ FOLLOWING_ERROR, REACH = 0.2, 2.9  # [rad]
 SILENCE, PATIENCE = 5, 3000  # cycles without news from a task, from the bus: stop, give up
 
 
-def dynamics(task, cost, state, torque, arm, gravity):
+def dynamics(task, cost, state, torque, model, gravity):
     """What the motion takes [N·m]: gravity, Coriolis, inertia, friction."""
-    model = control.Dynamics(arm, axes=JOINTS)
     friction, rotors = FRICTION.parameters.tolist(), ROTORS.parameters.tolist()  # faster as lists
     for _ in task:
         _, speed, acceleration, q, v = state.read()
@@ -56,19 +55,18 @@ def dynamics(task, cost, state, torque, arm, gravity):
 
 def trajectory(task, cost, state, phase, rows, done, goals):
     """Motions to the goals, one after the other, a few rows ahead of the main control."""
-    left, number = None, int(done.read())
+    motion, number = None, int(done.read())
     for _ in task:
         task.spend(cost)
         if phase.read() != cat.Phase.RUNNING or number == len(goals):
-            left = None
-        elif left is None and not len(rows):  # begins as the reference moves; mostly it stands
+            motion = None
+        elif motion is None and not len(rows):  # begins as the reference moves; mostly it stands
             begin = control.MotionState(*state.read()[:3])
-            motion = control.trajectory(begin, goals[number], LIMITS, PERIOD)
-            left = list(np.stack([motion.position, motion.velocity, motion.acceleration], 1))
-        while left and rows.put(left[0]):
-            left.pop(0)
-        if left == [] and not len(rows):
-            left, number = None, number + 1
+            motion, sent = control.trajectory(begin, goals[number], LIMITS, task.period / 2), 0
+        while motion and sent < len(motion) and rows.put(motion.row(sent)):
+            sent += 1
+        if motion and sent == len(motion) and not len(rows):
+            motion, number = None, number + 1
         done.write(number)  # also says: still here
 
 
@@ -112,18 +110,17 @@ def why_stop(wanted, q, v, signs):
     return next((sign for sign, there in signs.items() if there), None)
 
 
-def main_control(place, cost, target, share, state, torque, phase, rows, done, goals, hit):
-    """The bus, waited for when it is lost, and the cascades. Timing, stops, times real time."""
+def main_control(place, cost, period, target, share, state, torque, phase, rows, done, goals, hit):
+    """The bus, waited for when it is lost, and the cascades. What an `Outcome` is made of."""
     parameters = GAINS.parameters.tolist()
     wanted = speed = nothing = np.zeros(JOINTS)
     handled = lost = 0
     silences = realtime.Silence(torque), realtime.Silence(done)
-    options = {"run": "inline", "period": PERIOD, "priority": 90, "raise_faults": False}
+    options = {"run": "inline", "period": period, "priority": 90, "raise_faults": False}
     with cat.MainDevice(read_segment(target, clock=place) if place else target) as main:
         arm = cat.Drives(main.scan().drives, mode="cst", required=False, **AXES)
-        recovery = cat.Recovery(arm)
+        recovery, measured = cat.Recovery(arm), Measured(virtual=bool(place))
         with cat.Loop(arm, sink=share, lost_limit=PATIENCE, watchdog=0.02, **options) as loop:
-            began = time.perf_counter()
             for cycle in loop:
                 q, v = arm.actual.position, arm.actual.velocity
                 row = rows.take()
@@ -135,7 +132,7 @@ def main_control(place, cost, target, share, state, torque, phase, rows, done, g
                 arm.target.position[:] = wanted  # for the recording: the mode is torque
                 each = [row.tolist() for row in (wanted, speed, torque.read(), q, v)]
                 for i, joint in enumerate(zip(*each, strict=True)):
-                    arm.target.torque[i] = control.cascade(memory, parameters, i, *joint, PERIOD)
+                    arm.target.torque[i] = control.cascade(memory, parameters, i, *joint, period)
                 cycle.spend(cost)
                 lost = 0 if arm.present.all() else lost + 1
                 silence = [each.look() for each in silences]
@@ -147,25 +144,29 @@ def main_control(place, cost, target, share, state, torque, phase, rows, done, g
                 if recovery.just_stopped:
                     when = hit.read() * 1e-9 if reason == "key" else None
                     main.mark(f"stop: {reason}", time=when)
+                measured.look(cycle.time)
                 if done.read() == len(goals) or max(silence) > PATIENCE:
                     break
-            return loop.timing, recovery.stops, cycle.time / (time.perf_counter() - began)
+            return loop.timing, recovery.stops, measured
 
 
-def run(target, *, virtual, gravity, arm, folder, name="cobot", key_at=KEY_AT, goals=GOALS):
+def run(
+    target, *, virtual, gravity, arm, folder, name="cobot", key_at=KEY_AT, goals=GOALS, stretch=1.0
+):
     """One run of the whole program, with gravity compensated or not."""
     state, torque = realtime.Value("f8", (5, JOINTS)), realtime.Value("f8", JOINTS)
     rows, key = realtime.Queue("f8", (3, JOINTS), length=8), realtime.Signal()
     phase, done, hit = (realtime.Value("i8") for _ in range(3))
     without = "" if gravity else "-without"
     name, path = name + without, folder / f"cobot{without}.mcap"
+    model = control.Dynamics(arm, axes=JOINTS)
 
     def task(function, cost, *arguments, on_failure="restart", **more):  # [s], in virtual time
-        more |= {"cpu": 0 if virtual else None, "on_failure": on_failure}
-        return realtime.Task(function, (cost * virtual, *arguments), **more)
+        more |= {"cpu": 0 if virtual else None, "period": more["period"] * stretch}
+        return realtime.Task(function, (cost * virtual, *arguments), on_failure=on_failure, **more)
 
     tasks = realtime.Tasks(
-        task(dynamics, 40e-6, state, torque, arm, gravity, period=1e-3, priority=95),
+        task(dynamics, 40e-6, state, torque, model, gravity, period=1e-3, priority=95),
         task(trajectory, 25e-6, state, phase, rows, done, goals, period=2e-3, priority=85),
         task(monitor, 300e-6, name, key, key_at, period=10e-3, priority=80),
         task(log, 5e-3, name, path, period=0.1, priority=75, on_failure="continue"),
@@ -175,8 +176,9 @@ def run(target, *, virtual, gravity, arm, folder, name="cobot", key_at=KEY_AT, g
         best_effort=True,
     )
     with cat.Share(name) as share, tasks, on_enter(key.set):
-        given = (130e-6 * virtual, target, share, state, torque, phase, rows, done, goals, hit)
-        outcome = tasks.beside(main_control, *given, priority=90, cpu=0 if virtual else None)
+        given = (target, share, state, torque, phase, rows, done, goals, hit)
+        given = (main_control, 130e-6 * virtual, PERIOD * stretch, *given)
+        outcome = tasks.beside(*given, priority=90, cpu=0 if virtual else None)
     return Outcome(path, *outcome, tasks)
 
 
@@ -185,6 +187,8 @@ if __name__ == "__main__":  # the tasks' processes import this file
     parser.add_argument("target", nargs="?", help="a network interface; else virtual drives")
     parser.add_argument("--realtime", action="store_true", help="on the machine's clock")
     parser.add_argument("--headless", action="store_true", help="writes no plots")
+    parser.add_argument("--short", action="store_true", help="one run, with gravity compensated")
+    parser.add_argument("--stretch", type=float, default=1.0, help="all periods so much longer")
     parser.add_argument("--arm", default=str(HERE / "arm.xml"), help="MJCF or URDF of the arm")
     parser.add_argument("--segment", default=str(HERE / "segment.toml"), help="the virtual drives")
     parser.add_argument("--name", default="cobot", help="of what it shares with other processes")
@@ -194,7 +198,7 @@ if __name__ == "__main__":  # the tasks' processes import this file
         parser.error(f"{a.target} lives by the machine's clock: add --realtime")
     a.out.mkdir(exist_ok=True)
     options = {"virtual": not a.realtime, "arm": a.arm, "folder": a.out, "name": a.name}
-    options["key_at"] = None if a.target else KEY_AT
+    options |= {"key_at": None if a.target else KEY_AT, "stretch": a.stretch}
     with program_target(a.segment, a.target, realtime=a.realtime) as target:
-        outcomes = [run(target, gravity=each, **options) for each in (True, False)]
-    report(*outcomes, a.out, plots=not a.headless)
+        outcomes = [run(target, gravity=each, **options) for each in (True, False)[: 2 - a.short]]
+    report(a.out, *outcomes, plots=not a.headless)

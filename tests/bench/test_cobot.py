@@ -10,7 +10,10 @@ import pytest
 
 pytest.importorskip("mcap", reason="recordings are MCAP files: pip install 'catenary[log]'")
 
+from catenary.bench import cobot
 from catenary.bench.cobot import reactions
+from catenary.bench.task_times import TaskTimes
+from catenary.realtime.child import start_python
 
 GO, BRAKE = 0x000F, 0x0002
 ENABLED, QUICK_STOP_ACTIVE, SWITCHED_ON = 0x0237, 0x0217, 0x0233
@@ -77,3 +80,32 @@ def test_what_is_not_enabled_needs_no_quick_stop() -> None:
 def test_a_stop_that_never_came() -> None:
     with pytest.raises(ValueError, match="no quick stop was sent"):
         reactions(Cycles([GO] * 4, [ENABLED] * 4, cause=1.5e-3))  # type: ignore[arg-type]
+
+
+def test_responses_longer_than_their_bound_are_named() -> None:
+    row = (1.0, 1.0, 1.0, 0.0)
+    times = {name: TaskTimes(row, row, (1.0, 200.0, 20.0, 0.0)) for name in ("a", "b", "c")}
+    assert cobot.beyond(times, {"a": 201e-6, "b": 199e-6, "c": None}) == ["b", "c"]
+
+
+def test_the_longest_time_between_two_looks_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    times = iter([1.0, 1.5, 1.75])
+    measured = cobot.Measured(virtual=False)
+    monkeypatch.setattr(cobot.time, "clock_gettime", lambda _clock: next(times))
+    for _ in range(3):
+        measured.look(0.0)
+    assert measured.executions == {cobot.MAIN: 0.5}
+
+
+def test_in_virtual_time_no_processor_time_is_looked_at() -> None:
+    measured = cobot.Measured(virtual=True)
+    measured.look(1.0)
+    assert measured.executions == {}
+    assert measured.speed > 0
+
+
+def test_a_child_is_found_by_the_module_it_runs() -> None:
+    with start_python(["-m", "tests.bench.waits"]) as child:
+        assert child.read_line(30.0) == "here"
+        assert cobot.child_that_runs("tests.bench.waits") == child.pid
+    assert cobot.child_that_runs("tests.bench.waits") is None

@@ -22,6 +22,8 @@ FOUND = {
     "utilisation": 0.5,
     "schedulable": True,
     "times_real_time": 5.5,
+    "bounds_us": {name: 3.5 for name in COBOT},
+    "beyond": [],
 }
 WRITES = """
 import sys

@@ -1,6 +1,7 @@
 """Gravity and inverse dynamics: against a pendulum's formula and MuJoCo's own Python."""
 
 import math
+import pickle
 import sys
 from pathlib import Path
 
@@ -159,3 +160,10 @@ def test_each_law_has_a_workspace_of_its_own(three: Path) -> None:
     del dynamics
     control.gravity(first, q, torque)  # lives longer than the object
     assert torque == pytest.approx(oracle(three, JOINTS, q, np.zeros(3), np.zeros(3)))
+
+
+def test_another_process_gets_the_same_model(three: Path) -> None:
+    model = control.Dynamics(three, joints=JOINTS, armature=0.5)
+    copy = pickle.loads(pickle.dumps(model))
+    motion = np.full(3, 0.3), np.full(3, 0.2), np.full(3, 0.1)
+    assert np.array_equal(copy.inverse(*motion), model.inverse(*motion))

@@ -80,6 +80,17 @@ def test_waypoints_are_a_chain_at_rest_in_each() -> None:
     assert motion.duration == pytest.approx(sum(single))
 
 
+def test_a_row_at_a_time_is_what_the_arrays_hold() -> None:
+    goals = [[1.0, -0.5], [0.2, 0.3]]
+    limits = control.MotionLimits(1.0, 5.0, 50.0)
+    motion = control.trajectory([0.0, 0.0], goals, limits, 0.01)
+    rows = np.array([motion.row(k) for k in range(len(motion))])
+    arrays = [motion.position, motion.velocity, motion.acceleration]
+    assert np.array_equal(rows, np.stack(arrays, axis=1))
+    with pytest.raises(IndexError, match="row 3000"):
+        motion.row(3000)
+
+
 def test_where_it_stands_already_it_is_one_row() -> None:
     motion = control.trajectory(HOME, HOME, LIMITS, PERIOD)
     assert motion.position.tolist() == [[0.0, 0.0, 0.0]]

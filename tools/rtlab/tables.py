@@ -50,7 +50,7 @@ TABLES: Mapping[str, Table] = {
         "33 axes on two networks, 4 and 8 kHz",
     ),
     "cobot": Table(
-        "bench table cobot --realtime",
+        "bench table cobot --realtime --short --stretch 5",
         60,
         "six tasks of a cobot beside their analysis",
     ),

@@ -150,6 +150,8 @@ def measure_table(
     lead: float | None = None,
     example: Path | None = None,
     realtime: bool = False,
+    stretch: float | None = None,
+    short: bool = False,
     file: Path | None = None,
 ) -> None:
     """Prints a published table with ours beside it; `None`: as the table has it. What this machine
@@ -174,6 +176,8 @@ def measure_table(
         lead=lead,
         example=example,
         realtime=realtime,
+        stretch=stretch,
+        short=short,
         refused=refused,
     )
     made = tables.measure(name, options)

@@ -62,6 +62,15 @@ def add_table(group: Commands) -> None:
     parser.add_argument(
         "--realtime", action="store_true", help="cobot on the machine's clock, not in virtual time"
     )
+    parser.add_argument(
+        "--stretch",
+        type=positive_seconds,
+        metavar="N",
+        help="cobot's periods N times as long, for a slow processor",
+    )
+    parser.add_argument(
+        "--short", action="store_true", help="cobot: one run, with gravity compensated"
+    )
     add_file(parser)
     parser.set_defaults(run=run_table)
 
@@ -84,6 +93,8 @@ def run_table(arguments: argparse.Namespace) -> int:
         lead=arguments.lead,
         example=arguments.example,
         realtime=arguments.realtime,
+        stretch=arguments.stretch,
+        short=arguments.short,
         file=arguments.json,
     )
     return 0

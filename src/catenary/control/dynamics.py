@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -44,10 +45,15 @@ class Dynamics:
         axes: int | None = None,
         armature: PerAxis = 0.0,
     ) -> None:
+        # for another process: it reads the file itself (a task's, before it starts)
+        self._again = partial(Dynamics, path, joints=joints, axes=axes, armature=armature)
         self._model: Model = load_model(Path(path), joints, axes, armature)
         self._data = data = self._model.workspace()
         self._rows = (data.qpos, data.qvel, data.qacc, data.qfrc_inverse)  # looked up once
         self._coordinates, self._degrees = np.array(self._model.places).T
+
+    def __reduce__(self) -> tuple[partial[Dynamics], tuple[()]]:
+        return self._again, ()
 
     @property
     def joints(self) -> tuple[str, ...]:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from importlib import import_module
 from itertools import pairwise
 from typing import Any
@@ -43,20 +45,56 @@ class MotionState:
     acceleration: Vector | None = None
 
 
-@dataclass(frozen=True, slots=True)
 class Trajectory:
     """A motion as rows, one a period: `time` (k,) [s], from one period on; `position`, `velocity`,
     `acceleration` (k, n) [rad], [rad/s], [rad/s²]. The last row is the goal, at rest. `duration`
-    [s] is that of the motion, which ends within the last period."""
+    [s] is that of the motion, which ends within the last period.
 
-    time: Row
-    position: Rows
-    velocity: Rows
-    acceleration: Rows
-    duration: float
+    All rows are made when one of these is first asked for, some 10 us each. A task with a deadline
+    takes them one at a time: `row`.
+    """
+
+    def __init__(self, pieces: Sequence[Any], goal: Row, period: float) -> None:
+        self._pieces, self._goal, self._period = pieces, goal, period
+        self._ends = np.cumsum([piece.duration for piece in pieces]).tolist()
+        self.duration = float(self._ends[-1])
+        self._count = max(1, math.ceil(self.duration / period - SLACK))
 
     def __len__(self) -> int:
-        return len(self.time)
+        return self._count
+
+    def row(self, number: int) -> Rows:
+        """(3, n): position, velocity, acceleration of one row, the first is 0. IndexError: beyond
+        the last."""
+        if not 0 <= number < self._count:
+            raise IndexError(f"row {number} of a trajectory of {self._count}")
+        if number == self._count - 1:
+            rest = np.zeros(len(self._goal))
+            return np.stack([self._goal, rest, rest])
+        now = (number + 1) * self._period
+        which = bisect_left(self._ends, now)
+        piece = self._pieces[which]
+        return np.array(piece.at_time(now - (self._ends[which] - piece.duration))[:3])
+
+    @property
+    def time(self) -> Row:
+        return self._period * np.arange(1, self._count + 1, dtype=np.float64)
+
+    @property
+    def position(self) -> Rows:
+        return self._rows[:, 0]
+
+    @property
+    def velocity(self) -> Rows:
+        return self._rows[:, 1]
+
+    @property
+    def acceleration(self) -> Rows:
+        return self._rows[:, 2]
+
+    @cached_property
+    def _rows(self) -> Rows:
+        return np.stack([self.row(number) for number in range(self._count)])
 
 
 def trajectory(
@@ -91,7 +129,7 @@ def trajectory(
     rest = np.zeros(len(q))
     stages = [(q, v, a), *((row, rest, rest) for row in goals)]
     pieces = [_piece(ruckig, begin, end[0], bounds) for begin, end in pairwise(stages)]
-    return _sampled(pieces, goals[-1], period)
+    return Trajectory(pieces, goals[-1], period)
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,17 +238,3 @@ def _piece(ruckig: Any, begin: tuple[Row, Row, Row], goal: Row, bounds: _Bounds)
         np.array([axis.min for axis in extremes]), np.array([axis.max for axis in extremes])
     )
     return piece
-
-
-def _sampled(pieces: Sequence[Any], goal: Row, period: float) -> Trajectory:
-    ends = np.cumsum([piece.duration for piece in pieces])
-    duration = float(ends[-1])
-    count = max(1, math.ceil(duration / period - SLACK))
-    rows = np.empty((count, 3, len(goal)))
-    for k in range(count - 1):
-        now = (k + 1) * period
-        which = int(np.searchsorted(ends, now))
-        rows[k] = pieces[which].at_time(now - (ends[which] - pieces[which].duration))[:3]
-    rows[-1] = goal, np.zeros(len(goal)), np.zeros(len(goal))
-    time = period * np.arange(1, count + 1, dtype=np.float64)
-    return Trajectory(time, rows[:, 0], rows[:, 1], rows[:, 2], duration)

@@ -32,7 +32,7 @@ CONDITIONS = (
 
 def measure(options: Options) -> Sheet:
     reason = why_not(options)
-    found = {} if reason else run(program(options), realtime=options.realtime)
+    found = {} if reason else run(program(options), words_for(options))
     ours = {each["name"]: times_of(each) for each in found.get("tasks", ())}
     theirs = {f"{name} (theirs)": times for name, times in COBOT.items()}
     lines = [as_table(ours, COBOT) if ours else as_table(theirs, {})]
@@ -40,16 +40,28 @@ def measure(options: Options) -> Sheet:
     clock = "the machine's clock" if options.realtime else "virtual time, execution declared"
     return Sheet(
         title=f"Six tasks of a six-axis cobot; {CONDITIONS}",
-        conditions=f"ours: examples/cobot, a simulated arm, twice there and back; {clock}",
+        conditions=f"ours: examples/cobot, a simulated arm, {moves(options)}; {clock}",
         text="\n".join([*lines, *as_lines(found)]),
         figures={
             "published": {name: times._asdict() for name, times in COBOT.items()},
             "published_utilisation": COBOT_UTILISATION,
             "realtime": options.realtime,
+            "stretch": options.stretch,
             "ours": found,
         },
         left_out=[reason] if reason else [],
     )
+
+
+def words_for(options: Options) -> list[str]:
+    words = ["--headless", *(["--short"] if options.short else [])]
+    words += [] if options.stretch is None else ["--stretch", str(options.stretch)]
+    return [*words, *(["--realtime"] if options.realtime else [])]
+
+
+def moves(options: Options) -> str:
+    periods = "" if options.stretch is None else f", periods {options.stretch:g} times as long"
+    return "twice there and back" + periods
 
 
 def program(options: Options) -> Path:
@@ -70,14 +82,14 @@ def why_not(options: Options) -> str:
     return ""
 
 
-def run(path: Path, *, realtime: bool) -> dict[str, Any]:
+def run(path: Path, words: Sequence[str]) -> dict[str, Any]:
     """What the program wrote: `catenary.bench.cobot.report`. CatenaryError: it failed."""
     with tempfile.TemporaryDirectory(prefix="catenary-bench-") as name:
-        words = [str(path), "--headless", "--out", name]
-        if realtime:
-            words = ["-m", "catenary.realtime.private_network", *words, "--realtime"]
+        command = [str(path), *words, "--out", name]
+        if "--realtime" in words:
+            command = ["-m", "catenary.realtime.private_network", *command]
         done = subprocess.run(
-            [sys.executable, *words], capture_output=True, text=True, timeout=SECONDS, check=False
+            [sys.executable, *command], capture_output=True, text=True, timeout=SECONDS, check=False
         )
         file = Path(name, "cobot.json")
         if done.returncode or not file.exists():
@@ -98,9 +110,17 @@ def as_lines(found: Mapping[str, Any]) -> Sequence[str]:
     if not found:
         return []
     word = "schedulable" if found["schedulable"] else "NOT schedulable"
+    without = found["rms_deg_without"]
+    beyond = ", ".join(found["beyond"]) or "none"
     return [
         f"ours: utilisation {found['utilisation']:.1%}, {word}; "
-        f"tracking {found['rms_deg']:.3f} deg rms, "
-        f"without compensation {found['rms_deg_without']:.3f}; "
-        f"{found['times_real_time']:.1f} times real time",
+        f"tracking {found['rms_deg']:.3f} deg rms"
+        + ("" if without is None else f", without compensation {without:.3f}")
+        + f"; {found['times_real_time']:.1f} times real time",
+        "bounds of the analysis [us]: "
+        + ", ".join(
+            f"{name} {'none' if bound is None else round(bound)}"
+            for name, bound in found["bounds_us"].items()
+        ),
+        f"responses beyond their bound: {beyond}",
     ]

@@ -31,6 +31,8 @@ class Options:
     lead: float | None = None  # [s] of inline loops and laws; 0: a plain sleep
     example: Path | None = None  # the program of examples/cobot
     realtime: bool = False  # on the machine's clock, where virtual time is the default
+    stretch: float | None = None  # periods so many times as long, for a slow processor
+    short: bool = False  # less of it
     refused: str = ""  # why there is no private network
 
 

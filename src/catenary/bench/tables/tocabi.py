@@ -28,6 +28,7 @@ from catenary.bench.job import Body, Job
 from catenary.bench.loop import make_jobs, show_progress
 from catenary.bench.network_law import GO, PATIENCE
 from catenary.bench.networks import DRIVES, C, NetworkRound, run_c, run_ours
+from catenary.bench.processor import processor_time
 from catenary.bench.rounds import BRING_UP_SECONDS, RoundError, begin_anew
 from catenary.bench.segment import Served, processors, served
 from catenary.bench.statistics import summarise
@@ -40,7 +41,6 @@ from catenary.realtime.child import Child, start_python
 RATES, SECONDS, ROUNDS = (4000, 8000), 10.0, 2
 NETWORKS = ("upper", "lower")
 LOOKED_AT = 0.8  # of what is measured: shares of the processor
-CPUCLOCK_SCHED = 2  # linux/posix-timers.h
 LOOP, LAW = "loop", "law"
 TASK_PERIOD, TASK_PRIORITY = 1e-3, 60  # below loops and segments
 HEADER = ("avg/max/min/sd [us]", "latency", "send", "receive", "overflows", "lost")
@@ -205,11 +205,6 @@ def shares(processes: Mapping[str, int], seconds: float) -> dict[str, float]:
         name: round((processor_time(pid) - before[name]) / passed, 4)
         for name, pid in processes.items()
     }
-
-
-def processor_time(pid: int) -> float:
-    """[s] of all threads of a process (clock_getcpuclockid(3), Linux)."""
-    return time.clock_gettime(~pid << 3 | CPUCLOCK_SCHED)
 
 
 def start_law(job: Job) -> Child:
