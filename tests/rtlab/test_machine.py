@@ -146,3 +146,15 @@ def test_an_interrupted_run_leaves_no_process(
     lab.stdout.close()
     if number == signal.SIGTERM:
         assert list(folder.iterdir()) == []
+
+
+def test_a_guest_that_dies_before_its_first_word_is_started_again(
+    qemu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(machine, "BOOT_SECONDS", 1.0)
+    been = tmp_path / "been"
+    again = f"echo up; echo '{json.dumps(ANSWER)}' > \"$RESULTS\""
+    becomes(qemu, f"if test -e {been}; then {again}; else touch {been}; exec sleep 600; fi")
+    lines, answer = run(tmp_path)
+    assert lines == ["up"]
+    assert answer == ANSWER
