@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from catenary.core import GOAL_ENABLED, Engine
+from catenary.core import AXIS_DROPPED, AXIS_FOLLOWED, GOAL_ENABLED, Engine
 from catenary.plan.cycle import AxisLimits
 from tests.core.rig import CST, MS, Bench, TickingLink, axis, make_plan
 from tests.core.test_law import Frame, make_law
@@ -92,3 +92,40 @@ def test_a_law_too_long_for_the_lead_is_not_rehearsed() -> None:
     counted = law.figures["steps"]
     assert 8 <= counted <= steps <= counted + 1  # before the first step nobody knows
     b.engine.stop()
+
+
+@pytest.mark.parametrize("lead_ns", [0, LEAD])
+@pytest.mark.parametrize("lost", ["the device", "the frame"])
+def test_what_stays_away_is_missed_once_a_cycle(lost: str, lead_ns: int) -> None:
+    b = running(lead_ns)
+    if lost == "the device":
+        b.segment.silent.add(0)
+    else:
+        b.segment.spoil = lambda back: []
+    b.steps(2)
+    assert b.axis_flags[0] & AXIS_FOLLOWED  # two in a row, of a limit of three: bridged
+    b.steps(1)
+    assert b.axis_flags[0] & (AXIS_FOLLOWED | AXIS_DROPPED) == AXIS_DROPPED
+    b.engine.stop()
+
+
+@pytest.mark.parametrize("delay", [MS // 10, MS - LEAD // 2], ids=["before", "within"])
+def test_inputs_are_those_of_the_cycle_whether_they_come_before_the_lead_or_within(
+    delay: int,
+) -> None:
+    seen = {}
+    for lead_ns in (0, LEAD):
+        b = running(lead_ns, mode=CST)
+        b.segment.delay = delay
+        b.steps(2)
+        positions = []
+        for k in range(CYCLES):
+            b.drives[0].position = 10 * k * k
+            b.drives[0].velocity = k
+            b.steps(1)
+            positions.append((b.actual_position[0], b.actual_velocity[0], b.statusword[0]))
+        assert b.engine.counters["lost"] == 0
+        seen[lead_ns] = positions
+        b.engine.stop()
+    assert len(set(seen[0])) == CYCLES
+    assert seen[LEAD] == seen[0]

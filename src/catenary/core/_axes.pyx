@@ -55,7 +55,7 @@ MUTE_NS = 1_000_000_000                # without bit 12: longer than a brake tak
 
 # ---- inputs
 
-cdef void read_position(axis_t *a, const uint8_t *inputs, double elapsed) noexcept nogil:
+cdef inline void read_position(axis_t *a, const uint8_t *inputs, double elapsed) noexcept nogil:
     """`elapsed` [s]: since it was read last."""
     cdef number_t *n = &a.actual_position
     cdef uint64_t raw
@@ -67,15 +67,14 @@ cdef void read_position(axis_t *a, const uint8_t *inputs, double elapsed) noexce
         if not a.known:
             a.counts = number_integer(n, inputs)
         else:  # the shorter way round
-            a.counts += (<int64_t>((raw - a.last_raw) << (64 - n.bits))) >> (64 - n.bits)
+            a.counts += (<int64_t>((raw - a.last_raw) << n.right)) >> n.right
         a.last_raw = raw
-        a.position = a.counts * n.scale + n.offset
+        a.position = <double>a.counts * n.scale + n.offset
     if not a.actual_velocity.present:
         a.velocity = (a.position - before) / elapsed if a.known else 0.0
 
 
-cdef void read_axis(axes_t *x, axis_t *a, int64_t instant) noexcept nogil:
-    cdef const uint8_t *inputs = x.image.inputs
+cdef inline void read_axis(axes_t *x, axis_t *a, const uint8_t *inputs, int64_t instant) noexcept nogil:
     a.status = <uint16_t>number_bits(&a.statusword, inputs)
     a.state = cia402_state(a.status)
     a.mode_shown = a.mode
@@ -109,47 +108,52 @@ cdef void read_columns(const axes_t *x, actual_t *out) noexcept nogil:
             out.input_bits[c.rank] = number_bits(&c.number, x.image.inputs) != 0
 
 
-cdef inline void tell_axis(const axis_t *a, actual_t *out, uint32_t i) noexcept nogil:
-    """What was sent last."""
-    out.controlword[i] = a.controlword_sent
-    out.commanded_position[i] = a.commanded_position
-    out.commanded_velocity[i] = a.commanded_velocity
-    out.commanded_torque[i] = a.commanded_torque
-
-
 cdef void axes_read(axes_t *x, actual_t *out, uint64_t number, int64_t instant) noexcept nogil:
-    """After collect of cycle `number`, whose instant is `instant` [ns]: the input image → actual values."""
+    """After collect of cycle `number`, whose instant is `instant` [ns]: the input image → the actual
+    values that a law computes with. `axes_tell` follows, when there is time."""
+    cdef const uint8_t *inputs = x.image.inputs
     cdef axis_t *a
     cdef uint32_t i
     cdef uint8_t before
-    x.moving = 0
     for i in range(x.axis_count):
         a = &x.axes[i]
         before = a.state
         if x.image.unit_fresh[a.unit]:
-            read_axis(x, a, instant)
+            read_axis(x, a, inputs, instant)
         a.invalid_in_row = x.image.unit_missed[a.unit]
         guard_observe(x, a, before, number)
-        if not a.lost and (a.state == OPERATION_ENABLED or a.state == QUICK_STOP_ACTIVE
-                           or a.state == FAULT_REACTION_ACTIVE):
-            x.moving += 1
         out.position[i] = a.position
         out.velocity[i] = a.velocity
         out.torque[i] = a.torque
-        tell_axis(a, out, i)
+        out.enabled[i] = a.followed
+    read_columns(x, out)
+
+
+cdef void axes_tell(axes_t *x, actual_t *out) noexcept nogil:
+    """Beside the values of `axes_read`: how the axes stand, and what was sent to them last."""
+    cdef const axis_t *a
+    cdef uint32_t i
+    x.moving = 0
+    for i in range(x.axis_count):
+        a = &x.axes[i]
+        if not a.lost and (a.state == OPERATION_ENABLED or a.state == QUICK_STOP_ACTIVE
+                           or a.state == FAULT_REACTION_ACTIVE):
+            x.moving += 1
+        out.commanded_position[i] = a.commanded_position
+        out.commanded_velocity[i] = a.commanded_velocity
+        out.commanded_torque[i] = a.commanded_torque
         out.followed_since[i] = a.followed_since
         out.statusword[i] = a.status
+        out.controlword[i] = a.controlword_sent
         out.mode[i] = a.mode_shown
         out.state[i] = a.state
         out.enabled[i] = a.followed
         out.flags[i] = a.flags | (FOLLOWED if a.followed else 0) | (a.goal << GOAL_SHIFT)
-    read_columns(x, out)
 
 
 # ---- outputs
 
-cdef void write_axis(axes_t *x, axis_t *a, uint16_t controlword) noexcept nogil:
-    cdef uint8_t *outputs = x.image.outputs
+cdef inline void write_axis(axis_t *a, uint8_t *outputs, uint16_t controlword) noexcept nogil:
     cdef bint cut = False
     a.controlword_sent = controlword
     number_put_bits(&a.controlword, outputs, controlword)
@@ -210,7 +214,7 @@ cdef void axes_write(axes_t *x, const target_t *target, bint fresh) noexcept nog
         a = &x.axes[i]
         guard_setpoints(x, a, target, i, fresh)
         controlword = guard_controlword(x, a, target.controlword_bits[i])
-        write_axis(x, a, controlword)
+        write_axis(a, x.image.outputs, controlword)
         if a.flags & LIMITED:
             x.limited = 1
         if a.flags & REFUSED:
@@ -230,15 +234,15 @@ cdef void axes_rehearse(const axes_t *x, const target_t *target) noexcept nogil:
     axes_write(shadow, target, True)
 
 
-cdef void axes_tell(const axes_t *x, actual_t *out) noexcept nogil:
-    """What was commanded by the last write, where the values of `axes_read` are already there."""
-    cdef uint32_t i
-    for i in range(x.axis_count):
-        tell_axis(&x.axes[i], out, i)
+cdef inline void hold_target(target_t *target, uint32_t i, double position) noexcept nogil:
+    target.position[i] = position
+    target.velocity[i] = 0.0
+    target.torque[i] = 0.0
 
 
 cdef void axes_follow(const axes_t *x, const actual_t *actual, target_t *target) noexcept nogil:
-    """Targets of axes that are not followed: the actual position, no velocity, no torque.
+    """Targets of axes that are not followed: the actual position, no velocity, no torque. From what
+    was told: the application's axes are those of the cycle it has seen.
 
     An axis that has become followed since the last commit starts from what it is commanded: what
     was written before cannot have been meant for it. Its torque stays: it is what the axis was
@@ -247,12 +251,23 @@ cdef void axes_follow(const axes_t *x, const actual_t *actual, target_t *target)
     cdef uint32_t i
     for i in range(x.axis_count):
         if not actual.flags[i] & FOLLOWED:
-            target.position[i] = actual.position[i]
-            target.velocity[i] = 0.0
-            target.torque[i] = 0.0
+            hold_target(target, i, actual.position[i])
         elif actual.followed_since[i] > target.header.seen:
             target.position[i] = actual.commanded_position[i]
             target.velocity[i] = actual.commanded_velocity[i]
+
+
+cdef void axes_follow_now(const axes_t *x, target_t *target) noexcept nogil:
+    """The same for the targets of a law, from how the axes stand now."""
+    cdef const axis_t *a
+    cdef uint32_t i
+    for i in range(x.axis_count):
+        a = &x.axes[i]
+        if not a.followed:
+            hold_target(target, i, a.position)
+        elif a.followed_since > target.header.seen:
+            target.position[i] = a.commanded_position
+            target.velocity[i] = a.commanded_velocity
 
 
 # ---- the edge

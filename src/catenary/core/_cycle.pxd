@@ -98,6 +98,7 @@ cdef struct cycle_t:
     uint32_t dries
     uint32_t dry               # the stream had no row for the last set-points
     int missing
+    bint taken                 # the inputs of the cycle to come are there since the lead
     uint64_t lost
     uint64_t late
     uint64_t uncommitted

@@ -20,7 +20,7 @@ from libc.errno cimport EINTR
 from libc.stdint cimport int32_t, int64_t, uint8_t, uint32_t, uint64_t
 from libc.string cimport memcpy, memset
 
-from catenary.core._axes cimport axes_follow, axes_read, axes_rehearse, axes_tell, axes_write
+from catenary.core._axes cimport axes_follow_now, axes_read, axes_rehearse, axes_tell, axes_write
 from catenary.core._clocks cimport clock_close
 from catenary.core._handover cimport (
     BEFORE_LAW,
@@ -43,6 +43,7 @@ from catenary.core._law cimport (
     law_rehearse,
     law_run,
     law_t,
+    law_tell,
     law_took,
 )
 from catenary.core._native cimport cat_add32, cat_load_acquire32
@@ -159,15 +160,26 @@ cdef void cycle_await_lane(cycle_t *c, int64_t until) noexcept nogil:
         c.image.drain(c.image.self)
 
 
+cdef inline void take_early(cycle_t *c, actual_t *actual) noexcept nogil:
+    """The inputs of the cycle that is to come, if all of its frames are back."""
+    if c.taken or c.image.collect(c.image.self, 0) != 0:
+        return
+    c.missing = 0
+    axes_read(c.axes, actual, c.number + 1, c.next)
+    c.taken = 1
+
+
 cdef void cycle_prepare(cycle_t *c) noexcept nogil:
-    """In the lead: takes the frames that have come back, so that only late ones are left for the
+    """In the lead: takes the inputs that have come back, so that only late ones are left for the
     instant, and, where there is time, goes the way of the cycle once without effect: a step of the
     law on scratch, its targets to outputs that are not sent. Then all of it is in the caches."""
     cdef target_t *scratch = &c.handover.target[BEFORE_LAW]
     cdef target_t *target = &c.handover.target[OF_LAW if c.law != NULL else PRIVATE]
-    cdef actual_t *actual = &c.handover.actual[c.handover.actual_triple.back]
+    cdef actual_t *actual = &c.handover.actual[PRIVATE]
     cdef int64_t left
-    c.image.collect(c.image.self, 0)
+    if c.law != NULL:
+        actual = &c.handover.actual[c.handover.actual_triple.back]
+    take_early(c, actual)
     left = c.next - now(c)
     if 3 * left < c.lead:
         return
@@ -178,7 +190,7 @@ cdef void cycle_prepare(cycle_t *c) noexcept nogil:
     c.records[(c.number + 1) & c.records_mask].wake_ns = 0  # fetched
     if c.image.rehearse != NULL:
         c.image.rehearse(c.image.self)
-    c.image.collect(c.image.self, 0)
+    take_early(c, actual)
 
 
 cdef void cycle_open(cycle_t *c) noexcept nogil:
@@ -220,8 +232,10 @@ cdef void begin(cycle_t *c, int64_t wake) noexcept nogil:
 cdef void collect(cycle_t *c, actual_t *actual, int64_t deadline) noexcept nogil:
     """The compiled half after the wire: frames → images → actual values."""
     cdef int rc = c.image.collect(c.image.self, deadline)
-    c.missing = rc if rc >= 0 else -1
-    axes_read(c.axes, actual, c.number, c.scheduled)
+    if not c.taken:
+        c.missing = rc if rc >= 0 else -1
+        axes_read(c.axes, actual, c.number, c.scheduled)
+    c.taken = 0
     if c.clock != NULL:
         c.next += clock_close(c.clock)
         if c.clock.changes != c.clock.acknowledged:
@@ -380,6 +394,7 @@ cdef void cycle_threaded(cycle_t *c) noexcept nogil:
         c.flags |= UNCOMMITTED
         c.uncommitted += 1
     collect(c, actual, c.wake + c.collect_deadline)
+    axes_tell(c.axes, actual)
     close_header(c, actual)
     handover_publish(c.handover)
     published = now(c)
@@ -450,7 +465,7 @@ cdef bint step_law(cycle_t *c, actual_t *actual, target_t *target, int64_t usabl
     """One step of the law. False: what it left in the targets must not be sent."""
     cdef law_t *law = c.law
     cdef bint goes_on
-    axes_follow(c.axes, actual, target)
+    axes_follow_now(c.axes, target)
     take_streamed(c, target, False)
     target.header.hold = 0
     target.header.seen = c.number  # the law has read them: a streamed row passes through its hands
@@ -492,6 +507,8 @@ cdef void cycle_law(cycle_t *c) noexcept nogil:
     emit(c, target, fresh)
     sent = now(c)
     record.send_ns = short_ns(sent - done)
+    if c.law != NULL:
+        law_tell(c.law)
     axes_tell(c.axes, actual)
     close_header(c, actual)
     handover_publish(c.handover)
@@ -502,6 +519,7 @@ cdef void cycle_law(cycle_t *c) noexcept nogil:
 cdef void cycle_inputs(cycle_t *c, actual_t *actual) noexcept nogil:
     """inline, after the wait."""
     collect(c, actual, 0)
+    axes_tell(c.axes, actual)
     close_header(c, actual)
 
 

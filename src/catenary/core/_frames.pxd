@@ -21,7 +21,7 @@ cdef struct copy_t:
 cdef struct datagram_t:
     uint8_t kind
     uint8_t command
-    uint8_t address_moves      # devices count the position up: ADP is not compared
+    uint64_t header_mask       # of its first eight bytes: what a return has as it was sent
     uint16_t length            # of the data
     uint16_t expected_counter
     uint16_t counter           # of the last return
@@ -44,6 +44,7 @@ cdef struct frame_t:
     uint8_t index
     uint8_t needed             # its loss makes the cycle bad
     uint8_t back
+    uint8_t noted              # its counters, AL states and clocks were taken
     uint8_t template[1536]
     uint8_t returned[1536]
 
@@ -75,12 +76,20 @@ cdef struct frames_t:
     uint32_t *unit_missed
     uint32_t *unit_frame       # one of those that carry it: all are due together
     uint16_t *unit_counter
+    uint16_t *unit_expected    # the sum of its datagrams' counters
     uint8_t al_status
     uint16_t al_counter
+    uint8_t al_seen            # since the last emit, and
+    uint16_t al_answered
     int64_t frame_stamp
     uint32_t next_index
     uint32_t serial            # of the emit
     uint32_t missing
+    uint8_t all_due            # every frame goes out in every cycle
+    uint8_t settled            # the units say already that the last cycle was whole and right
+    uint8_t wrong              # a counter that is back, since the last emit
+    uint8_t judged             # once since the last emit, and
+    uint8_t collected          # with all frames back: nothing more can come
     uint8_t ok                 # every needed unit that was due valid, every needed frame back
     uint8_t whole              # every needed unit valid
     uint8_t frame_of_index[128]

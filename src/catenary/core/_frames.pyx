@@ -34,7 +34,6 @@ cdef enum:
     DATAGRAMS = 16
     HEADER = 10                # of a datagram
     COUNTER = 2
-    LENGTH_AND_MORE = 0x87FF   # of its length word: not the circulating bit, not the reserved ones
     CYCLE_INDICES = 0x80
     DRAIN_MAX = 256            # frames looked at in one collect: a flood cannot hold the cycle up
     EVERY_MAX = 10000
@@ -53,6 +52,12 @@ RECEIVE_MODES = {"look": LOOK, "wait": WAIT, "spin": SPIN}
 
 cdef inline uint16_t word_at(const uint8_t *bytes) noexcept nogil:
     return <uint16_t>(bytes[0] | (bytes[1] << 8))
+
+
+cdef inline uint64_t eight_at(const uint8_t *bytes) noexcept nogil:
+    cdef uint64_t word
+    memcpy(&word, bytes, 8)
+    return word
 
 
 cdef inline uint16_t counter_of(const datagram_t *d, const uint8_t *frame) noexcept nogil:
@@ -85,9 +90,15 @@ cdef int frames_emit(void *self) noexcept nogil:
     if f.clock != NULL:  # its datagrams are in the frame that goes first
         clock_emit(f.clock, f.link.now(f.link.self))
     f.missing = 0
+    f.wrong = 0
+    f.judged = 0
+    f.collected = 0
+    f.al_seen = 0
+    f.al_answered = 0
     for i in range(f.frame_count):
         frame = &f.frames[i]
         frame.back = 0
+        frame.noted = 0
         frame.due = frame.every == 1 or f.serial % frame.every == frame.phase
         if not frame.due:
             continue
@@ -116,38 +127,30 @@ cdef void frames_rehearse(void *self) noexcept nogil:
 
 # ---- collect
 
-cdef bint is_ours(const frame_t *frame, const uint8_t *bytes) noexcept nogil:
-    """Same source, but for the bit that controllers set."""
-    if (bytes[SOURCE] | SOURCE_PROCESSED) != (frame.template[SOURCE] | SOURCE_PROCESSED):
-        return False
-    return memcmp(bytes + SOURCE + 1, frame.template + SOURCE + 1, 5) == 0
+cdef inline bint is_ours(const uint8_t *ours, const uint8_t *bytes) noexcept nogil:
+    """Same source, but for the bit that controllers set, and EtherType: bytes 6 to 13 of a frame."""
+    return ((eight_at(bytes + SOURCE) ^ eight_at(ours + SOURCE)) & ~<uint64_t>SOURCE_PROCESSED) == 0
 
 
-cdef bint is_shaped(const frames_t *f, const frame_t *frame, const uint8_t *bytes,
-                    uint32_t length) noexcept nogil:
+cdef inline bint is_shaped(const frames_t *f, const frame_t *frame, const uint8_t *bytes,
+                           uint32_t length) noexcept nogil:
     """The template's datagrams, with the index of the frame. Those of the clocks are addressed to
     another device each cycle: a late frame is stale, not corrupt."""
     cdef const datagram_t *d
-    cdef const uint8_t *sent
-    cdef const uint8_t *back
+    cdef const datagram_t *end
     cdef uint8_t index = bytes[DATAGRAMS + 1]
-    cdef uint32_t k
     if length < frame.used or word_at(bytes + ETHERCAT_HEADER) != word_at(
         frame.template + ETHERCAT_HEADER
     ):
         return False
-    for k in range(frame.first_datagram, frame.first_datagram + frame.datagram_count):
-        d = &f.datagrams[k]
-        sent = frame.template + d.offset
-        back = bytes + d.offset
-        if back[0] != d.command or back[1] != index:
+    d = &f.datagrams[frame.first_datagram]
+    end = d + frame.datagram_count
+    while d < end:
+        if bytes[d.offset + 1] != index:
             return False
-        if not d.address_moves and word_at(back + 2) != word_at(sent + 2):
+        if (eight_at(bytes + d.offset) ^ eight_at(frame.template + d.offset)) & d.header_mask:
             return False
-        if d.kind != CLOCK and word_at(back + 4) != word_at(sent + 4):
-            return False
-        if (word_at(back + 6) & LENGTH_AND_MORE) != (word_at(sent + 6) & LENGTH_AND_MORE):
-            return False
+        d += 1
     return True
 
 
@@ -162,23 +165,26 @@ cdef bint is_untouched(const frames_t *f, const frame_t *frame, const uint8_t *b
     return True
 
 
+cdef inline int64_t stamp_of(frames_t *f) noexcept nogil:
+    """When what is being taken was seen."""
+    if f.frame_stamp == 0:
+        f.frame_stamp = f.link.now(f.link.self)
+    return f.frame_stamp
+
+
 cdef void take(frames_t *f, const uint8_t *bytes, uint32_t length) noexcept nogil:
     """One received frame: the cycle's, the lane's, or counted by kind and forgotten."""
     cdef frame_t *frame
     cdef uint8_t index
-    cdef uint32_t k
-    if length < ETHERCAT_HEADER or bytes[ETHERTYPE] != 0x88 or bytes[ETHERTYPE + 1] != 0xA4:
+    if length < ETHERCAT_HEADER or not is_ours(f.frames[0].template, bytes):
         f.counters.alien += 1
         return
     if length < DATAGRAMS + HEADER + COUNTER or length > CAT_FRAME_MAX:
         f.counters.corrupt += 1
         return
-    if not is_ours(&f.frames[0], bytes):
-        f.counters.alien += 1
-        return
     index = bytes[DATAGRAMS + 1]
     if index >= CYCLE_INDICES:
-        lane_received(f.lane, bytes, length, f.frame_stamp)
+        lane_received(f.lane, bytes, length, stamp_of(f))
         return
     if f.serial_of_index[index] == 0:
         f.counters.alien += 1
@@ -196,8 +202,6 @@ cdef void take(frames_t *f, const uint8_t *bytes, uint32_t length) noexcept nogi
         frame.back = 1
         f.missing -= 1
         memcpy(frame.returned, bytes, frame.used)
-        for k in range(frame.first_datagram, frame.first_datagram + frame.datagram_count):
-            f.datagrams[k].counter = counter_of(&f.datagrams[k], bytes)
 
 
 cdef int drain(frames_t *f, int budget) noexcept nogil:
@@ -238,26 +242,73 @@ cdef int await_frames(frames_t *f, int64_t deadline, int budget) noexcept nogil:
     return 0
 
 
+cdef void note(frames_t *f, frame_t *frame) noexcept nogil:
+    """The working counters of a frame that is back; what AL states and clocks say beside their data."""
+    cdef datagram_t *d = &f.datagrams[frame.first_datagram]
+    cdef const datagram_t *end = d + frame.datagram_count
+    while d < end:
+        d.counter = counter_of(d, frame.returned)
+        if d.counter != d.expected_counter:
+            f.wrong = 1
+        if d.kind == AL_STATUS:
+            if d.counter > 0:
+                f.al_answered += d.counter
+                f.al_seen |= frame.returned[d.offset + HEADER] & 0x1F
+        elif d.kind == CLOCK and f.clock != NULL:
+            clock_take(f.clock, d.command, frame.returned + d.offset + HEADER, d.counter)
+        d += 1
+    frame.noted = 1
+
+
+cdef inline bint are_good(const frames_t *f, const datagram_t *d) noexcept nogil:
+    """The inputs of a datagram, where not all are: those of a unit count together."""
+    if not f.frames[d.frame].back:
+        return False
+    if d.unit >= 0:
+        return f.unit_valid[d.unit] != 0
+    return d.counter == d.expected_counter
+
+
+cdef inline void copy_inputs(frames_t *f, const datagram_t *d) noexcept nogil:
+    cdef const uint8_t *returned = f.frames[d.frame].returned
+    cdef const copy_t *copy = &f.copies[d.first_input]
+    cdef const copy_t *end = copy + d.input_count
+    while copy < end:
+        memcpy(f.inputs + copy.image_offset, returned + copy.frame_offset, copy.size)
+        copy += 1
+
+
+cdef void settle(frames_t *f) noexcept nogil:
+    """Every unit: valid, now."""
+    cdef uint32_t unit
+    for unit in range(f.image.unit_count):
+        f.unit_valid[unit] = 1
+        f.unit_fresh[unit] = 1
+        f.unit_missed[unit] = 0
+        f.unit_counter[unit] = f.unit_expected[unit]
+    f.ok = 1
+    f.whole = 1
+    f.settled = 1
+
+
 cdef inline void judge_unit(frames_t *f, uint32_t unit) noexcept nogil:
     """A unit that was due."""
     if f.unit_valid[unit]:
         f.unit_missed[unit] = 0
         return
     f.unit_fresh[unit] = 0
-    if f.unit_missed[unit] < MISSED_MAX:
+    if not f.judged and f.unit_missed[unit] < MISSED_MAX:
         f.unit_missed[unit] += 1
     if not f.unit_optional[unit]:
         f.ok = 0
 
 
 cdef void judge_units(frames_t *f) noexcept nogil:
-    """Which sync units are valid; copies their inputs; AL status; whether the cycle was good."""
-    cdef datagram_t *d
-    cdef copy_t *copy
-    cdef uint32_t k, m, unit
-    cdef uint8_t al = 0
-    cdef uint16_t al_counter = 0
-    cdef bint good
+    """Which sync units are valid, and whether the cycle was good, where something was not due, not
+    back or not right."""
+    cdef const datagram_t *d
+    cdef uint32_t k, unit
+    f.settled = 0
     f.ok = 1
     f.whole = 1
     for unit in range(f.image.unit_count):
@@ -270,54 +321,61 @@ cdef void judge_units(frames_t *f) noexcept nogil:
             f.ok = 0
     for k in range(f.datagram_count):
         d = &f.datagrams[k]
-        if not f.frames[d.frame].due:
+        if d.unit < 0 or not f.frames[d.frame].due:
             continue
-        good = f.frames[d.frame].back and d.counter == d.expected_counter
-        if d.unit >= 0:
-            if f.frames[d.frame].back:
-                f.unit_counter[d.unit] += d.counter
-            if not good:
-                f.unit_valid[d.unit] = 0
-        if d.kind == AL_STATUS and f.frames[d.frame].back and d.counter > 0:
-            al_counter += d.counter
-            al |= f.frames[d.frame].returned[d.offset + HEADER] & 0x1F
-        if d.kind == CLOCK and f.clock != NULL and f.frames[d.frame].back:
-            clock_take(f.clock, d.command, f.frames[d.frame].returned + d.offset + HEADER, d.counter)
-    f.al_counter = al_counter
-    if al_counter > 0:
-        f.al_status = al
+        if f.frames[d.frame].back:
+            f.unit_counter[d.unit] += d.counter
+        if not f.frames[d.frame].back or d.counter != d.expected_counter:
+            f.unit_valid[d.unit] = 0
     for unit in range(f.image.unit_count):
         if f.unit_fresh[unit]:
             judge_unit(f, unit)
         if not f.unit_valid[unit] and not f.unit_optional[unit]:
             f.whole = 0
-    for k in range(f.datagram_count):
-        d = &f.datagrams[k]
-        if d.input_count == 0 or not f.frames[d.frame].back:
-            continue
-        if d.unit >= 0:
-            if not f.unit_valid[d.unit]:
-                continue
-        elif d.counter != d.expected_counter:
-            continue
-        for m in range(d.first_input, d.first_input + d.input_count):
-            copy = &f.copies[m]
-            memcpy(f.inputs + copy.image_offset,
-                   f.frames[d.frame].returned + copy.frame_offset, copy.size)
+
+
+cdef void judge(frames_t *f) noexcept nogil:
+    """What has come back: counters, valid units, their inputs."""
+    cdef frame_t *frame = f.frames
+    cdef const frame_t *last = frame + f.frame_count
+    cdef const datagram_t *d = f.datagrams
+    cdef const datagram_t *end = d + f.datagram_count
+    cdef bint right
+    while frame < last:
+        if frame.back and not frame.noted:
+            note(f, frame)
+        frame += 1
+    f.al_counter = f.al_answered
+    if f.al_counter > 0:
+        f.al_status = f.al_seen
+    right = f.all_due and f.missing == 0 and not f.wrong and f.serial != 0
+    if not right:
+        judge_units(f)
+    elif not f.settled:
+        settle(f)
+    f.judged = 1
+    f.collected = f.missing == 0
+    while d < end:
+        if d.input_count > 0 and (right or are_good(f, d)):
+            copy_inputs(f, d)
+        d += 1
 
 
 cdef void frames_drain(void *self) noexcept nogil:
+    (<frames_t *>self).frame_stamp = 0
     drain(<frames_t *>self, DRAIN_MAX)
 
 
 cdef int frames_collect(void *self, int64_t deadline) noexcept nogil:
     cdef frames_t *f = <frames_t *>self
     cdef int rc = 0, budget
-    f.frame_stamp = f.link.now(f.link.self)
+    f.frame_stamp = 0 if deadline == 0 else f.link.now(f.link.self)
     budget = drain(f, DRAIN_MAX)
+    if f.collected:
+        return 0
     if deadline != 0:
         rc = await_frames(f, deadline, budget)
-    judge_units(f)
+    judge(f)
     return rc if rc < 0 else <int>f.missing
 
 
@@ -368,9 +426,10 @@ cdef class Frames:
         self.c.unit_frame = <uint32_t *>calloc(len(units) + 1, sizeof(uint32_t))
         self.c.unit_optional = <uint8_t *>calloc(len(units) + 1, 1)
         self.c.unit_counter = <uint16_t *>calloc(len(units) + 1, sizeof(uint16_t))
+        self.c.unit_expected = <uint16_t *>calloc(len(units) + 1, sizeof(uint16_t))
         if not (self.c.outputs and self.c.inputs and self.c.unit_valid and self.c.unit_optional
-                and self.c.unit_counter and self.c.unit_fresh and self.c.unit_missed
-                and self.c.unit_frame):
+                and self.c.unit_counter and self.c.unit_expected and self.c.unit_fresh
+                and self.c.unit_missed and self.c.unit_frame):
             raise MemoryError
         for k, unit in enumerate(units):
             self.c.unit_optional[k] = 1 if unit.optional else 0
@@ -386,6 +445,7 @@ cdef class Frames:
         if not (self.c.frames and self.c.datagrams and self.c.copies):
             raise MemoryError
         self.c.frame_count = len(plan.frames)
+        self.c.all_due = all(frame.every == 1 for frame in plan.frames)
         copies = 0
         for number, frame in enumerate(plan.frames):
             self.make_frame(number, frame)
@@ -413,7 +473,7 @@ cdef class Frames:
         c.every = frame.every
         c.phase = frame.phase
         memcpy(c.template, <const uint8_t *>template, len(template))
-        check(is_ours(c, self.c.frames[0].template), f"frame {number}: another source than frame 0")
+        check(is_ours(self.c.frames[0].template, c.template), f"frame {number}: another source than frame 0")
 
     def make_datagram(self, uint32_t number, frame, plan, uint32_t copies):
         where = f"frame {number}, datagram at {plan.offset}"
@@ -436,9 +496,10 @@ cdef class Frames:
         check(plan.kind != AL_STATUS or plan.length >= 2, f"{where}: AL status has two bytes")
         if plan.sync_unit >= 0:
             self.place_unit(where, plan.sync_unit, number)
+            self.c.unit_expected[<uint32_t>plan.sync_unit] += <uint16_t>plan.expected_counter
         d.kind = plan.kind
         d.command = plan.command
-        d.address_moves = plan.command in ADDRESS_MOVES or plan.kind == CLOCK  # another each cycle
+        d.header_mask = int.from_bytes(self.kept(plan), "little")
         d.length = plan.length
         d.expected_counter = plan.expected_counter
         d.unit = plan.sync_unit
@@ -456,6 +517,13 @@ cdef class Frames:
             self.c.frames[number].needed = 1
         self.c.datagram_count += 1
         return copies
+
+    def kept(self, plan):
+        """Of the first eight bytes of a header, the bits that come back as they were sent: not the
+        index, nor the circulating bit and the reserved ones of the length word."""
+        adp = plan.command not in ADDRESS_MOVES and plan.kind != CLOCK  # another each cycle
+        ado = plan.kind != CLOCK
+        return bytes((0xFF, 0, *[0xFF * adp] * 2, *[0xFF * ado] * 2, 0xFF, 0x87))
 
     def place_unit(self, where, uint32_t unit, uint32_t number):
         """All frames of a unit are due in the same cycles."""
@@ -539,3 +607,4 @@ cdef class Frames:
         free(self.c.unit_frame)
         free(self.c.unit_optional)
         free(self.c.unit_counter)
+        free(self.c.unit_expected)

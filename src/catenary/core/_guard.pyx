@@ -34,8 +34,6 @@ from catenary.core._cia402 cimport (
 
 cdef enum:
     FOLLOWS_COMMAND = 0x1000   # statusword bit 12 in CSP, CSV, CST
-    MODE_BITS = 0x0270         # controlword bits 4, 5, 6, 9: the mode's, in OPERATION_ENABLED
-    FREE_BITS = 0xF800         # 11 to 15: the manufacturer's, always
 
 
 cdef inline double clamp(axis_t *a, double value, double low, double high) noexcept nogil:
@@ -123,15 +121,7 @@ cdef void guard_observe(axes_t *x, axis_t *a, uint8_t state_before,
         a.followed_since = number
 
 
-cdef void guard_mode(axis_t *a, int8_t mode) noexcept nogil:
-    """Takes the mode asked for over. Another one: what was written for the former counts no longer,
-    and the new one is not followed before the drive shows it."""
-    if mode != a.mode:
-        a.mode = mode
-        a.followed = 0
-
-
-cdef void guard_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nogil:
+cdef void guard_take_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nogil:
     """Takes a new request over; counts how long it has been waiting."""
     cdef uint8_t goal
     if t.request[i] != a.request:
@@ -161,7 +151,8 @@ cdef void guard_stop(axes_t *x) noexcept nogil:
         drop(x, &x.axes[i])
 
 
-cdef uint16_t guard_controlword(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil:
+cdef uint16_t guard_lead(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil:
+    """The controlword that leads an axis to its goal, or keeps it there."""
     cdef uint8_t goal = a.goal
     cdef uint16_t command
     if goal == ENABLED and not a.armed and quantity_of(a.mode) in (VELOCITY, TORQUE):

@@ -114,8 +114,12 @@ cdef bint law_run(law_t *law, const axes_t *axes, const actual_t *actual, target
     if rc == CAT_LAW_FINISHED:
         law_end(law, FINISHED, number)
         return False
-    give(&law.memory_out, law.numbers.memory)
     return True
+
+
+cdef void law_tell(law_t *law) noexcept nogil:
+    """Behind the outputs: the memory of a law that goes on, for the application."""
+    give(&law.memory_out, law.numbers.memory)
 
 
 cdef void law_rehearse(law_t *law, const actual_t *actual, target_t *scratch,

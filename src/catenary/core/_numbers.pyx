@@ -1,11 +1,69 @@
 # cython: cdivision=True
 """Numbers in a process image: checked here once, read and written by the inline code of the .pxd."""
 
-from libc.stdint cimport uint64_t
+from libc.math cimport isfinite, rint
+from libc.stdint cimport int64_t, uint8_t, uint32_t, uint64_t
+from libc.string cimport memcpy
 
 cdef double HIGHEST_SINGLE = 3.4028234663852886e38
 cdef double HIGHEST_DOUBLE = 1.7976931348623157e308
 
+
+# ---- the longer way
+
+cdef uint64_t number_bits_split(const number_t *n, const uint8_t *image) noexcept nogil:
+    cdef uint64_t word
+    memcpy(&word, image + n.byte, 8)
+    return (word >> n.shift | <uint64_t>image[n.byte + 8] << (64 - n.shift)) & n.mask
+
+
+cdef void number_put_bits_split(const number_t *n, uint8_t *image, uint64_t raw) noexcept nogil:
+    cdef uint64_t word
+    cdef uint8_t high_mask = <uint8_t>(n.mask >> (64 - n.shift))
+    raw &= n.mask
+    memcpy(&word, image + n.byte, 8)
+    word = (word & ~(n.mask << n.shift)) | (raw << n.shift)
+    memcpy(image + n.byte, &word, 8)
+    image[n.byte + 8] = (image[n.byte + 8] & ~high_mask) | <uint8_t>(raw >> (64 - n.shift))
+
+
+cdef double number_real(const number_t *n, const uint8_t *image) noexcept nogil:
+    """The raw value of a floating-point number."""
+    cdef uint64_t raw = number_bits(n, image)
+    cdef uint32_t raw32 = <uint32_t>raw
+    cdef float single
+    cdef double value
+    if n.bits == 32:
+        memcpy(&single, &raw32, 4)
+        return single
+    memcpy(&value, &raw, 8)
+    return value
+
+
+cdef bint number_put_other(const number_t *n, uint8_t *image, double raw) noexcept nogil:
+    """A floating-point number, or an integer that an int64 cannot hold; whether it had to be cut."""
+    cdef uint64_t bits
+    cdef uint32_t bits32
+    cdef float single
+    cdef double kept
+    if n.kind != REAL:
+        raw = rint(raw)
+    kept = n.low if raw < n.low else n.high if raw > n.high else raw
+    if n.kind == SIGNED:
+        bits = <uint64_t><int64_t>kept
+    elif n.kind == UNSIGNED:
+        bits = <uint64_t>kept
+    elif n.bits == 32:
+        single = <float>kept
+        memcpy(&bits32, &single, 4)
+        bits = bits32
+    else:
+        memcpy(&bits, &kept, 8)
+    number_put_bits(n, image, bits)
+    return kept != raw
+
+
+# ---- the edge
 
 cdef int make_number(number_t *n, object plan, object image_size, object where) except -1:
     """Fills `n` from a plan's Number; None: absent. ValueError names `where` and what is wrong."""
@@ -27,6 +85,9 @@ cdef int make_number(number_t *n, object plan, object image_size, object where) 
     n.bits = plan.bit_length
     n.byte = plan.bit_offset // 8
     n.shift = plan.bit_offset % 8
+    n.split = n.shift + n.bits > 64
+    n.left = 0 if n.split else 64 - n.shift - n.bits
+    n.right = 64 - n.bits
     n.mask = <uint64_t>((1 << plan.bit_length) - 1)
     n.scale = plan.scale
     n.offset = plan.offset
@@ -34,8 +95,16 @@ cdef int make_number(number_t *n, object plan, object image_size, object where) 
     n.low = -n.high if plan.kind == REAL else 0.0
     if plan.kind == SIGNED:
         n.low = -(2.0 ** (plan.bit_length - 1))
+    n.lowest, n.highest = whole_range(plan.kind, plan.bit_length)
     n.present = 1
     return 0
+
+
+def whole_range(kind, bits):
+    """The raw values of an integer, as far as an int64 holds them."""
+    if kind == SIGNED:
+        return -(1 << (bits - 1)), (1 << (bits - 1)) - 1
+    return 0, (1 << min(bits, 63)) - 1
 
 
 cdef double highest(int kind, int bits) except? -1:

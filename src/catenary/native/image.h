@@ -31,14 +31,15 @@ typedef struct cat_image {
     const uint8_t *whole;             /* one flag: every unit that is not optional is valid */
     const uint8_t *al_status;         /* one byte: OR of all AL states, bit 4: some device signals an error */
     const uint16_t *al_counter;       /* one value: devices that answered for it in the last collect */
-    const int64_t *frame_stamp;       /* one value: when the last cyclic frame was seen [ns]; 0: none */
+    const int64_t *frame_stamp;       /* one value: when a collect with a deadline saw its last frame [ns] */
 
     /* Sends the frames of this cycle. 0, or -errno of the first frame that could not go. */
     int (*emit)(void *self);
 
     /* Drains what has arrived and, until `deadline` [ns, link clock; 0: never waits], waits for
      * the rest of the frames of the last emit. Number of its frames still missing (0: all back),
-     * or -errno. */
+     * or -errno. It may be called again before the next emit: a unit is missed once an emit, and
+     * where all are back already nothing changes any more. */
     int (*collect)(void *self, int64_t deadline);
 
     /* Takes what has arrived, between two cycles: judges nothing, waits for nothing. */
