@@ -17,6 +17,10 @@ cdef enum:
     BANK_INTEGER = 1
     BANK_BIT = 2
 
+cdef struct put_t:             # a set-point, as it stands in the output image
+    double value               # NaN: not yet
+    uint8_t cut                # the type could not hold it
+
 cdef struct axis_t:
     # from the plan
     number_t controlword
@@ -68,7 +72,12 @@ cdef struct axis_t:
     uint32_t refused_cycles    # in a row, the target was not finite
     uint32_t beyond_cycles     # in a row, outside a position limit and leaving
     # sent
+    uint8_t written            # the output image has all of it
     uint16_t controlword_sent  # all of its bits
+    int8_t mode_sent
+    put_t put_position
+    put_t put_velocity
+    put_t put_torque
     double commanded_position
     double commanded_velocity
     double commanded_torque

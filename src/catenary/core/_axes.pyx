@@ -153,19 +153,30 @@ cdef void axes_tell(axes_t *x, actual_t *out) noexcept nogil:
 
 # ---- outputs
 
+cdef inline bint is_new(put_t *put, double value) noexcept nogil:
+    """Most set-points of most cycles stand in the image already: those of the other modes."""
+    if value == put.value:
+        return False
+    put.value = value
+    return True
+
+
 cdef inline void write_axis(axis_t *a, uint8_t *outputs, uint16_t controlword) noexcept nogil:
-    cdef bint cut = False
-    a.controlword_sent = controlword
-    number_put_bits(&a.controlword, outputs, controlword)
-    if a.mode_target.present:
-        number_put_bits(&a.mode_target, outputs, <uint64_t><int64_t>a.mode)
+    if controlword != a.controlword_sent or a.mode != a.mode_sent or not a.written:
+        a.written = 1
+        a.controlword_sent = controlword
+        a.mode_sent = a.mode
+        number_put_bits(&a.controlword, outputs, controlword)
+        if a.mode_target.present:
+            number_put_bits(&a.mode_target, outputs, <uint64_t><int64_t>a.mode)
     if a.target_position.present and a.known:
-        cut |= number_put_wrapped(&a.target_position, outputs, a.commanded_position)
-    if a.target_velocity.present:
-        cut |= number_put_value(&a.target_velocity, outputs, a.commanded_velocity)
-    if a.target_torque.present:
-        cut |= number_put_value(&a.target_torque, outputs, a.commanded_torque)
-    if cut:
+        if is_new(&a.put_position, a.commanded_position):
+            a.put_position.cut = number_put_wrapped(&a.target_position, outputs, a.commanded_position)
+    if a.target_velocity.present and is_new(&a.put_velocity, a.commanded_velocity):
+        a.put_velocity.cut = number_put_value(&a.target_velocity, outputs, a.commanded_velocity)
+    if a.target_torque.present and is_new(&a.put_torque, a.commanded_torque):
+        a.put_torque.cut = number_put_value(&a.target_torque, outputs, a.commanded_torque)
+    if a.put_position.cut or a.put_velocity.cut or a.put_torque.cut:
         a.flags |= LIMITED
 
 
@@ -353,6 +364,7 @@ cdef class Axes:
         a.mode = plan.mode
         a.mode_shown = 0
         a.position = a.velocity = a.torque = NAN
+        a.put_position.value = a.put_velocity.value = a.put_torque.value = NAN
         self.c.axis_count += 1
 
     def make_limits(self, plan, name):
