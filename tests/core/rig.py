@@ -112,9 +112,13 @@ class TickingLink(ScriptedLink):
     def __init__(self, answer: Callable[[bytes], Sequence[tuple[int, bytes]]]) -> None:
         super().__init__(answer)
         self.rehearsals: list[int] = []  # how many frames were sent before each
+        self.on_rehearsal: Callable[[int], None] | None = None  # instead of noting it
         self.table.flags = REHEARSES
         self.table.now = NOW(self.tick)
-        self.table.rehearse = REHEARSE(lambda _: self.rehearsals.append(len(self.sent)))
+        self.table.rehearse = REHEARSE(self.rehearse)
+
+    def rehearse(self, _) -> None:
+        (self.on_rehearsal or self.rehearsals.append)(len(self.sent))
 
     def tick(self, _) -> int:
         self.time += TICK

@@ -18,6 +18,7 @@ from catenary.core._cia402 import (
 )
 from catenary.core._clocks import Clock, PhaseController
 from catenary.core._cycle import (
+    CYCLE_AHEAD,
     CYCLE_CLOCKS,
     CYCLE_DROPPED,
     CYCLE_DRY,
@@ -54,6 +55,7 @@ __all__ = [
     "AXIS_FOLLOWED",
     "AXIS_LIMITED",
     "AXIS_REFUSED",
+    "CYCLE_AHEAD",
     "CYCLE_CLOCKS",
     "CYCLE_DROPPED",
     "CYCLE_DRY",

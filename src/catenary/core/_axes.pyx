@@ -24,6 +24,7 @@ from catenary.core._guard cimport (
     guard_request,
     guard_setpoints,
     guard_stop,
+    guard_take_request,
 )
 from catenary.core._native cimport cat_load_acquire32
 from catenary.core._numbers cimport REAL as REAL_KIND
@@ -231,6 +232,24 @@ cdef void axes_write(axes_t *x, const target_t *target, bint fresh) noexcept nog
         if a.flags & REFUSED:
             x.refused = 1
     write_columns(x, target)
+
+
+cdef void axes_hear(axes_t *x, const target_t *target) noexcept nogil:
+    """Behind a write that was made ahead of its instant: goals and stops that were asked for since."""
+    cdef uint32_t i, asked = cat_load_acquire32(&x.stop_asked)
+    cdef bint heard = asked != x.stop_seen
+    for i in range(x.axis_count):
+        if target.request[i] != x.axes[i].request:
+            guard_take_request(x, &x.axes[i], target, i)
+            heard = True
+    if asked != x.stop_seen:
+        x.stop_seen = asked
+        guard_stop(x)
+    if not heard:
+        return
+    for i in range(x.axis_count):
+        write_axis(&x.axes[i], x.image.outputs,
+                   guard_controlword(x, &x.axes[i], target.controlword_bits[i]))
 
 
 cdef void axes_rehearse(const axes_t *x, const target_t *target) noexcept nogil:

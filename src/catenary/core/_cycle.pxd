@@ -23,6 +23,7 @@ cdef enum:  # flags of a cycle
     LAW_FAILED = 1024
     DRY = 2048
     CLOCKS = 4096
+    AHEAD = 8192
 
 cdef enum:
     THREADED = 0
@@ -98,7 +99,9 @@ cdef struct cycle_t:
     uint32_t dries
     uint32_t dry               # the stream had no row for the last set-points
     int missing
-    bint taken                 # the inputs of the cycle to come are there since the lead
+    bint taken                 # the inputs of the cycle to come are there since the lead, and
+    bint ahead                 # its law has computed, its outputs stand in the image
+    uint32_t law_flags         # what the step of the law had to say of its cycle
     uint64_t lost
     uint64_t late
     uint64_t uncommitted

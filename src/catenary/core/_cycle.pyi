@@ -12,6 +12,7 @@ CYCLE_REFUSED: Final[int]  # some target was NaN or infinite: the axis held inst
 CYCLE_UNCOMMITTED: Final[int]  # threaded: no new targets were there at this instant
 CYCLE_LAW_DONE: Final[int]  # the law returned "finished"
 CYCLE_LAW_FAILED: Final[int]  # the law failed: the drives stop
+CYCLE_AHEAD: Final[int]  # the law computed in the lead: at the instant only the frames were left to go
 CYCLE_CLOCKS: Final[int]  # the clocks have come together or apart since `Clock.changes` was read
 CYCLE_DRY: Final[int]  # the stream of set-points has run dry: the axes hold
 CYCLE_STOPPED: Final[int]  # the native thread has ended (stop, or an error of the link)

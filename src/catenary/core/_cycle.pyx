@@ -4,6 +4,7 @@
     threaded   wait, emit, collect by a deadline, publish               in the native thread
     inline     wait, collect, [Python], emit                            in Python's thread
     law        wait, collect, law, emit, publish                        in the native thread
+      ahead    [lead: collect, law], wait, emit, publish                where all frames are back by then
 
 A law may be asked for while another order runs: its cycles take the law's order until it ends.
 
@@ -11,7 +12,7 @@ In virtual time all three run in the caller's thread. Instants are origin + k·p
 skipped and counted, never made up for by a burst.
 
 Phases. receive: wait returned → inputs usable (threaded: last frame seen → inputs published).
-process: the application's body. send: its end → the last cyclic send returned (threaded: wake →).
+process: the application's body, ahead of the instant where its cycle is marked so. send: its end → the last cyclic send returned (threaded: wake →).
 in_controller: their sum. tail: what remains before the next wait. round_trip: sent → last frame seen
 (threaded only: the others look at the next instant). Budget: 1 us for three drives, without the link.
 """
@@ -20,14 +21,20 @@ from libc.errno cimport EINTR
 from libc.stdint cimport int32_t, int64_t, uint8_t, uint32_t, uint64_t
 from libc.string cimport memcpy, memset
 
-from catenary.core._axes cimport axes_follow_now, axes_read, axes_rehearse, axes_tell, axes_write
+from catenary.core._axes cimport (
+    axes_follow_now,
+    axes_hear,
+    axes_read,
+    axes_rehearse,
+    axes_tell,
+    axes_write,
+)
 from catenary.core._clocks cimport clock_close
 from catenary.core._handover cimport (
     BEFORE_LAW,
     OF_LAW,
     PRIVATE,
     actual_header_t,
-    counts_t,
     handover_latch,
     handover_publish,
     handover_wake,
@@ -60,6 +67,7 @@ CYCLE_LAW_DONE = LAW_DONE
 CYCLE_LAW_FAILED = LAW_FAILED
 CYCLE_DRY = DRY
 CYCLE_CLOCKS = CLOCKS
+CYCLE_AHEAD = AHEAD
 CYCLE_STOPPED = STOPPED
 CYCLE_NONE = NONE
 
@@ -93,6 +101,10 @@ RECORD_FIELDS = [
     ("al_status", "u1"),
     ("reserved", "3u1"),
 ]
+
+
+cdef enum:
+    AHEAD_MARGIN = 2           # a law that may take so many times as long as it took last
 
 
 cdef inline int64_t now(const cycle_t *c) noexcept nogil:
@@ -170,11 +182,9 @@ cdef inline void take_early(cycle_t *c, actual_t *actual) noexcept nogil:
 
 
 cdef void cycle_prepare(cycle_t *c) noexcept nogil:
-    """In the lead: takes the inputs that have come back, so that only late ones are left for the
-    instant, and, where there is time, goes the way of the cycle once without effect: a step of the
-    law on scratch, its targets to outputs that are not sent. Then all of it is in the caches."""
-    cdef target_t *scratch = &c.handover.target[BEFORE_LAW]
-    cdef target_t *target = &c.handover.target[OF_LAW if c.law != NULL else PRIVATE]
+    """In the lead: takes the inputs that have come back. Where all are there and there is time, a
+    law computes now, and at the instant only the frames are left to go. Else, and for Python, the
+    way of the cycle is gone once without effect, so that all of it is in the caches."""
     cdef actual_t *actual = &c.handover.actual[PRIVATE]
     cdef int64_t left
     if c.law != NULL:
@@ -183,14 +193,35 @@ cdef void cycle_prepare(cycle_t *c) noexcept nogil:
     left = c.next - now(c)
     if 3 * left < c.lead:
         return
-    memcpy(scratch.header, target.header, c.handover.target_size)
-    if c.law != NULL and 2 * c.process < left:  # a long step would be late; it is also warm sooner
-        law_rehearse(c.law, actual, scratch, c.next)
-    axes_rehearse(c.axes, scratch)
+    if c.law != NULL and c.taken and c.process >= 0 and AHEAD_MARGIN * c.process < left:
+        compute_ahead(c, actual)
+    else:
+        rehearse(c, actual, left)
     c.records[(c.number + 1) & c.records_mask].wake_ns = 0  # fetched
     if c.image.rehearse != NULL:
         c.image.rehearse(c.image.self)
     take_early(c, actual)
+
+
+cdef void rehearse(cycle_t *c, const actual_t *actual, int64_t left) noexcept nogil:
+    """A step of the law on scratch, its targets to outputs that are not sent. A long step would be
+    late; it is also warm sooner."""
+    cdef target_t *scratch = &c.handover.target[BEFORE_LAW]
+    cdef target_t *target = &c.handover.target[OF_LAW if c.law != NULL else PRIVATE]
+    memcpy(scratch.header, target.header, c.handover.target_size)
+    if c.law != NULL and AHEAD_MARGIN * c.process < left:
+        law_rehearse(c.law, actual, scratch, c.next)
+    axes_rehearse(c.axes, scratch)
+
+
+cdef void compute_ahead(cycle_t *c, actual_t *actual) noexcept nogil:
+    """The law's part of the cycle that is to come, and its outputs as far as they lead without a
+    frame. Numbers and modes that the application gives from now on count a cycle later; goals and
+    stops are heard once more at the instant."""
+    cdef target_t *target = take_orders(c)
+    cdef bint fresh = step_law(c, actual, target, c.number + 1, c.next, now(c))
+    axes_write(c.axes, target, fresh)
+    c.ahead = 1
 
 
 cdef void cycle_open(cycle_t *c) noexcept nogil:
@@ -222,8 +253,11 @@ cdef void begin(cycle_t *c, int64_t wake) noexcept nogil:
         record.period_ns = short_ns(c.interval)
     c.begun += 1
     c.wake = wake
-    c.process = -1
     c.flags = LATE if c.skipped else 0
+    if c.ahead:
+        c.flags |= AHEAD
+    else:
+        c.process = -1
     c.skipped = 0
 
 
@@ -293,13 +327,18 @@ cdef void close_header(cycle_t *c, actual_t *actual) noexcept nogil:
     record.al_status = header.al_status
 
 
-cdef void emit(cycle_t *c, const target_t *target, bint fresh) noexcept nogil:
-    """The compiled half before the wire: targets → images → frames. A frame that could not be
-    sent is counted by the image and is missing at collect."""
-    axes_write(c.axes, target, fresh)
+cdef void send(cycle_t *c) noexcept nogil:
+    """The outputs as they stand in the image. A frame that could not go is counted by the image and
+    is missing at collect."""
     if c.clock != NULL:
         c.clock.scheduled = c.scheduled
     c.image.emit(c.image.self)
+
+
+cdef void emit(cycle_t *c, const target_t *target, bint fresh) noexcept nogil:
+    """The compiled half before the wire: targets → images → frames."""
+    axes_write(c.axes, target, fresh)
+    send(c)
 
 
 cdef bint take_streamed(cycle_t *c, target_t *target, bint fresh) noexcept nogil:
@@ -410,7 +449,7 @@ cdef void cycle_native(cycle_t *c) noexcept nogil:
     """One cycle after the wait, in the order that holds now. A threaded cycle before the first one
     of a law sends a second time: the law's first collect finds those frames."""
     cdef bint fresh
-    if c.order == LAW or c.law != NULL:
+    if c.order == LAW or c.law != NULL or c.ahead:  # ahead: it may have ended with that step
         cycle_law(c)
     else:
         cycle_threaded(c)
@@ -438,6 +477,7 @@ cdef void cycle_take_law(cycle_t *c, const target_t *orders) noexcept nogil:
         target.torque[i] = c.axes.axes[i].commanded_torque
     target.header.hold = 1
     target.header.seen = c.number
+    c.process = -1  # nobody knows how long its steps take
     if not law_begin(c.law, c.next):
         c.law = NULL
 
@@ -453,34 +493,41 @@ cdef void end_law(cycle_t *c, uint32_t status) noexcept nogil:
     c.law = NULL
 
 
-cdef void take_orders(target_t *target, const target_t *committed, const counts_t *n) noexcept nogil:
-    """What the application still says while a law runs: goals and modes."""
-    memcpy(target.request, committed.request, n.axes * sizeof(uint32_t))
-    memcpy(target.controlword_bits, committed.controlword_bits, n.axes * sizeof(uint16_t))
-    memcpy(target.mode, committed.mode, n.axes)
-    memcpy(target.goal, committed.goal, n.axes)
+cdef target_t *take_orders(cycle_t *c) noexcept nogil:
+    """The law's targets, with what the application still says while it runs: goals and modes."""
+    cdef bint fresh
+    cdef target_t *committed = handover_latch(c.handover, &fresh)
+    cdef target_t *target = &c.handover.target[OF_LAW]
+    cdef uint32_t axes = c.handover.counts.axes
+    if fresh:
+        memcpy(target.request, committed.request, axes * sizeof(uint32_t))
+        memcpy(target.controlword_bits, committed.controlword_bits, axes * sizeof(uint16_t))
+        memcpy(target.mode, committed.mode, axes)
+        memcpy(target.goal, committed.goal, axes)
+    return target
 
 
-cdef bint step_law(cycle_t *c, actual_t *actual, target_t *target, int64_t usable) noexcept nogil:
-    """One step of the law. False: what it left in the targets must not be sent."""
+cdef bint step_law(cycle_t *c, actual_t *actual, target_t *target, uint64_t number, int64_t instant,
+                   int64_t since) noexcept nogil:
+    """The step of the law for cycle `number`. False: what it left in the targets must not be sent."""
     cdef law_t *law = c.law
     cdef bint goes_on
     axes_follow_now(c.axes, target)
     take_streamed(c, target, False)
     target.header.hold = 0
-    target.header.seen = c.number  # the law has read them: a streamed row passes through its hands
-    actual.header.ok = c.flags & OK
+    target.header.seen = number  # the law has read them: a streamed row passes through its hands
+    actual.header.ok = c.image.ok[0]
     memcpy(c.handover.target[BEFORE_LAW].header, target.header, c.handover.target_size)
-    goes_on = law_run(law, c.axes, actual, target, c.scheduled, c.number)
-    c.process = now(c) - usable
-    if goes_on and law_took(law, c.process, c.number):
+    goes_on = law_run(law, c.axes, actual, target, instant, number)
+    c.process = now(c) - since
+    if goes_on and law_took(law, c.process, number):
         return True
     if law.status == FINISHED:
-        c.flags |= LAW_DONE
+        c.law_flags |= LAW_DONE
         end_law(c, RUNNING)
         target.header.hold = 0  # its last targets are sent
         return True
-    c.flags |= LAW_FAILED
+    c.law_flags |= LAW_FAILED
     memcpy(target.header, c.handover.target[BEFORE_LAW].header, c.handover.target_size)
     cat_add32(&c.axes.stop_asked, 1)
     end_law(c, RUNNING)
@@ -489,24 +536,29 @@ cdef bint step_law(cycle_t *c, actual_t *actual, target_t *target, int64_t usabl
 
 cdef void cycle_law(cycle_t *c) noexcept nogil:
     """Without a law, or after its end, axes hold."""
-    cdef bint fresh
-    cdef target_t *committed = handover_latch(c.handover, &fresh)
     cdef target_t *target = &c.handover.target[OF_LAW]
     cdef actual_t *actual = &c.handover.actual[c.handover.actual_triple.back]
     cdef record_t *record = record_of(c)
+    cdef bint fresh = False
     cdef int64_t usable, done, sent
-    if fresh:
-        take_orders(target, committed, &c.handover.counts)
+    take_orders(c)
     collect(c, actual, 0)
     usable = now(c)
     record.receive_ns = short_ns(usable - c.wake)
     done = usable
-    if c.law != NULL:
-        fresh = step_law(c, actual, target, usable)
-        done = usable + c.process
-    emit(c, target, fresh)
+    if c.ahead:
+        axes_hear(c.axes, target)
+        c.ahead = 0
+    else:
+        if c.law != NULL:
+            fresh = step_law(c, actual, target, c.number, c.scheduled, usable)
+            done = usable + c.process
+        axes_write(c.axes, target, fresh)
+    send(c)
     sent = now(c)
     record.send_ns = short_ns(sent - done)
+    c.flags |= c.law_flags
+    c.law_flags = 0
     if c.law != NULL:
         law_tell(c.law)
     axes_tell(c.axes, actual)

@@ -62,8 +62,9 @@ class Loop:
     CSP, 10 ms in CSV and CST; 0: never. `lost_limit`: cycles in a row without all answers before
     WorkingCounterError. `stop_deadline` [s] for standing still when leaving. `watchdog` [s] of the
     devices' outputs. `lead` [s], of an inline loop and of laws: how long before each instant the
-    thread wakes, to take what has come back and fetch what is needed next into the caches (costs
-    that much processor time a cycle); None: 50 us, at most a tenth of the period; 0: a plain sleep.
+    thread wakes, to take what has come back, compute a law ahead, or fetch what is needed next into
+    the caches (costs that much processor time a cycle); None: 50 us, at most a tenth of the period;
+    0: a plain sleep.
     `log`: how many cycles the log, and that of an error, reaches back.
     `raise_faults`: a drive in fault
     raises DriveError; else see `Drives.faults`. `on_return`: what becomes of a device that no wish

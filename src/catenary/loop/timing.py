@@ -11,9 +11,9 @@ class Timing(Mapping[str, Mapping[str, float]]):
     """Per phase of the cycle, mean, max, min, sd and quantiles in us.
 
     period: from instant to instant as it was met; lateness: of the wake-up against its instant;
-    receive: wake-up → inputs usable; process: the body; send: its end → the last frame is out;
-    in_controller: the three together; tail: what remains before the next wait; round_trip: of the
-    last frame. Phases that did not occur are left out.
+    receive: wake-up → inputs usable; process: the body (of a law also ahead of its instant); send:
+    its end → the last frame is out; in_controller: the three together; tail: what remains before
+    the next wait; round_trip: of the last frame. Phases that did not occur are left out.
     """
 
     def __init__(
