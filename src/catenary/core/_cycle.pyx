@@ -270,10 +270,20 @@ cdef void collect(cycle_t *c, actual_t *actual, int64_t deadline) noexcept nogil
         c.missing = rc if rc >= 0 else -1
         axes_read(c.axes, actual, c.number, c.scheduled)
     c.taken = 0
+    follow_clock(c)
+    judge(c)
+
+
+cdef inline void follow_clock(cycle_t *c) noexcept nogil:
+    """Behind the frames of a cycle and before the next are stamped."""
     if c.clock != NULL:
         c.next += clock_close(c.clock)
         if c.clock.changes != c.clock.acknowledged:
             c.flags |= CLOCKS
+
+
+cdef inline void judge(cycle_t *c) noexcept nogil:
+    """Whether the frames that were collected make a good cycle."""
     if c.image.ok[0]:
         c.flags |= OK
         if c.image.whole[0]:
@@ -534,29 +544,45 @@ cdef bint step_law(cycle_t *c, actual_t *actual, target_t *target, uint64_t numb
     return False
 
 
-cdef void cycle_law(cycle_t *c) noexcept nogil:
-    """Without a law, or after its end, axes hold."""
-    cdef target_t *target = &c.handover.target[OF_LAW]
-    cdef actual_t *actual = &c.handover.actual[c.handover.actual_triple.back]
+cdef int64_t send_ahead(cycle_t *c, const target_t *target) noexcept nogil:
+    """The frames of what was computed ahead; when they were out. All else follows behind them."""
+    cdef int64_t sent
+    axes_hear(c.axes, target)
+    follow_clock(c)
+    send(c)
+    sent = now(c)
+    judge(c)
+    c.taken = 0
+    c.ahead = 0
+    record_of(c).receive_ns = 0
+    record_of(c).send_ns = short_ns(sent - c.wake)
+    return sent
+
+
+cdef int64_t compute_and_send(cycle_t *c, actual_t *actual, target_t *target) noexcept nogil:
+    """All of it behind the instant; without a law, or after its end, axes hold. When the frames
+    were out."""
     cdef record_t *record = record_of(c)
     cdef bint fresh = False
     cdef int64_t usable, done, sent
-    take_orders(c)
     collect(c, actual, 0)
     usable = now(c)
     record.receive_ns = short_ns(usable - c.wake)
     done = usable
-    if c.ahead:
-        axes_hear(c.axes, target)
-        c.ahead = 0
-    else:
-        if c.law != NULL:
-            fresh = step_law(c, actual, target, c.number, c.scheduled, usable)
-            done = usable + c.process
-        axes_write(c.axes, target, fresh)
-    send(c)
+    if c.law != NULL:
+        fresh = step_law(c, actual, target, c.number, c.scheduled, usable)
+        done = usable + c.process
+    emit(c, target, fresh)
     sent = now(c)
     record.send_ns = short_ns(sent - done)
+    return sent
+
+
+cdef void cycle_law(cycle_t *c) noexcept nogil:
+    cdef target_t *target = take_orders(c)
+    cdef actual_t *actual = &c.handover.actual[c.handover.actual_triple.back]
+    cdef int64_t sent
+    sent = send_ahead(c, target) if c.ahead else compute_and_send(c, actual, target)
     c.flags |= c.law_flags
     c.law_flags = 0
     if c.law != NULL:
