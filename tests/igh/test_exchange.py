@@ -102,3 +102,18 @@ def test_answers_are_looked_for_when_they_are_there(doubles: dict[str, Path]) ->
             for _ in range(60):
                 next(loop)
             assert double.early() <= 5
+
+
+def test_slow_answers_of_devices_that_need_not_be_there_are_found(doubles: dict[str, Path]) -> None:
+    """Nobody is waited for long who was away before; but who is only slow must be heard."""
+    double = Double(doubles["1.6.1"])
+    double.delay(20_000)
+    with cat.MainDevice(Master(library=double.path)) as main:
+        main.scan()
+        arm = cat.Drives(main.subs.drives, counts_per_turn=1000, required=False)
+        calm = {"late_limit": 0, "priority": None, "watchdog": 2.0, "enable": False}
+        with cat.Loop(arm, period=50e-3, **calm) as loop:  # type: ignore[arg-type]
+            for cycle in loop:
+                if arm.present.all() or cycle.number > 100:
+                    break
+            assert arm.present.all()

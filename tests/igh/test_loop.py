@@ -177,12 +177,12 @@ def test_a_device_that_is_away_holds_no_cycle_up(main: cat.MainDevice, double: D
     with cat.Loop(one, two) as loop:
         next(loop)
         double.online(1, 0)
-        for _ in range(10):
+        for _ in range(20):
             next(loop)
         double.forget()
-        for _ in range(10):
+        for _ in range(64):
             assert next(loop).ok
-        assert double.calls().count("receive") < 60
+        assert double.calls().count("receive") < 640  # of some 2500 where all are waited for
 
 
 def test_a_device_that_refuses_op_is_named(main: cat.MainDevice, double: Double) -> None:

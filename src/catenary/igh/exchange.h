@@ -21,7 +21,9 @@
 #define IGH_NAP_NS 20000              /* between two looks for what has not come back */
 #define IGH_PATIENCE_FIRST_NS 50000
 #define IGH_PATIENCE_DECAY 14         /* of patience, a cycle: 2^-14 */
-#define IGH_GRACE 2                   /* times the patience: how long for units that were away before */
+#define IGH_GRACE 2                   /* times the patience: how long for units that are away */
+#define IGH_ABSENT 16u                /* misses in a row: a unit is away */
+#define IGH_ABSENT_EVERY 64u          /* exchanges between two that it is waited for all the same */
 #define IGH_MISSED_MAX 1000000000u
 
 static int igh_emit(void *self)
@@ -55,10 +57,12 @@ static int igh_emit(void *self)
     return rc < 0 ? rc : 0;
 }
 
-/* Whether a unit is expected back: one that need not answer, and did not before, is not. */
+/* Whether a unit is expected back. One that need not answer, and has not for a while, is not; but now
+ * and then it is: it may only be slower than the others were. */
 static int igh_expects(const igh_exchange *x, uint32_t u)
 {
-    return !x->units[u].optional || x->unit_missed[u] == 0;
+    uint32_t missed = x->unit_missed[u];
+    return !x->units[u].optional || missed < IGH_ABSENT || missed % IGH_ABSENT_EVERY == 0;
 }
 
 /* What has come back of the domains that were queued: how many have not; `expected`: of those that
@@ -129,7 +133,7 @@ static void igh_judge(igh_exchange *x)
 }
 
 /* Threaded: naps as long as answers take, then looks now and then until the deadline; for devices
- * that were away before not for long. A look that comes too early costs a line in the kernel's log
+ * that are away not for long. A look that comes too early costs a line in the kernel's log
  * ("working counter changes"): so one makes all later naps longer by a step, and only thousands of
  * good ones make them shorter. */
 static uint32_t igh_wait_for_answers(igh_exchange *x, int64_t deadline)
