@@ -1,6 +1,7 @@
 """One network's loop with a law, in a process of its own, as the published humanoid has one for
-each network: `python -m catenary.bench.network_law JOB`. It says "ready" once the law runs,
-measures from SIGUSR1 on, and says what it came to."""
+each network: `python -m catenary.bench.network_law JOB`. It says "here" once all is imported, opens
+the loop from SIGUSR1 on, says "ready" once the law runs, measures from the next SIGUSR1 on, and says
+what it came to. So no loop takes the processor from another one that still has to come up."""
 
 from __future__ import annotations
 
@@ -8,6 +9,7 @@ import signal
 import sys
 import time
 from collections.abc import Sequence
+from importlib import import_module
 
 import msgspec
 
@@ -19,20 +21,26 @@ from catenary.bench.peers.with_catenary_law import sine
 from catenary.errors import CatenaryError
 
 GO = signal.SIGUSR1
-PATIENCE = 60.0  # [s] for the others to be ready
+PATIENCE = 120.0  # [s] for the others to be ready
 LOOK = 500  # cycles from one look at the counters to the next
 NEVER = 1e9  # [s]
 
 
 def run_law(job: Job) -> NetworkRound:
+    import_module("numba")  # opening the loop compiles the law
+    wait_to_go("here")
     with opened(job, laws=[sine]) as (loop, arm):
         home = arm.actual.position.copy()
         parameters = [job.amplitude, job.stiffness, job.damping, NEVER]
         loop.start(sine, memory=home, parameters=parameters, budget=0)
-        print("ready", flush=True)
-        if signal.sigtimedwait({GO}, PATIENCE) is None:
-            raise CatenaryError(f"nobody said go within {PATIENCE:.0f} s")
+        wait_to_go("ready")
         return count(loop, job)
+
+
+def wait_to_go(said: str) -> None:
+    print(said, flush=True)
+    if signal.sigtimedwait({GO}, PATIENCE) is None:
+        raise CatenaryError(f"nobody said go within {PATIENCE:.0f} s")
 
 
 def count(loop: cat.Loop, job: Job) -> NetworkRound:

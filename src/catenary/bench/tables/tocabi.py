@@ -176,8 +176,11 @@ def two_laws(jobs: Sequence[Job], places: Places, found: WayRounds) -> None:
     with contextlib.ExitStack() as stack:
         children = [stack.enter_context(start_law(job)) for job in jobs]
         for child in children:
-            expect(child, PATIENCE, "ready")
+            expect(child, PATIENCE, "here")
         tasks = stack.enter_context(beside())
+        go(children)
+        for child in children:
+            expect(child, PATIENCE, "ready")
         processes = {
             f"{what}, {network}": pid
             for what, pids in (
@@ -186,8 +189,7 @@ def two_laws(jobs: Sequence[Job], places: Places, found: WayRounds) -> None:
             )
             for network, pid in zip(NETWORKS, pids, strict=True)
         }
-        for child in children:
-            os.kill(child.pid, GO)
+        go(children)
         found.shares.append(shares(processes, LOOKED_AT * measured))
         said = [expect(child, BRING_UP_SECONDS + measured, "{") for child in children]
         statistics = tasks["python"].statistics
@@ -225,6 +227,11 @@ def beside() -> Tasks:
         session=session(best_effort=True),
         best_effort=True,
     )
+
+
+def go(children: Sequence[Child]) -> None:
+    for child in children:
+        os.kill(child.pid, GO)
 
 
 def expect(child: Child, seconds: float, start: str) -> str:
