@@ -1,7 +1,7 @@
 """One network's loop with a law, in a process of its own, as the published humanoid has one for
-each network: `python -m catenary.bench.network_law JOB`. It says "here" once all is imported, opens
-the loop from SIGUSR1 on, says "ready" once the law runs, measures from the next SIGUSR1 on, and says
-what it came to. So no loop takes the processor from another one that still has to come up."""
+each network: `python -m catenary.bench.network_law JOB`. It says "here" once all is imported,
+opens the loop at SIGUSR1, says "ready" once the law runs, measures from the next SIGUSR1 on, and
+says what it came to. So no loop takes the processor from another one that still comes up."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def count(loop: cat.Loop, job: Job) -> NetworkRound:
 
 
 def main(arguments: Sequence[str]) -> None:
-    signal.pthread_sigmask(signal.SIG_BLOCK, {GO})  # before any thread is there
+    signal.pthread_sigmask(signal.SIG_BLOCK, {GO})  # who starts us has done so before any import
     job = msgspec.json.decode(arguments[0], type=Job)
     print(msgspec.json.encode(run_law(job)).decode(), flush=True)
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import signal
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -190,10 +191,11 @@ def two_laws(jobs: Sequence[Job], places: Places, found: WayRounds) -> None:
             for network, pid in zip(NETWORKS, pids, strict=True)
         }
         go(children)
-        found.shares.append(shares(processes, LOOKED_AT * measured))
+        took = shares(processes, LOOKED_AT * measured)
         said = [expect(child, BRING_UP_SECONDS + measured, "{") for child in children]
         statistics = tasks["python"].statistics
     found.task.append(statistics)
+    found.shares.append(took)
     found.networks.append([msgspec.json.decode(each, type=NetworkRound) for each in said])
 
 
@@ -210,8 +212,13 @@ def shares(processes: Mapping[str, int], seconds: float) -> dict[str, float]:
 
 
 def start_law(job: Job) -> Child:
+    """Its threads, those of imported libraries too, inherit that GO is blocked: it waits for it."""
     arguments = ["-m", "catenary.bench.network_law", msgspec.json.encode(job).decode()]
-    return start_python(arguments)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {GO})
+    try:
+        return start_python(arguments)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def beside() -> Tasks:
