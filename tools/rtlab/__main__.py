@@ -99,7 +99,12 @@ def run_table(
     """The record of one guest. LabError: it did not do it."""
     print(f"rtlab: {name}: catenary {table.command}", flush=True)
     command = [str(Path(sys.executable).with_name("catenary")), *table.arguments]
-    job = {"folder": str(REPOSITORY), "name": name, "arguments": command}
+    job = {
+        "folder": str(REPOSITORY),
+        "name": name,
+        "arguments": command,
+        "real_time_us": table.real_time_us,
+    }
     deadline = (minutes or table.minutes) * 60
     with machine.started(system, root, job, WORK, deadline) as guest:
         for text in guest.lines():

@@ -195,8 +195,12 @@ def two_laws(jobs: Sequence[Job], places: Places, found: WayRounds) -> None:
         took = shares(processes, LOOKED_AT * measured)
         said = [expect(child, BRING_UP_SECONDS + measured, "{") for child in children]
         statistics = tasks["python"].statistics
-    jobs, misses = statistics.jobs - before.jobs, statistics.misses - before.misses
-    found.task.append(replace(statistics, jobs=jobs, misses=misses))
+    while_measured = replace(
+        statistics,
+        jobs=statistics.jobs - before.jobs,
+        misses=statistics.misses - before.misses,
+    )
+    found.task.append(while_measured)
     found.shares.append(took)
     found.networks.append([msgspec.json.decode(each, type=NetworkRound) for each in said])
 
