@@ -72,6 +72,8 @@ def test_a_result_that_cannot_be_written_is_refused_before_the_work(
         result_file(str(tmp_path))
     with pytest.raises(argparse.ArgumentTypeError, match="there is no folder"):
         result_file(str(tmp_path / "nowhere" / "new.json"))
+    with pytest.raises(argparse.ArgumentTypeError, match="there is no folder"):
+        result_file(str(tmp_path / ("x" * 300) / "new.json"))  # an OSError where it is looked at
     monkeypatch.setattr("os.access", lambda path, mode: False)  # root may write everything
     with pytest.raises(argparse.ArgumentTypeError, match="may not be written"):
         result_file(str(tmp_path / "new.json"))

@@ -117,6 +117,15 @@ def test_a_file_in_the_way_has_a_hint(error: type[OSError], hint: str) -> None:
     assert hint in found
 
 
+def test_a_clone_that_was_pulled_is_to_be_built() -> None:
+    error = ImportError("cannot import name 'X' from 'catenary.core._cycle'")
+    error.name = "catenary.core._cycle"
+    message, hint = describe(error)
+    assert message.startswith("cannot import name")
+    assert "make build" in hint
+    assert "internal error" in describe(ImportError("no module", name="somebody"))[0]
+
+
 @pytest.mark.parametrize(
     "failing_scan", [LinkError("no such interface", hint="there are: lo")], indirect=True
 )

@@ -82,11 +82,11 @@ def _positive_time(text: str, unit: str) -> float:
 def result_file(text: str) -> Path:
     """A file that is written in the end: what stands in the way is said before the work."""
     path = Path(text)
-    if path.is_dir():
+    if os.path.isdir(path):  # no error where the folder may not be looked into
         raise argparse.ArgumentTypeError(f"{text} is a folder")
-    if not path.parent.is_dir():
+    if not os.path.isdir(path.parent):
         raise argparse.ArgumentTypeError(f"there is no folder {path.parent}")
-    if not os.access(path if path.exists() else path.parent, os.W_OK):
+    if not os.access(path if os.path.exists(path) else path.parent, os.W_OK):
         raise argparse.ArgumentTypeError(f"{text} may not be written")
     return path
 

@@ -47,6 +47,8 @@ def describe(error: Exception) -> tuple[str, str]:
         return f"{error.filename}: {error.strerror}", FILE_HINTS.get(type(error), "")
     if isinstance(error, ValueError | OSError):
         return one_line(str(error)), ""
+    if isinstance(error, ImportError) and (error.name or "").startswith("catenary."):
+        return one_line(str(error)), "its compiled part is of another version: make build"
     kind = type(error).__name__
     return (
         f"internal error: {kind}: {one_line(str(error))}",
