@@ -65,14 +65,13 @@ class Loop:
     thread wakes, to take what has come back, compute a law ahead, or fetch what is needed next into
     the caches (costs that much processor time a cycle); None: 50 us, at most a tenth of the period;
     0: a plain sleep.
-    `log`: how many cycles the log, and that of an error, reaches back.
-    `raise_faults`: a drive in fault
-    raises DriveError; else see `Drives.faults`. `on_return`: what becomes of a device that no wish
-    requires and that comes back: "restore", its start-up list is replayed and it goes to OP; or
-    "hold", it stays in PRE-OP until `restore`. `on_replacement`: the same for another device of the
-    same product in its place, which is not even led to PRE-OP when held. `laws` are compiled on
-    entry, before the devices go to OP; others when they are started. `sink` is given every cycle
-    (a `cat.Share`: to other processes).
+    `log`: how many cycles the log, and that of an error, reaches back. `raise_faults`: a drive in
+    fault raises DriveError; else see `Drives.faults`. `on_return`: what becomes of a device that no
+    wish requires and that comes back: "restore", its start-up list is replayed and it goes to OP;
+    or "hold", it stays in PRE-OP until `restore`. `on_replacement`: the same for another device of
+    the same product in its place, which is not even led to PRE-OP when held. `laws` are compiled
+    on entry, before the devices go to OP; others when they are started. `sink` is given every
+    cycle (a `cat.Share`: to other processes).
 
     Where a wish has `dc=`: `clock`, whom time is taken from: "reference", the wake-up follows the
     reference clock; "main", it follows the MainDevice's. `reference`: the device with that clock;

@@ -35,7 +35,7 @@ from catenary.loop.diagnosis import (
 from catenary.loop.error_watch import ErrorWatch
 from catenary.loop.laws.runner import LawRunner
 from catenary.loop.publishing import Publisher
-from catenary.loop.rehearsal import make_rehearsal
+from catenary.loop.rehearsal import fitting_rehearsal
 from catenary.loop.service import Service
 from catenary.loop.signals import SignalGuard
 from catenary.loop.watch import Attendance, Policy, Watch
@@ -79,7 +79,7 @@ class Running:
         self.engine = self._make_engine()
         self.views = bind_wishes(wishes, plan.tables, self.engine.buffers)
         if plan.cycle.lead_ns and plan.cycle.order == "inline":
-            self.engine.set_rehearsal(make_rehearsal(self.views))
+            self.engine.set_rehearsal(fitting_rehearsal(self.views, plan.cycle.lead_ns))
         self.laws = LawRunner(self.engine, plan)
         clock = plan.cycle.clock
         self.clocks: Clocks | None = None
