@@ -364,3 +364,13 @@ def test_a_law_that_never_returns_is_given_up_and_the_bus_goes_on(
     assert b.engine.counters["lost"] == 0
     again = Law(address, [], [], budget_ns=0, overrun_limit=3, priority=0)
     assert again.rehearse(b"\0" * 64, b"\0" * 64) == 0  # its first steps do return
+
+
+def test_axes_hold_for_long_after_a_law_of_an_order_without_application() -> None:
+    b = bench(axis(0), order="law")
+    b.enable()
+    law = make_law(b, lambda frame: frame.time > 0.03)
+    b.engine.start_law(law)
+    b.steps(200)  # beyond every limit of targets that stay away
+    assert law.ended
+    assert b.drives[0].state == 4  # operation enabled

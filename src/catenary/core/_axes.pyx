@@ -12,19 +12,23 @@ from libc.stdlib cimport calloc, free
 from libc.string cimport memcpy
 
 from catenary.core._cia402 cimport (
+    ENABLED,
     FAULT_REACTION_ACTIVE,
     OPERATION_ENABLED,
     QUICK_STOP_ACTIVE,
+    RESET,
     cia402_state,
 )
 from catenary.core._guard cimport (
     guard_controlword,
     guard_mode,
     guard_observe,
+    guard_operate,
     guard_request,
     guard_setpoints,
     guard_stop,
     guard_take_request,
+    guard_works,
 )
 from catenary.core._native cimport cat_load_acquire32
 from catenary.core._numbers cimport REAL as REAL_KIND
@@ -234,22 +238,30 @@ cdef void axes_write(axes_t *x, const target_t *target, bint fresh) noexcept nog
     write_columns(x, target)
 
 
+cdef inline bint takes_power(const target_t *target, uint32_t i) noexcept nogil:
+    return target.goal[i] != ENABLED and target.goal[i] != RESET
+
+
 cdef void axes_hear(axes_t *x, const target_t *target) noexcept nogil:
-    """Behind a write that was made ahead of its instant: goals and stops that were asked for since."""
+    """Behind a write that was made ahead of its instant: stops, goals that take power away, and control
+    bits of axes that work. What gives power or resets waits for the next write, set-points and all."""
+    cdef uint8_t *outputs = x.image.outputs
+    cdef axis_t *a
     cdef uint32_t i, asked = cat_load_acquire32(&x.stop_asked)
-    cdef bint heard = asked != x.stop_seen
-    for i in range(x.axis_count):
-        if target.request[i] != x.axes[i].request:
-            guard_take_request(x, &x.axes[i], target, i)
-            heard = True
     if asked != x.stop_seen:
         x.stop_seen = asked
         guard_stop(x)
-    if not heard:
+        for i in range(x.axis_count):
+            a = &x.axes[i]
+            write_axis(a, outputs, guard_controlword(x, a, target.controlword_bits[i]))
         return
     for i in range(x.axis_count):
-        write_axis(&x.axes[i], x.image.outputs,
-                   guard_controlword(x, &x.axes[i], target.controlword_bits[i]))
+        a = &x.axes[i]
+        if target.request[i] != a.request and takes_power(target, i):
+            guard_take_request(x, a, target, i)
+            write_axis(a, outputs, guard_controlword(x, a, target.controlword_bits[i]))
+        elif guard_works(a):
+            write_axis(a, outputs, guard_operate(a, target.controlword_bits[i]))
 
 
 cdef void axes_rehearse(const axes_t *x, const target_t *target) noexcept nogil:

@@ -103,10 +103,6 @@ RECORD_FIELDS = [
 ]
 
 
-cdef enum:
-    AHEAD_MARGIN = 2           # a law that may take so many times as long as it took last
-
-
 cdef inline int64_t now(const cycle_t *c) noexcept nogil:
     return c.link.now(c.link.self)
 
@@ -182,9 +178,10 @@ cdef inline void take_early(cycle_t *c, actual_t *actual) noexcept nogil:
 
 
 cdef void cycle_prepare(cycle_t *c) noexcept nogil:
-    """In the lead: takes the inputs that have come back. Where all are there and there is time, a
-    law computes now, and at the instant only the frames are left to go. Else, and for Python, the
-    way of the cycle is gone once without effect, so that all of it is in the caches."""
+    """In the lead: takes the inputs that have come back. Where all are there a law computes now, and
+    at the instant only the frames are left to go; a long one is late, but less than if it began
+    there. Else, and for Python, the way of the cycle is gone once without effect, so that all of it
+    is in the caches."""
     cdef actual_t *actual = &c.handover.actual[PRIVATE]
     cdef int64_t left
     if c.law != NULL:
@@ -193,7 +190,7 @@ cdef void cycle_prepare(cycle_t *c) noexcept nogil:
     left = c.next - now(c)
     if 3 * left < c.lead:
         return
-    if c.law != NULL and c.taken and c.process >= 0 and AHEAD_MARGIN * c.process < left:
+    if c.law != NULL and c.taken:
         compute_ahead(c, actual)
     else:
         rehearse(c, actual, left)
@@ -209,15 +206,15 @@ cdef void rehearse(cycle_t *c, const actual_t *actual, int64_t left) noexcept no
     cdef target_t *scratch = &c.handover.target[BEFORE_LAW]
     cdef target_t *target = &c.handover.target[OF_LAW if c.law != NULL else PRIVATE]
     memcpy(scratch.header, target.header, c.handover.target_size)
-    if c.law != NULL and AHEAD_MARGIN * c.process < left:
+    if c.law != NULL and 2 * c.process < left:
         law_rehearse(c.law, actual, scratch, c.next)
     axes_rehearse(c.axes, scratch)
 
 
 cdef void compute_ahead(cycle_t *c, actual_t *actual) noexcept nogil:
     """The law's part of the cycle that is to come, and its outputs as far as they lead without a
-    frame. Numbers and modes that the application gives from now on count a cycle later; goals and
-    stops are heard once more at the instant."""
+    frame. What the application says from now on counts a cycle later, but for what `axes_hear` hears
+    at the instant."""
     cdef target_t *target = take_orders(c)
     cdef bint fresh = step_law(c, actual, target, c.number + 1, c.next, now(c))
     axes_write(c.axes, target, fresh)
@@ -487,7 +484,6 @@ cdef void cycle_take_law(cycle_t *c, const target_t *orders) noexcept nogil:
         target.torque[i] = c.axes.axes[i].commanded_torque
     target.header.hold = 1
     target.header.seen = c.number
-    c.process = -1  # nobody knows how long its steps take
     if not law_begin(c.law, c.next):
         c.law = NULL
 
@@ -572,6 +568,8 @@ cdef int64_t compute_and_send(cycle_t *c, actual_t *actual, target_t *target) no
     if c.law != NULL:
         fresh = step_law(c, actual, target, c.number, c.scheduled, usable)
         done = usable + c.process
+    else:
+        target.header.hold = 1
     emit(c, target, fresh)
     sent = now(c)
     record.send_ns = short_ns(sent - done)

@@ -52,9 +52,15 @@ cdef inline void guard_request(axes_t *x, axis_t *a, const target_t *t, uint32_t
     if t.request[i] != a.request or (a.goal == ENABLED and not a.followed):
         guard_take_request(x, a, t, i)
 
+cdef inline bint guard_works(const axis_t *a) noexcept nogil:
+    """It follows, and nothing else is wanted: its controlword is known."""
+    return a.followed and a.goal == ENABLED and a.state == OPERATION_ENABLED and not a.clear_reset
+
+cdef inline uint16_t guard_operate(axis_t *a, uint16_t bits) noexcept nogil:
+    """Of an axis that works."""
+    a.command = OPERATE
+    return OPERATE | (bits & (MODE_BITS | FREE_BITS))
+
 cdef inline uint16_t guard_controlword(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil:
-    """That of an axis that works is known."""
-    if a.followed and a.goal == ENABLED and a.state == OPERATION_ENABLED and not a.clear_reset:
-        a.command = OPERATE
-        return OPERATE | (bits & (MODE_BITS | FREE_BITS))
-    return guard_lead(x, a, bits)
+    """Once a cycle: an edge of bit 7 is kept from being lost."""
+    return guard_operate(a, bits) if guard_works(a) else guard_lead(x, a, bits)
