@@ -121,7 +121,7 @@ cdef class Axes:
 
 cdef void axes_read(axes_t *x, actual_t *out, uint64_t number, int64_t instant) noexcept nogil
 cdef void axes_write(axes_t *x, const target_t *target, bint fresh) noexcept nogil
-cdef void axes_hear(axes_t *x, const target_t *target) noexcept nogil
+cdef void axes_hear(axes_t *x, const target_t *target, bint fresh) noexcept nogil
 cdef void axes_rehearse(const axes_t *x, const target_t *target) noexcept nogil
 cdef void axes_tell(axes_t *x, actual_t *out) noexcept nogil
 cdef void axes_follow(const axes_t *x, const actual_t *actual, target_t *target) noexcept nogil

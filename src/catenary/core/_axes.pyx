@@ -242,9 +242,10 @@ cdef inline bint takes_power(const target_t *target, uint32_t i) noexcept nogil:
     return target.goal[i] != ENABLED and target.goal[i] != RESET
 
 
-cdef void axes_hear(axes_t *x, const target_t *target) noexcept nogil:
-    """Behind a write that was made ahead of its instant: stops, goals that take power away, and control
-    bits of axes that work. What gives power or resets waits for the next write, set-points and all."""
+cdef void axes_hear(axes_t *x, const target_t *target, bint fresh) noexcept nogil:
+    """Behind a write that was made ahead of its instant: stops and, where `fresh` orders came since,
+    goals that take power away, and control bits of axes that work. What gives power or resets waits
+    for the next write, set-points and all."""
     cdef uint8_t *outputs = x.image.outputs
     cdef axis_t *a
     cdef uint32_t i, asked = cat_load_acquire32(&x.stop_asked)
@@ -254,6 +255,8 @@ cdef void axes_hear(axes_t *x, const target_t *target) noexcept nogil:
         for i in range(x.axis_count):
             a = &x.axes[i]
             write_axis(a, outputs, guard_controlword(x, a, target.controlword_bits[i]))
+        return
+    if not fresh:
         return
     for i in range(x.axis_count):
         a = &x.axes[i]

@@ -12,9 +12,10 @@ In virtual time all three run in the caller's thread. Instants are origin + k·p
 skipped and counted, never made up for by a burst.
 
 Phases. receive: wait returned → inputs usable (threaded: last frame seen → inputs published).
-process: the application's body, ahead of the instant where its cycle is marked so. send: its end → the last cyclic send returned (threaded: wake →).
-in_controller: their sum. tail: what remains before the next wait. round_trip: sent → last frame seen
-(threaded only: the others look at the next instant). Budget: 1 us for three drives, without the link.
+process: the application's body, ahead of the instant where its cycle is marked so. send: its end →
+the last cyclic send returned (threaded and ahead: wake →). in_controller: their sum. tail: what
+remains before the next wait. round_trip: sent → last frame seen (threaded only: the others look at
+the next instant). Budget: 1 us for three drives, without the link.
 """
 
 from libc.errno cimport EINTR
@@ -215,8 +216,9 @@ cdef void compute_ahead(cycle_t *c, actual_t *actual) noexcept nogil:
     """The law's part of the cycle that is to come, and its outputs as far as they lead without a
     frame. What the application says from now on counts a cycle later, but for what `axes_hear` hears
     at the instant."""
-    cdef target_t *target = take_orders(c)
-    cdef bint fresh = step_law(c, actual, target, c.number + 1, c.next, now(c))
+    cdef bint fresh
+    cdef target_t *target = take_orders(c, &fresh)
+    fresh = step_law(c, actual, target, c.number + 1, c.next, now(c))
     axes_write(c.axes, target, fresh)
     c.ahead = 1
 
@@ -499,13 +501,12 @@ cdef void end_law(cycle_t *c, uint32_t status) noexcept nogil:
     c.law = NULL
 
 
-cdef target_t *take_orders(cycle_t *c) noexcept nogil:
+cdef target_t *take_orders(cycle_t *c, bint *fresh) noexcept nogil:
     """The law's targets, with what the application still says while it runs: goals and modes."""
-    cdef bint fresh
-    cdef target_t *committed = handover_latch(c.handover, &fresh)
+    cdef target_t *committed = handover_latch(c.handover, fresh)
     cdef target_t *target = &c.handover.target[OF_LAW]
     cdef uint32_t axes = c.handover.counts.axes
-    if fresh:
+    if fresh[0]:
         memcpy(target.request, committed.request, axes * sizeof(uint32_t))
         memcpy(target.controlword_bits, committed.controlword_bits, axes * sizeof(uint16_t))
         memcpy(target.mode, committed.mode, axes)
@@ -540,10 +541,10 @@ cdef bint step_law(cycle_t *c, actual_t *actual, target_t *target, uint64_t numb
     return False
 
 
-cdef int64_t send_ahead(cycle_t *c, const target_t *target) noexcept nogil:
+cdef int64_t send_ahead(cycle_t *c, const target_t *target, bint fresh) noexcept nogil:
     """The frames of what was computed ahead; when they were out. All else follows behind them."""
     cdef int64_t sent
-    axes_hear(c.axes, target)
+    axes_hear(c.axes, target, fresh)
     follow_clock(c)
     send(c)
     sent = now(c)
@@ -577,10 +578,11 @@ cdef int64_t compute_and_send(cycle_t *c, actual_t *actual, target_t *target) no
 
 
 cdef void cycle_law(cycle_t *c) noexcept nogil:
-    cdef target_t *target = take_orders(c)
+    cdef bint fresh
+    cdef target_t *target = take_orders(c, &fresh)
     cdef actual_t *actual = &c.handover.actual[c.handover.actual_triple.back]
     cdef int64_t sent
-    sent = send_ahead(c, target) if c.ahead else compute_and_send(c, actual, target)
+    sent = send_ahead(c, target, fresh) if c.ahead else compute_and_send(c, actual, target)
     c.flags |= c.law_flags
     c.law_flags = 0
     if c.law != NULL:
