@@ -129,3 +129,9 @@ def test_what_no_benchmark_needs_is_dropped(tmp_path: Path) -> None:
     kernel.drop_what_is_not_used(top)
     assert sorted(path.name for path in others.iterdir()) == ["drivers"]
     assert [path.name for path in (others / "drivers").iterdir()] == ["net"]
+
+
+def test_without_a_network_the_newest_that_lies_there_counts() -> None:
+    names = ["linux-image-6.1.0-9-rt-amd64_6.1.27-1", "linux-image-6.1.0-56-rt-amd64_6.1.192-2"]
+    marks = [Path("cache", name, "unpacked") for name in names]
+    assert sorted(reversed(marks), key=kernel.by_version) == marks

@@ -158,3 +158,9 @@ def test_a_guest_that_dies_before_its_first_word_is_started_again(
     lines, answer = run(tmp_path)
     assert lines == ["up"]
     assert answer == ANSWER
+
+
+def test_a_job_that_the_kernel_would_cut_off_is_refused() -> None:
+    kernel = Kernel(Path("vmlinuz"), Path("modules"), "a kernel")
+    with pytest.raises(LabError, match="understands 2047"):
+        machine.command(kernel, Path("root"), Path("results"), {"arguments": ["x" * 1800]})

@@ -57,10 +57,10 @@ def in_one_line(error: OSError) -> str:
 
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
-    known = "\n".join(f"  {name:9}{table.help}" for name, table in tables.TABLES.items())
+    known = "\n".join(f"  {name:12}{table.help}" for name, table in tables.TABLES.items())
     parser = argparse.ArgumentParser(
         prog="python -m tools.rtlab",
-        description=f"tables:\n{known}\n  all      all but quick",
+        description=f"tables:\n{known}\n  all         all but quick",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("tables", nargs="*", default=["all"], metavar="TABLE")

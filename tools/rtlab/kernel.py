@@ -63,7 +63,7 @@ def depends(module: bytes) -> list[str]:
 def provide(cache: Path) -> Kernel:
     """The newest that apt knows, from `cache` where it lies there; without apt or a network the one
     that does. LabError: there is none."""
-    kept = sorted(cache.glob("linux-image-*/unpacked"))
+    kept = sorted(cache.glob("linux-image-*/unpacked"), key=by_version)
     try:
         name = wanted()
         if not (cache / name / "unpacked").exists():
@@ -73,6 +73,11 @@ def provide(cache: Path) -> Kernel:
         if not kept:
             raise
         return found_in(kept[-1].parent)
+
+
+def by_version(mark: Path) -> list[int]:
+    """6.1.0-56 is behind 6.1.0-9."""
+    return [int(number) for number in re.findall(r"\d+", mark.parent.name)]
 
 
 def found_in(folder: Path) -> Kernel:

@@ -28,6 +28,8 @@ MEMORY_MB = 3072
 # On a busy host one kernel in five dies in its first steps, before it says anything (QEMU 7.2).
 BOOT_SECONDS, BOOTS = 120.0, 4  # of the host's, until the guest's first word; at most so many
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
+COMMAND_LINE_SIZE = 2048  # of the kernel on x86; what is beyond is cut off
+END_SECONDS = 30.0  # from a guest's last line to the end of QEMU
 KERNEL_ARGUMENTS = (
     *("console=ttyS0", "quiet", "loglevel=3", "panic=-1", "rdinit=/init"),
     *("nokaslr", "norandmaps", "random.trust_cpu=on"),  # one run is to be as another
@@ -50,15 +52,22 @@ def version() -> str:
 
 def command(kernel: Kernel, root: Path, results: Path, job: Mapping[str, object]) -> list[str]:
     """`sleep=off`: where nothing runs in the guest, its clock goes on at once to the next timer.
-    All of its memory is there before it starts: a disk would answer in the host's time."""
+    All of its memory is there before it starts: a disk would answer in the host's time. LabError:
+    the job is too long."""
     encoded = base64.b64encode(json.dumps(job).encode()).decode()
+    said = " ".join((*KERNEL_ARGUMENTS, f"RTLAB_JOB={encoded}"))
+    if len(said) >= COMMAND_LINE_SIZE:
+        raise LabError(
+            f"the guest is told its work in {len(said)} characters, and understands"
+            f" {COMMAND_LINE_SIZE - 1}: fewer --options, or a shorter path of the working copy"
+        )
     return [
         program(),
         *("-nodefaults", "-no-user-config", "-display", "none", "-no-reboot"),
         *("-accel", "tcg", "-icount", f"shift={SHIFT},sleep=off", "-rtc", "clock=vm"),
         *("-cpu", "max", "-smp", "1", "-m", str(MEMORY_MB), "-seed", "1"),
         *("-kernel", str(kernel.image), "-initrd", str(root)),
-        *("-append", " ".join((*KERNEL_ARGUMENTS, f"RTLAB_JOB={encoded}"))),
+        *("-append", said),
         *("-chardev", "stdio,id=console,signal=off", "-serial", "chardev:console"),
         *("-serial", f"file:{results}"),
     ]
@@ -71,14 +80,16 @@ class Guest:
         self.results = results
         self.started = time.monotonic()
         self.limit = seconds
-        self.process = subprocess.Popen(
-            arguments,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            start_new_session=True,  # a Ctrl-C in the terminal is ours: we end it
-            preexec_fn=end_with_parent(os.getpid()),
-        )
+        self.errors = results.with_name("errors")
+        with self.errors.open("wb") as errors:  # a pipe that nobody reads would stop it when full
+            self.process = subprocess.Popen(
+                arguments,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=errors,
+                start_new_session=True,  # a Ctrl-C in the terminal is ours: we end it
+                preexec_fn=end_with_parent(os.getpid()),
+            )
 
     @property
     def seconds(self) -> float:
@@ -108,9 +119,13 @@ class Guest:
 
     def answer(self) -> dict[str, Any]:
         """What the guest wrote at its end. LabError: nothing, or that it failed."""
-        _, errors = self.process.communicate(timeout=30.0)
+        try:
+            self.process.communicate(timeout=END_SECONDS)
+        except subprocess.TimeoutExpired:
+            raise LabError(f"QEMU did not end within {END_SECONDS:.0f} s of its guest") from None
         if self.process.returncode != 0:
-            said = errors.decode(errors="replace").strip().splitlines() or ["it said nothing"]
+            errors = self.errors.read_text(errors="replace")
+            said = errors.strip().splitlines() or ["it said nothing"]
             raise LabError(f"QEMU ended with status {self.process.returncode}: {said[0]}")
         return understood(self.results.read_text(errors="replace"))
 
