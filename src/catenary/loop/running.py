@@ -33,6 +33,7 @@ from catenary.loop.diagnosis import (
     state_error,
 )
 from catenary.loop.error_watch import ErrorWatch
+from catenary.loop.interpreter import prompt_interpreter
 from catenary.loop.laws.runner import LawRunner
 from catenary.loop.publishing import Publisher
 from catenary.loop.rehearsal import fitting_rehearsal
@@ -157,6 +158,8 @@ class Running:
         """From SAFE-OP to OP: the cycle starts, and valid outputs flow while the states change.
         `origin_ns`: an instant of the grid to keep to."""
         self._attached.enter_context(self.main.attached(self.service.runner, self._abandon))
+        if self.plan.cycle.order == "inline" and self.engine.scheduling != "virtual time":
+            self._attached.enter_context(prompt_interpreter())
         self.engine.start(origin_ns)
         self._opened = True
         self.service.start()
