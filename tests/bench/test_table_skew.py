@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import json
 
+import pytest
+
 from catenary.bench.tables import skew
 from catenary.bench.tables.sheet import Options, as_json
+from catenary.errors import CatenaryError
+from catenary.virtual import DigitalOutputs
 
 
 def test_outputs_switch_together_with_sync0_and_later_by_the_line_without() -> None:
@@ -24,3 +28,9 @@ def test_outputs_switch_together_with_sync0_and_later_by_the_line_without() -> N
 def test_the_same_in_every_run() -> None:
     once, again = (skew.run(skew.make_line(real_crystals=True), 0.02, dc=True) for _ in range(2))
     assert once == again
+
+
+def test_outputs_that_are_never_taken_over_end_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(DigitalOutputs, "outputs_taken_ns", property(lambda self: None))
+    with pytest.raises(CatenaryError, match="taken over 0 times in 1 s"):
+        skew.run(skew.make_line(real_crystals=False), 0.02, dc=False)

@@ -17,9 +17,11 @@ from catenary.bench.clocks import DRIFT_PERIOD, DRIFT_PPM, LOCK_TIMEOUT, PPM
 from catenary.bench.statistics import summarise
 from catenary.bench.tables.published import SKEW, SKEW_CONDITIONS, Spread, spread_of
 from catenary.bench.tables.sheet import Options, Sheet, grid
+from catenary.errors import CatenaryError
 from catenary.virtual import Coupler, Crystal, DigitalOutputs, Segment, Servo
 
 DRIVES, PERIOD, SECONDS = 3, 1e-3, 10.0
+PATIENCE = 1.0  # [s] of virtual time
 STAMP_JITTER, SEED = 100e-9, 1  # [s] over which a controller's time stamp scatters
 WAYS = {
     "SYNC0, exact crystals": (True, False),
@@ -100,6 +102,11 @@ def run(segment: Segment, seconds: float, *, dc: bool) -> Found:
                 outputs.bits[:] = cycle.number % 2
                 if len(skews) * PERIOD >= seconds:
                     break
+                if cycle.time > 2 * seconds + PATIENCE:
+                    raise CatenaryError(
+                        f"the outputs of {first.name} and {last.name} were taken over {len(skews)}"
+                        f" times in {cycle.time:.0f} s of virtual time"
+                    )
     skew_us = np.array(skews) * 1e-3
     return Found(len(skews), summarise(skew_us), summarise(abs(skew_us)))
 
