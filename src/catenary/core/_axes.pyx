@@ -23,7 +23,6 @@ from catenary.core._guard cimport (
     guard_controlword,
     guard_mode,
     guard_observe,
-    guard_operate,
     guard_request,
     guard_setpoints,
     guard_stop,
@@ -79,7 +78,8 @@ cdef inline void read_position(axis_t *a, const uint8_t *inputs, double elapsed)
         a.velocity = (a.position - before) / elapsed if a.known else 0.0
 
 
-cdef inline void read_axis(axes_t *x, axis_t *a, const uint8_t *inputs, int64_t instant) noexcept nogil:
+cdef inline void read_axis(axes_t *x, axis_t *a, const uint8_t *inputs,
+                           int64_t instant) noexcept nogil:
     a.status = <uint16_t>number_bits(&a.statusword, inputs)
     a.state = cia402_state(a.status)
     a.mode_shown = a.mode
@@ -158,8 +158,9 @@ cdef void axes_tell(axes_t *x, actual_t *out) noexcept nogil:
 
 # ---- outputs
 
-cdef inline bint is_new(put_t *put, double value) noexcept nogil:
-    """Most set-points of most cycles stand in the image already: those of the other modes."""
+cdef inline bint takes(put_t *put, double value) noexcept nogil:
+    """Whether it is another one. Most set-points of most cycles stand in the image already: those of
+    the other modes."""
     if value == put.value:
         return False
     put.value = value
@@ -175,14 +176,29 @@ cdef inline void write_axis(axis_t *a, uint8_t *outputs, uint16_t controlword) n
         if a.mode_target.present:
             number_put_bits(&a.mode_target, outputs, <uint64_t><int64_t>a.mode)
     if a.target_position.present and a.known:
-        if is_new(&a.put_position, a.commanded_position):
+        if takes(&a.put_position, a.commanded_position):
             a.put_position.cut = number_put_wrapped(&a.target_position, outputs, a.commanded_position)
-    if a.target_velocity.present and is_new(&a.put_velocity, a.commanded_velocity):
+    if a.target_velocity.present and takes(&a.put_velocity, a.commanded_velocity):
         a.put_velocity.cut = number_put_value(&a.target_velocity, outputs, a.commanded_velocity)
-    if a.target_torque.present and is_new(&a.put_torque, a.commanded_torque):
+    if a.target_torque.present and takes(&a.put_torque, a.commanded_torque):
         a.put_torque.cut = number_put_value(&a.target_torque, outputs, a.commanded_torque)
     if a.put_position.cut or a.put_velocity.cut or a.put_torque.cut:
         a.flags |= LIMITED
+
+
+cdef inline void lead_axis(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil:
+    """The controlword towards its goal, and the set-points as they are commanded."""
+    write_axis(a, x.image.outputs, guard_controlword(x, a, bits))
+
+
+cdef inline bint hear_stop(axes_t *x) noexcept nogil:
+    """Whether a stop was asked for since the last time; then all axes are told."""
+    cdef uint32_t asked = cat_load_acquire32(&x.stop_asked)
+    if asked == x.stop_seen:
+        return False
+    x.stop_seen = asked
+    guard_stop(x)
+    return True
 
 
 cdef void write_columns(axes_t *x, const target_t *t) noexcept nogil:
@@ -207,8 +223,7 @@ cdef void axes_write(axes_t *x, const target_t *target, bint fresh) noexcept nog
     """Before emit: the committed targets, as far as they count → the output image. `fresh`: they
     were not there at the last instant."""
     cdef axis_t *a
-    cdef uint32_t i, asked = cat_load_acquire32(&x.stop_asked)
-    cdef uint16_t controlword
+    cdef uint32_t i
     x.limited = 0
     x.refused = 0
     if target.header.hold:
@@ -223,14 +238,11 @@ cdef void axes_write(axes_t *x, const target_t *target, bint fresh) noexcept nog
     for i in range(x.axis_count):
         guard_mode(&x.axes[i], target.mode[i])
         guard_request(x, &x.axes[i], target, i)
-    if asked != x.stop_seen:
-        x.stop_seen = asked
-        guard_stop(x)
+    hear_stop(x)
     for i in range(x.axis_count):
         a = &x.axes[i]
         guard_setpoints(x, a, target, i, fresh)
-        controlword = guard_controlword(x, a, target.controlword_bits[i])
-        write_axis(a, x.image.outputs, controlword)
+        lead_axis(x, a, target.controlword_bits[i])
         if a.flags & LIMITED:
             x.limited = 1
         if a.flags & REFUSED:
@@ -246,15 +258,11 @@ cdef void axes_hear(axes_t *x, const target_t *target, bint fresh) noexcept nogi
     """Behind a write that was made ahead of its instant: stops and, where `fresh` orders came since,
     goals that take power away, and control bits of axes that work. What gives power or resets waits
     for the next write, set-points and all."""
-    cdef uint8_t *outputs = x.image.outputs
     cdef axis_t *a
-    cdef uint32_t i, asked = cat_load_acquire32(&x.stop_asked)
-    if asked != x.stop_seen:
-        x.stop_seen = asked
-        guard_stop(x)
+    cdef uint32_t i
+    if hear_stop(x):
         for i in range(x.axis_count):
-            a = &x.axes[i]
-            write_axis(a, outputs, guard_controlword(x, a, target.controlword_bits[i]))
+            lead_axis(x, &x.axes[i], target.controlword_bits[i])
         return
     if not fresh:
         return
@@ -262,9 +270,9 @@ cdef void axes_hear(axes_t *x, const target_t *target, bint fresh) noexcept nogi
         a = &x.axes[i]
         if target.request[i] != a.request and takes_power(target, i):
             guard_take_request(x, a, target, i)
-            write_axis(a, outputs, guard_controlword(x, a, target.controlword_bits[i]))
+            lead_axis(x, a, target.controlword_bits[i])
         elif guard_works(a):
-            write_axis(a, outputs, guard_operate(a, target.controlword_bits[i]))
+            lead_axis(x, a, target.controlword_bits[i])
 
 
 cdef void axes_rehearse(const axes_t *x, const target_t *target) noexcept nogil:
@@ -279,40 +287,39 @@ cdef void axes_rehearse(const axes_t *x, const target_t *target) noexcept nogil:
     axes_write(shadow, target, True)
 
 
-cdef inline void hold_target(target_t *target, uint32_t i, double position) noexcept nogil:
-    target.position[i] = position
-    target.velocity[i] = 0.0
-    target.torque[i] = 0.0
-
-
-cdef void axes_follow(const axes_t *x, const actual_t *actual, target_t *target) noexcept nogil:
-    """Targets of axes that are not followed: the actual position, no velocity, no torque. From what
-    was told: the application's axes are those of the cycle it has seen.
+cdef inline void follow(target_t *target, uint32_t i, bint followed, uint64_t since, double position,
+                        double commanded_position, double commanded_velocity) noexcept nogil:
+    """The target of an axis that is not followed: the actual position, no velocity, no torque.
 
     An axis that has become followed since the last commit starts from what it is commanded: what
     was written before cannot have been meant for it. Its torque stays: it is what the axis was
     enabled with.
     """
+    if not followed:
+        target.position[i] = position
+        target.velocity[i] = 0.0
+        target.torque[i] = 0.0
+    elif since > target.header.seen:
+        target.position[i] = commanded_position
+        target.velocity[i] = commanded_velocity
+
+
+cdef void axes_follow(const axes_t *x, const actual_t *actual, target_t *target) noexcept nogil:
+    """The application's targets, from what was told: its axes are those of the cycle it has seen."""
     cdef uint32_t i
     for i in range(x.axis_count):
-        if not actual.flags[i] & FOLLOWED:
-            hold_target(target, i, actual.position[i])
-        elif actual.followed_since[i] > target.header.seen:
-            target.position[i] = actual.commanded_position[i]
-            target.velocity[i] = actual.commanded_velocity[i]
+        follow(target, i, actual.flags[i] & FOLLOWED, actual.followed_since[i], actual.position[i],
+               actual.commanded_position[i], actual.commanded_velocity[i])
 
 
 cdef void axes_follow_now(const axes_t *x, target_t *target) noexcept nogil:
-    """The same for the targets of a law, from how the axes stand now."""
+    """A law's targets, from how the axes stand now."""
     cdef const axis_t *a
     cdef uint32_t i
     for i in range(x.axis_count):
         a = &x.axes[i]
-        if not a.followed:
-            hold_target(target, i, a.position)
-        elif a.followed_since > target.header.seen:
-            target.position[i] = a.commanded_position
-            target.velocity[i] = a.commanded_velocity
+        follow(target, i, a.followed, a.followed_since, a.position,
+               a.commanded_position, a.commanded_velocity)
 
 
 # ---- the edge

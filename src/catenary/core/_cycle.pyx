@@ -112,9 +112,13 @@ cdef inline record_t *record_of(cycle_t *c) noexcept nogil:
     return &c.records[c.number & c.records_mask]
 
 
+cdef inline record_t *next_record(cycle_t *c) noexcept nogil:
+    return &c.records[(c.number + 1) & c.records_mask]
+
+
 cdef void clear_next_record(cycle_t *c) noexcept nogil:
     """Behind a cycle, and not at the head of the next one."""
-    cdef record_t *record = &c.records[(c.number + 1) & c.records_mask]
+    cdef record_t *record = next_record(c)
     memset(record, 0, sizeof(record_t))
     record.period_ns = -1
     record.receive_ns = -1
@@ -195,7 +199,7 @@ cdef void cycle_prepare(cycle_t *c) noexcept nogil:
         compute_ahead(c, actual)
     else:
         rehearse(c, actual, left)
-    c.records[(c.number + 1) & c.records_mask].wake_ns = 0  # fetched
+    next_record(c).wake_ns = 0  # fetched
     if c.image.rehearse != NULL:
         c.image.rehearse(c.image.self)
     take_early(c, actual)
@@ -294,11 +298,12 @@ cdef inline void judge(cycle_t *c) noexcept nogil:
             c.flags |= WORKING_COUNTER
 
 
-cdef void close_header(cycle_t *c, actual_t *actual) noexcept nogil:
-    """What is said of the cycle beside its values, in the header and in the log."""
+cdef void tell(cycle_t *c, actual_t *actual) noexcept nogil:
+    """What is said of the cycle beside its values: of the axes, in the header and in the log."""
     cdef actual_header_t *header = actual.header
     cdef record_t *record = record_of(c)
     cdef uint32_t unit
+    axes_tell(c.axes, actual)
     if c.axes.limited:
         c.flags |= LIMITED_SOME
         c.limits += 1
@@ -442,8 +447,7 @@ cdef void cycle_threaded(cycle_t *c) noexcept nogil:
         c.flags |= UNCOMMITTED
         c.uncommitted += 1
     collect(c, actual, c.wake + c.collect_deadline)
-    axes_tell(c.axes, actual)
-    close_header(c, actual)
+    tell(c, actual)
     handover_publish(c.handover)
     published = now(c)
     handover_wake(c.handover)
@@ -587,8 +591,7 @@ cdef void cycle_law(cycle_t *c) noexcept nogil:
     c.law_flags = 0
     if c.law != NULL:
         law_tell(c.law)
-    axes_tell(c.axes, actual)
-    close_header(c, actual)
+    tell(c, actual)
     handover_publish(c.handover)
     handover_wake(c.handover)
     tail(c, sent, actual, target)
@@ -597,8 +600,7 @@ cdef void cycle_law(cycle_t *c) noexcept nogil:
 cdef void cycle_inputs(cycle_t *c, actual_t *actual) noexcept nogil:
     """inline, after the wait."""
     collect(c, actual, 0)
-    axes_tell(c.axes, actual)
-    close_header(c, actual)
+    tell(c, actual)
 
 
 cdef void cycle_usable(cycle_t *c) noexcept nogil:

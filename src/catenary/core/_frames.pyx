@@ -29,7 +29,6 @@ from catenary.core._numbers cimport IMAGE_PADDING
 cdef enum:
     SOURCE = 6                 # offset of the source address
     SOURCE_PROCESSED = 0x02    # set in its first byte by the first controller passed
-    ETHERTYPE = 12
     ETHERCAT_HEADER = 14
     DATAGRAMS = 16
     HEADER = 10                # of a datagram
@@ -473,7 +472,8 @@ cdef class Frames:
         c.every = frame.every
         c.phase = frame.phase
         memcpy(c.template, <const uint8_t *>template, len(template))
-        check(is_ours(self.c.frames[0].template, c.template), f"frame {number}: another source than frame 0")
+        check(is_ours(self.c.frames[0].template, c.template),
+              f"frame {number}: another source than frame 0")
 
     def make_datagram(self, uint32_t number, frame, plan, uint32_t copies):
         where = f"frame {number}, datagram at {plan.offset}"

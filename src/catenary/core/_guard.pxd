@@ -56,11 +56,10 @@ cdef inline bint guard_works(const axis_t *a) noexcept nogil:
     """It follows, and nothing else is wanted: its controlword is known."""
     return a.followed and a.goal == ENABLED and a.state == OPERATION_ENABLED and not a.clear_reset
 
-cdef inline uint16_t guard_operate(axis_t *a, uint16_t bits) noexcept nogil:
-    """Of an axis that works."""
+cdef inline uint16_t guard_controlword(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil:
+    """Once a cycle: an edge of bit 7 is kept from being lost. Of an axis that works as often as one
+    likes."""
+    if not guard_works(a):
+        return guard_lead(x, a, bits)
     a.command = OPERATE
     return OPERATE | (bits & (MODE_BITS | FREE_BITS))
-
-cdef inline uint16_t guard_controlword(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil:
-    """Once a cycle: an edge of bit 7 is kept from being lost."""
-    return guard_operate(a, bits) if guard_works(a) else guard_lead(x, a, bits)
