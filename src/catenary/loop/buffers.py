@@ -17,6 +17,8 @@ AXIS_BUFFERS = (
     "mode_actual",
     "axis_state",
     "axis_flags",
+    "stop_reason",
+    "stop_cycle",
     "target_position",
     "target_velocity",
     "target_torque",

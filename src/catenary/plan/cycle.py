@@ -13,6 +13,7 @@ from typing import Literal
 Order = Literal["threaded", "inline", "law"]
 ReceiveMode = Literal["look", "wait", "spin"]
 FollowedClock = Literal["reference", "main"]
+OnLoss = Literal["quick_stop", "disable", "csp_hold"]
 
 
 class NumberKind(IntEnum):
@@ -114,6 +115,9 @@ class AxisLimits:
     position_max: float | None = None  # [rad]
     velocity: float | None = None  # [rad/s], symmetric; in CSP it bounds the step per cycle
     torque: float | None = None  # [N·m], symmetric
+    # [rad] largest difference between two CSP set-points; a larger one is refused.
+    # None: max(0.1, 2 · velocity · period · cycles between the two)
+    step: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,9 +139,15 @@ class AxisPlan:
     actual_position: Number | None = None  # 0x6064
     actual_velocity: Number | None = None  # 0x606C
     actual_torque: Number | None = None  # 0x6077
+    position_demand: Number | None = None  # 0x6062
+    torque_demand: Number | None = None  # 0x6074
+    velocity_offset: Number | None = None  # 0x60B1, where the application writes it as a column
     limits: AxisLimits = AxisLimits()
-    ramp_velocity: float = 100.0  # [rad/s²] at which CSV falls to zero when Python is late
-    ramp_torque: float = 1000.0  # [N·m/s] at which CST falls to zero when Python is late
+    # Shape of fallback and return, never of the application's set-points (docs/safety.md)
+    acceleration: float = 25.0  # [rad/s²] on return to the set-points
+    deceleration: float = 25.0  # [rad/s²] to standstill, and before a position limit in CSV
+    torque_slope: float | None = None  # [N·m/s] on return to the set-points in CST; None: at once
+    on_loss: OnLoss = "quick_stop"  # reaction when the core stops the axis
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,8 +188,11 @@ class CyclePlan:
     output_columns: tuple[Column, ...] = ()
     input_columns: tuple[Column, ...] = ()
     lost_limit: int = 3  # cycles in a row before WorkingCounterError
-    late_limit_position_ns: int = 50_000_000  # CSP; 0: off
-    late_limit_velocity_ns: int = 10_000_000  # CSV and CST; 0: off
+    # Without fresh set-points for this long (at least 3 cycles): quick stop. 0: off, not in CST
+    late_limit_position_ns: int = 50_000_000  # CSP
+    late_limit_velocity_ns: int = 50_000_000  # CSV
+    late_limit_torque_ns: int = 10_000_000  # CST
+    handover_ns: int = 20_000_000  # CST keeps its torque for this long after a law or stream ended
     stop_deadline_ns: int = 2_000_000_000  # quick stop to standstill, at most
     lead_ns: int = 0  # inline, law: awake that long before the instant
     log_cycles: int = 1000  # how far the log reaches back

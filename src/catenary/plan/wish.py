@@ -20,6 +20,7 @@ Words = npt.NDArray[np.uint16]
 Serials = npt.NDArray[np.uint32]
 Bytes = npt.NDArray[np.uint8]
 Modes = npt.NDArray[np.int8]
+Cycles = npt.NDArray[np.uint64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,10 +97,13 @@ class Views:
     statusword: Words  # (n,)
     mode_actual: Modes  # (n,)
     axis_state: Bytes  # (n,) CiA 402 state, wire.cia402.State
-    # axis_flags (n,): bit 0: set-points are followed; 1: the last one was limited; 2: the goal
-    # dropped to disabled by itself; 3: the target was NaN or infinite and refused; 4: no fresh
-    # target: holding or ramping to zero; bits 6 and 7: the goal in force
+    # axis_flags (n,): bit 0: set-points are followed; 1: the last one was limited; 2: the core
+    # stopped the axis; 3: the target was refused (NaN, infinite, further than the step limit);
+    # 4: no fresh target: fallback; 5: the drive refused the last mode change; bits 6 and 7: the
+    # requested state in force
     axis_flags: Bytes
+    stop_reason: Bytes  # (n,) plan.stop_reason.StopReason of the last stop, 0 after a new request
+    stop_cycle: Cycles  # (n,) number of the cycle of that stop
     target_position: Reals
     target_velocity: Reals
     target_torque: Reals
