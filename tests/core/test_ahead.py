@@ -34,7 +34,7 @@ SWITCHED_ON, FAULT = 3, 7  # states
 
 def running(lead_ns: int, *, mode: int = CSP, order: str = "inline") -> Bench:
     """On a link with a clock of its own, enabled."""
-    axes = [axis(k, mode=mode, ramp_torque=100.0) for k in range(2)]
+    axes = [axis(k, mode=mode, torque_slope=100.0) for k in range(2)]
     plan = make_plan(axes, order=order, priority=None, lead_ns=lead_ns)
     b = Bench(plan, link_type=TickingLink)
     b.ask(GOAL_ENABLED)

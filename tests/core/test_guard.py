@@ -22,6 +22,7 @@ from catenary.core import (
     GOAL_RESET,
 )
 from catenary.plan.cycle import AxisLimits, SyncUnit
+from catenary.plan.stop_reason import StopReason
 from tests.core.rig import CSP, CST, CSV, MS, Bench, ScriptedDrive, axis, bench
 
 ORDERS = ("threaded", "inline")
@@ -114,16 +115,27 @@ def test_a_torque_is_there_when_the_brake_opens() -> None:
     assert seen == {1: 0, 2: 0, 3: 0, OE: 500}
 
 
-@pytest.mark.parametrize("quantity", ["target_velocity", "target_torque"])
-def test_no_velocity_and_no_torque_before_it_is_followed(quantity: str) -> None:
-    mode = CSV if quantity == "target_velocity" else CST
-    b = bench(axis(0, mode=mode), drives=[ScriptedDrive(follows=False)])
+def test_no_velocity_before_it_is_followed() -> None:
+    b = bench(axis(0, mode=CSV), drives=[ScriptedDrive(follows=False)])
     b.ask(GOAL_ENABLED)
     for _ in range(10):
-        getattr(b, quantity)[0] = 1.0
+        b.target_velocity[0] = 1.0
         b.engine.next()
     assert b.drives[0].state == OE
-    assert getattr(b.drives[0], quantity) == 0
+    assert b.drives[0].target_velocity == 0
+
+
+def test_the_torque_goes_on_while_an_open_brake_waits_for_bit_12() -> None:
+    b = bench(axis(0, mode=CST), drives=[ScriptedDrive(follows=False)])
+    b.ask(GOAL_ENABLED)
+    sent = []
+    for _ in range(20):
+        b.target_torque[0] = 1.0
+        b.engine.next()
+        if b.drives[0].state == OE:
+            sent.append(b.drives[0].target_torque)
+    assert not followed(b)
+    assert set(sent) == {1000}  # 0 N·m would drop a load
 
 
 @pytest.mark.parametrize("drive", [ScriptedDrive(follows=False), ScriptedDrive(mode_shown=1)])
@@ -178,7 +190,7 @@ def test_bit_12_that_comes_after_all_drops_the_goal_once() -> None:
     b.steps(12)
     assert followed(b)
     b.drives[0].follows = False
-    b.steps(2)
+    b.steps(5)
     assert not followed(b)  # it has the bit: without it nothing counts
 
 
@@ -423,16 +435,8 @@ def test_late_python_holds_a_position_and_stops_after_50_ms() -> None:
     assert b.engine.counters["uncommitted"] == 100
 
 
-@pytest.mark.parametrize(
-    ("mode", "quantity", "ramp"),
-    [(CSV, "target_velocity", "ramp_velocity"), (CST, "target_torque", "ramp_torque")],
-)
-def test_late_python_lets_velocity_and_torque_ramp_to_zero(
-    mode: int, quantity: str, ramp: str
-) -> None:
-    b = driving(mode, **{ramp: 100.0})  # 0.1 a cycle
-    getattr(b, quantity)[0] = 1.0
-    b.engine.next()
+def noting(b: Bench, quantity: str) -> list[int]:
+    """Note what the drive receives in every cycle."""
     sent: list[int] = []
     exchange = b.drives[0].exchange
 
@@ -442,15 +446,55 @@ def test_late_python_lets_velocity_and_torque_ramp_to_zero(
         return inputs
 
     b.drives[0].exchange = note  # type: ignore[method-assign]
-    b.engine.spend(9 * MS)
-    assert sent == [900, 800, 700, 600, 500, 400, 300, 200, 100]
-    assert b.drives[0].state == OE
+    return sent
+
+
+def test_late_python_decelerates_a_velocity_and_returns_within_the_acceleration() -> None:
+    b = driving(CSV, deceleration=100.0, acceleration=200.0)  # 0.1 and 0.2 rad/s a cycle
+    b.target_velocity[0] = 1.0
     b.engine.next()
-    assert getattr(b.drives[0], quantity) == 1000  # back in time
-    b.engine.spend(12 * MS)
+    sent = noting(b, "target_velocity")
+    b.engine.spend(5 * MS)
+    assert sent == [900, 800, 700, 600, 500]
+    assert b.drives[0].state == OE
+    b.steps(4)
+    assert sent[5:] == [700, 900, 1000, 1000]
+    b.engine.spend(52 * MS)
     b.steps(3)
     assert dropped(b)
+    assert b.stop_reason[0] == StopReason.UNDERRUN
     assert b.drives[0].state == 1
+
+
+def test_late_python_keeps_a_torque_until_the_drive_has_left_operation_enabled() -> None:
+    b = driving(CST)
+    b.target_torque[0] = 0.5
+    b.engine.next()
+    sent = noting(b, "target_torque")
+    b.engine.spend(9 * MS)
+    assert sent == [500] * 9
+    assert b.drives[0].state == OE
+    b.engine.next()
+    assert followed(b)
+    sent.clear()
+    b.engine.spend(10 * MS)
+    assert sent == [500] * 10  # the last frame carries the quick stop
+    assert b.drives[0].state != OE
+    b.steps(3)
+    assert b.stop_reason[0] == StopReason.UNDERRUN
+    assert b.drives[0].state == 1
+    assert b.drives[0].target_torque == 0
+
+
+def test_a_torque_returns_within_its_slope() -> None:
+    b = driving(CST, torque_slope=100.0)  # 0.1 N·m a cycle
+    b.target_torque[0] = 0.5
+    b.engine.next()
+    sent = noting(b, "target_torque")
+    b.engine.spend(2 * MS)
+    b.target_torque[0] = 0.8
+    b.steps(5)
+    assert sent == [500, 500, 600, 700, 800, 800, 800]
 
 
 def test_a_late_limit_of_zero_is_off() -> None:
@@ -488,20 +532,21 @@ def test_a_position_that_is_no_number_is_refused(order: str, value: float) -> No
     assert b.axis_flags[0] & AXIS_REFUSED
     assert b.drives[0].target_position == 250
     b.target_position[0] = 0.26
-    b.steps(2)
+    b.steps(60)
     assert not b.axis_flags[0] & (AXIS_REFUSED | AXIS_FALLBACK)
     assert b.drives[0].target_position == 260
 
 
 def test_refused_for_too_long_is_a_quick_stop() -> None:
-    b = driving(CSV, ramp_velocity=100.0)
+    b = driving(CSV, deceleration=100.0)
     b.target_velocity[0] = 1.0
     b.engine.next()
     b.target_velocity[0] = np.nan
     b.steps(3)
     assert b.drives[0].target_velocity == 700
-    b.steps(20)
+    b.steps(55)
     assert dropped(b)
+    assert b.stop_reason[0] == StopReason.REFUSED
     assert b.drives[0].state == 1
 
 
@@ -510,7 +555,8 @@ def test_refused_for_too_long_is_a_quick_stop() -> None:
 
 @pytest.mark.parametrize("order", ORDERS)
 def test_a_position_is_clamped_and_so_is_its_step(order: str) -> None:
-    limits = AxisLimits(position_min=-0.5, position_max=0.5, velocity=100.0)  # 0.1 a cycle
+    # 0.1 rad a cycle
+    limits = AxisLimits(position_min=-0.5, position_max=0.5, velocity=100.0, step=20.0)
     b = driving(CSP, order=order, limits=limits)
     b.target_position[0] = 3.0
     steps = []
@@ -560,7 +606,7 @@ def test_velocity_and_torque_are_clamped() -> None:
 
 
 def test_a_velocity_comes_to_rest_at_the_position_limit() -> None:
-    b = driving(CSV, limits=AxisLimits(position_max=1.0, velocity=5.0), ramp_velocity=50.0)
+    b = driving(CSV, limits=AxisLimits(position_max=1.0, velocity=5.0), deceleration=50.0)
     drive = b.drives[0]
     for _ in range(2000):
         b.target_velocity[0] = 5.0

@@ -18,7 +18,7 @@ LIMITS = AxisLimits(position_min=-0.05, position_max=0.05, velocity=20.0, torque
 
 def running(lead_ns: int, *, mode: int = 8) -> Bench:
     """Inline on a link with a clock of its own, asked to enable."""
-    axes = [axis(k, mode=mode, limits=LIMITS, ramp_torque=100.0) for k in range(2)]
+    axes = [axis(k, mode=mode, limits=LIMITS, torque_slope=100.0) for k in range(2)]
     plan = make_plan(axes, order="inline", priority=None, lead_ns=lead_ns)
     b = Bench(plan, link_type=TickingLink)
     b.ask(GOAL_ENABLED)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from catenary.core import CYCLE_DRY, Stream
+from catenary.plan.stop_reason import StopReason
 from tests.core.rig import CSV, Bench, axis, bench
 from tests.core.test_law import Frame, make_law
 
@@ -40,23 +41,26 @@ def test_one_row_a_cycle_whatever_python_writes(order: str) -> None:
 
 
 @pytest.mark.parametrize("order", ["threaded", "inline"])
-def test_dry_holds_says_so_and_goes_on(order: str) -> None:
+def test_an_empty_stream_is_an_underrun_that_is_reported_and_ends(order: str) -> None:
     b, stream = streaming(order)
     b.steps(3)
     assert stream.dry == 0  # not begun: nothing was promised yet
     stream.write(rows(0.001), b.engine.number)
-    b.steps(200)  # longer than any late limit
+    b.steps(45)  # less than the late limit
     assert b.drives[0].target_position == 1
     assert b.drives[0].state == 4
     assert b.engine.next() & CYCLE_DRY
-    assert stream.dry > 190
+    assert stream.dry > 40
     stream.write(rows(0.002), b.engine.number)
-    b.steps(1)
+    b.steps(20)
     assert b.drives[0].target_position == 2
+    b.steps(60)
+    assert b.stop_reason[0] == StopReason.UNDERRUN
+    assert b.drives[0].state == 1
 
 
-def test_dry_velocity_goes_to_zero() -> None:
-    b = bench(axis(0, mode=CSV, ramp_velocity=10.0))
+def test_the_velocity_of_an_empty_stream_goes_to_zero() -> None:
+    b = bench(axis(0, mode=CSV, deceleration=10.0))
     b.ask(1)
     for _ in range(12):
         b.target_velocity[:] = 0.0
@@ -127,6 +131,8 @@ def test_no_row_is_torn_lost_or_doubled_between_two_threads() -> None:
     seen = []
     while stream.taken < count:
         before = stream.taken
+        if not stream.waiting:
+            continue
         b.engine.next()
         if stream.taken != before:
             seen.append(b.target_position[0])

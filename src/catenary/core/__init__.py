@@ -6,6 +6,7 @@ from catenary.core._axes import (
     AXIS_FALLBACK,
     AXIS_FOLLOWED,
     AXIS_LIMITED,
+    AXIS_MODE_REFUSED,
     AXIS_REFUSED,
 )
 from catenary.core._cia402 import (
@@ -54,6 +55,7 @@ __all__ = [
     "AXIS_FALLBACK",
     "AXIS_FOLLOWED",
     "AXIS_LIMITED",
+    "AXIS_MODE_REFUSED",
     "AXIS_REFUSED",
     "CYCLE_AHEAD",
     "CYCLE_CLOCKS",

@@ -4,12 +4,13 @@ from catenary.core._handover cimport actual_t, target_t
 from catenary.core._native cimport cat_image
 from catenary.core._numbers cimport number_t
 
-cdef enum:  # bits of axis_flags; 6 and 7: the goal in force
+cdef enum:  # bits of axis_flags; 6 and 7: the requested state in force
     FOLLOWED = 1
     LIMITED = 2
     DROPPED = 4
     REFUSED = 8
     FALLBACK = 16
+    MODE_REFUSED = 32
     GOAL_SHIFT = 6
 
 cdef enum:
@@ -33,14 +34,21 @@ cdef struct axis_t:
     number_t actual_position
     number_t actual_velocity
     number_t actual_torque
+    number_t position_demand   # 0x6062
+    number_t torque_demand     # 0x6074
+    number_t velocity_offset   # 0x60B1, where the application writes it
     uint32_t unit
+    uint32_t divider           # its unit is exchanged every `divider` cycles
     double position_min
     double position_max
     double velocity_limit
     double torque_limit
-    double ramp_velocity       # [rad/s²]
-    double ramp_torque         # [N·m/s]
+    double step_limit          # [rad] of a CSP set-point; 0: by velocity limit and time
+    double acceleration        # [rad/s²] of return
+    double deceleration        # [rad/s²] of fallback
+    double torque_slope        # [N·m/s] of return
     double standstill          # [rad/s] at most: at rest
+    uint8_t on_loss
     # observed
     uint8_t known              # its inputs were valid once
     uint8_t lost               # its unit was invalid lost_limit times in a row
@@ -48,29 +56,53 @@ cdef struct axis_t:
     int8_t mode_shown
     uint16_t status
     uint32_t invalid_in_row    # exchanges of its unit
-    int64_t read_at            # instant of its last valid inputs [ns]
+    int64_t read_at            # cycle start of its last valid inputs [ns]
     uint32_t still_cycles      # in a row, at rest
     uint64_t last_raw
-    int64_t counts             # last_raw without going round
+    int64_t counts             # last_raw unwrapped to 64 bits
     double position
     double velocity
     double torque
-    # asked
-    uint32_t request           # the last one taken over
-    uint8_t goal
+    double demand_position
+    double demand_torque
+    # requested
+    uint32_t request           # number of the last request taken over
+    uint8_t goal               # requested state in force
     uint16_t command           # command bits of the controlword sent last
-    int8_t mode
+    int8_t mode                # in force: its set-points are followed
+    int8_t mode_wanted         # sent in 0x6060
+    int8_t mode_refused        # by the drive, until another one is requested
     uint8_t armed              # the application has committed targets since the request
-    uint8_t stopping           # the goal dropped: stop by quick stop rather than by disabling
+    uint8_t stopping           # the core stopped it: quick stop rather than disable operation
+    uint8_t holding            # the core stopped it and holds it in CSP (on_loss)
     uint8_t clear_reset        # bit 7 is kept clear once, so that it makes an edge
     uint8_t followed
+    uint8_t worked             # was followed since OPERATION_ENABLED or since a mode change
     uint8_t tells              # bit 12 was seen: the drive has it
+    uint8_t followed_at_stop   # bit 12 was shown when the stop began
     uint8_t flags
+    uint8_t stop_reason
+    uint64_t stop_cycle
     uint64_t followed_since    # cycle
     uint32_t climbing_cycles   # since the request, not followed yet
+    uint32_t waiting_cycles    # powered, to be enabled, not followed
     uint32_t mute_cycles       # followed but for bit 12; stays at the limit
-    uint32_t refused_cycles    # in a row, the target was not finite
+    uint32_t gap_cycles        # bit 12 was shown and is missing
+    uint32_t stop_cycles       # in OPERATION_ENABLED since the stop
+    uint32_t refused_cycles    # in a row, the target was refused
     uint32_t beyond_cycles     # in a row, outside a position limit and leaving
+    # set-points: the last accepted one of CSP, and the way back to them
+    double setpoint            # [rad]
+    double setpoint_velocity   # [rad/s] between the last two
+    double previous_velocity   # [rad/s] between the two before
+    double ghost               # [rad] set-point that the core continues in a fallback
+    double ghost_velocity      # [rad/s]
+    uint64_t setpoint_stamp    # cycle it was meant for
+    uint32_t fallback_cycles   # in a row without one
+    uint8_t accepted           # 0, 1, 2: that many or more since followed
+    uint8_t returning          # the command is on its way back to the set-points
+    double command_velocity    # of the commanded position [rad/s]
+    double offset_sent         # 0x60B1 of the application [rad/s]
     # sent
     uint8_t written            # the output image has all of it
     uint16_t controlword_sent  # all of its bits
@@ -96,20 +128,31 @@ cdef struct axes_t:
     column_t *input_columns
     column_t *output_columns
     double period              # [s]
-    uint32_t lost_limit        # the following in cycles; 0: off
+    uint64_t number            # cycle whose inputs were read, or whose outputs are computed
+    uint32_t lost_limit        # this and the following in cycles; 0: off
     uint32_t late_limit_position
     uint32_t late_limit_velocity
+    uint32_t late_limit_torque
+    uint32_t handover_limit    # CST keeps its torque in a hand-over
+    uint32_t keep_limit        # CSP keeps its velocity in an underrun
+    uint32_t mode_limit        # 0x6061 shows the requested mode
+    uint32_t gap_limit         # bit 12 lost
+    uint32_t stop_patience     # quick stop shows an effect
+    uint32_t stop_patience_torque
+    uint32_t cut_patience      # disable operation shows an effect
+    uint32_t stop_limit        # a ramp of the drive takes at most this long
     uint32_t climbing_limit
     uint32_t mute_limit
     uint32_t still_limit
     uint32_t beyond_limit
-    uint32_t uncommitted       # instants in a row without new targets
+    uint32_t uncommitted       # cycles in a row without new targets
+    uint32_t handed_over       # cycles in a row of a hand-over
     uint32_t stop_asked        # counts; from any thread
     uint32_t stop_seen
     uint8_t running            # an application commits targets
     uint8_t limited            # of the last write
     uint8_t refused
-    uint8_t dropped            # since the last read
+    uint8_t dropped            # since the last read: an axis was stopped, or a mode refused
     uint32_t moving
     axes_t *shadow
 
@@ -120,7 +163,8 @@ cdef class Axes:
     cdef cat_image shadow_image
 
 cdef void axes_read(axes_t *x, actual_t *out, uint64_t number, int64_t instant) noexcept nogil
-cdef void axes_write(axes_t *x, const target_t *target, bint fresh) noexcept nogil
+cdef void axes_write(axes_t *x, const target_t *target, bint fresh, uint64_t number) noexcept nogil
+cdef void axes_hand_over(axes_t *x) noexcept nogil
 cdef void axes_hear(axes_t *x, const target_t *target, bint fresh) noexcept nogil
 cdef void axes_rehearse(const axes_t *x, const target_t *target) noexcept nogil
 cdef void axes_tell(axes_t *x, actual_t *out) noexcept nogil

@@ -20,6 +20,9 @@ from catenary.core._cia402 cimport (
     cia402_state,
 )
 from catenary.core._guard cimport (
+    CSP,
+    CST,
+    NO_MODE,
     guard_controlword,
     guard_mode,
     guard_observe,
@@ -48,13 +51,21 @@ AXIS_LIMITED = LIMITED
 AXIS_DROPPED = DROPPED
 AXIS_REFUSED = REFUSED
 AXIS_FALLBACK = FALLBACK
+AXIS_MODE_REFUSED = MODE_REFUSED
 
-cdef double STANDSTILL_RATIO = 0.01    # of the velocity limit
-cdef double STANDSTILL = 0.05          # [rad/s] where there is no limit
-STILL_NS = 5_000_000                   # at rest for so long: stopped
-BEYOND_NS = 20_000_000                 # CSV: outside a limit and leaving for so long: quick stop
+cdef double STANDSTILL = 0.05          # [rad/s]
+STILL_NS = 5_000_000                   # at rest for this long: stopped
+BEYOND_NS = 20_000_000                 # CSV: outside a limit and leaving for this long: stop
 CLIMBING_NS = 10_000_000_000           # a request to enable lapses
 MUTE_NS = 1_000_000_000                # without bit 12: longer than a brake takes to open
+KEEP_NS = 10_000_000                   # CSP keeps its velocity in an underrun
+MODE_NS = 100_000_000                  # 0x6061 shows the requested mode
+GAP_NS = 10_000_000                    # bit 12 lost: the axis is given up
+STOP_NS = 50_000_000                   # a quick stop shows an effect
+STOP_TORQUE_NS = 20_000_000            # the same in CST
+CUT_NS = 20_000_000                    # disable operation shows an effect
+LATE_CYCLES = 3                        # least number of cycles of a late limit
+ON_LOSS = {"quick_stop": 0, "disable": 1, "csp_hold": 2}
 
 
 # ---- inputs
@@ -78,6 +89,16 @@ cdef inline void read_position(axis_t *a, const uint8_t *inputs, double elapsed)
         a.velocity = (a.position - before) / elapsed if a.known else 0.0
 
 
+cdef inline double demand_error(axis_t *a, const uint8_t *inputs) noexcept nogil:
+    """Return demanded minus actual position; both count modulo the width of their types."""
+    cdef int64_t raw
+    if a.position_demand.kind == REAL_KIND or a.actual_position.kind == REAL_KIND:
+        return number_value(&a.position_demand, inputs) - a.position
+    raw = number_integer(&a.position_demand, inputs) - <int64_t>a.last_raw
+    raw = (raw << a.position_demand.right) >> a.position_demand.right
+    return <double>raw * a.position_demand.scale
+
+
 cdef inline void read_axis(axes_t *x, axis_t *a, const uint8_t *inputs,
                            int64_t instant) noexcept nogil:
     a.status = <uint16_t>number_bits(&a.statusword, inputs)
@@ -91,6 +112,10 @@ cdef inline void read_axis(axes_t *x, axis_t *a, const uint8_t *inputs,
         read_position(a, inputs, (instant - a.read_at) * 1e-9)
     if a.actual_torque.present:
         a.torque = number_value(&a.actual_torque, inputs)
+    if a.position_demand.present:
+        a.demand_position = a.position + demand_error(a, inputs)
+    if a.torque_demand.present:
+        a.demand_torque = number_value(&a.torque_demand, inputs)
     a.known = 1
     a.read_at = instant
     if -a.standstill <= a.velocity <= a.standstill:
@@ -120,6 +145,7 @@ cdef void axes_read(axes_t *x, actual_t *out, uint64_t number, int64_t instant) 
     cdef axis_t *a
     cdef uint32_t i
     cdef uint8_t before
+    x.number = number
     for i in range(x.axis_count):
         a = &x.axes[i]
         before = a.state
@@ -153,6 +179,8 @@ cdef void axes_tell(axes_t *x, actual_t *out) noexcept nogil:
         out.mode[i] = a.mode_shown
         out.state[i] = a.state
         out.enabled[i] = a.followed
+        out.stop_reason[i] = a.stop_reason
+        out.stop_cycle[i] = a.stop_cycle
         out.flags[i] = a.flags | (FOLLOWED if a.followed else 0) | (a.goal << GOAL_SHIFT)
 
 
@@ -168,13 +196,13 @@ cdef inline bint takes(put_t *put, double value) noexcept nogil:
 
 
 cdef inline void write_axis(axis_t *a, uint8_t *outputs, uint16_t controlword) noexcept nogil:
-    if controlword != a.controlword_sent or a.mode != a.mode_sent or not a.written:
+    if controlword != a.controlword_sent or a.mode_wanted != a.mode_sent or not a.written:
         a.written = 1
         a.controlword_sent = controlword
-        a.mode_sent = a.mode
+        a.mode_sent = a.mode_wanted
         number_put_bits(&a.controlword, outputs, controlword)
         if a.mode_target.present:
-            number_put_bits(&a.mode_target, outputs, <uint64_t><int64_t>a.mode)
+            number_put_bits(&a.mode_target, outputs, <uint64_t><int64_t>a.mode_wanted)
     if a.target_position.present and a.known:
         if takes(&a.put_position, a.commanded_position):
             a.put_position.cut = number_put_wrapped(&a.target_position, outputs, a.commanded_position)
@@ -219,20 +247,40 @@ cdef void write_columns(axes_t *x, const target_t *t) noexcept nogil:
             number_put_bits(&c.number, x.image.outputs, t.output_bits[c.rank] != 0)
 
 
-cdef void axes_write(axes_t *x, const target_t *target, bint fresh) noexcept nogil:
-    """Before emit: the committed targets, as far as they count → the output image. `fresh`: they
-    were not there at the last instant."""
+cdef void write_velocity_offsets(axes_t *x) noexcept nogil:
+    """After the columns: while an axis does not follow its set-points, 0x60B1 is the velocity of
+    its command."""
+    cdef axis_t *a
+    cdef uint32_t i
+    for i in range(x.axis_count):
+        a = &x.axes[i]
+        if not a.velocity_offset.present:
+            continue
+        if a.followed and not a.flags & FALLBACK:
+            a.offset_sent = number_value(&a.velocity_offset, x.image.outputs)
+            continue
+        a.offset_sent = 0.0
+        number_put_value(&a.velocity_offset, x.image.outputs,
+                         a.command_velocity if a.mode == CSP else 0.0)
+
+
+cdef void axes_write(axes_t *x, const target_t *target, bint fresh, uint64_t number) noexcept nogil:
+    """Write the committed targets, as far as they count, into the output image of cycle `number`.
+    `fresh`: they were committed since the last cycle."""
     cdef axis_t *a
     cdef uint32_t i
     x.limited = 0
     x.refused = 0
+    x.number = number
     if target.header.hold:
         x.running = 0
         x.uncommitted = 0
+        x.handed_over += 1
         fresh = False
     elif fresh:
         x.running = 1
         x.uncommitted = 0
+        x.handed_over = 0
     else:
         x.uncommitted += 1
     for i in range(x.axis_count):
@@ -248,6 +296,14 @@ cdef void axes_write(axes_t *x, const target_t *target, bint fresh) noexcept nog
         if a.flags & REFUSED:
             x.refused = 1
     write_columns(x, target)
+    write_velocity_offsets(x)
+
+
+cdef void axes_hand_over(axes_t *x) noexcept nogil:
+    """The source of the set-points changes: commands return to the new ones without a jump."""
+    cdef uint32_t i
+    for i in range(x.axis_count):
+        x.axes[i].returning = x.axes[i].accepted > 0
 
 
 cdef inline bint takes_power(const target_t *target, uint32_t i) noexcept nogil:
@@ -284,42 +340,47 @@ cdef void axes_rehearse(const axes_t *x, const target_t *target) noexcept nogil:
     shadow.axes = copies
     shadow.image = image
     memcpy(copies, x.axes, x.axis_count * sizeof(axis_t))
-    axes_write(shadow, target, True)
+    axes_write(shadow, target, True, x.number)
 
 
-cdef inline void follow(target_t *target, uint32_t i, bint followed, uint64_t since, double position,
-                        double commanded_position, double commanded_velocity) noexcept nogil:
-    """The target of an axis that is not followed: the actual position, no velocity, no torque.
+cdef inline void follow(target_t *target, uint32_t i, bint followed, uint64_t since,
+                        double commanded_position, double commanded_velocity,
+                        double commanded_torque) noexcept nogil:
+    """Set the target of an axis that is not followed to what is sent to it.
 
-    An axis that has become followed since the last commit starts from what it is commanded: what
-    was written before cannot have been meant for it. Its torque stays: it is what the axis was
-    enabled with.
+    An axis that has become followed since the last commit starts from what is commanded: what was
+    written before cannot have been meant for it. Its torque stays: the axis was enabled with it.
     """
     if not followed:
-        target.position[i] = position
-        target.velocity[i] = 0.0
-        target.torque[i] = 0.0
+        target.position[i] = commanded_position
+        target.velocity[i] = commanded_velocity
+        target.torque[i] = commanded_torque
     elif since > target.header.seen:
         target.position[i] = commanded_position
         target.velocity[i] = commanded_velocity
 
 
 cdef void axes_follow(const axes_t *x, const actual_t *actual, target_t *target) noexcept nogil:
-    """The application's targets, from what was told: its axes are those of the cycle it has seen."""
+    """Adapt the application's targets to the cycle that it sees."""
     cdef uint32_t i
+    cdef double position
     for i in range(x.axis_count):
-        follow(target, i, actual.flags[i] & FOLLOWED, actual.followed_since[i], actual.position[i],
-               actual.commanded_position[i], actual.commanded_velocity[i])
+        position = actual.position[i]
+        if actual.state[i] == OPERATION_ENABLED:
+            position = actual.commanded_position[i]
+        follow(target, i, actual.flags[i] & FOLLOWED, actual.followed_since[i], position,
+               actual.commanded_velocity[i], actual.commanded_torque[i])
 
 
 cdef void axes_follow_now(const axes_t *x, target_t *target) noexcept nogil:
-    """A law's targets, from how the axes stand now."""
+    """Adapt a law's targets to how the axes are now."""
     cdef const axis_t *a
     cdef uint32_t i
     for i in range(x.axis_count):
         a = &x.axes[i]
-        follow(target, i, a.followed, a.followed_since, a.position,
-               a.commanded_position, a.commanded_velocity)
+        follow(target, i, a.followed, a.followed_since,
+               a.commanded_position if a.state == OPERATION_ENABLED else a.position,
+               a.commanded_velocity, a.commanded_torque)
 
 
 # ---- the edge
@@ -357,20 +418,34 @@ cdef class Axes:
             raise MemoryError
         self.c.period = plan.period_ns / 1e9
         self.c.lost_limit = min(plan.lost_limit, 0x7FFFFFFF)
-        self.c.late_limit_position = cycles_of(
-            plan.late_limit_position_ns, plan.period_ns, "late_limit_position_ns"
-        )
-        self.c.late_limit_velocity = cycles_of(
-            plan.late_limit_velocity_ns, plan.period_ns, "late_limit_velocity_ns"
-        )
+        self.make_limits_in_time(plan)
         self.c.climbing_limit = cycles_of(CLIMBING_NS, plan.period_ns, "")
         self.c.mute_limit = max(cycles_of(MUTE_NS, plan.period_ns, ""), 1)
         self.c.still_limit = max(cycles_of(STILL_NS, plan.period_ns, ""), 3)
         self.c.beyond_limit = cycles_of(BEYOND_NS, plan.period_ns, "")
         for axis in plan.axes:
             self.make_axis(axis, plan)
+            if axis.mode == CST and self.c.late_limit_torque == 0:
+                raise ValueError("late_limit_torque_ns: 0 would keep a stale torque without limit")
         self.c.input_count = self.make_columns(plan.input_columns, plan.input_size, True)
         self.c.output_count = self.make_columns(plan.output_columns, plan.output_size, False)
+
+    def make_limits_in_time(self, plan):
+        def limit(name):
+            cycles = cycles_of(getattr(plan, name), plan.period_ns, name)
+            return max(cycles, LATE_CYCLES) if cycles else 0
+
+        self.c.late_limit_position = limit("late_limit_position_ns")
+        self.c.late_limit_velocity = limit("late_limit_velocity_ns")
+        self.c.late_limit_torque = limit("late_limit_torque_ns")
+        self.c.handover_limit = max(cycles_of(plan.handover_ns, plan.period_ns, "handover_ns"), 1)
+        self.c.keep_limit = max(cycles_of(KEEP_NS, plan.period_ns, ""), LATE_CYCLES)
+        self.c.mode_limit = max(cycles_of(MODE_NS, plan.period_ns, ""), 4)
+        self.c.gap_limit = cycles_of(GAP_NS, plan.period_ns, "")
+        self.c.stop_patience = cycles_of(STOP_NS, plan.period_ns, "")
+        self.c.stop_patience_torque = cycles_of(STOP_TORQUE_NS, plan.period_ns, "")
+        self.c.cut_patience = max(cycles_of(CUT_NS, plan.period_ns, ""), 1)
+        self.c.stop_limit = cycles_of(plan.stop_deadline_ns, plan.period_ns, "stop_deadline_ns")
 
     def make_axis(self, plan, cycle):
         name = f"axis {plan.name}"
@@ -400,9 +475,14 @@ cdef class Axes:
         make_number(&a.actual_position, plan.actual_position, inputs, f"{name} actual_position")
         make_number(&a.actual_velocity, plan.actual_velocity, inputs, f"{name} actual_velocity")
         make_number(&a.actual_torque, plan.actual_torque, inputs, f"{name} actual_torque")
+        make_number(&a.position_demand, plan.position_demand, inputs, f"{name} position_demand")
+        make_number(&a.torque_demand, plan.torque_demand, inputs, f"{name} torque_demand")
+        make_number(&a.velocity_offset, plan.velocity_offset, outputs, f"{name} velocity_offset")
         self.make_limits(plan, name)
         a.unit = plan.sync_unit
-        a.mode = plan.mode
+        a.divider = cycle.sync_units[plan.sync_unit].every
+        a.mode = a.mode_wanted = plan.mode
+        a.mode_refused = NO_MODE
         a.mode_shown = 0
         a.position = a.velocity = a.torque = NAN
         a.put_position.value = a.put_velocity.value = a.put_torque.value = NAN
@@ -419,11 +499,14 @@ cdef class Axes:
             raise ValueError(f"{name}: position limits without an actual position")
         a.velocity_limit = finite_or(limits.velocity, INFINITY, f"{name} velocity limit")
         a.torque_limit = finite_or(limits.torque, INFINITY, f"{name} torque limit")
-        a.ramp_velocity = finite_or(plan.ramp_velocity, INFINITY, f"{name} ramp_velocity")
-        a.ramp_torque = finite_or(plan.ramp_torque, INFINITY, f"{name} ramp_torque")
+        a.step_limit = finite_or(limits.step, 0.0, f"{name} step limit")
+        a.acceleration = finite_or(plan.acceleration, INFINITY, f"{name} acceleration")
+        a.deceleration = finite_or(plan.deceleration, INFINITY, f"{name} deceleration")
+        a.torque_slope = finite_or(plan.torque_slope, INFINITY, f"{name} torque_slope")
         a.standstill = STANDSTILL
-        if limits.velocity is not None:
-            a.standstill = STANDSTILL_RATIO * a.velocity_limit
+        if plan.on_loss not in ON_LOSS:
+            raise ValueError(f"{name} on_loss: {plan.on_loss!r}, must be one of {', '.join(ON_LOSS)}")
+        a.on_loss = ON_LOSS[plan.on_loss]
 
     def make_columns(self, columns, image_size, bint inputs):
         cdef column_t *c = self.c.input_columns if inputs else self.c.output_columns

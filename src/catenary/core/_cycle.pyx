@@ -24,6 +24,7 @@ from libc.string cimport memcpy, memset
 
 from catenary.core._axes cimport (
     axes_follow_now,
+    axes_hand_over,
     axes_hear,
     axes_read,
     axes_rehearse,
@@ -223,7 +224,7 @@ cdef void compute_ahead(cycle_t *c, actual_t *actual) noexcept nogil:
     cdef bint fresh
     cdef target_t *target = take_orders(c, &fresh)
     fresh = step_law(c, actual, target, c.number + 1, c.next, now(c))
-    axes_write(c.axes, target, fresh)
+    axes_write(c.axes, target, fresh, c.number + 1)
     c.ahead = 1
 
 
@@ -351,23 +352,26 @@ cdef void send(cycle_t *c) noexcept nogil:
 
 cdef void emit(cycle_t *c, const target_t *target, bint fresh) noexcept nogil:
     """The compiled half before the wire: targets → images → frames."""
-    axes_write(c.axes, target, fresh)
+    axes_write(c.axes, target, fresh, c.number)
     send(c)
 
 
 cdef bint take_streamed(cycle_t *c, target_t *target, bint fresh) noexcept nogil:
-    """Set-points that were written ahead come before the application's. Whether there are fresh
-    ones; where the stream has run dry the axes hold."""
+    """Take the next row of the stream, if there is one. Return True for fresh set-points; an empty
+    stream is an underrun."""
     cdef stream_t *stream = c.stream
     c.dry = 0
+    target.header.streamed = 0
     if stream == NULL:
         return fresh
     if stream_take(stream, target):
         target.header.hold = 0
+        target.header.streamed = 1
+        target.header.stamp = c.number
         return True
     if stream.taken == 0:
         return fresh
-    target.header.hold = 1
+    target.header.hold = 0
     c.dry = 1
     return False
 
@@ -500,6 +504,7 @@ cdef void end_law(cycle_t *c, uint32_t status) noexcept nogil:
         return
     c.handover.target[c.handover.target_triple.front].header.hold = 1
     c.handover.target[OF_LAW].header.hold = 1
+    axes_hand_over(c.axes)
     if status != RUNNING:
         law_end(c.law, status, c.number)
     c.law = NULL
@@ -526,6 +531,7 @@ cdef bint step_law(cycle_t *c, actual_t *actual, target_t *target, uint64_t numb
     axes_follow_now(c.axes, target)
     take_streamed(c, target, False)
     target.header.hold = 0
+    target.header.stamp = number
     target.header.seen = number  # the law has read them: a streamed row passes through its hands
     actual.header.ok = c.image.ok[0]
     memcpy(c.handover.target[BEFORE_LAW].header, target.header, c.handover.target_size)
@@ -615,6 +621,7 @@ cdef void cycle_outputs(cycle_t *c, target_t *target, bint application) noexcept
     cdef int64_t sent
     cdef actual_t *actual = &c.handover.actual[PRIVATE]
     target.header.seen = c.number
+    target.header.stamp = c.number
     target.header.hold = not application
     emit(c, target, take_streamed(c, target, True))
     sent = now(c)

@@ -318,6 +318,7 @@ cdef class Engine(Parts):
         cdef target_t *target = &self.h.target[PRIVATE]
         target.header.hold = hold
         target.header.seen = self.h.actual[PRIVATE].header.number
+        target.header.stamp = target.header.seen + 1
         target.header.process_ns = -1
         if self.left >= 0 and not hold:
             target.header.process_ns = self.now_ns() - self.left

@@ -13,6 +13,9 @@ cdef enum:  # modes of operation, 0x6060
     CST = 10
 
 cdef enum:
+    NO_MODE = -128             # mode_refused: no mode was refused
+
+cdef enum:
     NO_QUANTITY = 0
     POSITION = 1
     VELOCITY = 2
@@ -28,12 +31,32 @@ cdef inline uint8_t quantity_of(int8_t mode) noexcept nogil:
     return NO_QUANTITY
 
 cdef enum:
-    MODE_BITS = 0x0270         # controlword bits 4, 5, 6, 9: the mode's, in OPERATION_ENABLED
-    FREE_BITS = 0xF800         # 11 to 15: the manufacturer's, always
-    OPERATE = 0x000F           # the command of an axis that works
+    MODE_BITS = 0x0270         # controlword bits 4, 5, 6, 9: defined by the mode
+    FREE_BITS = 0xF800         # controlword bits 11 to 15: the manufacturer's
+    OPERATE = 0x000F           # enable operation
+
+cdef enum:  # on_loss: reaction when the core stops an axis
+    LOSS_QUICK_STOP = 0
+    LOSS_DISABLE = 1
+    LOSS_CSP_HOLD = 2
+
+cdef enum:  # plan.stop_reason.StopReason
+    STOP_NONE = 0
+    STOP_UNDERRUN = 1
+    STOP_HANDOVER = 2
+    STOP_REFUSED = 3
+    STOP_POSITION_LIMIT = 4
+    STOP_NOT_FOLLOWING = 5
+    STOP_MODE_CHANGE = 6
+    STOP_NOT_ENABLED = 7
+    STOP_DEVICE_LOST = 8
+    STOP_LEFT_OPERATION = 9
+    STOP_FAULT = 10
+    STOP_REQUEST = 11
 
 cdef void guard_observe(axes_t *x, axis_t *a, uint8_t state_before,
                         uint64_t number) noexcept nogil
+cdef void guard_take_mode(axis_t *a, int8_t mode) noexcept nogil
 cdef void guard_take_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nogil
 cdef void guard_stop(axes_t *x) noexcept nogil
 cdef uint16_t guard_lead(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil
@@ -41,24 +64,22 @@ cdef void guard_setpoints(axes_t *x, axis_t *a, const target_t *t, uint32_t i,
                           bint fresh) noexcept nogil
 
 cdef inline void guard_mode(axis_t *a, int8_t mode) noexcept nogil:
-    """Takes the mode asked for over. Another one: what was written for the former counts no longer,
-    and the new one is not followed before the drive shows it."""
-    if mode != a.mode:
-        a.mode = mode
-        a.followed = 0
+    """Apply the requested mode of operation."""
+    if mode != a.mode_wanted or a.mode_refused != NO_MODE:
+        guard_take_mode(a, mode)
 
 cdef inline void guard_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nogil:
-    """An axis that works and is asked nothing new has nothing to take over."""
+    """Apply a new request; a no-op for an axis that works and has no new request."""
     if t.request[i] != a.request or (a.goal == ENABLED and not a.followed):
         guard_take_request(x, a, t, i)
 
 cdef inline bint guard_works(const axis_t *a) noexcept nogil:
-    """It follows, and nothing else is wanted: its controlword is known."""
+    """Return True if the axis follows its set-points and is to go on with it."""
     return a.followed and a.goal == ENABLED and a.state == OPERATION_ENABLED and not a.clear_reset
 
 cdef inline uint16_t guard_controlword(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil:
-    """Once a cycle: an edge of bit 7 is kept from being lost. Of an axis that works as often as one
-    likes."""
+    """Return the controlword for this cycle. Call it once per cycle while the axis does not work,
+    so that an edge of bit 7 is sent exactly once."""
     if not guard_works(a):
         return guard_lead(x, a, bits)
     a.command = OPERATE

@@ -42,20 +42,24 @@ cdef struct actual_t:
     double *input_reals
     int64_t *input_integers
     uint64_t *followed_since   # the cycle; of axes that are followed
+    uint64_t *stop_cycle
     uint16_t *statusword
     uint16_t *controlword      # as sent last
     uint16_t *unit_counter
     int8_t *mode
     uint8_t *state
     uint8_t *flags
+    uint8_t *stop_reason
     uint8_t *enabled           # bit 0 of flags, for laws
     uint8_t *input_bits
     uint8_t *unit_valid
 
 cdef struct target_header_t:
     uint64_t seen              # the cycle whose actual values the application had read
+    uint64_t stamp             # the cycle that the set-points are meant for
     int64_t process_ns         # what its body took
-    uint32_t hold              # no application: set-points do not count
+    uint32_t hold              # hand-over: no application commits set-points
+    uint32_t streamed          # the set-points are a row of a stream
 
 cdef struct target_t:
     target_header_t *header

@@ -47,12 +47,14 @@ cdef size_t lay_actual(actual_t *a, uint8_t *block, const counts_t *n) noexcept:
     a.input_reals = <double *>carve(&place, n.input_reals, 8)
     a.input_integers = <int64_t *>carve(&place, n.input_integers, 8)
     a.followed_since = <uint64_t *>carve(&place, n.axes, 8)
+    a.stop_cycle = <uint64_t *>carve(&place, n.axes, 8)
     a.statusword = <uint16_t *>carve(&place, n.axes, 2)
     a.controlword = <uint16_t *>carve(&place, n.axes, 2)
     a.unit_counter = <uint16_t *>carve(&place, n.units, 2)
     a.mode = <int8_t *>carve(&place, n.axes, 1)
     a.state = carve(&place, n.axes, 1)
     a.flags = carve(&place, n.axes, 1)
+    a.stop_reason = carve(&place, n.axes, 1)
     a.enabled = carve(&place, n.axes, 1)
     a.input_bits = carve(&place, n.input_bits, 1)
     a.unit_valid = carve(&place, n.units, 1)
@@ -185,6 +187,8 @@ cdef class Handover:
             "mode_actual": self.field(a.mode, n.axes, 1, b"b", False),
             "axis_state": self.field(a.state, n.axes, 1, b"B", False),
             "axis_flags": self.field(a.flags, n.axes, 1, b"B", False),
+            "stop_reason": self.field(a.stop_reason, n.axes, 1, b"B", False),
+            "stop_cycle": self.field(a.stop_cycle, n.axes, 8, b"Q", False),
             "input_reals": self.field(a.input_reals, n.input_reals, 8, b"d", False),
             "input_integers": self.field(a.input_integers, n.input_integers, 8, b"q", False),
             "input_bits": self.field(a.input_bits, n.input_bits, 1, b"B", False),

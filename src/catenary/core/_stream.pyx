@@ -6,7 +6,7 @@ One thread writes, the cycle takes; neither waits for the other. Budget: 10 ns f
 
 from libc.stdint cimport uint32_t, uint64_t
 from libc.stdlib cimport calloc, free
-from libc.string cimport memcpy, memset
+from libc.string cimport memcpy
 
 from catenary.core._handover cimport target_t
 from catenary.core._native cimport cat_load_acquire64, cat_store_release64
@@ -21,14 +21,12 @@ cdef inline double *row_of(stream_t *s, uint64_t number) noexcept nogil:
 
 
 cdef bint stream_take(stream_t *s, target_t *target) noexcept nogil:
-    """The next row becomes the set-points. False: there is none; positions stay, and an axis that
-    was moving is to hold."""
+    """Make the next row the set-points. Return False if there is none."""
     cdef size_t size = s.axes * sizeof(double)
     cdef const double *row
     if cat_load_acquire64(&s.written) == s.taken:
         if s.taken:
             s.dry += 1
-            memset(target.velocity, 0, size)
         return False
     row = row_of(s, s.taken)
     memcpy(target.position, row, size)
