@@ -95,7 +95,7 @@ cdef struct axis_t:
     double setpoint            # [rad]
     double setpoint_velocity   # [rad/s] between the last two
     double previous_velocity   # [rad/s] between the two before
-    double ghost               # [rad] set-point that the core continues in a fallback
+    double ghost               # [rad] set-point of this cycle, continued by the core in a fallback
     double ghost_velocity      # [rad/s]
     uint64_t setpoint_stamp    # cycle it was meant for
     uint32_t fallback_cycles   # in a row without one

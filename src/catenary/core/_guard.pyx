@@ -218,6 +218,7 @@ cdef void prepare_mode(axis_t *a, int8_t mode) noexcept nogil:
 cdef void begin_setpoints(axis_t *a) noexcept nogil:
     """Forget the set-points so far: the axis stands at its command."""
     a.setpoint = a.commanded_position
+    a.ghost = a.commanded_position
     a.setpoint_velocity = 0.0
     a.previous_velocity = 0.0
     a.setpoint_stamp = 0
@@ -327,7 +328,7 @@ cdef void guard_observe(axes_t *x, axis_t *a, uint8_t state_before,
 
 cdef void return_to(axes_t *x, axis_t *a, double target, double velocity) noexcept nogil:
     """Move the command towards a moving set-point: velocity from the remaining distance."""
-    cdef double distance = target - a.commanded_position
+    cdef double distance = target - a.commanded_position - velocity * x.period
     cdef double step = a.acceleration * x.period
     cdef double catch_up
     if fabs(distance) <= step * x.period and fabs(a.command_velocity - velocity) <= step:
@@ -377,10 +378,7 @@ cdef inline double fallback_velocity(const axis_t *a) noexcept nogil:
 cdef void fall_back_position(axes_t *x, axis_t *a, bint keep) noexcept nogil:
     """Continue the set-points at their velocity, or decelerate them; the command tracks them."""
     if a.fallback_cycles == 1:
-        a.ghost = a.setpoint
         a.ghost_velocity = fallback_velocity(a) if a.accepted >= 2 else 0.0
-        if a.accepted == 0:
-            a.ghost = a.commanded_position
     if not keep:
         a.ghost_velocity = approach(a.ghost_velocity, 0.0, a.deceleration * x.period)
     a.ghost_velocity = towards_limits(a, a.ghost_velocity)
@@ -451,8 +449,8 @@ cdef void follow_position(axes_t *x, axis_t *a, const target_t *t, double target
     a.accepted = min(a.accepted + 1, 2)
     a.refused_cycles = 0
     a.fallback_cycles = 0
-    target += a.setpoint_velocity * x.period * <double>age
-    track(x, a, target, a.setpoint_velocity)
+    a.ghost = target + a.setpoint_velocity * x.period * <double>age
+    track(x, a, a.ghost, a.setpoint_velocity)
 
 
 cdef bint is_leaving(const axis_t *a) noexcept nogil:
