@@ -14,9 +14,8 @@ RECEIVE = ctypes.CFUNCTYPE(
 NOW = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
 WAIT_UNTIL = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int)
 SPEND = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_int64)
-REHEARSE = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
 
-VIRTUAL_TIME, SHARED_TIME, SPENDS, POLLS, FORETELLS, REHEARSES = 1, 2, 4, 8, 16, 32
+VIRTUAL_TIME, SHARED_TIME, SPENDS, POLLS, FORETELLS = 1, 2, 4, 8, 16
 
 
 class Table(ctypes.Structure):
@@ -33,7 +32,6 @@ class Table(ctypes.Structure):
         ("spend", SPEND),
         ("due", NOW),
         ("fd", ctypes.c_int),
-        ("rehearse", REHEARSE),
     )
 
 

@@ -30,8 +30,6 @@ from catenary.wire.frame import decode_frame, encode_frame
 from tests.link_table import (
     NOW,
     RECEIVE,
-    REHEARSE,
-    REHEARSES,
     SEND,
     WAIT_UNTIL,
     Table,
@@ -107,18 +105,12 @@ class ScriptedLink:
 
 
 class TickingLink(ScriptedLink):
-    """Like a NIC: time passes by itself, and a way to send can be rehearsed."""
+    """Like a NIC: time passes by itself."""
 
     def __init__(self, answer: Callable[[bytes], Sequence[tuple[int, bytes]]]) -> None:
         super().__init__(answer)
-        self.rehearsals: list[int] = []  # how many frames were sent before each
-        self.on_rehearsal: Callable[[int], None] | None = None  # instead of noting it
-        self.table.flags = REHEARSES
+        self.table.flags = 0
         self.table.now = NOW(self.tick)
-        self.table.rehearse = REHEARSE(self.rehearse)
-
-    def rehearse(self, _) -> None:
-        (self.on_rehearsal or self.rehearsals.append)(len(self.sent))
 
     def tick(self, _) -> int:
         self.time += TICK

@@ -16,7 +16,7 @@ from catenary.wire.datagram import Command, Datagram
 from catenary.wire.frame import decode_frame, encode_frame
 from tests.core.rig import Bench, al_status, axis, frame_plan, make_plan
 
-ORDERS = ("threaded", "inline", "law")
+ORDERS = ("threaded", "inline")
 
 
 def plan(order: str, **more: object) -> CyclePlan:

@@ -1,7 +1,5 @@
 """Fallback, return, mode changes and stops of one axis: the rows of docs/safety.md, in the core."""
 
-import math
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -22,7 +20,6 @@ from tests.core.rig import (
     CSP,
     CST,
     CSV,
-    DRIVE_SIZE,
     MS,
     NM,
     PERIOD,

@@ -1,4 +1,4 @@
-"""Iteration and its Cycle; the lead of an inline cycle."""
+"""Iteration and its Cycle; busy-wait before the cycle start."""
 
 import pytest
 
@@ -15,7 +15,7 @@ from tests.core.rig import (
     make_plan,
 )
 
-LEAD = 60_000  # [ns]
+BUSY_WAIT = 60_000  # [ns]
 
 
 def started(link: TickingLink, **more: object) -> Engine:
@@ -62,60 +62,25 @@ def test_what_the_judge_raises_ends_the_iteration() -> None:
         next(Iteration(b.engine, judge, trouble=CYCLE_OK, al_status=-1))
 
 
-def test_in_the_lead_the_thread_is_awake_and_rehearses_before_the_instant() -> None:
+def test_a_busy_wait_begins_before_the_cycle_start_and_ends_at_it() -> None:
     link = ticking()
-    engine = started(link, lead_ns=LEAD)
-    rehearsed: list[int] = []
-    engine.set_rehearsal(lambda: rehearsed.append(link.time))
+    engine = started(link, busy_wait_ns=BUSY_WAIT)
     engine.next()
     engine.next()
-    instants = [link.waits[-2] + LEAD, link.waits[-1] + LEAD]
-    assert instants[1] - instants[0] == PERIOD  # it sleeps until the lead begins
-    assert all(0 < at - seen < LEAD for at, seen in zip(instants, rehearsed, strict=True))
+    starts = [link.waits[-2] + BUSY_WAIT, link.waits[-1] + BUSY_WAIT]
+    assert starts[1] - starts[0] == PERIOD
     lateness = engine.histograms()["lateness"]
     assert 0 <= lateness["max"] <= 2 * TICK * 1e-3
     engine.stop()
 
 
-def test_woken_late_it_does_not_rehearse() -> None:
-    link = ticking()
-    engine = started(link, lead_ns=LEAD)
-    rehearsed: list[int] = []
-    engine.set_rehearsal(lambda: rehearsed.append(link.time))
-    wait = link.table_wait_until
-
-    def oversleep(_, deadline: int, wake_on_frame: int) -> int:
-        return wait(_, deadline + LEAD - 10 * TICK, wake_on_frame)
-
-    link.table.wait_until = type(link.table.wait_until)(oversleep)
-    engine.next()
-    engine.next()  # figures come with the outputs
-    assert rehearsed == []
-    assert engine.histograms()["lateness"]["max"] <= 2 * TICK * 1e-3
-    engine.stop()
-
-
-def test_what_the_rehearsal_raises_comes_out_and_the_engine_goes_on() -> None:
-    engine = started(ticking(), lead_ns=LEAD)
-
-    def interrupted() -> None:
-        raise KeyboardInterrupt
-
-    engine.set_rehearsal(interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        engine.next()
-    engine.set_rehearsal(None)
-    assert engine.next() & CYCLE_OK
-    engine.stop()
-
-
-def test_virtual_time_has_no_lead() -> None:
-    b = bench(axis(0), order="inline", lead_ns=LEAD)
+def test_virtual_time_has_no_busy_wait() -> None:
+    b = bench(axis(0), order="inline", busy_wait_ns=BUSY_WAIT)
     b.steps(2)
     assert b.link.waits == [PERIOD, 2 * PERIOD]
 
 
-@pytest.mark.parametrize("lead", [-1, PERIOD, MS * 1000])
-def test_a_lead_as_long_as_the_period_is_refused(lead: int) -> None:
-    with pytest.raises(ValueError, match="lead_ns"):
-        started(ticking(), lead_ns=lead)
+@pytest.mark.parametrize("busy_wait", [-1, PERIOD, MS * 1000])
+def test_a_busy_wait_as_long_as_the_period_is_refused(busy_wait: int) -> None:
+    with pytest.raises(ValueError, match="busy_wait_ns"):
+        started(ticking(), busy_wait_ns=busy_wait)

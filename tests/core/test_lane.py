@@ -15,7 +15,7 @@ def lane_frames(b: Bench) -> list[bytes]:
     return [f for f in b.link.sent if decode_frame(f).datagrams[0].index >= 0x80]
 
 
-@pytest.mark.parametrize("order", ["threaded", "inline", "law"])
+@pytest.mark.parametrize("order", ["threaded", "inline"])
 def test_a_frame_goes_out_after_the_cyclic_one_and_comes_back(order: str) -> None:
     b = bench(axis(0), order=order)
     b.engine.run(1)

@@ -37,7 +37,7 @@ from tests.core.rig import (
     number,
 )
 
-ORDERS = ("threaded", "inline", "law")
+ORDERS = ("threaded", "inline")
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 STEP = ctypes.CFUNCTYPE(
     ctypes.c_int,
@@ -187,8 +187,7 @@ def test_a_finished_law_leaves_the_axes_holding_and_python_where_it_ended(order:
         before = b.drives[0].target_position
     assert np.abs(np.diff(speeds)).max() <= 1  # no jump: 1 rad/s decelerates at 25 rad/s²
     assert speeds[-1] == 0
-    if order != "law":  # which takes no set-points of Python
-        assert before == round(asked * 1e3)
+    assert before == round(asked * 1e3)
     assert b.drives[0].state == 4
 
 
@@ -203,14 +202,6 @@ def test_run_law_goes_on_until_its_end(order: str) -> None:
         flags = b.engine.run_law(10 * MS, CYCLE_LAW_FAILED)
     assert flags & CYCLE_LAW_DONE
     assert law.figures["steps"] == pytest.approx(0.02 / (PERIOD * 1e-9), abs=2)
-
-
-def test_without_a_law_the_law_order_holds() -> None:
-    b = bench(axis(0), order="law")
-    b.enable()
-    b.target_position[0] = 1.0
-    b.steps(5)
-    assert b.drives[0].target_position == 0
 
 
 def failing(b: Bench, body: Callable[[Frame], int], **more: int) -> tuple[Law, int]:
@@ -371,13 +362,3 @@ def test_a_law_that_never_returns_is_given_up_and_the_bus_goes_on(
     assert b.engine.counters["lost"] == 0
     again = Law(address, [], [], budget_ns=0, overrun_limit=3, priority=0)
     assert again.rehearse(b"\0" * 64, b"\0" * 64) == 0  # its first steps do return
-
-
-def test_axes_hold_for_long_after_a_law_of_an_order_without_application() -> None:
-    b = bench(axis(0), order="law")
-    b.enable()
-    law = make_law(b, lambda frame: frame.time > 0.03)
-    b.engine.start_law(law)
-    b.steps(200)  # beyond every limit of targets that stay away
-    assert law.ended
-    assert b.drives[0].state == 4  # operation enabled

@@ -71,7 +71,7 @@ def opened(order: str, **options: object) -> tuple[Bench, Sink]:
     return b, sink
 
 
-@pytest.mark.parametrize("order", ["threaded", "inline", "law"])
+@pytest.mark.parametrize("order", ["threaded", "inline"])
 def test_every_cycle_once_with_what_was_known_and_sent(order: str) -> None:
     b, sink = opened(order)
     b.enable()
@@ -101,7 +101,7 @@ def test_it_comes_behind_the_frames_of_its_cycle(order: str) -> None:
     assert frames[-1] == len(sent)
 
 
-@pytest.mark.parametrize("order", ["threaded", "inline", "law"])
+@pytest.mark.parametrize("order", ["threaded", "inline"])
 def test_the_controlword_is_that_of_the_frames_of_its_cycle(order: str) -> None:
     on_the_wire: list[list[int]] = []
 

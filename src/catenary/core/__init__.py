@@ -19,7 +19,6 @@ from catenary.core._cia402 import (
 )
 from catenary.core._clocks import Clock, PhaseController
 from catenary.core._cycle import (
-    CYCLE_AHEAD,
     CYCLE_CLOCKS,
     CYCLE_DROPPED,
     CYCLE_DRY,
@@ -57,7 +56,6 @@ __all__ = [
     "AXIS_LIMITED",
     "AXIS_MODE_REFUSED",
     "AXIS_REFUSED",
-    "CYCLE_AHEAD",
     "CYCLE_CLOCKS",
     "CYCLE_DROPPED",
     "CYCLE_DRY",

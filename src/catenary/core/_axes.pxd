@@ -150,23 +150,17 @@ cdef struct axes_t:
     uint32_t stop_asked        # counts; from any thread
     uint32_t stop_seen
     uint8_t running            # an application commits targets
-    uint8_t limited            # of the last write
-    uint8_t refused
-    uint8_t dropped            # since the last read: an axis was stopped, or a mode refused
+    uint32_t told              # flags of the cycle that its axes set
     uint32_t moving
-    axes_t *shadow
 
 cdef class Axes:
     """Owns the axis records and column tables."""
     cdef axes_t c
-    cdef axes_t shadow         # what a rehearsed write works on
-    cdef cat_image shadow_image
 
 cdef void axes_read(axes_t *x, actual_t *out, uint64_t number, int64_t instant) noexcept nogil
 cdef void axes_write(axes_t *x, const target_t *target, bint fresh, uint64_t number) noexcept nogil
 cdef void axes_hand_over(axes_t *x) noexcept nogil
-cdef void axes_hear(axes_t *x, const target_t *target, bint fresh) noexcept nogil
-cdef void axes_rehearse(const axes_t *x, const target_t *target) noexcept nogil
+cdef void axes_apply_late(axes_t *x, const target_t *target, bint fresh) noexcept nogil
 cdef void axes_tell(axes_t *x, actual_t *out) noexcept nogil
 cdef void axes_follow(const axes_t *x, const actual_t *actual, target_t *target) noexcept nogil
 cdef void axes_follow_now(const axes_t *x, target_t *target) noexcept nogil

@@ -9,7 +9,6 @@ drive is led to a state _cia402's. Budget: 60 ns an axis and direction.
 from libc.math cimport INFINITY, NAN, isfinite
 from libc.stdint cimport int8_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 from libc.stdlib cimport calloc, free
-from libc.string cimport memcpy
 
 from catenary.core._cia402 cimport (
     ENABLED,
@@ -32,10 +31,10 @@ from catenary.core._guard cimport (
     guard_take_request,
     guard_works,
 )
+from catenary.core._handover cimport LIMITED_SOME, REFUSED_SOME
 from catenary.core._native cimport cat_load_acquire32
 from catenary.core._numbers cimport REAL as REAL_KIND
 from catenary.core._numbers cimport (
-    IMAGE_PADDING,
     make_number,
     number_bits,
     number_integer,
@@ -219,8 +218,8 @@ cdef inline void lead_axis(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil:
     write_axis(a, x.image.outputs, guard_controlword(x, a, bits))
 
 
-cdef inline bint hear_stop(axes_t *x) noexcept nogil:
-    """Whether a stop was asked for since the last time; then all axes are told."""
+cdef inline bint apply_stop(axes_t *x) noexcept nogil:
+    """Stop all axes if a stop was requested since the last call. Return True if so."""
     cdef uint32_t asked = cat_load_acquire32(&x.stop_asked)
     if asked == x.stop_seen:
         return False
@@ -237,12 +236,12 @@ cdef void write_columns(axes_t *x, const target_t *t) noexcept nogil:
         c = &x.output_columns[k]
         if c.bank == BANK_REAL:
             if not isfinite(t.output_reals[c.rank]):
-                x.refused = 1
+                x.told |= REFUSED_SOME
             elif number_put_value(&c.number, x.image.outputs, t.output_reals[c.rank]):
-                x.limited = 1
+                x.told |= LIMITED_SOME
         elif c.bank == BANK_INTEGER:
             if number_put_integer(&c.number, x.image.outputs, t.output_integers[c.rank]):
-                x.limited = 1
+                x.told |= LIMITED_SOME
         else:
             number_put_bits(&c.number, x.image.outputs, t.output_bits[c.rank] != 0)
 
@@ -269,8 +268,6 @@ cdef void axes_write(axes_t *x, const target_t *target, bint fresh, uint64_t num
     `fresh`: they were committed since the last cycle."""
     cdef axis_t *a
     cdef uint32_t i
-    x.limited = 0
-    x.refused = 0
     x.number = number
     if target.header.hold:
         x.running = 0
@@ -286,15 +283,15 @@ cdef void axes_write(axes_t *x, const target_t *target, bint fresh, uint64_t num
     for i in range(x.axis_count):
         guard_mode(&x.axes[i], target.mode[i])
         guard_request(x, &x.axes[i], target, i)
-    hear_stop(x)
+    apply_stop(x)
     for i in range(x.axis_count):
         a = &x.axes[i]
         guard_setpoints(x, a, target, i, fresh)
         lead_axis(x, a, target.controlword_bits[i])
         if a.flags & LIMITED:
-            x.limited = 1
+            x.told |= LIMITED_SOME
         if a.flags & REFUSED:
-            x.refused = 1
+            x.told |= REFUSED_SOME
     write_columns(x, target)
     write_velocity_offsets(x)
 
@@ -306,17 +303,17 @@ cdef void axes_hand_over(axes_t *x) noexcept nogil:
         x.axes[i].returning = x.axes[i].accepted > 0
 
 
-cdef inline bint takes_power(const target_t *target, uint32_t i) noexcept nogil:
+cdef inline bint removes_power(const target_t *target, uint32_t i) noexcept nogil:
     return target.goal[i] != ENABLED and target.goal[i] != RESET
 
 
-cdef void axes_hear(axes_t *x, const target_t *target, bint fresh) noexcept nogil:
-    """Behind a write that was made ahead of its instant: stops and, where `fresh` orders came since,
-    goals that take power away, and control bits of axes that work. What gives power or resets waits
-    for the next write, set-points and all."""
+cdef void axes_apply_late(axes_t *x, const target_t *target, bint fresh) noexcept nogil:
+    """Apply late stop requests to outputs that a law has computed: stops and, where orders are
+    fresh, requested states that remove power, and control bits of axes that work. What gives power
+    or resets waits for the next write, set-points and all."""
     cdef axis_t *a
     cdef uint32_t i
-    if hear_stop(x):
+    if apply_stop(x):
         for i in range(x.axis_count):
             lead_axis(x, &x.axes[i], target.controlword_bits[i])
         return
@@ -324,23 +321,11 @@ cdef void axes_hear(axes_t *x, const target_t *target, bint fresh) noexcept nogi
         return
     for i in range(x.axis_count):
         a = &x.axes[i]
-        if target.request[i] != a.request and takes_power(target, i):
+        if target.request[i] != a.request and removes_power(target, i):
             guard_take_request(x, a, target, i)
             lead_axis(x, a, target.controlword_bits[i])
         elif guard_works(a):
             lead_axis(x, a, target.controlword_bits[i])
-
-
-cdef void axes_rehearse(const axes_t *x, const target_t *target) noexcept nogil:
-    """A write to nowhere: what the next one needs is in the caches then."""
-    cdef axes_t *shadow = x.shadow
-    cdef axis_t *copies = shadow.axes
-    cdef cat_image *image = shadow.image
-    shadow[0] = x[0]
-    shadow.axes = copies
-    shadow.image = image
-    memcpy(copies, x.axes, x.axis_count * sizeof(axis_t))
-    axes_write(shadow, target, True, x.number)
 
 
 cdef inline void follow(target_t *target, uint32_t i, bint followed, uint64_t since,
@@ -410,12 +395,6 @@ cdef class Axes:
             raise MemoryError
         if plan.lost_limit < 1:
             raise ValueError(f"lost_limit: {plan.lost_limit}")
-        self.c.shadow = &self.shadow
-        self.shadow.axes = <axis_t *>calloc(len(plan.axes) + 1, sizeof(axis_t))
-        self.shadow.image = &self.shadow_image
-        self.shadow_image.outputs = <uint8_t *>calloc(plan.output_size + IMAGE_PADDING, 1)
-        if not (self.shadow.axes and self.shadow_image.outputs):
-            raise MemoryError
         self.c.period = plan.period_ns / 1e9
         self.c.lost_limit = min(plan.lost_limit, 0x7FFFFFFF)
         self.make_limits_in_time(plan)
@@ -524,7 +503,5 @@ cdef class Axes:
 
     def __dealloc__(self):
         free(self.c.axes)
-        free(self.shadow.axes)
-        free(self.shadow_image.outputs)
         free(self.c.input_columns)
         free(self.c.output_columns)

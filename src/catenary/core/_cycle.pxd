@@ -9,26 +9,9 @@ from catenary.core._law cimport law_t
 from catenary.core._native cimport cat_image, cat_link, cat_sink
 from catenary.core._stream cimport stream_t
 
-cdef enum:  # flags of a cycle
-    OK = 1
-    LATE = 2
-    LIMITED_SOME = 4
-    WORKING_COUNTER = 8
-    DROPPED_SOME = 16
-    REFUSED_SOME = 32
-    UNCOMMITTED = 64
-    LAW_DONE = 128
-    STOPPED = 256
-    NONE = 512
-    LAW_FAILED = 1024
-    DRY = 2048
-    CLOCKS = 4096
-    AHEAD = 8192
-
 cdef enum:
     THREADED = 0
     INLINE = 1
-    LAW = 2
 
 cdef enum:  # phases
     PERIOD = 0
@@ -39,7 +22,9 @@ cdef enum:  # phases
     TAIL = 5
     ROUND_TRIP = 6
     IN_CONTROLLER = 7
-    PHASES = 8
+    OUTPUT_DELAY = 8
+    INPUT_AGE = 9
+    PHASES = 10
 
 cdef enum:
     LOG_MARGIN = 24            # the writer is not overtaken while the log is copied
@@ -55,6 +40,8 @@ cdef struct record_t:
     int32_t send_ns
     int32_t tail_ns
     int32_t round_trip_ns
+    int32_t output_delay_ns
+    int32_t input_age_ns
     uint32_t flags
     uint32_t lost_in_row
     uint32_t skipped
@@ -72,52 +59,51 @@ cdef struct cycle_t:
     clock_t *clock             # NULL: no distributed clocks
     law_t *law                 # NULL: none runs
     law_t *law_asked           # NULL: none is to run
-    uint32_t law_request       # counts what was asked
+    uint32_t law_request       # counts the requests
     uint32_t law_seen
-    stream_t *stream           # NULL: the application or the law says the set-points
-    const cat_sink *sink       # NULL: nobody is given the cycles
+    stream_t *stream           # NULL: the application or the law computes the set-points
+    const cat_sink *sink       # NULL: none
     int order
-    bint patient               # a cycle may begin late within its period: engines that take turns
+    bint patient               # a cycle may begin at any time within its period: engines in turns
     int64_t period
-    int64_t lead               # inline, law: awake that long before the instant
-    int64_t collect_deadline
+    int64_t busy_wait          # before each cycle start
+    int64_t collect_deadline   # after the wake-up
+    int64_t law_reserve        # of the period, for the law and the post-processing
+    int64_t sync_margin        # from the cycle start to the frames, at most, with clocks
     uint32_t lost_limit
-    int64_t origin             # the first instant
-    int64_t next               # instant to wait for
-    int64_t scheduled          # instant of this cycle
+    int64_t origin             # the first cycle start
+    int64_t next               # cycle start to wait for
+    int64_t scheduled          # cycle start of this cycle
     int64_t wake
     int64_t interval           # since the last one; -1: none
     int64_t usable             # when Python had the inputs; 0: not known
+    int64_t sent               # when the last cyclic frame was handed to the kernel
+    int64_t turnaround         # wake-up → last frame seen, of the last whole cycle
     int64_t process            # of this cycle; -1: no application
+    int64_t input_age          # of this cycle; -1: not known
     uint64_t number
-    uint32_t skipped           # instants before this cycle
+    uint32_t skipped           # cycle starts before this cycle
     uint32_t lost_in_row
     uint32_t flags
-    uint32_t drops             # cycles so far with each of four things to say
-    uint32_t refusals
-    uint32_t limits
-    uint32_t dries
-    uint32_t dry               # the stream had no row for the last set-points
     int missing
-    bint taken                 # the inputs of the cycle to come are there since the lead, and
-    bint ahead                 # its law has computed, its outputs stand in the image
-    uint32_t law_flags         # what the step of the law had to say of its cycle
+    bint computed              # a law has computed the outputs of the next cycle
+    bint outstanding           # frames were sent and not collected yet
+    bint kept                  # a commit of the application waits for the end of a law
     uint64_t lost
     uint64_t late
+    uint64_t missed_sync       # frames that left later than sync_margin
     uint64_t uncommitted
-    uint64_t begun             # wakes since the start: the first has no period
+    uint64_t begun             # wake-ups since the start: the first has no period
     record_t *records
-    uint64_t records_mask      # of them there are so many and one: a power of two
+    uint64_t records_mask      # number of records less one; a power of two less one
     histogram_t *histograms    # PHASES of them
 
 cdef void cycle_start(cycle_t *c, int64_t origin) noexcept nogil
 cdef int cycle_wait(cycle_t *c) noexcept nogil
-cdef int cycle_sleep(cycle_t *c, int64_t lead) noexcept nogil
 cdef void cycle_await_lane(cycle_t *c, int64_t until) noexcept nogil
-cdef void cycle_prepare(cycle_t *c) noexcept nogil
-cdef void cycle_open(cycle_t *c) noexcept nogil
 cdef void cycle_native(cycle_t *c) noexcept nogil
-cdef void cycle_take_law(cycle_t *c, const target_t *orders) noexcept nogil
+cdef int64_t cycle_law_reserve(const cycle_t *c, int64_t budget) noexcept nogil
+cdef bint cycle_wants_native(cycle_t *c) noexcept nogil
 cdef void cycle_inputs(cycle_t *c, actual_t *actual) noexcept nogil
 cdef void cycle_usable(cycle_t *c) noexcept nogil
 cdef void cycle_outputs(cycle_t *c, target_t *target, bint application) noexcept nogil

@@ -16,20 +16,17 @@ cdef class Engine(Parts):
     cdef bint running
     cdef bint committed        # the targets of the next step are on their way already
     cdef bint emitted          # inline: the frames of this cycle are on their way
-    cdef object rehearsal      # called in the lead
     cdef object sink           # keeps what is given the cycles alive
     cdef int64_t left          # when `next` returned [ns]; -1: no application since
+    cdef int64_t input_age     # at that time [ns]
 
-    cdef uint32_t drops_heard  # of the counts in the header, what the application has been told
-    cdef uint32_t refusals_heard
-    cdef uint32_t limits_heard
-    cdef uint32_t dries_heard
 
     cdef uint32_t step(self, int64_t timeout_ns=*) except? 0xFFFFFFFF
     cdef bint is_native_cycle(self, bint application) noexcept nogil
     cdef void follow(self) noexcept
     cdef bint is_led(self) noexcept
-    cdef uint32_t heard(self) noexcept
+    cdef uint32_t flags_since(self) noexcept
+    cdef void enter_body(self) noexcept
     cdef void inline_outputs(self, bint application) noexcept nogil
     cdef int inline_inputs(self) except -1
     cdef int lockstep(self) except -1
@@ -47,4 +44,5 @@ cdef class Engine(Parts):
     cdef int spend_cycle(self) except -1
     cdef void compute(self, int64_t duration_ns) noexcept
     cdef int pass_time(self, int64_t duration) except -1
+    cdef int check_reserve(self, int64_t budget) except -1
     cdef void ask_law(self, law_t *law) noexcept

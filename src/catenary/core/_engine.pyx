@@ -16,31 +16,26 @@ from libc.string cimport memcpy
 
 from catenary.core._axes cimport axes_follow
 from catenary.core._cycle cimport (
-    DROPPED_SOME,
-    DRY,
     INLINE,
-    LATE,
-    LAW_DONE,
-    LAW_FAILED,
-    LIMITED_SOME,
-    NONE,
-    REFUSED_SOME,
-    STOPPED,
     cycle_inputs,
+    cycle_law_reserve,
     cycle_native,
-    cycle_open,
     cycle_outputs,
-    cycle_prepare,
-    cycle_sleep,
     cycle_start,
     cycle_t,
-    cycle_take_law,
     cycle_usable,
     cycle_wait,
+    cycle_wants_native,
 )
 from catenary.core._frames cimport frames_flush
 from catenary.core._handover cimport (
+    LATE,
+    LAW_DONE,
+    LAW_FAILED,
+    NONE,
     PRIVATE,
+    STICKY,
+    STOPPED,
     actual_header_t,
     actual_t,
     handover_commit,
@@ -53,6 +48,7 @@ from catenary.core._native cimport (
     CAT_SINK_CAPSULE,
     CAT_SINK_VERSION,
     cat_add32,
+    cat_exchange32,
     cat_fence,
     cat_futex_wait,
     cat_futex_wake,
@@ -84,7 +80,7 @@ cdef void thread_loop(void *argument) noexcept nogil:
     cdef engine_t *e = <engine_t *>argument
     cdef int rc
     while not cat_load_acquire32(&e.thread.stop):
-        rc = wait_native(&e.cycle)
+        rc = cycle_wait(&e.cycle)
         if rc == 0:
             cycle_native(&e.cycle)
         elif rc != -EINTR:
@@ -93,18 +89,6 @@ cdef void thread_loop(void *argument) noexcept nogil:
     cat_store_release32(&e.done, 1)
     cat_add32(&e.cycle.handover.published, 1)
     cat_futex_wake(&e.cycle.handover.published)
-
-
-cdef inline int wait_native(cycle_t *c) noexcept nogil:
-    """A law has a lead."""
-    cdef int rc
-    if c.law == NULL or c.lead == 0:
-        return cycle_wait(c)
-    rc = cycle_sleep(c, c.lead)
-    if rc == 0:
-        cycle_prepare(c)
-        cycle_open(c)
-    return rc
 
 
 @cython.no_gc_clear  # its parts must outlive the native thread
@@ -184,39 +168,30 @@ cdef class Engine(Parts):
             self.inline_outputs(True)
             self.inline_inputs()
         self.follow()
-        return self.heard()
+        return self.flags_since()
 
     cdef bint is_led(self) noexcept:
         """Whether a law that has begun, or a stream, says the set-points."""
         return self.stream is not None or (self.law is not None and self.law.c.status != WAITING)
 
-    cdef uint32_t heard(self) noexcept:
-        """The flags of the cycle, with what was said in cycles that the application has missed."""
+    cdef uint32_t flags_since(self) noexcept:
+        """Return the flags of the cycle, with the sticky ones of cycles that Python has missed."""
         cdef actual_header_t *header = self.h.actual[PRIVATE].header
-        if header.drops != self.drops_heard:
-            header.flags |= DROPPED_SOME
-        if header.refusals != self.refusals_heard:
-            header.flags |= REFUSED_SOME
-        if header.limits != self.limits_heard:
-            header.flags |= LIMITED_SOME
-        if header.dries != self.dries_heard:
-            header.flags |= DRY
-        self.drops_heard = header.drops
-        self.refusals_heard = header.refusals
-        self.limits_heard = header.limits
-        self.dries_heard = header.dries
+        if cat_load_acquire32(&self.h.sticky):
+            header.flags |= cat_exchange32(&self.h.sticky, 0)
         return header.flags
 
     cdef bint is_native_cycle(self, bint application) noexcept nogil:
-        """Whether the next cycle of the caller's thread has the order of a native one. Inline: only
-        while a law runs; one that was asked for is taken over here, behind Python's last outputs."""
+        """Return True if the next cycle of the caller's thread is a threaded one. Inline: only
+        while a law runs; it is taken over after Python's last outputs."""
         cdef cycle_t *c = &self.e.cycle
         if c.order != INLINE:
             return True
-        if c.law_seen != c.law_request:
+        if not cycle_wants_native(c):
+            return False
+        if c.law == NULL and not c.computed:
             self.inline_outputs(application)
-            cycle_take_law(c, &self.h.target[PRIVATE])
-        return c.law != NULL
+        return True
 
     cdef void follow(self) noexcept:
         """After new actual values: Python's targets where they follow by themselves. While a law
@@ -238,25 +213,18 @@ cdef class Engine(Parts):
             self.emitted = True
 
     cdef int inline_inputs(self) except -1:
-        """The wait, and the half of the cycle behind it, in Python's thread. With a lead it wakes
-        ahead of the instant, takes the GIL back and calls the rehearsal, if there is time: then
-        what Python needs next is in the caches when the inputs come."""
+        """The wait, and the half of the cycle after it, in Python's thread."""
         cdef cycle_t *c = &self.e.cycle
         cdef int rc
         while True:
             if self.alone:
-                rc = cycle_sleep(c, 0)
+                rc = cycle_wait(c)
             else:
                 with nogil:
-                    rc = cycle_sleep(c, c.lead)
+                    rc = cycle_wait(c)
             if rc == 0:
                 break
             self.interrupted(rc)
-        if c.lead > 0:
-            if self.rehearsal is not None and 3 * (c.next - self.now_ns()) > c.lead:
-                self.rehearsal()
-            cycle_prepare(c)
-        cycle_open(c)
         cycle_inputs(c, &self.h.actual[PRIVATE])
         cycle_usable(c)
         self.emitted = False
@@ -276,16 +244,16 @@ cdef class Engine(Parts):
             if rc == 0:
                 if before > 0 and header.number > before + 1:
                     header.flags |= LATE  # cycles happened in `spend`
-                self.left = self.now_ns()
+                self.enter_body()
                 return 0
             self.interrupted(rc)
 
     cdef int native_cycle_here(self) noexcept nogil:
-        cdef int rc = wait_native(&self.e.cycle)
+        cdef int rc = cycle_wait(&self.e.cycle)
         if rc == 0:
             cycle_native(&self.e.cycle)
             handover_swap(self.h)
-            self.emitted = True
+            self.emitted = False
         return rc
 
     cdef int inline_cycle_here(self) noexcept nogil:
@@ -309,10 +277,15 @@ cdef class Engine(Parts):
         self.committed = False
         flags = self.await_cycle(timeout_ns)
         self.follow()
-        self.left = self.now_ns()
+        self.enter_body()
         if before > 0 and header.number > before + 1:
             header.flags |= LATE
-        return self.heard() | flags
+        return self.flags_since() | flags
+
+    cdef void enter_body(self) noexcept:
+        """Note when the application begins to compute, and how old its inputs are."""
+        self.left = self.now_ns()
+        self.input_age = self.left - self.h.actual[PRIVATE].header.sent_ns
 
     cdef void commit(self, bint hold) noexcept:
         cdef target_t *target = &self.h.target[PRIVATE]
@@ -320,8 +293,10 @@ cdef class Engine(Parts):
         target.header.seen = self.h.actual[PRIVATE].header.number
         target.header.stamp = target.header.seen + 1
         target.header.process_ns = -1
+        target.header.input_age_ns = -1
         if self.left >= 0 and not hold:
             target.header.process_ns = self.now_ns() - self.left
+            target.header.input_age_ns = self.input_age
         handover_commit(self.h)
 
     cdef int await_cycle(self, int64_t timeout_ns) except -1:
@@ -361,7 +336,7 @@ cdef class Engine(Parts):
             raise RuntimeError("the engine is not running: start it first")
         flags = self.hold(cycles, False, 0)
         self.left = -1
-        return flags | self.heard()
+        return flags | self.flags_since()
 
     cdef uint32_t hold(self, int64_t cycles, bint until_stopped, int64_t deadline) except? 0xFFFFFFFF:
         """Cycles without an application: so many, or until nothing moves or the deadline [ns]."""
@@ -488,9 +463,6 @@ cdef class Engine(Parts):
         self.hold(1 << 62, True, self.now_ns() + timeout_ns)
         return self.h.actual[PRIVATE].header.moving == 0
 
-    def set_rehearsal(self, rehearsal):
-        self.rehearsal = rehearsal
-
     @property
     def scheduling(self):
         if self.virtual:
@@ -502,12 +474,25 @@ cdef class Engine(Parts):
     def start_law(self, Law law not None):
         if not self.running:
             raise RuntimeError("the engine is not running: start it first")
+        self.check_reserve(law.c.budget)
         if self.law is not None:
             self.law.supersede()
         kept = [known for known in self.laws[:-1] if not known.ended]
         self.laws = [*kept, *self.laws[-1:], law]  # the cycle may still be in one of them
         self.law = law
         self.ask_law(&law.c)
+
+    cdef int check_reserve(self, int64_t budget) except -1:
+        """Refuse a law that leaves the frames too little of the period."""
+        cdef cycle_t *c = &self.e.cycle
+        cdef int64_t left = c.period - cycle_law_reserve(c, budget)
+        if left > c.turnaround:
+            return 0
+        raise ValueError(
+            f"a law with a budget of {budget / 1e3:g} us leaves {left / 1e3:g} us of the period of"
+            f" {c.period / 1e3:g} us for the frames, which take {c.turnaround / 1e3:g} us: give it"
+            " a smaller budget or the loop a longer period"
+        )
 
     def stop_law(self):
         if self.law is not None:
@@ -537,7 +522,7 @@ cdef class Engine(Parts):
                 cycles -= 1
         self.follow()
         self.left = -1
-        return flags | self.heard()
+        return flags | self.flags_since()
 
     # ---- sinks
 

@@ -19,7 +19,6 @@ from catenary.core._native cimport (
     CAT_FRAME_MIN,
     CAT_IMAGE_VERSION,
     CAT_LINK_CAPSULE,
-    CAT_LINK_REHEARSES,
     CAT_LINK_VERSION,
     CAT_LINK_VIRTUAL_TIME,
     cat_link,
@@ -113,15 +112,6 @@ cdef int frames_emit(void *self) noexcept nogil:
             if first_error == 0:
                 first_error = rc
     return first_error
-
-
-cdef void frames_rehearse(void *self) noexcept nogil:
-    cdef frames_t *f = <frames_t *>self
-    cdef uint32_t i
-    for i in range(f.frame_count):
-        fill(f, &f.frames[i])
-    if f.link.flags & CAT_LINK_REHEARSES:
-        f.link.rehearse(f.link.self)
 
 
 # ---- collect
@@ -593,7 +583,6 @@ cdef class Frames:
         self.c.image.emit = frames_emit
         self.c.image.collect = frames_collect
         self.c.image.drain = frames_drain
-        self.c.image.rehearse = frames_rehearse
 
     def __dealloc__(self):
         free(self.c.frames)

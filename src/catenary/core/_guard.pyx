@@ -42,6 +42,8 @@ from catenary.core._cia402 cimport (
     cia402_command,
 )
 
+from catenary.core._handover cimport DROPPED_SOME
+
 cdef enum:
     FOLLOWS_COMMAND = 0x1000   # statusword bit 12 in CSP, CSV, CST
     BIT_12_GAP = 3             # exchanges without bit 12 that are bridged
@@ -78,7 +80,7 @@ cdef void stop_axis(axes_t *x, axis_t *a, uint8_t reason) noexcept nogil:
     """Stop an axis for a reason; only a new request enables it again."""
     if a.goal != DISABLED or a.holding:
         a.flags |= DROPPED
-        x.dropped = 1
+        x.told |= DROPPED_SOME
         a.stop_reason = reason
         a.stop_cycle = x.number
         a.stop_cycles = 0
@@ -96,7 +98,7 @@ cdef void lose_axis(axes_t *x, axis_t *a, uint8_t reason) noexcept nogil:
         stop_axis(x, a, reason)
         return
     a.flags |= DROPPED
-    x.dropped = 1
+    x.told |= DROPPED_SOME
     a.stop_reason = reason
     a.stop_cycle = x.number
     a.holding = 1              # a new request ends it
@@ -590,7 +592,7 @@ cdef void refuse_mode(axes_t *x, axis_t *a) noexcept nogil:
     a.mode_wanted = a.mode
     a.waiting_cycles = 0
     a.flags |= MODE_REFUSED
-    x.dropped = 1
+    x.told |= DROPPED_SOME
 
 
 cdef void wait_for_mode(axes_t *x, axis_t *a) noexcept nogil:

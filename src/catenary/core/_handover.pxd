@@ -2,6 +2,22 @@ from libc.stdint cimport int8_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 
 from catenary.core._native cimport cat_triple
 
+cdef enum:  # flags of a cycle
+    OK = 1
+    LATE = 2
+    LIMITED_SOME = 4
+    WORKING_COUNTER = 8
+    DROPPED_SOME = 16
+    REFUSED_SOME = 32
+    UNCOMMITTED = 64
+    LAW_DONE = 128
+    STOPPED = 256
+    NONE = 512
+    LAW_FAILED = 1024
+    DRY = 2048
+    CLOCKS = 4096
+    STICKY = LIMITED_SOME | DROPPED_SOME | REFUSED_SOME | DRY  # kept until Python has read them
+
 cdef struct counts_t:
     uint32_t axes
     uint32_t units
@@ -14,15 +30,11 @@ cdef struct counts_t:
 
 cdef struct actual_header_t:
     uint64_t number            # cycles done
-    int64_t time_ns            # its instant, from the first one
-    int64_t receive_ns
+    int64_t time_ns            # its cycle start, from the first one
+    int64_t sent_ns            # when its last cyclic frame was handed to the kernel, link's clock
     uint32_t flags
     uint32_t lost_in_row
     uint32_t skipped
-    uint32_t drops             # cycles so far with each of four things to say: an application that
-    uint32_t refusals          # misses a cycle hears of it in the next
-    uint32_t limits
-    uint32_t dries
     uint32_t moving            # axes under power and not at rest
     double period              # [s]
     uint32_t axis_count
@@ -57,7 +69,8 @@ cdef struct actual_t:
 cdef struct target_header_t:
     uint64_t seen              # the cycle whose actual values the application had read
     uint64_t stamp             # the cycle that the set-points are meant for
-    int64_t process_ns         # what its body took
+    int64_t process_ns         # what its body took; -1: unknown
+    int64_t input_age_ns       # of its inputs when the body began; -1: unknown
     uint32_t hold              # hand-over: no application commits set-points
     uint32_t streamed          # the set-points are a row of a stream
 
@@ -84,6 +97,7 @@ cdef struct handover_t:
     target_t target[6]         # and the law's two
     uint32_t published         # futex word: counts publications
     uint32_t waiting           # Python sleeps on it
+    uint32_t sticky            # flags of cycles that Python has not read yet
 
 cdef enum:
     PRIVATE = 3

@@ -5,7 +5,7 @@ whatever is not in the caches, and a Python generator and its properties are a l
 
 from libc.stdint cimport int64_t, uint32_t, uint64_t
 
-from catenary.core._cycle cimport DRY, LATE, LIMITED_SOME, OK, REFUSED_SOME, UNCOMMITTED
+from catenary.core._handover cimport DRY, LATE, LIMITED_SOME, OK, REFUSED_SOME, UNCOMMITTED
 from catenary.core._engine cimport Engine
 
 

@@ -122,17 +122,6 @@ cdef void law_tell(law_t *law) noexcept nogil:
     give(&law.memory_out, law.numbers.memory)
 
 
-cdef void law_rehearse(law_t *law, const actual_t *actual, target_t *scratch,
-                       int64_t instant) noexcept nogil:
-    """A step on scratch: targets that are not sent, a copy of the memory."""
-    cdef cat_law_numbers copied = law.numbers
-    if law.memory_out.count:
-        copied.memory = law.memory_out.slots[law.memory_out.triple.back]
-        memcpy(copied.memory, law.numbers.memory, law.memory_out.count * sizeof(double))
-    cat_law_call(&law.guard, law.step, actual.header, scratch.header, &copied,
-                 <double>(instant - law.begun) * 1e-9)
-
-
 cdef bint law_took(law_t *law, int64_t duration, uint64_t number) noexcept nogil:
     """Notes how long the step took; whether it may go on."""
     law.longest = max(law.longest, duration)

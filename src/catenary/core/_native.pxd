@@ -16,6 +16,7 @@ cdef extern from "atomics.h" nogil:
     bint cat_change32(uint32_t *p, uint32_t before, uint32_t after)
     uint32_t cat_add32(uint32_t *p, uint32_t v)
     uint32_t cat_exchange32(uint32_t *p, uint32_t v)
+    uint32_t cat_or32(uint32_t *p, uint32_t v)
     void cat_fence()
 
 
@@ -32,7 +33,6 @@ cdef extern from "link.h" nogil:
     const uint32_t CAT_LINK_VIRTUAL_TIME
     const uint32_t CAT_LINK_SHARED_TIME
     const uint32_t CAT_LINK_SPENDS
-    const uint32_t CAT_LINK_REHEARSES
 
     ctypedef struct cat_link:
         uint32_t version
@@ -43,7 +43,6 @@ cdef extern from "link.h" nogil:
         int64_t (*now)(void *self) noexcept nogil
         int (*wait_until)(void *self, int64_t deadline, int wake_on_frame) noexcept nogil
         int (*spend)(void *self, int64_t duration) noexcept nogil
-        void (*rehearse)(void *self) noexcept nogil
 
 
 cdef extern from "image.h" nogil:
@@ -70,7 +69,6 @@ cdef extern from "image.h" nogil:
         int (*emit)(void *self) noexcept nogil
         int (*collect)(void *self, int64_t deadline) noexcept nogil
         void (*drain)(void *self) noexcept nogil
-        void (*rehearse)(void *self) noexcept nogil
 
 
 cdef extern from "packet_ring.h" nogil:

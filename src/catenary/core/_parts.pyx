@@ -84,8 +84,8 @@ cdef class Parts:
             raise ValueError(f"priority: {plan.priority}, must be 1 to 99 or None")
         if plan.cpu is not None and not 0 <= plan.cpu < 1024:
             raise ValueError(f"cpu: {plan.cpu}")
-        if not 0 <= plan.lead_ns < plan.period_ns:
-            raise ValueError(f"lead_ns: {plan.lead_ns}, must be less than the period")
+        if not 0 <= plan.busy_wait_ns < plan.period_ns:
+            raise ValueError(f"busy_wait_ns: {plan.busy_wait_ns}, must be less than the period")
         if not 1 <= plan.log_cycles <= 1 << 24:
             raise ValueError(f"log_cycles: {plan.log_cycles}, must be 1 to {1 << 24}")
         self.e.thread.priority = plan.priority or 0
@@ -139,7 +139,7 @@ cdef class Parts:
         self.alone = self.virtual and not c.link.flags & CAT_LINK_SHARED_TIME
         c.order = ORDERS[plan.order]
         c.period = plan.period_ns
-        c.lead = 0 if self.virtual else plan.lead_ns
+        c.busy_wait = 0 if self.virtual else plan.busy_wait_ns
         c.collect_deadline = plan.collect_deadline_ns
         c.lost_limit = plan.lost_limit
         self.h = &self.handover.c
@@ -233,6 +233,7 @@ cdef class Parts:
             "lost": self.e.cycle.lost,
             "late": self.e.cycle.late,
             "uncommitted": self.e.cycle.uncommitted,
+            "missed_sync": self.e.cycle.missed_sync,
             "stale": 0,
             "alien": 0,
             "corrupt": 0,

@@ -12,7 +12,7 @@ from libc.string cimport memcpy, memset
 from posix.time cimport CLOCK_MONOTONIC, clock_gettime, timespec
 
 from catenary.link._table cimport (
-    CAT_FRAME_MAX, CAT_FRAME_MIN, CAT_LINK_POLLS, CAT_LINK_REHEARSES, TableLink,
+    CAT_FRAME_MAX, CAT_FRAME_MIN, CAT_LINK_POLLS, TableLink,
 )
 
 cdef extern from "atomics.h" nogil:
@@ -55,7 +55,6 @@ cdef extern from "<time.h>" nogil:
 cdef enum:
     SECOND = 1_000_000_000
     ODD_FRAMES = 16                   # too long or too short, skipped in one call
-    SHORTER_THAN_A_HEADER = 13        # bytes
 
 ctypedef struct raw_state:
     int fd
@@ -96,14 +95,6 @@ cdef int raw_send(void *self, const uint8_t *frame, uint32_t length) noexcept no
     if c_send(raw.fd, frame, length, MSG_DONTWAIT) < 0:
         return -errno
     return 0
-
-
-cdef void raw_rehearse(void *self) noexcept nogil:
-    """The kernel makes a buffer, copies, and refuses what is shorter than a header (EINVAL)."""
-    cdef raw_state *raw = <raw_state *> self
-    cdef uint8_t stump[SHORTER_THAN_A_HEADER]
-    memset(stump, 0, SHORTER_THAN_A_HEADER)
-    c_send(raw.fd, stump, SHORTER_THAN_A_HEADER, MSG_DONTWAIT)
 
 
 cdef int receive_from_ring(void *self, const uint8_t **frame) noexcept nogil:
@@ -212,8 +203,7 @@ cdef class RawLink(TableLink):
             self.raw.slot_size = slot_size
             self.raw.slot_count = <uint32_t> (self.view.len // slot_size)
         self.table.self = &self.raw
-        self.table.flags = CAT_LINK_POLLS | CAT_LINK_REHEARSES
-        self.table.rehearse = raw_rehearse
+        self.table.flags = CAT_LINK_POLLS
         self.table.fd = self.raw.fd
         self.table.send = raw_send
         self.table.receive = receive_by_recv if ring is None else receive_from_ring

@@ -8,7 +8,6 @@ cdef extern from "link.h" nogil:
     const uint32_t CAT_LINK_SPENDS
     const uint32_t CAT_LINK_POLLS
     const uint32_t CAT_LINK_FORETELLS
-    const uint32_t CAT_LINK_REHEARSES
     enum:
         CAT_FRAME_MAX
         CAT_FRAME_MIN
@@ -22,7 +21,6 @@ cdef extern from "link.h" nogil:
         int (*wait_until)(void *self, int64_t deadline, int wake_on_frame) noexcept nogil
         int64_t (*due)(void *self) noexcept nogil
         int fd
-        void (*rehearse)(void *self) noexcept nogil
 
 
 cdef class TableLink:

@@ -53,10 +53,6 @@ cdef int closed_wait_until(void *self, int64_t deadline, int wake_on_frame) noex
     return -EBADF
 
 
-cdef void closed_rehearse(void *self) noexcept nogil:
-    return
-
-
 cdef class TableLink:
     """Owns one link table; a base for the compiled links of this package."""
 
@@ -75,7 +71,6 @@ cdef class TableLink:
         self.table.receive = closed_receive
         self.table.now = closed_now
         self.table.wait_until = closed_wait_until
-        self.table.rehearse = closed_rehearse
 
     @property
     def capsule(self):
@@ -153,7 +148,7 @@ cdef class WrapperLink(TableLink):
         self.link = opened
         self.name = opened.name
         self.table.flags = self.inner.flags & ~(
-            CAT_LINK_SPENDS | CAT_LINK_POLLS | CAT_LINK_FORETELLS | CAT_LINK_REHEARSES
+            CAT_LINK_SPENDS | CAT_LINK_POLLS | CAT_LINK_FORETELLS
         )
         return 0
 

@@ -44,10 +44,6 @@ typedef struct cat_image {
 
     /* Takes what has arrived, between two cycles: judges nothing, waits for nothing. */
     void (*drain)(void *self);
-
-    /* The way of an `emit` as far as it leads without a frame, for the caches' sake; NULL: there
-     * is none. Changes nothing that is sent. */
-    void (*rehearse)(void *self);
 } cat_image;
 
 #endif

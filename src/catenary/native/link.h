@@ -22,7 +22,6 @@
 #define CAT_LINK_SPENDS 4u            /* `spend` is there */
 #define CAT_LINK_POLLS 8u             /* `fd` is there: readable when a frame can be received */
 #define CAT_LINK_FORETELLS 16u        /* `due` is there */
-#define CAT_LINK_REHEARSES 32u        /* `rehearse` is there */
 
 typedef struct cat_link {
     uint32_t version;                 /* CAT_LINK_VERSION */
@@ -55,10 +54,6 @@ typedef struct cat_link {
 
     /* Only with CAT_LINK_POLLS. */
     int fd;
-
-    /* Only with CAT_LINK_REHEARSES. The way of a `send` as far as it leads without a frame: so that
-     * the next one finds it in the caches. */
-    void (*rehearse)(void *self);
 } cat_link;
 
 #endif

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Literal
 
-Order = Literal["threaded", "inline", "law"]
+Order = Literal["threaded", "inline"]
 ReceiveMode = Literal["look", "wait", "spin"]
 FollowedClock = Literal["reference", "main"]
 OnLoss = Literal["quick_stop", "disable", "csp_hold"]
@@ -194,7 +194,7 @@ class CyclePlan:
     late_limit_torque_ns: int = 10_000_000  # CST
     handover_ns: int = 20_000_000  # CST keeps its torque for this long after a law or stream ended
     stop_deadline_ns: int = 2_000_000_000  # quick stop to standstill, at most
-    lead_ns: int = 0  # inline, law: awake that long before the instant
+    busy_wait_ns: int = 0  # before each cycle start; costs as much processor time
     log_cycles: int = 1000  # how far the log reaches back
     cpu: int | None = None  # of the native thread
     priority: int | None = 80  # SCHED_FIFO; None: leave the scheduling as it is
