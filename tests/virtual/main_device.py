@@ -82,14 +82,19 @@ class MainDevice:
         self.sync_manager(station, 1, 0x1000 + size, size, 0x22)
         assert self.request(station, 2) == (2, 0)
 
-    def start_servo(self, station: int, logical: int) -> None:
-        """To SAFE-OP with the default 13 + 13 bytes; outputs first in the logical image."""
+    def start_servo(self, station: int, logical: int, *, control: int = 0x64) -> None:
+        """To SAFE-OP with the default 13 + 13 bytes; outputs first in the logical image.
+        `control`: byte of SyncManager 2."""
+        self.map_servo(station, logical, control=control)
+        assert self.request(station, 4) == (4, 0)
+
+    def map_servo(self, station: int, logical: int, *, control: int = 0x64) -> None:
+        """The same as far as PRE-OP, with the process data configured."""
         self.start_mailbox(station)
-        self.sync_manager(station, 2, 0x1100, 13, 0x64)
+        self.sync_manager(station, 2, 0x1100, 13, control)
         self.sync_manager(station, 3, 0x2000, 13, 0x20)
         self.fmmu(station, 0, logical, (13, 0, 7), 0x1100, 2)
         self.fmmu(station, 1, logical + 13, (13, 0, 7), 0x2000, 1)
-        assert self.request(station, 4) == (4, 0)
 
     # -- mailbox ------------------------------------------------------------------------------
 

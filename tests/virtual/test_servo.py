@@ -4,61 +4,23 @@ from __future__ import annotations
 
 import math
 import struct
-from dataclasses import dataclass
 
 import pytest
 
 from catenary.virtual import Segment, Servo
-from catenary.wire.datagram import Command
-from tests.virtual.main_device import MILLISECOND, STATION, MainDevice
-
-CSP, CSV, CST = 8, 9, 10
-TURN = 1 << 20
-STATE_MASK = 0x6F
-SHUTDOWN, SWITCH_ON, ENABLE, QUICK_STOP = 0x06, 0x07, 0x0F, 0x02
-
-
-@dataclass
-class Inputs:
-    status: int
-    mode: int
-    velocity: int
-    position: int
-    torque: int
-
-
-class Drive:
-    """Owns a cyclic exchange with one servo in OP."""
-
-    def __init__(self, servo: Servo) -> None:
-        self.servo = servo
-        self.main = MainDevice(Segment([servo]))
-        self.main.number_stations()
-        self.main.let_pass(30)
-        self.main.start_servo(STATION, 0)
-        self.word, self.mode, self.velocity, self.position, self.torque = 0, CSP, 0, 0, 0
-        self.cycle()
-        assert self.main.request(STATION, 8) == (8, 0)
-
-    def cycle(self, count: int = 1) -> Inputs:
-        for _ in range(count):
-            start = self.main.link.now()
-            out = struct.pack(
-                "<HbiiH", self.word, self.mode, self.velocity, self.position, self.torque & 0xFFFF
-            )
-            answer = self.main.exchange_logical(Command.LRW, 0, out + bytes(13))
-            assert answer.working_counter == 3
-            self.main.link.wait_until(start + MILLISECOND, False)
-        return Inputs(*struct.unpack("<Hbiih", answer.data[13:]))
-
-    def enable(self, mode: int) -> Inputs:
-        self.mode = mode
-        for self.word in (SHUTDOWN, SWITCH_ON, ENABLE):
-            self.position = self.cycle(3).position
-        return self.cycle(3)
-
-    def state(self) -> int:
-        return self.cycle(2).status & STATE_MASK
+from tests.virtual.main_device import STATION, MainDevice
+from tests.virtual.servo_drive import (
+    CSP,
+    CST,
+    CSV,
+    ENABLE,
+    QUICK_STOP,
+    SHUTDOWN,
+    STATE_MASK,
+    SWITCH_ON,
+    TURN,
+    Drive,
+)
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ from catenary.virtual.devices import (
     Junction,
     Servo,
 )
+from catenary.virtual.devices.servo_quirks import ServoQuirks
 from catenary.virtual.fault_player import FaultEvent, Loss
 from catenary.virtual.faults import Fault
 from catenary.virtual.plant import Joint, Plant
@@ -35,6 +36,7 @@ __all__ = [
     "Segment",
     "Server",
     "Servo",
+    "ServoQuirks",
     "demo_segment",
     "faults",
     "read_segment",

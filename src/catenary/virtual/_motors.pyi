@@ -19,6 +19,19 @@ class Motors:
         integral_gain: float,
         boot: float,
     ) -> None: ...
+    def set_quirks(
+        self,
+        position: int,
+        axis: int,
+        *,
+        mode_delay: float,
+        refused_modes: int,
+        never_bit_12: bool,
+        follows_without_bit_12: bool,
+        ignores_quick_stop: bool,
+        ignores_disable: bool,
+    ) -> None: ...
+    def hide_bit_12(self, position: int, axis: int, seconds: float) -> None: ...
     def state(self, position: int, axis: int) -> tuple[float, float, float, int]: ...
     def tune(
         self, position: int, axis: int, *, velocity_gain: float, integral_gain: float

@@ -32,6 +32,20 @@ cdef class Motors:
         a.position_gain, a.velocity_gain = position_gain, velocity_gain
         a.integral_gain, a.boot = integral_gain, boot
 
+    def set_quirks(self, int position, int axis, *, double mode_delay, unsigned int refused_modes,
+                   bint never_bit_12, bint follows_without_bit_12, bint ignores_quick_stop,
+                   bint ignores_disable):
+        """Make the drive differ from the profile (devices/servo_quirks.py)."""
+        cdef servo_axis *a = self._core._axis(position, axis)
+        a.quirks.mode_delay, a.quirks.refused_modes = mode_delay, refused_modes
+        a.quirks.never_bit_12 = never_bit_12
+        a.quirks.follows_without_bit_12 = follows_without_bit_12
+        a.quirks.ignores_quick_stop, a.quirks.ignores_disable = ignores_quick_stop, ignores_disable
+
+    def hide_bit_12(self, int position, int axis, double seconds):
+        """Hide bit 12 of the statusword from the next step on, for this time."""
+        self._core._axis(position, axis).bit_12_hidden = seconds
+
     def state(self, int position, int axis):
         """(position [rad], velocity [rad/s], torque [N m], state)"""
         cdef servo_axis *a = self._core._axis(position, axis)

@@ -75,11 +75,16 @@ cdef extern from "segment_memory.h" nogil:
         int64_t period, due
         uint64_t steps
         char words[256]
+    ctypedef struct servo_quirks:
+        double mode_delay
+        uint32_t refused_modes
+        uint8_t never_bit_12, follows_without_bit_12, ignores_quick_stop, ignores_disable
     ctypedef struct servo_axis:
         double inertia, viscous, coulomb, load, rated_torque, velocity_limit
         double counts_per_radian, velocity_per_radian, position_gain, velocity_gain, integral_gain
         double radian_per_count, radian_per_velocity, per_inertia, per_torque
-        double position, velocity, torque, boot
+        double position, velocity, torque, boot, bit_12_hidden
+        servo_quirks quirks
         int state
         uint16_t injected
         uint8_t sto

@@ -59,6 +59,7 @@ SLOT_HOMING_SPEED: Final[int]
 SLOT_HOMING_SLOW: Final[int]
 SLOT_HOMING_ACCELERATION: Final[int]
 SLOT_HOMING_TORQUE: Final[int]
+SLOT_ABORT_CONNECTION_OPTION: Final[int]
 
 class Core:
     failure: BaseException | None

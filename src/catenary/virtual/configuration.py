@@ -33,6 +33,7 @@ from catenary.virtual.devices.digital_inputs import DigitalInputs
 from catenary.virtual.devices.digital_outputs import DigitalOutputs
 from catenary.virtual.devices.junction import Junction
 from catenary.virtual.devices.servo import Servo
+from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
 from catenary.virtual.faults import Fault
 from catenary.virtual.plant import STEP, Joint, Plant
 from catenary.virtual.segment import ClockKind, Segment
@@ -152,6 +153,7 @@ class ServoTable(_ClockedTable, tag="servo", frozen=True, kw_only=True):
     mailbox_delay: float = 300e-6
     lrw: bool = True
     sync_missed_limit: int = 3
+    quirks: ServoQuirks = NO_QUIRKS
 
     def device(self) -> Device:
         return Servo(
@@ -175,6 +177,7 @@ class ServoTable(_ClockedTable, tag="servo", frozen=True, kw_only=True):
             crystal=self.crystal.crystal(),
             clock_bits=self.clock_bits,
             sync_missed_limit=self.sync_missed_limit,
+            quirks=self.quirks,
         )
 
 

@@ -24,7 +24,7 @@ enum servo_slot {
     SLOT_INTERPOLATION_PERIOD, SLOT_INTERPOLATION_EXPONENT, SLOT_VELOCITY_DEMAND,
     SLOT_POLARITY,
     SLOT_HOME_OFFSET, SLOT_HOMING_METHOD, SLOT_HOMING_SPEED, SLOT_HOMING_SLOW,
-    SLOT_HOMING_ACCELERATION, SLOT_HOMING_TORQUE, AXIS_SLOTS
+    SLOT_HOMING_ACCELERATION, SLOT_HOMING_TORQUE, SLOT_ABORT_CONNECTION_OPTION, AXIS_SLOTS
 };
 
 enum {
@@ -33,6 +33,9 @@ enum {
 };
 
 enum { HM = 6, CSP = 8, CSV = 9, CST = 10 };
+
+/* 0x6007, what the drive does when its process data stops. */
+enum { ABORT_NOTHING = 0, ABORT_FAULT = 1, ABORT_DISABLE_VOLTAGE = 2, ABORT_QUICK_STOP = 3 };
 
 enum {
     ERROR_OVERCURRENT = 0x2310, ERROR_STO = 0xFF01, ERROR_FOLLOWING = 0x8611,
@@ -43,6 +46,18 @@ enum {
 typedef enum { RAMP_NONE, RAMP_TO_DISABLED, RAMP_AND_STAY, RAMP_TO_READY, RAMP_TO_SWITCHED_ON, RAMP_TO_FAULT } ramp_end;
 
 struct plant_joint;
+
+/* Behaviour of real drives that differs from the profile; devices/servo_quirks.py has the sources. */
+typedef struct servo_quirks {
+    double mode_delay;                                /* seconds from 0x6060 to 0x6061 */
+    uint32_t refused_modes;                           /* bit n: 0x6061 never shows mode n */
+    uint8_t never_bit_12, follows_without_bit_12, ignores_quick_stop, ignores_disable;
+} servo_quirks;
+
+/* Set-points besides the position, as last followed: units of their objects. */
+typedef struct servo_targets {
+    int64_t velocity, velocity_offset, torque, torque_offset;
+} servo_targets;
 
 typedef struct servo_axis {
     /* the machine, SI */
@@ -68,6 +83,11 @@ typedef struct servo_axis {
     uint16_t last_controlword, injected;
     uint8_t sto, fed;                                 /* safe torque off; process data is valid */
     double boot;                                      /* seconds until ready for anything */
+    servo_quirks quirks;
+    servo_targets targets;
+    double bit_12_hidden;                             /* seconds for which bit 12 is not shown */
+    double mode_wait;                                 /* seconds until the requested mode applies */
+    int mode_requested;
 } servo_axis;
 
 static const uint16_t statuswords[] = {
@@ -85,6 +105,11 @@ static inline int64_t servo_counts(const servo_axis *a) {
     return llrint(a->position * a->counts_per_radian) - a->zero;
 }
 
+/* The drive obeys its targets. It holds its last demand while bit 12 is not shown. */
+static inline int servo_follows(const servo_axis *a) {
+    return a->quirks.follows_without_bit_12 || !(a->quirks.never_bit_12 || a->bit_12_hidden > 0);
+}
+
 /* The same, not quantised. */
 static inline double servo_exact(const servo_axis *a) {
     return a->position * a->counts_per_radian - (double)a->zero;
@@ -99,6 +124,7 @@ static void servo_hold(servo_axis *a) {
     a->integral = 0;
     a->interpolated = 0;
     a->following_time = 0;
+    a->targets = (servo_targets){0};
 }
 
 static void servo_fault(controller *c, servo_axis *a, int64_t *slots, uint16_t code) {
@@ -113,7 +139,10 @@ static void servo_fault(controller *c, servo_axis *a, int64_t *slots, uint16_t c
     a->state = gentle ? FAULT_REACTION_ACTIVE : FAULT;
 }
 
+/* 0x605A. A negative code disables the quick stop: the drive goes on as before. */
 static void servo_quick_stop(servo_axis *a, int64_t option) {
+    if (option < 0)
+        return;
     a->ramp = a->velocity;
     if (option == 0) {
         a->state = SWITCH_ON_DISABLED;
@@ -168,19 +197,21 @@ static void servo_command(controller *c, servo_axis *a, int64_t *slots) {
     case OPERATION_ENABLED:
         if (disable_voltage)
             a->state = SWITCH_ON_DISABLED;                                  /* 9 */
+        else if (quick_stop && a->quirks.ignores_quick_stop)
+            return;
         else if (quick_stop)
             servo_quick_stop(a, slots[SLOT_QUICK_STOP_OPTION]);             /* 11 */
         else if (a->ramping != RAMP_NONE)
             return;
         else if (shutdown)
             servo_leave(a, slots[SLOT_SHUTDOWN_OPTION], READY_TO_SWITCH_ON, RAMP_TO_READY);      /* 8 */
-        else if (switch_on && !enable)
+        else if (switch_on && !enable && !a->quirks.ignores_disable)
             servo_leave(a, slots[SLOT_DISABLE_OPTION], SWITCHED_ON, RAMP_TO_SWITCHED_ON);        /* 5 */
         return;
     case QUICK_STOP_ACTIVE:
         if (disable_voltage)
             a->state = SWITCH_ON_DISABLED;                                  /* 12 */
-        else if (enable && a->ramping == RAMP_AND_STAY && fabs(a->velocity) < 0.05) {
+        else if (enable && a->fed && a->ramping == RAMP_AND_STAY && fabs(a->velocity) < 0.05) {
             servo_hold(a);
             a->state = OPERATION_ENABLED;                                   /* 16 */
             a->ramping = RAMP_NONE;
@@ -267,9 +298,18 @@ static double servo_velocity_loop(servo_axis *a, double velocity, double feed_fo
     return torque;
 }
 
+/* 1: the ramp is that of 0x6085, not that of 0x6084. Options 1 and 5 of 0x605A, and 1 of 0x605E, slow
+ * down by 0x6084; the options that brake at the current or voltage limit use the steeper 0x6085. */
+static int servo_ramps_quickly(const servo_axis *a, const int64_t *slots) {
+    int64_t option = slots[SLOT_QUICK_STOP_OPTION];
+    if (a->state == QUICK_STOP_ACTIVE)
+        return option != 1 && option != 5;
+    return a->state == FAULT_REACTION_ACTIVE && slots[SLOT_FAULT_OPTION] != 1;
+}
+
 /* Down a ramp of the velocity to zero, whatever the mode was. */
 static double servo_ramp(servo_axis *a, const int64_t *slots, double limit, double dt) {
-    int quick = a->state == QUICK_STOP_ACTIVE || a->state == FAULT_REACTION_ACTIVE;
+    int quick = servo_ramps_quickly(a, slots);
     int64_t raw = slots[quick ? SLOT_QUICK_STOP_DECELERATION : SLOT_DECELERATION];
     double step = larger(1e-3, (double)raw * a->radian_per_velocity) * dt;
     a->ramp = fabs(a->ramp) <= step ? 0 : a->ramp - copysign(step, a->ramp);
@@ -278,22 +318,37 @@ static double servo_ramp(servo_axis *a, const int64_t *slots, double limit, doub
 
 #include "servo_homing.h"
 
+/* Takes the set-points over, or holds the demand at the last ones followed. */
+static void servo_take_targets(servo_axis *a, const int64_t *slots, int fresh, double dt, double rate) {
+    if (!servo_follows(a)) {
+        a->command_velocity = 0;
+        a->interpolated = 0;
+        return;
+    }
+    a->targets = (servo_targets){slots[SLOT_TARGET_VELOCITY], slots[SLOT_VELOCITY_OFFSET],
+                                 slots[SLOT_TARGET_TORQUE], slots[SLOT_TORQUE_OFFSET]};
+    if (a->mode == CSP)
+        servo_interpolate(a, slots, fresh, dt, rate);
+}
+
 static double servo_drive(servo_axis *a, const int64_t *slots, int fresh, double dt, double rate) {
     double limit = a->rated_torque * (double)slots[SLOT_MAX_TORQUE] * 1e-3;
-    double feed_forward = (double)slots[SLOT_TORQUE_OFFSET] * 1e-3 * a->rated_torque;
     double torque;
+    if (a->ramping == RAMP_NONE)
+        servo_take_targets(a, slots, fresh, dt, rate);
+    const servo_targets *t = &a->targets;
+    double feed_forward = (double)t->torque_offset * 1e-3 * a->rated_torque;
     if (a->ramping != RAMP_NONE)
         torque = servo_ramp(a, slots, limit, dt);
     else if (a->mode == CSP) {
-        servo_interpolate(a, slots, fresh, dt, rate);
-        double offset = (double)slots[SLOT_VELOCITY_OFFSET] * a->radian_per_velocity;
+        double offset = (double)t->velocity_offset * a->radian_per_velocity;
         double error = (a->command - servo_exact(a)) * a->radian_per_count;
         torque = servo_velocity_loop(a, a->position_gain * error + a->command_velocity + offset, feed_forward, limit, dt);
     } else if (a->mode == CSV) {
-        a->command_velocity = (double)(slots[SLOT_TARGET_VELOCITY] + slots[SLOT_VELOCITY_OFFSET]) * a->radian_per_velocity;
+        a->command_velocity = (double)(t->velocity + t->velocity_offset) * a->radian_per_velocity;
         torque = servo_velocity_loop(a, a->command_velocity, feed_forward, limit, dt);
     } else if (a->mode == CST) {
-        torque = (double)slots[SLOT_TARGET_TORQUE] * 1e-3 * a->rated_torque + feed_forward;
+        torque = (double)t->torque * 1e-3 * a->rated_torque + feed_forward;
         if (fabs(a->velocity) > a->velocity_limit && torque * a->velocity > 0)
             torque = 0;
     } else if (a->mode == HM)
@@ -325,7 +380,7 @@ static uint16_t servo_statusword(const servo_axis *a, const int64_t *slots) {
     if (a->mode == HM)
         return word | homing_status(a);
     int cyclic = a->mode == CSP || a->mode == CSV || a->mode == CST;
-    if (cyclic && a->ramping == RAMP_NONE && a->fed)
+    if (cyclic && a->ramping == RAMP_NONE && a->fed && !a->quirks.never_bit_12 && a->bit_12_hidden <= 0)
         word |= 0x1000;                                      /* follows the set-point */
     if (a->mode == CSP && a->following_time > 0)
         word |= 0x2000;
@@ -341,7 +396,8 @@ static void servo_show(servo_axis *a, int64_t *slots) {
     slots[SLOT_VELOCITY] = wrap32(llrint(a->velocity * a->velocity_per_radian));
     slots[SLOT_TORQUE] = llrint(1e3 * a->torque * a->per_torque);
     slots[SLOT_TORQUE_DEMAND] = slots[SLOT_TORQUE];
-    slots[SLOT_POSITION_DEMAND] = wrap32(a->mode == CSP && servo_powered(a) ? llrint(a->command) : counts);
+    int commanded = a->mode == CSP && servo_powered(a) && a->ramping == RAMP_NONE;
+    slots[SLOT_POSITION_DEMAND] = wrap32(commanded ? llrint(a->command) : counts);
     slots[SLOT_VELOCITY_DEMAND] = wrap32(llrint(a->command_velocity * a->velocity_per_radian));
     slots[SLOT_FOLLOWING_ERROR] = wrap32(slots[SLOT_POSITION_DEMAND] - slots[SLOT_POSITION]);
     slots[SLOT_DIGITAL_INPUTS] = (slots[SLOT_DIGITAL_INPUTS] & ~8ll) | (a->sto ? 8 : 0);
@@ -349,25 +405,56 @@ static void servo_show(servo_axis *a, int64_t *slots) {
     slots[SLOT_STATUSWORD] = servo_statusword(a, slots);
 }
 
-/* The mode changes at standstill of the set-point: the loops restart bumplessly. */
-static void servo_change_mode(servo_axis *a, const int64_t *slots) {
+static inline int servo_knows_mode(const servo_axis *a, int mode) {
+    int known = mode == 0 || mode == HM || mode == CSP || mode == CSV || mode == CST;
+    return known && !(a->quirks.refused_modes >> mode & 1);
+}
+
+/* The mode changes at standstill of the set-point: the loops restart bumplessly. The display keeps the
+ * old mode, which goes on, while an unknown one is requested and until the delay has passed. */
+static void servo_change_mode(servo_axis *a, const int64_t *slots, double dt) {
     int mode = (int)slots[SLOT_MODE];
-    if (mode == a->mode || (mode != HM && mode != CSP && mode != CSV && mode != CST && mode != 0))
-        return;                                              /* unknown: the display keeps the old one */
+    if (mode != a->mode_requested)
+        a->mode_wait = a->quirks.mode_delay;
+    a->mode_requested = mode;
+    if (mode == a->mode || !servo_knows_mode(a, mode))
+        return;
+    if (a->mode_wait > 0.5 * dt) {
+        a->mode_wait -= dt;
+        return;
+    }
     double integral = a->integral;
     servo_hold(a);
     a->integral = integral;
     a->mode = mode;
 }
 
+/* The process data has stopped while the axis is enabled: 0x6007. */
+static void servo_abort_connection(controller *c, servo_axis *a, int64_t *slots) {
+    switch (slots[SLOT_ABORT_CONNECTION_OPTION]) {
+    case ABORT_NOTHING:
+        return;
+    case ABORT_DISABLE_VOLTAGE:
+        a->state = SWITCH_ON_DISABLED;
+        return;
+    case ABORT_QUICK_STOP:
+        servo_quick_stop(a, slots[SLOT_QUICK_STOP_OPTION]);
+        return;
+    default:
+        servo_fault(c, a, slots, ERROR_COMMUNICATION);
+    }
+}
+
+static inline double counted_down(double seconds, double dt) { return seconds > 1.5 * dt ? seconds - dt : 0; }
+
 /* `fed`: the process data is valid (OPERATIONAL, watchdog content); `fresh`: it came since the last step. */
 static void servo_step(controller *c, servo_axis *a, int64_t *slots, int fed, int fresh, double dt, double rate) {
     if (a->state == NOT_READY && (a->boot -= dt) <= 0)
         a->state = SWITCH_ON_DISABLED;                       /* 0, 1 */
     if (a->fed && !fed && a->state == OPERATION_ENABLED)
-        servo_fault(c, a, slots, ERROR_COMMUNICATION);
+        servo_abort_connection(c, a, slots);
     a->fed = (uint8_t)fed;
-    servo_change_mode(a, slots);
+    servo_change_mode(a, slots, dt);
     servo_command(c, a, slots);
     homing_command(a, slots);
     servo_supervise(c, a, slots, dt);
@@ -375,6 +462,7 @@ static void servo_step(controller *c, servo_axis *a, int64_t *slots, int fed, in
     if (a->joint == NULL)
         servo_motor(a, dt);
     servo_standstill(a);
+    a->bit_12_hidden = counted_down(a->bit_12_hidden, dt);
 }
 
 /* The objects show what the axes do when somebody looks. */

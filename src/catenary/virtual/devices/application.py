@@ -47,6 +47,7 @@ from catenary.virtual.state_machine import (
     INVALID_INPUT_CONFIGURATION,
     INVALID_MAILBOX_CONFIGURATION,
     INVALID_OUTPUT_CONFIGURATION,
+    INVALID_WATCHDOG_CONFIGURATION,
     NO_SYNC_ERROR,
     NO_VALID_OUTPUTS,
     OP,
@@ -59,6 +60,8 @@ from catenary.virtual.state_machine import (
 
 EMERGENCY = 1
 ENABLE_AND_MODE = 0x0F  # of a SyncManager's control: direction and mode
+WATCHDOG_TRIGGER = 0x40  # likewise
+WATCHDOG_DIVIDER, WATCHDOG_TIME = 0x0400, 0x0420  # registers
 RAM_START, RAM_END = 0x1000, 0x3000
 BLOB_BYTES = 2048  # an object larger than any usual mailbox
 
@@ -75,16 +78,21 @@ def process_data_areas(mailbox_size: int) -> tuple[int, int, int]:
 
 
 def sync_managers_of(
-    mailbox_size: int, outputs: Sequence[Pdo], inputs: Sequence[Pdo]
+    mailbox_size: int,
+    outputs: Sequence[Pdo],
+    inputs: Sequence[Pdo],
+    *,
+    watchdog_trigger: bool = True,
 ) -> tuple[SyncManagerDefault, ...]:
     def size(pdos: Sequence[Pdo]) -> int:
         return (sum(pdo.bits for pdo in pdos if pdo.sync_manager != 0xFF) + 7) // 8
 
     out, into, _room = process_data_areas(mailbox_size)
+    control = 0x64 if watchdog_trigger else 0x24
     return (
         SyncManagerDefault(RAM_START, mailbox_size, 0x26, 1, 1),
         SyncManagerDefault(RAM_START + mailbox_size, mailbox_size, 0x22, 1, 2),
-        SyncManagerDefault(out, size(outputs), 0x64, 1 if size(outputs) else 0, 3),
+        SyncManagerDefault(out, size(outputs), control, 1 if size(outputs) else 0, 3),
         SyncManagerDefault(into, size(inputs), 0x20, 1 if size(inputs) else 0, 4),
     )
 
@@ -109,6 +117,7 @@ class Application:
         self._position = position
         self._box = box
         self.synchronisation: Synchronisation | None = None  # a device that can keep time by SYNC0
+        self.checks_watchdog = False  # refuses SAFE-OP with 0x001F (ServoQuirks)
         self.states = StateMachine(self, scheduler, description.identification)
         self.dictionary = Dictionary(lambda: self.states.state)
         self._add_communication_objects(description)
@@ -225,9 +234,22 @@ class Application:
                 return INVALID_OUTPUT_CONFIGURATION
             if not self._buffer_is_configured(3, TX_ASSIGNMENT, 0x00):
                 return INVALID_INPUT_CONFIGURATION
-            if self.synchronisation is not None:
-                return self.synchronisation.check()
+            refusal = 0 if self.synchronisation is None else self.synchronisation.check()
+            if refusal == 0 and self.checks_watchdog and not self._watchdog_is_consistent():
+                return INVALID_WATCHDOG_CONFIGURATION
+            return refusal
         return 0
+
+    def _watchdog_is_consistent(self) -> bool:
+        """Return True if the trigger bit of SyncManager 2 is set exactly if the watchdog is on.
+
+        The rule of Beckhoff's slave stack code, ecatslv.c, StartInputHandler.
+        """
+        [divider] = struct.unpack("<H", self._core.peek(self._position, WATCHDOG_DIVIDER, 2))
+        [time] = struct.unpack("<H", self._core.peek(self._position, WATCHDOG_TIME, 2))
+        on = bool(divider and time and self.pdos.size(RX_ASSIGNMENT))
+        _start, _length, control, _enabled, _full = self._buffers.settings(self._position, 2)
+        return on is bool(control & WATCHDOG_TRIGGER)
 
     def _mailbox_is_configured(self) -> bool:
         box = self._box

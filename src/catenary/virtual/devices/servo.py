@@ -36,6 +36,7 @@ from catenary.virtual.devices.servo_objects import (
     RW,
     RX,
 )
+from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
 from catenary.virtual.devices.synchronisation import Synchronisation
 from catenary.virtual.scheduler import Scheduler
 
@@ -102,10 +103,12 @@ class Servo(AppliedDevice):
         clock_bits: ClockBits = 64,
         lrw: bool = True,
         sync_missed_limit: int = 3,
+        quirks: ServoQuirks = NO_QUIRKS,
     ) -> None:
         """Units: kg·m², N·m·s/rad, N·m, rad/s, rad; `max_torque_ratio` of the rated torque;
         `velocity_counts_per_turn`: the unit of 0x606C and 0x60FF, a turn a second;
-        `sync_missed_limit`: SYNC0 pulses in a row without new outputs that are an error."""
+        `sync_missed_limit`: SYNC0 pulses in a row without new outputs that are an error;
+        `quirks`: how the drive differs from the profile."""
         super().__init__(
             name=name,
             alias=alias,
@@ -144,6 +147,7 @@ class Servo(AppliedDevice):
         self.following_error_turns = following_error_turns
         self.position_limits = position_limits
         self.sync_missed_limit = sync_missed_limit
+        self.quirks = quirks
         self._inertias = [inertia] * axes  # what the loops are tuned for
 
     def _pdos(
@@ -173,7 +177,9 @@ class Servo(AppliedDevice):
             emulation=False,
             pdi_type=0x05,
             mailbox=mailbox_of(self.mailbox_bytes),
-            sync_managers=sync_managers_of(self.mailbox_bytes, rx, tx),
+            sync_managers=sync_managers_of(
+                self.mailbox_bytes, rx, tx, watchdog_trigger=self.quirks.watchdog_trigger
+            ),
             fmmus=(1, 2, 3),
             rx_pdos=tuple(rx),
             tx_pdos=tuple(tx),
@@ -201,6 +207,16 @@ class Servo(AppliedDevice):
                 integral_gain=integral_gain,
                 boot=BOOT_SECONDS,
             )
+            self._motors.set_quirks(
+                self.position,
+                axis,
+                mode_delay=self.quirks.mode_delay,
+                refused_modes=self.quirks.refused_mask,
+                never_bit_12=self.quirks.bit_12 == "never",
+                follows_without_bit_12=self.quirks.follows_without_bit_12,
+                ignores_quick_stop=self.quirks.ignores_quick_stop,
+                ignores_disable=self.quirks.ignores_disable,
+            )
             self._preset(axis, counts_per_radian)
         super().started(scheduler)
         self.core.run_model(self.position, STEP_NS)
@@ -219,9 +235,11 @@ class Servo(AppliedDevice):
 
     def _preset(self, axis: int, counts_per_radian: float) -> None:
         low, high = self.position_limits or (0.0, 0.0)
+        quick_stop = self.quirks.quick_stop_option
         deceleration = round(1000 * self.velocity_counts_per_turn / (2 * math.pi))  # 1000 rad/s2
         for slot, value in (
-            (_segment.SLOT_QUICK_STOP_OPTION, 2),
+            (_segment.SLOT_ABORT_CONNECTION_OPTION, self.quirks.abort_connection_option),
+            (_segment.SLOT_QUICK_STOP_OPTION, 2 if quick_stop == "absent" else quick_stop),
             (_segment.SLOT_DISABLE_OPTION, 1),
             (_segment.SLOT_FAULT_OPTION, 2),
             (
@@ -251,6 +269,7 @@ class Servo(AppliedDevice):
             copy_ns=COPY_NS,
             missed_limit=self.sync_missed_limit,
         )
+        application.checks_watchdog = self.quirks.checks_watchdog
         for axis in range(self.axes):
             self._add_axis(application, axis)
 
@@ -258,6 +277,8 @@ class Servo(AppliedDevice):
         base, slots = AXIS_STRIDE * axis, _segment.SLOTS_PER_AXIS * axis
         dictionary = application.dictionary
         for o in OBJECTS:
+            if o.index == 0x605A and self.quirks.quick_stop_option == "absent":
+                continue
             entry = application.slot_entry(
                 o.name, o.data_type, BITS[o.data_type], slots + o.slot, o.access
             )
@@ -357,6 +378,13 @@ class Servo(AppliedDevice):
     def inject_fault(self, code: int, axis: int = 0) -> None:
         """A fault with this error code (0x603F); 0: its cause is gone and it can be reset."""
         self._motors.inject(self.position, axis, code)
+
+    def hide_bit_12(self, seconds: float, axis: int = 0) -> None:
+        """Hide bit 12 of the statusword for this time [s], from the next step on (`inf`: for good).
+
+        Meanwhile the drive holds its last demand, or follows its targets if `quirks` says so.
+        """
+        self._motors.hide_bit_12(self.position, axis, seconds)
 
     def switch_sto(self, active: bool, axis: int = 0) -> None:
         """Safe torque off."""

@@ -41,6 +41,13 @@ class AxisObject:
 
 
 OBJECTS = (
+    AxisObject(
+        0x6007,
+        "Abort connection option code",
+        INTEGER16,
+        RW,
+        _segment.SLOT_ABORT_CONNECTION_OPTION,
+    ),
     AxisObject(0x603F, "Error code", UNSIGNED16, TX, _segment.SLOT_ERROR_CODE),
     AxisObject(0x6040, "Controlword", UNSIGNED16, RX, _segment.SLOT_CONTROLWORD),
     AxisObject(0x6041, "Statusword", UNSIGNED16, TX, _segment.SLOT_STATUSWORD),

@@ -1,0 +1,85 @@
+"""Quirks: behaviour of real drives that differs from CiA 402 (IEC 61800-7-201).
+
+In TOML a quirk is a field of a table: `quirks = { bit_12 = "never" }`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import msgspec
+
+MODES = (6, 8, 9, 10)  # homing, CSP, CSV, CST
+OPTION_CODES = range(-(1 << 15), 1 << 15)
+
+
+class ServoQuirks(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Differences of one drive from the profile; all axes have them. Without arguments: none."""
+
+    # Statusword bit 12 of the cyclic modes. "never": leducp/KickCAT,
+    # lib/simulation/include/kickcat/simulation/devices/Ds402Motor.h shows 0x37 when enabled.
+    bit_12: Literal["standard", "never"] = "standard"
+
+    # The drive follows its targets although bit 12 is not shown, as Ds402Motor.h does. False: it
+    # ignores them and holds its last demand, as IEC 61800-7-201 says of bit 12 = 0.
+    follows_without_bit_12: bool = False
+
+    # Controlword 0x02 is ignored while enabled: Ds402Motor.h, "any other command: hold the
+    # current state". See also `quick_stop_option`.
+    ignores_quick_stop: bool = False
+
+    # Controlword 0x07 is ignored while enabled. No report is known. This is the device that the
+    # last step of a stop (disable voltage) exists for.
+    ignores_disable: bool = False
+
+    # Initial value of 0x605A. 0: torque off at once. Negative: the quick stop is disabled, as -1 of
+    # Beckhoff's AX8000 (infosys.beckhoff.com, ax8xxx_object, 605A "Disable_quick_stop").
+    # "absent": the object does not exist (abort 0x06020000) and the drive ramps down as with 2; so
+    # wangpinganliuyang/GDC16, SSC/Src/cia402appl.c, which obeys a quick stop without 0x605A.
+    quick_stop_option: int | Literal["absent"] = 2
+
+    # Initial value of 0x6007 (IEC 61800-7-201), the reaction to process data that stops.
+    # 0: none, 1: fault, 2: disable voltage, 3: quick stop as 0x605A says.
+    abort_connection_option: int = 1
+
+    # Time from 0x6060 to 0x6061 [s]; the old mode goes on until then. ipa320/ipa_canopen#29 and
+    # jia-xie/python-damiao-driver#4 changed their timing for drives that need longer than a cycle.
+    mode_delay: float = 0.0
+
+    # Modes that 0x6061 never shows, though 0x6060 accepts them. ipa320/ipa_canopen#29: a drive that
+    # changes its mode only before operation enabled.
+    refused_modes: tuple[int, ...] = ()
+
+    # SyncManager 2 triggers the watchdog: control byte 0x64 in the SII. False: 0x24, as in three
+    # SIIs of leducp/KickCAT (examples/slave: lan9252/freedom-k64f, lan9252/rpi and
+    # xmc4800/xmc4800-relax) and in both of MetalMusings' EaserCAT boards.
+    watchdog_trigger: bool = True
+
+    # SAFE-OP is refused with AL status code 0x001F, "invalid watchdog configuration", unless the
+    # trigger bit is set if and only if the watchdog time is not 0: Beckhoff's slave stack code (SSC
+    # 5.11 to 5.13), ecatslv.c, StartInputHandler.
+    checks_watchdog: bool = False
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.mode_delay < math.inf:
+            raise ValueError(f"mode_delay must be 0 or more seconds, not {self.mode_delay}")
+        for mode in self.refused_modes:
+            if mode not in MODES:
+                raise ValueError(f"refused_modes: {mode} is not one of the servo's {MODES}")
+        if self.quick_stop_option != "absent" and self.quick_stop_option not in OPTION_CODES:
+            raise ValueError(
+                f"quick_stop_option {self.quick_stop_option}: use a 16-bit number, or 'absent'"
+            )
+        if self.abort_connection_option not in (0, 1, 2, 3):
+            raise ValueError(
+                f"abort_connection_option must be 0 to 3, not {self.abort_connection_option}"
+            )
+
+    @property
+    def refused_mask(self) -> int:
+        """Bit n is set if mode n is refused."""
+        return sum(1 << mode for mode in set(self.refused_modes))
+
+
+NO_QUIRKS = ServoQuirks()
