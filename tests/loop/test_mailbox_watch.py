@@ -32,7 +32,7 @@ def test_an_emergency_arrives_over_the_wire(
             raise_faults=False,
             lost_limit=PATIENCE,
             late_limit=0,
-            watchdog=None,
+            watchdog=0,
         ) as loop:
             found: list[Event] = []
             for cycle in loop:

@@ -24,7 +24,7 @@ def test_both_run_on_threads_of_their_own() -> None:
             period=2e-3,
             lost_limit=1_000_000,
             late_limit=0,
-            watchdog=None,
+            watchdog=0,
             raise_faults=False,
         ) as loop:
             for cycle in loop:

@@ -130,7 +130,7 @@ def test_a_plan_prints_what_it_holds() -> None:
     for part in (
         "6 devices, period 1 ms",
         "device   2  Servo  station 0x1003  13 out, 13 in, watchdog 100 ms",
-        "SyncManager 2 out  0x1100 + 13",
+        "SyncManager 2 out  0x1100 + 13  control 0x64, triggers the watchdog",
         "FMMU 0 out  logical 0x00010001 + 13  → 0x1100",
         "0x607A:00 (32 bits) Target position",
         "LRW  80 bytes at 30  expected counter 13",
@@ -247,7 +247,7 @@ def test_a_wish_for_a_device_that_is_not_there() -> None:
         (0.0, 0.1, "period"),
         (1e-3, 1e-3, "expire"),
         (1e-3, 10.0, "watchdog"),
-        (1e-3, 0.0, "watchdog"),
+        (1e-3, -0.1, "watchdog"),
     ],
 )
 def test_times_that_cannot_be(period: float, watchdog: float, match: str) -> None:
@@ -256,4 +256,7 @@ def test_times_that_cannot_be(period: float, watchdog: float, match: str) -> Non
 
 
 def test_the_watchdog_can_be_off() -> None:
-    assert make_plan(demo(), watchdog=None).devices[2].watchdog_count == 0
+    plan = make_plan(demo(), watchdog=0)
+    assert plan.devices[2].watchdog_count == 0
+    assert plan.devices[2].layout.sync_managers[0].control == 0x24
+    assert "13 out, 13 in, watchdog off" in str(plan)

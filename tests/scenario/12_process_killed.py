@@ -3,15 +3,20 @@ The watchdogs, set from the plan, take the outputs down and the drives stop by t
 The next process finds the segment as it is and starts anew.
 """
 
+from __future__ import annotations
+
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable
 
+import pytest
+
 import catenary as cat
-from catenary.virtual import Coupler, DigitalOutputs, Segment, Server, Servo
-from tests.scenario.cell import Cell
+from catenary.virtual import Coupler, DigitalOutputs, Segment, Server, Servo, ServoQuirks
+from tests.scenario.cell import Cell, cell_of
+from tests.scenario.vertical import VerticalCell, vertical_cell
 
 WATCHDOG = 0.1  # [s], the default of Loop
 # In real time: the machine may stop for a while without the scenario being over.
@@ -54,6 +59,63 @@ def test_without_frames_the_watchdog_takes_everything_down(cell: Cell) -> None:
         assert all(abs(servo.velocity_rad_s) < 0.05 for servo in cell.servos)
         loop._opened.engine.start()  # so that leaving finds what it expects
     cell.assert_safe()
+
+
+@pytest.mark.parametrize("checks_watchdog", [False, True])
+def test_a_drive_stops_whose_sii_lacks_the_watchdog_trigger(checks_watchdog: bool) -> None:
+    """Control byte 0x24. With `checks_watchdog` it would refuse SAFE-OP as its SII says."""
+    quirks = ServoQuirks(watchdog_trigger=False, checks_watchdog=checks_watchdog)
+    with cell_of(Coupler(), Servo(quirks=quirks)) as cell:
+        arm = cell.drives()
+        with cat.Loop(arm) as loop:
+            home = arm.actual.position.copy()
+            for cycle in loop:
+                arm.target.position[:] = home + 5.0 * cycle.time
+                if cycle.number == 200:
+                    break
+            assert cell.drive_states == ["OPERATION ENABLED"]
+            loop._opened.engine.stop()
+            cell.let_pass(WATCHDOG + 0.2)
+            assert cell.drive_states == ["FAULT"]
+            loop._opened.engine.start()
+        cell.assert_safe()
+
+
+def kill_in_cst(cell: VerticalCell, watchdog: float) -> tuple[float, float]:
+    """Kill the process while the arm is lifted by 10 N·m more than its load.
+
+    Returns the way [rad] from then until the arm stands, and the velocity at the kill [rad/s].
+    """
+    arm = cell.drives(mode="cst", velocity_limit=6.0)
+    with cat.Loop(arm, watchdog=watchdog, raise_faults=False) as loop:
+        for cycle in loop:
+            arm.target.torque[:] = cell.gravity + 10.0
+            if cycle.number == 50:
+                break
+        before, velocity = cell.joint, cell.velocity
+        loop._opened.engine.stop()
+        cell.let_pass(1.0)
+        assert not cell.powered
+        assert abs(cell.velocity) < 1e-3
+        loop._opened.engine.start()
+    return cell.joint - before, velocity
+
+
+@pytest.mark.parametrize("watchdog", [0.010, 0.100])
+def test_a_stale_torque_lasts_as_long_as_the_watchdog(watchdog: float) -> None:
+    """Bound upwards: the way of the watchdog's time, then the drive's ramp (0x6085). Downwards: the
+    fall until the brake has closed."""
+    with vertical_cell() as cell:
+        travelled, velocity = kill_in_cst(cell, watchdog)
+        acceleration = cell.g_eff * 10.0 / cell.gravity
+        seconds = watchdog + 2e-3  # the last frame, and the device's service
+        reached = velocity + acceleration * seconds
+        accelerated = velocity * seconds + 0.5 * acceleration * seconds**2
+        ramp = 1000.0 / 50.0  # rad/s² at the joint
+        assert velocity > 0.1
+        assert -cell.fall_bound(reaction=0) < travelled
+        assert travelled < accelerated + reached**2 / (2 * ramp) + 0.005
+        assert travelled > 0.9 * accelerated - cell.fall_bound(reaction=0)
 
 
 def until(condition: Callable[[], bool], seconds: float) -> bool:

@@ -314,7 +314,7 @@ def test_in_real_time_too(name: str, order: str) -> None:
             run=order,  # type: ignore[arg-type]
             lost_limit=1_000_000,
             late_limit=0,
-            watchdog=None,
+            watchdog=0,
             raise_faults=False,
             sink=(share := cat.Share(name)),
         )

@@ -226,10 +226,10 @@ class MainDevice:
         order: Order = "threaded",
         receive_mode: ReceiveMode = "wait",
         optional: Collection[int] = (),
-        watchdog: float | None = 0.1,
+        watchdog: float | None = None,
     ) -> Plan:
         """The plan that fulfils the wishes, from what the devices have mapped now. In PRE-OP;
-        nothing is written. MappingError names an object that cannot be.
+        nothing is written. MappingError names an object that cannot be. `watchdog` as of `Loop`.
 
         For more to choose: `read_mappings`, then `catenary.plan.make_plan`.
         """

@@ -9,6 +9,9 @@
   Sharing bytes by bit-wise FMMUs would save some bytes, but writes would need the neighbour's
   bits, the ESC must have bit-wise FMMUs, and SOEM#958-like mismatches follow. IgH does likewise.
 - SyncManagers whose memory is adjacent share an FMMU: terminals have few of them.
+- The control byte is the SII's, except for the watchdog trigger of outputs. It is set if and only
+  if the watchdog is on: some SIIs have it clear, and Beckhoff's slave stack code answers 0x001F if
+  the bit and the time contradict each other.
 """
 
 from __future__ import annotations
@@ -20,6 +23,7 @@ from catenary.errors import ConfigurationError, MappingError
 from catenary.model.device import Assignment, DeviceDescription, Direction
 from catenary.plan.cycle import Number
 from catenary.plan.numbers import numbers
+from catenary.wire.sync_manager import WATCHDOG_TRIGGER
 
 LOGICAL_BASE = 0x0001_0000
 LOGICAL_STRIDE = 0x0000_0800  # units start at multiples: no two share an FMMU's range
@@ -35,6 +39,11 @@ class SyncManagerPlan:
     start: int
     length: int  # bytes
     control: int
+
+    @property
+    def triggers_watchdog(self) -> bool:
+        """True if a write triggers the process-data watchdog."""
+        return bool(self.control & WATCHDOG_TRIGGER)
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,6 +108,7 @@ class DeviceData:
     inputs: tuple[Assignment, ...]
     every: int = 1  # cycles between two exchanges
     optional: bool = False
+    watchdog_ns: int = 0  # of process data; 0: off
 
     @property
     def position(self) -> int:
@@ -234,8 +244,8 @@ def _places(
     output_offset = input_offset = 0  # inside the unit
     for data in members:
         managers = (
-            *_managers(data.description, data.outputs, Direction.OUTPUT),
-            *_managers(data.description, data.inputs, Direction.INPUT),
+            *_managers(data, Direction.OUTPUT),
+            *_managers(data, Direction.INPUT),
         )
         outputs_at = unit.logical_start + output_offset
         inputs_at = unit.logical_start + unit.output_size + input_offset
@@ -254,9 +264,9 @@ def _places(
     return places
 
 
-def _managers(
-    device: DeviceDescription, assignments: Sequence[Assignment], direction: Direction
-) -> tuple[SyncManagerPlan, ...]:
+def _managers(data: DeviceData, direction: Direction) -> tuple[SyncManagerPlan, ...]:
+    device = data.description
+    assignments = data.outputs if direction is Direction.OUTPUT else data.inputs
     channels = {channel.index: channel for channel in device.sync_managers}
     plans = []
     for assignment in assignments:
@@ -275,10 +285,17 @@ def _managers(
                 direction,
                 channel.start,
                 assignment.byte_length,
-                channel.control,
+                _control(channel.control, direction, data.watchdog_ns),
             )
         )
     return tuple(plans)
+
+
+def _control(byte: int, direction: Direction, watchdog_ns: int) -> int:
+    """Return the control byte: the trigger bit of outputs agrees with the watchdog time."""
+    if direction is Direction.INPUT:
+        return byte
+    return byte | WATCHDOG_TRIGGER if watchdog_ns else byte & ~WATCHDOG_TRIGGER
 
 
 def _fmmus(

@@ -15,11 +15,9 @@ from catenary.plan.layout import DeviceData, Layout, make_layout
 from catenary.plan.mailboxes import MailboxArea, with_mailboxes
 from catenary.plan.mapping import Mapping, make_mapping
 from catenary.plan.report import report
-from catenary.plan.start_up import WATCHDOG_UNIT_NS, DevicePlan, make_device_plan
+from catenary.plan.start_up import DevicePlan, make_device_plan
+from catenary.plan.watchdog import choose_watchdog
 from catenary.plan.wish import DC, ObjectReference, PdoWish, Wish, WishTables
-
-WATCHDOG_PERIODS = 3  # the watchdog must outlive that many lost cycles
-WATCHDOG_COUNT_MAX = 0xFFFF
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +46,7 @@ def make_plan(
     order: Order = "threaded",
     receive_mode: ReceiveMode = "wait",
     optional: Collection[int] = (),
-    watchdog: float | None = 0.1,
+    watchdog: float | None = None,
     collect_share: float = 0.8,
     lost_limit: int = 3,
     late_limit_position: float = 0.050,
@@ -65,7 +63,8 @@ def make_plan(
 ) -> Plan:
     """The plan that fulfils all wishes, or an error that names the object that cannot be.
 
-    `period` [s]; `watchdog` [s] of process data, None: off; `collect_share`: when threaded,
+    `period` [s]; `watchdog` [s] of process data, 0: off; None: 0.1 s, for devices in CST the longer
+    of 10 ms and five exchanges. `collect_share`: when threaded,
     the part of the period in which frames may come back; `late_limit_*`, `stop_deadline` [s];
     `lead` [s]: inline and with a law, awake that long before the instant; `log`: cycles that are
     remembered. Where a wish asks for
@@ -77,12 +76,15 @@ def make_plan(
     period_ns = round(period * 1e9)
     if period_ns <= 0:
         raise ValueError(f"period must be positive, not {period}")
-    watchdog_ns = _watchdog_ns(watchdog, period_ns)
     asked = _asked(devices, wishes, period_ns)
+    watchdogs = [
+        choose_watchdog(device, asked.get(device.position, PdoWish()), watchdog, period_ns)
+        for device in devices
+    ]
     mappings = [_mappings(device, asked.get(device.position, PdoWish())) for device in devices]
     data = [
-        _device_data(device, mapping, asked.get(device.position), watchdog_ns, period_ns)
-        for device, mapping in zip(devices, mappings, strict=True)
+        _device_data(device, mapping, asked.get(device.position, PdoWish()), watchdog_ns)
+        for device, mapping, watchdog_ns in zip(devices, mappings, watchdogs, strict=True)
     ]
     data = [replace(d, optional=d.optional or d.position in optional) for d in data]
     layout = make_layout(data)
@@ -126,10 +128,12 @@ def make_plan(
             inputs,
             place,
             asked.get(device.position, PdoWish()).start_up,
-            watchdog_ns if place.output_size else 0,
+            each.watchdog_ns if place.output_size else 0,
             syncs.get(device.position),
         )
-        for device, (outputs, inputs), place in zip(devices, mappings, layout.devices, strict=True)
+        for device, (outputs, inputs), place, each in zip(
+            devices, mappings, layout.devices, data, strict=True
+        )
     )
     return Plan(cycle, plans, layout, tables, mailboxes)
 
@@ -203,36 +207,14 @@ def _mappings(device: DeviceDescription, wish: PdoWish) -> tuple[Mapping, Mappin
 
 
 def _device_data(
-    device: DeviceDescription,
-    mapping: tuple[Mapping, Mapping],
-    wish: PdoWish | None,
-    watchdog_ns: int,
-    period_ns: int,
+    device: DeviceDescription, mapping: tuple[Mapping, Mapping], wish: PdoWish, watchdog_ns: int
 ) -> DeviceData:
     outputs, inputs = (direction.assignments for direction in mapping)
-    every, required = (wish.every, wish.required) if wish is not None else (1, True)
-    if watchdog_ns and watchdog_ns < WATCHDOG_PERIODS * period_ns * every:
-        raise ValueError(
-            f"{device}: exchanged every {every} cycles of {period_ns * 1e-9} s, less than "
-            f"{WATCHDOG_PERIODS} times within the watchdog of {watchdog_ns * 1e-9:.4f} s: ask for "
-            "a smaller divisor, or a longer watchdog=... of the Loop"
-        )
-    return DeviceData(device, outputs, inputs, every, optional=not required)
-
-
-def _watchdog_ns(watchdog: float | None, period_ns: int) -> int:
-    if watchdog is None:
-        return 0
-    count = round(watchdog * 1e9 / WATCHDOG_UNIT_NS)
-    if not 0 < count <= WATCHDOG_COUNT_MAX:
-        raise ValueError(
-            f"watchdog of {watchdog} s: from {WATCHDOG_UNIT_NS * 1e-9:.4f} to "
-            f"{WATCHDOG_UNIT_NS * WATCHDOG_COUNT_MAX * 1e-9:.4f} s, or None to switch it off"
-        )
-    watchdog_ns = count * WATCHDOG_UNIT_NS
-    if watchdog_ns < WATCHDOG_PERIODS * period_ns:
-        raise ValueError(
-            f"watchdog of {watchdog} s would expire after less than {WATCHDOG_PERIODS} periods "
-            f"of {period_ns * 1e-9} s"
-        )
-    return watchdog_ns
+    return DeviceData(
+        device,
+        outputs,
+        inputs,
+        wish.every,
+        optional=not wish.required,
+        watchdog_ns=watchdog_ns,
+    )

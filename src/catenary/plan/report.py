@@ -35,15 +35,19 @@ def _heading(cycle: CyclePlan) -> Iterator[str]:
 def _devices(devices: Sequence[DevicePlan]) -> Iterator[str]:
     for device in devices:
         place = device.layout
-        watchdog = f", watchdog {device.watchdog_ns / 1e6:g} ms" if device.watchdog_ns else ""
+        off = ", watchdog off" if place.output_size else ""
+        watchdog = f", watchdog {device.watchdog_ns / 1e6:g} ms" if device.watchdog_ns else off
         yield (
             f"device {device.position:>3}  {device.name}  station 0x{device.station_address:04X}  "
             f"{place.output_size} out, {place.input_size} in{watchdog}"
         )
         for manager in place.sync_managers:
+            control = f"control 0x{manager.control:02X}"
+            if manager.triggers_watchdog:
+                control += ", triggers the watchdog"
             yield (
                 f"    SyncManager {manager.index} {_ARROW[manager.direction]}  "
-                f"0x{manager.start:04X} + {manager.length}  control 0x{manager.control:02X}"
+                f"0x{manager.start:04X} + {manager.length}  {control}"
             )
         for fmmu in place.fmmus:
             yield (

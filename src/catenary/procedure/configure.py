@@ -1,6 +1,7 @@
 """Writing SyncManagers, FMMUs and the watchdog, ETG.1000.4 §6.3, §6.6, §6.7.
 
-The mailbox's SyncManagers are written in INIT, those of the process data in PRE-OP.
+The mailbox's SyncManagers are written in INIT, those of the process data in PRE-OP. The watchdog is
+read back, because drives rely on it when the MainDevice is gone.
 """
 
 from __future__ import annotations
@@ -9,15 +10,17 @@ from catenary.errors import ConfigurationError, DecodeError
 from catenary.model.device import DeviceDescription, Direction
 from catenary.plan.layout import FmmuPlan, MailboxFmmu, SyncManagerPlan
 from catenary.plan.start_up import WATCHDOG_DIVIDER, DevicePlan
-from catenary.procedure.exchange import Procedure, Request, write
+from catenary.procedure.exchange import Procedure, Request, read, write
 from catenary.procedure.mailbox import IN, OUT, MailboxChannel
 from catenary.procedure.station import Station, answered
 from catenary.wire import fmmu, register
 from catenary.wire.datagram import Command
+from catenary.wire.register import Register
 from catenary.wire.sii import MailboxArea
 from catenary.wire.sync_manager import (
     MAILBOX_IN,
     MAILBOX_OUT,
+    WATCHDOG_TRIGGER,
     Activation,
     Control,
     Status,
@@ -66,11 +69,49 @@ def configure_process_data(
     for number in range(used_fmmus, device.controller.fmmu_count):
         block = register.fmmu(number)
         requests.append(write(Command.FPWR, station.address, block, bytes(block.size)))
-    if plan.layout.output_size:
-        divider, time = register.WATCHDOG_DIVIDER, register.WATCHDOG_TIME_PROCESS_DATA
-        requests.append(write(Command.FPWR, station.address, divider, WATCHDOG_DIVIDER))
-        requests.append(write(Command.FPWR, station.address, time, plan.watchdog_count))
+    watchdog = _watchdog_registers(plan)
+    requests += [write(Command.FPWR, station.address, reg, value) for reg, value in watchdog]
     yield from _write_all(station, requests, "SyncManagers and FMMUs")
+    yield from _verify_watchdog(station, plan, watchdog)
+
+
+def _watchdog_registers(plan: DevicePlan) -> list[tuple[Register[int], int]]:
+    """Return the registers of the watchdog and their values; none for a device without outputs."""
+    if not plan.layout.output_size:
+        return []
+    time = (register.WATCHDOG_TIME_PROCESS_DATA, plan.watchdog_count)
+    return [(register.WATCHDOG_DIVIDER, WATCHDOG_DIVIDER), time] if plan.watchdog_ns else [time]
+
+
+def _verify_watchdog(
+    station: Station, plan: DevicePlan, written: list[tuple[Register[int], int]]
+) -> Procedure[None]:
+    """Read the watchdog's registers and trigger bits back."""
+    outputs = [m for m in plan.layout.sync_managers if m.direction is Direction.OUTPUT]
+    expected = [(reg, value, ~0) for reg, value in written]
+    expected += [
+        (register.sync_manager_control(m.index), m.control, WATCHDOG_TRIGGER) for m in outputs
+    ]
+    if not expected:
+        return
+    replies = yield [read(Command.FPRD, station.address, reg) for reg, _, _ in expected]
+    for (reg, value, mask), reply in zip(expected, replies, strict=True):
+        found = reg.unpack(answered(reply, station, reg.name))
+        if (found ^ value) & mask:
+            raise _not_kept(station, reg, value, found, trigger=mask == WATCHDOG_TRIGGER)
+
+
+def _not_kept(
+    station: Station, reg: Register[int], written: int, found: int, *, trigger: bool
+) -> ConfigurationError:
+    digits = 2 * reg.size
+    what = f" (bit 6, watchdog trigger: {bool(found & WATCHDOG_TRIGGER):d})" if trigger else ""
+    return ConfigurationError(
+        f"{station}: register 0x{reg.address:04X} ({reg.name}): wrote 0x{written:0{digits}X}, "
+        f"read back 0x{found:0{digits}X}{what}: its outputs would not have the planned watchdog",
+        hint="use watchdog=0 if the device has no process-data watchdog; it then keeps its last "
+        "outputs after a crash",
+    )
 
 
 def _is_mailbox(device: DeviceDescription, index: int) -> bool:

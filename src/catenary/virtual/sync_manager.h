@@ -96,6 +96,8 @@ static inline void sm_write_completed(controller *c, int n) {
     }
     if (sm->watchdog)
         watchdog_trigger(c);
+    else if (!sm->mailbox)
+        watchdog_bypass(c);
     sm_show_status(c, n);
 }
 

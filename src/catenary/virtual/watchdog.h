@@ -21,6 +21,13 @@ static inline void watchdog_trigger(controller *c) {
         c->outputs_valid = (c->memory[REG_AL_STATUS] & AL_STATE) == 8;
 }
 
+/* A complete write without trigger. A terminal without microcontroller shows its outputs as long as
+ * the watchdog is off or active (0x0440.0). */
+static inline void watchdog_bypass(controller *c) {
+    if (c->emulation && watchdog_time(c, REG_WATCHDOG_PROCESS_DATA) == 0)
+        c->outputs_valid = (c->memory[REG_AL_STATUS] & AL_STATE) == 8;
+}
+
 static inline void watchdog_trigger_pdi(controller *c) {
     int64_t time = watchdog_time(c, REG_WATCHDOG_PDI);
     c->memory[REG_DL_STATUS] |= 0x02;

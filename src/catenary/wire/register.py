@@ -220,6 +220,12 @@ def sync_manager(k: int) -> Register[bytes]:
     return Register(0x0800 + 8 * _checked(k, SYNC_MANAGER_COUNT), "8s", f"SyncManager {k}")
 
 
+def sync_manager_control(k: int) -> Register[int]:
+    """The control byte alone: mode, direction, interrupts, watchdog trigger."""
+    address = 0x0804 + 8 * _checked(k, SYNC_MANAGER_COUNT)
+    return Register(address, "<B", f"SyncManager {k} control")
+
+
 def sync_manager_status(k: int) -> Register[int]:
     """The status byte alone: mailbox full, buffers."""
     address = 0x0805 + 8 * _checked(k, SYNC_MANAGER_COUNT)

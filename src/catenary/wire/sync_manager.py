@@ -9,6 +9,7 @@ from enum import IntEnum, IntFlag
 from catenary.errors import DecodeError
 
 SIZE = 8
+WATCHDOG_TRIGGER = 0x40  # of the control byte: a write triggers the process-data watchdog
 _BLOCK = struct.Struct("<HHBBBB")
 
 
@@ -72,7 +73,7 @@ class Control:
             | self.direction << 2
             | self.interrupt_ecat << 4
             | self.interrupt_pdi << 5
-            | self.watchdog << 6
+            | (WATCHDOG_TRIGGER if self.watchdog else 0)
         )
 
     @classmethod
@@ -82,7 +83,8 @@ class Control:
             buffering, direction = Buffering(byte & 0x03), Direction(byte >> 2 & 0x03)
         except ValueError as error:
             raise DecodeError(f"SyncManager control 0x{byte:02X}: {error}") from None
-        return cls(buffering, direction, bool(byte & 0x10), bool(byte & 0x20), bool(byte & 0x40))
+        watchdog = bool(byte & WATCHDOG_TRIGGER)
+        return cls(buffering, direction, bool(byte & 0x10), bool(byte & 0x20), watchdog)
 
 
 MAILBOX_OUT = Control(Buffering.MAILBOX, Direction.WRITE, interrupt_pdi=True)  # 0x26

@@ -1,0 +1,81 @@
+"""The time of each device's process-data watchdog, ETG.1000.4 §6.3 (registers 0x0400, 0x0420).
+
+After a crash of the MainDevice a drive uses its last outputs until the watchdog expires. In CSP and
+CSV its own loops hold it meanwhile. In CST it applies a stale torque, so the default is short.
+"""
+
+from __future__ import annotations
+
+from catenary.model.device import DeviceDescription
+from catenary.plan.start_up import WATCHDOG_UNIT_NS
+from catenary.plan.wish import PdoWish
+from catenary.wire.cia402 import SLOT_OFFSET, Object
+
+DEFAULT_NS = 100_000_000
+TORQUE_NS = 10_000_000  # default in CST, or
+TORQUE_EXCHANGES = 5  # as long as so many exchanges of the device, if that is longer
+LEAST_EXCHANGES = 3  # a watchdog must outlive so many lost exchanges
+COUNT_MAX = 0xFFFF
+SLOTS = 8  # axes of a device, ETG.6010
+TARGET_TORQUES = frozenset(Object.TARGET_TORQUE + SLOT_OFFSET * slot for slot in range(SLOTS))
+
+
+def choose_watchdog(
+    device: DeviceDescription, wish: PdoWish, seconds: float | None, period_ns: int
+) -> int:
+    """Return the watchdog time of a device [ns], 0 for off.
+
+    Args:
+        device: The device, for error messages.
+        wish: Its process-data request; a required target torque means CST.
+        seconds: The application's choice [s]; 0: off, None: the default.
+        period_ns: Period of the cycle.
+
+    Raises:
+        ValueError: The register cannot hold the time, or it is shorter than three exchanges.
+    """
+    exchange_ns = period_ns * wish.every
+    if seconds is not None:
+        watchdog_ns = _rounded(seconds)
+    elif _is_torque_controlled(wish):
+        longest = max(TORQUE_NS, TORQUE_EXCHANGES * exchange_ns)
+        watchdog_ns = -(-longest // WATCHDOG_UNIT_NS) * WATCHDOG_UNIT_NS
+    else:
+        watchdog_ns = DEFAULT_NS
+    _check(device, wish, watchdog_ns, period_ns)
+    return watchdog_ns
+
+
+def _rounded(seconds: float) -> int:
+    """Return a multiple of the register's unit [ns]; 0 only for 0 s."""
+    count = round(seconds * 1e9 / WATCHDOG_UNIT_NS)
+    if seconds != 0 and not 0 < count <= COUNT_MAX:
+        raise ValueError(_range(seconds))
+    return count * WATCHDOG_UNIT_NS
+
+
+def _range(seconds: float) -> str:
+    unit = WATCHDOG_UNIT_NS * 1e-9
+    return f"watchdog of {seconds:g} s: use {unit:.4f} to {unit * COUNT_MAX:.4f} s, or 0 for off"
+
+
+def _is_torque_controlled(wish: PdoWish) -> bool:
+    return any(o.required and o.index in TARGET_TORQUES for o in wish.outputs)
+
+
+def _check(device: DeviceDescription, wish: PdoWish, watchdog_ns: int, period_ns: int) -> None:
+    if watchdog_ns > COUNT_MAX * WATCHDOG_UNIT_NS:
+        raise ValueError(_range(watchdog_ns * 1e-9))
+    if watchdog_ns == 0 or watchdog_ns >= LEAST_EXCHANGES * period_ns * wish.every:
+        return
+    seconds, period = watchdog_ns * 1e-9, period_ns * 1e-9
+    if watchdog_ns < LEAST_EXCHANGES * period_ns:
+        raise ValueError(
+            f"watchdog of {seconds:.4f} s would expire after less than {LEAST_EXCHANGES} periods "
+            f"of {period} s; use a longer watchdog=... of the Loop"
+        )
+    raise ValueError(
+        f"{device}: exchanged every {wish.every} cycles of {period} s, less than "
+        f"{LEAST_EXCHANGES} times within the watchdog of {seconds:.4f} s; use a smaller divisor, "
+        "or a longer watchdog=... of the Loop"
+    )
