@@ -106,6 +106,15 @@ def test_the_calls_before_operation(main: cat.MainDevice, double: Double) -> Non
     assert told[-2:] == ["set_send_interval 1000", "activate"]
 
 
+def test_without_a_watchdog_the_trigger_is_cleared(main: cat.MainDevice, double: Double) -> None:
+    double.forget()
+    with cat.Loop(arm_of(main), watchdog=0):
+        pass
+    calls = double.calls()
+    assert "pdos 0 sync 2 dir 1 pdos 1 watchdog 2" in calls
+    assert not [call for call in calls if call.startswith("watchdog")]
+
+
 def test_the_mapping_is_changed_where_something_is_missing(
     main: cat.MainDevice, double: Double
 ) -> None:

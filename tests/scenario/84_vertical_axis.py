@@ -54,6 +54,19 @@ def test_in_csp_the_drive_carries_the_load() -> None:
             assert arm.actual.torque[0] == pytest.approx(LOAD, rel=0.02)
 
 
+def test_in_cst_the_torque_of_gravity_holds_the_arm() -> None:
+    with vertical_cell(start=0.4) as cell:
+        arm = cell.drives(mode="cst", velocity_limit=6.0)
+        with cat.Loop(arm) as loop:
+            for cycle in loop:
+                arm.target.torque[:] = cell.gravity
+                if cycle.number == 300:
+                    break
+            assert cell.powered
+            assert cell.torque == pytest.approx(cell.gravity, abs=0.05)
+            assert abs(cell.fall(0.4)) < 0.01
+
+
 @pytest.mark.parametrize("brake_delay", [0.0, 0.030, 0.100])
 def test_without_torque_the_arm_falls_until_the_brake_has_closed(brake_delay: float) -> None:
     with vertical_cell(brake_delay=brake_delay) as cell:

@@ -39,6 +39,8 @@ NO_QUIRKS = ServoQuirks()
 
 @dataclass
 class VerticalCell:
+    """The rig, scanned: a MainDevice on a segment of one servo that moves the arm."""
+
     segment: Segment
     link: FaultInjector
     main: cat.MainDevice
@@ -76,9 +78,9 @@ class VerticalCell:
     def fall_bound(self, reaction: float) -> float:
         """Return the bound of a fall from rest [rad].
 
-        ½·g_eff·t², t = `reaction` [s] (without torque, until the drive has left OPERATION ENABLED)
-        + the brake's delay + two steps of the drive; and the way on which the closed brake stops
-        the arm, which is that of the fall times load / (brake - load).
+        It is ½·g_eff·t² plus the way on which the closed brake stops the arm, which is
+        load / (brake - load) times as long. t is the sum of `reaction`, the brake's delay and two
+        steps of the drive. `reaction` [s]: time without torque while the drive is powered.
         """
         seconds = reaction + self.brake_delay + 2 * STEP
         return 0.5 * self.g_eff * seconds**2 * (1 + LOAD / (self.brake - LOAD))
@@ -110,7 +112,8 @@ def vertical_cell(
     brake: float = BRAKE,
     **servo: object,
 ) -> Iterator[VerticalCell]:
-    """The scanned rig with the arm on its brake at `start` [rad]; `servo`: options of `Servo`."""
+    """Set the rig up with the arm on its brake at `start` [rad], and scan it. `servo`: options of
+    `Servo`."""
     options = {
         "counts_per_turn": COUNTS,
         "inertia": 1e-4,

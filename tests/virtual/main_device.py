@@ -83,13 +83,13 @@ class MainDevice:
         assert self.request(station, 2) == (2, 0)
 
     def start_servo(self, station: int, logical: int, *, control: int = 0x64) -> None:
-        """To SAFE-OP with the default 13 + 13 bytes; outputs first in the logical image.
-        `control`: byte of SyncManager 2."""
+        """Bring a servo to SAFE-OP with the default 13 + 13 bytes, outputs first in the logical
+        image. `control`: control byte of SyncManager 2."""
         self.map_servo(station, logical, control=control)
         assert self.request(station, 4) == (4, 0)
 
     def map_servo(self, station: int, logical: int, *, control: int = 0x64) -> None:
-        """The same as far as PRE-OP, with the process data configured."""
+        """Bring a servo to PRE-OP and configure its process data, as for `start_servo`."""
         self.start_mailbox(station)
         self.sync_manager(station, 2, 0x1100, 13, control)
         self.sync_manager(station, 3, 0x2000, 13, 0x20)
