@@ -18,6 +18,7 @@ from catenary.plan.report import report
 from catenary.plan.start_up import DevicePlan, make_device_plan
 from catenary.plan.watchdog import choose_watchdog
 from catenary.plan.wish import DC, ObjectReference, PdoWish, Wish, WishTables
+from catenary.wire.cia402 import Mode
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +36,8 @@ class Plan:
     mailboxes: MailboxArea
 
     def __str__(self) -> str:
-        return report(self.cycle, self.devices, self.layout)
+        axes = [axis for table in self.tables for axis in table.axis_reports]
+        return report(self.cycle, self.devices, self.layout, axes)
 
 
 def make_plan(
@@ -50,7 +52,9 @@ def make_plan(
     collect_share: float = 0.8,
     lost_limit: int = 3,
     late_limit_position: float = 0.050,
-    late_limit_velocity: float = 0.010,
+    late_limit_velocity: float = 0.050,
+    late_limit_torque: float = 0.010,
+    handover: float = 0.020,
     stop_deadline: float = 2.0,
     lead: float = 0.0,
     log: int = 1000,
@@ -63,9 +67,10 @@ def make_plan(
 ) -> Plan:
     """The plan that fulfils all wishes, or an error that names the object that cannot be.
 
-    `period` [s]; `watchdog` [s] of process data, 0: off; None: 0.1 s, for devices in CST the longer
+`period` [s]; `watchdog` [s] of process data, 0: off; None: 0.1 s, for devices in CST the longer
     of 10 ms and five exchanges. `collect_share`: when threaded,
-    the part of the period in which frames may come back; `late_limit_*`, `stop_deadline` [s];
+    the part of the period in which frames may come back; `late_limit_*` (position: CSP, velocity:
+    CSV, torque: CST), `handover`, `stop_deadline` [s];
     `lead` [s]: inline and with a law, awake that long before the instant; `log`: cycles that are
     remembered. Where a wish asks for
     distributed clocks: `clock`, whom the others follow; `reference`, position of the reference
@@ -93,6 +98,7 @@ def make_plan(
     choice = choose_clocks(devices, _clock_wishes(asked), clock, reference)
     frames = make_frames(layout.units, len(devices), choice, mailboxes)
     tables = tuple(wish.tables(layout) for wish in wishes)
+    _check_times(tables, late_limit_torque, handover)
     cycle = CyclePlan(
         period_ns=period_ns,
         order=order,
@@ -112,6 +118,8 @@ def make_plan(
         lost_limit=lost_limit,
         late_limit_position_ns=round(late_limit_position * 1e9),
         late_limit_velocity_ns=round(late_limit_velocity * 1e9),
+        late_limit_torque_ns=round(late_limit_torque * 1e9),
+        handover_ns=round(handover * 1e9),
         stop_deadline_ns=round(stop_deadline * 1e9),
         lead_ns=round(lead * 1e9),
         log_cycles=log,
@@ -191,6 +199,21 @@ def _syncs(
         position: make_sync(devices[position], wish, period_ns * asked[position].every)
         for position, wish in _clock_wishes(asked).items()
     }
+
+
+def _check_times(tables: Sequence[WishTables], late_limit_torque: float, handover: float) -> None:
+    """Raise ValueError for times that would leave an axis in CST under torque for ever."""
+    if not 0 < handover < math.inf:
+        raise ValueError(f"handover must be positive and finite [s], not {handover}")
+    if late_limit_torque:
+        return
+    for table in tables:
+        for axis in table.axis_reports:
+            if Mode.CST in axis.modes:
+                raise ValueError(
+                    f"{axis.name}: late_limit=0 is refused with CST: a stalled program would "
+                    "leave its last torque on the motor; give a time [s]"
+                )
 
 
 def _merged(

@@ -6,22 +6,37 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 
 from catenary.model.device import Assignment, Direction
+from catenary.plan.axis_report import AxisReport
 from catenary.plan.clocks import SyncPlan
 from catenary.plan.cycle import ClockPlan, CyclePlan, DatagramPlan
 from catenary.plan.layout import Layout
 from catenary.plan.numbers import entry_places
 from catenary.plan.start_up import DevicePlan
+from catenary.wire.cia402 import Mode
 from catenary.wire.clock import Activation
 from catenary.wire.datagram import Command
 
 _ARROW = {Direction.OUTPUT: "out", Direction.INPUT: "in "}
 
 
-def report(cycle: CyclePlan, devices: Sequence[DevicePlan], layout: Layout) -> str:
-    """The lines of `print(plan)`."""
+def report(
+    cycle: CyclePlan,
+    devices: Sequence[DevicePlan],
+    layout: Layout,
+    axes: Sequence[AxisReport] = (),
+) -> str:
+    """Return the lines of `print(plan)`."""
     clocks = [] if cycle.clock is None else _clocks(cycle.clock, cycle.period_ns, devices)
-    lines = [*_heading(cycle), *_devices(devices), *clocks, *_frames(cycle), *_units(layout)]
-    return "\n".join(lines)
+    return "\n".join(
+        [
+            *_heading(cycle),
+            *_devices(devices),
+            *_axes(cycle, axes),
+            *clocks,
+            *_frames(cycle),
+            *_units(layout),
+        ]
+    )
 
 
 def _heading(cycle: CyclePlan) -> Iterator[str]:
@@ -63,6 +78,24 @@ def _devices(devices: Sequence[DevicePlan]) -> Iterator[str]:
         yield from _entries(Direction.INPUT, device.inputs, place.input_offset)
         if device.downloads:
             yield f"    {len(device.downloads)} SDO downloads before SAFE-OP"
+
+
+def _axes(cycle: CyclePlan, axes: Sequence[AxisReport]) -> Iterator[str]:
+    if not axes:
+        return
+    late = (
+        ("CSP", cycle.late_limit_position_ns),
+        ("CSV", cycle.late_limit_velocity_ns),
+        ("CST", cycle.late_limit_torque_ns),
+    )
+    limits = ", ".join(f"{mode} {ns / 1e6:g} ms" if ns else f"{mode} off" for mode, ns in late)
+    yield (
+        f"axes: late limit {limits}; "
+        f"CST keeps its torque for {cycle.handover_ns / 1e6:g} ms after a law or stream ended"
+    )
+    for number, axis in enumerate(axes):
+        yield f"    axis {number}  {axis.name}  {', '.join(Mode(m).name for m in axis.modes)}"
+        yield from (f"        {line}" for line in axis.lines)
 
 
 def _sync(sync: SyncPlan) -> str:

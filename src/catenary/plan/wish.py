@@ -12,6 +12,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from catenary.plan.axis_report import AxisReport
 from catenary.plan.cycle import AxisPlan, Column, Number
 
 Reals = npt.NDArray[np.float64]
@@ -77,11 +78,12 @@ class ImageLayout(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class WishTables:
-    """A wish as numbers."""
+    """A wish as numbers. `axis_reports` has one entry per axis, or none."""
 
     axes: tuple[AxisPlan, ...] = ()
     output_columns: tuple[Column, ...] = ()
     input_columns: tuple[Column, ...] = ()
+    axis_reports: tuple[AxisReport, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
