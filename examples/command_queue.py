@@ -30,7 +30,8 @@ class CommandQueue:
 
 if __name__ == "__main__":
     with cat.MainDevice(sys.argv[1] if len(sys.argv) > 1 else "virtual") as main:
-        arm, queue = cat.Drives(main.scan().drives, counts_per_turn=2**20), CommandQueue()
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=2.0)
+        queue = CommandQueue()
         with cat.Loop(arm) as loop:
             goal = arm.actual.position.copy()
             for cycle in loop:

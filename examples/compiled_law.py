@@ -17,7 +17,7 @@ def pd(actual, target, memory, time, parameters):  # plain Python here, compiled
 
 
 with cat.MainDevice(sys.argv[1] if len(sys.argv) > 1 else "virtual") as main:
-    arm = cat.Drives(main.scan().drives, mode="cst", counts_per_turn=2**20)
+    arm = cat.Drives(main.scan().drives, mode="cst", counts_per_turn=2**20, velocity_limit=100.0)
     with cat.Loop(arm, period=1e-3, laws=[pd]) as loop:  # compiled before the devices go to OP
         goal = arm.actual.position + 0.5  # [rad]
         run = loop.start(pd, memory=goal, parameters=[4.0, 0.2])  # N·m/rad, N·m/(rad/s)

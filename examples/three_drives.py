@@ -6,7 +6,7 @@ import sys
 import catenary as cat
 
 with cat.MainDevice(sys.argv[1] if len(sys.argv) > 1 else "virtual") as main:
-    arm = cat.Drives(main.scan().drives, mode="csp", counts_per_turn=2**20)
+    arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=1.0)  # [rad/s]
     with cat.Loop(arm, period=1e-3) as loop:  # → OP, drives enabled and holding
         home = arm.actual.position.copy()  # [rad], one per axis
         for cycle in loop:

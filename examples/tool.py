@@ -9,7 +9,8 @@ import catenary as cat
 with cat.MainDevice(sys.argv[1]) as main:
     subs = main.scan()
     tool = subs.group(20)
-    arm = cat.Drives([d for d in subs.drives if d not in tool], counts_per_turn=2**20)
+    others = [drive for drive in subs.drives if drive not in tool]
+    arm = cat.Drives(others, counts_per_turn=2**20, velocity_limit=2.0)
     grip = cat.Outputs(*tool, required=False)
     with cat.Loop(arm, grip, period=1e-3, on_return="restore") as loop:
         for cycle in loop:

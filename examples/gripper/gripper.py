@@ -75,7 +75,7 @@ servo = Servo(axes=2, inertia=1e-4, viscous_friction=VISCOUS, coulomb_friction=C
 plant = Plant(Path(__file__).with_name("gripper.xml"), [Joint("left"), Joint("right")])
 segment = Segment([servo], plant=plant)
 with cat.MainDevice(segment) as main:
-    arm = cat.Drives(main.scan().drives, mode="cst", counts_per_turn=2**20)
+    arm = cat.Drives(main.scan().drives, mode="cst", counts_per_turn=2**20, velocity_limit=50.0)
     with cat.Loop(arm, period=PERIOD, laws=[home, grip]) as loop:
         memory = control.join(seeking.memory, speed.memory)
         memory = loop.run(home, memory, control.join(seeking.parameters, speed.parameters))

@@ -3,7 +3,7 @@
     import catenary as cat
 
     with cat.MainDevice("eth0") as main:
-        arm = cat.Drives(main.scan().drives, mode="csp", counts_per_turn=2**20)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=1.0)
         with cat.Loop(arm, period=1e-3) as loop:
             home = arm.actual.position.copy()
             for cycle in loop:

@@ -57,7 +57,7 @@ def test_a_loop_that_stands_still_says_why(monkeypatch: pytest.MonkeyPatch) -> N
 
     def run() -> None:
         with cat.MainDevice(segment) as main:
-            arm = cat.Drives(main.scan().drives, counts_per_turn=1000)
+            arm = cat.Drives(main.scan().drives, counts_per_turn=1000, velocity_limit=100.0)
             with cat.Loop(arm) as loop:
                 segment.unplug()
                 network_law.count(loop, job)

@@ -140,7 +140,9 @@ def test_beside_a_running_loop_from_another_thread(segment: cat.Segment) -> None
     segment.core.poke(2, 0x0300, b"\x09")
     results: list[Diagnosis] = []
     with cat.MainDevice(segment) as main:
-        arm = cat.Drives(main.scan().drives, mode="csp", counts_per_turn=2**20)
+        arm = cat.Drives(
+            main.scan().drives, mode="csp", counts_per_turn=2**20, velocity_limit=100.0
+        )
         with cat.Loop(arm, period=1e-3, late_limit=0) as loop:
             asking = threading.Thread(target=lambda: results.append(main.diagnose()))
             asking.start()
@@ -155,7 +157,9 @@ def test_beside_a_running_loop_from_another_thread(segment: cat.Segment) -> None
 
 def test_in_the_loops_own_thread_it_is_refused(segment: cat.Segment) -> None:
     with cat.MainDevice(segment) as main:
-        arm = cat.Drives(main.scan().drives, mode="csp", counts_per_turn=2**20)
+        arm = cat.Drives(
+            main.scan().drives, mode="csp", counts_per_turn=2**20, velocity_limit=100.0
+        )
         with cat.Loop(arm, period=1e-3) as loop:
             next(iter(loop))
             with pytest.raises(RuntimeError, match="the loop's own thread"):

@@ -131,7 +131,7 @@ def test_an_sii_without_one_of_its_categories(
         assert servo.state == State.PRE_OP
         assert servo.name
         assert servo.sdo.read(0x1018, 1, type=UDINT) == servo.identity.vendor
-        arm = cat.Drives([servo], counts_per_turn=2**20)
+        arm = cat.Drives([servo], counts_per_turn=2**20, velocity_limit=100.0)
         if missing == SYNC_MANAGER:  # there is no place to put process data
             with pytest.raises(MappingError, match=r"device 1.*SyncManager"), cat.Loop(arm):
                 pass
@@ -162,7 +162,7 @@ def test_every_answer_comes_twice() -> None:
         subs = main.scan()
         assert [sub.state for sub in subs] == [State.PRE_OP] * 3
         assert subs[1].sdo.read(0x1018, 1, type=UDINT) == subs[1].identity.vendor
-        arm = cat.Drives(subs.drives, counts_per_turn=2**20)
+        arm = cat.Drives(subs.drives, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Loop(arm) as loop:
             for cycle in loop:
                 assert cycle.ok
@@ -180,7 +180,7 @@ def test_sdo_from_another_thread_while_the_loop_runs_and_never_from_its_own(run:
     found: list[int] = []
     with cat.MainDevice(cat.Segment(devices, clock="monotonic")) as main:
         servo = main.scan()[1]
-        arm = cat.Drives([servo], counts_per_turn=2**20)
+        arm = cat.Drives([servo], counts_per_turn=2**20, velocity_limit=100.0)
 
         def ask() -> None:
             servo.sdo.write(0x6065, 0, 12345, type=UDINT)

@@ -39,7 +39,7 @@ def test_else_it_is_raised_when_the_device_is_used(segment: cat.Segment) -> None
         assert subs[2].sdo.read(0x1018, 1)
         with pytest.raises(StateError, match="device 1"):
             subs[1].sdo.read(0x1018, 1)
-        arm = cat.Drives([subs[2]], counts_per_turn=2**20)
+        arm = cat.Drives([subs[2]], counts_per_turn=2**20, velocity_limit=100.0)
         with pytest.raises(StateError, match="device 1"), cat.Loop(arm):
             pass
 

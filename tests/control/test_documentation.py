@@ -22,6 +22,7 @@ def test_the_first_example_holds_an_arm_at_its_goal(monkeypatch: pytest.MonkeyPa
             main.scan().drives,
             mode="cst",
             counts_per_turn=2**17,
+            velocity_limit=100.0,
             gear_ratio=[121.0, 121.0, 121.0, 101.0, 101.0, 101.0],
             direction=[1, 1, -1, 1, -1, 1],
         )

@@ -25,7 +25,7 @@ def opened(
 ) -> Iterator[tuple[cat.Drives, cat.Loop]]:
     servo = cat.Servo(axes=axes, inertia=0.01, rated_torque=20.0)
     with cat.MainDevice(cat.Segment([servo])) as main:
-        arm = cat.Drives(main.scan().drives, mode=mode, counts_per_turn=2**20)
+        arm = cat.Drives(main.scan().drives, mode=mode, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Loop(arm, period=1e-3, **more) as loop, warnings.catch_warnings():
             warnings.simplefilter("error")  # a law that allocates is warned of
             yield arm, loop

@@ -69,9 +69,10 @@ class FakeSdo:
 def fake_sub(
     position: int, values: dict[tuple[int, int], int] | None = None, slots: tuple[int, ...] = (0,)
 ) -> SimpleNamespace:
-    """What the drive layer sees of a SubDevice: 0.64 N·m rated, interpolation time settable."""
+    """A SubDevice for the drive layer: 0.64 N·m rated, interpolation time settable, a quick stop
+    that brakes."""
     if values is None:
-        values = {(0x6076, 0): 640, (0x60C2, 1): 2, (0x60C2, 2): -3}
+        values = {(0x6076, 0): 640, (0x605A, 0): 2, (0x60C2, 1): 2, (0x60C2, 2): -3}
     return SimpleNamespace(
         position=position,
         name="Servo",
@@ -94,6 +95,8 @@ def views_of(tables: WishTables) -> Views:
         mode_actual=np.zeros(n, np.int8),
         axis_state=np.zeros(n, np.uint8),
         axis_flags=np.zeros(n, np.uint8),
+        stop_reason=np.zeros(n, np.uint8),
+        stop_cycle=np.zeros(n, np.uint64),
         target_position=reals[3],
         target_velocity=reals[4],
         target_torque=reals[5],

@@ -1,6 +1,8 @@
 """Drives as a wish: objects, tables, arrays, requests."""
 
 import math
+import warnings
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -10,10 +12,18 @@ from catenary.drive import Drives
 from catenary.drive.objects import AxisObject
 from catenary.errors import ConfigurationError, MappingError
 from catenary.plan.cycle import AxisLimits, Bank
+from catenary.plan.stop_reason import StopReason
 from catenary.wire.cia402 import Mode, State
 from tests.drive.fakes import FakeLayout, fake_sub, views_of
 
 MILLISECOND = 1_000_000
+
+
+@pytest.fixture(autouse=True)
+def _no_warning_of_the_default_velocity() -> Iterator[None]:
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "no velocity_limit", UserWarning)
+        yield
 
 
 def opened(drives: Drives) -> Drives:
@@ -51,7 +61,11 @@ def test_a_period_that_cannot_be_said_is_refused_by_its_object() -> None:
 
 def test_a_drive_that_does_not_know_its_rated_torque_asks_for_it() -> None:
     sub = fake_sub(3, {})
-    for asked in ({"mode": "cst"}, {"measured": ["torque"]}, {"torque_limit": 1.0}):
+    for asked in (
+        {"mode": "cst", "velocity_limit": 1.0},
+        {"measured": ["torque"]},
+        {"torque_limit": 1.0},
+    ):
         with pytest.raises(ConfigurationError, match="rated_torque="):
             Drives([sub], counts_per_turn=1, **asked).pdos(MILLISECOND)
     assert Drives([sub], counts_per_turn=1, measured=["position"]).pdos(MILLISECOND)
@@ -71,7 +85,13 @@ def test_what_a_drive_may_lack_is_not_required() -> None:
         return [r.index for r in wish.outputs + wish.inputs if r.required]
 
     assert required(Drives([fake_sub(3)], counts_per_turn=1)) == [0x6040, 0x607A, 0x6041, 0x6064]
-    switching = Drives([fake_sub(3)], counts_per_turn=1, other_modes=["csv"], measured=["velocity"])
+    switching = Drives(
+        [fake_sub(3)],
+        counts_per_turn=1,
+        other_modes=["csv"],
+        measured=["velocity"],
+        velocity_limit=1.0,
+    )
     assert required(switching) == [0x6040, 0x6060, 0x607A, 0x60FF, 0x6041, 0x6061, 0x606C]
 
 
@@ -81,9 +101,11 @@ def test_the_mode_is_written_once_where_the_drive_has_it() -> None:
 
 
 def test_slots_are_axes_of_their_own() -> None:
-    values = {(0x6076, 0): 640, (0x6876, 0): 1280}
+    values = {(0x6076, 0): 640, (0x6876, 0): 1280, (0x685A, 0): 2}
     sub = fake_sub(2, values)
-    drives = Drives([(sub, 0), (sub, 1)], counts_per_turn=2**20, mode=["csp", "cst"])
+    drives = Drives(
+        [(sub, 0), (sub, 1)], counts_per_turn=2**20, mode=["csp", "cst"], velocity_limit=3.0
+    )
     wish = drives.pdos(MILLISECOND)[2]
     assert [r.index for r in wish.outputs] == [0x6040, 0x6060, 0x607A, 0x6840, 0x6860, 0x6871]
     first, second = drives.tables(FakeLayout.of({2: wish})).axes
@@ -102,7 +124,7 @@ def test_all_slots_of_a_device_are_taken_when_none_is_named() -> None:
 
 
 def test_other_modes_map_their_targets() -> None:
-    drives = Drives([fake_sub(3)], counts_per_turn=1, other_modes=["cst"])
+    drives = Drives([fake_sub(3)], counts_per_turn=1, other_modes=["cst"], velocity_limit=3.0)
     assert 0x6071 in [r.index for r in drives.pdos(MILLISECOND)[3].outputs]
     opened(drives).switch("cst")
     assert drives.target.mode.tolist() == [Mode.CST]
@@ -209,6 +231,24 @@ def test_states_and_faults_are_read_from_the_cycle() -> None:
     assert drives.faults == (1, 2)
     assert drives.enabled.tolist() == [True, False, False]
     assert drives.limited.tolist() == [False, False, True]
+
+
+def test_an_axis_of_an_absent_device_is_not_enabled() -> None:
+    drives = opened(Drives([fake_sub(1), fake_sub(2)], counts_per_turn=1, required=False))
+    views = drives._views
+    assert views is not None
+    views.axis_flags[:] = 1
+    views.unit_valid[2] = 0  # a sync unit per device in the fake layout
+    assert drives.present.tolist() == [True, False]
+    assert drives.enabled.tolist() == [True, False]
+
+
+def test_the_reason_of_a_stop_is_kept() -> None:
+    drives = opened(Drives([fake_sub(1), fake_sub(2)], counts_per_turn=1))
+    views = drives._views
+    assert views is not None
+    views.stop_reason[:] = [0, StopReason.UNDERRUN]
+    assert drives.stopped == (None, StopReason.UNDERRUN)
 
 
 def test_a_statusword_that_codes_no_state_is_none() -> None:

@@ -26,7 +26,13 @@ def opened(
         for servo in servos:
             servo.move_to(at)
         arm = cat.Drives(
-            main.subs.drives, **{"counts_per_turn": COUNTS, "other_modes": ["hm"], **options}
+            main.subs.drives,
+            **{
+                "counts_per_turn": COUNTS,
+                "velocity_limit": 100.0,
+                "other_modes": ["hm"],
+                **options,
+            },
         )
         with cat.Loop(arm, period=1e-3, run=run) as loop:
             yield arm, loop
@@ -91,6 +97,7 @@ def test_against_a_joints_hard_stop(tmp_path: Path, method: int, stop: float) ->
         arm = cat.Drives(
             main.scan().drives,
             counts_per_turn=COUNTS,
+            velocity_limit=100.0,
             gear_ratio=10.0,
             other_modes=["hm"],
             homing=homing,

@@ -44,7 +44,9 @@ def rig(*faults: object, **options: float) -> Iterator[Rig]:
     for fault in faults:
         segment.inject(fault)  # type: ignore[arg-type]
     with cat.MainDevice(segment) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, required=False)
+        arm = cat.Drives(
+            main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0, required=False
+        )
         with cat.Loop(arm, period=MS, raise_faults=False, lost_limit=1000) as loop:
             yield Rig(segment, arm, loop, **options)
 

@@ -36,7 +36,7 @@ def test_where_a_device_is_now() -> None:
 
 
 def test_the_master_is_told_aliases(main: cat.MainDevice, double: Double) -> None:
-    with cat.Loop(cat.Drives(main.subs.drives, counts_per_turn=1000)):
+    with cat.Loop(cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0)):
         pass
     told = [call for call in double.calls() if call.startswith("slave_config ")]
     assert told == [f"slave_config {where} aa 402" for where in ("0 0", "7 0", "7 1")]
@@ -49,7 +49,7 @@ def test_a_group_is_the_same_as_on_our_own(main: cat.MainDevice) -> None:
 def test_a_device_is_followed_where_it_is_plugged_in(main: cat.MainDevice, double: Double) -> None:
     """The two drives of the tool and the one in front of it change their places."""
     double.set(1, 0x6076, 0, 5000)
-    tool = cat.Drives([main.subs.group(7)[0]], counts_per_turn=1000)
+    tool = cat.Drives([main.subs.group(7)[0]], counts_per_turn=1000, velocity_limit=100.0)
     with cat.Loop(tool) as loop:
         double.swap(0, 1)
         for _ in range(50):

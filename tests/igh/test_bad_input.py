@@ -126,7 +126,7 @@ def test_other_devices_than_expected(double: Double) -> None:
 def test_a_failed_configuration_leaves_nothing(double: Double, call: bytes) -> None:
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         main.scan()
-        arm = cat.Drives(main.subs.drives, counts_per_turn=1000)
+        arm = cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0)
         double.fail(call, -errno.ENOMEM)
         with pytest.raises(CatenaryError, match=r"Cannot allocate memory"), cat.Loop(arm):
             pass
@@ -140,7 +140,7 @@ def test_a_failed_configuration_leaves_nothing(double: Double, call: bytes) -> N
 def test_configuration_after_activation(double: Double) -> None:
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         main.scan()
-        arm = cat.Drives(main.subs.drives, counts_per_turn=1000)
+        arm = cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0)
         plan = main.plan(arm)
         main.configure(plan)
         with pytest.raises(ConfigurationError, match="activated already"):
@@ -154,7 +154,9 @@ def test_nothing_is_left_reserved(double: Double, error: type[BaseException]) ->
     def run() -> None:
         with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
             main.scan()
-            with cat.Loop(cat.Drives(main.subs.drives, counts_per_turn=1000)) as loop:
+            with cat.Loop(
+                cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0)
+            ) as loop:
                 next(loop)
                 raise error
 
@@ -168,7 +170,7 @@ def test_a_device_that_is_gone_when_the_loop_begins(double: Double) -> None:
     """Its place is empty: the master has found fewer devices since."""
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         main.scan()
-        arm = cat.Drives(main.subs.drives, counts_per_turn=1000)
+        arm = cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0)
         double.online(1, 0)
         with pytest.raises(CatenaryError, match="device 1"), cat.Loop(arm):
             pass

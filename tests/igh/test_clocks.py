@@ -24,7 +24,9 @@ def main(double: Double) -> Iterator[cat.MainDevice]:
 
 
 def loop_of(main: cat.MainDevice, **options: object) -> cat.Loop:
-    return cat.Loop(cat.Drives(main.subs.drives, counts_per_turn=1000, dc=True), **options)
+    return cat.Loop(
+        cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0, dc=True), **options
+    )
 
 
 def times_of(calls: list[str], name: str) -> list[int]:
@@ -98,7 +100,7 @@ def test_a_clock_that_is_far_off_teaches_no_drift(double: Double) -> None:
 
 
 def test_a_reference_clock_can_be_chosen(main: cat.MainDevice, double: Double) -> None:
-    arm = cat.Drives([main.subs[1]], counts_per_turn=1000, dc=True)
+    arm = cat.Drives([main.subs[1]], counts_per_turn=1000, velocity_limit=100.0, dc=True)
     with cat.Loop(arm, reference=main.subs[1]):
         pass
     assert "select_reference_clock 1" in double.calls()
@@ -151,8 +153,8 @@ def test_clocks_are_kept_while_a_device_is_away_that_need_not_be_there(
     main: cat.MainDevice, double: Double
 ) -> None:
     """Its domain stays incomplete: that is no reason to let the instants of the others drift."""
-    arm = cat.Drives([main.subs[0]], counts_per_turn=1000, dc=True)
-    tool = cat.Drives([main.subs[1]], counts_per_turn=1000, required=False)
+    arm = cat.Drives([main.subs[0]], counts_per_turn=1000, velocity_limit=100.0, dc=True)
+    tool = cat.Drives([main.subs[1]], counts_per_turn=1000, velocity_limit=100.0, required=False)
     with cat.Loop(arm, tool) as loop:
         for _ in range(50):
             next(loop)
@@ -166,7 +168,7 @@ def test_clocks_are_kept_while_a_device_is_away_that_need_not_be_there(
 
 def test_without_clocks_there_is_nothing_to_watch(main: cat.MainDevice) -> None:
     with (
-        cat.Loop(cat.Drives(main.subs.drives, counts_per_turn=1000)) as loop,
+        cat.Loop(cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0)) as loop,
         pytest.raises(RuntimeError, match="no distributed clocks"),
     ):
         _ = loop.clocks
@@ -180,5 +182,5 @@ def test_devices_keep_time_as_before_when_a_loop_with_clocks_ends(
     with loop_of(main):
         assert double.value(0, 0x1C32, 1) == 2
     assert double.value(0, 0x1C32, 1) == 1
-    with cat.Loop(cat.Drives(main.subs.drives, counts_per_turn=1000)) as loop:
+    with cat.Loop(cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0)) as loop:
         assert next(loop).ok

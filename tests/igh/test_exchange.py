@@ -58,9 +58,13 @@ def test_an_engine_takes_an_image_made_for_its_plan(doubles: dict[str, Path]) ->
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         main.scan()
         assert isinstance(main, igh.MainDevice)
-        both = cat.Drives(main.subs.drives, counts_per_turn=1000)
+        both = cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0)
         plan = carried(main.plan(both))
-        other = carried(main.plan(cat.Drives([main.subs[0]], counts_per_turn=1000, mode="cst")))
+        other = carried(
+            main.plan(
+                cat.Drives([main.subs[0]], counts_per_turn=1000, velocity_limit=100.0, mode="cst")
+            )
+        )
         main.configure(plan)
         image, link = main.configuration.exchange.capsule, main.link.capsule
         Engine(plan.cycle, link, image)
@@ -75,7 +79,9 @@ def test_nothing_is_called_behind_the_end(doubles: dict[str, Path]) -> None:
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         main.scan()
         assert isinstance(main, igh.MainDevice)
-        plan = carried(main.plan(cat.Drives(main.subs.drives, counts_per_turn=1000)))
+        plan = carried(
+            main.plan(cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0))
+        )
         main.configure(plan)
         engine = Engine(plan.cycle, main.link.capsule, main.configuration.exchange.capsule)
         engine.start()
@@ -94,7 +100,7 @@ def test_answers_are_looked_for_when_they_are_there(doubles: dict[str, Path]) ->
     double.delay(400)
     with cat.MainDevice(Master(library=double.path)) as main:
         main.scan()
-        arm = cat.Drives(main.subs.drives, counts_per_turn=1000)
+        arm = cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0)
         with cat.Loop(arm, period=4e-3, late_limit=0, priority=None) as loop:
             for _ in range(60):
                 next(loop)
@@ -110,7 +116,9 @@ def test_slow_answers_of_devices_that_need_not_be_there_are_found(doubles: dict[
     double.delay(20_000)
     with cat.MainDevice(Master(library=double.path)) as main:
         main.scan()
-        arm = cat.Drives(main.subs.drives, counts_per_turn=1000, required=False)
+        arm = cat.Drives(
+            main.subs.drives, counts_per_turn=1000, velocity_limit=100.0, required=False
+        )
         calm = {"late_limit": 0, "priority": None, "watchdog": 2.0, "enable": False}
         with cat.Loop(arm, period=50e-3, **calm) as loop:  # type: ignore[arg-type]
             for cycle in loop:

@@ -27,7 +27,7 @@ def main(double: Double) -> Iterator[cat.MainDevice]:
 
 
 def arm_of(main: cat.MainDevice, **options: object) -> cat.Drives:
-    return cat.Drives(main.subs.drives, counts_per_turn=1000, **options)
+    return cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0, **options)
 
 
 def test_a_scan_finds_drives(main: cat.MainDevice) -> None:
@@ -119,7 +119,7 @@ def test_the_mapping_is_changed_where_something_is_missing(
     main: cat.MainDevice, double: Double
 ) -> None:
     """Torque control needs 0x6071, which is not mapped: the master is told a new mapping."""
-    arm = cat.Drives(main.subs.drives, mode="cst", counts_per_turn=1000)
+    arm = cat.Drives(main.subs.drives, mode="cst", counts_per_turn=1000, velocity_limit=100.0)
     with cat.Loop(arm) as loop:
         for cycle in loop:
             arm.target.torque[:] = 0.25
@@ -132,8 +132,8 @@ def test_the_mapping_is_changed_where_something_is_missing(
 
 def test_sync_units_are_domains(main: cat.MainDevice, double: Double) -> None:
     left, right = main.subs.drives
-    one = cat.Drives([left], counts_per_turn=1000)
-    two = cat.Drives([right], counts_per_turn=1000, required=False, every=2)
+    one = cat.Drives([left], counts_per_turn=1000, velocity_limit=100.0)
+    two = cat.Drives([right], counts_per_turn=1000, velocity_limit=100.0, required=False, every=2)
     with cat.Loop(one, two, run="inline") as loop:
         next(loop)
         double.forget()
@@ -159,8 +159,8 @@ def test_a_cable_pulled_ends_the_loop(main: cat.MainDevice, double: Double) -> N
 
 def test_a_device_that_need_not_be_there_comes_back(main: cat.MainDevice, double: Double) -> None:
     left, right = main.subs.drives
-    one = cat.Drives([left], counts_per_turn=1000)
-    two = cat.Drives([right], counts_per_turn=1000, required=False)
+    one = cat.Drives([left], counts_per_turn=1000, velocity_limit=100.0)
+    two = cat.Drives([right], counts_per_turn=1000, velocity_limit=100.0, required=False)
     seen = []
     with cat.Loop(one, two) as loop:
         for cycle in loop:
@@ -181,8 +181,8 @@ def test_a_device_that_need_not_be_there_comes_back(main: cat.MainDevice, double
 def test_a_device_that_is_away_holds_no_cycle_up(main: cat.MainDevice, double: Double) -> None:
     """Answers of those that are there are not kept until frames might still come back."""
     left, right = main.subs.drives
-    one = cat.Drives([left], counts_per_turn=1000)
-    two = cat.Drives([right], counts_per_turn=1000, required=False)
+    one = cat.Drives([left], counts_per_turn=1000, velocity_limit=100.0)
+    two = cat.Drives([right], counts_per_turn=1000, velocity_limit=100.0, required=False)
     with cat.Loop(one, two) as loop:
         next(loop)
         double.online(1, 0)
@@ -318,7 +318,10 @@ def test_two_masters_in_one_loop(doubles: dict[str, Path], tmp_path: Path) -> No
         Double(path)
     sources = [Master(number, library=path) for number, path in enumerate(paths)]
     with cat.MainDevice(sources[0]) as first, cat.MainDevice(sources[1]) as second:
-        arms = [cat.Drives(main.scan().drives, counts_per_turn=1000) for main in (first, second)]
+        arms = [
+            cat.Drives(main.scan().drives, counts_per_turn=1000, velocity_limit=100.0)
+            for main in (first, second)
+        ]
         with cat.Loop(*arms, period=5e-3, late_limit=0, priority=None) as loop:
             for cycle in loop:
                 assert cycle.ok

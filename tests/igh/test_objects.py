@@ -23,7 +23,9 @@ def main(double: Double) -> Iterator[cat.MainDevice]:
 
 
 def loop_of(main: cat.MainDevice, **options: object) -> cat.Loop:
-    return cat.Loop(cat.Drives(main.subs.drives, counts_per_turn=1000), **options)
+    return cat.Loop(
+        cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0), **options
+    )
 
 
 def test_objects_before_a_loop(main: cat.MainDevice, double: Double) -> None:
@@ -144,7 +146,7 @@ def test_an_activated_master_without_cycles_is_not_asked(
     main: cat.MainDevice, double: Double
 ) -> None:
     """The real one would wait in the kernel for ever, and the process with it."""
-    plan = main.plan(cat.Drives(main.subs.drives, counts_per_turn=1000))
+    plan = main.plan(cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0))
     main.configure(plan)
     double.forget()
     for ask in (
@@ -159,7 +161,7 @@ def test_an_activated_master_without_cycles_is_not_asked(
 def test_a_request_that_nobody_serves_has_an_end(main: cat.MainDevice, double: Double) -> None:
     """A device that is not there: its request stays busy in the kernel."""
     one, two = (
-        cat.Drives([drive], counts_per_turn=1000, required=required)
+        cat.Drives([drive], counts_per_turn=1000, velocity_limit=100.0, required=required)
         for drive, required in zip(main.subs.drives, (True, False), strict=True)
     )
     with cat.Loop(one, two) as loop:

@@ -148,7 +148,7 @@ def test_clocks_are_watched(subject: Subject, main: cat.MainDevice, clock: str) 
     clocked = [sub for sub in drives(main) if sub.description.clock_bits]
     if not clocked:
         pytest.skip("no drive with distributed clocks")
-    arm = cat.Drives(clocked, counts_per_turn=2**20, dc=True)
+    arm = cat.Drives(clocked, counts_per_turn=2**20, velocity_limit=100.0, dc=True)
     with subject.loop(arm, clock=clock) as loop:
         clocks = loop.clocks
         until(loop, lambda: not any(math.isnan(d) for d in clocks.differences.values()))
@@ -162,7 +162,7 @@ def test_clocks_are_watched(subject: Subject, main: cat.MainDevice, clock: str) 
 def test_drives_follow(subject: Subject, main: cat.MainDevice, run: str) -> None:
     if not subject.may_move:
         pytest.skip("nothing moves without CATENARY_IGH_MOVE=1")
-    arm = cat.Drives(drives(main), counts_per_turn=2**20)
+    arm = cat.Drives(drives(main), counts_per_turn=2**20, velocity_limit=100.0)
     with subject.loop(arm, run=run, enable=True) as loop:
         assert arm.enabled.all()
         home = arm.actual.position.copy()

@@ -55,7 +55,9 @@ def test_clocks_are_where_receive_times_were_latched(double: Double) -> None:
         first, second = main.scan()
         assert (first.description.clock_bits, second.description.clock_bits) == (0, 64)
         with pytest.raises(CatenaryError, match="device 0"):
-            main.plan(cat.Drives([first], counts_per_turn=1000, dc=True))
-        with cat.Loop(cat.Drives([second], counts_per_turn=1000, dc=True)) as loop:
+            main.plan(cat.Drives([first], counts_per_turn=1000, velocity_limit=100.0, dc=True))
+        with cat.Loop(
+            cat.Drives([second], counts_per_turn=1000, velocity_limit=100.0, dc=True)
+        ) as loop:
             assert loop.clocks.reference is second
     assert "select_reference_clock 1" in double.calls()

@@ -54,7 +54,9 @@ def test_a_loop_wants_it_while_it_is_inline_and_time_is_real(
     clock: str, run: str, during: float
 ) -> None:
     with cat.MainDevice(Segment([Servo()], clock=clock)) as main:
-        arm = cat.Drives(main.scan().drives, mode="csp", counts_per_turn=1 << 20)
+        arm = cat.Drives(
+            main.scan().drives, mode="csp", counts_per_turn=1 << 20, velocity_limit=100.0
+        )
         with cat.Loop(arm, period=5e-3, run=run, lost_limit=1000, late_limit=0) as loop:
             next(iter(loop))
             assert interval() == during

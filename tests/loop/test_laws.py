@@ -18,7 +18,9 @@ COUNTS = 2**20
 @contextmanager
 def opened(mode: str = "csp", **more: Any) -> Iterator[tuple[cat.Drives, cat.Loop]]:
     with cat.MainDevice(cat.Segment([cat.Coupler(), cat.Servo(), cat.Servo()])) as main:
-        arm = cat.Drives(main.scan().drives, mode=mode, counts_per_turn=COUNTS)
+        arm = cat.Drives(
+            main.scan().drives, mode=mode, counts_per_turn=COUNTS, velocity_limit=100.0
+        )
         with cat.Loop(arm, period=1e-3, **more) as loop:
             yield arm, loop
 
@@ -125,7 +127,11 @@ def test_columns_by_name_and_by_bank() -> None:
         subs = main.scan()
         lamps, buttons = cat.Outputs(subs[0]), cat.Inputs(subs[1])
         arm = cat.Drives(
-            subs.drives, mode="csp", counts_per_turn=COUNTS, columns=["following_error"]
+            subs.drives,
+            mode="csp",
+            counts_per_turn=COUNTS,
+            velocity_limit=100.0,
+            columns=["following_error"],
         )
         with cat.Loop(arm, lamps, buttons) as loop:
             for compiled in (True, False):

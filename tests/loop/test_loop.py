@@ -19,14 +19,18 @@ from catenary.virtual import Segment, Servo
 )
 def test_refuses_what_cannot_be(asked: dict, named: str) -> None:
     with cat.MainDevice(Segment([Servo()])) as main:
-        arm = cat.Drives(main.scan().drives, mode="csp", counts_per_turn=2**20)
+        arm = cat.Drives(
+            main.scan().drives, mode="csp", counts_per_turn=2**20, velocity_limit=100.0
+        )
         with pytest.raises(ValueError, match=named):
             cat.Loop(arm, period=1e-3, **{"run": "inline", **asked})
 
 
 def test_the_lead_is_bounded_by_the_period() -> None:
     with cat.MainDevice(Segment([Servo()])) as main:
-        arm = cat.Drives(main.scan().drives, mode="csp", counts_per_turn=2**20)
+        arm = cat.Drives(
+            main.scan().drives, mode="csp", counts_per_turn=2**20, velocity_limit=100.0
+        )
         with cat.Loop(arm, period=250e-6, run="inline") as loop:
             assert loop.plan.cycle.lead_ns == 25_000
         with cat.Loop(arm, period=1e-3, lead=0) as loop:
@@ -35,7 +39,9 @@ def test_the_lead_is_bounded_by_the_period() -> None:
 
 def test_the_log_reaches_back_as_far_as_asked() -> None:
     with cat.MainDevice(Segment([Servo()])) as main:
-        arm = cat.Drives(main.scan().drives, mode="csp", counts_per_turn=2**20)
+        arm = cat.Drives(
+            main.scan().drives, mode="csp", counts_per_turn=2**20, velocity_limit=100.0
+        )
         with cat.Loop(arm, period=1e-3, run="inline", log=1500) as loop:
             for cycle in loop:
                 if cycle.time >= 2.0:
@@ -49,7 +55,7 @@ def test_a_main_device_that_is_closed_round_an_open_loop_leaves_it_first() -> No
     segment = Segment([Servo()])
     main = cat.MainDevice(segment)
     main.open()
-    arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+    arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
     loop = cat.Loop(arm)
     loop.__enter__()
     next(loop)
@@ -62,7 +68,7 @@ def test_what_was_asked_and_not_committed_does_not_come_after_the_stop() -> None
     """An exception right after `enable`: the axis stays off while the loop is being left."""
     segment = Segment([Servo()])
     with cat.MainDevice(segment) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with contextlib.suppress(ZeroDivisionError), cat.Loop(arm, enable=False) as loop:
             for cycle in loop:
                 if cycle.number == 5:
@@ -84,14 +90,14 @@ def test_a_fault_in_a_cycle_that_python_has_missed_is_raised_all_the_same() -> N
                     break
 
     with cat.MainDevice(segment) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with pytest.raises(DriveError, match="0x2310"):
             run()
 
 
 def test_a_period_longer_than_a_second() -> None:
     with cat.MainDevice(Segment([Servo()])) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Loop(arm, period=1.5, watchdog=5.0, late_limit=0) as loop:
             assert next(loop).ok
             assert next(loop).ok

@@ -24,7 +24,7 @@ def test_an_emergency_arrives_over_the_wire(
         cat.MainDevice(veth[0]) as main,
     ):
         main.on_event(told.append)
-        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Loop(
             arm,
             period=2e-3,

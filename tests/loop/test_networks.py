@@ -16,7 +16,8 @@ def test_both_run_on_threads_of_their_own() -> None:
     segments = [Segment([Coupler(), Servo(), Servo()], clock="monotonic") for _ in range(2)]
     with cat.MainDevice(segments[0]) as first, cat.MainDevice(segments[1]) as second:
         upper, lower = (
-            cat.Drives(main.scan().drives, counts_per_turn=2**20) for main in (first, second)
+            cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
+            for main in (first, second)
         )
         with cat.Loop(
             upper,

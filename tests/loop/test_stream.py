@@ -11,7 +11,9 @@ import catenary as cat
 @pytest.fixture
 def opened():
     with cat.MainDevice(cat.Segment([cat.Servo(), cat.Servo()])) as main:
-        arm = cat.Drives(main.scan().drives, mode="csp", counts_per_turn=2**20)
+        arm = cat.Drives(
+            main.scan().drives, mode="csp", counts_per_turn=2**20, velocity_limit=100.0
+        )
         with cat.Loop(arm, period=1e-3) as loop:
             yield arm, loop
 

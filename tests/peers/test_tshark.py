@@ -33,7 +33,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
         servo.sdo.write(0x6065, 0, 5000, type=UDINT)
         with pytest.raises(SdoAbort):
             servo.sdo.read(0x5FFF)
-        arm = cat.Drives(subs.drives, mode="csp", counts_per_turn=2**20)
+        arm = cat.Drives(subs.drives, mode="csp", counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Loop(arm, period=1e-3) as loop:
             home = arm.actual.position.copy()
             for cycle in loop:

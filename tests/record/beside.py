@@ -38,7 +38,7 @@ def shared_loop(name: str, *, axes: int = 3, history: float = 30.0) -> Iterator[
     """Remembers so much that a recorder that starts late, or is slow, loses nothing."""
     segment = cat.Segment([cat.Coupler(), *(cat.Servo() for _ in range(axes))])
     with cat.MainDevice(segment) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with (
             cat.Share(name, history=history) as share,
             cat.Loop(arm, period=PERIOD, sink=share) as loop,

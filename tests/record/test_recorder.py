@@ -72,7 +72,7 @@ def test_inputs_and_outputs_are_recorded_by_name(name: str, tmp_path: Path) -> N
 def test_events_are_recorded(name: str, tmp_path: Path) -> None:
     segment = cat.Segment([cat.Coupler(), cat.Servo(), cat.Servo()])
     with cat.MainDevice(segment) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Share(name) as share:
             with suppress(WorkingCounterError), cat.Loop(arm, period=1e-3, sink=share) as loop:
                 recorder = record.Recorder(name, tmp_path / "x.mcap")
@@ -256,7 +256,7 @@ def test_a_loop_that_is_opened_again_is_another_recording(name: str, tmp_path: P
     with cat.MainDevice(segment) as main, cat.Share(name) as share:
         drives = main.scan().drives
         for axes in (1, 2):
-            arm = cat.Drives(drives[:axes], counts_per_turn=2**20)
+            arm = cat.Drives(drives[:axes], counts_per_turn=2**20, velocity_limit=100.0)
             with cat.Loop(arm, period=1e-3, sink=share) as loop:
                 recorder = record.Recorder(name, tmp_path / f"{axes}.mcap")
                 for cycle in loop:

@@ -147,7 +147,7 @@ def test_a_killed_process_leaves_nothing_turning_and_nothing_locked(veth: tuple[
         assert until(lambda: servo.drive_state() != "OPERATION ENABLED", seconds=30)
         assert until(lambda: abs(servo.velocity_rad_s) < 0.05, seconds=30)
         with cat.MainDevice(veth[0]) as main:
-            arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+            arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
             with cat.Loop(arm, period=2e-3, watchdog=1.0, lost_limit=1000, late_limit=0) as loop:
                 next(loop)
                 assert servo.drive_state() == "OPERATION ENABLED"

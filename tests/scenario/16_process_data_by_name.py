@@ -83,6 +83,7 @@ def test_mixed_drives_are_one_arm() -> None:
         arm = cat.Drives(
             cell.subs.drives,
             counts_per_turn=[2**20, 2**20, 2**17],
+            velocity_limit=100.0,
             gear_ratio=gears,
             direction=directions,
             offset=offsets,

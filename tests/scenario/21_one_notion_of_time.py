@@ -42,7 +42,9 @@ def live(path: Path, run: Run) -> tuple[str, list[float], int, object]:
         )
         segment = cat.Segment([cat.Coupler(), *(cat.Servo() for _ in range(3))], clock=clock)
         with tasks, Recorder(segment, path) as link, cat.MainDevice(link) as main:
-            arm = cat.Drives(main.scan().drives, mode="csp", counts_per_turn=2**20)
+            arm = cat.Drives(
+                main.scan().drives, mode="csp", counts_per_turn=2**20, velocity_limit=100.0
+            )
             with cat.Loop(arm, period=1e-3) as loop:
                 for cycle in loop:
                     arm.target.position[:] = 0.1 * math.sin(cycle.time)
@@ -75,7 +77,9 @@ def looping(clock: VirtualClock, place: Participant, took: list[float]) -> None:
     """A loop in a thread of its own, whose body computes 9 ms in each of three cycles."""
     try:
         with cat.MainDevice(cat.Segment([cat.Servo()], clock=place)) as main:
-            arm = cat.Drives(main.scan().drives, mode="csp", counts_per_turn=2**20)
+            arm = cat.Drives(
+                main.scan().drives, mode="csp", counts_per_turn=2**20, velocity_limit=100.0
+            )
             with cat.Loop(arm, period=20e-3, late_limit=0) as loop:
                 for cycle in loop:
                     if cycle.number == 3:

@@ -47,8 +47,10 @@ def cell() -> Iterator[Cell]:
 
 
 def wishes(cell: Cell) -> tuple[cat.Drives, cat.Drives, cat.Outputs]:
-    arm = cat.Drives([cell.subs[1], cell.subs[2]], counts_per_turn=2**20)
-    tool = cat.Drives([cell.subs[TOOL]], counts_per_turn=2**20, required=False)
+    arm = cat.Drives([cell.subs[1], cell.subs[2]], counts_per_turn=2**20, velocity_limit=100.0)
+    tool = cat.Drives(
+        [cell.subs[TOOL]], counts_per_turn=2**20, velocity_limit=100.0, required=False
+    )
     gripper = cat.Outputs(cell.subs[GRIPPER], required=False)
     return arm, tool, gripper
 
@@ -137,7 +139,13 @@ def test_what_was_mapped_and_written_at_the_start_is_replayed(cell: Cell) -> Non
     """After power-up the servo has its default mapping and interpolation time; the loop asked for
     others. With another mapping its answers would not fit its sync unit."""
     tool = cell.subs[TOOL]
-    drives = cat.Drives([tool], counts_per_turn=2**20, required=False, columns=["following_error"])
+    drives = cat.Drives(
+        [tool],
+        counts_per_turn=2**20,
+        velocity_limit=100.0,
+        required=False,
+        columns=["following_error"],
+    )
     gripper = cat.Outputs(cell.subs[GRIPPER], required=False)
     answers = []
     with cat.Loop(drives, gripper, period=4e-3) as loop:

@@ -33,8 +33,10 @@ def star() -> Iterator[Cell]:
 def ride(cell: Cell, vanishing: int, seconds: float = 6.0) -> list[event.Event]:
     """The others hold while one is without power for half a second."""
     others = [cell.subs[p] for p in (FIRST, SECOND, THIRD) if p != vanishing]
-    arm = cat.Drives(others, counts_per_turn=2**20, dc=True)
-    tool = cat.Drives([cell.subs[vanishing]], counts_per_turn=2**20, dc=True, required=False)
+    arm = cat.Drives(others, counts_per_turn=2**20, velocity_limit=100.0, dc=True)
+    tool = cat.Drives(
+        [cell.subs[vanishing]], counts_per_turn=2**20, velocity_limit=100.0, dc=True, required=False
+    )
     core = cell.segment.core
     with cat.Loop(arm, tool, period=1e-3, reference=cell.subs[FIRST]) as loop:
         loop.wait_locked()

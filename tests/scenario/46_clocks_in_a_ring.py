@@ -38,7 +38,7 @@ def main(segment: Segment) -> Iterator[cat.MainDevice]:
 
 
 def drives(main: cat.MainDevice) -> cat.Drives:
-    return cat.Drives(main.scan().drives, counts_per_turn=2**20, dc=True)
+    return cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0, dc=True)
 
 
 def assert_together(segment: Segment, loop: cat.Loop) -> None:

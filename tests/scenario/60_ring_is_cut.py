@@ -40,7 +40,7 @@ def test_any_cable_may_be_pulled_and_put_in_again(
     segment: Segment, between: tuple[int | None, int | None]
 ) -> None:
     with cat.MainDevice(segment.first, segment.second) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Loop(arm) as loop:
             home = arm.actual.position.copy()
             for cycle in loop:
@@ -67,7 +67,7 @@ def test_it_starts_with_any_cable_missing(between: tuple[int | None, int | None]
         subs = main.scan()
         assert [sub.identity.serial for sub in subs][1:] == [1, 2, 3, 4, 5]
         assert any("the ring is cut" in note for note in main.notes)
-        arm = cat.Drives(subs.drives, counts_per_turn=2**20)
+        arm = cat.Drives(subs.drives, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Loop(arm) as loop:
             for cycle in loop:
                 assert cycle.ok
@@ -79,7 +79,7 @@ def test_it_starts_with_any_cable_missing(between: tuple[int | None, int | None]
 
 def test_cut_twice_an_island_of_required_devices_ends_the_loop(segment: Segment) -> None:
     with cat.MainDevice(segment.first, segment.second) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with pytest.raises(WorkingCounterError, match="device 3") as caught, cat.Loop(arm) as loop:
             for cycle in loop:
                 if cycle.number == 50:
@@ -99,8 +99,10 @@ def test_cut_twice_an_island_that_is_not_required_is_named_and_comes_back(
 ) -> None:
     with cat.MainDevice(segment.first, segment.second) as main:
         subs = main.scan()
-        arm = cat.Drives([subs[1], subs[2], subs[5]], counts_per_turn=2**20)
-        others = cat.Drives([subs[3], subs[4]], counts_per_turn=2**20, required=False)
+        arm = cat.Drives([subs[1], subs[2], subs[5]], counts_per_turn=2**20, velocity_limit=100.0)
+        others = cat.Drives(
+            [subs[3], subs[4]], counts_per_turn=2**20, velocity_limit=100.0, required=False
+        )
         with cat.Loop(arm, others) as loop:
             for cycle in loop:
                 assert cycle.ok
@@ -123,8 +125,10 @@ def test_before_a_cut_a_device_that_was_switched_off_comes_back(segment: Segment
     """Positions count from the first port: who is behind the cut has none just now."""
     with cat.MainDevice(segment.first, segment.second) as main:
         subs = main.scan()
-        arm = cat.Drives([subs[k] for k in (1, 2, 5)], counts_per_turn=2**20)
-        others = cat.Drives([subs[3], subs[4]], counts_per_turn=2**20, required=False)
+        arm = cat.Drives([subs[k] for k in (1, 2, 5)], counts_per_turn=2**20, velocity_limit=100.0)
+        others = cat.Drives(
+            [subs[3], subs[4]], counts_per_turn=2**20, velocity_limit=100.0, required=False
+        )
         with cat.Loop(arm, others) as loop:
             for cycle in loop:
                 assert cycle.ok
@@ -146,7 +150,7 @@ def test_a_thousand_cuts_and_joins_cost_no_frame_that_could_have_come(
     chance = random.Random(7)
     segment = segment_of(detection=detection)
     with cat.MainDevice(segment.first, segment.second) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Loop(arm, lost_limit=20) as loop:
             changes, cutting, between, longest, lost = 0, True, CABLES[0], 0, 0
             for cycle in loop:

@@ -25,7 +25,7 @@ class Body:
 
     def wishes(self) -> tuple[cat.Drives, cat.Drives]:
         return tuple(
-            cat.Drives(main.subs.drives, counts_per_turn=2**20)
+            cat.Drives(main.subs.drives, counts_per_turn=2**20, velocity_limit=100.0)
             for main in (self.upper_main, self.lower_main)
         )  # type: ignore[return-value]
 
@@ -183,7 +183,7 @@ def test_their_clocks_follow_the_main_device() -> None:
         segments = [Segment([Coupler(crystal=c), Servo()], clock=clock) for c in crystals]
         with cat.MainDevice(segments[0]) as first, cat.MainDevice(segments[1]) as second:
             wishes = [
-                cat.Drives(main.scan().drives, counts_per_turn=2**20, dc=True)
+                cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0, dc=True)
                 for main in (first, second)
             ]
             with cat.Loop(*wishes) as loop:
@@ -211,7 +211,7 @@ def test_clocks_that_nobody_wished_for_cannot_be_waited_for(body: Body) -> None:
 def test_a_device_is_released_in_its_own_network(body: Body) -> None:
     """Both have a device at that position, switched off and on, and held."""
     upper, lower = [
-        cat.Drives(main.subs.drives, counts_per_turn=2**20, required=False)
+        cat.Drives(main.subs.drives, counts_per_turn=2**20, velocity_limit=100.0, required=False)
         for main in (body.upper_main, body.lower_main)
     ]
     with cat.Loop(upper, lower, on_return="hold") as loop:
@@ -240,12 +240,15 @@ def test_what_several_networks_cannot_have(body: Body) -> None:
         cat.Loop(upper, lower, quorum=3)
     with pytest.raises(ValueError, match="one wish with devices of several"):
         both = [body.upper_main.subs[1], body.lower_main.subs[2]]
-        cat.Loop(cat.Drives(both, counts_per_turn=2**20))
+        cat.Loop(cat.Drives(both, counts_per_turn=2**20, velocity_limit=100.0))
 
 
 def test_segments_with_clocks_of_their_own_are_refused() -> None:
     segments = Segment([Servo()]), Segment([Servo(), Servo()])
     with cat.MainDevice(segments[0]) as first, cat.MainDevice(segments[1]) as second:
-        wishes = [cat.Drives(main.scan().drives, counts_per_turn=2**20) for main in (first, second)]
+        wishes = [
+            cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
+            for main in (first, second)
+        ]
         with pytest.raises(ValueError, match="VirtualClock"), cat.Loop(*wishes):
             raise AssertionError("it opened")

@@ -62,7 +62,7 @@ def assert_replaced(name: str, old: cat.share.Reader) -> None:
         cat.attach(name)
     assert cat.attach(name, stale=True).number == last
     with cat.MainDevice(Segment([Servo()])) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Share(name) as share, cat.Loop(arm, sink=share) as loop:
             next(loop)
             with cat.attach(name) as new:

@@ -28,7 +28,7 @@ with cat.attach(sys.argv[1]) as arm, arm.lease(axes=[1], for_=3600.0) as command
 
 def test_its_axis_holds_and_is_free_again() -> None:
     with own_name("lease") as name, cat.MainDevice(Segment([Servo(), Servo()])) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Share(name) as share, cat.Loop(arm, sink=share) as loop:
             next(loop)
             ended: list[LeaseEnd] = []

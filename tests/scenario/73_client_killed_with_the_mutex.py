@@ -42,7 +42,7 @@ def test_the_next_owner_is_told() -> None:
 
 def test_a_lease_can_be_taken_where_another_client_died_taking_one() -> None:
     with own_name("desk") as name, cat.MainDevice(Segment([Servo(), Servo()])) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Share(name) as share, cat.Loop(arm, sink=share) as loop:
             next(loop)
             with started(IN_MID_LEASE, name) as client:

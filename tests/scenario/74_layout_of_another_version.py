@@ -18,7 +18,7 @@ from tests.share.names import own_name
 def shared() -> Iterator[tuple[str, Path]]:
     """A name, and a file there as a loop has written it."""
     with own_name("version") as name, cat.MainDevice(Segment([Servo()])) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         path = Path(f"/dev/shm/catenary-{name}")
         with cat.Share(name, history=0.01) as share, cat.Loop(arm, sink=share) as loop:
             next(loop)

@@ -26,7 +26,7 @@ LISTEN = "import sys, catenary as cat; print(cat.attach(sys.argv[1], stale=True)
 def open_share(name: str) -> Iterator[None]:
     """A loop with a share, in this process."""
     with cat.MainDevice(Segment([Servo()])) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Share(name) as share, cat.Loop(arm, sink=share) as loop:
             next(loop)
             yield

@@ -99,7 +99,7 @@ def test_in_virtual_time_a_task_takes_what_came(name: str, tmp_path: Path) -> No
     with VirtualClock() as clock:
         segment = cat.Segment([cat.Servo() for _ in range(6)], clock=clock)
         with cat.MainDevice(segment) as main, cat.Share(name) as share:
-            arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+            arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
             with cat.Loop(arm, period=1e-3, sink=share) as loop:
                 recorder = record.Recorder(name, tmp_path / "x.mcap")
                 for cycle in loop:

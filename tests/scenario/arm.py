@@ -42,6 +42,7 @@ class ArmCell:
         joints = self.plant.joints
         given = {
             "counts_per_turn": COUNTS,
+            "velocity_limit": 3.0,
             "gear_ratio": [joint.gear for joint in joints],
             "direction": [joint.direction for joint in joints],
             "offset": [joint.zero for joint in joints],

@@ -44,7 +44,8 @@ class Cell:
 
     def drives(self, **options: object) -> cat.Drives:
         """All servos, counted in the segment's default resolution."""
-        return cat.Drives(self.subs.drives, **{"counts_per_turn": 2**20, **options})  # type: ignore[arg-type]
+        given = {"counts_per_turn": 2**20, "velocity_limit": 100.0, **options}
+        return cat.Drives(self.subs.drives, **given)  # type: ignore[arg-type]
 
     def spoil(self, fault: str, cycles: int, **options: object) -> None:
         """Does this to the next cycles' frames."""

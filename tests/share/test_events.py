@@ -35,7 +35,7 @@ def test_what_is_no_event_is_refused() -> None:
 
 def test_the_oldest_give_way(name: str) -> None:
     with cat.MainDevice(Segment([Servo()])) as main, cat.Share(name) as share:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Loop(arm, sink=share) as loop, cat.attach(name) as reader:
             next(loop)
             for k in range(EVENT_COUNT + 10):

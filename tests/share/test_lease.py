@@ -40,7 +40,7 @@ class Cell:
 @contextlib.contextmanager
 def cell_of(name: str, **options: object) -> Iterator[Cell]:
     with cat.MainDevice(Segment([Servo(), Servo(), Servo()])) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, **options)  # type: ignore[arg-type]
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0, **options)  # type: ignore[arg-type]
         with cat.Share(name) as share, cat.Loop(arm, sink=share) as loop:
             next(loop)
             with cat.attach(name) as reader:
@@ -205,8 +205,8 @@ def test_a_client_that_was_stopped_with_the_desk_does_not_hold_others_for_ever(
 def test_axes_of_several_drives(name: str) -> None:
     with cat.MainDevice(Segment([Servo(), Servo(), Servo()])) as main:
         subs = main.scan().drives
-        left = cat.Drives(subs[:1], counts_per_turn=2**20)
-        right = cat.Drives(subs[1:], counts_per_turn=2**20)
+        left = cat.Drives(subs[:1], counts_per_turn=2**20, velocity_limit=100.0)
+        right = cat.Drives(subs[1:], counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Share(name) as share, cat.Loop(left, right, sink=share) as loop:
             next(loop)
             with cat.attach(name) as reader, reader.lease(for_=LONG) as command:
@@ -285,7 +285,7 @@ def test_a_lease_taken_while_the_loop_ends_is_over(
 
 def test_the_end_of_the_loop_ends_all_leases(name: str) -> None:
     with cat.MainDevice(Segment([Servo()])) as main, cat.Share(name) as share:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Loop(arm, sink=share) as loop:
             next(loop)
             reader = cat.attach(name)

@@ -60,7 +60,7 @@ def as_nobody(name: str, verb: str) -> list[str]:
 )
 def test_another_user(name: str, mode: int, verb: str, said: list[str]) -> None:
     with cat.MainDevice(Segment([Servo()])) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Share(name, mode=mode) as share, cat.Loop(arm, sink=share) as loop:
             next(loop)
             found = as_nobody(name, verb)
@@ -84,7 +84,7 @@ def test_a_full_disk_is_told_and_nothing_is_left(
     monkeypatch.setattr("catenary.share.memory.os.posix_fallocate", allocate)
     segment = Segment([Servo()])
     with cat.MainDevice(segment) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         share = cat.Share(name)
         no_room = pytest.raises(ShareError, match=r"/dev/shm has no room for .* MiB")
         with no_room, share, cat.Loop(arm, sink=share):

@@ -27,7 +27,12 @@ def hold(actual, target, memory, time):
 def run(name: str, order: str, body: Callable[[cat.Loop, cat.Drives, Reader], None]) -> None:
     segment = Segment([Coupler(), Servo(), Servo()])
     with cat.MainDevice(segment) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=TURN, columns=["following_error"])
+        arm = cat.Drives(
+            main.scan().drives,
+            counts_per_turn=TURN,
+            velocity_limit=100.0,
+            columns=["following_error"],
+        )
         share = cat.Share(name)
         with share, cat.Loop(arm, run=order, sink=share) as loop, cat.attach(name) as reader:  # type: ignore[arg-type]
             body(loop, arm, reader)
@@ -144,7 +149,7 @@ def test_columns_of_one_name_get_their_devices_with_it(name: str) -> None:
 def test_waiting_ends_with_the_loop(name: str) -> None:
     segment = Segment([Servo()])
     with cat.MainDevice(segment) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=TURN)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=TURN, velocity_limit=100.0)
         with cat.Share(name) as share:
             with cat.Loop(arm, sink=share) as loop:
                 reader = cat.attach(name)
@@ -182,7 +187,7 @@ def test_the_last_cycles_are_seen_where_the_loop_ends_while_it_is_asked(
 def test_a_second_loop_begins_a_share_of_its_own(name: str) -> None:
     segment = Segment([Servo()])
     with cat.MainDevice(segment) as main, cat.Share(name) as share:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=TURN)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=TURN, velocity_limit=100.0)
         with cat.Loop(arm, sink=share) as loop:
             next(loop)
             first = cat.attach(name)
@@ -201,7 +206,7 @@ def test_a_second_loop_begins_a_share_of_its_own(name: str) -> None:
 def test_overwritten_cycles_are_counted(name: str) -> None:
     segment = Segment([Servo()])
     with cat.MainDevice(segment) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=TURN)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=TURN, velocity_limit=100.0)
         share = cat.Share(name, history=0.1)
         with share, cat.Loop(arm, sink=share) as loop, cat.attach(name) as reader:
             for cycle in loop:
@@ -216,7 +221,7 @@ def test_overwritten_cycles_are_counted(name: str) -> None:
 def test_events_and_the_error_that_ends_the_loop(name: str) -> None:
     segment = Segment([Coupler(), Servo()])
     with cat.MainDevice(segment) as main, cat.Share(name) as share:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=TURN)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=TURN, velocity_limit=100.0)
         reader = None
 
         def run() -> None:
@@ -245,7 +250,7 @@ def test_events_and_the_error_that_ends_the_loop(name: str) -> None:
 def test_a_name_in_use_is_refused(name: str) -> None:
     segment = Segment([Servo()])
     with cat.MainDevice(segment) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=TURN)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=TURN, velocity_limit=100.0)
         with cat.Share(name) as share, cat.Loop(arm, sink=share):
             with pytest.raises(ShareError, match="which lives"), cat.Share(name):
                 pass
@@ -256,7 +261,7 @@ def test_a_name_in_use_is_refused(name: str) -> None:
 def test_a_share_that_was_not_entered_leaves_nothing_open(name: str) -> None:
     segment = Segment([Servo()])
     with cat.MainDevice(segment) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=TURN)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=TURN, velocity_limit=100.0)
         with pytest.raises(RuntimeError, match="with block"), cat.Loop(arm, sink=cat.Share(name)):
             pass
         assert segment[0].state & 0x0F == 2
@@ -271,7 +276,10 @@ def test_two_networks_have_a_share_each(name: str) -> None:
     clock = cat.realtime.VirtualClock()
     segments = [Segment([Servo()], clock=clock) for _ in range(2)]
     with cat.MainDevice(segments[0]) as one, cat.MainDevice(segments[1]) as two:
-        first, second = (cat.Drives(m.scan().drives, counts_per_turn=TURN) for m in (one, two))
+        first, second = (
+            cat.Drives(m.scan().drives, counts_per_turn=TURN, velocity_limit=100.0)
+            for m in (one, two)
+        )
         shares = [cat.Share(f"{name}-{k}") for k in range(2)]
         with shares[0], shares[1], cat.Loop(first, second, sink=shares) as loop:
             readers = [cat.attach(f"{name}-{k}") for k in range(2)]
@@ -297,7 +305,7 @@ def test_names_that_cannot_be(bad: str) -> None:
 def test_the_mode_of_the_file_is_the_permission(name: str) -> None:
     segment = Segment([Servo()])
     with cat.MainDevice(segment) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=TURN)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=TURN, velocity_limit=100.0)
         with cat.Share(name, mode=0o640) as share, cat.Loop(arm, sink=share):
             assert Path(f"/dev/shm/catenary-{name}").stat().st_mode & 0o777 == 0o640
 
@@ -307,7 +315,7 @@ def test_in_real_time_too(name: str, order: str) -> None:
     """Nothing is said of how timely: only that every cycle is shared, whatever thread runs it."""
     segment = Segment([Servo()], clock="monotonic")
     with cat.MainDevice(segment) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=TURN)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=TURN, velocity_limit=100.0)
         loop = cat.Loop(
             arm,
             period=2e-3,

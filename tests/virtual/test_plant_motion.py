@@ -25,7 +25,7 @@ def sway(segment: Segment, **options: object) -> tuple[Values, Values]:
     """Positions and targets of 500 cycles of a smooth motion in CSP [rad]."""
     positions, targets = [], []
     with cat.MainDevice(segment) as main:
-        given = {"counts_per_turn": 131072, **GEARS, **options}
+        given = {"counts_per_turn": 131072, "velocity_limit": 3.0, **GEARS, **options}
         arm = cat.Drives(main.scan().drives, **given)  # type: ignore[arg-type]
         with cat.Loop(arm, period=1e-3) as loop:
             if options.get("dc"):

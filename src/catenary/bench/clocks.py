@@ -101,7 +101,9 @@ def run(count: int, seconds: float, jitter: float, seed: int) -> Outcome:
     segment = make_segment(count, jitter, seed)
     truth = Truth(segment)
     with cat.MainDevice(segment) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=COUNTS_PER_TURN, dc=True)
+        arm = cat.Drives(
+            main.scan().drives, counts_per_turn=COUNTS_PER_TURN, velocity_limit=100.0, dc=True
+        )
         entered = segment.now_ns
         with cat.Loop(arm, period=PERIOD) as loop:
             loop.wait_locked(within=BOUND, timeout=LOCK_TIMEOUT)

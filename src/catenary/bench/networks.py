@@ -160,7 +160,12 @@ def in_virtual_time(rate: int, seconds: float) -> tuple[int, int]:
         segments = [make_segment(drives, clock=clock) for drives in DRIVES]
         mains = [stack.enter_context(cat.MainDevice(segment)) for segment in segments]
         bodies = [
-            cat.Drives(main.scan().drives, mode="csp", counts_per_turn=COUNTS_PER_TURN)
+            cat.Drives(
+                main.scan().drives,
+                mode="csp",
+                counts_per_turn=COUNTS_PER_TURN,
+                velocity_limit=100.0,
+            )
             for main in mains
         ]
         loop = stack.enter_context(cat.Loop(*bodies, period=1 / rate))
@@ -195,7 +200,12 @@ def run_loop(jobs: Sequence[Job]) -> list[NetworkRound]:
     with contextlib.ExitStack() as stack:
         mains = [stack.enter_context(cat.MainDevice(*job.interfaces)) for job in jobs]
         bodies = [
-            cat.Drives(main.scan().drives, mode="csp", counts_per_turn=COUNTS_PER_TURN)
+            cat.Drives(
+                main.scan().drives,
+                mode="csp",
+                counts_per_turn=COUNTS_PER_TURN,
+                velocity_limit=100.0,
+            )
             for main in mains
         ]
         loop = stack.enter_context(

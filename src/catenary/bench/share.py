@@ -60,7 +60,7 @@ def measure_reading(axes: int) -> Reading:
     """Of a loop that has stopped for the while, in this process."""
     name = f"bench-read-{os.getpid()}"
     with cat.MainDevice(make_segment(axes, clock="virtual")) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=COUNTS_PER_TURN)
+        arm = cat.Drives(main.scan().drives, counts_per_turn=COUNTS_PER_TURN, velocity_limit=100.0)
         with (
             cat.Share(name) as share,
             cat.Loop(arm, sink=share) as loop,

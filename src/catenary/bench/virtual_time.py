@@ -58,7 +58,9 @@ def sine(actual, target, memory, time, parameters):  # type: ignore[no-untyped-d
 def run_law(segment: Segment, seconds: float) -> float:
     """The same for a law, without compiling it."""
     with cat.MainDevice(segment) as main:
-        arm = cat.Drives(main.scan().drives, mode="csp", counts_per_turn=COUNTS_PER_TURN)
+        arm = cat.Drives(
+            main.scan().drives, mode="csp", counts_per_turn=COUNTS_PER_TURN, velocity_limit=100.0
+        )
         with cat.Loop(arm, period=PERIOD, laws=[sine]) as loop:
             home = arm.actual.position.copy()
             loop.run(sine, memory=home, parameters=[PERIOD])
@@ -70,7 +72,9 @@ def run_law(segment: Segment, seconds: float) -> float:
 def run(segment: Segment, seconds: float, order: Order) -> float:
     """How long the loop took [s], without bring-up and leaving."""
     with cat.MainDevice(segment) as main:
-        arm = cat.Drives(main.scan().drives, mode="csp", counts_per_turn=COUNTS_PER_TURN)
+        arm = cat.Drives(
+            main.scan().drives, mode="csp", counts_per_turn=COUNTS_PER_TURN, velocity_limit=100.0
+        )
         with cat.Loop(arm, period=PERIOD, run=order) as loop:
             home = arm.actual.position.copy()
             start = time.perf_counter()

@@ -20,11 +20,17 @@ WATCHDOG = 1.0  # [s] of the devices
 LATE_LIMIT = 0.5  # [s]
 AMPLITUDE = math.pi  # [rad]
 PULSATION = math.pi  # [rad/s]
+VELOCITY_LIMIT = 20.0  # [rad/s]: the sines reach 10
 FADE_IN = 1.0  # [s] in which the amplitude grows, so that the drives start from rest
 
 
 def drives_of(subs: SubDevices) -> cat.Drives:
-    return cat.Drives(subs.drives, mode="csp", counts_per_turn=COUNTS_PER_TURN)
+    return cat.Drives(
+        subs.drives,
+        mode="csp",
+        counts_per_turn=COUNTS_PER_TURN,
+        velocity_limit=VELOCITY_LIMIT,
+    )
 
 
 def follow(loop: cat.Loop, arm: cat.Drives, recording: Recording, progress: ProgressBar) -> None:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Sequence
 from typing import TypeAlias
 
 from catenary.bus import SubDevice
-from catenary.drive.axis import MEASURED
+from catenary.drive.axis import MEASURED, Axis
+from catenary.drive.limits import DEFAULT_VELOCITY
 from catenary.drive.objects import NAMED_COLUMNS, AxisObject
-from catenary.plan.cycle import AxisLimits
 from catenary.plan.wish import DC
 from catenary.wire.cia402 import Mode
 
@@ -46,6 +47,18 @@ def axis_modes(first: str, others: Sequence[str]) -> tuple[Mode, ...]:
     return tuple(dict.fromkeys(mode_of(name) for name in (first, *others)))
 
 
+def warn_of_default_velocity(axes: Sequence[Axis]) -> None:
+    """Warn once for all axes in CSP without a velocity limit."""
+    names = [axis.name for axis in axes if axis.options.lacks_velocity(axis.modes)]
+    if names:
+        warnings.warn(
+            f"no velocity_limit for {', '.join(names)}: {DEFAULT_VELOCITY:.3g} rad/s at the joint "
+            "is used; write Drives(velocity_limit=...) [rad/s]",
+            UserWarning,
+            stacklevel=3,
+        )
+
+
 def clock_wish(dc: DC | bool) -> DC | None:
     """What `dc=` asks for."""
     if isinstance(dc, bool):
@@ -58,20 +71,6 @@ def mode_of(name: str) -> Mode:
         return MODES[name.lower()]
     except KeyError:
         raise ValueError(f"mode {name!r}; known: {', '.join(MODES)}") from None
-
-
-def axis_limits(
-    position_min: float | None,
-    position_max: float | None,
-    velocity: float | None,
-    torque: float | None,
-) -> AxisLimits:
-    if position_min is not None and position_max is not None and position_min >= position_max:
-        raise ValueError(f"position_min {position_min} is not below position_max {position_max}")
-    for name, value in (("velocity_limit", velocity), ("torque_limit", torque)):
-        if value is not None and not value > 0:
-            raise ValueError(f"{name} must be positive, not {value}")
-    return AxisLimits(position_min, position_max, velocity, torque)
 
 
 def cycles_between(name: str, every: int) -> int:

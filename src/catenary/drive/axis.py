@@ -7,10 +7,14 @@ from dataclasses import dataclass, field, replace
 
 from catenary.drive import objects
 from catenary.drive.homing import HomingMethod
+from catenary.drive.limits import AxisBounds, LimitOptions, make_bounds
 from catenary.drive.objects import AxisObject, Unit
+from catenary.drive.report import axis_report
+from catenary.drive.settings import DriveSettings, own_limits
 from catenary.drive.units import AxisUnits
 from catenary.errors import MappingError
-from catenary.plan.cycle import AxisLimits, AxisPlan, Bank, Column, Number, NumberKind
+from catenary.plan.axis_report import AxisReport
+from catenary.plan.cycle import AxisPlan, Bank, Column, Number, NumberKind
 from catenary.plan.wish import ImageLayout, PdoWish
 from catenary.wire.cia402 import SLOT_OFFSET, Mode
 
@@ -35,13 +39,14 @@ class Axis:
     slot: int
     modes: tuple[Mode, ...]
     units: AxisUnits
-    limits: AxisLimits
+    options: LimitOptions
     measured: tuple[str, ...] = tuple(MEASURED)
     measured_required: bool = False  # else what the drive cannot map reads NaN
     columns: Mapping[str, AxisObject] = field(default_factory=dict)
     every: int = 1  # cycles between two exchanges
     required: bool = True  # the cycle is not good without its device
     homing: HomingMethod | None = None
+    settings: DriveSettings = field(default_factory=DriveSettings)  # of the drive; read in PRE-OP
 
     def index(self, base: int) -> int:
         """The number of slot 0's object `base` in this slot."""
@@ -58,8 +63,21 @@ class Axis:
         return (
             ("torque" in self.measured and self.measured_required)
             or Mode.CST in self.modes
-            or self.limits.torque is not None
+            or self.options.torque_limit is not None
             or any(column.unit is Unit.TORQUE for column in self.columns.values())
+        )
+
+    @property
+    def bounds(self) -> AxisBounds:
+        """Limits and reactions in force. ConfigurationError if a required one is not known."""
+        homing_offset = None if self.homing is None else self.homing.offset_counts(self.units)
+        own = own_limits(self.settings, self.units, homing_offset)
+        return make_bounds(self.name, self.options, self.modes, own)
+
+    def report(self, period_ns: int) -> AxisReport:
+        """Describe the axis for the plan. `period_ns`: of the loop."""
+        return axis_report(
+            self.name, self.modes, self.bounds, self.settings, period_ns * self.every
         )
 
     def pdo_wish(self, start_up: tuple[tuple[int, int, bytes], ...] = ()) -> PdoWish:
@@ -70,6 +88,9 @@ class Axis:
             *(TARGETS[m] for m in self.modes if m in TARGETS),
         ]
         given = [objects.STATUSWORD, objects.MODE_ACTUAL, *(MEASURED[m] for m in self.measured)]
+        if self.holds_on_loss:
+            wanted.append(objects.TARGET_POSITION)
+            given.append(objects.ACTUAL_POSITION)
         for column in self.columns.values():
             (wanted if column.output else given).append(column)
         optional = self._optional()
@@ -85,16 +106,24 @@ class Axis:
             required=self.required,
         )
 
+    @property
+    def holds_on_loss(self) -> bool:
+        """True if the core changes to CSP when it stops the axis."""
+        return self.options.on_loss == "csp_hold"
+
     def _optional(self) -> set[AxisObject]:
         """What a drive may lack: velocity and torque, unless asked for by name; and the mode, which
         the start-up list sets, where it never changes."""
         optional = set() if self.measured_required else {MEASURED["velocity"], MEASURED["torque"]}
-        if len(self.modes) == 1:
+        if len(self.modes) == 1 and not self.holds_on_loss:
             optional |= {objects.MODE_TARGET, objects.MODE_ACTUAL}
         return optional - set(self.columns.values())
 
     def plan(self, layout: ImageLayout) -> AxisPlan:
-        """The axis as numbers. What was not wished for but is mapped is used as well."""
+        """Return the axis as numbers. Objects that are mapped without a request are used too."""
+        bounds = self.bounds
+        assert bounds.acceleration.value is not None
+        assert bounds.deceleration.value is not None
         return AxisPlan(
             name=self.name,
             device=self.device,
@@ -111,8 +140,29 @@ class Axis:
             actual_position=self._place(layout, objects.ACTUAL_POSITION),
             actual_velocity=self._place(layout, objects.ACTUAL_VELOCITY),
             actual_torque=self._place(layout, objects.ACTUAL_TORQUE),
-            limits=self.limits,
+            position_demand=self._demand(layout, Mode.CSP, objects.POSITION_DEMAND),
+            torque_demand=self._demand(layout, Mode.CST, objects.TORQUE_DEMAND),
+            velocity_offset=self._column_place(layout, objects.VELOCITY_OFFSET),
+            limits=bounds.limits,
+            acceleration=bounds.acceleration.value,
+            deceleration=bounds.deceleration.value,
+            torque_slope=bounds.torque_slope.value,
+            on_loss=bounds.on_loss,
         )
+
+    def _demand(self, layout: ImageLayout, mode: Mode, wanted: AxisObject) -> Number | None:
+        """Return the place of a demand value that is mapped anyway, if the axis uses `mode`.
+
+        It is never requested: an addition to the process data could change a mapping that fits.
+        """
+        return self._place(layout, wanted) if mode in self.modes else None
+
+    def _column_place(self, layout: ImageLayout, wanted: AxisObject) -> Number | None:
+        """Return the place of an object that the application has as a column."""
+        written = ((column.index, column.subindex) for column in self.columns.values())
+        if (wanted.index, wanted.subindex) not in written:
+            return None
+        return self._place(layout, wanted)
 
     def column(self, name: str, layout: ImageLayout) -> Column:
         """The named column, with its place."""

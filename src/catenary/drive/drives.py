@@ -12,7 +12,6 @@ import numpy.typing as npt
 from catenary.drive import start_up
 from catenary.drive.arguments import (
     AxisSource,
-    axis_limits,
     axis_modes,
     axis_name,
     axis_sources,
@@ -21,14 +20,17 @@ from catenary.drive.arguments import (
     known,
     mode_of,
     named_columns,
+    warn_of_default_velocity,
 )
 from catenary.drive.axis import MEASURED, Axis, column_bank
 from catenary.drive.homing import HomingMethod, Timed, run_homing
+from catenary.drive.limits import LimitOptions
 from catenary.drive.objects import AxisObject
 from catenary.drive.state_machine import Goal
 from catenary.drive.units import AxisUnits, one_each, per_axis
 from catenary.drive.values import Array, AxisValues
-from catenary.plan.cycle import Bank
+from catenary.plan.cycle import Bank, OnLoss
+from catenary.plan.stop_reason import StopReason
 from catenary.plan.wish import DC, ImageLayout, PdoWish, Views, WishTables
 from catenary.wire.cia402 import IN_FAULT, Mode, State
 
@@ -41,32 +43,55 @@ ALL = slice(None)
 
 
 class Drives:
-    """A wish for n axes.
+    """Process-data request for n axes.
 
-    `subs`: SubDevices with all of their axes, or `(SubDevice, slot)` for single ones.
-    `mode`: "csp", "csv" or "cst", one for all or one for each; `other_modes` may be switched to
-    while the loop runs ("hm" too: `home`). Every further option is one value for all axes, or one
-    for each:
+    `subs`: SubDevices with all of their axes, or `(SubDevice, slot)` for single axes.
 
-    `counts_per_turn` of the motor's encoder; `gear_ratio` motor turns per joint turn; `direction`
-    1 or -1; `offset` [rad] of the joint where the drive says 0; `velocity_unit` [rad/s of the
-    motor] of one raw velocity count (None: one position count per second); `rated_torque` [N·m]
-    (None: read from 0x6076).
-    Limits at the joint, enforced by the core whatever is written: `position_min`, `position_max`
-    [rad], `velocity_limit` [rad/s], `torque_limit` [N·m].
+    Options for all axes:
 
-    `measured`: which of position, velocity and torque the drives must give; None: all three, where
-    a drive cannot give velocity or torque it reads NaN (velocity: estimated). `columns`: further
-    objects, by a name of `NAMED_COLUMNS` or as `(name, AxisObject)`:
-    `arm.actual["following_error"]`.
+    - `other_modes`: modes that the axes may change to while the loop runs ("hm": see `home`).
+    - `measured`: position, velocity, torque that the drives must supply. None: all three; a
+      velocity that the drive lacks is estimated, a torque reads NaN.
+    - `columns`: further objects, by a name of `NAMED_COLUMNS` or as `(name, AxisObject)`. Read
+      them as `arm.actual["following_error"]`.
+    - `required`: False: the loop continues without a lost drive. Its axes hold their last values;
+      enable them again when it is `present`.
+    - `every`: cycles of the loop between two exchanges.
+    - `dc`: distributed clocks. True: as each device's SII states; or a `DC` for all of them.
 
-    `required=False`: the loop goes on without a drive that vanishes; what is not `present` holds
-    its last values and follows nothing, and must be enabled again when it is back. `every`: the
-    drives are exchanged every so many cycles of the loop.
+    Options with one value for all axes, or a sequence of one per axis:
 
-    `homing`: a `HomingMethod`, how the drive finds its home.
+    - `mode`: "csp", "csv" or "cst" at the start.
+    - `counts_per_turn`: counts of the motor's encoder per turn.
+    - `gear_ratio`: motor turns per joint turn.
+    - `direction`: 1, or -1 if the joint turns against the motor.
+    - `offset` [rad]: position of the joint where the drive reads 0.
+    - `velocity_unit` [rad/s of the motor]: one raw velocity count. None: one position count per s.
+    - `rated_torque` [N·m of the motor]. None: read from 0x6076.
+    - `homing`: a `HomingMethod`.
 
-    `dc`: distributed clocks; True: as each device's SII says, or a `DC` for all of them.
+    Limits at the joint. The core enforces them; plausible limits of the drive only tighten them:
+
+    - `position_min`, `position_max` [rad].
+    - `velocity_limit` [rad/s]: required for CSV and CST. CSP without it: 2π rad/s and a warning.
+      `math.inf`: none.
+    - `torque_limit` [N·m].
+    - `step_limit` [rad]: largest difference between two CSP set-points; a larger one is refused.
+      None: max(0.1 rad, twice the way at `velocity_limit`). Required if `velocity_limit` is
+      infinite.
+
+    Fallback and return after a loss of set-points; they never shape your set-points:
+
+    - `deceleration_limit` [rad/s²]. None: a plausible 0x6085 of the drive, else
+      `velocity_limit` / 0.25 s.
+    - `acceleration_limit` [rad/s²]. None: the deceleration.
+    - `torque_slope` [N·m/s] in CST. None: at once.
+    - `on_loss`: reaction when the core stops an axis: "quick_stop" (None), "disable", or
+      "csp_hold" (change to CSP and hold). Required in CST if the drive's quick stop (0x605A) does
+      not brake.
+
+    Raises:
+        ValueError: An option is impossible, or a required one is missing.
     """
 
     def __init__(
@@ -85,6 +110,11 @@ class Drives:
         position_max: PerAxis[float | None] = None,
         velocity_limit: PerAxis[float | None] = None,
         torque_limit: PerAxis[float | None] = None,
+        step_limit: PerAxis[float | None] = None,
+        acceleration_limit: PerAxis[float | None] = None,
+        deceleration_limit: PerAxis[float | None] = None,
+        torque_slope: PerAxis[float | None] = None,
+        on_loss: PerAxis[OnLoss | None] = None,
         homing: PerAxis[HomingMethod | None] = None,
         measured: Sequence[str] | None = None,
         columns: Sequence[str | tuple[str, AxisObject]] = (),
@@ -103,12 +133,19 @@ class Drives:
             per_axis("velocity_unit", velocity_unit, n),
             per_axis("rated_torque", rated_torque, n),
         )
-        limits = map(
-            axis_limits,
+        options = map(
+            LimitOptions,
             per_axis("position_min", position_min, n),
             per_axis("position_max", position_max, n),
             per_axis("velocity_limit", velocity_limit, n),
             per_axis("torque_limit", torque_limit, n),
+            per_axis("acceleration_limit", acceleration_limit, n),
+            per_axis("deceleration_limit", deceleration_limit, n),
+            per_axis("torque_slope", torque_slope, n),
+            per_axis("step_limit", step_limit, n),
+            (on_loss,) * n
+            if on_loss is None or isinstance(on_loss, str)
+            else one_each("on_loss", on_loss, n),
         )
         first_modes = (mode,) * n if isinstance(mode, str) else one_each("mode", mode, n)
         self.subs = tuple(sub for sub, _ in sources)
@@ -121,7 +158,7 @@ class Drives:
                 slot=slot,
                 modes=axis_modes(first, other_modes),
                 units=unit,
-                limits=limit,
+                options=limits,
                 measured=known(tuple(MEASURED) if measured is None else measured),
                 measured_required=measured is not None,
                 columns=self._columns,
@@ -129,15 +166,20 @@ class Drives:
                 required=required,
                 homing=home,
             )
-            for (sub, slot), first, unit, limit, home in zip(
+            for (sub, slot), first, unit, limits, home in zip(
                 sources,
                 first_modes,
                 units,
-                limits,
+                options,
                 per_axis("homing", homing, n),
                 strict=True,
             )
         )
+        for axis in self._axes:
+            axis.options.check(axis.name, axis.modes)
+        warn_of_default_velocity(self._axes)
+        self._period_ns = 0
+        self._is_read = False  # settings of the drives, since the last plan
         self.actual = AxisValues("actual")
         self.target = AxisValues("target")
         self._views: Views | None = None
@@ -161,13 +203,19 @@ class Drives:
 
     @property
     def enabled(self) -> npt.NDArray[np.bool_]:
-        """(n,) which axes follow their set-points now."""
-        return (self._bound().axis_flags & 1).astype(np.bool_)
+        """(n,) True for each axis that follows its set-points now and is `present`."""
+        return (self._bound().axis_flags & 1).astype(np.bool_) & self.present
 
     @property
     def limited(self) -> npt.NDArray[np.bool_]:
         """(n,) whose set-points the core had to limit in the last cycle."""
         return (self._bound().axis_flags & 2).astype(np.bool_)
+
+    @property
+    def stopped(self) -> tuple[StopReason | None, ...]:
+        """Reason of each axis that the core stopped, until your next request; else None."""
+        reasons = self._bound().stop_reason.tolist()
+        return tuple(StopReason(reason) if reason else None for reason in reasons)
 
     @property
     def present(self) -> npt.NDArray[np.bool_]:
@@ -183,24 +231,27 @@ class Drives:
     # What follows is committed with the targets, by the next `next(loop)`.
 
     def enable(self, axes: Axes = ALL) -> None:
-        """Asks for axes to be enabled; each starts from where it stands."""
+        """Request that axes be enabled. Each starts from its actual position."""
         self._ask(Goal.ENABLED, axes)
 
     def disable(self, axes: Axes = ALL) -> None:
-        """Asks for axes to be switched off."""
+        """Request that axes be disabled."""
         self._ask(Goal.DISABLED, axes)
 
     def quick_stop(self, axes: Axes = ALL) -> None:
-        """Asks for axes to brake as their 0x605A says; they stay still until enabled again."""
+        """Request a quick stop. The ramp and the final state are the drive's (0x605A)."""
         self._ask(Goal.QUICK_STOP, axes)
 
     def reset_faults(self, axes: Axes = ALL) -> None:
-        """Asks those axes that are in fault to forget it; nothing moves before `enable`."""
+        """Request a fault reset of those axes that are in fault. Nothing moves before `enable`."""
         chosen = set(np.atleast_1d(np.arange(len(self))[axes]).tolist())
         self._ask(Goal.RESET, sorted(chosen & set(self.faults)))
 
     def switch(self, mode: str, axes: Axes = ALL) -> None:
-        """Asks axes to change to `mode`, one of those the Drives were made with."""
+        """Request a change to `mode`, one of those that the Drives were made with.
+
+        Until the drive shows the new mode, the old one continues without fresh set-points.
+        """
         wanted = mode_of(mode)
         for axis in np.atleast_1d(np.arange(len(self))[axes]).tolist():
             if wanted not in self._axes[axis].modes:
@@ -223,12 +274,13 @@ class Drives:
     # plan.wish.Wish
 
     def pdos(self, period_ns: int) -> Mapping[int, PdoWish]:
-        """The objects wished for, by device position. Reads 0x6076 and 0x60C2 of the drives
-        (PRE-OP or later): what the start-up list and the torque scale need."""
-        self._axes = tuple(
-            start_up.with_rated_torque(axis, sub)
-            for axis, sub in zip(self._axes, self.subs, strict=True)
-        )
+        """Return the process-data request of each device, by position.
+
+        Reads the drives by SDO (PRE-OP or later): rated torque, reactions, limits, mode and
+        interpolation time.
+        """
+        self._period_ns = period_ns
+        self._read_drives()
         wishes: dict[int, PdoWish] = {}
         for axis, sub in zip(self._axes, self.subs, strict=True):
             wish = axis.pdo_wish(start_up.downloads(axis, sub, period_ns * axis.every))
@@ -238,8 +290,18 @@ class Drives:
             wishes[axis.device] = replace(wishes[axis.device], clock=self._clock)
         return wishes
 
+    def _read_drives(self) -> None:
+        """Read rated torque and settings once per plan: `pdos` is called twice for each."""
+        if self._is_read:
+            return
+        pairs = list(zip(self._axes, self.subs, strict=True))
+        rated = [(start_up.with_rated_torque(axis, sub), sub) for axis, sub in pairs]
+        self._axes = tuple(start_up.with_settings(axis, sub) for axis, sub in rated)
+        self._is_read = True
+
     def tables(self, layout: ImageLayout) -> WishTables:
-        """Axes in their order; columns by name, then by axis, so that a name is one array."""
+        """Return the axes in their order; columns by name, then by axis: a name is one array."""
+        self._is_read = False  # the next plan reads again
         self._units = np.array([layout.sync_unit(axis.device) for axis in self._axes], np.intp)
         return WishTables(
             axes=tuple(axis.plan(layout) for axis in self._axes),
@@ -255,6 +317,7 @@ class Drives:
                 if not wanted.output
                 for axis in self._axes
             ),
+            axis_reports=tuple(axis.report(self._period_ns) for axis in self._axes),
         )
 
     def bind(self, views: Views) -> None:

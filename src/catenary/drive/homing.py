@@ -57,13 +57,17 @@ class HomingMethod:
         if self.offset is not None and not math.isfinite(self.offset):
             raise ValueError(f"offset={self.offset}: must be finite")
 
+    def offset_counts(self, units: AxisUnits) -> int | None:
+        """Return 0x607C [counts]; None if it is not given."""
+        return None if self.offset is None else round(self.offset / units.position_scale)
+
     def downloads(self, units: AxisUnits, base: int) -> tuple[tuple[int, int, bytes], ...]:
         """(index, subindex, data) of what is given; `base`: of the axis' slot."""
         found: list[tuple[int, int, bytes]] = []
         if self.method is not None:
             found.append((Object.HOMING_METHOD + base, 0, SINT.encode(self.method)))
-        if self.offset is not None:
-            counts = round(self.offset / units.position_scale)
+        counts = self.offset_counts(units)
+        if counts is not None:
             found.append((Object.HOME_OFFSET + base, 0, DINT.encode(counts)))
         for index, subindex, value in (
             (Object.HOMING_SPEEDS, 1, self.speed),
@@ -71,8 +75,8 @@ class HomingMethod:
             (Object.HOMING_ACCELERATION, 0, self.acceleration),
         ):
             if value is not None:
-                counts = max(1, round(value / abs(units.velocity_scale)))
-                found.append((index + base, subindex, UDINT.encode(counts)))
+                speed = max(1, round(value / abs(units.velocity_scale)))
+                found.append((index + base, subindex, UDINT.encode(speed)))
         return tuple(found)
 
 

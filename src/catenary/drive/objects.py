@@ -46,16 +46,19 @@ ACTUAL_POSITION = AxisObject(Object.POSITION_ACTUAL, 0, 32, True, Unit.POSITION,
 ACTUAL_VELOCITY = AxisObject(Object.VELOCITY_ACTUAL, 0, 32, True, Unit.VELOCITY, False)
 TARGET_TORQUE = AxisObject(Object.TARGET_TORQUE, 0, 16, True, Unit.TORQUE, True)
 ACTUAL_TORQUE = AxisObject(Object.TORQUE_ACTUAL, 0, 16, True, Unit.TORQUE, False)
+POSITION_DEMAND = AxisObject(Object.POSITION_DEMAND, 0, 32, True, Unit.POSITION, False)
+TORQUE_DEMAND = AxisObject(Object.TORQUE_DEMAND, 0, 16, True, Unit.TORQUE, False)
+VELOCITY_OFFSET = AxisObject(Object.VELOCITY_OFFSET, 0, 32, True, Unit.VELOCITY, True)
 TARGET_POSITION = AxisObject(Object.TARGET_POSITION, 0, 32, True, Unit.POSITION, True)
 TARGET_VELOCITY = AxisObject(Object.TARGET_VELOCITY, 0, 32, True, Unit.VELOCITY, True)
 
 # Columns that can be asked for by name, in the order of their numbers.
 NAMED_COLUMNS: dict[str, AxisObject] = {
     "error_code": AxisObject(Object.ERROR_CODE, 0, 16, False, Unit.RAW, False),
-    "position_demand": AxisObject(0x6062, 0, 32, True, Unit.POSITION, False),
+    "position_demand": POSITION_DEMAND,
     "velocity_demand": AxisObject(0x606B, 0, 32, True, Unit.VELOCITY, False),
-    "torque_demand": AxisObject(0x6074, 0, 16, True, Unit.TORQUE, False),
-    "velocity_offset": AxisObject(Object.VELOCITY_OFFSET, 0, 32, True, Unit.VELOCITY, True),
+    "torque_demand": TORQUE_DEMAND,
+    "velocity_offset": VELOCITY_OFFSET,
     "torque_offset": AxisObject(Object.TORQUE_OFFSET, 0, 16, True, Unit.TORQUE, True),
     "touch_probe_function": AxisObject(0x60B8, 0, 16, False, Unit.RAW, True),
     "touch_probe_status": AxisObject(0x60B9, 0, 16, False, Unit.RAW, False),

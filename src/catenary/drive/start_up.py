@@ -1,4 +1,4 @@
-"""What a drive is asked and told once, in PRE-OP: rated torque, mode, interpolation time."""
+"""SDO reads and downloads of an axis in PRE-OP: rated torque, settings, mode, 0x60C2."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from dataclasses import replace
 
 from catenary.bus import SubDevice
 from catenary.drive.axis import Axis, interpolation_time
+from catenary.drive.settings import read_settings
 from catenary.errors import ConfigurationError, SdoAbort
 from catenary.types import SINT, UDINT, USINT
-from catenary.wire.cia402 import Object
+from catenary.wire.cia402 import Mode, Object
 
 # SDO abort codes of an object a drive does not have: no object, no subindex.
 OBJECT_MISSING = (0x06020000, 0x06090011)
@@ -33,6 +34,34 @@ def with_rated_torque(axis: Axis, sub: SubDevice) -> Axis:
             hint="give Drives(rated_torque=...) in N·m, or leave torque out of measured=",
         )
     return replace(axis, units=replace(axis.units, rated_torque=rated * 1e-3))
+
+
+def with_settings(axis: Axis, sub: SubDevice) -> Axis:
+    """Return the axis with its drive's reactions and limits.
+
+    Raises:
+        ConfigurationError: CST without `on_loss=` on a drive whose quick stop does not brake, or
+            no deceleration is known.
+    """
+    axis = replace(axis, settings=read_settings(sub, axis.slot))
+    _check_quick_stop(axis)
+    _ = axis.bounds  # raises here, before anything is written
+    return axis
+
+
+def _check_quick_stop(axis: Axis) -> None:
+    """Refuse CST where a quick stop is not known to decelerate, unless `on_loss=` is given."""
+    if Mode.CST not in axis.modes or axis.options.on_loss is not None or axis.settings.brakes:
+        return
+    index, code = axis.index(Object.QUICK_STOP_OPTION), axis.settings.quick_stop
+    found = "cannot be read" if code is None else f"is {code}"
+    why = "switches the motor off without braking" if code == 0 else "has an unknown effect"
+    raise ConfigurationError(
+        f"{axis.name}: the quick stop option code 0x{index:04X} {found}, so a quick stop in CST "
+        f"{why}",
+        hint=f"write 2 to 0x{index:04X} if the drive allows it, or state the reaction: "
+        'Drives(on_loss="quick_stop"), "disable", or "csp_hold" (position hold in CSP)',
+    )
 
 
 def downloads(axis: Axis, sub: SubDevice, period_ns: int) -> tuple[tuple[int, int, bytes], ...]:

@@ -74,6 +74,7 @@ def bring_up(job: Job) -> CyclePlan:
             [subs[position] for position in job.drives],
             mode=MODE[job.body],
             counts_per_turn=job.counts_per_turn,
+            velocity_limit=100.0,
         )
         plan = main.plan(arm, period=job.period_ns * 1e-9)
         main.configure(plan)

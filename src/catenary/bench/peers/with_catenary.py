@@ -21,7 +21,7 @@ STORM = "-sdo"
 IDENTITY, SERIAL = 0x1018, 4  # what the storm asks for
 # Like the peers, it counts lost and late cycles and goes on; by default it would stop the drives.
 LOST_LIMIT = 1000
-LATE_LIMIT = 0.0
+LATE_LIMIT = 10.0  # [s]: a benchmark must not stop the axes
 MODE = {Body.SINE: "csp", Body.PD: "cst"}
 
 
@@ -48,6 +48,7 @@ def opened(
             [subs[position] for position in job.drives],
             mode=MODE[job.body],
             counts_per_turn=job.counts_per_turn,
+            velocity_limit=100.0,
         )
         with cat.Loop(
             arm,

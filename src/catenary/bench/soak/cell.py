@@ -56,8 +56,12 @@ class Wishes:
 
     def __init__(self, main: cat.MainDevice) -> None:
         subs = main.subs
-        arm = cat.Drives([subs[k] for k in ARM], counts_per_turn=COUNTS_PER_TURN)
-        tool = cat.Drives([subs[TOOL]], counts_per_turn=COUNTS_PER_TURN, required=False)
+        arm = cat.Drives(
+            [subs[k] for k in ARM], counts_per_turn=COUNTS_PER_TURN, velocity_limit=100.0
+        )
+        tool = cat.Drives(
+            [subs[TOOL]], counts_per_turn=COUNTS_PER_TURN, velocity_limit=100.0, required=False
+        )
         self.lamps = cat.Outputs(subs[LAMPS])
         self.gripper = cat.Outputs(subs[GRIPPER], required=False)
         self.sensor = cat.Inputs(subs[SENSOR], required=False)

@@ -1,0 +1,187 @@
+"""Limits and reactions of an axis: the application's options, the drive's own limits, defaults."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from catenary.drive.settings import OwnLimits
+from catenary.errors import ConfigurationError
+from catenary.plan.cycle import AxisLimits, OnLoss
+from catenary.wire.cia402 import Mode
+
+DEFAULT_VELOCITY = 2 * math.pi  # [rad/s] in CSP
+BRAKE_TIME = 0.25  # [s] from velocity_limit to standstill, where nothing states a deceleration
+BRAKE_TIMES = (1e-3, 2.5)  # [s]: outside, the unit of 0x6085 is another one
+DEFAULT_DECELERATION = 25.0  # [rad/s²] of an axis that has no velocity limit and no cyclic mode
+REACTIONS: tuple[OnLoss, ...] = ("quick_stop", "disable", "csp_hold")
+POSITIVE = (
+    "velocity_limit",
+    "torque_limit",
+    "acceleration_limit",
+    "deceleration_limit",
+    "torque_slope",
+    "step_limit",
+)
+INFINITE = ("velocity_limit", "torque_limit")  # the others must be finite
+
+
+@dataclass(frozen=True, slots=True)
+class LimitOptions:
+    """Options of `Drives` about the limits and reactions of one axis; None: not given."""
+
+    position_min: float | None = None  # [rad]
+    position_max: float | None = None  # [rad]
+    velocity_limit: float | None = None  # [rad/s]
+    torque_limit: float | None = None  # [N·m]
+    acceleration_limit: float | None = None  # [rad/s²]
+    deceleration_limit: float | None = None  # [rad/s²]
+    torque_slope: float | None = None  # [N·m/s]
+    step_limit: float | None = None  # [rad]
+    on_loss: OnLoss | None = None
+
+    def check(self, name: str, modes: Sequence[Mode]) -> None:
+        """Raise ValueError for an impossible or missing option of the axis `name`."""
+        self._check_positions(name)
+        for option in POSITIVE:
+            value = getattr(self, option)
+            if value is not None and not value > 0:
+                raise ValueError(f"{name}: {option} must be positive, not {value}")
+            if value == math.inf and option not in INFINITE:
+                raise ValueError(f"{name}: {option} must be finite, not {value}")
+        if self.on_loss is not None and self.on_loss not in REACTIONS:
+            known = ", ".join(map(repr, REACTIONS))
+            raise ValueError(f"{name}: on_loss={self.on_loss!r}; known: {known}")
+        unlimited = [mode.name for mode in modes if mode in (Mode.CSV, Mode.CST)]
+        if self.velocity_limit is None and unlimited:
+            raise ValueError(
+                f"{name}: {' and '.join(unlimited)} need velocity_limit= [rad/s] at the joint; "
+                "write Drives(velocity_limit=...), or math.inf for none"
+            )
+        if self.velocity_limit == math.inf and Mode.CSP in modes and self.step_limit is None:
+            raise ValueError(
+                f"{name}: velocity_limit=inf in CSP needs step_limit= [rad], the largest "
+                "difference between two set-points; without it a wrong target is not refused"
+            )
+
+    def _check_positions(self, name: str) -> None:
+        for option in ("position_min", "position_max"):
+            value = getattr(self, option)
+            if value is not None and math.isnan(value):
+                raise ValueError(f"{name}: {option} must be an angle [rad], not {value}")
+        low, high = self.position_min, self.position_max
+        if low is not None and high is not None and low >= high:
+            raise ValueError(f"{name}: position_min {low} is not below position_max {high}")
+
+    def lacks_velocity(self, modes: Sequence[Mode]) -> bool:
+        """True if the default velocity limit of CSP applies."""
+        return self.velocity_limit is None and Mode.CSP in modes
+
+
+@dataclass(frozen=True, slots=True)
+class Chosen:
+    """A value and its source, for the plan report. None: no limit."""
+
+    value: float | None
+    source: str = "none"
+
+
+@dataclass(frozen=True, slots=True)
+class AxisBounds:
+    """Limits and reactions in force for one axis, each with its source."""
+
+    position_min: Chosen  # [rad]
+    position_max: Chosen  # [rad]
+    velocity: Chosen  # [rad/s]
+    torque: Chosen  # [N·m]
+    step: Chosen  # [rad]; None: computed by the core from the velocity limit
+    acceleration: Chosen  # [rad/s²]
+    deceleration: Chosen  # [rad/s²]
+    torque_slope: Chosen  # [N·m/s]
+    on_loss: OnLoss
+
+    @property
+    def limits(self) -> AxisLimits:
+        """The limits for the core."""
+        return AxisLimits(
+            self.position_min.value,
+            self.position_max.value,
+            self.velocity.value,
+            self.torque.value,
+            self.step.value,
+        )
+
+
+def make_bounds(
+    name: str, options: LimitOptions, modes: Sequence[Mode], own: OwnLimits
+) -> AxisBounds:
+    """Combine options, the drive's own limits and defaults. The drive's limits only tighten.
+
+    Args:
+        name: Name of the axis, for errors.
+        options: Options of the application.
+        modes: Modes that the axis may use.
+        own: Plausible limits of the drive.
+
+    Raises:
+        ConfigurationError: Nothing states a deceleration and velocity_limit is infinite.
+    """
+    position_min = _tightest(options.position_min, own.position_min, "0x607D of the drive", max)
+    position_max = _tightest(options.position_max, own.position_max, "0x607D of the drive", min)
+    velocity = _tightest(options.velocity_limit, own.velocity, own.velocity_source, min)
+    if options.lacks_velocity(modes) and not (velocity.value or math.inf) < DEFAULT_VELOCITY:
+        velocity = Chosen(DEFAULT_VELOCITY, "default")
+    deceleration = _deceleration(name, options, velocity.value, own)
+    return AxisBounds(
+        position_min=position_min,
+        position_max=position_max,
+        velocity=velocity,
+        torque=_tightest(options.torque_limit, own.torque, "0x6072 of the drive", min),
+        step=_given(options.step_limit),
+        acceleration=_given(options.acceleration_limit)
+        if options.acceleration_limit is not None
+        else Chosen(deceleration.value, "as the deceleration"),
+        deceleration=deceleration,
+        torque_slope=_given(options.torque_slope),
+        on_loss=options.on_loss or "quick_stop",
+    )
+
+
+def _given(value: float | None) -> Chosen:
+    return Chosen(None) if value is None else Chosen(value, "option")
+
+
+def _tightest(
+    option: float | None, own: float | None, source: str, pick: Callable[[float, float], float]
+) -> Chosen:
+    """Return the tighter of an option and the drive's own limit; None for an infinite one."""
+    if option is not None and not math.isfinite(option):
+        option = None
+    if own is None or (option is not None and pick(option, own) == option):
+        return _given(option)
+    return Chosen(own, source)
+
+
+def _deceleration(
+    name: str, options: LimitOptions, velocity: float | None, own: OwnLimits
+) -> Chosen:
+    """Return the option, else a plausible 0x6085, else a stop within BRAKE_TIME."""
+    if options.deceleration_limit is not None:
+        return _given(options.deceleration_limit)
+    if own.deceleration is not None and _is_plausible(own.deceleration, velocity):
+        return Chosen(own.deceleration, "0x6085 of the drive")
+    if velocity is not None:
+        return Chosen(velocity / BRAKE_TIME, f"default, velocity limit / {BRAKE_TIME:g} s")
+    if options.velocity_limit is None:
+        return Chosen(DEFAULT_DECELERATION, "default")
+    raise ConfigurationError(
+        f"{name}: velocity_limit=inf, and the drive states no plausible deceleration (0x6085)",
+        hint="write Drives(deceleration_limit=...) in rad/s² at the joint",
+    )
+
+
+def _is_plausible(deceleration: float, velocity: float | None) -> bool:
+    if velocity is None:
+        return True
+    return BRAKE_TIMES[0] <= velocity / deceleration <= BRAKE_TIMES[1]

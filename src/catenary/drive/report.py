@@ -1,0 +1,66 @@
+"""Text about the limits and reactions of an axis, for `print(loop.plan)`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from catenary.drive.limits import AxisBounds, Chosen
+from catenary.drive.settings import DriveSettings
+from catenary.plan.axis_report import AxisReport
+from catenary.wire.cia402 import Mode
+
+STEP_LEAST = 0.1  # [rad]: default step limit, at least (core/_axes.pyx)
+STEP_SHARE = 2.0  # of the velocity limit · time between two set-points
+
+
+def axis_report(
+    name: str,
+    modes: Sequence[Mode],
+    bounds: AxisBounds,
+    settings: DriveSettings,
+    exchange_ns: int,
+) -> AxisReport:
+    """Describe one axis.
+
+    Args:
+        name: Name of the axis.
+        modes: Modes that the axis may use, the first one at the start.
+        bounds: Limits in force.
+        settings: Raw settings of the drive.
+        exchange_ns: Time between two exchanges of the device.
+    """
+    lines = (*_limits(bounds), *_fallback(modes, bounds, exchange_ns), *settings.reactions())
+    return AxisReport(name, tuple(map(int, modes)), lines)
+
+
+def _limits(bounds: AxisBounds) -> Iterator[str]:
+    yield (
+        f"limits: position from {_shown(bounds.position_min, 'rad')} "
+        f"to {_shown(bounds.position_max, 'rad')}"
+    )
+    yield f"limits: velocity {_shown(bounds.velocity, 'rad/s')}"
+    yield f"limits: torque {_shown(bounds.torque, 'N·m')}"
+
+
+def _fallback(modes: Sequence[Mode], bounds: AxisBounds, exchange_ns: int) -> Iterator[str]:
+    if Mode.CSP in modes:
+        yield f"step limit {_shown(_step(bounds, exchange_ns), 'rad')}"
+    yield (
+        f"fallback: deceleration {_shown(bounds.deceleration, 'rad/s²')}, "
+        f"acceleration {_shown(bounds.acceleration, 'rad/s²')}"
+    )
+    if Mode.CST in modes:
+        yield f"fallback: torque slope {_shown(bounds.torque_slope, 'N·m/s')}"
+    yield f"on_loss: {bounds.on_loss}"
+
+
+def _step(bounds: AxisBounds, exchange_ns: int) -> Chosen:
+    """Return the step limit between two set-points of neighbouring exchanges."""
+    if bounds.step.value is not None or bounds.velocity.value is None:
+        return bounds.step
+    step = max(STEP_LEAST, STEP_SHARE * bounds.velocity.value * exchange_ns * 1e-9)
+    return Chosen(step, "default")
+
+
+def _shown(chosen: Chosen, unit: str) -> str:
+    return "none" if chosen.value is None else f"{chosen.value:.4g} {unit} ({chosen.source})"

@@ -1,0 +1,156 @@
+"""Reactions of a drive: option codes read in PRE-OP, CST without a quick stop that brakes."""
+
+import pytest
+
+from catenary.drive import Drives
+from catenary.drive.settings import DriveSettings, read_settings
+from catenary.errors import ConfigurationError, DecodeError
+from catenary.plan.stop_reason import TEXTS, StopReason
+from tests.drive.fakes import FakeLayout, fake_sub
+
+MILLISECOND = 1_000_000
+
+
+def lines(**codes: int) -> tuple[str, ...]:
+    return DriveSettings(**codes).reactions()
+
+
+@pytest.mark.parametrize(
+    ("code", "text"),
+    [
+        (0, "quick stop: disable the drive function, the motor coasts (0x605A = 0)"),
+        (
+            2,
+            "quick stop: slow down on the quick stop ramp, then SWITCH ON DISABLED (0x605A = 2)",
+        ),
+        (
+            6,
+            "quick stop: slow down on the quick stop ramp, stay in QUICK STOP ACTIVE (0x605A = 6)",
+        ),
+        (-3, "quick stop: manufacturer-specific (0x605A = -3)"),
+        (9, "quick stop: reserved code (0x605A = 9)"),
+    ],
+)
+def test_a_quick_stop_in_words(code: int, text: str) -> None:
+    assert lines(quick_stop=code)[0] == text
+
+
+def test_the_other_reactions_in_words() -> None:
+    assert lines(disable_operation=1, fault_reaction=2, abort_connection=3) == (
+        "quick stop: unknown (0x605A cannot be read)",
+        "disable operation: slow down on the slow down ramp, then disable the drive function "
+        "(0x605C = 1)",
+        "fault: slow down on the quick stop ramp (0x605E = 2)",
+        "watchdog expired: quick stop (0x6007 = 3)",
+    )
+
+
+def test_only_a_known_ramp_brakes() -> None:
+    known = [code for code in range(-2, 12) if DriveSettings(quick_stop=code).brakes]
+    assert known == [1, 2, 3, 4, 5, 6, 7, 8]
+    assert not DriveSettings().brakes
+
+
+def test_each_slot_has_its_own_settings() -> None:
+    sub = fake_sub(1, {(0x605A, 0): 2, (0x685A, 0): 6, (0x6885, 0): 77, (0x6807, 0): 1})
+    assert read_settings(sub, 0) == DriveSettings(quick_stop=2)
+    assert read_settings(sub, 1) == DriveSettings(
+        quick_stop=6, quick_stop_deceleration=77, abort_connection=1
+    )
+
+
+def test_an_object_of_another_size_is_unreadable() -> None:
+    sub = fake_sub(1, {(0x605A, 0): 2})
+
+    class Odd:
+        def read(self, index: int, subindex: int, *, type: object = None) -> int:
+            raise DecodeError("4 bytes are no INT")
+
+    sub.sdo = Odd()
+    assert read_settings(sub, 0) == DriveSettings()
+
+
+@pytest.mark.parametrize(
+    ("code", "found"), [(0, "is 0, .*without braking"), (-1, "is -1"), (None, "cannot be read")]
+)
+def test_cst_needs_a_reaction_where_a_quick_stop_does_not_brake(
+    code: int | None, found: str
+) -> None:
+    values = {(0x6076, 0): 640} | ({} if code is None else {(0x605A, 0): code})
+    options = {"counts_per_turn": 1, "velocity_limit": 1.0}
+    for modes in ({"mode": "cst"}, {"mode": "csp", "other_modes": ["cst"]}):
+        drives = Drives([fake_sub(3, values)], **options, **modes)  # type: ignore[arg-type]
+        with pytest.raises(ConfigurationError, match=f"3 Servo: .*0x605A {found}") as caught:
+            drives.pdos(MILLISECOND)
+        assert 'on_loss="quick_stop"' in caught.value.hint
+    for reaction in ("quick_stop", "disable", "csp_hold"):
+        assert Drives(
+            [fake_sub(3, values)],
+            **options,  # type: ignore[arg-type]
+            mode="cst",
+            on_loss=reaction,  # type: ignore[arg-type]
+        ).pdos(MILLISECOND)
+    csv = Drives([fake_sub(3, values)], **options, mode="csv")  # type: ignore[arg-type]
+    assert csv.pdos(MILLISECOND)
+
+
+def test_a_refused_axis_is_read_again() -> None:
+    values = {(0x6076, 0): 640, (0x605A, 0): 0}
+    drives = Drives([fake_sub(3, values)], counts_per_turn=1, mode="cst", velocity_limit=1.0)
+    with pytest.raises(ConfigurationError):
+        drives.pdos(MILLISECOND)
+    values[0x605A, 0] = 2
+    assert drives.pdos(MILLISECOND)
+
+
+def test_each_plan_reads_the_drive_once() -> None:
+    values = {(0x6076, 0): 640, (0x605A, 0): 2}
+    drives = Drives([fake_sub(3, values)], counts_per_turn=1, velocity_limit=1.0)
+    wishes = dict(drives.pdos(MILLISECOND))
+    values[0x605A, 0] = 6
+    drives.pdos(MILLISECOND)
+    layout = FakeLayout.of(wishes)
+    assert "0x605A = 2" in str(drives.tables(layout).axis_reports)
+    drives.pdos(MILLISECOND)
+    assert "0x605A = 6" in str(drives.tables(layout).axis_reports)
+
+
+def test_csp_hold_maps_the_position_and_the_mode() -> None:
+    def required(**options: object) -> list[int]:
+        drives = Drives([fake_sub(3)], counts_per_turn=1, velocity_limit=1.0, **options)  # type: ignore[arg-type]
+        wish = drives.pdos(MILLISECOND)[3]
+        return [r.index for r in wish.outputs + wish.inputs if r.required]
+
+    assert required(mode="cst") == [0x6040, 0x6071, 0x6041, 0x6064]
+    hold = [0x6040, 0x6060, 0x6071, 0x607A, 0x6041, 0x6061, 0x6064]
+    assert required(mode="cst", on_loss="csp_hold") == hold
+    alone = required(mode="cst", on_loss="csp_hold", measured=["torque"])
+    assert alone == [0x6040, 0x6060, 0x6071, 0x607A, 0x6041, 0x6061, 0x6077, 0x6064]
+
+
+def test_demand_values_are_used_where_they_are_mapped_and_never_requested() -> None:
+    drives = Drives([fake_sub(3)], counts_per_turn=1, velocity_limit=1.0, other_modes=["cst"])
+    wishes = dict(drives.pdos(MILLISECOND))
+    assert not {0x6062, 0x6074} & {r.index for r in wishes[3].inputs}
+    layout = FakeLayout.of(wishes)
+    (axis,) = drives.tables(layout).axes
+    assert (axis.position_demand, axis.torque_demand) == (None, None)
+    layout.inputs[3] |= {(0x6062, 0): 32, (0x6074, 0): 16}
+    drives.pdos(MILLISECOND)
+    (axis,) = drives.tables(layout).axes
+    assert axis.position_demand is not None
+    assert axis.torque_demand is not None
+    assert axis.torque_demand.scale == pytest.approx(0.64e-3)
+
+
+def test_the_velocity_offset_counts_only_as_a_column() -> None:
+    for columns in ([], ["velocity_offset"]):
+        drives = Drives([fake_sub(3)], counts_per_turn=1, velocity_limit=1.0, columns=columns)
+        layout = FakeLayout.of(dict(drives.pdos(MILLISECOND)))
+        layout.outputs[3][0x60B1, 0] = 32
+        (axis,) = drives.tables(layout).axes
+        assert (axis.velocity_offset is not None) is bool(columns)
+
+
+def test_every_reason_has_a_text() -> None:
+    assert set(TEXTS) == set(StopReason)
