@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from catenary.model.device import Identity
 from catenary.model.finding import Finding
+from catenary.plan.stop_reason import StopReason
 from catenary.wire import coe
 from catenary.wire.drive_error import error_text
 
@@ -122,6 +123,23 @@ class ClockLocked(Event):
 
     difference: float  # from the reference clock, the largest where it is about all [s]
     bound: float  # [s]
+
+
+@dataclass(frozen=True, slots=True)
+class AxisStopped(Event):
+    """The core stopped an axis, without a request of the application."""
+
+    axis: str
+    reason: StopReason
+    cycle: int  # its number
+
+
+@dataclass(frozen=True, slots=True)
+class ModeRefused(Event):
+    """A drive did not change to a requested mode; the axis continues in its former mode."""
+
+    axis: str
+    mode: int  # mode of operation 0x6060 that was requested
 
 
 @dataclass(frozen=True, slots=True)

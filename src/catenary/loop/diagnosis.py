@@ -119,7 +119,8 @@ def drive_error(axes: Sequence[AxisTrouble], what: str, log: object) -> DriveErr
     """The error for axes of which `what` is to be said: "in fault", "cannot be enabled"."""
     faulty = any(axis.state in IN_FAULT for axis in axes)
     hint = (
-        "remove the cause; a new Loop, or Drives.enable(), resets the fault"
+        "remove the cause, then open a new Loop: it resets the fault. To stay in this one, use "
+        "Loop(raise_faults=False) and Drives.enable()"
         if faulty
         else "check its main supply, safe torque off and the enable input"
     )

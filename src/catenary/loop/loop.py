@@ -6,6 +6,7 @@ Leaving, for whatever reason, stops the drives natively before the states go dow
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -24,6 +25,7 @@ from catenary.core import (
     Iteration,
 )
 from catenary.errors import LawError
+from catenary.loop.axis_watch import StopPolicy
 from catenary.loop.carried import CarriedRunning, carried
 from catenary.loop.clocks import Clocks
 from catenary.loop.devices import DeviceWish, by_network, main_device_of
@@ -45,7 +47,9 @@ from catenary.wire.al import State
 ENDING = CYCLE_WORKING_COUNTER | CYCLE_DROPPED | CYCLE_STOPPED | CYCLE_NONE | CYCLE_LAW_FAILED
 TROUBLE = ENDING | CYCLE_CLOCKS
 LATE_LIMIT_POSITION = 0.050  # [s], CSP
-LATE_LIMIT_VELOCITY = 0.010  # [s], CSV and CST
+LATE_LIMIT_VELOCITY = 0.050  # [s], CSV
+LATE_LIMIT_TORQUE = 0.010  # [s], CST
+HANDOVER = 0.020  # [s], CST
 LEAD = 50e-6  # [s]: what a wake-up is late on an ordinary kernel, and the time to use it
 LOG_LIMIT = 2**24  # cycles: a gigabyte
 LEAD_SHARE = 0.1  # of the period, at most
@@ -58,8 +62,11 @@ class Loop:
     `period` [s]. `run`: "threaded", a native thread keeps the instants and Python follows; or
     "inline", the thread that iterates exchanges the frames itself. `receive`: "look", "wait" or
     "spin"; None: "wait" when threaded, "look" when inline. `enable`: drives are enabled on entry.
-    `late_limit` [s] after which drives are stopped quickly when no targets come; None: 50 ms in
-    CSP, 10 ms in CSV and CST; 0: never. `lost_limit`: cycles in a row without all answers before
+    `late_limit` [s] without fresh set-points, then quick stop; None: 50 ms in CSP and CSV, 10 ms in
+    CST; 0: never, refused for axes that use CST. `handover` [s]: CST keeps its torque for this time
+    after a law or stream ended, then quick stop. `on_axis_stopped`: the core stopped a required
+    axis without a request: "raise", the iteration raises DriveError; "event", see the event
+    `AxisStopped` and `Drives.stopped`. `lost_limit`: cycles in a row without all answers before
     WorkingCounterError. `stop_deadline` [s] for standing still when leaving. `watchdog` [s] of the
     devices' outputs. `lead` [s], of an inline loop and of laws: how long before each instant the
     thread wakes, to take what has come back, compute a law ahead, or fetch what is needed next into
@@ -100,6 +107,8 @@ class Loop:
         receive: ReceiveMode | None = None,
         enable: bool = True,
         late_limit: float | None = None,
+        handover: float = HANDOVER,
+        on_axis_stopped: StopPolicy = "raise",
         lost_limit: int = 3,
         stop_deadline: float = 2.0,
         watchdog: float | None = 0.1,
@@ -130,7 +139,13 @@ class Loop:
         self._run: Literal["threaded", "inline"] = run
         self._receive: ReceiveMode = receive or ("look" if run == "inline" else "wait")
         self._enable = enable
+        if late_limit is not None and not 0 <= late_limit < math.inf:
+            raise ValueError(f"late_limit={late_limit} s: must be 0 (never) or a positive time")
         self._late_limit = late_limit
+        self._handover = handover
+        if on_axis_stopped not in ("raise", "event"):
+            raise ValueError(f'on_axis_stopped={on_axis_stopped!r}: "raise" or "event"')
+        self._on_axis_stopped: StopPolicy = on_axis_stopped
         self._lost_limit = lost_limit
         self._stop_deadline = stop_deadline
         self._watchdog = watchdog
@@ -188,6 +203,7 @@ class Loop:
             carried(plan) if is_carried else plan,
             self._wishes,
             abandon=abandon,
+            on_axis_stopped=self._on_axis_stopped,
             on_return=self._on_return,
             on_replacement=self._on_replacement,
         )
@@ -373,6 +389,8 @@ class Loop:
             lost_limit=self._lost_limit,
             late_limit_position=LATE_LIMIT_POSITION if late is None else late,
             late_limit_velocity=LATE_LIMIT_VELOCITY if late is None else late,
+            late_limit_torque=LATE_LIMIT_TORQUE if late is None else late,
+            handover=self._handover,
             stop_deadline=self._stop_deadline,
             lead=self._lead,
             log=self._log,

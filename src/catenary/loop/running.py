@@ -9,9 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from catenary.bus import CycleClock, MainDevice, Pending
+from catenary.bus.event import AxisStopped, ModeRefused
 from catenary.core import (
     AXIS_FOLLOWED,
     CYCLE_CLOCKS,
+    CYCLE_DROPPED,
     CYCLE_LAW_FAILED,
     CYCLE_NONE,
     CYCLE_OK,
@@ -23,6 +25,7 @@ from catenary.core import (
     Engine,
 )
 from catenary.errors import CatenaryError, DriveError, LoopError
+from catenary.loop.axis_watch import AxisWatch, StoppedAxis, StopPolicy, mode_name
 from catenary.loop.buffers import bind_wishes
 from catenary.loop.clocks import Clocks
 from catenary.loop.diagnosis import (
@@ -39,11 +42,13 @@ from catenary.loop.publishing import Publisher
 from catenary.loop.rehearsal import fitting_rehearsal
 from catenary.loop.service import Service
 from catenary.loop.signals import SignalGuard
+from catenary.loop.stop_error import stopped_error
 from catenary.loop.watch import Attendance, Policy, Watch
 from catenary.model.device import Direction
 from catenary.model.silence import judge_silence
 from catenary.plan.make import Plan
 from catenary.plan.sink import Sink
+from catenary.plan.stop_reason import UNASKED, StopReason
 from catenary.plan.wish import Wish
 from catenary.procedure.al_state import request_state
 from catenary.procedure.probe import probe_inputs
@@ -72,6 +77,7 @@ class Running:
         wishes: Sequence[Wish],
         *,
         abandon: Callable[[], object],
+        on_axis_stopped: StopPolicy = "raise",
         on_return: Policy = "restore",
         on_replacement: Policy = "hold",
     ) -> None:
@@ -81,6 +87,8 @@ class Running:
         self.views = bind_wishes(wishes, plan.tables, self.engine.buffers)
         if plan.cycle.lead_ns and plan.cycle.order == "inline":
             self.engine.set_rehearsal(fitting_rehearsal(self.views, plan.cycle.lead_ns))
+        self._axis_watch = AxisWatch(self.views, plan.cycle.axes)
+        self._on_axis_stopped: StopPolicy = on_axis_stopped
         self.laws = LawRunner(self.engine, plan)
         clock = plan.cycle.clock
         self.clocks: Clocks | None = None
@@ -184,6 +192,8 @@ class Running:
         deadline = self.engine.now() + patience
         while True:
             flags = self.cycle()
+            if flags & CYCLE_DROPPED:
+                self._announce_axes()
             waiting = in_position & (self.views.axis_flags & AXIS_FOLLOWED == 0)
             if not waiting.any():
                 return
@@ -204,8 +214,9 @@ class Running:
     # Running
 
     def judge(self, flags: int, *, faults: bool) -> None:
-        """Raises the error for a cycle in trouble; returns where it was a false alarm."""
+        """Announce what happened in a cycle in trouble, and raise its error, if it is one."""
         self._raise_ended(flags)
+        stops = self._announce_axes() if flags & CYCLE_DROPPED else []
         if flags & CYCLE_CLOCKS:
             self._announce_clocks()
         if flags & CYCLE_WORKING_COUNTER:
@@ -224,6 +235,43 @@ class Running:
             if self.engine.al_status != State.OP:
                 self._raise_astray()  # the fault may be its consequence
             raise self._drive_error(faulty, "in fault")
+        self._raise_stopped([s for s in stops if self.watch.requires(s.device)], faults=faults)
+
+    def _announce_axes(self) -> list[StoppedAxis]:
+        """Put one event for each axis that the core stopped unasked and each refused mode.
+
+        Returns the new stops.
+        """
+        stops = self._axis_watch.new_stops()
+        now = self.engine.now() * 1e-9
+        for stop in stops:
+            if stop.requested:
+                continue
+            message = f"{stop.name} was stopped in cycle {stop.cycle}: {stop.reason.text}"
+            sub = self.main.subs[stop.device]
+            self.main.events.put(AxisStopped(now, sub, message, stop.name, stop.reason, stop.cycle))
+        for refusal in self._axis_watch.new_refusals(explained=bool(stops)):
+            message = (
+                f"{refusal.name} did not change to {mode_name(refusal.mode)} (0x6061); it "
+                "continues in its former mode"
+            )
+            sub = self.main.subs[refusal.device]
+            self.main.events.put(ModeRefused(now, sub, message, refusal.name, refusal.mode))
+        return stops
+
+    def _raise_stopped(self, stops: Sequence[StoppedAxis], *, faults: bool) -> None:
+        """Raise DriveError for required axes that stopped without a request."""
+        left = [s.axis for s in stops if s.reason is StopReason.LEFT_OPERATION]
+        faulty = [s.axis for s in stops if s.reason is StopReason.FAULT]
+        if faults and faulty:
+            raise self._drive_error(faulty, "in fault")
+        if faults and left:
+            raise self._drive_error(left, "left OPERATION_ENABLED by itself")
+        unasked = [s for s in stops if s.reason in UNASKED]
+        if unasked and self._on_axis_stopped == "raise":
+            log = self.log()
+            self.stop_axes_at_once()
+            raise stopped_error(unasked, self.plan.cycle, log)
 
     def _announce_clocks(self) -> None:
         if self.clocks is not None:

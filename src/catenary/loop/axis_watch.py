@@ -1,0 +1,96 @@
+"""Axes that the core stopped, and modes that drives refused: what is new since the last look."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from catenary.core import GOAL_ENABLED
+from catenary.plan.cycle import AxisPlan
+from catenary.plan.stop_reason import StopReason
+from catenary.plan.wish import Views
+from catenary.wire.cia402 import Mode
+
+StopPolicy = Literal["raise", "event"]
+
+MODE_REFUSED = 1 << 5  # of axis_flags
+
+
+class StoppedAxis(NamedTuple):
+    """One stop of an axis by the core."""
+
+    axis: int  # its number in the plan
+    name: str
+    device: int
+    mode: int  # mode of operation that the drive shows
+    reason: StopReason
+    cycle: int
+    requested: bool  # by the application or the loop
+
+
+class RefusedMode(NamedTuple):
+    """A change of mode that a drive did not make."""
+
+    axis: int
+    name: str
+    device: int
+    mode: int  # requested
+
+
+class AxisWatch:
+    """Owns the stops and refused modes that were announced already."""
+
+    def __init__(self, views: Views, axes: Sequence[AxisPlan]) -> None:
+        self._views = views
+        self._axes = axes
+        self._reasons = views.stop_reason.copy()
+        self._cycles = views.stop_cycle.copy()
+        self._refused = np.zeros(len(axes), np.bool_)
+
+    def new_stops(self) -> list[StoppedAxis]:
+        """Return the stops since the last call, in the order of the axes."""
+        reasons, cycles = self._views.stop_reason.copy(), self._views.stop_cycle.copy()
+        changed = (reasons != self._reasons) | (cycles != self._cycles)
+        self._reasons, self._cycles = reasons, cycles
+        return [self._stop(axis) for axis in np.flatnonzero(changed & (reasons != 0)).tolist()]
+
+    def new_refusals(self, *, explained: bool) -> list[RefusedMode]:
+        """Return the refused changes of mode since the last call.
+
+        Args:
+            explained: True if a new stop explains the call. Otherwise flags that were seen before
+                are new occurrences: the application asked again between two calls.
+        """
+        flagged = (self._views.axis_flags & MODE_REFUSED) != 0
+        new = flagged & ~self._refused
+        self._refused = flagged
+        if not explained and not new.any():
+            new = flagged
+        return [self._refusal(axis) for axis in np.flatnonzero(new).tolist()]
+
+    def _stop(self, axis: int) -> StoppedAxis:
+        plan, reason = self._axes[axis], StopReason(self._views.stop_reason.item(axis))
+        by_request = self._views.goal.item(axis) != GOAL_ENABLED
+        return StoppedAxis(
+            axis,
+            plan.name,
+            plan.device,
+            self._views.mode_actual.item(axis) or plan.mode,
+            reason,
+            self._views.stop_cycle.item(axis),
+            requested=reason is StopReason.STOP_REQUEST and by_request,
+        )
+
+    def _refusal(self, axis: int) -> RefusedMode:
+        plan = self._axes[axis]
+        return RefusedMode(axis, plan.name, plan.device, self._views.mode_target.item(axis))
+
+
+def mode_name(mode: int) -> str:
+    """Return the name of a mode of operation, or its number."""
+    try:
+        return Mode(mode).name
+    except ValueError:
+        return str(mode)

@@ -1,0 +1,95 @@
+"""The error for axes that the core stopped: reason, cycle, what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from catenary.core import CYCLE_DRY, CYCLE_UNCOMMITTED
+from catenary.errors import DriveError
+from catenary.loop.axis_watch import StoppedAxis, mode_name
+from catenary.plan.cycle import CyclePlan
+from catenary.plan.stop_reason import StopReason
+from catenary.wire.cia402 import Mode
+
+ADVICE: dict[StopReason, str] = {
+    StopReason.UNDERRUN: (
+        "move slow work out of the loop body, keep more rows in the stream, "
+        "or give Loop(late_limit=...) a longer time [s]"
+    ),
+    StopReason.HANDOVER: (
+        "start the next law or write torques in time, change to CSP before the law ends, "
+        "or give Loop(handover=...) a longer time [s]"
+    ),
+    StopReason.REFUSED: (
+        "look for NaN or a jump in the targets: begin at the commanded position and move by "
+        "small steps; Drives(step_limit=...) [rad] allows larger ones"
+    ),
+    StopReason.POSITION_LIMIT: (
+        "slow down before position_min and position_max; the drive's 0x607D may be tighter: "
+        "print(loop.plan)"
+    ),
+    StopReason.NOT_FOLLOWING: (
+        "look for an internal limit or a mode of the drive that ignores targets (statusword, "
+        "bits 11 and 12)"
+    ),
+    StopReason.MODE_CHANGE: "check that the drive supports the mode (0x6502, its manual)",
+    StopReason.NOT_ENABLED: "check its main supply, safe torque off and the enable input",
+}
+GO_ON = (
+    'Loop(on_axis_stopped="event") keeps the loop running; Drives.enable() starts the axis again'
+)
+
+
+def stopped_error(
+    stops: Sequence[StoppedAxis], cycle: CyclePlan, log: npt.NDArray[np.void]
+) -> DriveError:
+    """Return the error for axes that were stopped without a request.
+
+    Args:
+        stops: At least one.
+        cycle: The plan, for its times.
+        log: The last cycles, oldest first.
+    """
+    told = "; ".join(
+        f"{stop.name} was stopped in cycle {stop.cycle}: {_text(stop, cycle, log)}"
+        for stop in stops
+    )
+    reasons = dict.fromkeys(stop.reason for stop in stops)
+    advice = "; ".join(ADVICE[reason] for reason in reasons if reason in ADVICE)
+    return DriveError(told, log=log, hint=f"{advice}; {GO_ON}")
+
+
+def _text(stop: StoppedAxis, cycle: CyclePlan, log: npt.NDArray[np.void]) -> str:
+    if stop.reason is StopReason.UNDERRUN:
+        limit = _late_limit_ns(stop.mode, cycle) / 1e6
+        late = _what_was_late(stop, log)
+        return f"{stop.reason.text} ({limit:g} ms in {mode_name(stop.mode)}); {late}"
+    if stop.reason is StopReason.HANDOVER:
+        return f"{stop.reason.text} ({cycle.handover_ns / 1e6:g} ms)"
+    return stop.reason.text
+
+
+def _late_limit_ns(mode: int, cycle: CyclePlan) -> int:
+    if mode == Mode.CST:
+        return cycle.late_limit_torque_ns
+    if mode == Mode.CSV:
+        return cycle.late_limit_velocity_ns
+    return cycle.late_limit_position_ns
+
+
+def _what_was_late(stop: StoppedAxis, log: npt.NDArray[np.void]) -> str:
+    """Return the source of set-points that was late, and for how many cycles."""
+    before = log[log["number"] <= stop.cycle]
+    if len(before) and before["flags"][-1] & CYCLE_DRY:
+        return f"the stream was empty for {_trailing(before['flags'], CYCLE_DRY)} cycles"
+    count = _trailing(before["flags"], CYCLE_UNCOMMITTED)
+    return f"the program wrote no targets for {count} cycles" if count else "the program was late"
+
+
+def _trailing(flags: npt.NDArray[np.uint32], bit: int) -> int:
+    """Return how many of the last flags have the bit without a gap."""
+    without = np.flatnonzero((flags & bit) == 0)
+    return len(flags) - (int(without[-1]) + 1 if len(without) else 0)
