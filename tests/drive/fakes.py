@@ -66,6 +66,32 @@ class FakeSdo:
         return self.values[index, subindex]
 
 
+SIZES = {0x6085: 4, 0x607C: 4, 0x607D: 4, 0x607F: 4, 0x6080: 4}  # [bytes] of objects; others: 2
+
+
+@dataclass(eq=False)
+class FakeMain:
+    """A MainDevice with one device."""
+
+    sdo: FakeSdo
+
+    def read_objects(
+        self, wanted: dict[int, list[tuple[int, int]]]
+    ) -> dict[int, dict[tuple[int, int], bytes]]:
+        return {position: self._found(places) for position, places in wanted.items()}
+
+    def _found(self, places: list[tuple[int, int]]) -> dict[tuple[int, int], bytes]:
+        there = {place: self.sdo.values[place] for place in places if place in self.sdo.values}
+        return {
+            (index, subindex): value.to_bytes(size_of(index), "little", signed=value < 0)
+            for (index, subindex), value in there.items()
+        }
+
+
+def size_of(index: int) -> int:
+    return SIZES.get(0x6000 | index & 0x7FF, 2)
+
+
 def fake_sub(
     position: int, values: dict[tuple[int, int], int] | None = None, slots: tuple[int, ...] = (0,)
 ) -> SimpleNamespace:
@@ -73,11 +99,9 @@ def fake_sub(
     that brakes."""
     if values is None:
         values = {(0x6076, 0): 640, (0x605A, 0): 2, (0x60C2, 1): 2, (0x60C2, 2): -3}
+    sdo = FakeSdo(values, position)
     return SimpleNamespace(
-        position=position,
-        name="Servo",
-        sdo=FakeSdo(values, position),
-        slots=slots,
+        position=position, name="Servo", sdo=sdo, slots=slots, main=FakeMain(sdo)
     )
 
 

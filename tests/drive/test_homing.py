@@ -123,7 +123,7 @@ def test_an_axis_that_drops_out() -> None:
     servo = Servo(name="Left")
     with opened(servo, homing=HomingMethod(-3)) as (arm, loop):
         servo.switch_sto(True)
-        with pytest.raises(DriveError, match="1 Left was enabled no longer"):
+        with pytest.raises(DriveError, match="left OPERATION_ENABLED by itself: 1 Left"):
             arm.home(loop)
 
 

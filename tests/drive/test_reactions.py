@@ -2,10 +2,13 @@
 
 import pytest
 
+import catenary as cat
 from catenary.drive import Drives
 from catenary.drive.settings import DriveSettings, read_settings
-from catenary.errors import ConfigurationError, DecodeError
+from catenary.errors import ConfigurationError
 from catenary.plan.stop_reason import TEXTS, StopReason
+from catenary.types import INT
+from tests.drive import fakes
 from tests.drive.fakes import FakeLayout, fake_sub
 
 MILLISECOND = 1_000_000
@@ -51,23 +54,30 @@ def test_only_a_known_ramp_brakes() -> None:
     assert not DriveSettings().brakes
 
 
-def test_each_slot_has_its_own_settings() -> None:
+def test_each_slot_and_device_has_its_own_settings() -> None:
     sub = fake_sub(1, {(0x605A, 0): 2, (0x685A, 0): 6, (0x6885, 0): 77, (0x6807, 0): 1})
-    assert read_settings(sub, 0) == DriveSettings(quick_stop=2)
-    assert read_settings(sub, 1) == DriveSettings(
-        quick_stop=6, quick_stop_deceleration=77, abort_connection=1
-    )
+    other = fake_sub(2, {(0x605A, 0): -1})
+    assert read_settings([(sub, 0), (sub, 1), (other, 0)]) == [
+        DriveSettings(quick_stop=2),
+        DriveSettings(quick_stop=6, quick_stop_deceleration=77, abort_connection=1),
+        DriveSettings(quick_stop=-1),
+    ]
 
 
-def test_an_object_of_another_size_is_unreadable() -> None:
-    sub = fake_sub(1, {(0x605A, 0): 2})
+def test_an_object_of_another_size_is_unreadable(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fakes, "size_of", lambda index: 3)
+    assert read_settings([(fake_sub(1, {(0x605A, 0): 2}), 0)]) == [DriveSettings()]
 
-    class Odd:
-        def read(self, index: int, subindex: int, *, type: object = None) -> int:
-            raise DecodeError("4 bytes are no INT")
 
-    sub.sdo = Odd()
-    assert read_settings(sub, 0) == DriveSettings()
+def test_real_frames_bring_the_same() -> None:
+    """Two axes of a virtual servo: all objects of all devices in one conversation each."""
+    with cat.MainDevice(cat.Segment([cat.Servo(axes=2), cat.Servo()])) as main:
+        first, second = main.scan()
+        first.sdo.write(0x685A, 0, 6, type=INT)
+        found = read_settings([(first, 0), (first, 1), (second, 0)])
+    assert [each.quick_stop for each in found] == [2, 6, 2]
+    assert {each.abort_connection for each in found} == {None}
+    assert all(each.quick_stop_deceleration for each in found)
 
 
 @pytest.mark.parametrize(

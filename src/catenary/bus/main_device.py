@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Self, TypeVar
 
@@ -13,6 +13,7 @@ from catenary.bus.carrier import Carrier
 from catenary.bus.events import Callback, Callbacks, Events
 from catenary.bus.pending import Pending
 from catenary.bus.runner import BlockingRunner, FrameCounts, LinkLent, Runner
+from catenary.bus.sdo import Objects, read_each
 from catenary.bus.segment_scan import Found, check_identity, find, oddities, with_places
 from catenary.bus.sub_device import SubDevice
 from catenary.bus.sub_devices import SubDevices
@@ -267,6 +268,19 @@ class MainDevice:
         """Brings all devices to SAFE-OP, then PRE-OP. StateError names one that stays up."""
         self._bring_down(State.SAFE_OP, timeout)
         self._bring_down(State.PRE_OP, timeout)
+
+    def read_objects(self, wanted: Mapping[int, Sequence[tuple[int, int]]]) -> dict[int, Objects]:
+        """Read objects of several devices before a loop, all devices at the same time.
+
+        Args:
+            wanted: (index, subindex) by position.
+
+        Returns:
+            By position, the bytes of each object that the device did not refuse.
+        """
+        positions = list(wanted)
+        found = self._runner.run_all([read_each(self.subs[k], wanted[k]) for k in positions])
+        return dict(zip(positions, found, strict=True))
 
     def converse(self, procedure: Procedure[T]) -> T:
         """Runs a procedure, alone or beside the running loop."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar, overload
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import TYPE_CHECKING, TypeAlias, TypeVar, overload
 
 from catenary.bus.pending import Pending
-from catenary.errors import MailboxError
+from catenary.errors import MailboxError, SdoAbort
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.sdo import UPLOAD_LIMIT, download, upload
@@ -17,6 +19,8 @@ if TYPE_CHECKING:
     from catenary.bus.sub_device import SubDevice
 
 T = TypeVar("T")
+
+Objects: TypeAlias = dict[tuple[int, int], bytes]  # by index and subindex
 
 
 class Sdo:
@@ -168,6 +172,16 @@ class Sdo:
                 hint="couplers and simple terminals have no object dictionary",
             )
         return channel
+
+
+def read_each(sub: SubDevice, places: Sequence[tuple[int, int]]) -> Procedure[Objects]:
+    """Read objects one after the other. Objects that the device refuses are left out."""
+    found: Objects = {}
+    channel = sub.sdo._channel()
+    for index, subindex in places:
+        with suppress(SdoAbort):
+            found[index, subindex] = yield from upload(channel, index, subindex)
+    return found
 
 
 def _decoded(asked: Procedure[bytes], type: DataType[T]) -> Procedure[T]:

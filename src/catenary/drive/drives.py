@@ -294,9 +294,11 @@ class Drives:
         """Read rated torque and settings once per plan: `pdos` is called twice for each."""
         if self._is_read:
             return
-        pairs = list(zip(self._axes, self.subs, strict=True))
-        rated = [(start_up.with_rated_torque(axis, sub), sub) for axis, sub in pairs]
-        self._axes = tuple(start_up.with_settings(axis, sub) for axis, sub in rated)
+        rated = [
+            start_up.with_rated_torque(axis, sub)
+            for axis, sub in zip(self._axes, self.subs, strict=True)
+        ]
+        self._axes = start_up.with_settings(rated, self.subs)
         self._is_read = True
 
     def tables(self, layout: ImageLayout) -> WishTables:

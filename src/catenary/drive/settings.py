@@ -7,16 +7,18 @@ IEC 61800-7-201 / CiA 402-2: option codes 0x605A, 0x605C, 0x605E, 0x6007; quick 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeGuard
 
 from catenary.drive.units import AxisUnits
-from catenary.errors import DecodeError, SdoAbort
+from catenary.errors import DecodeError
 from catenary.types import DINT, INT, UDINT, UINT, DataType
 from catenary.wire.cia402 import SLOT_OFFSET, Object
 
 if TYPE_CHECKING:
-    from catenary.bus import SubDevice
+    from catenary.bus import MainDevice, SubDevice
 
 MOTOR_SPEED_RANGE = (60, 200_000)  # [rpm]: beyond, the drive counts 0x6080 in another unit
 POSITION_EXTREMES = (-(2**31), 2**31 - 1)
@@ -98,30 +100,47 @@ class OwnLimits:
     deceleration: float | None = None  # [rad/s²]
 
 
-def read_settings(sub: SubDevice, slot: int) -> DriveSettings:
-    """Read the settings of one axis by SDO, one upload each. A refused object reads None."""
-    base = SLOT_OFFSET * slot
+OBJECTS: tuple[tuple[str, int, int, DataType[int]], ...] = (
+    ("quick_stop", Object.QUICK_STOP_OPTION, 0, INT),
+    ("disable_operation", Object.DISABLE_OPERATION_OPTION, 0, INT),
+    ("fault_reaction", Object.FAULT_REACTION_OPTION, 0, INT),
+    ("abort_connection", Object.ABORT_CONNECTION_OPTION, 0, INT),
+    ("quick_stop_deceleration", Object.QUICK_STOP_DECELERATION, 0, UDINT),
+    ("position_min", Object.SOFTWARE_POSITION_LIMIT, 1, DINT),
+    ("position_max", Object.SOFTWARE_POSITION_LIMIT, 2, DINT),
+    ("home_offset", Object.HOME_OFFSET, 0, DINT),
+    ("max_profile_velocity", Object.MAX_PROFILE_VELOCITY, 0, UDINT),
+    ("max_motor_speed", Object.MAX_MOTOR_SPEED, 0, UDINT),
+    ("max_torque", Object.MAX_TORQUE, 0, UINT),
+)
 
-    def read(index: int, subindex: int, kind: DataType[int]) -> int | None:
-        try:
-            return sub.sdo.read(index + base, subindex, type=kind)
-        except (SdoAbort, DecodeError):
-            return None
 
-    low = read(Object.SOFTWARE_POSITION_LIMIT, 1, DINT)
-    return DriveSettings(
-        quick_stop=read(Object.QUICK_STOP_OPTION, 0, INT),
-        disable_operation=read(Object.DISABLE_OPERATION_OPTION, 0, INT),
-        fault_reaction=read(Object.FAULT_REACTION_OPTION, 0, INT),
-        abort_connection=read(Object.ABORT_CONNECTION_OPTION, 0, INT),
-        quick_stop_deceleration=read(Object.QUICK_STOP_DECELERATION, 0, UDINT),
-        position_min=low,
-        position_max=None if low is None else read(Object.SOFTWARE_POSITION_LIMIT, 2, DINT),
-        home_offset=None if low is None else read(Object.HOME_OFFSET, 0, DINT),
-        max_profile_velocity=read(Object.MAX_PROFILE_VELOCITY, 0, UDINT),
-        max_motor_speed=read(Object.MAX_MOTOR_SPEED, 0, UDINT),
-        max_torque=read(Object.MAX_TORQUE, 0, UINT),
-    )
+def read_settings(places: Sequence[tuple[SubDevice, int]]) -> list[DriveSettings]:
+    """Read the settings of axes by SDO, all devices at the same time.
+
+    Args:
+        places: SubDevice and slot of each axis.
+
+    Returns:
+        The settings in this order. An object that the device refuses, or that has another size,
+        is None.
+    """
+    wanted: dict[MainDevice, dict[int, list[tuple[int, int]]]] = {}
+    for sub, slot in places:
+        objects = [(index + SLOT_OFFSET * slot, subindex) for _, index, subindex, _ in OBJECTS]
+        wanted.setdefault(sub.main, {}).setdefault(sub.position, []).extend(objects)
+    found = {main: main.read_objects(its) for main, its in wanted.items()}
+    return [_settings(found[sub.main][sub.position], SLOT_OFFSET * slot) for sub, slot in places]
+
+
+def _settings(found: Mapping[tuple[int, int], bytes], base: int) -> DriveSettings:
+    values: dict[str, int] = {}
+    for name, index, subindex, kind in OBJECTS:
+        data = found.get((index + base, subindex))
+        if data is not None:
+            with suppress(DecodeError):
+                values[name] = kind.decode(data)
+    return DriveSettings(**values)
 
 
 def own_limits(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from catenary.bus import SubDevice
@@ -36,17 +37,22 @@ def with_rated_torque(axis: Axis, sub: SubDevice) -> Axis:
     return replace(axis, units=replace(axis.units, rated_torque=rated * 1e-3))
 
 
-def with_settings(axis: Axis, sub: SubDevice) -> Axis:
-    """Return the axis with its drive's reactions and limits.
+def with_settings(axes: Sequence[Axis], subs: Sequence[SubDevice]) -> tuple[Axis, ...]:
+    """Return the axes with their drives' reactions and limits.
 
     Raises:
         ConfigurationError: CST without `on_loss=` on a drive whose quick stop does not brake, or
             no deceleration is known.
     """
-    axis = replace(axis, settings=read_settings(sub, axis.slot))
-    _check_quick_stop(axis)
-    _ = axis.bounds  # raises here, before anything is written
-    return axis
+    places = [(sub, axis.slot) for axis, sub in zip(axes, subs, strict=True)]
+    read = tuple(
+        replace(axis, settings=settings)
+        for axis, settings in zip(axes, read_settings(places), strict=True)
+    )
+    for axis in read:
+        _check_quick_stop(axis)
+        _ = axis.bounds  # raises here, before anything is written
+    return read
 
 
 def _check_quick_stop(axis: Axis) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import struct
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, NoReturn
 
@@ -98,6 +98,19 @@ class MainDevice(bus.MainDevice):
                 if renewed.coe
             ]
             sub.description = replace(renewed, objects=tuple(objects))
+
+    def read_objects(
+        self, wanted: Mapping[int, Sequence[tuple[int, int]]]
+    ) -> dict[int, dict[tuple[int, int], bytes]]:
+        """Read objects before a loop, one after the other; see `bus.MainDevice.read_objects`."""
+        found: dict[int, dict[tuple[int, int], bytes]] = {}
+        for position, places in wanted.items():
+            read = {
+                place: read_if_there(self.reservation, self.place_of(position), *place)
+                for place in places
+            }
+            found[position] = {place: data for place, data in read.items() if data}
+        return found
 
     def configure(self, plan: Plan) -> None:
         """Tells the master the plan and activates it: from here on it waits for cycles."""
