@@ -28,20 +28,21 @@ def test_a_trajectory_written_ahead_is_followed_and_then_held(opened) -> None:
     stream = loop.stream(capacity=300)
     assert stream.write(ramp(300)) == 300
     assert (stream.waiting, stream.free) == (300, 0)
-    dry_at = None
-    for cycle in loop:
-        if cycle.dry and dry_at is None:
-            dry_at = cycle.number
-        if cycle.number == 600:
-            break
+    dry_at = next(cycle.number for cycle in loop if cycle.dry)
     assert 298 <= dry_at <= 302
-    assert stream.dry >= 290
-    assert arm.actual.position == pytest.approx([0.05, -0.05], abs=1e-3)
-    assert all(arm.enabled)
+    for cycle in loop:
+        assert cycle.dry
+        if cycle.number == dry_at + 30:  # less than the late limit
+            break
+    assert 30 <= stream.dry <= 32
     stream.close()
     for cycle in loop:
         assert not cycle.dry
-        break
+        if cycle.number == 600:
+            break
+    # The empty stream was continued for 10 cycles; the axes hold there.
+    assert arm.actual.position == pytest.approx([0.05, -0.05], abs=2e-3)
+    assert all(arm.enabled)
 
 
 def test_another_thread_may_write(opened) -> None:
@@ -56,7 +57,8 @@ def test_another_thread_may_write(opened) -> None:
     writer = threading.Thread(target=fill)
     writer.start()
     while writer.is_alive() or stream.waiting:
-        next(loop)
+        if stream.waiting:  # an empty stream would be an underrun
+            next(loop)
     writer.join()
     assert arm.target.position == pytest.approx([0.05, -0.05])
 

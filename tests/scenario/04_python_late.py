@@ -6,6 +6,9 @@ targets that come after all move nothing before the application asks.
 import pytest
 
 import catenary as cat
+from catenary import events
+from catenary.errors import DriveError
+from catenary.plan.stop_reason import StopReason
 from catenary.wire.cia402 import State
 from tests.scenario.cell import OP, Cell
 
@@ -32,7 +35,7 @@ def test_a_position_holds_while_python_is_a_little_late(cell: Cell) -> None:
 
 def test_after_the_late_limit_the_axes_stop_and_stay(cell: Cell) -> None:
     arm = cell.drives()
-    with cat.Loop(arm) as loop:
+    with cat.Loop(arm, on_axis_stopped="event") as loop:
         home = arm.actual.position.copy()
         for cycle in loop:
             if cycle.number < 100:
@@ -47,7 +50,24 @@ def test_after_the_late_limit_the_axes_stop_and_stay(cell: Cell) -> None:
                 break
         assert [servo.position_rad for servo in cell.servos] == pytest.approx(stopped, abs=1e-3)
         assert not arm.enabled.any()
+        assert arm.stopped == (StopReason.UNDERRUN,) * 2
         assert cell.states == [OP] * 4  # the devices were fed all the time
+    stops = [e for e in cell.main.events if isinstance(e, events.AxisStopped)]
+    assert [(e.axis, e.reason) for e in stops] == [(n, StopReason.UNDERRUN) for n in arm.names]
+    cell.assert_safe()
+
+
+def test_the_iteration_says_which_axes_were_stopped_and_what_was_late(cell: Cell) -> None:
+    arm = cell.drives()
+    with pytest.raises(DriveError, match=r"in cycle .*late_limit") as caught, cat.Loop(arm) as loop:
+        for cycle in loop:
+            if cycle.number == 100:
+                cycle.spend(0.5)
+            assert cycle.number < 110
+    assert all(name in str(caught.value) for name in arm.names)
+    assert "50 ms in CSP" in caught.value.message
+    assert "wrote no targets for" in caught.value.message
+    assert "Loop(late_limit=...)" in caught.value.hint
     cell.assert_safe()
 
 

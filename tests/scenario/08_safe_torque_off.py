@@ -6,13 +6,14 @@ import pytest
 
 import catenary as cat
 from catenary.errors import DriveError
+from catenary.plan.stop_reason import StopReason
 from tests.scenario.cell import OP, Cell
 
 
 def test_nothing_moves_after_sto_until_the_application_asks(cell: Cell) -> None:
     arm = cell.drives()
     servo = cell.servos[0]
-    with cat.Loop(arm) as loop:
+    with cat.Loop(arm, raise_faults=False) as loop:
         home = arm.actual.position.copy()
         for cycle in loop:
             if cycle.number < 100 or cycle.number >= 400:
@@ -22,6 +23,7 @@ def test_nothing_moves_after_sto_until_the_application_asks(cell: Cell) -> None:
             if cycle.number == 200:
                 assert not arm.enabled[0]
                 assert arm.faults == ()
+                assert arm.stopped == (StopReason.LEFT_OPERATION, None)
                 servo.switch_sto(False)
                 stopped = servo.position_rad
             if 200 < cycle.number < 400:
@@ -36,6 +38,19 @@ def test_nothing_moves_after_sto_until_the_application_asks(cell: Cell) -> None:
                 break
         assert arm.enabled.all()
         assert cell.states == [OP] * 4
+    cell.assert_safe()
+
+
+def test_sto_ends_the_loop_unless_faults_are_the_applications_business(cell: Cell) -> None:
+    arm = cell.drives()
+    with pytest.raises(DriveError, match="left OPERATION_ENABLED") as caught, cat.Loop(arm) as loop:
+        for cycle in loop:
+            if cycle.number == 100:
+                cell.servos[0].switch_sto(True)
+            assert cycle.number < 110
+    assert arm.names[0] in caught.value.message
+    assert arm.names[1] not in caught.value.message
+    assert "safe torque off" in caught.value.hint
     cell.assert_safe()
 
 

@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 
 import catenary as cat
+from catenary.errors import DriveError
+from catenary.plan.stop_reason import StopReason
 from tests.scenario.cell import Cell
 
 SLACK = 0.03  # [rad] the servo's own overshoot when its set-point stops at the limit
 
 
 def test_position_and_step_are_clamped_in_csp(cell: Cell) -> None:
-    arm = cell.drives(position_min=-0.5, position_max=1.0, velocity_limit=2.0)
+    arm = cell.drives(position_min=-0.5, position_max=1.0, velocity_limit=2.0, step_limit=1e3)
     fastest = 0.0
     with cat.Loop(arm) as loop:
         for cycle in loop:
@@ -26,6 +28,20 @@ def test_position_and_step_are_clamped_in_csp(cell: Cell) -> None:
             if cycle.time > 3.0:
                 break
     assert 1.9 < fastest < 2.5
+    cell.assert_safe()
+
+
+def test_a_step_beyond_the_step_limit_is_refused(cell: Cell) -> None:
+    arm = cell.drives(velocity_limit=2.0)
+    with (
+        pytest.raises(DriveError, match="further than step_limit") as caught,
+        cat.Loop(arm) as loop,
+    ):
+        for cycle in loop:
+            arm.target.position[:] = 3.0 if cycle.number > 100 else 0.0
+            assert all(abs(servo.position_rad) < 0.01 for servo in cell.servos)
+            assert cycle.number < 200
+    assert "step_limit" in caught.value.hint
     cell.assert_safe()
 
 
@@ -44,13 +60,14 @@ def test_a_velocity_stops_at_the_position_limit(cell: Cell) -> None:
 
 def test_a_torque_is_clamped_and_stops_at_the_position_limit(cell: Cell) -> None:
     arm = cell.drives(mode="cst", position_max=0.5, torque_limit=0.05)
-    with cat.Loop(arm) as loop:
+    with cat.Loop(arm, on_axis_stopped="event") as loop:
         for cycle in loop:
             arm.target.torque[:] = 1.9
             assert all(servo.torque_nm < 0.051 for servo in cell.servos if arm.enabled.all())
             if cycle.time > 1.0:
                 break
         assert "OPERATION ENABLED" not in cell.drive_states  # nothing else could brake it
+        assert arm.stopped == (StopReason.POSITION_LIMIT,) * 2
         assert all(servo.position_rad < 0.6 for servo in cell.servos)
     cell.assert_safe()
 

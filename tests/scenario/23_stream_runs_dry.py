@@ -1,14 +1,16 @@
-"""The slower task that writes set-points ahead falls behind: the axes hold, it is said, and the
-next rows are followed."""
+"""The slower task that writes set-points ahead falls behind. The axes continue, then hold, and
+follow the next rows. An empty stream is an underrun: after the late limit the axes are stopped.
+"""
 
 import numpy as np
 import pytest
 
 import catenary as cat
+from catenary.plan.stop_reason import StopReason
 from tests.scenario.cell import Cell
 
 
-def test_the_axes_hold_and_go_on(cell: Cell) -> None:
+def test_the_axes_continue_and_follow_the_next_rows(cell: Cell) -> None:
     arm = cell.drives()
     with cat.Loop(arm) as loop:
         home = arm.actual.position.copy()
@@ -18,21 +20,26 @@ def test_the_axes_hold_and_go_on(cell: Cell) -> None:
         dry = 0
         for cycle in loop:
             dry += cycle.dry
-            if cycle.number == 500:
-                held = [servo.position_rad for servo in cell.servos]
-                assert held == pytest.approx(path[199], abs=1e-3)
-                assert stream.write(path[200:]) == 200
-            if cycle.number == 900:
+            if stream.taken == 400:
                 break
-        assert dry == stream.dry > 400
+            if dry == 30 and not stream.waiting:  # of 50 ms
+                held = [servo.position_rad for servo in cell.servos]
+                assert held == pytest.approx(path[199], abs=0.01)  # 10 ms further at 0.5 rad/s
+                assert stream.write(path[200:]) == 200
+        assert dry == stream.dry
+        assert 30 <= dry <= 32
+        stream.close()
+        for cycle in loop:
+            if cycle.number == 600:
+                break
         assert arm.enabled.all()
         assert [servo.position_rad for servo in cell.servos] == pytest.approx(path[-1], abs=1e-3)
     cell.assert_safe()
 
 
-def test_a_moving_axis_comes_to_rest(cell: Cell) -> None:
+def test_a_moving_axis_comes_to_rest_and_is_stopped(cell: Cell) -> None:
     arm = cell.drives(mode="csv")
-    with cat.Loop(arm) as loop:
+    with cat.Loop(arm, on_axis_stopped="event") as loop:
         for cycle in loop:
             arm.target.velocity[:] = 0.0  # somebody holds the load
             if cycle.number == 100:
@@ -45,5 +52,6 @@ def test_a_moving_axis_comes_to_rest(cell: Cell) -> None:
             if cycle.number == 600:
                 break
         assert all(abs(servo.velocity_rad_s) < 1e-3 for servo in cell.servos)
-        assert set(cell.drive_states) == {"OPERATION ENABLED"}
+        assert arm.stopped == (StopReason.UNDERRUN,) * 2
+        assert "OPERATION ENABLED" not in cell.drive_states
     cell.assert_safe()

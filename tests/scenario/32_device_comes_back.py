@@ -90,7 +90,8 @@ def kinds(events: list[event.Event]) -> list[tuple[str, int]]:
     return [
         (type(e).__name__, e.sub.position)
         for e in events
-        if e.sub is not None and not isinstance(e, event.Emergency | event.FaultFound)
+        if e.sub is not None
+        and not isinstance(e, event.Emergency | event.FaultFound | event.AxisStopped)
     ]
 
 
@@ -118,7 +119,7 @@ def test_switched_off_and_on_it_is_led_back(cell: Cell) -> None:
 
     events = run(cell, power_cycle(TOOL, at=0.2, for_=0.5), seconds=1.6, each=look)
     assert sorted(kinds(events)) == sorted(LOST + BACK)
-    assert states[100]
+    assert states[50]
     assert not any(states[300:1400])
     assert states[-1]
 

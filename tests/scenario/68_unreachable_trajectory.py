@@ -34,9 +34,10 @@ def test_the_arm_ends_the_motion_it_had_and_holds() -> None:
             with pytest.raises(ValueError, match=r"highest position of axis 0: 1.* position_max 1"):
                 control.trajectory(fast, [0.0, 0.0], LIMITS, 1e-3)
             for cycle in loop:
+                if stream.taken == len(motion):
+                    stream.close()  # the end of the motion, not an underrun: the axes hold
                 if cycle.number > len(motion) + 500:
                     break
-            assert cycle.dry
             assert stream.taken == len(motion)
             assert arm.enabled.all()
             assert arm.actual.position == pytest.approx([0.8, -0.8], abs=1e-3)

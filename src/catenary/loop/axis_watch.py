@@ -7,15 +7,13 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from catenary.core import GOAL_ENABLED
+from catenary.core import AXIS_MODE_REFUSED, GOAL_ENABLED
 from catenary.plan.cycle import AxisPlan
 from catenary.plan.stop_reason import StopReason
 from catenary.plan.wish import Views
 from catenary.wire.cia402 import Mode
 
 StopPolicy = Literal["raise", "event"]
-
-MODE_REFUSED = 1 << 5  # of axis_flags
 
 
 class StoppedAxis(NamedTuple):
@@ -63,7 +61,7 @@ class AxisWatch:
             explained: True if a new stop explains the call. Otherwise flags that were seen before
                 are new occurrences: the application asked again between two calls.
         """
-        flagged = (self._views.axis_flags & MODE_REFUSED) != 0
+        flagged = (self._views.axis_flags & AXIS_MODE_REFUSED) != 0
         new = flagged & ~self._refused
         self._refused = flagged
         if not explained and not new.any():
