@@ -29,7 +29,7 @@ def test_what_is_commanded_keeps_every_limit_and_arrives() -> None:
                 if sent == len(motion) and cycle.dry:
                     break
     commanded = np.array(rows)
-    assert commanded[-1] == pytest.approx(goal, abs=1e-12)
+    assert commanded[-1] == pytest.approx(goal, abs=1e-8)  # one cycle was continued
     begun = np.flatnonzero((commanded != home).any(axis=1))[0]
     ended = begun + len(motion)
     assert commanded[begun:ended] == pytest.approx(motion.position)  # no row lost or held

@@ -304,7 +304,10 @@ def test_others_read_along_and_set_points_are_streamed(main: cat.MainDevice) -> 
         home = arm.actual.position.copy()
         stream = loop.stream(50)
         stream.write(home + np.linspace(0.0, 0.2, 50)[:, None])
-        for _ in range(60):
+        while stream.taken < 50:
+            next(loop)
+        stream.close()  # the end; an empty stream would be continued
+        for _ in range(10):
             next(loop)
         with cat.attach(f"igh-{os.getpid()}") as reader:
             last = reader.read()

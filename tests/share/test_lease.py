@@ -40,7 +40,8 @@ class Cell:
 @contextlib.contextmanager
 def cell_of(name: str, **options: object) -> Iterator[Cell]:
     with cat.MainDevice(Segment([Servo(), Servo(), Servo()])) as main:
-        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0, **options)  # type: ignore[arg-type]
+        given = {"counts_per_turn": 2**20, "velocity_limit": 100.0, **options}
+        arm = cat.Drives(main.scan().drives, **given)  # type: ignore[arg-type]
         with cat.Share(name) as share, cat.Loop(arm, sink=share) as loop:
             next(loop)
             with cat.attach(name) as reader:
@@ -160,7 +161,7 @@ def test_what_was_sent_under_a_lease_that_is_over_is_not_taken(cell: Cell) -> No
 
 
 def test_an_axis_holds_where_it_is_commanded_and_not_where_it_was_sent(name: str) -> None:
-    with cell_of(name, velocity_limit=1.0) as cell:
+    with cell_of(name, velocity_limit=1.0, step_limit=2.0) as cell:
         with cell.reader.lease(axes=[0], for_=LONG) as command:
             command.send(position=1.0)  # a thousand cycles away
             cell.cycles(10)
