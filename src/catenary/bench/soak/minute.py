@@ -125,7 +125,7 @@ class Minute:
         wishes = Wishes(self._main)
         for positions in wishes.parts:
             self.witness.ask(positions)
-        with cat.Loop(*wishes.all, period=PERIOD) as loop:
+        with cat.Loop(*wishes.all, period=PERIOD, on_axis_stopped="event") as loop:
             self.figures.loops += 1
             self.witness.enter(Phase.RUNNING)
             try:
