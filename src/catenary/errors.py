@@ -126,7 +126,7 @@ class WorkingCounterError(LoopError):
 
 
 class DriveError(LoopError):
-    """A drive is in fault or cannot be enabled."""
+    """A drive is in fault, cannot be enabled, or was stopped without a request."""
 
 
 class RealtimeError(CatenaryError):

@@ -369,9 +369,12 @@ def test_a_quick_stop_without_effect_ends_in_disable_voltage(mode: int, patience
     log = Recorder(b)
     b.ask(GOAL_QUICK_STOP)
     b.steps(100)
-    runs = [word & 0x0F for word, before in zip(log.words, [None, *log.words], strict=False)
-            if word != before]
-    assert runs[-4:] == [ENABLE, QUICK_STOP, DISABLE_OPERATION, DISABLE_VOLTAGE][-len(runs):]
+    runs = [
+        word & 0x0F
+        for word, before in zip(log.words, [None, *log.words], strict=False)
+        if word != before
+    ]
+    assert runs[-4:] == [ENABLE, QUICK_STOP, DISABLE_OPERATION, DISABLE_VOLTAGE][-len(runs) :]
     assert log.words.count(QUICK_STOP) == pytest.approx(patience, abs=1)
     assert log.words.count(DISABLE_OPERATION) == pytest.approx(20, abs=1)
     if mode == CST:

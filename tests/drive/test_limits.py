@@ -197,6 +197,13 @@ def test_the_limits_of_the_drive_only_tighten() -> None:
         assert bounds.velocity.source == source
 
 
+def test_position_limits_that_contradict_the_options_do_not_count() -> None:
+    own = OwnLimits(position_min=2.0, position_max=3.0)
+    bounds = make_bounds("a", LimitOptions(-1.0, 1.0, 1.0), [Mode.CSP], own)
+    assert (bounds.position_min.value, bounds.position_max.value) == (-1.0, 1.0)
+    assert "contradicts" in bounds.position_max.source
+
+
 def test_the_default_velocity_is_not_raised_by_the_drive() -> None:
     fast = make_bounds("a", LimitOptions(), [Mode.CSP], OwnLimits(velocity=300.0))
     slow = make_bounds("a", LimitOptions(), [Mode.CSP], OwnLimits(velocity=3.0))

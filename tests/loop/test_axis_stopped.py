@@ -104,10 +104,10 @@ def test_the_error_names_axis_reason_and_cycle_and_what_to_do(reason: StopReason
 
 def test_the_error_of_an_underrun_says_what_was_late() -> None:
     late = error_of(StopReason.UNDERRUN, 10, (1, CYCLE_UNCOMMITTED, CYCLE_UNCOMMITTED)).message
-    assert "(10 ms in CST); the program wrote no targets for 2 cycles" in late
+    assert "(10 ms in CST), the program wrote no targets for 2 cycles" in late
     empty = error_of(StopReason.UNDERRUN, 8, (CYCLE_DRY,) * 3).message
-    assert "(50 ms in CSP); the stream was empty for 3 cycles" in empty
-    assert "(50 ms in CSV); the program was late" in error_of(StopReason.UNDERRUN, 9).message
+    assert "(50 ms in CSP), the stream was empty for 3 cycles" in empty
+    assert "(50 ms in CSV), the program was late" in error_of(StopReason.UNDERRUN, 9).message
     assert "(20 ms)" in error_of(StopReason.HANDOVER, 10).message
 
 

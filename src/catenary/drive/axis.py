@@ -155,7 +155,8 @@ class Axis:
 
         It is never requested: an addition to the process data could change a mapping that fits.
         """
-        return self._place(layout, wanted) if mode in self.modes else None
+        used = mode in self.modes or (mode is Mode.CSP and self.holds_on_loss)
+        return self._place(layout, wanted) if used else None
 
     def _column_place(self, layout: ImageLayout, wanted: AxisObject) -> Number | None:
         """Return the place of an object that the application has as a column."""

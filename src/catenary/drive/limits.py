@@ -127,8 +127,7 @@ def make_bounds(
     Raises:
         ConfigurationError: Nothing states a deceleration and velocity_limit is infinite.
     """
-    position_min = _tightest(options.position_min, own.position_min, "0x607D of the drive", max)
-    position_max = _tightest(options.position_max, own.position_max, "0x607D of the drive", min)
+    position_min, position_max = _positions(options, own)
     velocity = _tightest(options.velocity_limit, own.velocity, own.velocity_source, min)
     if options.lacks_velocity(modes) and not (velocity.value or math.inf) < DEFAULT_VELOCITY:
         velocity = Chosen(DEFAULT_VELOCITY, "default")
@@ -161,6 +160,16 @@ def _tightest(
     if own is None or (option is not None and pick(option, own) == option):
         return _given(option)
     return Chosen(own, source)
+
+
+def _positions(options: LimitOptions, own: OwnLimits) -> tuple[Chosen, Chosen]:
+    """Return the tighter ends. Limits of the drive that contradict the options do not count."""
+    low = _tightest(options.position_min, own.position_min, "0x607D of the drive", max)
+    high = _tightest(options.position_max, own.position_max, "0x607D of the drive", min)
+    if low.value is None or high.value is None or low.value < high.value:
+        return low, high
+    contradicted = "option; 0x607D of the drive contradicts it"
+    return Chosen(options.position_min, contradicted), Chosen(options.position_max, contradicted)
 
 
 def _deceleration(

@@ -7,6 +7,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from catenary.bus import SubDevice
+from catenary.bus.event import AxisStopped, ModeRefused
 from catenary.core import AXIS_MODE_REFUSED, GOAL_ENABLED
 from catenary.plan.cycle import AxisPlan
 from catenary.plan.stop_reason import StopReason
@@ -27,6 +29,15 @@ class StoppedAxis(NamedTuple):
     cycle: int
     requested: bool  # by the application or the loop
 
+    @property
+    def message(self) -> str:
+        """Axis, cycle and reason."""
+        return f"{self.name} was stopped in cycle {self.cycle}: {self.reason.text}"
+
+    def event(self, now: float, sub: SubDevice) -> AxisStopped:
+        """Return the event at `now` [s]."""
+        return AxisStopped(now, sub, self.message, self.name, self.reason, self.cycle)
+
 
 class RefusedMode(NamedTuple):
     """A change of mode that a drive did not make."""
@@ -35,6 +46,14 @@ class RefusedMode(NamedTuple):
     name: str
     device: int
     mode: int  # requested
+
+    def event(self, now: float, sub: SubDevice) -> ModeRefused:
+        """Return the event at `now` [s]."""
+        message = (
+            f"{self.name} did not change to {mode_name(self.mode)} (0x6061); it continues in its "
+            "former mode"
+        )
+        return ModeRefused(now, sub, message, self.name, self.mode)
 
 
 class AxisWatch:

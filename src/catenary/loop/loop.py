@@ -73,7 +73,8 @@ class Loop:
     the caches (costs that much processor time a cycle); None: 50 us, at most a tenth of the period;
     0: a plain sleep.
     `log`: how many cycles the log, and that of an error, reaches back. `raise_faults`: a drive in
-    fault raises DriveError; else see `Drives.faults`. `on_return`: what becomes of a device that no
+    fault, or one that left OPERATION_ENABLED by itself (STO), raises DriveError; else see
+    `Drives.faults` and `Drives.stopped`. `on_return`: what becomes of a device that no
     wish requires and that comes back: "restore", its start-up list is replayed and it goes to OP;
     or "hold", it stays in PRE-OP until `restore`. `on_replacement`: the same for another device of
     the same product in its place, which is not even led to PRE-OP when held. `laws` are compiled

@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from catenary.bus import CycleClock, MainDevice, Pending
-from catenary.bus.event import AxisStopped, ModeRefused
 from catenary.core import (
     AXIS_FOLLOWED,
     CYCLE_CLOCKS,
@@ -25,7 +24,7 @@ from catenary.core import (
     Engine,
 )
 from catenary.errors import CatenaryError, DriveError, LoopError
-from catenary.loop.axis_watch import AxisWatch, StoppedAxis, StopPolicy, mode_name
+from catenary.loop.axis_watch import AxisWatch, RefusedMode, StoppedAxis, StopPolicy
 from catenary.loop.buffers import bind_wishes
 from catenary.loop.clocks import Clocks
 from catenary.loop.diagnosis import (
@@ -243,20 +242,11 @@ class Running:
         Returns the new stops.
         """
         stops = self._axis_watch.new_stops()
+        refusals = self._axis_watch.new_refusals(explained=bool(stops))
         now = self.engine.now() * 1e-9
-        for stop in stops:
-            if stop.requested:
-                continue
-            message = f"{stop.name} was stopped in cycle {stop.cycle}: {stop.reason.text}"
-            sub = self.main.subs[stop.device]
-            self.main.events.put(AxisStopped(now, sub, message, stop.name, stop.reason, stop.cycle))
-        for refusal in self._axis_watch.new_refusals(explained=bool(stops)):
-            message = (
-                f"{refusal.name} did not change to {mode_name(refusal.mode)} (0x6061); it "
-                "continues in its former mode"
-            )
-            sub = self.main.subs[refusal.device]
-            self.main.events.put(ModeRefused(now, sub, message, refusal.name, refusal.mode))
+        news: list[StoppedAxis | RefusedMode] = [stop for stop in stops if not stop.requested]
+        for each in [*news, *refusals]:
+            self.main.events.put(each.event(now, self.main.subs[each.device]))
         return stops
 
     def _raise_stopped(self, stops: Sequence[StoppedAxis], *, faults: bool) -> None:

@@ -53,23 +53,20 @@ def stopped_error(
         cycle: The plan, for its times.
         log: The last cycles, oldest first.
     """
-    told = "; ".join(
-        f"{stop.name} was stopped in cycle {stop.cycle}: {_text(stop, cycle, log)}"
-        for stop in stops
-    )
+    told = "; ".join(stop.message + _details(stop, cycle, log) for stop in stops)
     reasons = dict.fromkeys(stop.reason for stop in stops)
     advice = "; ".join(ADVICE[reason] for reason in reasons if reason in ADVICE)
     return DriveError(told, log=log, hint=f"{advice}; {GO_ON}")
 
 
-def _text(stop: StoppedAxis, cycle: CyclePlan, log: npt.NDArray[np.void]) -> str:
+def _details(stop: StoppedAxis, cycle: CyclePlan, log: npt.NDArray[np.void]) -> str:
+    """Return the limit that was exceeded, and what was late; empty for other reasons."""
     if stop.reason is StopReason.UNDERRUN:
         limit = _late_limit_ns(stop.mode, cycle) / 1e6
-        late = _what_was_late(stop, log)
-        return f"{stop.reason.text} ({limit:g} ms in {mode_name(stop.mode)}); {late}"
+        return f" ({limit:g} ms in {mode_name(stop.mode)}), {_what_was_late(stop, log)}"
     if stop.reason is StopReason.HANDOVER:
-        return f"{stop.reason.text} ({cycle.handover_ns / 1e6:g} ms)"
-    return stop.reason.text
+        return f" ({cycle.handover_ns / 1e6:g} ms)"
+    return ""
 
 
 def _late_limit_ns(mode: int, cycle: CyclePlan) -> int:
