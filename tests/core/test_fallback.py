@@ -1,6 +1,5 @@
 """Fallback, return, mode changes and stops of one axis: the rows of docs/safety.md, in the core."""
 
-
 import numpy as np
 import pytest
 

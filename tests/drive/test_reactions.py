@@ -76,7 +76,7 @@ def test_real_frames_bring_the_same() -> None:
         first.sdo.write(0x685A, 0, 6, type=INT)
         found = read_settings([(first, 0), (first, 1), (second, 0)])
     assert [each.quick_stop for each in found] == [2, 6, 2]
-    assert {each.abort_connection for each in found} == {None}
+    assert {each.abort_connection for each in found} == {1}
     assert all(each.quick_stop_deceleration for each in found)
 
 

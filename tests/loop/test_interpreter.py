@@ -1,4 +1,4 @@
-"""An inline loop gets the interpreter in time."""
+"""The interpreter's switch interval is an option of inline loops."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 import catenary as cat
-from catenary.loop.interpreter import SWITCH_INTERVAL, prompt_interpreter
+from catenary.loop.interpreter import switch_interval
 from catenary.virtual import Segment, Servo
 
 
@@ -24,40 +24,44 @@ def interval() -> float:
     return round(sys.getswitchinterval(), 6)
 
 
-def test_the_switch_interval_is_short_until_the_last_loop_has_gone() -> None:
-    first, second = prompt_interpreter(), prompt_interpreter()
+def test_the_shortest_interval_counts_until_the_last_loop_is_closed() -> None:
+    first, second = switch_interval(100e-6), switch_interval(20e-6)
     first.__enter__()
     second.__enter__()
-    assert interval() == SWITCH_INTERVAL
-    first.__exit__(None, None, None)
-    assert interval() == SWITCH_INTERVAL
+    assert interval() == 20e-6
     second.__exit__(None, None, None)
+    assert interval() == 100e-6
+    first.__exit__(None, None, None)
     assert interval() == 0.005
 
 
-def test_a_shorter_one_stays() -> None:
-    sys.setswitchinterval(5.5e-6)
-    with prompt_interpreter():
-        assert interval() == 5e-6
-    assert interval() == 5e-6
-
-
 @pytest.mark.parametrize(
-    ("clock", "run", "during"),
+    ("clock", "run", "option", "during"),
     [
-        ("monotonic", "inline", SWITCH_INTERVAL),
-        ("monotonic", "threaded", 0.005),
-        ("virtual", "inline", 0.005),
+        ("monotonic", "inline", 20e-6, 20e-6),
+        ("monotonic", "inline", None, 0.005),
+        ("monotonic", "threaded", 20e-6, 0.005),
+        ("virtual", "inline", 20e-6, 0.005),
     ],
 )
-def test_a_loop_wants_it_while_it_is_inline_and_time_is_real(
-    clock: str, run: str, during: float
+def test_an_inline_loop_sets_it_where_time_is_real(
+    clock: str, run: str, option: float | None, during: float
 ) -> None:
     with cat.MainDevice(Segment([Servo()], clock=clock)) as main:
         arm = cat.Drives(
-            main.scan().drives, mode="csp", counts_per_turn=1 << 20, velocity_limit=100.0
+            main.scan().drives, mode="csp", counts_per_turn=1 << 20, velocity_limit=6.0
         )
-        with cat.Loop(arm, period=5e-3, run=run, lost_limit=1000, late_limit=0) as loop:
+        with cat.Loop(
+            arm, period=5e-3, run=run, lost_limit=1000, late_limit=0, switch_interval=option
+        ) as loop:
             next(iter(loop))
             assert interval() == during
         assert interval() == 0.005
+
+
+@pytest.mark.parametrize("option", [0.0, -1.0, 2.0, float("nan")])
+def test_an_interval_that_cannot_be_is_refused(option: float) -> None:
+    with cat.MainDevice(Segment([Servo()])) as main:
+        arm = cat.Drives(main.scan().drives, counts_per_turn=1 << 20, velocity_limit=6.0)
+        with pytest.raises(ValueError, match="switch_interval"):
+            cat.Loop(arm, switch_interval=option)

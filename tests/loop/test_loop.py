@@ -12,8 +12,9 @@ from catenary.virtual import Segment, Servo
 @pytest.mark.parametrize(
     ("asked", "named"),
     [
-        ({"lead": 1e-3}, "less than the period"),
-        ({"lead": -1e-6}, "less than the period"),
+        ({"busy_wait": 1e-3}, "less than the period"),
+        ({"busy_wait": -1e-6}, "less than the period"),
+        ({"collect_deadline": 1.5}, "share of the period"),
         ({"run": "fast"}, "threaded"),
     ],
 )
@@ -24,17 +25,6 @@ def test_refuses_what_cannot_be(asked: dict, named: str) -> None:
         )
         with pytest.raises(ValueError, match=named):
             cat.Loop(arm, period=1e-3, **{"run": "inline", **asked})
-
-
-def test_the_lead_is_bounded_by_the_period() -> None:
-    with cat.MainDevice(Segment([Servo()])) as main:
-        arm = cat.Drives(
-            main.scan().drives, mode="csp", counts_per_turn=2**20, velocity_limit=100.0
-        )
-        with cat.Loop(arm, period=250e-6, run="inline") as loop:
-            assert loop.plan.cycle.lead_ns == 25_000
-        with cat.Loop(arm, period=1e-3, lead=0) as loop:
-            assert loop.plan.cycle.lead_ns == 0
 
 
 def test_the_log_reaches_back_as_far_as_asked() -> None:

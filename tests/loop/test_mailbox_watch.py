@@ -38,10 +38,9 @@ def test_an_emergency_arrives_over_the_wire(
             for cycle in loop:
                 if cycle.number == 10:
                     servo.inject_fault(0x7305)
-                found += main.events
+                found += [event for event in main.events if isinstance(event, Emergency)]
                 if found or cycle.number > PATIENCE:
                     break
     [event] = found
-    assert isinstance(event, Emergency)
     assert event.error_code == 0x7305
-    assert told == [event]  # delivered by its thread, at the latest when the MainDevice is closed
+    assert event in told  # delivered by its thread, at the latest when the MainDevice is closed

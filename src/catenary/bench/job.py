@@ -44,7 +44,7 @@ class Job:
     stiffness: float = 0.5  # PD [N·m/rad]
     damping: float = 0.02  # PD [N·m/(rad/s)]
     second: str = ""  # interface of a ring's other end
-    lead: float | None = None  # [s] of inline loops and laws; None: a loop's own, 0: none
+    busy_wait: float = 0.0  # [s] of our loops before each cycle start
 
     @property
     def interfaces(self) -> tuple[str, ...]:

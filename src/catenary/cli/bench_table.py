@@ -51,10 +51,11 @@ def add_table(group: Commands) -> None:
     )
     parser.add_argument("--ring", action="store_true", help="each network a ring, not a line")
     parser.add_argument(
-        "--lead",
+        "--busy-wait",
         type=seconds,
+        default=0.0,
         metavar="S",
-        help="how long before its instant a loop wakes, and waits without sleep; 0: it does not",
+        help="busy-wait of our loops before each cycle start (default: none)",
     )
     parser.add_argument(
         "--example", type=Path, metavar="FILE", help="of cobot (examples/cobot/cobot.py)"
@@ -90,7 +91,7 @@ def run_table(arguments: argparse.Namespace) -> int:
         rates=arguments.rates,
         peers=arguments.peers and [name for name in arguments.peers.split(",") if name],
         ring=arguments.ring,
-        lead=arguments.lead,
+        busy_wait=arguments.busy_wait,
         example=arguments.example,
         realtime=arguments.realtime,
         stretch=arguments.stretch,

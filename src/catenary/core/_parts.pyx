@@ -130,6 +130,7 @@ cdef class Parts:
         if self.clock is not None:
             self.frames.carry_time(&self.clock.c)
             c.clock = &self.clock.c
+            c.sync_margin = plan.clock.allowance_ns
         c.link = self.link
         c.image = self.image
         c.axes = &self.axes.c

@@ -1,7 +1,7 @@
-"""How long other Python threads keep the interpreter from a loop that iterates inline.
+"""The interpreter's switch interval while inline loops are open.
 
-A thread that wants the interpreter waits for a switch interval, 5 ms in CPython, before whoever has
-it is asked to give it up. An inline loop asks for it a lead, 50 us, before its instant.
+A thread that wants the interpreter waits for the switch interval, 5 ms in CPython, before the
+thread that holds it must release it. A second busy Python thread delays an inline loop that long.
 """
 
 from __future__ import annotations
@@ -11,27 +11,25 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-SWITCH_INTERVAL = 20e-6  # [s]
-HALF_A_MICROSECOND = 0.5e-6  # CPython keeps whole ones, and cuts off what is beyond
+HALF_A_MICROSECOND = 0.5e-6  # CPython keeps whole microseconds and truncates the rest
 
 _lock = threading.Lock()  # of the two below
-_loops = 0
+_wanted: list[float] = []
 _before = 0.0
 
 
 @contextmanager
-def prompt_interpreter() -> Iterator[None]:
-    """A short switch interval as long as any loop wants it; then what it was before the first."""
-    global _loops, _before
+def switch_interval(seconds: float) -> Iterator[None]:
+    """Set the switch interval [s]; the shortest of nested ones counts, the last one restores it."""
+    global _before
     with _lock:
-        _loops += 1
-        if _loops == 1:
+        if not _wanted:
             _before = sys.getswitchinterval()
-            sys.setswitchinterval(min(_before, SWITCH_INTERVAL) + HALF_A_MICROSECOND)
+        _wanted.append(seconds)
+        sys.setswitchinterval(min(_wanted) + HALF_A_MICROSECOND)
     try:
         yield
     finally:
         with _lock:
-            _loops -= 1
-            if _loops == 0:
-                sys.setswitchinterval(_before + HALF_A_MICROSECOND)
+            _wanted.remove(seconds)
+            sys.setswitchinterval((min(_wanted) if _wanted else _before) + HALF_A_MICROSECOND)

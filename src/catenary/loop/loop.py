@@ -50,9 +50,7 @@ LATE_LIMIT_POSITION = 0.050  # [s], CSP
 LATE_LIMIT_VELOCITY = 0.050  # [s], CSV
 LATE_LIMIT_TORQUE = 0.010  # [s], CST
 HANDOVER = 0.020  # [s], CST
-LEAD = 50e-6  # [s]: what a wake-up is late on an ordinary kernel, and the time to use it
 LOG_LIMIT = 2**24  # cycles: a gigabyte
-LEAD_SHARE = 0.1  # of the period, at most
 
 
 class Loop:
@@ -68,10 +66,11 @@ class Loop:
     axis without a request: "raise", the iteration raises DriveError; "event", see the event
     `AxisStopped` and `Drives.stopped`. `lost_limit`: cycles in a row without all answers before
     WorkingCounterError. `stop_deadline` [s] for standing still when leaving. `watchdog` [s] of the
-    devices' outputs. `lead` [s], of an inline loop and of laws: how long before each instant the
-    thread wakes, to take what has come back, compute a law ahead, or fetch what is needed next into
-    the caches (costs that much processor time a cycle); None: 50 us, at most a tenth of the period;
-    0: a plain sleep.
+    devices' outputs; 0: off; None: 0.1 s, in CST the longer of 10 ms and five exchanges.
+    `busy_wait` [s] before each cycle start instead of a plain sleep; it costs as much processor
+    time. `switch_interval` [s] of the interpreter while an inline loop is open in real time; None:
+    as it is (see `interpreter` in `loop.timing`). `collect_deadline`: threaded, the share of the
+    period in which frames may come back; a law's budget shortens it.
     `log`: how many cycles the log, and that of an error, reaches back. `raise_faults`: a drive in
     fault, or one that left OPERATION_ENABLED by itself (STO), raises DriveError; else see
     `Drives.faults` and `Drives.stopped`. `on_return`: what becomes of a device that no
@@ -84,8 +83,8 @@ class Loop:
     Where a wish has `dc=`: `clock`, whom time is taken from: "reference", the wake-up follows the
     reference clock; "main", it follows the MainDevice's. `reference`: the device with that clock;
     None: the first that has one. `margin` [s]: from the instant to the frames, at most; None: 20 %
-    of the period when threaded, 50 % when inline. `burst`: frames that bring the clocks together
-    before the cycle begins.
+    of the period when threaded and for laws, 50 % when inline. `burst`: frames that bring the clocks
+    together before the cycle begins.
 
     `cpu` and `priority` (SCHED_FIFO) of the native thread; None: as they are. With wishes on
     several MainDevices (docs/networks.md) `cpu` is a sequence, one for each network, and `quorum`
@@ -112,8 +111,10 @@ class Loop:
         on_axis_stopped: StopPolicy = "raise",
         lost_limit: int = 3,
         stop_deadline: float = 2.0,
-        watchdog: float | None = 0.1,
-        lead: float | None = None,
+        watchdog: float | None = None,
+        busy_wait: float = 0.0,
+        switch_interval: float | None = None,
+        collect_deadline: float = 0.8,
         log: int = 1000,
         raise_faults: bool = True,
         on_return: Policy = "restore",
@@ -132,8 +133,12 @@ class Loop:
             raise ValueError(f'run={run!r}: "threaded" or "inline"')
         if clock not in ("reference", "main"):
             raise ValueError(f'clock={clock!r}: "reference" or "main"')
-        if lead is not None and not 0 <= lead < period:
-            raise ValueError(f"lead={lead} s: must be less than the period of {period} s")
+        if not 0 <= busy_wait < period:
+            raise ValueError(f"busy_wait={busy_wait} s: must be less than the period of {period} s")
+        if switch_interval is not None and not 1e-6 <= switch_interval <= 1.0:
+            raise ValueError(f"switch_interval={switch_interval} s: must be 1 us to 1 s")
+        if not 0 < collect_deadline <= 1:
+            raise ValueError(f"collect_deadline={collect_deadline}: a share of the period, 0 to 1")
         self._wishes = wishes
         self._main = main_device_of(wishes)
         self._period = period
@@ -150,7 +155,9 @@ class Loop:
         self._lost_limit = lost_limit
         self._stop_deadline = stop_deadline
         self._watchdog = watchdog
-        self._lead = min(LEAD, LEAD_SHARE * period) if lead is None else lead
+        self._busy_wait = busy_wait
+        self._switch_interval = switch_interval
+        self._collect_deadline = collect_deadline
         if not 1 <= log <= LOG_LIMIT:
             raise ValueError(f"log={log} cycles: must be 1 to {LOG_LIMIT}")
         self._log = log
@@ -208,6 +215,7 @@ class Loop:
             on_return=self._on_return,
             on_replacement=self._on_replacement,
         )
+        running.switch_interval = self._switch_interval
         for law in self._laws:
             running.laws.compile(law)
         if self._sink is not None:
@@ -259,8 +267,8 @@ class Loop:
         beside it, to watch.
 
         It begins from what is commanded. `memory`, `parameters`: float64, at most 4096 each.
-        `budget` [s] of one step (None: the period; 0: none); after `overruns` steps in a row over
-        it, an exception, a target that is NaN or infinite, or a step that never returns, the drives
+        `budget` [s] of one step (None: 0.4 periods; 0: no check); after `overruns` steps in a row
+        over it, an exception, a target that is NaN or infinite, or a step that never returns, the drives
         stop and LawError is raised by the iteration. LawError also for what cannot be compiled.
         """
         return self._opened.laws.start(made_law(law), memory, parameters, budget, overruns)
@@ -346,8 +354,14 @@ class Loop:
     def wait_locked(self, within: float = 1e-6, timeout: float = 5.0) -> None:
         """Cycles, axes holding, until every clock differs by at most `within` [s] from the
         reference clock and the instants are in phase with it. That bound holds from now on: leaving
-        it is a `ClockUnlocked` event, coming back `ClockLocked`. ClockError after `timeout` [s]."""
+        it is a `ClockUnlocked` event, coming back `ClockLocked`.
+
+        Raises:
+            ClockError: after `timeout` [s].
+            LoopError: an axis is powered in CST, whose torque would become stale meanwhile.
+        """
         running = self._opened
+        running.refuse_powered_torque("wait_locked")
         self.clocks.wait(within, timeout, self._judge)
         running.judge(CYCLE_CLOCKS, faults=self._raise_faults)
 
@@ -393,7 +407,8 @@ class Loop:
             late_limit_torque=LATE_LIMIT_TORQUE if late is None else late,
             handover=self._handover,
             stop_deadline=self._stop_deadline,
-            lead=self._lead,
+            busy_wait=self._busy_wait,
+            collect_share=self._collect_deadline,
             log=self._log,
             clock=self._clock,
             reference=None if self._reference is None else self._reference.position,

@@ -215,6 +215,7 @@ class NetworksLoop(Loop):
         if not clocked:
             raise RuntimeError("no distributed clocks in this loop: Drives(..., dc=True)")
         for running, clocks in clocked:
+            running.refuse_powered_torque("wait_locked")
 
             def check(flags: int, running: Running = running) -> None:
                 if flags & TROUBLE or running.engine.al_status != State.OP:

@@ -35,10 +35,9 @@ from catenary.loop.diagnosis import (
     state_error,
 )
 from catenary.loop.error_watch import ErrorWatch
-from catenary.loop.interpreter import prompt_interpreter
+from catenary.loop.interpreter import switch_interval
 from catenary.loop.laws.runner import LawRunner
 from catenary.loop.publishing import Publisher
-from catenary.loop.rehearsal import fitting_rehearsal
 from catenary.loop.service import Service
 from catenary.loop.signals import SignalGuard
 from catenary.loop.stop_error import stopped_error
@@ -56,6 +55,7 @@ from catenary.procedure.survey import survey
 from catenary.types import UINT
 from catenary.wire.al import State
 from catenary.wire.cia402 import IN_FAULT, SLOT_OFFSET, Mode, Object, state_of
+from catenary.wire.cia402 import State as DriveState
 
 LogArray = npt.NDArray[np.void]
 
@@ -84,8 +84,6 @@ class Running:
         self.plan = plan
         self.engine = self._make_engine()
         self.views = bind_wishes(wishes, plan.tables, self.engine.buffers)
-        if plan.cycle.lead_ns and plan.cycle.order == "inline":
-            self.engine.set_rehearsal(fitting_rehearsal(self.views, plan.cycle.lead_ns))
         self._axis_watch = AxisWatch(self.views, plan.cycle.axes)
         self._on_axis_stopped: StopPolicy = on_axis_stopped
         self.laws = LawRunner(self.engine, plan)
@@ -97,6 +95,7 @@ class Running:
         self._on_return: Policy = on_return
         self._on_replacement: Policy = on_replacement
         self._attend()
+        self.switch_interval: float | None = None  # [s] of the interpreter, inline
         self._attached = ExitStack()
         self._opened = self._left = False
         self._abandon = abandon  # leaves the loop, when the MainDevice is closed round it
@@ -165,8 +164,9 @@ class Running:
         """From SAFE-OP to OP: the cycle starts, and valid outputs flow while the states change.
         `origin_ns`: an instant of the grid to keep to."""
         self._attached.enter_context(self.main.attached(self.service.runner, self._abandon))
-        if self.plan.cycle.order == "inline" and self.engine.scheduling != "virtual time":
-            self._attached.enter_context(prompt_interpreter())
+        inline = self.plan.cycle.order == "inline" and self.engine.scheduling != "virtual time"
+        if inline and self.switch_interval is not None:
+            self._attached.enter_context(switch_interval(self.switch_interval))
         self.engine.start(origin_ns)
         self._opened = True
         self.service.start()
@@ -200,6 +200,21 @@ class Running:
                 self.judge(flags, faults=False)
             if self.engine.now() > deadline:
                 raise self._drive_error(np.flatnonzero(waiting).tolist(), "cannot be enabled")
+
+    def refuse_powered_torque(self, call: str) -> None:
+        """Raise LoopError for axes that are powered in CST: a waiting call commits no torque."""
+        views = self.views
+        powered = (views.axis_state == DriveState.OPERATION_ENABLED) & (
+            views.mode_target == Mode.CST
+        )
+        if not powered.any():
+            return
+        names = [self.plan.cycle.axes[i].name for i in np.flatnonzero(powered).tolist()]
+        raise LoopError(
+            f"{call}: {', '.join(names)} powered in CST, and no torque set-points while it waits",
+            log=self.log(),
+            hint="wait before the first torque is committed, disable the axes, or switch to CSP",
+        )
 
     def _settle(self) -> None:
         """Until all units answer: the first cycles of a new thread may find nobody."""

@@ -32,7 +32,7 @@ START_DELAY_NS = 100_000_000  # to the first SYNC pulse: as SOEM (`SyncDelay`) a
 HOP_NS = 1000  # through a device and its cable: 0.3 µs by E-bus, up to 1 µs by Ethernet PHYs
 # What of the period is left between the instant and the frames: threaded, the wake-up's lateness;
 # inline and with a law, the calculation too, which comes before the frames.
-ALLOWANCE: dict[Order, float] = {"threaded": 0.2, "inline": 0.5, "law": 0.5}
+ALLOWANCE: dict[Order, float] = {"threaded": 0.2, "inline": 0.5}
 
 # The phase controller (docs/clocks.md): a critically damped loop of this time constant, which
 # begins quick and slows down, and what it may do to the period.

@@ -56,7 +56,7 @@ def make_plan(
     late_limit_torque: float = 0.010,
     handover: float = 0.020,
     stop_deadline: float = 2.0,
-    lead: float = 0.0,
+    busy_wait: float = 0.0,
     log: int = 1000,
     cpu: int | None = None,
     priority: int | None = 80,
@@ -65,18 +65,26 @@ def make_plan(
     margin: float | None = None,
     burst: int = BURST,
 ) -> Plan:
-    """The plan that fulfils all wishes, or an error that names the object that cannot be.
+    """Return the plan that fulfils all wishes.
 
-`period` [s]; `watchdog` [s] of process data, 0: off; None: 0.1 s, for devices in CST the longer
-    of 10 ms and five exchanges. `collect_share`: when threaded,
-    the part of the period in which frames may come back; `late_limit_*` (position: CSP, velocity:
-    CSV, torque: CST), `handover`, `stop_deadline` [s];
-    `lead` [s]: inline and with a law, awake that long before the instant; `log`: cycles that are
-    remembered. Where a wish asks for
-    distributed clocks: `clock`, whom the others follow; `reference`, position of the reference
-    clock (None: the first there is); `margin` [s] between the instant and the frames (None: by the
-    order); `burst`, frames that bring the clocks together before the cycle. `optional`: positions
-    without which the cycle is good, beside those that no wish requires.
+    Args:
+        period: [s].
+        watchdog: of process data [s]; 0: off; None: 0.1 s, for devices in CST the longer of 10 ms
+            and five exchanges.
+        optional: positions without which the cycle is good, in addition to devices that no wish
+            requires.
+        collect_share: threaded, the part of the period in which frames may come back.
+        late_limit_position, late_limit_velocity, late_limit_torque: of CSP, CSV and CST [s].
+        handover, stop_deadline: [s].
+        busy_wait: [s] before each cycle start.
+        log: number of cycles that are kept.
+        clock: clock that the others follow.
+        reference: position of the reference clock; None: the first there is.
+        margin: [s] between the cycle start and the frames; None: by the execution mode.
+        burst: frames that bring the clocks together before the cycle.
+
+    Raises:
+        ConfigurationError: an object cannot be mapped, or a wish contradicts another.
     """
     period_ns = round(period * 1e9)
     if period_ns <= 0:
@@ -121,7 +129,7 @@ def make_plan(
         late_limit_torque_ns=round(late_limit_torque * 1e9),
         handover_ns=round(handover * 1e9),
         stop_deadline_ns=round(stop_deadline * 1e9),
-        lead_ns=round(lead * 1e9),
+        busy_wait_ns=round(busy_wait * 1e9),
         log_cycles=log,
         cpu=cpu,
         priority=priority,

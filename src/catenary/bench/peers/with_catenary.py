@@ -58,7 +58,7 @@ def opened(
             priority=job.priority,
             lost_limit=LOST_LIMIT,
             late_limit=LATE_LIMIT,
-            lead=job.lead,
+            busy_wait=job.busy_wait,
             log=job.log,
             laws=laws,
             sink=sink,

@@ -102,13 +102,13 @@ def run(
     rounds = options.rounds or max(ROUNDS, math.ceil(cycles / ROUND_CYCLES))
     with served(DRIVES) as segment:
         jobs = make_jobs(names, segment, RATE, math.ceil(cycles / rounds), Body.SINE, spin=False)
-        jobs = [published_body(job, options.lead) for job in jobs]
+        jobs = [published_body(job, options.busy_wait) for job in jobs]
         return interleave(jobs, rounds, show_progress, failed)
 
 
-def published_body(job: Job, lead: float | None) -> Job:
+def published_body(job: Job, busy_wait: float) -> Job:
     """pi·sin(pi·t) for every drive."""
-    return replace(job, amplitude=math.pi, lead=lead)
+    return replace(job, amplitude=math.pi, busy_wait=busy_wait)
 
 
 # ---- the two tests

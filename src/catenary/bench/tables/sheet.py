@@ -28,7 +28,7 @@ class Options:
     rates: tuple[int, ...] | None = None  # [Hz]
     peers: tuple[str, ...] | None = None  # of those that the table compares
     ring: bool = False
-    lead: float | None = None  # [s] of inline loops and laws; 0: a plain sleep
+    busy_wait: float = 0.0  # [s] of our loops before each cycle start
     example: Path | None = None  # the program of examples/cobot
     realtime: bool = False  # on the machine's clock, where virtual time is the default
     stretch: float | None = None  # periods so many times as long, for a slow processor

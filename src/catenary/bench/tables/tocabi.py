@@ -152,7 +152,8 @@ def run(
         cycles = round(seconds * rate / rounds)
         jobs = [
             replace(
-                make_jobs([C], segment, rate, cycles, Body.SINE, spin=False)[0], lead=options.lead
+                make_jobs([C], segment, rate, cycles, Body.SINE, spin=False)[0],
+                busy_wait=options.busy_wait,
             )
             for segment in segments
         ]

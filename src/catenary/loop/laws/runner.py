@@ -20,6 +20,7 @@ from catenary.plan.make import Plan
 SLICE_NS = 10_000_000  # between looks at signals while a law runs
 GUARD_ABOVE = 1  # the thread that watches a law has so much more priority
 PRIORITY_MAX = 99
+BUDGET_SHARE = 0.4  # of the period: the frames need the rest
 
 
 class LawRunner:
@@ -60,7 +61,7 @@ class LawRunner:
             compiled.address,
             numbers("memory", memory),
             given,
-            budget_ns=self._period_ns if budget is None else round(budget * 1e9),
+            budget_ns=round(BUDGET_SHARE * self._period_ns if budget is None else budget * 1e9),
             overrun_limit=overruns,
             priority=self._priority,
         )
