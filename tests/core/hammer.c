@@ -1,9 +1,10 @@
-/* Two threads on the real headers, as fast as they can: for test_handover.py and test_lane.py. */
+/* Two threads on the real headers, as fast as they can: for test_handover.py and tools/sanitize. */
 #include <pthread.h>
 #include <sched.h>
 #include <stdint.h>
 #include <string.h>
 #include "packet_ring.h"
+#include "pointer_handover.h"
 #include "triple_buffer.h"
 
 #define WORDS 100
@@ -92,4 +93,74 @@ uint64_t hammer_ring(uint64_t count) {
     }
     pthread_join(producer, 0);
     return wrong;
+}
+
+/* One owner, one user: requests by `take`, or objects by `claim`. A freed object is overwritten. */
+#define OBJECTS 64
+#define ALIVE 0x5AFE5AFE5AFE5AFEu
+
+typedef struct {
+    uint64_t alive;
+    uint64_t number;
+    uint64_t copy;                    /* of `number`: a torn object has another one */
+} object;
+
+typedef struct {
+    cat_pointer pointer;
+    object objects[OBJECTS];
+    int requests;                     /* 1: take; 0: claim */
+    uint32_t stop;
+    uint64_t served, wrong, backward;
+} pointer_work;
+
+static void serve(pointer_work *w, const object *o, uint64_t *last) {
+    if (o->alive != ALIVE || o->number != o->copy) w->wrong++;
+    if (w->requests ? o->number <= *last : o->number < *last) w->backward++;
+    *last = o->number;
+    cat_store_release64(&w->served, w->served + 1);
+}
+
+static void *use_pointers(void *argument) {
+    pointer_work *w = argument;
+    uint64_t last = 0, turn = 0;
+    while (!cat_load_acquire32(&w->stop)) {
+        void *pointer = 0;
+        if (w->requests) cat_pointer_take(&w->pointer, &pointer);
+        else pointer = cat_pointer_claim(&w->pointer);
+        if (pointer) serve(w, pointer, &last);
+        cat_pointer_release(&w->pointer);
+        if (++turn % 16 == 0) sched_yield();
+    }
+    return 0;
+}
+
+static object *unused_object(pointer_work *w) {
+    for (;;) {
+        for (int i = 0; i < OBJECTS; i++)
+            if (!cat_pointer_is_used(&w->pointer, &w->objects[i])) return &w->objects[i];
+        sched_yield();
+    }
+}
+
+/* Offers objects until `count` were served; a place is overwritten as soon as it counts as unused.
+ * wrong: an object that was overwritten meanwhile; backward: an older one, or a request twice. */
+void hammer_pointer(uint64_t count, int requests, uint64_t *wrong, uint64_t *backward) {
+    static pointer_work w;
+    pthread_t user;
+    memset(&w, 0, sizeof w);
+    w.requests = requests;
+    pthread_create(&user, 0, use_pointers, &w);
+    for (uint64_t n = 1; cat_load_acquire64(&w.served) < count; n++) {
+        object *o = unused_object(&w);
+        o->alive = 0;
+        o->number = o->copy = n;
+        o->alive = ALIVE;
+        cat_pointer_offer(&w.pointer, o);
+        if (n % 8 == 0) cat_pointer_offer(&w.pointer, requests ? CAT_POINTER_NONE : 0);
+        if (n % 32 == 0) sched_yield();
+    }
+    cat_store_release32(&w.stop, 1);
+    pthread_join(user, 0);
+    *wrong = w.wrong;
+    *backward = w.backward;
 }

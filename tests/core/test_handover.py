@@ -21,6 +21,16 @@ def test_a_packet_ring_keeps_order_and_bytes() -> None:
     assert load_hammer().hammer_ring(ctypes.c_uint64(200_000)) == 0
 
 
+@pytest.mark.parametrize("requests", [False, True])
+def test_a_pointer_is_served_once_and_never_freed_while_it_is_used(requests: bool) -> None:
+    wrong, backward = ctypes.c_uint64(), ctypes.c_uint64()
+    count = ctypes.c_uint64(200_000)
+    load_hammer().hammer_pointer(
+        count, ctypes.c_int(requests), ctypes.byref(wrong), ctypes.byref(backward)
+    )
+    assert (wrong.value, backward.value) == (0, 0)
+
+
 def test_actual_values_are_read_only_and_constant_between_steps() -> None:
     b = bench(axis(0))
     b.engine.run(1)
