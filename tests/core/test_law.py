@@ -325,6 +325,22 @@ def test_a_law_can_be_stopped_and_another_started() -> None:
     assert b.drives[0].target_position == 2
 
 
+@pytest.mark.parametrize("order", ORDERS)
+def test_of_two_requests_in_one_cycle_the_last_one_is_served(order: str) -> None:
+    b = bench(axis(0), order=order)
+    b.enable()
+    first, second, third = (make_law(b, lambda frame: 0) for _ in range(3))
+    b.engine.start_law(first)
+    b.engine.start_law(second)
+    b.steps(3)
+    assert (first.status, second.status) == (LAW_STOPPED, LAW_RUNNING)
+    b.engine.start_law(third)
+    b.engine.stop_law()
+    b.steps(3)
+    assert (second.status, third.status) == (LAW_STOPPED, LAW_STOPPED)
+    assert third.figures["steps"] == 0
+
+
 @pytest.fixture(scope="module")
 def endless(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
     folder = Path(tmp_path_factory.mktemp("endless"))

@@ -75,7 +75,14 @@ from catenary.core._law cimport (
     law_tell,
     law_took,
 )
-from catenary.core._native cimport cat_add32, cat_load_acquire32, cat_or32
+from catenary.core._native cimport (
+    cat_add32,
+    cat_or32,
+    cat_pointer_claim,
+    cat_pointer_is_offered,
+    cat_pointer_release,
+    cat_pointer_take,
+)
 from catenary.core._stream cimport stream_t, stream_take
 
 CYCLE_OK = OK
@@ -310,20 +317,22 @@ cdef void send(cycle_t *c) noexcept nogil:
 cdef bint take_streamed(cycle_t *c, target_t *target, bint fresh, uint64_t number) noexcept nogil:
     """Take the next row of the stream for the outputs of cycle `number`. Return True for fresh
     set-points; an empty stream is an underrun."""
-    cdef stream_t *stream = c.stream
+    cdef stream_t *stream
     target.header.streamed = 0
-    if stream == NULL:
+    if not cat_pointer_is_offered(&c.stream):
         return fresh
-    if stream_take(stream, target):
+    stream = <stream_t *>cat_pointer_claim(&c.stream)
+    if stream != NULL and stream_take(stream, target):
         target.header.hold = 0
         target.header.streamed = 1
         target.header.stamp = number
-        return True
-    if stream.taken == 0:
-        return fresh
-    target.header.hold = 0
-    c.axes.told |= DRY
-    return False
+        fresh = True
+    elif stream != NULL and stream.taken > 0:
+        target.header.hold = 0
+        c.axes.told |= DRY
+        fresh = False
+    cat_pointer_release(&c.stream)
+    return fresh
 
 
 cdef int64_t give(cycle_t *c, record_t *record, int64_t since, const actual_t *actual,
@@ -388,18 +397,24 @@ cdef void end_law(cycle_t *c, uint32_t status) noexcept nogil:
     axes_hand_over(c.axes)
     if status != RUNNING:
         law_end(c.law, status, c.number)
+    forget_law(c)
+
+
+cdef void forget_law(cycle_t *c) noexcept nogil:
+    """The last access: from here on the engine may free the law."""
     c.law = NULL
+    cat_pointer_release(&c.law_request)
 
 
 cdef void take_law(cycle_t *c, const target_t *orders) noexcept nogil:
     """Start the requested law, or end the one that runs. It begins from what is commanded."""
     cdef target_t *target = &c.handover.target[OF_LAW]
+    cdef void *requested
     cdef uint32_t i
-    c.law_seen = cat_load_acquire32(&c.law_request)
-    end_law(c, STOPPED_BY_APPLICATION)
-    c.law = c.law_asked
-    if c.law == NULL:
+    end_law(c, STOPPED_BY_APPLICATION)  # first: a request that is taken replaces the claimed law
+    if not cat_pointer_take(&c.law_request, &requested) or requested == NULL:
         return
+    c.law = <law_t *>requested
     memcpy(target.header, orders.header, c.handover.target_size)
     for i in range(c.axes.axis_count):
         target.position[i] = c.axes.axes[i].commanded_position
@@ -409,7 +424,7 @@ cdef void take_law(cycle_t *c, const target_t *orders) noexcept nogil:
     target.header.seen = c.number
     c.law_reserve = cycle_law_reserve(c, c.law.budget)
     if not law_begin(c.law, c.scheduled):
-        c.law = NULL
+        forget_law(c)
 
 
 cdef void take_orders(cycle_t *c, const target_t *committed) noexcept nogil:
@@ -527,7 +542,7 @@ cdef void cycle_native(cycle_t *c) noexcept nogil:
     record_of(c).send_ns = short_ns(c.sent - c.wake)
     collect(c, actual, min(c.wake + c.collect_deadline, c.next - reserve))
     note_return(c)
-    if c.law_seen != cat_load_acquire32(&c.law_request):
+    if cat_pointer_is_offered(&c.law_request):
         take_law(c, committed)
     if c.law != NULL:
         target = &c.handover.target[OF_LAW]
@@ -546,12 +561,7 @@ cdef bint cycle_wants_native(cycle_t *c) noexcept nogil:
     """inline: return True if the next cycle is a law's."""
     if c.law != NULL or c.computed:
         return True
-    if c.law_seen == cat_load_acquire32(&c.law_request):
-        return False
-    if c.law_asked != NULL:
-        return True
-    c.law_seen = cat_load_acquire32(&c.law_request)
-    return False
+    return cat_pointer_is_offered(&c.law_request)
 
 
 cdef void cycle_inputs(cycle_t *c, actual_t *actual) noexcept nogil:

@@ -1,6 +1,6 @@
 from libc.stdint cimport int64_t, uint32_t
 
-from catenary.core._law cimport Law, law_t
+from catenary.core._law cimport Law
 from catenary.core._parts cimport Parts
 from catenary.core._stream cimport Stream
 from catenary.core._thread cimport cat_scheduling
@@ -45,4 +45,5 @@ cdef class Engine(Parts):
     cdef void compute(self, int64_t duration_ns) noexcept
     cdef int pass_time(self, int64_t duration) except -1
     cdef int check_reserve(self, int64_t budget) except -1
-    cdef void ask_law(self, law_t *law) noexcept
+    cdef bint is_law_used(self, Law law) noexcept
+    cdef bint is_stream_used(self, Stream stream) noexcept

@@ -42,9 +42,10 @@ from catenary.core._handover cimport (
     handover_swap,
     target_t,
 )
-from catenary.core._law cimport WAITING, Law, law_t
+from catenary.core._law cimport WAITING, Law
 from catenary.core._native cimport (
     CAT_LINK_SPENDS,
+    CAT_POINTER_NONE,
     CAT_SINK_CAPSULE,
     CAT_SINK_VERSION,
     cat_add32,
@@ -54,6 +55,8 @@ from catenary.core._native cimport (
     cat_futex_wake,
     cat_link,
     cat_load_acquire32,
+    cat_pointer_is_used,
+    cat_pointer_offer,
     cat_sink,
     cat_store_release32,
 )
@@ -71,7 +74,6 @@ from catenary.core._thread cimport (
 
 cdef enum:
     SIGNALS_NS = 10_000_000    # native cycles in a row, before signal handlers get their turn
-    STREAMS_KEPT = 8           # replaced ones: more than can be made while a row is taken
     SILENCE_NS = 1_000_000_000 # and periods: longest wait for a cycle of a thread that lives
 
 
@@ -477,10 +479,10 @@ cdef class Engine(Parts):
         self.check_reserve(law.c.budget)
         if self.law is not None:
             self.law.supersede()
-        kept = [known for known in self.laws[:-1] if not known.ended]
-        self.laws = [*kept, *self.laws[-1:], law]  # the cycle may still be in one of them
+        self.laws = [*self.laws, law]  # before it is offered: the cycle must not outlive it
         self.law = law
-        self.ask_law(&law.c)
+        cat_pointer_offer(&self.e.cycle.law_request, &law.c)
+        self.laws = [known for known in self.laws if self.is_law_used(known)]
 
     cdef int check_reserve(self, int64_t budget) except -1:
         """Refuse a law that leaves the frames too little of the period."""
@@ -497,11 +499,11 @@ cdef class Engine(Parts):
     def stop_law(self):
         if self.law is not None:
             self.law.supersede()
-        self.ask_law(NULL)
+        cat_pointer_offer(&self.e.cycle.law_request, CAT_POINTER_NONE)
 
-    cdef void ask_law(self, law_t *law) noexcept:
-        self.e.cycle.law_asked = law
-        cat_add32(&self.e.cycle.law_request, 1)
+    cdef bint is_law_used(self, Law law) noexcept:
+        """Return True if the cycle runs the law or has not served the request for it yet."""
+        return cat_pointer_is_used(&self.e.cycle.law_request, &law.c)
 
     def run_law(self, int64_t duration_ns, uint32_t trouble):
         cdef int64_t cycles = duration_ns // self.e.cycle.period + 1
@@ -545,11 +547,17 @@ cdef class Engine(Parts):
     def set_stream(self, Stream stream):
         if stream is not None and stream.c.axes != self.axes.c.axis_count:
             raise ValueError(f"a stream for {stream.c.axes} axes, there are {self.axes.c.axis_count}")
-        self.streams = [*self.streams[-STREAMS_KEPT:], stream]  # the cycle may be in an old one
+        if stream is not None:
+            self.streams = [*self.streams, stream]  # before it is offered, as with laws
         self.stream = stream
-        self.e.cycle.stream = NULL if stream is None else &stream.c
+        cat_pointer_offer(&self.e.cycle.stream, NULL if stream is None else &stream.c)
+        self.streams = [known for known in self.streams if self.is_stream_used(known)]
         handover_swap(self.h)
         self.take_commanded()
+
+    cdef bint is_stream_used(self, Stream stream) noexcept:
+        """Return True if the cycle may be reading the stream."""
+        return cat_pointer_is_used(&self.e.cycle.stream, &stream.c)
 
     def __dealloc__(self):
         with nogil:

@@ -97,6 +97,20 @@ cdef extern from "triple_buffer.h" nogil:
     int cat_triple_take(cat_triple *triple)
 
 
+cdef extern from "pointer_handover.h" nogil:
+    void *CAT_POINTER_NONE
+
+    ctypedef struct cat_pointer:
+        pass
+
+    void *cat_pointer_offer(cat_pointer *p, void *pointer)
+    bint cat_pointer_is_used(const cat_pointer *p, const void *pointer)
+    bint cat_pointer_is_offered(const cat_pointer *p)
+    void *cat_pointer_claim(cat_pointer *p)
+    bint cat_pointer_take(cat_pointer *p, void **pointer)
+    void cat_pointer_release(cat_pointer *p)
+
+
 cdef extern from "sink.h" nogil:
     const char *CAT_SINK_CAPSULE
     const uint32_t CAT_SINK_VERSION
