@@ -12,7 +12,10 @@
 #include <setjmp.h>
 #include <signal.h>
 #include <stdint.h>
+#include <sys/syscall.h>
 #include <time.h>
+#include <unistd.h>
+#include "atomics.h"
 
 #define CAT_LAW_GOES_ON 0
 #define CAT_LAW_FINISHED 1
@@ -31,17 +34,20 @@ typedef struct cat_law_numbers {
 typedef int (*cat_law_step)(const void *actual, void *target, double *memory, int64_t memory_count,
                             const double *parameters, int64_t parameter_count, double time);
 
+/* Words that two threads or the signal handler share are atomic: `under_way`, `condemned`, `task` and
+ * `stop`. Lock-free atomics are safe in a signal handler (C11 §7.14.1.1). */
 typedef struct cat_law_guard {
     sigjmp_buf jump;
-    uint64_t calls;
-    volatile uint64_t under_way;  /* number of the call; 0: none */
-    volatile uint64_t condemned;  /* the call that is to be given up */
-    pthread_t runner;
+    uint64_t calls;               /* the runner's */
+    uint64_t under_way;           /* number of the call; 0: none */
+    uint64_t condemned;           /* the call that is to be given up */
+    uint32_t task;                /* thread ID of the runner, for the kernel */
+    uint32_t stop;                /* 1: the monitor ends */
+    pthread_t runner;             /* the thread that calls */
     pthread_t monitor;
     uint32_t known;               /* the runner is ready to be interrupted */
-    uint32_t watched;             /* the monitor lives */
-    volatile uint32_t stop;
-    int64_t limit;                /* [ns] of the runner's processor time */
+    uint32_t watched;             /* the monitor runs */
+    int64_t limit;                /* [ns] of the runner's processor time; set before the monitor runs */
 } cat_law_guard;
 
 #define CAT_LAW_SIGNAL (SIGRTMIN + 7)
@@ -50,30 +56,47 @@ typedef struct cat_law_guard {
 static void cat_law_give_up(int number, siginfo_t *info, void *context) {
     cat_law_guard *guard = (cat_law_guard *)info->si_value.sival_ptr;
     (void)number, (void)context;
-    if (info->si_code != SI_QUEUE || !guard || !pthread_equal(pthread_self(), guard->runner)) return;
-    if (guard->under_way && guard->under_way == guard->condemned) siglongjmp(guard->jump, 1);
+    if (info->si_code != SI_QUEUE || !guard) return;
+    if (cat_load_relaxed32(&guard->task) != (uint32_t)syscall(SYS_gettid)) return;
+    uint64_t call = cat_load_relaxed64(&guard->under_way);
+    if (call && call == cat_load_relaxed64(&guard->condemned)) siglongjmp(guard->jump, 1);
 }
 
-/* Looks every 5 ms whether the same call is still under way, and how long it has computed. */
+/* The processor time of a thread of this process [ns]; -1 if it has ended. The clock is named by the
+ * thread ID (linux/posix-timers.h): unlike a pthread_t it may be used after the thread has ended. */
+static inline int64_t cat_law_time_used(uint32_t task) {
+    struct timespec used;
+    clockid_t clock = (clockid_t)((~(unsigned)task << 3) | 6u);
+    if (clock_gettime(clock, &used)) return -1;
+    return used.tv_sec * 1000000000LL + used.tv_nsec;
+}
+
+/* Sends the signal that ends a call. Nothing happens if the thread has ended. */
+static inline void cat_law_interrupt(cat_law_guard *guard, uint32_t task) {
+    siginfo_t info = {0};
+    info.si_signo = CAT_LAW_SIGNAL;
+    info.si_code = SI_QUEUE;
+    info.si_pid = getpid();
+    info.si_uid = getuid();
+    info.si_value.sival_ptr = guard;
+    syscall(SYS_rt_tgsigqueueinfo, getpid(), task, CAT_LAW_SIGNAL, &info);
+}
+
+/* Checks every 5 ms whether the same call is still under way, and how long it has computed. */
 static void *cat_law_watch(void *argument) {
     cat_law_guard *guard = (cat_law_guard *)argument;
     const struct timespec pause = {0, CAT_LAW_LOOKS_NS};
     uint64_t seen = 0;
     int64_t since = 0;
-    while (!guard->stop) {
-        uint64_t call = __atomic_load_n(&guard->under_way, __ATOMIC_ACQUIRE);
-        clockid_t clock;
-        struct timespec used;
-        if (call && pthread_getcpuclockid(guard->runner, &clock) == 0
-                && clock_gettime(clock, &used) == 0) {
-            int64_t present = used.tv_sec * 1000000000LL + used.tv_nsec;
-            if (call != seen) {
-                since = present;
-            } else if (present - since >= guard->limit) {
-                union sigval value = {.sival_ptr = guard};
-                guard->condemned = call;
-                pthread_sigqueue(guard->runner, CAT_LAW_SIGNAL, value);
-            }
+    while (!cat_load_acquire32(&guard->stop)) {
+        uint64_t call = cat_load_acquire64(&guard->under_way);
+        uint32_t task = cat_load_relaxed32(&guard->task);
+        int64_t present = call ? cat_law_time_used(task) : -1;
+        if (present >= 0 && call != seen) {
+            since = present;
+        } else if (present >= 0 && present - since >= guard->limit) {
+            cat_store_release64(&guard->condemned, call);
+            cat_law_interrupt(guard, task);
         }
         seen = call;
         clock_nanosleep(CLOCK_MONOTONIC, 0, &pause, NULL);
@@ -91,7 +114,7 @@ static inline int cat_law_guard_start(cat_law_guard *guard, int64_t limit, int p
     sigemptyset(&action.sa_mask);
     if (sigaction(CAT_LAW_SIGNAL, &action, NULL)) return -errno;
     guard->limit = limit;
-    guard->stop = 0;
+    cat_store_release32(&guard->stop, 0);
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
     rc = pthread_create(&guard->monitor, NULL, cat_law_watch, guard);
@@ -105,7 +128,7 @@ static inline int cat_law_guard_start(cat_law_guard *guard, int64_t limit, int p
 
 static inline void cat_law_guard_stop(cat_law_guard *guard) {
     if (!guard->watched) return;
-    guard->stop = 1;
+    cat_store_release32(&guard->stop, 1);
     pthread_join(guard->monitor, NULL);
     guard->watched = 0;
 }
@@ -117,6 +140,7 @@ static __attribute__((noinline)) void cat_law_meet_runner(cat_law_guard *guard) 
     sigaddset(&ours, CAT_LAW_SIGNAL);
     pthread_sigmask(SIG_UNBLOCK, &ours, NULL);
     guard->runner = pthread_self();
+    cat_store_release32(&guard->task, (uint32_t)syscall(SYS_gettid));
     guard->known = 1;
 }
 
@@ -125,13 +149,13 @@ static inline int cat_law_call(cat_law_guard *guard, cat_law_step step, const vo
     int rc;
     if (!guard->known || !pthread_equal(guard->runner, pthread_self())) cat_law_meet_runner(guard);
     if (sigsetjmp(guard->jump, 0) == 0) {
-        __atomic_store_n(&guard->under_way, ++guard->calls, __ATOMIC_RELEASE);
+        cat_store_release64(&guard->under_way, ++guard->calls);
         rc = step(actual, target, n->memory, n->memory_count, n->parameters, n->parameter_count,
                   time);
     } else {
         rc = CAT_LAW_ABORTED;
     }
-    __atomic_store_n(&guard->under_way, 0, __ATOMIC_RELEASE);
+    cat_store_release64(&guard->under_way, 0);
     return rc;
 }
 
