@@ -12,10 +12,17 @@
 
 #define CAT_TRIPLE_NEW 4u             /* with the slot's number: not taken yet */
 
+/* Each word has 60 bytes on both sides, so that no two of them share a cache line of 64 bytes
+ * wherever the structure lies. It needs the alignment of a uint32_t only: objects of Python, of which
+ * it is a member, are aligned to 16 bytes. */
 typedef struct cat_triple {
-    uint32_t offered __attribute__((aligned(64)));  /* slot | CAT_TRIPLE_NEW */
-    uint32_t back __attribute__((aligned(64)));     /* the writer's slot */
-    uint32_t front __attribute__((aligned(64)));    /* the reader's slot */
+    uint8_t before[60];
+    uint32_t offered;             /* slot | CAT_TRIPLE_NEW */
+    uint8_t between[60];
+    uint32_t back;                /* the writer's slot */
+    uint8_t apart[60];
+    uint32_t front;               /* the reader's slot */
+    uint8_t after[60];
 } cat_triple;
 
 static inline void cat_triple_init(cat_triple *triple) {
