@@ -39,3 +39,11 @@ def test_functions_are_there(name: str) -> None:
 )
 def test_every_package_is_explained(name: str) -> None:
     assert name == "__init__" or re.search(rf"^\|[^|]*`{name}/?`", TEXT, re.MULTILINE)
+
+
+def test_the_state_of_free_threading_is_declared_once_for_all_compiled_modules() -> None:
+    root = Path(__file__).resolve().parent.parent
+    assert "-X freethreading_compatible=False" in (root / "CMakeLists.txt").read_text()
+    sources = list((root / "src").rglob("*.pyx"))
+    assert sources
+    assert not [path for path in sources if "freethreading" in path.read_text()]
