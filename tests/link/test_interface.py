@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import ctypes
+import os
 import subprocess
 import threading
+from pathlib import Path
 
 import pytest
 
 from catenary.errors import LinkError
 from catenary.link import Interface, Link, LinkSource
+from tests.core.hammer import compiled
+from tests.link_table import table_in
 
 HEADER = b"\xff" * 6 + bytes.fromhex("020000000001") + b"\x88\xa4"
 SECOND = 1_000_000_000
@@ -143,6 +148,25 @@ def test_a_closed_link_says_so(pair):
     with pytest.raises(LinkError, match="the link is closed"):
         near.send(frame(bytes(46)))
     assert "catenary.link" in repr(capsule)
+
+
+@pytest.mark.parametrize("mapped_ring", [True, False])
+def test_a_link_can_be_closed_while_a_native_thread_uses_it(veth, mapped_ring):
+    """The thread keeps reading: neither the ring nor the descriptor may go away under it."""
+    hammer = compiled(Path(__file__).with_name("close_hammer.c"))
+    before = len(os.listdir("/proc/self/fd"))
+    for _ in range(100):
+        link = Interface(veth[0], mapped_ring=mapped_ring).open_link()
+        capsule = link.capsule
+        hammer.use_begin(ctypes.byref(table_in(capsule)))
+        for number in range(5):
+            link.send(frame(bytes([number]) * 46))
+        link.close()
+        hammer.use_end()
+        with pytest.raises(LinkError, match="the link is closed"):
+            link.receive()
+        del link, capsule
+    assert len(os.listdir("/proc/self/fd")) == before
 
 
 def test_old_frames_are_flushed(veth):

@@ -1,11 +1,10 @@
-from mmap import mmap
 from socket import socket
 
 from catenary.link._table import TableLink
 
 class RawLink(TableLink):
     def __init__(
-        self, name: str, socket: socket, ring: mmap | None, slot_size: int, receive_path: str
+        self, name: str, socket: socket, ring_size: int, slot_size: int, receive_path: str
     ) -> None: ...
     @property
     def receive_path(self) -> str: ...

@@ -3,17 +3,38 @@
 `interface.py` opens, checks and binds the socket; here is only what runs in a cycle:
 send 1 system call, receive none (0.07 us a frame with the call from Python, 50 frames waiting on a
 veth; through `recv`, where the ring was refused, 0.7 us).
+
+Closing: a native thread may be inside a call, or read a frame in the ring. `close` puts zero pages in
+the place of the ring and a socket without a peer in the place of the descriptor; both keep their
+address and number, so that such a thread finds no frame instead of a fault or another file. The kernel
+releases the interface at once; the pages and the number are released with the object.
 """
 
-from cpython.buffer cimport PyBUF_WRITABLE, PyBuffer_Release, PyObject_GetBuffer
+import os
+import socket as sockets
+
 from libc.errno cimport EAGAIN, EINTR, EINVAL, EMSGSIZE, ENETDOWN, errno
 from libc.stdint cimport int64_t, uint8_t, uint16_t, uint32_t
 from libc.string cimport memcpy, memset
 from posix.time cimport CLOCK_MONOTONIC, clock_gettime, timespec
+from posix.unistd cimport close
 
 from catenary.link._table cimport (
     CAT_FRAME_MAX, CAT_FRAME_MIN, CAT_LINK_POLLS, TableLink,
 )
+
+cdef extern from "<sys/mman.h>" nogil:
+    enum:
+        PROT_READ
+        PROT_WRITE
+        MAP_SHARED
+        MAP_PRIVATE
+        MAP_ANONYMOUS
+        MAP_FIXED
+        MAP_NORESERVE
+    void *MAP_FAILED
+    void *mmap(void *address, size_t length, int protection, int flags, int fd, ssize_t offset)
+    int munmap(void *address, size_t length)
 
 cdef extern from "atomics.h" nogil:
     uint32_t cat_load_acquire32(const uint32_t *p)
@@ -179,34 +200,31 @@ cdef int pending_error(raw_state *raw) noexcept nogil:
 
 
 cdef class RawLink(TableLink):
-    """Owns a bound AF_PACKET socket and, unless `ring` is None, its mapped TPACKET_V2 ring.
+    """Owns an AF_PACKET socket and, unless `ring_size` is 0, the mapping of its TPACKET_V2 ring.
 
-    `receive_path` says which of the two ways frames come: "mapped ring", or "recv (reason)".
+    `receive_path` names how frames are received: "mapped ring", or "recv (reason)".
     """
     cdef raw_state raw
-    cdef object socket
-    cdef object ring
-    cdef Py_buffer view
+    cdef size_t ring_size
     cdef readonly str receive_path
 
-    def __init__(self, str name not None, socket, ring, int slot_size, str receive_path not None):
-        if ring is not None and (slot_size < 2048 or len(ring) < slot_size):
-            raise ValueError(f"a ring of {len(ring)} bytes holds no slot of {slot_size}")
+    def __cinit__(self):
+        self.raw.fd = -1
+
+    def __init__(self, str name not None, socket, size_t ring_size, int slot_size,
+                 str receive_path not None):
+        if ring_size and (slot_size < 2048 or ring_size < <size_t> slot_size):
+            raise ValueError(f"a ring of {ring_size} bytes holds no slot of {slot_size}")
         self.name = name
         self.receive_path = receive_path
-        self.socket = socket
-        self.raw.fd = socket.fileno()
-        if ring is not None:
-            PyObject_GetBuffer(ring, &self.view, PyBUF_WRITABLE)
-            self.ring = ring
-            self.raw.ring = <uint8_t *> self.view.buf
-            self.raw.slot_size = slot_size
-            self.raw.slot_count = <uint32_t> (self.view.len // slot_size)
+        if ring_size:
+            self.map_ring(socket.fileno(), ring_size, slot_size)
+        self.raw.fd = socket.detach()
         self.table.self = &self.raw
         self.table.flags = CAT_LINK_POLLS
         self.table.fd = self.raw.fd
         self.table.send = raw_send
-        self.table.receive = receive_by_recv if ring is None else receive_from_ring
+        self.table.receive = receive_from_ring if ring_size else receive_by_recv
         self.table.now = raw_now
         self.table.wait_until = raw_wait_until
 
@@ -218,14 +236,29 @@ cdef class RawLink(TableLink):
             count += 1
         return count
 
+    cdef int map_ring(self, int fd, size_t size, int slot_size) except -1:
+        cdef void *ring = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0)
+        if ring == MAP_FAILED:
+            raise OSError(errno, f"{self.name}: cannot map the receive ring: {os.strerror(errno)}")
+        self.ring_size = size
+        self.raw.ring = <uint8_t *> ring
+        self.raw.slot_size = slot_size
+        self.raw.slot_count = <uint32_t> (size // slot_size)
+        return 0
+
     cdef int close_table(self) except -1:
-        self.raw.held = NULL
-        self.raw.ring = NULL
-        if self.ring is not None:
-            PyBuffer_Release(&self.view)
-            self.ring.close()
-        self.socket.close()
+        """Replace the ring by zero pages (TP_STATUS_KERNEL: no frame), and the socket."""
+        if self.raw.ring != NULL and mmap(
+            self.raw.ring, self.ring_size, PROT_READ | PROT_WRITE,
+            MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED | MAP_NORESERVE, -1, 0,
+        ) == MAP_FAILED:
+            raise OSError(errno, f"{self.name}: cannot release the ring: {os.strerror(errno)}")
+        with sockets.socket(sockets.AF_UNIX, sockets.SOCK_DGRAM) as silent:
+            os.dup2(silent.fileno(), self.raw.fd, inheritable=False)
         return 0
 
     def __dealloc__(self):
-        PyBuffer_Release(&self.view)  # no harm where it is empty or released
+        if self.raw.ring != NULL:
+            munmap(self.raw.ring, self.ring_size)
+        if self.raw.fd >= 0:
+            close(self.raw.fd)

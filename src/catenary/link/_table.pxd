@@ -21,6 +21,12 @@ cdef extern from "link.h" nogil:
         int (*wait_until)(void *self, int64_t deadline, int wake_on_frame) noexcept nogil
         int64_t (*due)(void *self) noexcept nogil
         int fd
+    void cat_link_replace_calls(
+        cat_link *link,
+        int (*send)(void *, const uint8_t *, uint32_t) noexcept nogil,
+        int (*receive)(void *, const uint8_t **) noexcept nogil,
+        int64_t (*now)(void *) noexcept nogil,
+        int (*wait_until)(void *, int64_t, int) noexcept nogil)
 
 
 cdef class TableLink:

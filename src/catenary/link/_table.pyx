@@ -1,7 +1,9 @@
 """The Python methods of a link, over its C table (`native/link.h`).
 
-Compiled links derive from `TableLink`, fill its `table` and get the rest. Closing replaces the
-calls of the table, so that whoever still holds it gets -EBADF instead of freed memory.
+Compiled links derive from `TableLink`, fill its `table` and get the rest. `close` first replaces the
+calls of the table: a later call returns -EBADF. A native thread may still be inside a former call, or
+read a frame that it received. Therefore `close_table` must leave valid what the calls use: memory and
+descriptors are released when the last holder of the table has gone (`__dealloc__`).
 """
 
 from cpython.exc cimport PyErr_CheckSignals
@@ -63,14 +65,14 @@ cdef class TableLink:
         self.disconnect()
 
     cdef int close_table(self) except -1:
-        """Gives back what the table uses. Called once at most with a connected table."""
+        """Release the device or the file. Called at most once, after the calls were replaced; another
+        thread may still be inside one of them."""
         return 0
 
     cdef void disconnect(self):
-        self.table.send = closed_send
-        self.table.receive = closed_receive
-        self.table.now = closed_now
-        self.table.wait_until = closed_wait_until
+        cat_link_replace_calls(
+            &self.table, closed_send, closed_receive, closed_now, closed_wait_until
+        )
 
     @property
     def capsule(self):
@@ -122,10 +124,8 @@ cdef class TableLink:
     def close(self):
         if self.closed:
             return
-        try:
-            self.close_table()
-        finally:
-            self.disconnect()
+        self.disconnect()
+        self.close_table()
 
     def __enter__(self):
         return self

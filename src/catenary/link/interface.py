@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import fcntl
-import mmap
 import os
 import shlex
 import socket
@@ -49,7 +48,7 @@ class Interface:
         check(self.name)
         raw = open_socket(self.name)
         try:
-            ring, receive_path = map_ring(raw) if self.mapped_ring else (None, "recv (as asked)")
+            size, receive_path = request_ring(raw) if self.mapped_ring else (0, "recv (as asked)")
             raw.bind((self.name, ETHERTYPE))
         except OSError as error:
             raw.close()
@@ -57,7 +56,8 @@ class Interface:
         except BaseException:
             raw.close()
             raise
-        link = RawLink(self.name, raw, ring, SLOT_SIZE, receive_path)
+        with raw:  # which is empty once the link owns the descriptor
+            link = RawLink(self.name, raw, size, SLOT_SIZE, receive_path)
         link.flush()
         return link
 
@@ -114,14 +114,14 @@ def permission_command() -> str:
     return f"sudo setcap cap_net_raw,cap_sys_nice,cap_ipc_lock=ep {shlex.quote(interpreter)}"
 
 
-def map_ring(opened: socket.socket) -> tuple[mmap.mmap | None, str]:
-    """Maps the receive ring, and says how frames will come; (None, reason) where it is refused."""
-    request = struct.pack(
-        "=4I", BLOCK_SIZE, BLOCK_COUNT, SLOT_SIZE, BLOCK_SIZE * BLOCK_COUNT // SLOT_SIZE
-    )
+def request_ring(opened: socket.socket) -> tuple[int, str]:
+    """Request a receive ring. Returns its size, 0 if the kernel refuses it, and how frames are
+    received."""
+    size = BLOCK_SIZE * BLOCK_COUNT
+    request = struct.pack("=4I", BLOCK_SIZE, BLOCK_COUNT, SLOT_SIZE, size // SLOT_SIZE)
     try:
         opened.setsockopt(SOL_PACKET, PACKET_VERSION, TPACKET_V2)
         opened.setsockopt(SOL_PACKET, PACKET_RX_RING, request)
-        return mmap.mmap(opened.fileno(), BLOCK_SIZE * BLOCK_COUNT), "mapped ring"
+        return size, "mapped ring"
     except OSError as error:
-        return None, f"recv (no mapped ring: {error.strerror})"
+        return 0, f"recv (no mapped ring: {error.strerror})"

@@ -56,4 +56,18 @@ typedef struct cat_link {
     int fd;
 } cat_link;
 
+/* Replaces the calls of a table. A thread that is inside a former call finishes it there: the owner
+ * keeps valid what that call uses. */
+static inline void cat_link_replace_calls(
+        cat_link *link,
+        int (*send)(void *, const uint8_t *, uint32_t),
+        int (*receive)(void *, const uint8_t **),
+        int64_t (*now)(void *),
+        int (*wait_until)(void *, int64_t, int)) {
+    __atomic_store_n(&link->send, send, __ATOMIC_RELEASE);
+    __atomic_store_n(&link->receive, receive, __ATOMIC_RELEASE);
+    __atomic_store_n(&link->now, now, __ATOMIC_RELEASE);
+    __atomic_store_n(&link->wait_until, wait_until, __ATOMIC_RELEASE);
+}
+
 #endif
