@@ -217,6 +217,8 @@ class Segment:
             return replace(datagram, address=address, data=data, working_counter=len(answering))
         if datagram.command == Command.LRW:
             return self.process_logical(datagram, answering)
+        if datagram.command == Command.NOP:
+            return datagram
         return replace(datagram, working_counter=len(answering))
 
     def process_logical(self, datagram: Datagram, answering: list[int]) -> Datagram:
@@ -287,6 +289,10 @@ def frame_plan(parts: Sequence[tuple[DatagramKind, Datagram, int, int]]) -> Fram
 def al_status(devices: int) -> tuple[DatagramKind, Datagram, int, int]:
     brd = Datagram(Command.BRD, 0x0130 << 16, bytes(2))
     return DatagramKind.AL_STATUS, brd, devices, -1
+
+
+def cycle_number() -> tuple[DatagramKind, Datagram, int, int]:
+    return DatagramKind.CYCLE_NUMBER, Datagram(Command.NOP, 0, bytes(4)), 0, -1
 
 
 def lrw(unit: int, size: int = DRIVE_SIZE) -> tuple[DatagramKind, Datagram, int, int]:

@@ -12,9 +12,11 @@ from tests.core.rig import (
     DRIVE_SIZE,
     LOGICAL,
     Bench,
+    ScriptedDrive,
     al_status,
     axis,
     bench,
+    cycle_number,
     frame_plan,
     lrw,
     make_plan,
@@ -102,6 +104,102 @@ def test_alien_frames(spoil) -> None:
     b.segment.spoil = lambda frame: [(100, spoil(frame))]
     b.engine.run(1)
     assert kinds(b) == {"lost": 1, "alien": 1}
+
+
+def test_a_late_frame_is_not_repeated() -> None:
+    b = bench(axis(0))
+    b.segment.spoil = lambda frame: [(1_000_000, frame)]
+    b.engine.run(20)
+    assert kinds(b)["stale"] == 19
+    assert b.engine.counters["repeated"] == 0
+
+
+def numbered(*, every: int = 1) -> Bench:
+    """Two drives in two frames with cycle numbers, the second one with a divider."""
+    plan = make_plan([axis(0), axis(1)])
+    units = (plan.sync_units[0], SyncUnit("second", (1,), every=every))
+    slow = replace(frame_plan([lrw(1), cycle_number()]), every=every)
+    first = frame_plan([al_status(2), lrw(0), cycle_number()])
+    return Bench(replace(plan, frames=(first, slow), sync_units=units))
+
+
+def false_positions(b: Bench) -> int:
+    """Repeat every frame 128 frames later, just before the current one, while a drive moves.
+    Returns the number of cycles that showed an old position."""
+    history: list[bytes] = []
+
+    def repeat(frame: bytes) -> list[tuple[int, bytes]]:
+        history.append(frame)
+        return [*((100, old) for old in history[-129:-128]), (200, frame)]
+
+    b.segment.spoil = repeat
+    false = 0
+    for cycle in range(400):
+        b.drives[0].position = cycle
+        b.engine.run(1)
+        false += b.actual_position[0] != pytest.approx(cycle / 1000)
+    return false
+
+
+def test_frames_repeated_128_frames_later_pass_as_current_and_are_counted() -> None:
+    b = bench(axis(0))
+    assert false_positions(b) == 272
+    assert b.ok
+    assert b.engine.counters["stale"] == b.engine.counters["repeated"] == 271  # the true ones
+
+
+@pytest.mark.parametrize("every", [1, 3])
+def test_with_cycle_numbers_no_repeated_frame_passes(every: int) -> None:
+    b = numbered(every=every)
+    assert false_positions(b) == 0
+    assert b.ok
+    assert b.engine.counters["lost"] == 0
+    assert b.engine.counters["stale"] == b.engine.counters["repeated"] == len(b.link.sent) - 128
+
+
+def test_cycle_numbers_count_the_cycles() -> None:
+    b = numbered(every=2)
+    b.engine.run(4)
+    numbers = [
+        int.from_bytes(datagram.data, "little")
+        for frame in b.link.sent
+        for datagram in decode_frame(frame).datagrams
+        if datagram.command == Command.NOP
+    ]
+    assert numbers == [1, 2, 2, 3, 4, 4]
+
+
+@pytest.mark.parametrize(
+    ("frames", "every", "exact", "refused"),
+    [
+        (32, 1, False, None),
+        (33, 1, False, "33 in one cycle, at most 32"),
+        (63, 2, False, None),
+        (64, 2, False, "33 in one cycle, at most 32"),
+        (128, 1, True, None),
+        (129, 1, True, "129 in one cycle, at most 128"),
+        (1025, 100, False, "1025, at least 1 and at most 1024"),
+    ],
+)
+def test_how_many_frames_a_cycle_may_have(
+    frames: int, every: int, exact: bool, refused: str | None
+) -> None:
+    parts = [al_status(1), *([cycle_number()] if exact else [])]
+    one = frame_plan(parts)
+    plan = make_plan(
+        frames=tuple(
+            replace(one, every=every, phase=k % every) if k else one for k in range(frames)
+        ),
+        device_count=1,
+    )
+    if refused:
+        with pytest.raises(ValueError, match=refused):
+            Bench(plan)
+        return
+    b = Bench(plan, drives=[ScriptedDrive()])
+    b.engine.run(20)
+    assert b.ok
+    assert kinds(b) == {}
 
 
 def test_an_index_never_sent_is_alien() -> None:

@@ -15,10 +15,8 @@ from catenary.model.topology import Topology, make_topology
 from catenary.procedure.error_counters import counted_since, read_error_counters
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.survey import Answer, survey
-from catenary.wire.al import AlStatus, status_code
+from catenary.wire.al import ERROR_FLAG, AlStatus, status_code
 from catenary.wire.error_counters import ErrorCounters
-
-_ERROR_BIT = 0x10
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +80,7 @@ def _complaints(names: Names, answers: Sequence[Answer]) -> list[Finding]:
     """Devices in a state with an error."""
     found = []
     for answer in answers:
-        if answer.word is None or not answer.word & _ERROR_BIT:
+        if answer.word is None or not answer.word & ERROR_FLAG:
             continue
         position, code = answer.station.position, status_code(answer.code)
         try:

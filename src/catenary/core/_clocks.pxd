@@ -1,10 +1,5 @@
 from libc.stdint cimport int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 
-cdef enum:  # commands of the clocks' datagrams, ETG.1000.4 §5.4.1
-    FPRD = 4
-    FPWR = 5
-    FRMW = 14
-
 cdef enum:
     SEEKING = 0                # the instants are to be set into phase
     FOLLOWING = 1              # and are being kept there

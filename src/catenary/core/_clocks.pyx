@@ -16,6 +16,8 @@ from libc.math cimport fabs
 from libc.stdint cimport int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 from libc.stdlib cimport calloc, free
 
+from catenary.core._native cimport CAT_FPRD, CAT_FRMW
+
 cdef enum:
     HOLD = 2                   # an answer tells of an instant that was fixed two cycles before
     REJECTED_MAX = 8           # errors beyond `step` in a row: the clock has jumped
@@ -214,9 +216,9 @@ cdef void clock_take(clock_t *k, uint8_t command, const uint8_t *data,
     """One datagram of the frame that came back; the frame may be shown again."""
     if not k.awaited:
         return
-    if command == FRMW:
+    if command == CAT_FRMW:
         take_time(k, data, counter)
-    elif command == FPRD:
+    elif command == CAT_FPRD:
         take_difference(k, data, counter)
 
 

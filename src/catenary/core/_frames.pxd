@@ -5,15 +5,16 @@ from catenary.core._native cimport cat_image, cat_link
 from catenary.core._lane cimport lane_t
 
 cdef enum:
-    FRAME_COUNT_MAX = 32   # so that an index comes again after four cycles at the earliest
-    INDEX_COUNT = 128      # 0x00 to 0x7F are the cycle's, the rest the lane's
+    FRAMES_MAX = 1024          # of a plan, all dividers and phases together
+    FRAMES_PER_CYCLE_MAX = 32  # without cycle numbers: an index returns after four cycles at least
+    INDEX_COUNT = 128          # 0x00 to 0x7F belong to the cycle, the others to the acyclic queue
 
-cdef enum:
-    LOOK = 0
-    WAIT = 1
-    SPIN = 2
+cdef enum:                     # receive modes
+    LOOK = 0                   # sleep until the deadline, then take what is there
+    WAIT = 1                   # sleep until a frame has come
+    SPIN = 2                   # busy-wait
 
-cdef struct copy_t:
+cdef struct copy_t:            # bytes between a frame and an image
     uint32_t frame_offset
     uint32_t image_offset
     uint32_t size
@@ -21,11 +22,11 @@ cdef struct copy_t:
 cdef struct datagram_t:
     uint8_t kind
     uint8_t command
-    uint64_t header_mask       # of its first eight bytes: what a return has as it was sent
+    uint8_t right              # judged: back with the expected working counter
+    uint64_t header_mask       # of its first eight bytes: what comes back as it was sent
     uint16_t length            # of the data
     uint16_t expected_counter
-    uint16_t counter           # of the last return
-    int32_t unit               # -1: none
+    int32_t unit               # sync unit; -1: none
     uint32_t frame
     uint32_t offset            # of the header, in the frame
     uint32_t first_output
@@ -38,15 +39,28 @@ cdef struct frame_t:
     uint32_t used              # up to the end of the last datagram; padding follows
     uint32_t first_datagram
     uint32_t datagram_count
-    uint32_t every             # goes out in cycles whose serial is `phase` modulo `every`
+    uint32_t every             # due in cycles whose serial is `phase` modulo `every`
     uint32_t phase
-    uint8_t due                # in this cycle
-    uint8_t index
+    uint32_t number_offset     # of the cycle number, in the frame; 0: the frame has none
     uint8_t needed             # its loss makes the cycle bad
-    uint8_t back
-    uint8_t noted              # its counters, AL states and clocks were taken
-    uint8_t template[1536]
-    uint8_t returned[1536]
+    uint8_t index              # of the last emit in which it was due
+    uint8_t due                # sent in the last emit
+    uint8_t back               # since the last emit: accepted
+    uint8_t judged             # since the last emit: counters, AL status and clocks were taken
+    uint8_t template[1536]     # what is sent
+    uint8_t returned[1536]     # what came back last
+
+cdef struct unit_t:
+    uint32_t frame             # one of those that carry it: all are due in the same cycles
+    uint32_t datagrams         # of this unit, in all frames
+    uint32_t right             # since the last emit: datagrams with the expected counter
+    uint16_t counter           # since the last emit: sum of the working counters
+    uint8_t optional           # its loss does not make the cycle bad
+
+cdef struct sent_t:            # the last use of an index
+    uint32_t serial            # of the emit; 0: never used
+    uint16_t frame
+    uint8_t answered           # a frame with this index has come back, in time or late
 
 cdef struct frame_counters_t:
     uint64_t stale             # ours, of an earlier cycle
@@ -54,10 +68,12 @@ cdef struct frame_counters_t:
     uint64_t corrupt           # an EtherCAT frame that contradicts itself or its template
     uint64_t duplicate         # ours, a second time in this cycle
     uint64_t unprocessed       # an echo no device has touched
+    uint64_t repeated          # of the stale and duplicate frames, those that were back before
     uint64_t send_errors
     uint64_t receive_errors
 
 cdef struct frames_t:
+    # constant after construction
     cat_image image
     const cat_link *link
     lane_t *lane
@@ -68,36 +84,36 @@ cdef struct frames_t:
     frame_t *frames
     datagram_t *datagrams
     copy_t *copies
+    unit_t *units
+    # the image table points to these
     uint8_t *outputs
     uint8_t *inputs
     uint8_t *unit_valid
     uint8_t *unit_fresh
-    uint8_t *unit_optional
     uint32_t *unit_missed
-    uint32_t *unit_frame       # one of those that carry it: all are due together
     uint16_t *unit_counter
-    uint16_t *unit_expected    # the sum of its datagrams' counters
     uint8_t al_status
     uint16_t al_counter
-    uint8_t al_seen            # since the last emit, and
-    uint16_t al_answered
-    int64_t frame_stamp
+    int64_t frame_stamp        # when the last frames were seen; 0: not read yet
+    uint8_t ok                 # every needed unit that was due is valid, every needed frame is back
+    uint8_t whole              # every needed unit is valid
+    # since the last emit
+    uint32_t serial            # of the emit; never 0
+    uint32_t missing           # frames that are due and not back
+    uint32_t missing_needed    # those of them that are needed
+    uint32_t right             # datagrams judged right
+    uint16_t al_answered       # devices that answered the AL status datagram
+    uint8_t al_seen            # OR of their answers
+    uint8_t judged             # once at least
+    uint8_t collected          # judged with all frames back: nothing more can come
+    # for longer
+    uint8_t settled            # the last judgement found every datagram of all frames right
     uint32_t next_index
-    uint32_t serial            # of the emit
-    uint32_t missing
-    uint8_t all_due            # every frame goes out in every cycle
-    uint8_t settled            # the units say already that the last cycle was whole and right
-    uint8_t wrong              # a counter that is back, since the last emit
-    uint8_t judged             # once since the last emit, and
-    uint8_t collected          # with all frames back: nothing more can come
-    uint8_t ok                 # every needed unit that was due valid, every needed frame back
-    uint8_t whole              # every needed unit valid
-    uint8_t frame_of_index[128]
-    uint32_t serial_of_index[128]   # 0: never sent
+    sent_t sent[128]           # by index
     frame_counters_t counters
 
 cdef class Frames:
-    """Owns the templates, images and tables of one cyclic exchange."""
+    """Owner of the templates, images and tables of one cyclic exchange."""
     cdef frames_t c
     cdef object link_owner
     cdef make_table(self)

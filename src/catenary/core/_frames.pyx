@@ -1,9 +1,25 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""The frame engine: the image table (native/image.h) on a link (native/link.h).
+"""The frame engine: the image table (native/image.h) on a link (native/link.h), ETG.1000.4 §5.4.
 
-Templates are built by the plan; a cycle patches indices and outputs, sends, and believes a returned
-frame only where index, commands, addresses, lengths and working counters are those expected
-(ETG.1000.4 §5.4). Budget for three drives in one frame: emit 0.2 us, collect 0.3 us, without the link.
+Theory of operation
+    The plan makes a template for each frame. `emit` advances `serial`, gives each frame that is due
+    in this cycle the next index, copies the outputs into the templates and sends them. `collect`
+    takes what the link received until all frames are back or the deadline has passed. Then it judges
+    once: frames that came back (`judge_frame`), sync units (`judge_units`), and copies the inputs of
+    valid units to the image. The inputs of other units keep their last good values.
+
+Matching
+    A received frame is accepted if source, EtherType, commands, addresses and lengths are those of
+    the template and its index was given out in this cycle. An index returns after 128 frames: a
+    frame that is repeated that much later is accepted too. Frames with a cycle number (a NOP datagram,
+    `exact_matching` in the plan) are accepted only with the number of this cycle.
+    Every other frame is counted by kind and dropped (`frame_counters_t`).
+
+Validity
+    A sync unit is valid if all of its datagrams are back with the expected working counter. `ok`
+    and `whole` are the two results for the cycle; the fields are defined in _frames.pxd.
+
+Budget for three drives in one frame: emit 0.2 us, collect 0.3 us, without the link.
 """
 
 from cpython.pycapsule cimport PyCapsule_GetPointer, PyCapsule_IsValid
@@ -12,15 +28,32 @@ from libc.stdint cimport int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 from libc.stdlib cimport calloc, free
 from libc.string cimport memcpy
 
-from catenary.core._clocks cimport FPRD, FPWR, FRMW, clock_emit, clock_t, clock_take
+from catenary.core._clocks cimport clock_emit, clock_t, clock_take
 from catenary.core._lane cimport lane_received
 from catenary.core._native cimport (
+    CAT_AL_ERROR,
+    CAT_AL_STATE,
+    CAT_APRD,
+    CAT_APRW,
+    CAT_APWR,
+    CAT_ARMW,
+    CAT_BRD,
+    CAT_BRW,
+    CAT_BWR,
+    CAT_DATAGRAM_COUNTER,
+    CAT_DATAGRAM_HEADER,
+    CAT_ETHERCAT_HEADER,
+    CAT_ETHERNET_HEADER,
+    CAT_FPRD,
+    CAT_FPWR,
     CAT_FRAME_MAX,
     CAT_FRAME_MIN,
+    CAT_FRMW,
     CAT_IMAGE_VERSION,
     CAT_LINK_CAPSULE,
     CAT_LINK_VERSION,
     CAT_LINK_VIRTUAL_TIME,
+    CAT_NOP,
     cat_link,
 )
 from catenary.core._numbers cimport IMAGE_PADDING
@@ -28,23 +61,24 @@ from catenary.core._numbers cimport IMAGE_PADDING
 cdef enum:
     SOURCE = 6                 # offset of the source address
     SOURCE_PROCESSED = 0x02    # set in its first byte by the first controller passed
-    ETHERCAT_HEADER = 14
-    DATAGRAMS = 16
-    HEADER = 10                # of a datagram
-    COUNTER = 2
-    CYCLE_INDICES = 0x80
-    DRAIN_MAX = 256            # frames looked at in one collect: a flood cannot hold the cycle up
+    DATAGRAMS = CAT_ETHERNET_HEADER + CAT_ETHERCAT_HEADER
+    HEADER = CAT_DATAGRAM_HEADER
+    CYCLE_INDICES = 0x80       # indices from here on belong to the acyclic queue
+    DRAIN_MAX = 256            # frames taken in one collect: a flood cannot delay the cycle
     EVERY_MAX = 10000
     MISSED_MAX = 1000000000
+    NUMBER_SIZE = 4            # of the data of a cycle number
 
-cdef enum:
+cdef enum:                     # kinds of datagrams, as in plan/cycle.py
     PROCESS_DATA = 0
     AL_STATUS = 1
     CLOCK = 2
+    CYCLE_NUMBER = 3
 
-# APRD, APWR, APRW, BRD, BWR, BRW, ARMW: every device adds one to the position (ETG.1000.4 §5.4.1)
-ADDRESS_MOVES = frozenset((1, 2, 3, 7, 8, 9, 13))
-COMMAND_MAX = 14
+# Every device adds one to the position in the address (ETG.1000.4 §5.4.1).
+ADDRESS_MOVES = frozenset(
+    (CAT_APRD, CAT_APWR, CAT_APRW, CAT_BRD, CAT_BWR, CAT_BRW, CAT_ARMW)
+)
 RECEIVE_MODES = {"look": LOOK, "wait": WAIT, "spin": SPIN}
 
 
@@ -62,10 +96,17 @@ cdef inline uint16_t counter_of(const datagram_t *d, const uint8_t *frame) noexc
     return word_at(frame + d.offset + HEADER + d.length)
 
 
+cdef inline uint32_t number_in(const frame_t *frame, const uint8_t *bytes) noexcept nogil:
+    """The cycle number in a frame that has one, in the byte order of this machine."""
+    cdef uint32_t number
+    memcpy(&number, bytes + frame.number_offset, NUMBER_SIZE)
+    return number
+
+
 # ---- emit
 
 cdef inline void fill(frames_t *f, frame_t *frame) noexcept nogil:
-    """Index and outputs into a frame's template."""
+    """Write index, cycle number and outputs into the template of a frame."""
     cdef datagram_t *d
     cdef copy_t *copy
     cdef uint32_t k, m
@@ -75,6 +116,17 @@ cdef inline void fill(frames_t *f, frame_t *frame) noexcept nogil:
         for m in range(d.first_output, d.first_output + d.output_count):
             copy = &f.copies[m]
             memcpy(frame.template + copy.frame_offset, f.outputs + copy.image_offset, copy.size)
+    if frame.number_offset:
+        memcpy(frame.template + frame.number_offset, &f.serial, NUMBER_SIZE)
+
+
+cdef inline void give_index(frames_t *f, uint32_t number) noexcept nogil:
+    cdef sent_t *sent = &f.sent[f.next_index]
+    f.frames[number].index = <uint8_t>f.next_index
+    sent.frame = <uint16_t>number
+    sent.serial = f.serial
+    sent.answered = 0
+    f.next_index = (f.next_index + 1) % INDEX_COUNT
 
 
 cdef int frames_emit(void *self) noexcept nogil:
@@ -83,53 +135,61 @@ cdef int frames_emit(void *self) noexcept nogil:
     cdef uint32_t i
     cdef int rc, first_error = 0
     f.serial += 1
-    if f.serial == 0:  # which says: never sent
+    if f.serial == 0:  # 0: never sent
         f.serial = 1
     if f.clock != NULL:  # its datagrams are in the frame that goes first
         clock_emit(f.clock, f.link.now(f.link.self))
     f.missing = 0
-    f.wrong = 0
-    f.judged = 0
-    f.collected = 0
-    f.al_seen = 0
-    f.al_answered = 0
+    f.missing_needed = 0
     for i in range(f.frame_count):
         frame = &f.frames[i]
         frame.back = 0
-        frame.noted = 0
+        frame.judged = 0
         frame.due = frame.every == 1 or f.serial % frame.every == frame.phase
         if not frame.due:
             continue
         f.missing += 1
-        frame.index = <uint8_t>f.next_index
-        f.frame_of_index[f.next_index] = <uint8_t>i
-        f.serial_of_index[f.next_index] = f.serial
-        f.next_index = (f.next_index + 1) % INDEX_COUNT
+        f.missing_needed += frame.needed
+        give_index(f, i)
         fill(f, frame)
         rc = f.link.send(f.link.self, frame.template, frame.length)
         if rc < 0:
             f.counters.send_errors += 1
             if first_error == 0:
                 first_error = rc
+    forget_returns(f)
     return first_error
 
 
-# ---- collect
+cdef void forget_returns(frames_t *f) noexcept nogil:
+    """Reset what `judge` adds up, after the frames were sent."""
+    cdef uint32_t unit
+    for unit in range(f.image.unit_count):
+        f.units[unit].right = 0
+        f.units[unit].counter = 0
+    f.right = 0
+    f.judged = 0
+    f.collected = 0
+    f.al_seen = 0
+    f.al_answered = 0
+
+
+# ---- receive and match
 
 cdef inline bint is_ours(const uint8_t *ours, const uint8_t *bytes) noexcept nogil:
-    """Same source, but for the bit that controllers set, and EtherType: bytes 6 to 13 of a frame."""
+    """Same EtherType and source, except for the bit that controllers set: bytes 6 to 13 of a frame."""
     return ((eight_at(bytes + SOURCE) ^ eight_at(ours + SOURCE)) & ~<uint64_t>SOURCE_PROCESSED) == 0
 
 
 cdef inline bint is_shaped(const frames_t *f, const frame_t *frame, const uint8_t *bytes,
                            uint32_t length) noexcept nogil:
-    """The template's datagrams, with the index of the frame. Those of the clocks are addressed to
-    another device each cycle: a late frame is stale, not corrupt."""
+    """True if the datagrams are those of the template and all have the index of the frame. Datagrams
+    of clocks address another device each cycle: a late frame is stale, not corrupt."""
     cdef const datagram_t *d
     cdef const datagram_t *end
     cdef uint8_t index = bytes[DATAGRAMS + 1]
-    if length < frame.used or word_at(bytes + ETHERCAT_HEADER) != word_at(
-        frame.template + ETHERCAT_HEADER
+    if length < frame.used or word_at(bytes + CAT_ETHERNET_HEADER) != word_at(
+        frame.template + CAT_ETHERNET_HEADER
     ):
         return False
     d = &f.datagrams[frame.first_datagram]
@@ -144,7 +204,7 @@ cdef inline bint is_shaped(const frames_t *f, const frame_t *frame, const uint8_
 
 
 cdef bint is_untouched(const frames_t *f, const frame_t *frame, const uint8_t *bytes) noexcept nogil:
-    """An echo: no controller has set its bit of the source address nor counted."""
+    """True for an echo: no controller has set its bit of the source address or counted."""
     cdef uint32_t k
     if bytes[SOURCE] != frame.template[SOURCE] or frame.template[SOURCE] & SOURCE_PROCESSED:
         return False
@@ -155,46 +215,68 @@ cdef bint is_untouched(const frames_t *f, const frame_t *frame, const uint8_t *b
 
 
 cdef inline int64_t stamp_of(frames_t *f) noexcept nogil:
-    """When what is being taken was seen."""
+    """The time at which the frames that are being taken were seen."""
     if f.frame_stamp == 0:
         f.frame_stamp = f.link.now(f.link.self)
     return f.frame_stamp
 
 
+cdef inline bint is_current(const frames_t *f, const frame_t *frame, const sent_t *sent,
+                            const uint8_t *bytes) noexcept nogil:
+    """True if the frame was sent in this cycle, as far as its index and its cycle number show."""
+    if sent.serial != f.serial:
+        return False
+    return frame.number_offset == 0 or number_in(frame, bytes) == f.serial
+
+
+cdef void count_stale(frames_t *f, const frame_t *frame, sent_t *sent,
+                      const uint8_t *bytes) noexcept nogil:
+    """A late frame comes once. One that was back before, or that an older use of the index sent, is
+    repeated."""
+    f.counters.stale += 1
+    if sent.answered or (frame.number_offset and number_in(frame, bytes) != sent.serial):
+        f.counters.repeated += 1
+    else:
+        sent.answered = 1
+
+
 cdef void take(frames_t *f, const uint8_t *bytes, uint32_t length) noexcept nogil:
-    """One received frame: the cycle's, the lane's, or counted by kind and forgotten."""
+    """Accept one received frame, pass it to the acyclic queue, or count it by kind and drop it."""
     cdef frame_t *frame
-    cdef uint8_t index
-    if length < ETHERCAT_HEADER or not is_ours(f.frames[0].template, bytes):
+    cdef sent_t *sent
+    if length < CAT_ETHERNET_HEADER or not is_ours(f.frames[0].template, bytes):
         f.counters.alien += 1
         return
-    if length < DATAGRAMS + HEADER + COUNTER or length > CAT_FRAME_MAX:
+    if length < DATAGRAMS + HEADER + CAT_DATAGRAM_COUNTER or length > CAT_FRAME_MAX:
         f.counters.corrupt += 1
         return
-    index = bytes[DATAGRAMS + 1]
-    if index >= CYCLE_INDICES:
+    if bytes[DATAGRAMS + 1] >= CYCLE_INDICES:
         lane_received(f.lane, bytes, length, stamp_of(f))
         return
-    if f.serial_of_index[index] == 0:
+    sent = &f.sent[bytes[DATAGRAMS + 1]]
+    if sent.serial == 0:
         f.counters.alien += 1
         return
-    frame = &f.frames[f.frame_of_index[index]]
+    frame = &f.frames[sent.frame]
     if not is_shaped(f, frame, bytes, length):
         f.counters.corrupt += 1
-    elif f.serial_of_index[index] != f.serial:
-        f.counters.stale += 1
+    elif not is_current(f, frame, sent, bytes):
+        count_stale(f, frame, sent, bytes)
     elif is_untouched(f, frame, bytes):
         f.counters.unprocessed += 1
     elif frame.back:
         f.counters.duplicate += 1
+        f.counters.repeated += 1
     else:
         frame.back = 1
+        sent.answered = 1
         f.missing -= 1
+        f.missing_needed -= frame.needed
         memcpy(frame.returned, bytes, frame.used)
 
 
 cdef int drain(frames_t *f, int budget) noexcept nogil:
-    """Takes what has arrived; what is left of the budget."""
+    """Take what has arrived. Returns what is left of the budget."""
     cdef const uint8_t *bytes
     cdef int length
     while budget > 0:
@@ -210,7 +292,7 @@ cdef int drain(frames_t *f, int budget) noexcept nogil:
 
 
 cdef int await_frames(frames_t *f, int64_t deadline, int budget) noexcept nogil:
-    """Until all frames are back or the deadline has come. 0, or -errno of the wait."""
+    """Wait until all frames are back or the deadline has passed. Returns 0, or -errno of the wait."""
     cdef const cat_link *link = f.link
     cdef int rc
     while f.missing > 0 and budget > 0:
@@ -231,123 +313,94 @@ cdef int await_frames(frames_t *f, int64_t deadline, int budget) noexcept nogil:
     return 0
 
 
-cdef void note(frames_t *f, frame_t *frame) noexcept nogil:
-    """The working counters of a frame that is back; what AL states and clocks say beside their data."""
+# ---- judge
+
+cdef void judge_frame(frames_t *f, frame_t *frame) noexcept nogil:
+    """Judge the datagrams of a frame that is back, once: working counters, AL status, clocks."""
     cdef datagram_t *d = &f.datagrams[frame.first_datagram]
     cdef const datagram_t *end = d + frame.datagram_count
+    cdef uint16_t counter
     while d < end:
-        d.counter = counter_of(d, frame.returned)
-        if d.counter != d.expected_counter:
-            f.wrong = 1
-        if d.kind == AL_STATUS:
-            if d.counter > 0:
-                f.al_answered += d.counter
-                f.al_seen |= frame.returned[d.offset + HEADER] & 0x1F
+        counter = counter_of(d, frame.returned)
+        d.right = counter == d.expected_counter
+        f.right += d.right
+        if d.unit >= 0:
+            f.units[d.unit].right += d.right
+            f.units[d.unit].counter += counter
+        elif d.kind == AL_STATUS and counter > 0:
+            f.al_answered += counter
+            f.al_seen |= frame.returned[d.offset + HEADER] & (CAT_AL_STATE | CAT_AL_ERROR)
         elif d.kind == CLOCK and f.clock != NULL:
-            clock_take(f.clock, d.command, frame.returned + d.offset + HEADER, d.counter)
+            clock_take(f.clock, d.command, frame.returned + d.offset + HEADER, counter)
         d += 1
-    frame.noted = 1
-
-
-cdef inline bint are_good(const frames_t *f, const datagram_t *d) noexcept nogil:
-    """The inputs of a datagram, where not all are: those of a unit count together."""
-    if not f.frames[d.frame].back:
-        return False
-    if d.unit >= 0:
-        return f.unit_valid[d.unit] != 0
-    return d.counter == d.expected_counter
-
-
-cdef inline void copy_inputs(frames_t *f, const datagram_t *d) noexcept nogil:
-    cdef const uint8_t *returned = f.frames[d.frame].returned
-    cdef const copy_t *copy = &f.copies[d.first_input]
-    cdef const copy_t *end = copy + d.input_count
-    while copy < end:
-        memcpy(f.inputs + copy.image_offset, returned + copy.frame_offset, copy.size)
-        copy += 1
-
-
-cdef void settle(frames_t *f) noexcept nogil:
-    """Every unit: valid, now."""
-    cdef uint32_t unit
-    for unit in range(f.image.unit_count):
-        f.unit_valid[unit] = 1
-        f.unit_fresh[unit] = 1
-        f.unit_missed[unit] = 0
-        f.unit_counter[unit] = f.unit_expected[unit]
-    f.ok = 1
-    f.whole = 1
-    f.settled = 1
+    frame.judged = 1
 
 
 cdef inline void judge_unit(frames_t *f, uint32_t unit) noexcept nogil:
-    """A unit that was due."""
-    if f.unit_valid[unit]:
+    """Judge a unit that is due in this cycle."""
+    cdef bint valid = f.units[unit].right == f.units[unit].datagrams
+    f.unit_valid[unit] = valid
+    f.unit_fresh[unit] = valid
+    f.unit_counter[unit] = f.units[unit].counter
+    if valid:
         f.unit_missed[unit] = 0
         return
-    f.unit_fresh[unit] = 0
     if not f.judged and f.unit_missed[unit] < MISSED_MAX:
         f.unit_missed[unit] += 1
-    if not f.unit_optional[unit]:
+    if not f.units[unit].optional:
         f.ok = 0
 
 
 cdef void judge_units(frames_t *f) noexcept nogil:
-    """Which sync units are valid, and whether the cycle was good, where something was not due, not
-    back or not right."""
-    cdef const datagram_t *d
-    cdef uint32_t k, unit
-    f.settled = 0
-    f.ok = 1
+    cdef uint32_t unit
+    f.ok = f.missing_needed == 0
     f.whole = 1
     for unit in range(f.image.unit_count):
-        f.unit_fresh[unit] = f.frames[f.unit_frame[unit]].due
-        if f.unit_fresh[unit]:
-            f.unit_valid[unit] = 1
-            f.unit_counter[unit] = 0
-    for k in range(f.frame_count):
-        if f.frames[k].needed and f.frames[k].due and not f.frames[k].back:
-            f.ok = 0
-    for k in range(f.datagram_count):
-        d = &f.datagrams[k]
-        if d.unit < 0 or not f.frames[d.frame].due:
-            continue
-        if f.frames[d.frame].back:
-            f.unit_counter[d.unit] += d.counter
-        if not f.frames[d.frame].back or d.counter != d.expected_counter:
-            f.unit_valid[d.unit] = 0
-    for unit in range(f.image.unit_count):
-        if f.unit_fresh[unit]:
+        f.unit_fresh[unit] = 0
+        if f.frames[f.units[unit].frame].due:
             judge_unit(f, unit)
-        if not f.unit_valid[unit] and not f.unit_optional[unit]:
+        if not f.unit_valid[unit] and not f.units[unit].optional:
             f.whole = 0
 
 
-cdef void judge(frames_t *f) noexcept nogil:
-    """What has come back: counters, valid units, their inputs."""
-    cdef frame_t *frame = f.frames
-    cdef const frame_t *last = frame + f.frame_count
+cdef void copy_inputs(frames_t *f) noexcept nogil:
+    """Copy the inputs of the datagrams that are back: of units all or none."""
     cdef const datagram_t *d = f.datagrams
     cdef const datagram_t *end = d + f.datagram_count
-    cdef bint right
+    cdef const frame_t *frame
+    cdef const copy_t *copy
+    cdef const copy_t *last
+    while d < end:
+        frame = &f.frames[d.frame]
+        if frame.back and (f.unit_valid[d.unit] if d.unit >= 0 else d.right):
+            copy = &f.copies[d.first_input]
+            last = copy + d.input_count
+            while copy < last:
+                memcpy(f.inputs + copy.image_offset, frame.returned + copy.frame_offset, copy.size)
+                copy += 1
+        d += 1
+
+
+cdef void judge(frames_t *f) noexcept nogil:
+    """The one judging pass of a collect: frames, then units, then the inputs. If the units are
+    settled and every datagram is right again, they are as they were."""
+    cdef frame_t *frame = f.frames
+    cdef const frame_t *last = frame + f.frame_count
+    cdef bint all_right
     while frame < last:
-        if frame.back and not frame.noted:
-            note(f, frame)
+        if frame.back and not frame.judged:
+            judge_frame(f, frame)
         frame += 1
     f.al_counter = f.al_answered
     if f.al_counter > 0:
         f.al_status = f.al_seen
-    right = f.all_due and f.missing == 0 and not f.wrong and f.serial != 0
-    if not right:
+    all_right = f.right == f.datagram_count
+    if not (all_right and f.settled):
         judge_units(f)
-    elif not f.settled:
-        settle(f)
+    f.settled = all_right
     f.judged = 1
     f.collected = f.missing == 0
-    while d < end:
-        if d.input_count > 0 and (right or are_good(f, d)):
-            copy_inputs(f, d)
-        d += 1
+    copy_inputs(f)
 
 
 cdef void frames_drain(void *self) noexcept nogil:
@@ -369,7 +422,7 @@ cdef int frames_collect(void *self, int64_t deadline) noexcept nogil:
 
 
 cdef void frames_flush(frames_t *f) noexcept nogil:
-    """Forgets what arrived before the first cycle; frames of a former run are no news."""
+    """Drop what arrived before the first cycle."""
     cdef const uint8_t *bytes
     cdef int k
     for k in range(4 * DRAIN_MAX):
@@ -377,12 +430,26 @@ cdef void frames_flush(frames_t *f) noexcept nogil:
             return
 
 
-# ---- the edge: a plan is checked once, so that nothing above needs to
+# ---- construction: the plan is checked once, so that no function above has to
 
 def check(condition, message):
-    """ValueError with `message` unless `condition`."""
+    """Raise ValueError(message) unless the condition holds."""
     if not condition:
         raise ValueError(message)
+
+
+def frames_per_cycle(frames):
+    """Return an upper bound of the frames that are due in one cycle: for each divider its fullest
+    phase. The plan refuses by the same number (plan/frames.py)."""
+    counts = {}
+    for frame in frames:
+        counts.setdefault(frame.every, {}).setdefault(frame.phase, []).append(frame)
+    return sum(max(map(len, phases.values())) for phases in counts.values())
+
+
+def has_number(frame):
+    """True if the frame carries a cycle number."""
+    return any(d.kind == CYCLE_NUMBER for d in frame.datagrams)
 
 
 cdef class Frames:
@@ -412,29 +479,28 @@ cdef class Frames:
         self.c.unit_valid = <uint8_t *>calloc(len(units) + 1, 1)
         self.c.unit_fresh = <uint8_t *>calloc(len(units) + 1, 1)
         self.c.unit_missed = <uint32_t *>calloc(len(units) + 1, sizeof(uint32_t))
-        self.c.unit_frame = <uint32_t *>calloc(len(units) + 1, sizeof(uint32_t))
-        self.c.unit_optional = <uint8_t *>calloc(len(units) + 1, 1)
         self.c.unit_counter = <uint16_t *>calloc(len(units) + 1, sizeof(uint16_t))
-        self.c.unit_expected = <uint16_t *>calloc(len(units) + 1, sizeof(uint16_t))
-        if not (self.c.outputs and self.c.inputs and self.c.unit_valid and self.c.unit_optional
-                and self.c.unit_counter and self.c.unit_expected and self.c.unit_fresh
-                and self.c.unit_missed and self.c.unit_frame):
+        self.c.units = <unit_t *>calloc(len(units) + 1, sizeof(unit_t))
+        if not (self.c.outputs and self.c.inputs and self.c.unit_valid and self.c.unit_fresh
+                and self.c.unit_missed and self.c.unit_counter and self.c.units):
             raise MemoryError
         for k, unit in enumerate(units):
-            self.c.unit_optional[k] = 1 if unit.optional else 0
+            self.c.units[k].optional = 1 if unit.optional else 0
 
     def make_frames(self, plan):
         datagrams = [d for frame in plan.frames for d in frame.datagrams]
         copies = sum(len(d.outputs) + len(d.inputs) for d in datagrams)
-        check(1 <= len(plan.frames) <= FRAME_COUNT_MAX,
-              f"frames: {len(plan.frames)}, at least 1 and at most {FRAME_COUNT_MAX}")
+        check(1 <= len(plan.frames) <= FRAMES_MAX,
+              f"frames: {len(plan.frames)}, at least 1 and at most {FRAMES_MAX}")
+        limit = INDEX_COUNT if all(map(has_number, plan.frames)) else FRAMES_PER_CYCLE_MAX
+        busiest = frames_per_cycle(plan.frames)
+        check(busiest <= limit, f"frames: {busiest} in one cycle, at most {limit}")
         self.c.frames = <frame_t *>calloc(len(plan.frames), sizeof(frame_t))
         self.c.datagrams = <datagram_t *>calloc(len(datagrams) + 1, sizeof(datagram_t))
         self.c.copies = <copy_t *>calloc(copies + 1, sizeof(copy_t))
         if not (self.c.frames and self.c.datagrams and self.c.copies):
             raise MemoryError
         self.c.frame_count = len(plan.frames)
-        self.c.all_due = all(frame.every == 1 for frame in plan.frames)
         copies = 0
         for number, frame in enumerate(plan.frames):
             self.make_frame(number, frame)
@@ -451,7 +517,7 @@ cdef class Frames:
               f"frame {number}: every {frame.every} cycles, phase {frame.phase}")
         check(number > 0 or frame.every == 1, "frame 0 goes out in every cycle")
         payload = int.from_bytes(template[14:16], "little")
-        end = DATAGRAMS + sum(HEADER + d.length + COUNTER for d in frame.datagrams)
+        end = DATAGRAMS + sum(HEADER + d.length + CAT_DATAGRAM_COUNTER for d in frame.datagrams)
         check(payload >> 12 == 1 and DATAGRAMS + (payload & 0x7FF) == end and end <= len(template),
               f"frame {number}: its EtherCAT header says {payload:#06x}, its datagrams end at {end}")
         cdef frame_t *c = &self.c.frames[number]
@@ -471,10 +537,11 @@ cdef class Frames:
         cdef datagram_t *d = &self.c.datagrams[place]
         first = place == self.c.frames[number].first_datagram
         expected = DATAGRAMS if first else (
-            self.c.datagrams[place - 1].offset + HEADER + self.c.datagrams[place - 1].length + COUNTER
+            self.c.datagrams[place - 1].offset + HEADER + self.c.datagrams[place - 1].length
+            + CAT_DATAGRAM_COUNTER
         )
         check(plan.offset == expected, f"{where}: expected at {expected}")
-        check(0 <= plan.command <= COMMAND_MAX, f"{where}: command {plan.command}")
+        check(CAT_NOP <= plan.command <= CAT_FRMW, f"{where}: command {plan.command}")
         header = frame.template[plan.offset : plan.offset + HEADER]
         check(header[0] == plan.command
               and int.from_bytes(header[6:8], "little") & 0x7FF == plan.length,
@@ -482,11 +549,15 @@ cdef class Frames:
         check(0 <= plan.expected_counter <= 0xFFFF, f"{where}: counter {plan.expected_counter}")
         check(-1 <= plan.sync_unit < <int>self.c.image.unit_count,
               f"{where}: sync unit {plan.sync_unit} of {self.c.image.unit_count}")
-        check(plan.kind in (PROCESS_DATA, AL_STATUS, CLOCK), f"{where}: kind {plan.kind}")
+        check(plan.kind in (PROCESS_DATA, AL_STATUS, CLOCK, CYCLE_NUMBER),
+              f"{where}: kind {plan.kind}")
         check(plan.kind != AL_STATUS or plan.length >= 2, f"{where}: AL status has two bytes")
+        check(plan.kind == PROCESS_DATA or plan.sync_unit < 0, f"{where}: kind {plan.kind} in a unit")
+        if plan.kind == CYCLE_NUMBER:
+            self.place_number(where, plan, number)
         if plan.sync_unit >= 0:
             self.place_unit(where, plan.sync_unit, number)
-            self.c.unit_expected[<uint32_t>plan.sync_unit] += <uint16_t>plan.expected_counter
+            self.c.units[<uint32_t>plan.sync_unit].datagrams += 1
         d.kind = plan.kind
         d.command = plan.command
         d.header_mask = int.from_bytes(self.kept(plan), "little")
@@ -503,25 +574,34 @@ cdef class Frames:
             copies = self.make_copy(where, plan, copy, self.c.image.output_size, copies)
         for copy in plan.inputs:
             copies = self.make_copy(where, plan, copy, self.c.image.input_size, copies)
-        if d.unit < 0 or not self.c.unit_optional[d.unit]:
+        if d.unit < 0:
+            self.c.frames[number].needed |= plan.kind != CYCLE_NUMBER
+        elif not self.c.units[d.unit].optional:
             self.c.frames[number].needed = 1
         self.c.datagram_count += 1
         return copies
 
+    def place_number(self, where, plan, uint32_t number):
+        cdef frame_t *frame = &self.c.frames[number]
+        check(plan.command == CAT_NOP and plan.length == NUMBER_SIZE and plan.expected_counter == 0,
+              f"{where}: a cycle number is a NOP of {NUMBER_SIZE} bytes")
+        check(frame.number_offset == 0, f"{where}: a second cycle number")
+        frame.number_offset = plan.offset + HEADER
+
     def kept(self, plan):
-        """Of the first eight bytes of a header, the bits that come back as they were sent: not the
-        index, nor the circulating bit and the reserved ones of the length word."""
+        """Return the mask of the bits in the first eight bytes of a header that come back as sent:
+        not the index, the circulating bit or the reserved bits of the length word."""
         adp = plan.command not in ADDRESS_MOVES and plan.kind != CLOCK  # another each cycle
         ado = plan.kind != CLOCK
         return bytes((0xFF, 0, *[0xFF * adp] * 2, *[0xFF * ado] * 2, 0xFF, 0x87))
 
     def place_unit(self, where, uint32_t unit, uint32_t number):
-        """All frames of a unit are due in the same cycles."""
+        """Check that all frames of a unit are due in the same cycles."""
         cdef frame_t *first
         if not self.c.unit_valid[unit]:  # used as a mark until the first cycle
             self.c.unit_valid[unit] = 1
-            self.c.unit_frame[unit] = number
-        first = &self.c.frames[self.c.unit_frame[unit]]
+            self.c.units[unit].frame = number
+        first = &self.c.frames[self.c.units[unit].frame]
         check((first.every, first.phase) == (self.c.frames[number].every, self.c.frames[number].phase),
               f"{where}: its sync unit rides in frames of other cycles too")
 
@@ -539,7 +619,7 @@ cdef class Frames:
         return place + 1
 
     cdef carry_time(self, clock_t *clock):
-        """Shows the clock where its data sits in the templates."""
+        """Give the clock the places of its data in the templates."""
         cdef uint32_t k
         cdef datagram_t *d
         cdef uint8_t *header
@@ -549,12 +629,12 @@ cdef class Frames:
                 continue
             check(d.frame == 0 and d.length == 4, "clock: four bytes each, in the first frame")
             header = self.c.frames[0].template + d.offset
-            if d.command == FRMW:
+            if d.command == CAT_FRMW:
                 clock.time_header = header
                 clock.listeners = d.expected_counter
-            elif d.command == FPWR:
+            elif d.command == CAT_FPWR:
                 clock.main_header = header
-            elif d.command == FPRD:
+            elif d.command == CAT_FPRD:
                 clock.watch_header = header
         check(clock.time_header != NULL, "clock: no frame carries the reference's time")
         check((clock.main_header != NULL) == (clock.follows_main != 0),
@@ -593,7 +673,5 @@ cdef class Frames:
         free(self.c.unit_valid)
         free(self.c.unit_fresh)
         free(self.c.unit_missed)
-        free(self.c.unit_frame)
-        free(self.c.unit_optional)
         free(self.c.unit_counter)
-        free(self.c.unit_expected)
+        free(self.c.units)

@@ -20,6 +20,28 @@ cdef extern from "atomics.h" nogil:
     void cat_fence()
 
 
+cdef extern from "ethercat.h" nogil:
+    enum:
+        CAT_NOP
+        CAT_APRD
+        CAT_APWR
+        CAT_APRW
+        CAT_FPRD
+        CAT_FPWR
+        CAT_BRD
+        CAT_BWR
+        CAT_BRW
+        CAT_ARMW
+        CAT_FRMW
+        CAT_ETHERNET_HEADER
+        CAT_ETHERCAT_HEADER
+        CAT_DATAGRAM_HEADER
+        CAT_DATAGRAM_COUNTER
+        CAT_AL_STATE
+        CAT_AL_ERROR
+        CAT_AL_OP
+
+
 cdef extern from "futex.h" nogil:
     int cat_futex_wait(uint32_t *word, uint32_t value, int64_t timeout_ns)
     void cat_futex_wake(uint32_t *word)

@@ -26,6 +26,7 @@ from catenary.core._histogram cimport (
 )
 from catenary.core._lane cimport Lane
 from catenary.core._native cimport (
+    CAT_AL_OP,
     CAT_IMAGE_CAPSULE,
     CAT_IMAGE_VERSION,
     CAT_LINK_CAPSULE,
@@ -36,10 +37,6 @@ from catenary.core._native cimport (
     cat_image,
     cat_link,
 )
-
-
-cdef enum:
-    AL_OP = 8                  # AL status of a device in OP without an error
 
 
 def columns_by_bank(columns):
@@ -222,7 +219,7 @@ cdef class Parts:
         for unit in range(image.unit_count):
             if not image.unit_valid[unit]:
                 return True
-        return image.al_counter[0] != self.device_count or image.al_status[0] != AL_OP
+        return image.al_counter[0] != self.device_count or image.al_status[0] != CAT_AL_OP
 
     # ---- figures
 
@@ -240,6 +237,7 @@ cdef class Parts:
             "corrupt": 0,
             "duplicate": 0,
             "unprocessed": 0,
+            "repeated": 0,
             "lane_sent": self.lane.c.sent,
             "lane_received": self.lane.c.received,
             "lane_dropped": self.lane.c.dropped,

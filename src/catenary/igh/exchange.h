@@ -13,6 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "ethercat.h"
 #include "exchange_memory.h"
 #include "follow.h"
 #include "image.h"
@@ -128,7 +129,7 @@ static void igh_judge(igh_exchange *x)
     igh_state(&x->calls, x->calls.master_state, x->master, &state);
     x->al_counter = (uint16_t)state.responding;
     if (state.responding > 0)
-        x->al_status = state.bits & 0x0F;
+        x->al_status = state.bits & CAT_AL_STATE;
     x->link_up = state.bits >> 4 & 1;
 }
 

@@ -12,7 +12,7 @@ and 2 system calls to send.
 from libc.errno cimport EINTR, EMSGSIZE, errno
 from libc.stdint cimport int64_t, uint8_t, uint32_t, uint64_t
 from libc.stdlib cimport calloc, free
-from libc.string cimport memcpy
+from libc.string cimport memcmp, memcpy
 from posix.time cimport timespec
 
 from catenary.link._table cimport (
@@ -32,6 +32,15 @@ from catenary.link.ring_state import ROUTES, RingState
 cdef extern from "ring_merge.h" nogil:
     int cat_ring_merge(uint8_t *frame, uint32_t length, const uint8_t *other, uint32_t other_length)
     void cat_ring_second(uint8_t *frame, uint32_t length)
+    uint32_t cat_find_nop(const uint8_t *frame, uint32_t length, uint32_t *size)
+
+cdef extern from "ethercat.h" nogil:
+    enum:
+        CAT_BRD
+        CAT_DATAGRAM_COUNTER
+        CAT_DATAGRAM_HEADER
+        CAT_ETHERCAT_HEADER
+        CAT_ETHERNET_HEADER
 
 cdef extern from "<poll.h>" nogil:
     enum:
@@ -51,17 +60,19 @@ cdef enum:
     SECOND_BIT = 0x80
     SOURCE = 6
     PROCESSED = 0x02                  # of the source address's first byte: a controller was passed
-    INDEX = 17                        # of the first datagram
-    HEADERS = 28                      # to the end of the first datagram's header, and its counter
+    DATAGRAMS = CAT_ETHERNET_HEADER + CAT_ETHERCAT_HEADER
+    INDEX = DATAGRAMS + 1             # of the first datagram
+    HEADERS = DATAGRAMS + CAT_DATAGRAM_HEADER + CAT_DATAGRAM_COUNTER  # of the first datagram
     GIVEN_UP = 3                      # copies in a row that did not come
     BURST = 512                       # frames taken in at once
     SECOND_NS = 1_000_000_000
-    BRD = 7
 
 cdef int64_t NEVER = 0x7FFFFFFFFFFFFFFF
 
 ctypedef struct slot_t:
     uint32_t length
+    uint32_t nop                      # where a NOP in the frame has its data; 0: it has none
+    uint32_t nop_size
     uint8_t expected                  # copies sent: bit 0 first, bit 1 second
     uint8_t back                      # copies that came
     uint8_t delivered
@@ -120,6 +131,7 @@ cdef int ring_send(void *self, const uint8_t *frame, uint32_t length) noexcept n
     slot = &ring.slots[frame[INDEX]]
     forget(ring, frame[INDEX])
     slot.length = length
+    slot.nop = cat_find_nop(frame, length, &slot.nop_size)
     slot.back = 0
     slot.delivered = 0
     slot.expected = 0
@@ -170,7 +182,7 @@ cdef void take(ring_t *ring, int arrived, const uint8_t *frame, uint32_t length)
     slot.back |= 1 << side
     ring.missed[side] = 0
     ring.arrived_on[side] = arrived
-    if frame[16] == BRD:
+    if frame[16] == CAT_BRD:
         ring.counted[side] = first_counter(frame, length)
     if slot.delivered:
         return
@@ -183,12 +195,13 @@ cdef void take(ring_t *ring, int arrived, const uint8_t *frame, uint32_t length)
 
 
 cdef bint is_copy(const slot_t *slot, const uint8_t *frame, uint32_t length) noexcept nogil:
-    """As far as can be told cheaply: the same EtherCAT header, and all its datagrams."""
-    return (
-        frame[14] == slot.sent[14]
-        and frame[15] == slot.sent[15]
-        and length >= 16 + <uint32_t> (frame[14] | (frame[15] & 7) << 8)
-    )
+    """True if the frame has the EtherCAT header and all datagrams of the one sent, and its NOP is
+    unchanged. That tells a cycle number from an older one (core/_frames.pyx)."""
+    if length < DATAGRAMS + <uint32_t> (frame[14] | (frame[15] & 7) << 8):
+        return False
+    if frame[14] != slot.sent[14] or frame[15] != slot.sent[15]:
+        return False
+    return slot.nop == 0 or memcmp(frame + slot.nop, slot.sent + slot.nop, slot.nop_size) == 0
 
 
 cdef uint32_t first_counter(const uint8_t *frame, uint32_t length) noexcept nogil:
@@ -202,7 +215,7 @@ cdef inline bint is_processed(const uint8_t *frame) noexcept nogil:
 
 cdef inline bint lacks_devices(ring_t *ring, const slot_t *slot, int side) noexcept nogil:
     """A broadcast that met fewer devices than the last: they may be on the other side now."""
-    return slot.sent[16] == BRD and first_counter(slot.copies[side], slot.length) < ring.total
+    return slot.sent[16] == CAT_BRD and first_counter(slot.copies[side], slot.length) < ring.total
 
 
 cdef int64_t due_at(ring_t *ring, const slot_t *slot) noexcept nogil:
@@ -250,7 +263,7 @@ cdef int ring_receive(void *self, const uint8_t **frame) noexcept nogil:
     if not whole:
         ring.unpaired += 1
         note_missed(ring, SECOND if slot.back == 1 else FIRST)
-    if slot.sent[16] == BRD:
+    if slot.sent[16] == CAT_BRD:
         ring.total = 0
         for side in range(2):
             if slot.back >> side & 1:

@@ -8,13 +8,10 @@ from typing import NamedTuple
 from catenary.errors import DriveError, StateError, WorkingCounterError
 from catenary.model.finding import Finding
 from catenary.procedure.survey import Answer
-from catenary.wire.al import State, status_code
+from catenary.wire.al import ERROR_FLAG, STATE_MASK, State, status_code
 from catenary.wire.cia402 import IN_FAULT
 from catenary.wire.cia402 import State as DriveState
 from catenary.wire.drive_error import error_text
-
-STATE_BITS = 0x0F
-ERROR_BIT = 0x10
 
 
 def silence_error(
@@ -71,7 +68,7 @@ def state_error(answers: Sequence[Answer], log: object) -> StateError | None:
         f"{described(first)}, out of OP",
         position=first.station.position,
         requested=int(State.OP),
-        actual=(first.word or 0) & STATE_BITS,
+        actual=(first.word or 0) & STATE_MASK,
         code=first.code,
         log=log,
         hint=known.cause or "see its manual for what makes it leave OP",
@@ -129,17 +126,17 @@ def drive_error(axes: Sequence[AxisTrouble], what: str, log: object) -> DriveErr
 
 def is_astray(answer: Answer) -> bool:
     """Answers, but not from OP."""
-    return answer.word is not None and answer.word & (STATE_BITS | ERROR_BIT) != State.OP
+    return answer.word is not None and answer.word & (STATE_MASK | ERROR_FLAG) != State.OP
 
 
 def described(answer: Answer) -> str:
     """The device, its state and its reason."""
     assert answer.word is not None
     try:
-        state = str(State(answer.word & STATE_BITS))
+        state = str(State(answer.word & STATE_MASK))
     except ValueError:
-        state = f"state {answer.word & STATE_BITS}"
-    error = " with an error" if answer.word & ERROR_BIT else ""
+        state = f"state {answer.word & STATE_MASK}"
+    error = " with an error" if answer.word & ERROR_FLAG else ""
     reason = (
         f" (AL status code 0x{answer.code:04X}: {status_code(answer.code).text})"
         if answer.code

@@ -24,7 +24,7 @@ from catenary.bus.event import (
 from catenary.bus.pending import Pending
 from catenary.errors import CatenaryError
 from catenary.link import ring_of
-from catenary.loop.diagnosis import ERROR_BIT, STATE_BITS, described
+from catenary.loop.diagnosis import described
 from catenary.loop.ring_watch import RingWatch
 from catenary.model.device import Identity
 from catenary.model.returning import vacancies
@@ -34,7 +34,7 @@ from catenary.procedure import restore
 from catenary.procedure.al_state import request_state
 from catenary.procedure.exchange import Procedure, after
 from catenary.procedure.survey import Answer, survey
-from catenary.wire.al import State
+from catenary.wire.al import ERROR_FLAG, STATE_MASK, State
 
 Policy = Literal["restore", "hold"]
 Submit = Callable[[Procedure[None]], Pending[None]]
@@ -175,7 +175,7 @@ class Watch:
             self._conclude(charge, task)
         if answer.word is None:
             self._lose(charge)
-        elif answer.word & (STATE_BITS | ERROR_BIT) == State.OP:
+        elif answer.word & (STATE_MASK | ERROR_FLAG) == State.OP:
             if charge.standing is Standing.LOST and not self._lets_in(charge):
                 self._welcome(charge)  # out of OP, which it has never left
             elif charge.standing is not Standing.HELD:
@@ -183,7 +183,7 @@ class Watch:
         elif charge.standing is Standing.RUNNING:
             charge.standing = Standing.ASTRAY
             charge.sub.state = None
-            state = answer.word & STATE_BITS
+            state = answer.word & STATE_MASK
             message = f"{described(answer)}, out of OP"
             self._tell(
                 StateLost(self._now(), charge.sub, message, int(State.OP), state, answer.code)

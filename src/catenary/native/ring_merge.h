@@ -13,12 +13,10 @@
 #define CATENARY_RING_MERGE_H
 
 #include <stdint.h>
+#include "ethercat.h"
 
 enum {
-    CAT_MERGE_HEADER = 16,            /* Ethernet and EtherCAT headers */
-    CAT_DATAGRAM_HEADER = 10,
-    CAT_DATAGRAM_COUNTER = 2,
-    CAT_FRMW = 14,
+    CAT_MERGE_HEADER = CAT_ETHERNET_HEADER + CAT_ETHERCAT_HEADER,
     CAT_NOBODY = 0xFF                 /* both bytes of a station address that no device has */
 };
 
@@ -38,9 +36,24 @@ static inline uint32_t cat_datagrams_end(const uint8_t *frame, uint32_t length) 
     return end <= length ? end : 0;
 }
 
+/* Where the data of the frame's first NOP datagram begin, and their size; 0: the frame has none. */
+static inline uint32_t cat_find_nop(const uint8_t *frame, uint32_t length, uint32_t *size) {
+    uint32_t end = cat_datagrams_end(frame, length);
+    for (uint32_t at = CAT_MERGE_HEADER; at < end;) {
+        uint32_t whole = cat_datagram_size(frame, at, end);
+        if (whole == 0) return 0;
+        if (frame[at] == CAT_NOP) {
+            *size = whole - CAT_DATAGRAM_HEADER - CAT_DATAGRAM_COUNTER;
+            return at + CAT_DATAGRAM_HEADER;
+        }
+        at += whole;
+    }
+    return 0;
+}
+
 /* Whether the second copy's datagram says nothing of the first's: it is not the same question. */
 static inline int cat_is_apart(const uint8_t *mine, const uint8_t *other) {
-    return other[0] == 0 || (other[0] == CAT_FRMW && cat_word(other + 2) != cat_word(mine + 2));
+    return other[0] == CAT_NOP || (other[0] == CAT_FRMW && cat_word(other + 2) != cat_word(mine + 2));
 }
 
 /* Merges `other` into `frame`. 0, or -1 where the two are not copies of one frame (then `frame` may
@@ -88,9 +101,8 @@ static inline void cat_ring_second(uint8_t *frame, uint32_t length) {
                 break;
             }
             /* fallthrough */
-        case 1: case 2: case 3:       /* APRD, APWR, APRW */
-        case 13:                      /* ARMW */
-            frame[at] = 0;
+        case CAT_APRD: case CAT_APWR: case CAT_APRW: case CAT_ARMW:
+            frame[at] = CAT_NOP;
         }
         at += size;
     }

@@ -63,6 +63,7 @@ class DatagramKind(IntEnum):
     PROCESS_DATA = 0
     AL_STATUS = 1  # the BRD that rides in every cycle
     CLOCK = 2  # distributed clocks: FPWR our time, FRMW the reference's, FPRD a difference
+    CYCLE_NUMBER = 3  # a NOP that no device changes: makes the matching of the frame exact
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ static inline void watchdog_trigger(controller *c) {
     c->watchdog_due = time > 0 ? c->segment->now + time : NEVER;
     due_at(c, c->watchdog_due);
     if (c->emulation)
-        c->outputs_valid = (c->memory[REG_AL_STATUS] & AL_STATE) == 8;
+        c->outputs_valid = (c->memory[REG_AL_STATUS] & AL_STATE) == CAT_AL_OP;
 }
 
 /* A complete write without trigger. A terminal without microcontroller shows its outputs as long as

@@ -8,8 +8,8 @@ from enum import IntEnum
 
 from catenary.errors import DecodeError
 
-_STATE_MASK = 0x000F
-_ACKNOWLEDGE = 0x0010  # in AL control; in AL status the same bit says that an error is pending
+STATE_MASK = 0x000F  # in AL control and AL status
+ERROR_FLAG = 0x0010  # AL status: an error is pending; AL control: acknowledge it
 _IDENTIFICATION = 0x0020
 
 
@@ -38,14 +38,14 @@ class AlControl:
     def word(self) -> int:
         """The register's value."""
         word = int(self.state)
-        word |= _ACKNOWLEDGE if self.acknowledge else 0
+        word |= ERROR_FLAG if self.acknowledge else 0
         word |= _IDENTIFICATION if self.request_identification else 0
         return word
 
     @classmethod
     def from_word(cls, word: int) -> AlControl:
         """The reverse of `word`. DecodeError if the state is none. Bits 6 to 15 carry nothing."""
-        return cls(_state(word), bool(word & _ACKNOWLEDGE), bool(word & _IDENTIFICATION))
+        return cls(_state(word), bool(word & ERROR_FLAG), bool(word & _IDENTIFICATION))
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ class AlStatus:
     def word(self) -> int:
         """The register's value."""
         word = int(self.state)
-        word |= _ACKNOWLEDGE if self.error else 0
+        word |= ERROR_FLAG if self.error else 0
         word |= _IDENTIFICATION if self.identification else 0
         return word
 
@@ -70,7 +70,7 @@ class AlStatus:
 
         After a broadcast read the states are or-ed together, which may be none: `states_in`.
         """
-        return cls(_state(word), bool(word & _ACKNOWLEDGE), bool(word & _IDENTIFICATION))
+        return cls(_state(word), bool(word & ERROR_FLAG), bool(word & _IDENTIFICATION))
 
 
 def states_in(word: int) -> frozenset[State]:
@@ -97,9 +97,9 @@ def status_code(code: int) -> StatusCode:
 
 def _state(word: int) -> State:
     try:
-        return State(word & _STATE_MASK)
+        return State(word & STATE_MASK)
     except ValueError:
-        raise DecodeError(f"no EtherCAT state: {word & _STATE_MASK} (word 0x{word:04X})") from None
+        raise DecodeError(f"no EtherCAT state: {word & STATE_MASK} (word 0x{word:04X})") from None
 
 
 _CODES = (
