@@ -115,6 +115,25 @@ def servo(
     )
 
 
+def block(position: int, *, outputs: int, inputs: int) -> DeviceDescription:
+    """Bytes of outputs and inputs, in adjacent SyncManagers."""
+    pdos = [
+        Pdo(index, tuple(Entry(index + 0x5A00, k % 255 + 1, 8, "", 5) for k in range(size)), number)
+        for index, number, size in ((0x1600, 2, outputs), (0x1A00, 3, inputs))
+    ]
+    channels = (
+        SyncManager(2, OUT, 0x1000, outputs, 0x64),
+        SyncManager(3, IN, 0x2000, inputs, 0x20),
+    )
+    return device(
+        position,
+        "Block",
+        outputs=(pdos[0],) if outputs else (),
+        inputs=(pdos[1],) if inputs else (),
+        sync_managers=channels,
+    )
+
+
 def demo() -> list[DeviceDescription]:
     """Coupler, lamps, three servos, lamps."""
     return [coupler(0), lamps(1), servo(2), servo(3), servo(4), lamps(5)]

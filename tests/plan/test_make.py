@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from catenary.errors import ConfigurationError
+from catenary.errors import ConfigurationError, MappingError
 from catenary.model.device import Direction
 from catenary.plan import Number, NumberKind, make_plan
 from catenary.plan.cycle import Copy, DatagramKind, DatagramPlan
@@ -16,7 +16,7 @@ from catenary.plan.wish import PdoWish, WishTables
 from catenary.wire.datagram import Command
 from catenary.wire.features import Feature
 from catenary.wire.frame import decode_frame
-from tests.plan.devices import asks, coupler, demo, lamps, servo
+from tests.plan.devices import asks, block, coupler, demo, lamps, servo
 
 MAILBOXES = DatagramPlan(  # of three drives, behind the 80 bytes of process data
     DatagramKind.PROCESS_DATA, Command.LRD, 122, 1, 3, -1, inputs=(Copy(132, 39, 1),)
@@ -234,6 +234,32 @@ def test_many_devices_take_several_frames_and_never_straddle(count: int) -> None
     )
     for (start, length), (following, _) in itertools.pairwise(logical):
         assert start + length <= following
+
+
+@pytest.mark.parametrize(("exact", "limit"), [(False, 1472), (True, 1456)])
+def test_a_device_that_exceeds_a_datagram_is_refused_with_both_numbers(
+    exact: bool, limit: int
+) -> None:
+    fits = block(0, outputs=700, inputs=limit - 700)
+    plan = make_plan([fits], exact_matching=exact)
+    assert len(plan.cycle.frames) == 1
+    with pytest.raises(MappingError) as caught:
+        make_plan([block(0, outputs=701, inputs=limit - 700)], exact_matching=exact)
+    text = str(caught.value)
+    assert f"701 bytes of outputs and {limit - 700} bytes of inputs" in text
+    assert f"{limit + 1} bytes of process data" in text
+    assert f"holds {limit} bytes" in text
+    assert "1 bytes less" in text
+
+
+def test_more_frames_in_a_cycle_than_indices_are_refused_by_the_plan() -> None:
+    devices = [block(k, outputs=1000, inputs=0) for k in range(33)]
+    assert len(make_plan(devices[:32]).cycle.frames) == 32
+    with pytest.raises(ConfigurationError) as caught:
+        make_plan(devices)
+    assert "33 frames in one cycle, at most 32" in str(caught.value)
+    assert "exact_matching=True" in str(caught.value)
+    assert len(make_plan(devices, exact_matching=True).cycle.frames) == 33
 
 
 def test_a_wish_for_a_device_that_is_not_there() -> None:

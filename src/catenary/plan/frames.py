@@ -2,13 +2,19 @@
 
 A device adds to a logical datagram's working counter: LRD 1, LWR 1, LRW 1 for a read and 2 for
 a write (ETG.1000.4 table 14), once per datagram however many FMMUs it has.
+
+Frames are matched by an index of 7 bits (core/_frames.pyx). An index returns after 128 frames, so
+that at most 32 frames may be sent in one cycle. With `exact_matching` each frame also carries the
+cycle number, and 128 frames are possible.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from catenary.errors import ConfigurationError
 from catenary.plan.clocks import ClockChoice
 from catenary.plan.cycle import Copy, DatagramKind, DatagramPlan, FramePlan
 from catenary.plan.layout import UnitLayout
@@ -22,6 +28,11 @@ from catenary.wire.register import (
     SYSTEM_TIME_LOW,
     Register,
 )
+
+CYCLE_NUMBER_SIZE = OVERHEAD + 4  # bytes of a datagram with a number of 32 bits
+FRAMES_PER_CYCLE_MAX = 32  # an index returns after four cycles at least
+EXACT_FRAMES_MAX = 128  # all indices, 0x00 to 0x7F
+FRAMES_MAX = 1024  # of all dividers and phases together
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +51,11 @@ class _Piece:
     phase: int = 0
 
     @property
+    def turn(self) -> tuple[int, int]:
+        """The cycles in which it is sent."""
+        return self.every, self.phase
+
+    @property
     def size(self) -> int:
         return OVERHEAD + self.length
 
@@ -49,16 +65,76 @@ def make_frames(
     device_count: int,
     clocks: ClockChoice | None = None,
     mailboxes: MailboxArea | None = None,
+    *,
+    exact_matching: bool = False,
 ) -> tuple[FramePlan, ...]:
-    """The frames of one cycle, in the order they are sent. Frame 0 begins with the BRD of AL
-    status, which every device answers, and carries the time. What is not exchanged in every cycle
-    rides in frames of its own, so that the other cycles do not carry it."""
+    """Return the frames of one cycle, in the order they are sent.
+
+    Frame 0 begins with the BRD of AL status, which every device answers, and carries the time.
+    Units with a divider have frames of their own, so that the other cycles do not carry them.
+
+    Args:
+        units: Units of the layout, in its order.
+        device_count: Devices on the segment.
+        clocks: Distributed clocks; None if no device uses them.
+        mailboxes: Mailbox bits; None if they are not exchanged.
+        exact_matching: True if every frame carries the cycle number.
+
+    Raises:
+        ConfigurationError: More frames in one cycle than indices can tell apart.
+    """
     pieces = [_al_status(device_count), *_of_clocks(clocks)]
     for number, unit in enumerate(units):
         for piece in _of_unit(unit, number):
             pieces.append(replace(piece, every=unit.every, phase=unit.phase))
     pieces.extend(_of_mailboxes(mailboxes))
-    return tuple(_frame(batch) for batch in _batches(pieces))
+    room = MAXIMUM_PAYLOAD - (CYCLE_NUMBER_SIZE if exact_matching else 0)
+    batches = _batches(pieces, room)
+    if exact_matching:
+        batches = [[*batch, _cycle_number(batch[0])] for batch in batches]
+    frames = tuple(_frame(batch) for batch in batches)
+    _check_count(frames, exact_matching)
+    return frames
+
+
+def frames_per_cycle(frames: Sequence[FramePlan]) -> int:
+    """Return an upper bound of the frames sent in one cycle: for each divider its fullest phase."""
+    counts = Counter((frame.every, frame.phase) for frame in frames)
+    fullest: dict[int, int] = {}
+    for (every, _), count in counts.items():
+        fullest[every] = max(fullest.get(every, 0), count)
+    return sum(fullest.values())
+
+
+def _check_count(frames: Sequence[FramePlan], exact_matching: bool) -> None:
+    limit = EXACT_FRAMES_MAX if exact_matching else FRAMES_PER_CYCLE_MAX
+    busiest = frames_per_cycle(frames)
+    if busiest <= limit and len(frames) <= FRAMES_MAX:
+        return
+    if busiest <= limit:
+        raise ConfigurationError(
+            f"{len(frames)} frames for all dividers and phases, at most {FRAMES_MAX}",
+            hint="exchange fewer devices with dividers (every=...)",
+        )
+    more = "" if exact_matching else f", Loop(exact_matching=True) allows {EXACT_FRAMES_MAX}"
+    raise ConfigurationError(
+        f"{busiest} frames in one cycle, at most {limit}: an index of 7 bits identifies them{more}",
+        hint="map fewer objects, or exchange some devices less often (every=...)",
+    )
+
+
+def _cycle_number(first: _Piece) -> _Piece:
+    """The last datagram of a frame: a NOP, which passes every device unchanged."""
+    return _Piece(
+        DatagramKind.CYCLE_NUMBER,
+        Command.NOP,
+        0,
+        CYCLE_NUMBER_SIZE - OVERHEAD,
+        expected_counter=0,
+        sync_unit=-1,
+        every=first.every,
+        phase=first.phase,
+    )
 
 
 def _al_status(device_count: int) -> _Piece:
@@ -159,13 +235,14 @@ def _of_unit(unit: UnitLayout, number: int) -> list[_Piece]:
     return pieces
 
 
-def _batches(pieces: Sequence[_Piece]) -> list[list[_Piece]]:
-    """Pieces by frame: each goes into the first frame of its cycles with room."""
+def _batches(pieces: Sequence[_Piece], room: int) -> list[list[_Piece]]:
+    """Return the pieces by frame. Each goes into the first frame of its cycles that has room for
+    it; `room` [bytes] is that of an empty frame."""
     batches: list[list[_Piece]] = []
     for piece in pieces:
         for batch in batches:
-            together = (piece.every, piece.phase) == (batch[0].every, batch[0].phase)
-            if together and sum(p.size for p in batch) + piece.size <= MAXIMUM_PAYLOAD:
+            fits = sum(p.size for p in batch) + piece.size <= room
+            if fits and piece.turn == batch[0].turn:
                 batch.append(piece)
                 break
         else:

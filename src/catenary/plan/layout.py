@@ -1,9 +1,11 @@
 """Where the process data sits: images, logical addresses, FMMUs, sync units. ETG.1000.4 §6.6.
 
 - A unit is what one datagram carries (LRW; or LRD and LWR where a device has no LRW). A device
-  never straddles units; an optional device is a unit of its own, so its loss spoils no other.
-  Devices that are exchanged every few cycles share units with their like; the units of a divisor
-  take turns, so that a cycle carries as little as can be.
+  is never split over units or datagrams (docs/deviations.md): when one of two frames is lost, its
+  data would be of different cycles.
+- An optional device is a unit of its own, so its loss spoils no other. Devices that are exchanged
+  every few cycles share units with their like; the units of a divisor take turns, so that a cycle
+  carries as little as can be.
 - Inside a unit: the outputs of its devices, then their inputs, both by position.
 - Every device starts at a byte of its own and fills whole bytes, also a terminal of four bits.
   Sharing bytes by bit-wise FMMUs would save some bytes, but writes would need the neighbour's
@@ -28,6 +30,7 @@ from catenary.wire.sync_manager import WATCHDOG_TRIGGER
 LOGICAL_BASE = 0x0001_0000
 LOGICAL_STRIDE = 0x0000_0800  # units start at multiples: no two share an FMMU's range
 UNIT_MAX = 1472  # bytes of a unit: a frame's 1486 less the 14 of the AL status datagram
+EXACT_UNIT_MAX = UNIT_MAX - 16  # with a cycle number in each frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,14 +151,22 @@ class Layout:
         return self.devices[device].sync_unit
 
 
-def make_layout(devices: Sequence[DeviceData]) -> Layout:
-    """Lays out all devices, given in the order of their positions."""
+def make_layout(devices: Sequence[DeviceData], unit_max: int = UNIT_MAX) -> Layout:
+    """Return the places of all devices.
+
+    Args:
+        devices: All devices, in the order of their positions.
+        unit_max: Limit of a unit [bytes].
+
+    Raises:
+        MappingError: The process data of a device exceed a unit.
+    """
     units: list[UnitLayout] = []
     places: dict[int, DeviceLayout] = {}
     output_offset = input_offset = 0
     logical_start = LOGICAL_BASE
     turns: dict[int, int] = {}  # divisor → units that have it
-    for members in _grouped(devices):
+    for members in _grouped(devices, unit_max):
         number = len(units)
         every = members[0].every
         turn = turns[every] = turns.get(every, -1) + 1
@@ -180,25 +191,26 @@ def make_layout(devices: Sequence[DeviceData]) -> Layout:
     )
 
 
-def _grouped(devices: Sequence[DeviceData]) -> list[list[DeviceData]]:
-    """Devices by unit, in the order of their first member."""
+def _grouped(devices: Sequence[DeviceData], unit_max: int) -> list[list[DeviceData]]:
+    """Return the devices by unit, in the order of their first member."""
     groups: list[list[DeviceData]] = []
     room: dict[tuple[bool, int], int] = {}  # LRW or not, divisor → rank of the group being filled
     for data in devices:
         if data.size == 0:
             continue
-        if data.size > UNIT_MAX:
+        if data.size > unit_max:
             raise MappingError(
-                f"{data.description}: {data.size} bytes of process data do not fit a datagram "
-                f"of {UNIT_MAX} bytes",
-                hint="map fewer objects",
+                f"{data.description}: {data.output_size} bytes of outputs and {data.input_size} "
+                f"bytes of inputs are {data.size} bytes of process data; a device is exchanged in "
+                f"one datagram, which holds {unit_max} bytes",
+                hint=f"map fewer objects: {data.size - unit_max} bytes less",
             )
         if data.optional:
             groups.append([data])
             continue
         kind = (data.description.controller.supports_lrw, data.every)
         rank = room.get(kind)
-        if rank is not None and _fits(groups[rank], data):
+        if rank is not None and _fits(groups[rank], data, unit_max):
             groups[rank].append(data)
         else:
             room[kind] = len(groups)
@@ -206,8 +218,8 @@ def _grouped(devices: Sequence[DeviceData]) -> list[list[DeviceData]]:
     return groups
 
 
-def _fits(group: Sequence[DeviceData], data: DeviceData) -> bool:
-    return sum(member.size for member in group) + data.size <= UNIT_MAX
+def _fits(group: Sequence[DeviceData], data: DeviceData, unit_max: int) -> bool:
+    return sum(member.size for member in group) + data.size <= unit_max
 
 
 def _unit(

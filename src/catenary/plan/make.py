@@ -11,7 +11,7 @@ from catenary.model.device import DeviceDescription, Direction
 from catenary.plan.clocks import BURST, SyncPlan, choose_clocks, make_clock_plan, make_sync
 from catenary.plan.cycle import CyclePlan, FollowedClock, Order, ReceiveMode, SyncUnit
 from catenary.plan.frames import make_frames
-from catenary.plan.layout import DeviceData, Layout, make_layout
+from catenary.plan.layout import EXACT_UNIT_MAX, UNIT_MAX, DeviceData, Layout, make_layout
 from catenary.plan.mailboxes import MailboxArea, with_mailboxes
 from catenary.plan.mapping import Mapping, make_mapping
 from catenary.plan.report import report
@@ -64,6 +64,7 @@ def make_plan(
     reference: int | None = None,
     margin: float | None = None,
     burst: int = BURST,
+    exact_matching: bool = False,
 ) -> Plan:
     """Return the plan that fulfils all wishes.
 
@@ -82,6 +83,7 @@ def make_plan(
         reference: position of the reference clock; None: the first there is.
         margin: [s] between the cycle start and the frames; None: by the execution mode.
         burst: frames that bring the clocks together before the cycle.
+        exact_matching: every frame carries the cycle number (plan/frames.py).
 
     Raises:
         ConfigurationError: an object cannot be mapped, or a wish contradicts another.
@@ -100,11 +102,13 @@ def make_plan(
         for device, mapping, watchdog_ns in zip(devices, mappings, watchdogs, strict=True)
     ]
     data = [replace(d, optional=d.optional or d.position in optional) for d in data]
-    layout = make_layout(data)
+    layout = make_layout(data, EXACT_UNIT_MAX if exact_matching else UNIT_MAX)
     syncs = _syncs(devices, asked, period_ns)
     layout, mailboxes = with_mailboxes(layout, devices)
     choice = choose_clocks(devices, _clock_wishes(asked), clock, reference)
-    frames = make_frames(layout.units, len(devices), choice, mailboxes)
+    frames = make_frames(
+        layout.units, len(devices), choice, mailboxes, exact_matching=exact_matching
+    )
     tables = tuple(wish.tables(layout) for wish in wishes)
     _check_times(tables, late_limit_torque, handover)
     cycle = CyclePlan(

@@ -8,13 +8,14 @@ from itertools import groupby
 from catenary.model.device import Assignment, Direction
 from catenary.plan.axis_report import AxisReport
 from catenary.plan.clocks import SyncPlan
-from catenary.plan.cycle import ClockPlan, CyclePlan, DatagramPlan
+from catenary.plan.cycle import ClockPlan, CyclePlan, DatagramKind, DatagramPlan, FramePlan
 from catenary.plan.layout import Layout
 from catenary.plan.numbers import entry_places
 from catenary.plan.start_up import DevicePlan
 from catenary.wire.cia402 import Mode
 from catenary.wire.clock import Activation
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import OVERHEAD, Command
+from catenary.wire.frame import HEADER_SIZE, wire_time_ns
 
 _ARROW = {Direction.OUTPUT: "out", Direction.INPUT: "in "}
 
@@ -133,11 +134,30 @@ def _entries(direction: Direction, assignments: Sequence[Assignment], offset: in
 
 
 def _frames(cycle: CyclePlan) -> Iterator[str]:
+    yield from _exact_matching(cycle.frames)
     for number, frame in enumerate(cycle.frames):
         when = f", every {frame.every} cycles" if frame.every > 1 else ""
         yield f"frame {number}: {len(frame.template)} bytes{when}"
         for datagram in frame.datagrams:
             yield f"    {_datagram(datagram)}"
+
+
+def _exact_matching(frames: Sequence[FramePlan]) -> Iterator[str]:
+    """The cost of the cycle numbers. A frame below Ethernet's minimum is padded anyway."""
+    sizes = [
+        (HEADER_SIZE + sum(OVERHEAD + d.length for d in frame.datagrams), OVERHEAD + number.length)
+        for frame in frames
+        for number in frame.datagrams
+        if number.kind is DatagramKind.CYCLE_NUMBER
+    ]
+    if not sizes:
+        return
+    time_ns = sum(wire_time_ns(size) - wire_time_ns(size - added) for size, added in sizes)
+    total = sum(added for _, added in sizes)
+    yield (
+        f"exact matching: a cycle number in each frame; {total} bytes and "
+        f"{time_ns / 1e3:g} us of wire time for {len(sizes)} frames"
+    )
 
 
 def _datagram(datagram: DatagramPlan) -> str:
