@@ -110,6 +110,15 @@ class FaultFound(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class DuplicateFrames(Event):
+    """Many cyclic frames came back more than once: suspect a loop in the wiring or a second
+    sender. `sub` is None."""
+
+    count: int  # of such frames in `interval`
+    interval: float  # [s]
+
+
+@dataclass(frozen=True, slots=True)
 class ClockUnlocked(Event):
     """A device's clock left the bound it was held in."""
 

@@ -8,10 +8,11 @@ from dataclasses import replace
 from catenary.bus import Carrier, CycleClock, MainDevice, SubDevice
 from catenary.bus.event import DeviceLost, DeviceReturned, StateLost
 from catenary.core import Engine
-from catenary.errors import CatenaryError
+from catenary.errors import CatenaryError, ConfigurationError
 from catenary.loop.diagnosis import described, is_astray, silence_error, state_error
 from catenary.loop.running import FATAL, Running
 from catenary.loop.watch import LOOK
+from catenary.plan.cycle import DatagramKind
 from catenary.plan.make import Plan
 from catenary.procedure.exchange import Procedure, after
 from catenary.procedure.survey import Answer
@@ -158,5 +159,15 @@ class CarriedWatch:
 
 
 def carried(plan: Plan) -> Plan:
-    """The plan without what the carrier does itself: frames."""
+    """Return the plan without the frames, which the carrier makes.
+
+    Raises:
+        ConfigurationError: The plan asks for frames that the carrier does not make.
+    """
+    kinds = {datagram.kind for frame in plan.cycle.frames for datagram in frame.datagrams}
+    if DatagramKind.CYCLE_NUMBER in kinds:
+        raise ConfigurationError(
+            "exact_matching=True: another master makes the frames on this network",
+            hint="leave the option out, or open the network interface itself",
+        )
     return replace(plan, cycle=replace(plan.cycle, frames=()))

@@ -86,6 +86,10 @@ class Loop:
     of the period when threaded and for laws, 50 % when inline. `burst`: frames that bring the clocks
     together before the cycle begins.
 
+    `exact_matching`: every cyclic frame carries the cycle number in a NOP datagram. A frame that a
+    loop in the wiring or a second sender repeats is then never accepted as a current one. Costs 16
+    bytes and 1.3 us of wire time per frame; `print(loop.plan)` shows it.
+
     `cpu` and `priority` (SCHED_FIFO) of the native thread; None: as they are. With wishes on
     several MainDevices (docs/networks.md) `cpu` is a sequence, one for each network, and `quorum`
     says how many of them must be good for a cycle to be; None: all.
@@ -125,6 +129,7 @@ class Loop:
         reference: SubDevice | None = None,
         margin: float | None = None,
         burst: int = BURST,
+        exact_matching: bool = False,
         cpu: int | Sequence[int] | None = None,
         quorum: int | None = None,
         priority: int | None = 80,
@@ -173,6 +178,7 @@ class Loop:
         self._reference = reference
         self._margin = margin
         self._burst = burst
+        self._exact_matching = exact_matching
         if quorum not in (None, 1):
             raise ValueError(f"quorum={quorum}: there is one network")
         if cpu is not None and not isinstance(cpu, int):
@@ -414,6 +420,7 @@ class Loop:
             reference=None if self._reference is None else self._reference.position,
             margin=self._margin,
             burst=self._burst,
+            exact_matching=self._exact_matching,
             cpu=self._cpu,
             priority=self._priority,
         )

@@ -24,6 +24,7 @@ from catenary.core import (
     Engine,
 )
 from catenary.errors import CatenaryError, DriveError, LoopError
+from catenary.link import ring_of
 from catenary.loop.axis_watch import AxisWatch, RefusedMode, StoppedAxis, StopPolicy
 from catenary.loop.buffers import bind_wishes
 from catenary.loop.clocks import Clocks
@@ -35,6 +36,7 @@ from catenary.loop.diagnosis import (
     state_error,
 )
 from catenary.loop.error_watch import ErrorWatch
+from catenary.loop.frame_watch import FrameWatch
 from catenary.loop.interpreter import switch_interval
 from catenary.loop.laws.runner import LawRunner
 from catenary.loop.publishing import Publisher
@@ -129,6 +131,17 @@ class Running:
             on_replacement=self._on_replacement,
         )
         self.errors = ErrorWatch(self.main, now=lambda: self.engine.now() * 1e-9)
+        self.frames = FrameWatch(
+            self._repeated_frames,
+            put=self.main.events.put,
+            now=lambda: self.engine.now() * 1e-9,
+        )
+
+    def _repeated_frames(self) -> int:
+        """Frames so far that came back more than once, or that a ring could not assign."""
+        ring = ring_of(self.main.link)
+        unassigned = 0 if ring is None else ring.counts["alien"]
+        return self.engine.counters["repeated"] + unassigned
 
     # Opening
 
@@ -179,7 +192,8 @@ class Running:
         self.service.converse(*(request_state(station, State.OP) for station in self._stations))
         for sub in self.main.subs:
             sub.state = State.OP
-        self._watches = [self.service.runner.submit(w.run()) for w in (self.watch, self.errors)]
+        watches = (self.watch, self.errors, self.frames)
+        self._watches = [self.service.runner.submit(watch.run()) for watch in watches]
 
     def enable(self) -> None:
         """Enables all axes. Position axes hold when this returns; velocity and torque axes wait for
