@@ -33,7 +33,7 @@ static void value_write(latest_value *v, const void *bytes) {
     uint64_t *sequence = &v->sequence[number % VALUE_SLOTS];
     __atomic_store_n(sequence, 2 * number + 1, __ATOMIC_RELAXED);
     __atomic_thread_fence(__ATOMIC_RELEASE);
-    memcpy(value_slot(v, number), bytes, v->size);
+    cat_copy_to_shared(value_slot(v, number), bytes, v->size);
     __atomic_store_n(sequence, 2 * number + 2, __ATOMIC_RELEASE);
     __atomic_store_n(&v->number, number, __ATOMIC_RELEASE);
 }
@@ -44,7 +44,7 @@ static int64_t value_read(latest_value *v, void *bytes) {
         uint64_t number = cat_load_acquire64(&v->number);
         const uint64_t *sequence = &v->sequence[number % VALUE_SLOTS];
         uint64_t before = __atomic_load_n(sequence, __ATOMIC_ACQUIRE);
-        memcpy(bytes, value_slot(v, number), v->size);
+        cat_copy_from_shared(bytes, value_slot(v, number), v->size);
         __atomic_thread_fence(__ATOMIC_ACQUIRE);
         uint64_t after = __atomic_load_n(sequence, __ATOMIC_RELAXED);
         uint64_t whole = number ? 2 * number + 2 : 0;

@@ -48,7 +48,7 @@ static int queue_put(record_queue *q, const void *bytes) {
     uint64_t *stamp = queue_stamp(q, ticket);
     __atomic_store_n(stamp, 0, __ATOMIC_RELAXED);
     __atomic_thread_fence(__ATOMIC_RELEASE);
-    memcpy(queue_record(q, ticket), bytes, q->size);
+    cat_copy_to_shared(queue_record(q, ticket), bytes, q->size);
     cat_store_release64(stamp, ticket + 1);
     cat_store_release64(&q->put, ticket + 1);
     return 1;
@@ -65,7 +65,7 @@ static int queue_take(record_queue *q, void *bytes) {
         }
         uint64_t *stamp = queue_stamp(q, ticket);
         uint64_t before = cat_load_acquire64(stamp);
-        memcpy(bytes, queue_record(q, ticket), q->size);
+        cat_copy_from_shared(bytes, queue_record(q, ticket), q->size);
         __atomic_thread_fence(__ATOMIC_ACQUIRE);
         int whole = before == ticket + 1 && cat_load_relaxed64(stamp) == before;
         q->lost += !whole;

@@ -1,5 +1,10 @@
 from libc.stdint cimport int64_t, uint8_t, uint32_t, uint64_t
 
+cdef extern from "atomics.h" nogil:
+    void cat_copy_to_shared(void *to, const void *source, size_t size)
+    void cat_clear_shared(void *to, size_t size)
+
+
 cdef extern from "ring.h" nogil:
     ctypedef struct share_ring:
         uint64_t newest

@@ -13,7 +13,6 @@ from cpython.pycapsule cimport PyCapsule_GetContext, PyCapsule_New, PyCapsule_Se
 from cpython.ref cimport Py_DECREF, Py_INCREF, PyObject
 from libc.errno cimport EINTR
 from libc.stdint cimport int64_t, uint8_t, uint32_t, uint64_t
-from libc.string cimport memcpy, memset
 
 cdef enum:
     COUNT_MAX = 1 << 24
@@ -106,8 +105,8 @@ cdef class Ring:
         if size > self.view.size:
             raise ValueError(f"{size} bytes, a row has {self.view.size}")
         place = ring_begin(&self.view, number)
-        memcpy(place, PyBytes_AS_STRING(row), size)
-        memset(place + size, 0, self.view.size - size)
+        cat_copy_to_shared(place, PyBytes_AS_STRING(row), size)
+        cat_clear_shared(place + size, self.view.size - size)
         ring_publish(&self.view, number)
 
     def end(self):
@@ -120,9 +119,9 @@ cdef void put(void *self, uint64_t number, const void *record, const void *actua
               const void *target) noexcept nogil:
     cdef cycle_rows *rows = <cycle_rows *>self
     cdef uint8_t *row = ring_begin(&rows.view, number)
-    memcpy(row, record, rows.record_size)
-    memcpy(row + rows.actual_at, actual, rows.actual_size)
-    memcpy(row + rows.target_at, target, rows.target_size)
+    cat_copy_to_shared(row, record, rows.record_size)
+    cat_copy_to_shared(row + rows.actual_at, actual, rows.actual_size)
+    cat_copy_to_shared(row + rows.target_at, target, rows.target_size)
     ring_publish(&rows.view, number)
 
 

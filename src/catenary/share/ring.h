@@ -47,7 +47,8 @@ static inline uint64_t ring_newest(const ring_view *v) {
 /* Read before `newest`: then that was the last. */
 static inline int ring_is_ended(const ring_view *v) { return cat_load_acquire32(&v->ring->ended) != 0; }
 
-/* Where the bytes of row `number` go: between this and ring_publish nobody reads them. */
+/* Where the bytes of row `number` go, by cat_copy_to_shared; a reader drops what it copies between
+ * this and ring_publish. */
 static inline uint8_t *ring_begin(const ring_view *v, uint64_t number) {
     uint64_t *slot = ring_slot(v, number);
     __atomic_store_n(slot, 2 * number + 1, __ATOMIC_RELAXED);
@@ -73,7 +74,7 @@ static inline int ring_copy(const ring_view *v, uint64_t number, uint8_t *bytes)
     const uint64_t *slot = ring_slot(v, number);
     uint64_t whole = 2 * number + 2;
     if (__atomic_load_n(slot, __ATOMIC_ACQUIRE) != whole) return 0;
-    memcpy(bytes, slot + 1, v->size);
+    cat_copy_from_shared(bytes, slot + 1, v->size);
     __atomic_thread_fence(__ATOMIC_ACQUIRE);
     return __atomic_load_n(slot, __ATOMIC_RELAXED) == whole;
 }
