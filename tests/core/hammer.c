@@ -1,7 +1,10 @@
-/* Two threads on the real headers, as fast as they can: for test_handover.py and tools/sanitize. */
+/* Two threads on the headers of the package, as fast as they can: for test_handover.py. With
+ * HAMMER_MAIN it is a program: for tools/sanitize. */
+#define _GNU_SOURCE
 #include <pthread.h>
 #include <sched.h>
 #include <stdint.h>
+#include <stdlib.h>
 #include <string.h>
 #include "packet_ring.h"
 #include "pointer_handover.h"
@@ -164,3 +167,116 @@ void hammer_pointer(uint64_t count, int requests, uint64_t *wrong, uint64_t *bac
     *wrong = w.wrong;
     *backward = w.backward;
 }
+
+#ifdef HAMMER_MAIN
+#include <stdio.h>
+#include "law.h"
+#include "ring.h"
+
+/* The rows of a share: a writer, and a reader that never keeps it waiting. */
+#define ROW_WORDS 40
+#define ROWS 4
+
+static ring_view view;
+static uint64_t rows;
+
+static void *write_rows(void *argument) {
+    uint64_t row[ROW_WORDS];
+    (void)argument;
+    for (uint64_t n = 1; n <= rows; n++) {
+        for (int i = 0; i < ROW_WORDS; i++) row[i] = n;
+        cat_copy_to_shared(ring_begin(&view, n), row, sizeof row);
+        ring_publish(&view, n);
+        if (n % 32 == 0) sched_yield();
+    }
+    ring_end(&view);
+    return 0;
+}
+
+/* How many rows were torn or older than the one before. */
+static uint64_t hammer_rows(uint64_t count) {
+    pthread_t writer;
+    uint64_t row[ROW_WORDS], last = 0, wrong = 0;
+    view = (ring_view){.count = ROWS, .size = sizeof row, .stride = ring_stride(sizeof row)};
+    view.ring = aligned_alloc(64, (sizeof(share_ring) + ROWS * view.stride + 63) / 64 * 64);
+    memset(view.ring, 0, sizeof(share_ring) + ROWS * view.stride);
+    rows = count;
+    pthread_create(&writer, 0, write_rows, 0);
+    while (ring_wait(&view, last, INT64_MAX) == 1) {
+        uint64_t number = ring_copy_newest(&view, (uint8_t *)row);
+        for (int i = 0; i < ROW_WORDS; i++) wrong += row[i] != number;
+        wrong += number <= last;
+        last = number;
+    }
+    pthread_join(writer, 0);
+    free(view.ring);
+    return wrong;
+}
+
+/* Laws that return, and some that never do: the monitor gives them up. After one siglongjmp out of a
+ * signal handler ThreadSanitizer delivers no further signal to that thread. */
+#ifdef __SANITIZE_THREAD__
+#define ENDLESS_STEPS 1
+#else
+#define ENDLESS_STEPS 3
+#endif
+
+static int short_step(const void *a, void *t, double *m, int64_t n, const double *p, int64_t k,
+                      double time) {
+    (void)a, (void)t, (void)n, (void)p, (void)k, (void)time;
+    m[0] += 1;
+    return CAT_LAW_GOES_ON;
+}
+
+static int endless_step(const void *a, void *t, double *m, int64_t n, const double *p, int64_t k,
+                        double time) {
+    (void)a, (void)t, (void)m, (void)n, (void)p, (void)k, (void)time;
+    for (volatile uint32_t i = 0;; i++)
+        if (i % 100000 == 0) usleep(1); /* ThreadSanitizer delivers signals in such calls only */
+    return CAT_LAW_FINISHED;
+}
+
+static void *run_laws(void *argument) {
+    cat_law_guard *guard = argument;
+    static double memory[1];
+    cat_law_numbers numbers = {memory, 1, 0, 0};
+    uint64_t wrong = 0;
+    for (int n = 0; n < 20000; n++)
+        wrong += cat_law_call(guard, short_step, 0, 0, &numbers, 0) != CAT_LAW_GOES_ON;
+    for (int n = 0; n < ENDLESS_STEPS; n++)
+        wrong += cat_law_call(guard, endless_step, 0, 0, &numbers, 0) != CAT_LAW_ABORTED;
+    return (void *)(uintptr_t)wrong;
+}
+
+static uint64_t hammer_laws(void) {
+    static cat_law_guard guard;
+    pthread_t runner;
+    void *wrong;
+    if (cat_law_guard_start(&guard, 20000000, 0)) return 1;
+    pthread_create(&runner, 0, run_laws, &guard);
+    pthread_join(runner, &wrong);
+    cat_law_guard_stop(&guard);
+    return (uintptr_t)wrong;
+}
+
+static int report(const char *what, uint64_t wrong) {
+    printf("%s: %s\n", what, wrong ? "wrong" : "good");
+    fflush(stdout);
+    return wrong != 0;
+}
+
+int main(void) {
+    uint64_t first, second;
+    int failures = 0;
+    hammer_triple(200000, &first, &second);
+    failures += report("triple buffer", first + second);
+    failures += report("packet ring (acyclic queue)", hammer_ring(200000));
+    hammer_pointer(200000, 0, &first, &second);
+    failures += report("pointer (stream)", first + second);
+    hammer_pointer(200000, 1, &first, &second);
+    failures += report("pointer (law)", first + second);
+    failures += report("rows of a share", hammer_rows(200000));
+    failures += report("law guard", hammer_laws());
+    return failures ? 1 : 0;
+}
+#endif
