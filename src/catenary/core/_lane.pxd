@@ -3,18 +3,18 @@ from libc.stdint cimport int64_t, uint8_t, uint32_t, uint64_t
 from catenary.core._native cimport cat_link, cat_packet_ring
 
 cdef struct lane_t:
-    cat_packet_ring *out       # the service thread's frames, to be sent
-    cat_packet_ring *back      # those that came back
-    uint32_t bytes_per_cycle
+    cat_packet_ring *out       # frames of the service thread, to be sent
+    cat_packet_ring *back      # frames that came back
+    uint32_t bytes_per_cycle   # limit of what one cycle sends
     uint32_t arrived           # futex word: counts arrivals
-    uint32_t under_way         # sent in the last cycle and not back yet
-    uint32_t waiting           # the service thread sleeps on it
-    uint64_t sent
+    uint32_t waiting           # 1: the service thread sleeps, or is about to sleep, on `arrived`
+    uint32_t under_way         # the cycle's: sent in the last cycle and not back yet
+    uint64_t sent              # the cycle's, as the next two
     uint64_t received
     uint64_t dropped           # came back to a full ring, or could not be sent
 
 cdef class Lane:
-    """Owns the two rings of the acyclic lane."""
+    """Owner of the two rings of the acyclic queue."""
     cdef lane_t c
 
 cdef void lane_send(lane_t *lane, const cat_link *link) noexcept nogil

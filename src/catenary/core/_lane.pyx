@@ -1,8 +1,18 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""The acyclic lane: opaque frames of procedures travel beside the cycle, a bounded number after
-each cyclic frame. One service thread pushes and pops; the cycle never waits for it.
+"""The acyclic queue: frames of procedures, sent after the cyclic frames.
 
-Budget: 0.05 us where nothing is queued, else what the link's send takes, at most four times.
+Theory of operation
+    One service thread pushes whole frames into `out` and pops returned ones from `back`; both are
+    rings for one producer and one consumer (native/packet_ring.h). After each cycle `lane_send` sends
+    at most four frames and a quarter of the period's wire time. Frames with an index from 0x80 on
+    return through `lane_received`. The cycle never waits for the service thread.
+
+Waking
+    The service thread sets `waiting`, then sleeps while `arrived` is unchanged. The cycle increments
+    `arrived`, then wakes it if `waiting` is set. A full fence lies between the two steps of the cycle;
+    the futex compares `arrived` again in the kernel, so that no wake-up is lost.
+
+Budget: 0.05 us if nothing is queued, else what the link's send takes, at most four times.
 """
 
 from libc.stdint cimport int64_t, uint8_t, uint32_t, uint64_t
@@ -34,7 +44,7 @@ cdef enum:
 
 
 cdef void lane_send(lane_t *lane, const cat_link *link) noexcept nogil:
-    """At most four frames and a quarter of the period's wire time (one frame in any case)."""
+    """Send at most four frames and a quarter of the period's wire time (one frame in any case)."""
     cdef const cat_packet *packet
     cdef uint32_t count, bytes = 0
     lane.under_way = 0
@@ -101,7 +111,7 @@ cdef class Lane:
         return frame
 
     def wait(self, int64_t timeout_ns):
-        """One attempt: a signal or a spurious wake ends it early."""
+        """Wait once. A signal or a spurious wake-up ends it early."""
         cdef uint32_t seen = cat_load_acquire32(&self.c.arrived)
         if cat_ring_peek(self.c.back) != NULL:
             return True
