@@ -83,8 +83,8 @@ class Loop:
     Where a wish has `dc=`: `clock`, whom time is taken from: "reference", the wake-up follows the
     reference clock; "main", it follows the MainDevice's. `reference`: the device with that clock;
     None: the first that has one. `margin` [s]: from the instant to the frames, at most; None: 20 %
-    of the period when threaded and for laws, 50 % when inline. `burst`: frames that bring the clocks
-    together before the cycle begins.
+    of the period when threaded and for laws, 50 % when inline. `burst`: frames that bring the
+    clocks together before the cycle begins.
 
     `exact_matching`: every cyclic frame carries the cycle number in a NOP datagram. A frame that a
     loop in the wiring or a second sender repeats is then never accepted as a current one. Costs 16
@@ -269,13 +269,20 @@ class Loop:
         budget: float | None = None,
         overruns: int = 3,
     ) -> LawRun:
-        """Lets a law say the set-points from the next cycle on, natively; the loop can be iterated
-        beside it, to watch.
+        """Start a compiled law. From the next cycle on, it computes the set-points in the cycle
+        thread; the loop can be iterated meanwhile, to watch.
 
-        It begins from what is commanded. `memory`, `parameters`: float64, at most 4096 each.
-        `budget` [s] of one step (None: 0.4 periods; 0: no check); after `overruns` steps in a row
-        over it, an exception, a target that is NaN or infinite, or a step that never returns, the drives
-        stop and LawError is raised by the iteration. LawError also for what cannot be compiled.
+        Args:
+            law: function or compiled law; it begins from what is commanded.
+            memory: its state, float64, at most 4096 numbers.
+            parameters: of the application, float64, at most 4096 numbers.
+            budget: of one step [s]; None: 0.4 periods; 0: no check. The frames need the rest.
+            overruns: number of steps in a row over the budget that end the law.
+
+        Raises:
+            LawError: the law cannot be compiled. The iteration raises it for an exception, a
+                target that is NaN or infinite, overruns, and a step that never returns.
+            ValueError: the budget leaves too little of the period for the frames.
         """
         return self._opened.laws.start(made_law(law), memory, parameters, budget, overruns)
 
