@@ -43,7 +43,7 @@ cdef struct actual_header_t:
     uint8_t al_status
     uint8_t ok
 
-cdef struct actual_t:
+cdef struct actual_t:           # a header and the arrays of ACTUAL (_handover.pyx), in its order
     actual_header_t *header
     double *position
     double *velocity
@@ -74,7 +74,7 @@ cdef struct target_header_t:
     uint32_t hold              # hand-over: no application commits set-points
     uint32_t streamed          # the set-points are a row of a stream
 
-cdef struct target_t:
+cdef struct target_t:           # a header and the arrays of TARGET, in its order
     target_header_t *header
     double *position
     double *velocity
@@ -109,7 +109,10 @@ cdef class Handover:
     """Owns the buffers between the cycle and Python."""
     cdef handover_t c
     cdef uint8_t *memory
+    cdef dict counts
     cdef allocate(self)
+    cdef dict views(self, void **block, tuple table, bint writable)
+    cdef dict places(self, void **block, tuple table, int column)
     cdef field(self, void *start, uint32_t count, size_t itemsize, bytes format, bint writable)
 
 cdef void handover_commit(handover_t *h) noexcept nogil

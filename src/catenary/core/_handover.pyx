@@ -27,55 +27,62 @@ cdef enum:
     COUNT_MAX = 1 << 16
 
 
-cdef uint8_t *carve(uint8_t **place, size_t count, size_t size) noexcept:
-    """The next array of the block."""
-    cdef uint8_t *start = place[0]
-    place[0] = start + count * size
-    return start
+# Arrays of the two blocks, in the order of actual_t and target_t (_handover.pxd): name, NumPy format,
+# what it counts, and its names for Python's views (plan.wish.Views), for laws and for sinks; None:
+# not shown there. Items of 8 bytes come first, so that each array is aligned.
+ACTUAL = (
+    ("position", "<f8", "axes", "actual_position", "position", "position"),
+    ("velocity", "<f8", "axes", "actual_velocity", "velocity", "velocity"),
+    ("torque", "<f8", "axes", "actual_torque", "torque", "torque"),
+    ("commanded_position", "<f8", "axes", None, None, "commanded_position"),
+    ("commanded_velocity", "<f8", "axes", None, None, "commanded_velocity"),
+    ("commanded_torque", "<f8", "axes", None, None, "commanded_torque"),
+    ("input_reals", "<f8", "input_reals", "input_reals", "reals", "reals"),
+    ("input_integers", "<i8", "input_integers", "input_integers", "integers", "integers"),
+    ("followed_since", "<u8", "axes", None, None, None),
+    ("stop_cycle", "<u8", "axes", "stop_cycle", None, None),
+    ("statusword", "<u2", "axes", "statusword", None, "statusword"),
+    ("controlword", "<u2", "axes", None, None, "controlword"),
+    ("unit_counter", "<u2", "units", "unit_counter", None, None),
+    ("mode", "i1", "axes", "mode_actual", None, "mode"),
+    ("state", "u1", "axes", "axis_state", None, "state"),
+    ("flags", "u1", "axes", "axis_flags", None, "axis_flags"),
+    ("stop_reason", "u1", "axes", "stop_reason", None, None),
+    ("enabled", "u1", "axes", None, "enabled", "enabled"),
+    ("input_bits", "u1", "input_bits", "input_bits", "bits", "bits"),
+    ("unit_valid", "u1", "units", "unit_valid", None, "unit_valid"),
+)
+TARGET = (
+    ("position", "<f8", "axes", "target_position", "position", "target_position"),
+    ("velocity", "<f8", "axes", "target_velocity", "velocity", "target_velocity"),
+    ("torque", "<f8", "axes", "target_torque", "torque", "target_torque"),
+    ("output_reals", "<f8", "output_reals", "output_reals", "reals", "reals"),
+    ("output_integers", "<i8", "output_integers", "output_integers", "integers", "integers"),
+    ("request", "<u4", "axes", "request", None, None),
+    ("controlword_bits", "<u2", "axes", "controlword_bits", None, None),
+    ("mode", "i1", "axes", "mode_target", None, "target_mode"),
+    ("goal", "u1", "axes", "goal", None, "goal"),
+    ("output_bits", "u1", "output_bits", "output_bits", "bits", "bits"),
+)
+CODES = {"<f8": b"d", "<i8": b"q", "<u8": b"Q", "<u4": b"I", "<u2": b"H", "i1": b"b", "u1": b"B"}
+SIZES = {"<f8": 8, "<i8": 8, "<u8": 8, "<u4": 4, "<u2": 2, "i1": 1, "u1": 1}
+VIEW, OF_A_LAW, OF_A_SINK = 3, 4, 5  # columns of the tables above
+
+if sizeof(actual_t) != (len(ACTUAL) + 1) * sizeof(void *) or sizeof(target_t) != (
+    len(TARGET) + 1
+) * sizeof(void *):
+    raise ImportError("the tables of _handover.pyx do not describe the blocks of _handover.pxd")
 
 
-cdef size_t lay_actual(actual_t *a, uint8_t *block, const counts_t *n) noexcept:
-    """Points the arrays of `a` into the block; its size."""
-    cdef uint8_t *place = block
-    a.header = <actual_header_t *>carve(&place, 1, sizeof(actual_header_t))
-    a.position = <double *>carve(&place, n.axes, 8)
-    a.velocity = <double *>carve(&place, n.axes, 8)
-    a.torque = <double *>carve(&place, n.axes, 8)
-    a.commanded_position = <double *>carve(&place, n.axes, 8)
-    a.commanded_velocity = <double *>carve(&place, n.axes, 8)
-    a.commanded_torque = <double *>carve(&place, n.axes, 8)
-    a.input_reals = <double *>carve(&place, n.input_reals, 8)
-    a.input_integers = <int64_t *>carve(&place, n.input_integers, 8)
-    a.followed_since = <uint64_t *>carve(&place, n.axes, 8)
-    a.stop_cycle = <uint64_t *>carve(&place, n.axes, 8)
-    a.statusword = <uint16_t *>carve(&place, n.axes, 2)
-    a.controlword = <uint16_t *>carve(&place, n.axes, 2)
-    a.unit_counter = <uint16_t *>carve(&place, n.units, 2)
-    a.mode = <int8_t *>carve(&place, n.axes, 1)
-    a.state = carve(&place, n.axes, 1)
-    a.flags = carve(&place, n.axes, 1)
-    a.stop_reason = carve(&place, n.axes, 1)
-    a.enabled = carve(&place, n.axes, 1)
-    a.input_bits = carve(&place, n.input_bits, 1)
-    a.unit_valid = carve(&place, n.units, 1)
-    return place - block
-
-
-cdef size_t lay_target(target_t *t, uint8_t *block, const counts_t *n) noexcept:
-    """Points the arrays of `t` into the block; its size."""
-    cdef uint8_t *place = block
-    t.header = <target_header_t *>carve(&place, 1, sizeof(target_header_t))
-    t.position = <double *>carve(&place, n.axes, 8)
-    t.velocity = <double *>carve(&place, n.axes, 8)
-    t.torque = <double *>carve(&place, n.axes, 8)
-    t.output_reals = <double *>carve(&place, n.output_reals, 8)
-    t.output_integers = <int64_t *>carve(&place, n.output_integers, 8)
-    t.request = <uint32_t *>carve(&place, n.axes, 4)
-    t.controlword_bits = <uint16_t *>carve(&place, n.axes, 2)
-    t.mode = <int8_t *>carve(&place, n.axes, 1)
-    t.goal = carve(&place, n.axes, 1)
-    t.output_bits = carve(&place, n.output_bits, 1)
-    return place - block
+cdef size_t lay(void **block, uint8_t *memory, size_t header_size, tuple table, dict counts) except 0:
+    """Point a block's header and arrays into its memory; return its size."""
+    cdef size_t used = header_size
+    cdef size_t k
+    block[0] = memory
+    for k in range(len(table)):
+        block[k + 1] = memory + used
+        used += counts[table[k][2]] * SIZES[table[k][1]]
+    return used
 
 
 cdef void handover_commit(handover_t *h) noexcept nogil:
@@ -152,8 +159,13 @@ cdef class Handover:
             output_integers=output_counts[1],
             output_bits=output_counts[2],
         )
-        self.c.actual_size = lay_actual(&self.c.actual[0], NULL, &self.c.counts)
-        self.c.target_size = lay_target(&self.c.target[0], NULL, &self.c.counts)
+        self.counts = self.c.counts
+        self.c.actual_size = lay(
+            <void **>&self.c.actual[0], NULL, sizeof(actual_header_t), ACTUAL, self.counts
+        )
+        self.c.target_size = lay(
+            <void **>&self.c.target[0], NULL, sizeof(target_header_t), TARGET, self.counts
+        )
         self.allocate()
         cat_triple_init(&self.c.actual_triple)
         cat_triple_init(&self.c.target_triple)
@@ -168,113 +180,61 @@ cdef class Handover:
             raise MemoryError
         memset(self.memory, 0, size)
         for k in range(4):
-            lay_actual(&self.c.actual[k], self.memory + k * actual, &self.c.counts)
+            lay(<void **>&self.c.actual[k], self.memory + k * actual, sizeof(actual_header_t),
+                ACTUAL, self.counts)
             self.c.actual[k].header.axis_count = self.c.counts.axes
         for k in range(TARGETS):
-            lay_target(&self.c.target[k], self.memory + 4 * actual + k * target, &self.c.counts)
+            lay(<void **>&self.c.target[k], self.memory + 4 * actual + k * target,
+                sizeof(target_header_t), TARGET, self.counts)
             self.c.target[k].header.hold = 1  # nothing was committed yet
 
     def fields(self):
-        """Python's own arrays by the names of plan.wish.Views, as memoryviews."""
-        cdef actual_t *a = &self.c.actual[PRIVATE]
-        cdef target_t *t = &self.c.target[PRIVATE]
-        cdef counts_t *n = &self.c.counts
-        return {
-            "actual_position": self.field(a.position, n.axes, 8, b"d", False),
-            "actual_velocity": self.field(a.velocity, n.axes, 8, b"d", False),
-            "actual_torque": self.field(a.torque, n.axes, 8, b"d", False),
-            "statusword": self.field(a.statusword, n.axes, 2, b"H", False),
-            "mode_actual": self.field(a.mode, n.axes, 1, b"b", False),
-            "axis_state": self.field(a.state, n.axes, 1, b"B", False),
-            "axis_flags": self.field(a.flags, n.axes, 1, b"B", False),
-            "stop_reason": self.field(a.stop_reason, n.axes, 1, b"B", False),
-            "stop_cycle": self.field(a.stop_cycle, n.axes, 8, b"Q", False),
-            "input_reals": self.field(a.input_reals, n.input_reals, 8, b"d", False),
-            "input_integers": self.field(a.input_integers, n.input_integers, 8, b"q", False),
-            "input_bits": self.field(a.input_bits, n.input_bits, 1, b"B", False),
-            "unit_valid": self.field(a.unit_valid, n.units, 1, b"B", False),
-            "unit_counter": self.field(a.unit_counter, n.units, 2, b"H", False),
-            "target_position": self.field(t.position, n.axes, 8, b"d", True),
-            "target_velocity": self.field(t.velocity, n.axes, 8, b"d", True),
-            "target_torque": self.field(t.torque, n.axes, 8, b"d", True),
-            "mode_target": self.field(t.mode, n.axes, 1, b"b", True),
-            "goal": self.field(t.goal, n.axes, 1, b"B", True),
-            "request": self.field(t.request, n.axes, 4, b"I", True),
-            "controlword_bits": self.field(t.controlword_bits, n.axes, 2, b"H", True),
-            "output_reals": self.field(t.output_reals, n.output_reals, 8, b"d", True),
-            "output_integers": self.field(t.output_integers, n.output_integers, 8, b"q", True),
-            "output_bits": self.field(t.output_bits, n.output_bits, 1, b"B", True),
-        }
+        """Return Python's own arrays by the names of plan.wish.Views, as memoryviews."""
+        fields = self.views(<void **>&self.c.actual[PRIVATE], ACTUAL, False)
+        return fields | self.views(<void **>&self.c.target[PRIVATE], TARGET, True)
+
+    cdef dict views(self, void **block, tuple table, bint writable):
+        fields = {}
+        for k, row in enumerate(table):
+            if row[VIEW] is not None:
+                count, size = self.counts[row[2]], SIZES[row[1]]
+                fields[row[VIEW]] = self.field(
+                    block[<size_t>k + 1], count, size, CODES[row[1]], writable
+                )
+        return fields
 
     def law_fields(self):
-        """The blocks a law works on, (actual, target): name → (offset, NumPy format, count; None for
-        a single number)."""
+        """Return the blocks that a law works on, (actual, target): name → (offset, NumPy format,
+        count; None for a single number)."""
         cdef actual_t *a = &self.c.actual[PRIVATE]
-        cdef target_t *t = &self.c.target[PRIVATE]
-        cdef counts_t *n = &self.c.counts
-        cdef char *of_actual = <char *>a.header
-        cdef char *of_target = <char *>t.header
+        cdef char *start = <char *>a.header
         actual = {
-            "n": (<char *>&a.header.axis_count - of_actual, "<u4", None),
-            "ok": (<char *>&a.header.ok - of_actual, "?", None),
-            "dt": (<char *>&a.header.period - of_actual, "<f8", None),
-            "position": (<char *>a.position - of_actual, "<f8", n.axes),
-            "velocity": (<char *>a.velocity - of_actual, "<f8", n.axes),
-            "torque": (<char *>a.torque - of_actual, "<f8", n.axes),
-            "enabled": (<char *>a.enabled - of_actual, "u1", n.axes),
-            "reals": (<char *>a.input_reals - of_actual, "<f8", n.input_reals),
-            "integers": (<char *>a.input_integers - of_actual, "<i8", n.input_integers),
-            "bits": (<char *>a.input_bits - of_actual, "u1", n.input_bits),
+            "n": (<char *>&a.header.axis_count - start, "<u4", None),
+            "ok": (<char *>&a.header.ok - start, "?", None),
+            "dt": (<char *>&a.header.period - start, "<f8", None),
         }
-        target = {
-            "position": (<char *>t.position - of_target, "<f8", n.axes),
-            "velocity": (<char *>t.velocity - of_target, "<f8", n.axes),
-            "torque": (<char *>t.torque - of_target, "<f8", n.axes),
-            "reals": (<char *>t.output_reals - of_target, "<f8", n.output_reals),
-            "integers": (<char *>t.output_integers - of_target, "<i8", n.output_integers),
-            "bits": (<char *>t.output_bits - of_target, "u1", n.output_bits),
-        }
-        return actual, target
+        actual |= self.places(<void **>a, ACTUAL, OF_A_LAW)
+        return actual, self.places(<void **>&self.c.target[PRIVATE], TARGET, OF_A_LAW)
 
     def sink_fields(self):
-        """The blocks a sink is given, (actual, target): name → (offset, NumPy format, count; None
-        for a single number)."""
+        """Return the blocks that a sink is given, (actual, target): as `law_fields`."""
         cdef actual_t *a = &self.c.actual[PRIVATE]
-        cdef target_t *t = &self.c.target[PRIVATE]
-        cdef counts_t *n = &self.c.counts
-        cdef char *of_actual = <char *>a.header
-        cdef char *of_target = <char *>t.header
+        cdef char *start = <char *>a.header
         actual = {
-            "time_ns": (<char *>&a.header.time_ns - of_actual, "<i8", None),
-            "moving": (<char *>&a.header.moving - of_actual, "<u4", None),
-            "position": (<char *>a.position - of_actual, "<f8", n.axes),
-            "velocity": (<char *>a.velocity - of_actual, "<f8", n.axes),
-            "torque": (<char *>a.torque - of_actual, "<f8", n.axes),
-            "commanded_position": (<char *>a.commanded_position - of_actual, "<f8", n.axes),
-            "commanded_velocity": (<char *>a.commanded_velocity - of_actual, "<f8", n.axes),
-            "commanded_torque": (<char *>a.commanded_torque - of_actual, "<f8", n.axes),
-            "statusword": (<char *>a.statusword - of_actual, "<u2", n.axes),
-            "controlword": (<char *>a.controlword - of_actual, "<u2", n.axes),
-            "mode": (<char *>a.mode - of_actual, "i1", n.axes),
-            "state": (<char *>a.state - of_actual, "u1", n.axes),
-            "axis_flags": (<char *>a.flags - of_actual, "u1", n.axes),
-            "enabled": (<char *>a.enabled - of_actual, "u1", n.axes),
-            "unit_valid": (<char *>a.unit_valid - of_actual, "u1", n.units),
-            "reals": (<char *>a.input_reals - of_actual, "<f8", n.input_reals),
-            "integers": (<char *>a.input_integers - of_actual, "<i8", n.input_integers),
-            "bits": (<char *>a.input_bits - of_actual, "u1", n.input_bits),
+            "time_ns": (<char *>&a.header.time_ns - start, "<i8", None),
+            "moving": (<char *>&a.header.moving - start, "<u4", None),
         }
-        target = {
-            "target_position": (<char *>t.position - of_target, "<f8", n.axes),
-            "target_velocity": (<char *>t.velocity - of_target, "<f8", n.axes),
-            "target_torque": (<char *>t.torque - of_target, "<f8", n.axes),
-            "target_mode": (<char *>t.mode - of_target, "i1", n.axes),
-            "goal": (<char *>t.goal - of_target, "u1", n.axes),
-            "reals": (<char *>t.output_reals - of_target, "<f8", n.output_reals),
-            "integers": (<char *>t.output_integers - of_target, "<i8", n.output_integers),
-            "bits": (<char *>t.output_bits - of_target, "u1", n.output_bits),
+        actual |= self.places(<void **>a, ACTUAL, OF_A_SINK)
+        return actual, self.places(<void **>&self.c.target[PRIVATE], TARGET, OF_A_SINK)
+
+    cdef dict places(self, void **block, tuple table, int column):
+        return {
+            row[column]: (
+                <char *>block[<size_t>k + 1] - <char *>block[0], row[1], self.counts[row[2]]
+            )
+            for k, row in enumerate(table)
+            if row[column] is not None
         }
-        return actual, target
 
     def blocks(self):
         """Python's own blocks whole, (actual, target), as bytes."""

@@ -3,30 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 
 import numpy as np
 
 from catenary.plan.cycle import Bank, Column
 from catenary.plan.wish import Views, Wish, WishTables
 
-AXIS_BUFFERS = (
-    "actual_position",
-    "actual_velocity",
-    "actual_torque",
-    "statusword",
-    "mode_actual",
-    "axis_state",
-    "axis_flags",
-    "stop_reason",
-    "stop_cycle",
-    "target_position",
-    "target_velocity",
-    "target_torque",
-    "mode_target",
-    "goal",
-    "request",
-    "controlword_bits",
-)
 COLUMN_BUFFERS: dict[tuple[bool, Bank], str] = {
     (False, Bank.REAL): "input_reals",
     (False, Bank.INTEGER): "input_integers",
@@ -35,6 +18,11 @@ COLUMN_BUFFERS: dict[tuple[bool, Bank], str] = {
     (True, Bank.INTEGER): "output_integers",
     (True, Bank.BIT): "output_bits",
 }
+AXIS_BUFFERS = tuple(
+    each.name
+    for each in fields(Views)
+    if each.name not in (*COLUMN_BUFFERS.values(), "unit_valid")
+)
 
 
 def bind_wishes(
