@@ -1,11 +1,39 @@
-from libc.stdint cimport int64_t, uint32_t
+from libc.stdint cimport int64_t, uint16_t, uint32_t
 
+from catenary.core._axes cimport Axes
+from catenary.core._clocks cimport Clock
+from catenary.core._cycle cimport cycle_t
+from catenary.core._figures cimport Figures
+from catenary.core._frames cimport Frames
+from catenary.core._handover cimport Handover, actual_header_t, handover_t
+from catenary.core._lane cimport Lane
 from catenary.core._law cimport Law
-from catenary.core._parts cimport Parts
+from catenary.core._native cimport cat_image, cat_link
 from catenary.core._stream cimport Stream
-from catenary.core._thread cimport cat_scheduling
+from catenary.core._thread cimport cat_scheduling, thread_t
 
-cdef class Engine(Parts):
+cdef struct engine_t:
+    cycle_t cycle
+    thread_t thread
+    int error                  # why the native thread ended by itself
+    uint32_t done              # it has ended
+
+cdef class Engine:
+    cdef engine_t e
+    cdef handover_t *h
+    cdef Frames frames         # None: the image table came from outside
+    cdef cat_image *image
+    cdef const cat_link *link
+    cdef tuple owners          # of the two tables
+    cdef Lane lane
+    cdef Axes axes
+    cdef readonly Clock clock  # None: no distributed clocks
+    cdef Handover handover
+    cdef dict _buffers
+    cdef bint virtual          # the link's time is virtual: everything in the caller's thread
+    cdef uint16_t device_count
+    cdef bint alone            # nobody else lives by that time: waits keep the GIL
+    cdef Figures figures
     cdef Law law               # runs, or its end has not been seen yet; None: Python says the targets
     cdef list laws             # those the cycle may know
     cdef Stream stream         # says the set-points; None: Python or the law does
@@ -19,7 +47,6 @@ cdef class Engine(Parts):
     cdef object sink           # keeps what is given the cycles alive
     cdef int64_t left          # when `next` returned [ns]; -1: no application since
     cdef int64_t input_age     # at that time [ns]
-
 
     cdef uint32_t step(self, int64_t timeout_ns=*) except? 0xFFFFFFFF
     cdef bint is_native_cycle(self, bint application) noexcept nogil
@@ -47,3 +74,6 @@ cdef class Engine(Parts):
     cdef int check_reserve(self, int64_t budget) except -1
     cdef bint is_law_used(self, Law law) noexcept
     cdef bint is_stream_used(self, Stream stream) noexcept
+    cdef connect(self, plan)
+    cdef int64_t now_ns(self) noexcept
+    cdef actual_header_t *actual_header(self) noexcept

@@ -9,14 +9,16 @@ import os
 
 cimport cython
 from cpython.exc cimport PyErr_CheckSignals
-from cpython.pycapsule cimport PyCapsule_GetPointer
 from libc.errno cimport EINTR
 from libc.stdint cimport int64_t, uint32_t, uint64_t
 from libc.string cimport memcpy
 
-from catenary.core._axes cimport axes_follow
+from catenary.core._axes cimport Axes, axes_follow
+from catenary.core._capsules cimport image_in, link_in, sink_in
+from catenary.core._clocks cimport Clock
 from catenary.core._cycle cimport (
     INLINE,
+    cycle_await_lane,
     cycle_inputs,
     cycle_law_reserve,
     cycle_native,
@@ -26,8 +28,11 @@ from catenary.core._cycle cimport (
     cycle_usable,
     cycle_wait,
     cycle_wants_native,
+    record_t,
 )
-from catenary.core._frames cimport frames_flush
+from catenary.core._cycle import ORDERS
+from catenary.core._figures cimport Figures
+from catenary.core._frames cimport Frames, frames_flush
 from catenary.core._handover cimport (
     LATE,
     LAW_DONE,
@@ -36,18 +41,22 @@ from catenary.core._handover cimport (
     PRIVATE,
     STICKY,
     STOPPED,
+    TARGETS,
+    Handover,
     actual_header_t,
     actual_t,
     handover_commit,
     handover_swap,
     target_t,
 )
+from catenary.core._lane cimport Lane
 from catenary.core._law cimport WAITING, Law
 from catenary.core._native cimport (
+    CAT_AL_OP,
+    CAT_LINK_SHARED_TIME,
     CAT_LINK_SPENDS,
+    CAT_LINK_VIRTUAL_TIME,
     CAT_POINTER_NONE,
-    CAT_SINK_CAPSULE,
-    CAT_SINK_VERSION,
     cat_add32,
     cat_exchange32,
     cat_fence,
@@ -60,7 +69,6 @@ from catenary.core._native cimport (
     cat_sink,
     cat_store_release32,
 )
-from catenary.core._parts cimport Parts, engine_t
 from catenary.core._stream cimport Stream
 from catenary.core._thread cimport (
     cat_scheduling,
@@ -93,13 +101,170 @@ cdef void thread_loop(void *argument) noexcept nogil:
     cat_futex_wake(&e.cycle.handover.published)
 
 
+def columns_by_bank(columns):
+    """Return the number of columns in each bank."""
+    return [sum(column.bank == bank for column in columns) for bank in range(3)]
+
+
+def check_plan(plan):
+    """Raise ValueError for numbers of a plan that cannot be."""
+    if plan.order not in ORDERS:
+        raise ValueError(f"order: {plan.order!r}, must be one of {', '.join(ORDERS)}")
+    if not 1000 <= plan.period_ns <= 1 << 40:
+        raise ValueError(f"period_ns: {plan.period_ns}")
+    if not 0 <= plan.collect_deadline_ns <= plan.period_ns:
+        raise ValueError(
+            f"collect_deadline_ns: {plan.collect_deadline_ns}, must lie in the period"
+            f" of {plan.period_ns}"
+        )
+    if plan.priority is not None and not 1 <= plan.priority <= 99:
+        raise ValueError(f"priority: {plan.priority}, must be 1 to 99 or None")
+    if plan.cpu is not None and not 0 <= plan.cpu < 1024:
+        raise ValueError(f"cpu: {plan.cpu}")
+    if not 0 <= plan.busy_wait_ns < plan.period_ns:
+        raise ValueError(f"busy_wait_ns: {plan.busy_wait_ns}, must be less than the period")
+    if not 1 <= plan.log_cycles <= 1 << 24:
+        raise ValueError(f"log_cycles: {plan.log_cycles}, must be 1 to {1 << 24}")
+
+
 @cython.no_gc_clear  # its parts must outlive the native thread
-cdef class Engine(Parts):
+cdef class Engine:
     def __cinit__(self, plan, link, image=None):
+        check_plan(plan)
+        self.e.thread.priority = plan.priority or 0
+        self.e.thread.cpu = -1 if plan.cpu is None else plan.cpu
+        self.device_count = plan.device_count
+        self.owners = (link, image)
+        if image is None:
+            self.frames = Frames(plan, link)
+            self.image = &self.frames.c.image
+            self.link = self.frames.c.link
+        else:
+            self.image = image_in(image, plan)
+            self.link = link_in(link)
+        self.lane = Lane(plan.period_ns)
+        self.axes = Axes(plan)
+        if plan.clock is not None:
+            self.clock = Clock(plan.clock, plan.period_ns)
+        self.handover = Handover(
+            len(plan.axes),
+            len(plan.sync_units),
+            columns_by_bank(plan.input_columns),
+            columns_by_bank(plan.output_columns),
+        )
+        self.figures = Figures()
+        self.connect(plan)
+        self._buffers = self.handover.fields()
         self.laws = []
         self.streams = []
         self.native = self.e.cycle.order != INLINE and not self.virtual
         self.left = -1
+
+    cdef connect(self, plan):
+        """Connect the parts."""
+        cdef cycle_t *c = &self.e.cycle
+        cdef uint32_t i
+        cdef int slot
+        self.figures.attach(c, plan.log_cycles)
+        if self.frames is not None:
+            self.frames.c.lane = &self.lane.c
+        self.axes.c.image = self.image
+        if self.clock is not None:
+            self.frames.carry_time(&self.clock.c)
+            c.clock = &self.clock.c
+            c.sync_margin = plan.clock.allowance_ns
+        c.link = self.link
+        c.image = self.image
+        c.axes = &self.axes.c
+        c.lane = &self.lane.c
+        c.handover = &self.handover.c
+        self.virtual = c.link.flags & CAT_LINK_VIRTUAL_TIME != 0
+        self.alone = self.virtual and not c.link.flags & CAT_LINK_SHARED_TIME
+        c.order = ORDERS[plan.order]
+        c.period = plan.period_ns
+        c.busy_wait = 0 if self.virtual else plan.busy_wait_ns
+        c.collect_deadline = plan.collect_deadline_ns
+        c.lost_limit = plan.lost_limit
+        self.h = &self.handover.c
+        for slot in range(4):
+            self.h.actual[slot].header.period = c.period * 1e-9
+        for slot in range(TARGETS):
+            for i in range(c.axes.axis_count):
+                self.h.target[slot].mode[i] = c.axes.axes[i].mode
+        for i in range(c.axes.axis_count):
+            self.h.actual[PRIVATE].position[i] = c.axes.axes[i].position
+            self.h.actual[PRIVATE].velocity[i] = c.axes.axes[i].velocity
+            self.h.actual[PRIVATE].torque[i] = c.axes.axes[i].torque
+
+    # ---- the cycle that `actual` belongs to
+
+    cdef actual_header_t *actual_header(self) noexcept:
+        """Of the cycle that Python's actual values belong to; lives as long as the engine."""
+        return self.h.actual[PRIVATE].header
+
+    cdef int64_t now_ns(self) noexcept:
+        return self.e.cycle.link.now(self.e.cycle.link.self)
+
+    def now(self):
+        return self.now_ns()
+
+    @property
+    def buffers(self):
+        return dict(self._buffers)
+
+    def blocks(self):
+        return self.handover.blocks()
+
+    def law_fields(self):
+        return self.handover.law_fields()
+
+    def sink_fields(self):
+        return self.handover.sink_fields()
+
+    @property
+    def sink_sizes(self):
+        return sizeof(record_t), self.h.actual_size, self.h.target_size
+
+    @property
+    def number(self):
+        return self.h.actual[PRIVATE].header.number
+
+    @property
+    def time_ns(self):
+        return self.h.actual[PRIVATE].header.time_ns
+
+    @property
+    def flags(self):
+        return self.h.actual[PRIVATE].header.flags
+
+    @property
+    def lost_in_row(self):
+        return self.h.actual[PRIVATE].header.lost_in_row
+
+    @property
+    def skipped(self):
+        return self.h.actual[PRIVATE].header.skipped
+
+    @property
+    def missing_frames(self):
+        return self.h.actual[PRIVATE].header.missing_frames
+
+    @property
+    def al_status(self):
+        return self.h.actual[PRIVATE].header.al_status
+
+    @property
+    def al_counter(self):
+        return self.h.actual[PRIVATE].header.al_counter
+
+    @property
+    def disturbed(self):
+        cdef uint32_t unit
+        image = self.image
+        for unit in range(image.unit_count):
+            if not image.unit_valid[unit]:
+                return True
+        return image.al_counter[0] != self.device_count or image.al_status[0] != CAT_AL_OP
 
     # ---- life
 
@@ -533,12 +698,7 @@ cdef class Engine(Parts):
         if self.running:
             raise RuntimeError("the engine is running: a sink is set before, and taken away after")
         if capsule is not None:
-            sink = <const cat_sink *>PyCapsule_GetPointer(capsule, CAT_SINK_CAPSULE)
-            if sink.version != CAT_SINK_VERSION:
-                raise ValueError(f"sink table of version {sink.version}, not {CAT_SINK_VERSION}")
-            asked = (sink.record_size, sink.actual_size, sink.target_size)
-            if asked != self.sink_sizes:
-                raise ValueError(f"a sink for blocks of {asked} bytes, there are {self.sink_sizes}")
+            sink = sink_in(capsule, self.sink_sizes)
         self.e.cycle.sink = sink
         self.sink = capsule
 
@@ -558,6 +718,60 @@ cdef class Engine(Parts):
     cdef bint is_stream_used(self, Stream stream) noexcept:
         """Return True if the cycle may be reading the stream."""
         return cat_pointer_is_used(&self.e.cycle.stream, &stream.c)
+
+    # ---- figures
+
+    @property
+    def counters(self):
+        frames = {} if self.frames is None else self.frames.c.counters
+        return {
+            "cycles": self.e.cycle.number,
+            "lost": self.e.cycle.lost,
+            "late": self.e.cycle.late,
+            "uncommitted": self.e.cycle.uncommitted,
+            "missed_sync": self.e.cycle.missed_sync,
+            "stale": 0,
+            "alien": 0,
+            "corrupt": 0,
+            "duplicate": 0,
+            "unprocessed": 0,
+            "repeated": 0,
+            "lane_sent": self.lane.c.sent,
+            "lane_received": self.lane.c.received,
+            "lane_dropped": self.lane.c.dropped,
+            "send_errors": 0,
+            "receive_errors": 0,
+            **frames,
+        }
+
+    def histograms(self):
+        return self.figures.histograms()
+
+    def histogram_counts(self, str phase not None):
+        return self.figures.counts(phase)
+
+    def reset_histograms(self):
+        self.figures.reset()
+
+    def log(self):
+        return self.figures.log()
+
+    # ---- the acyclic lane
+
+    def lane_push(self, bytes frame not None):
+        return self.lane.push(frame)
+
+    def lane_pop(self):
+        return self.lane.pop()
+
+    def lane_wait(self, int64_t timeout_ns):
+        cdef int64_t until
+        if not self.virtual:
+            return self.lane.wait(timeout_ns)
+        until = min(self.e.cycle.next, self.e.cycle.link.now(self.e.cycle.link.self) + timeout_ns)
+        with nogil:
+            cycle_await_lane(&self.e.cycle, until)
+        return self.lane.wait(0)
 
     def __dealloc__(self):
         with nogil:

@@ -1,0 +1,1 @@
+"""Tables that come in capsules; private to the core."""

@@ -1,0 +1,49 @@
+# cython: boundscheck=False, wraparound=False
+"""Tables that come in capsules: checked once, before the cycle uses them."""
+
+from cpython.pycapsule cimport PyCapsule_GetPointer
+
+from catenary.core._native cimport (
+    CAT_IMAGE_CAPSULE,
+    CAT_IMAGE_VERSION,
+    CAT_LINK_CAPSULE,
+    CAT_LINK_VERSION,
+    CAT_SINK_CAPSULE,
+    CAT_SINK_VERSION,
+    cat_image,
+    cat_link,
+    cat_sink,
+)
+
+
+cdef const cat_link *link_in(object capsule) except NULL:
+    """Return the link table of a capsule, after a check of its version."""
+    cdef const cat_link *link = <const cat_link *>PyCapsule_GetPointer(capsule, CAT_LINK_CAPSULE)
+    if link.version != CAT_LINK_VERSION:
+        raise ValueError(f"link: table version {link.version}, expected {CAT_LINK_VERSION}")
+    return link
+
+
+cdef cat_image *image_in(object capsule, plan) except NULL:
+    """Return the image table of a capsule, after a check that it was made for this plan."""
+    cdef cat_image *image = <cat_image *>PyCapsule_GetPointer(capsule, CAT_IMAGE_CAPSULE)
+    if image.version != CAT_IMAGE_VERSION:
+        raise ValueError(f"image: table version {image.version}, expected {CAT_IMAGE_VERSION}")
+    mine = (image.output_size, image.input_size, image.unit_count)
+    wanted = (plan.output_size, plan.input_size, len(plan.sync_units))
+    if mine != wanted:
+        raise ValueError(f"image: (output, input bytes, sync units) {mine}, the plan has {wanted}")
+    if plan.clock is not None:
+        raise ValueError("clock: the owner of the image table keeps the clocks")
+    return image
+
+
+cdef const cat_sink *sink_in(object capsule, tuple sizes) except NULL:
+    """Return the sink table of a capsule, after a check of its block sizes [bytes]."""
+    cdef const cat_sink *sink = <const cat_sink *>PyCapsule_GetPointer(capsule, CAT_SINK_CAPSULE)
+    if sink.version != CAT_SINK_VERSION:
+        raise ValueError(f"sink table of version {sink.version}, not {CAT_SINK_VERSION}")
+    asked = (sink.record_size, sink.actual_size, sink.target_size)
+    if asked != sizes:
+        raise ValueError(f"a sink for blocks of {asked} bytes, there are {sizes}")
+    return sink

@@ -1,0 +1,1 @@
+"""Log and histograms of a cycle; private to the core."""

@@ -1,0 +1,75 @@
+# cython: boundscheck=False, wraparound=False, cdivision=True
+"""Figures of a cycle: the log, a ring of records, and one histogram per phase.
+
+The native thread writes without waiting. A reader copies a record and drops it if the thread has
+overwritten it meanwhile; histograms are reset by exchanging them for cleared ones.
+"""
+
+from libc.stdint cimport uint64_t
+from libc.stdlib cimport calloc, free
+
+from catenary.core._cycle cimport LOG_MARGIN, PHASES, cycle_t, record_t
+from catenary.core._cycle import PHASE_NAMES
+from catenary.core._histogram cimport (
+    histogram_counts,
+    histogram_reset,
+    histogram_summary,
+    histogram_t,
+)
+from catenary.core._native cimport cat_fence
+
+
+cdef class Figures:
+    cdef int attach(self, cycle_t *cycle, uint64_t log_cycles) except -1:
+        """Give a cycle its records and histograms."""
+        self.cycle = cycle
+        self.log_cycles = log_cycles
+        cycle.records_mask = (1 << (log_cycles + LOG_MARGIN - 1).bit_length()) - 1
+        cycle.records = <record_t *>calloc(cycle.records_mask + 1, sizeof(record_t))
+        cycle.histograms = <histogram_t *>calloc(PHASES, sizeof(histogram_t))
+        self.spare = <histogram_t *>calloc(PHASES, sizeof(histogram_t))
+        if not (cycle.records and cycle.histograms and self.spare):
+            raise MemoryError
+        return 0
+
+    cdef bytes log(self):
+        """Return the last records, oldest first; one that was overwritten meanwhile is left out."""
+        cdef cycle_t *c = self.cycle
+        cdef uint64_t last = c.number
+        cdef uint64_t number
+        cdef record_t record
+        found = []
+        for number in range(last - min(last, self.log_cycles) + 1, last + 1):
+            record = c.records[number & c.records_mask]
+            cat_fence()
+            if record.number == number == c.records[number & c.records_mask].number:
+                found.append((<char *>&record)[: sizeof(record_t)])
+        return b"".join(found)
+
+    cdef dict histograms(self):
+        """Return the summary of every phase."""
+        return {
+            name: histogram_summary(&self.cycle.histograms[phase])
+            for name, phase in PHASE_NAMES.items()
+        }
+
+    cdef list counts(self, str phase):
+        """Return the buckets of one phase."""
+        if phase not in PHASE_NAMES:
+            raise ValueError(f"phase {phase!r}: must be one of {', '.join(PHASE_NAMES)}")
+        return histogram_counts(&self.cycle.histograms[<int>PHASE_NAMES[phase]])
+
+    cdef void reset(self) noexcept:
+        cdef histogram_t *old = self.cycle.histograms
+        cdef int phase
+        for phase in range(PHASES):
+            histogram_reset(&self.spare[phase])
+        cat_fence()
+        self.cycle.histograms = self.spare
+        self.spare = old
+
+    def __dealloc__(self):
+        if self.cycle != NULL:
+            free(self.cycle.records)
+            free(self.cycle.histograms)
+        free(self.spare)
