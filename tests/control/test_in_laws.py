@@ -177,14 +177,14 @@ def test_the_models_residual_is_the_same_compiled(tmp_path: Path) -> None:
     assert abs(ends[0]).min() > 0.01
 
 
-def test_a_rehearsal_leaves_nothing_behind_in_the_model(tmp_path: Path) -> None:
-    """With a lead each step is rehearsed on a copy of the memory, but in the same workspace."""
+def test_trial_steps_leave_nothing_in_the_model(tmp_path: Path) -> None:
+    """A law is tried on copies of its memory before it starts, but in the same workspace."""
     path = tmp_path / "three.xml"
     path.write_text(THREE)
     dynamics = control.Dynamics(path, joints=JOINTS)
     ends = []
-    for lead in (0.0, 100e-6):
-        with opened(lead=lead) as (_, loop):
+    for _ in range(2):
+        with opened() as (_, loop):
             memory = control.join(dynamics.memory, np.zeros(3), np.zeros(3), np.full(3, 0.2))
             memory = loop.run(weightless, memory)
             ends.append([*control.part(memory, 1), *control.part(memory, 2)])

@@ -646,6 +646,7 @@ cdef class Engine:
             self.law.supersede()
         self.laws = [*self.laws, law]  # before it is offered: the cycle must not outlive it
         self.law = law
+        law.c.threaded = self.native
         cat_pointer_offer(&self.e.cycle.law_request, &law.c)
         self.laws = [known for known in self.laws if self.is_law_used(known)]
 

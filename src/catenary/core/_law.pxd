@@ -36,6 +36,9 @@ cdef struct law_t:
     uint64_t ended_at          # cycle
     uint32_t status            # futex word
     uint32_t axis              # NOT_FINITE: whose target
+    bint threaded              # the cycle runs in another thread: memory is copied on request
+    uint32_t wanted            # counts requests for the memory
+    uint32_t given             # the last request that was answered; futex word
 
 cdef class Law:
     """Owns a law's numbers while it runs."""
@@ -43,6 +46,7 @@ cdef class Law:
     cdef double *block
     cdef allocate(self, exchange_t *numbers, double **place)
     cdef fill(self, exchange_t *numbers, values)
+    cdef int request_memory(self) except -1
     cdef bint ended_before(self, uint64_t number) noexcept
     cdef bint failed(self) noexcept
     cdef void supersede(self) noexcept

@@ -4,6 +4,7 @@
 The law itself is a function of native/law.h. Budget: 30 ns beside it, without memory.
 """
 
+from cpython.exc cimport PyErr_CheckSignals
 from libc.math cimport isfinite
 from libc.stdint cimport int64_t, uint32_t, uint64_t, uintptr_t
 from libc.stdlib cimport calloc, free
@@ -44,6 +45,8 @@ cdef enum:
     NUMBERS_MAX = 4096         # copied in every cycle
     STUCK_NS = 20_000_000      # of processor time in one call: it never returns
     REHEARSALS = 3
+    ANSWER_NS = 200_000_000    # longest wait for a copy of the memory
+    SLICE_NS = 10_000_000      # of it, between signals
 
 
 # ---- numbers that change all at once
@@ -118,8 +121,16 @@ cdef bint law_run(law_t *law, const axes_t *axes, const actual_t *actual, target
 
 
 cdef void law_tell(law_t *law) noexcept nogil:
-    """Behind the outputs: the memory of a law that goes on, for the application."""
-    give(&law.memory_out, law.numbers.memory)
+    """After a step of a law that goes on: copy its memory where the application wants it."""
+    cdef uint32_t wanted
+    if not law.threaded:
+        give(&law.memory_out, law.numbers.memory)
+        return
+    wanted = cat_load_acquire32(&law.wanted)
+    if wanted != law.given:
+        give(&law.memory_out, law.numbers.memory)
+        cat_store_release32(&law.given, wanted)
+        cat_futex_wake(&law.given)
 
 
 cdef bint law_took(law_t *law, int64_t duration, uint64_t number) noexcept nogil:
@@ -203,9 +214,28 @@ cdef class Law:
     def memory(self):
         cdef exchange_t *numbers = &self.c.memory_out
         cdef uint32_t i
+        if numbers.count and self.c.threaded:
+            self.request_memory()
         if numbers.count:
             cat_triple_take(&numbers.triple)
         return [numbers.slots[numbers.triple.front][i] for i in range(numbers.count)]
+
+    cdef int request_memory(self) except -1:
+        """Wait until the cycle has copied the memory after its next step; the end of the law does
+        so too. Give up after ANSWER_NS: the last copy counts."""
+        cdef uint32_t wanted = self.c.wanted + 1
+        cdef uint32_t given
+        cdef int64_t waited = 0
+        cat_store_release32(&self.c.wanted, wanted)
+        while waited < ANSWER_NS and cat_load_acquire32(&self.c.status) <= RUNNING:
+            given = cat_load_acquire32(&self.c.given)
+            if given == wanted:
+                return 0
+            with nogil:
+                cat_futex_wait(&self.c.given, given, SLICE_NS)
+            waited += SLICE_NS
+            PyErr_CheckSignals()
+        return 0
 
     @property
     def status(self):
