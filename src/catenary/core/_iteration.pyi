@@ -1,4 +1,4 @@
-"""What `for cycle in loop` runs through."""
+"""Iteration of a loop, and the cycle that it yields."""
 
 from collections.abc import Callable
 from typing import Self
@@ -6,52 +6,52 @@ from typing import Self
 from catenary.core._engine import Engine
 
 class Cycle:
-    """The cycle that the actual values belong to. The same object every time: it reads the
-    engine, so note down what you want to keep."""
+    """The cycle that the actual values belong to. It is the same object in every iteration: copy
+    what you want to keep."""
 
     def __init__(self, engine: Engine) -> None: ...
     @property
     def number(self) -> int:
-        """0 for the first cycle of the iteration; skipped instants leave gaps in `time` alone."""
+        """0 for the first cycle of the iteration. Skipped cycles leave gaps in `time` only."""
 
     @property
     def time(self) -> float:
-        """[s] since the first cycle of the iteration: a multiple of the period."""
+        """Cycle start [s] on the link's clock, counted from the first cycle of the iteration. It is not
+        an exact multiple of the period where the cycle follows a reference clock."""
 
     @property
     def ok(self) -> bool:
-        """Every sync unit that is needed answered: the inputs are of this cycle."""
+        """True if every required sync unit answered: the inputs are of this cycle."""
 
     @property
     def lost(self) -> int:
-        """How many cycles in a row, up to this one, were not ok."""
+        """Number of cycles in a row, up to this one, that were not ok."""
 
     @property
     def late(self) -> bool:
-        """Instants were skipped, or happened without new targets, since the cycle before."""
+        """True if cycles were skipped, or ran without new targets, since the iteration before."""
 
     @property
     def limited(self) -> bool:
-        """The set-points sent last were limited on some axis: see `Drives.limited`."""
+        """True if a set-point was limited on some axis: see `Drives.limited`."""
 
     @property
     def refused(self) -> bool:
-        """Some target was NaN or infinite; its axis held instead."""
+        """True if a target was refused: NaN, infinite, or further than the step limit."""
 
     @property
     def dry(self) -> bool:
-        """The stream of set-points had run dry: the axes hold."""
+        """True if the stream of set-points was empty: an underrun."""
 
     def spend(self, seconds: float) -> None:
-        """In virtual time: lets time pass as if the body took that long [s]. On a NIC time passes
-        by itself: computes that long, as `task.spend` does."""
+        """Let virtual time pass as if the body took this long [s]. On a NIC, compute that long."""
 
 class Iteration:
-    """Steps the engine once for every `next`, and hands out its one Cycle.
+    """Iterator that steps the engine once per `next` and yields its one Cycle.
 
-    Calls `judge(flags)` when one of the CYCLE_* flags of `trouble` is set, or the devices' AL states
-    together are not `al_status`; what it raises ends the iteration. The first step commits nothing.
-    `beside` is called before every step.
+    It calls `judge(flags)` if one of the CYCLE_* flags of `trouble` is set, or if the devices' AL
+    states together differ from `al_status`; an exception of `judge` ends the iteration. The first
+    step commits nothing. `beside` is called before every step.
     """
 
     def __init__(

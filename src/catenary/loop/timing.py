@@ -8,12 +8,15 @@ FIGURES = ("mean", "max", "min", "sd", "p50", "p99", "p999")
 
 
 class Timing(Mapping[str, Mapping[str, float]]):
-    """Per phase of the cycle, mean, max, min, sd and quantiles in us.
+    """Mean, max, min, sd and quantiles of each phase of the cycle [us].
 
-    period: from instant to instant as it was met; lateness: of the wake-up against its instant;
-    receive: wake-up → inputs usable; process: the body (of a law also ahead of its instant); send:
-    its end → the last frame is out; in_controller: the three together; tail: what remains before
-    the next wait; round_trip: of the last frame. Phases that did not occur are left out.
+    period: wake-up to wake-up. lateness: cycle start → wake-up. receive: wake-up (threaded: last
+    frame) → inputs usable. process: the body, or the law. send: wake-up (inline: end of the body) →
+    last frame handed to the kernel. in_controller: the sum of these three. tail: post-processing
+    until the next wait. round_trip: of the last frame. output_delay: cycle start → last cyclic frame
+    handed to the kernel. input_age: frames handed to the kernel → body or law begins with their
+    inputs. interpreter: wake-up → this thread has the interpreter. Phases that did not occur are
+    left out.
     """
 
     def __init__(
