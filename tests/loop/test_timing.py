@@ -21,3 +21,11 @@ def test_the_table_shows_every_figure_and_the_counts() -> None:
     assert head.split() == ["[us]", "mean", "max", "min", "sd", "p50", "p99", "p999"]
     assert row.split() == ["receive", "5.25", "9.00", "4.00", "0.50", "5.00", "8.00", "8.90"]
     assert counts == "10 cycles, 1 lost, 2 late"
+
+
+def test_a_second_busy_thread_is_reported() -> None:
+    waits = {"count": 10.0, **FIGURES, "p99": 4900.0}
+    counters = {"cycles": 10, "lost": 0, "late": 0}
+    assert "switch_interval" in str(Timing({"interpreter": waits}, counters))
+    waits["p99"] = 300.0
+    assert "switch_interval" not in str(Timing({"interpreter": waits}, counters))

@@ -24,7 +24,8 @@ cdef enum:  # phases
     IN_CONTROLLER = 7
     OUTPUT_DELAY = 8
     INPUT_AGE = 9
-    PHASES = 10
+    INTERPRETER = 10           # written by Python's thread
+    PHASES = 11
 
 cdef enum:
     LOG_MARGIN = 24            # the writer is not overtaken while the log is copied

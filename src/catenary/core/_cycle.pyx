@@ -23,6 +23,7 @@ the body of the application, or the law. send: wake-up → last cyclic frame han
 (inline: end of the body →). in_controller: their sum. tail: post-processing until the next wait.
 round_trip: sent → last frame seen (threaded). output_delay: cycle start → last cyclic frame handed to
 the kernel. input_age: frames handed to the kernel → law or body begins with their inputs.
+interpreter: Python's thread awake → it has the interpreter (added by the engine).
 Budget: 1 us for three drives, without the link.
 """
 
@@ -111,6 +112,7 @@ PHASE_NAMES = {
     "in_controller": IN_CONTROLLER,
     "output_delay": OUTPUT_DELAY,
     "input_age": INPUT_AGE,
+    "interpreter": INTERPRETER,
 }
 RECORD_FIELDS = [
     ("number", "<u8"),

@@ -18,6 +18,7 @@ from catenary.core._capsules cimport image_in, link_in, sink_in
 from catenary.core._clocks cimport Clock
 from catenary.core._cycle cimport (
     INLINE,
+    INTERPRETER,
     cycle_await_lane,
     cycle_inputs,
     cycle_law_reserve,
@@ -49,6 +50,7 @@ from catenary.core._handover cimport (
     handover_swap,
     target_t,
 )
+from catenary.core._histogram cimport histogram_add
 from catenary.core._lane cimport Lane
 from catenary.core._law cimport WAITING, Law
 from catenary.core._native cimport (
@@ -392,6 +394,8 @@ cdef class Engine:
             if rc == 0:
                 break
             self.interrupted(rc)
+        if not self.alone:
+            histogram_add(&c.histograms[INTERPRETER], self.now_ns() - c.wake)
         cycle_inputs(c, &self.h.actual[PRIVATE])
         cycle_usable(c)
         self.emitted = False
@@ -469,7 +473,7 @@ cdef class Engine:
     cdef int await_cycle(self, int64_t timeout_ns) except -1:
         """Swaps the newest cycle in, waiting for one if need be. 0, NONE or STOPPED."""
         cdef int64_t deadline = -1
-        cdef int64_t left
+        cdef int64_t left, woken
         cdef uint32_t seen
         cdef int rc
         while not handover_swap(self.h):
@@ -490,6 +494,8 @@ cdef class Engine:
                 with nogil:
                     if not cat_load_acquire32(&self.e.done):
                         rc = cat_futex_wait(&self.h.published, seen, left)
+                    woken = self.link.now(self.link.self)
+                histogram_add(&self.e.cycle.histograms[INTERPRETER], self.now_ns() - woken)
             else:
                 cat_store_release32(&self.h.waiting, 0)
                 return 0

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Mapping
 
+BUSY_SHARE = 0.5  # of the switch interval: a wait this long shows a second busy thread
 FIGURES = ("mean", "max", "min", "sd", "p50", "p99", "p999")
 
 
@@ -38,5 +40,11 @@ class Timing(Mapping[str, Mapping[str, float]]):
         rows = [f"{'[us]':<14}" + "".join(f"{name:>11}" for name in FIGURES)]
         for phase, figures in self._phases.items():
             rows.append(f"{phase:<14}" + "".join(f"{figures[name]:>11.2f}" for name in FIGURES))
+        waits = self._phases.get("interpreter", {}).get("p99", 0.0)
+        if waits >= BUSY_SHARE * sys.getswitchinterval() * 1e6:
+            rows.append(
+                f"Another Python thread keeps the interpreter for up to {waits:.0f} us (p99): end it, "
+                "run it in a process, or shorten its turns with Loop(switch_interval=20e-6)."
+            )
         counted = ", ".join(f"{self.counters[name]} {name}" for name in ("cycles", "lost", "late"))
         return "\n".join([*rows, counted])
