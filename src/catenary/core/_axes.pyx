@@ -23,12 +23,10 @@ from catenary.core._guard cimport (
     CST,
     NO_MODE,
     guard_controlword,
-    guard_mode,
     guard_observe,
-    guard_request,
-    guard_setpoints,
+    guard_orders,
     guard_stop,
-    guard_take_request,
+    guard_take_orders,
     guard_works,
 )
 from catenary.core._handover cimport LIMITED_SOME, REFUSED_SOME
@@ -44,6 +42,7 @@ from catenary.core._numbers cimport (
     number_put_wrapped,
     number_value,
 )
+from catenary.core._setpoints cimport axis_setpoints
 
 AXIS_FOLLOWED = FOLLOWED
 AXIS_LIMITED = LIMITED
@@ -281,12 +280,11 @@ cdef void axes_write(axes_t *x, const target_t *target, bint fresh, uint64_t num
     else:
         x.uncommitted += 1
     for i in range(x.axis_count):
-        guard_mode(&x.axes[i], target.mode[i])
-        guard_request(x, &x.axes[i], target, i)
+        guard_orders(x, &x.axes[i], target, i)
     apply_stop(x)
     for i in range(x.axis_count):
         a = &x.axes[i]
-        guard_setpoints(x, a, target, i, fresh)
+        axis_setpoints(x, a, target, i, fresh)
         lead_axis(x, a, target.controlword_bits[i])
         if a.flags & LIMITED:
             x.told |= LIMITED_SOME
@@ -322,7 +320,7 @@ cdef void axes_apply_late(axes_t *x, const target_t *target, bint fresh) noexcep
     for i in range(x.axis_count):
         a = &x.axes[i]
         if target.request[i] != a.request and removes_power(target, i):
-            guard_take_request(x, a, target, i)
+            guard_take_orders(x, a, target, i)
             lead_axis(x, a, target.controlword_bits[i])
         elif guard_works(a):
             lead_axis(x, a, target.controlword_bits[i])

@@ -54,24 +54,30 @@ cdef enum:  # plan.stop_reason.StopReason
     STOP_FAULT = 10
     STOP_REQUEST = 11
 
+cdef enum:  # commands of a stop, IEC 61800-7-201 table 26
+    DISABLE_VOLTAGE = 0x00
+    QUICK_STOP_COMMAND = 0x02
+    DISABLE_OPERATION = 0x07
+
 cdef void guard_observe(axes_t *x, axis_t *a, uint8_t state_before,
                         uint64_t number) noexcept nogil
-cdef void guard_take_mode(axis_t *a, int8_t mode) noexcept nogil
-cdef void guard_take_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nogil
+cdef void guard_take_orders(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nogil
 cdef void guard_stop(axes_t *x) noexcept nogil
 cdef uint16_t guard_lead(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil
-cdef void guard_setpoints(axes_t *x, axis_t *a, const target_t *t, uint32_t i,
-                          bint fresh) noexcept nogil
+cdef void stop_axis(axes_t *x, axis_t *a, uint8_t reason) noexcept nogil
+cdef void lose_axis(axes_t *x, axis_t *a, uint8_t reason) noexcept nogil
+cdef uint16_t stop_command(axes_t *x, axis_t *a) noexcept nogil
+cdef void prepare_mode(axis_t *a, int8_t mode) noexcept nogil
+cdef void refuse_mode(axes_t *x, axis_t *a) noexcept nogil
 
-cdef inline void guard_mode(axis_t *a, int8_t mode) noexcept nogil:
-    """Apply the requested mode of operation."""
-    if mode != a.mode_wanted or a.mode_refused != NO_MODE:
-        guard_take_mode(a, mode)
+cdef inline bint shows_mode(const axis_t *a) noexcept nogil:
+    return not a.mode_actual.present or a.mode_shown == a.mode
 
-cdef inline void guard_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nogil:
-    """Apply a new request; a no-op for an axis that works and has no new request."""
-    if t.request[i] != a.request or (a.goal == ENABLED and not a.followed):
-        guard_take_request(x, a, t, i)
+cdef inline void guard_orders(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nogil:
+    """Take over new orders; a no-op for an axis that works and has none."""
+    if (t.request[i] != a.request or t.mode[i] != a.mode_wanted or a.mode_refused != NO_MODE
+            or (a.goal == ENABLED and not a.followed)):
+        guard_take_orders(x, a, t, i)
 
 cdef inline bint guard_works(const axis_t *a) noexcept nogil:
     """Return True if the axis follows its set-points and is to go on with it."""

@@ -1,33 +1,26 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""Safety of one axis in one cycle. docs/safety.md has the table of reactions and their scenarios.
+"""Safety of one axis in one cycle: what is requested of it, whether it is followed, how it stops.
+docs/safety.md has the table of reactions and their scenarios; _setpoints.pyx computes what is sent.
 
 Theory of operation. `guard_observe` runs after the inputs of a cycle, the other functions before its
-outputs. The set-points of the application count only while the axis is *followed*: requested state
-enabled, OPERATION_ENABLED, the mode shown is the one in force, statusword bit 12 where the mode
-defines it, and its unit answers. Five situations decide what is sent instead:
+outputs. `goal` is the requested state in force, `mode` the mode of operation in force, `mode_wanted`
+the one that 0x6060 requests. The set-points of the application count only while the axis is
+*followed*: requested state enabled, OPERATION_ENABLED, the mode shown is the one in force, statusword
+bit 12 where the mode defines it, and its unit answers. `worked` is set once it was followed since
+OPERATION_ENABLED or since a mode change; `tells` once its drive has shown bit 12; `gap_cycles` counts
+since bit 12 was lost, `mute_cycles` while it was never shown, `climbing_cycles` since the request.
 
-- not powered: target := actual; in SWITCHED_ON a committed torque is sent, so that it is there when
-  the brake opens;
-- waiting: powered, but not followed yet (`waiting`), after a mode request (`mode_wanted` differs from
-  `mode`) or after bit 12 was lost (`worked` is set);
-- hand-over (`x.handed_over`): a law or stream ended, or a call of ours waits;
-- underrun (`x.uncommitted`), or a refused set-point of this axis (`refused_cycles`);
-- stopping: another state was requested, or the core stopped the axis (`stop_axis`).
+A stop (`stop_axis`) needs a new request afterwards; `stop_reason` and `stop_cycle` keep its cause. It
+sends quick stop, then disable operation, then disable voltage (`stop_command`, `stop_cycles`). With
+`on_loss` csp_hold, an axis in CST whose set-points stay away is held in CSP instead (`holding`).
 
-In all of them CSP and CSV decelerate and hold, and CST keeps its torque; each is bounded in time.
-In an underrun CSP first keeps the velocity of the last two set-points: `ghost` is the set-point that
-the core continues. When set-points come back, the command returns to them within acceleration,
-deceleration and torque slope (`returning`).
-A stop sends quick stop, then disable operation, then disable voltage; the last torque stays until
-OPERATION_ENABLED is left. `stop_reason` and `stop_cycle` keep the cause until a new request.
-
-Budget: 20 ns per axis that works.
+Budget: 10 ns per axis that works.
 """
 
-from libc.math cimport INFINITY, copysign, fabs, fmax, fmin, isfinite, sqrt
+from libc.math cimport isfinite
 from libc.stdint cimport int8_t, uint8_t, uint16_t, uint32_t, uint64_t
 
-from catenary.core._axes cimport DROPPED, FALLBACK, LIMITED, MODE_REFUSED, REFUSED
+from catenary.core._axes cimport DROPPED, MODE_REFUSED
 from catenary.core._cia402 cimport (
     DISABLED,
     ENABLED,
@@ -38,7 +31,6 @@ from catenary.core._cia402 cimport (
     QUICK_STOP,
     QUICK_STOP_ACTIVE,
     RESET,
-    SWITCHED_ON,
     cia402_command,
 )
 
@@ -47,31 +39,6 @@ from catenary.core._handover cimport DROPPED_SOME
 cdef enum:
     FOLLOWS_COMMAND = 0x1000   # statusword bit 12 in CSP, CSV, CST
     BIT_12_GAP = 3             # exchanges without bit 12 that are bridged
-
-cdef enum:  # commands of a stop, IEC 61800-7-201 table 26
-    DISABLE_VOLTAGE = 0x00
-    QUICK_STOP_COMMAND = 0x02
-    DISABLE_OPERATION = 0x07
-
-cdef double STEP_FLOOR = 0.1           # [rad] smallest default of the step limit
-cdef double STEP_TOLERANCE = 1.000001  # a step of exactly the limit is accepted
-
-
-cdef inline double clamp(axis_t *a, double value, double low, double high) noexcept nogil:
-    if value < low:
-        a.flags |= LIMITED
-        return low
-    if value > high:
-        a.flags |= LIMITED
-        return high
-    return value
-
-
-cdef inline double approach(double value, double goal, double step) noexcept nogil:
-    """Return `value` moved towards `goal` by at most `step`."""
-    if fabs(goal - value) <= step:
-        return goal
-    return value + copysign(step, goal - value)
 
 
 # ---- stops and requests
@@ -107,7 +74,22 @@ cdef void lose_axis(axes_t *x, axis_t *a, uint8_t reason) noexcept nogil:
     a.mode_wanted = CSP
 
 
-cdef void guard_take_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nogil:
+cdef void take_mode(axis_t *a, int8_t mode) noexcept nogil:
+    """Take a requested mode over. A powered axis keeps its mode until 0x6061 shows the new one."""
+    if mode == a.mode_refused:
+        return
+    a.mode_refused = NO_MODE
+    a.flags &= ~MODE_REFUSED
+    if a.holding or mode == a.mode_wanted:
+        return
+    a.mode_wanted = mode
+    a.waiting_cycles = 0
+    if a.state != OPERATION_ENABLED:
+        a.mode = mode
+    a.followed = 0
+
+
+cdef void take_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nogil:
     """Take a new request over; count how long it has been waiting."""
     cdef uint8_t goal
     if t.request[i] != a.request:
@@ -134,6 +116,13 @@ cdef void guard_take_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i
             a.climbing_cycles += 1
         if a.climbing_cycles > x.climbing_limit:
             stop_axis(x, a, STOP_NOT_ENABLED)
+
+
+cdef void guard_take_orders(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nogil:
+    """Take over what the application requests: mode of operation and state."""
+    if t.mode[i] != a.mode_wanted or a.mode_refused != NO_MODE:
+        take_mode(a, t.mode[i])
+    take_request(x, a, t, i)
 
 
 cdef void guard_stop(axes_t *x) noexcept nogil:
@@ -185,21 +174,6 @@ cdef uint16_t guard_lead(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil:
 
 # ---- modes of operation
 
-cdef void guard_take_mode(axis_t *a, int8_t mode) noexcept nogil:
-    """Take a requested mode over. A powered axis keeps its mode until 0x6061 shows the new one."""
-    if mode == a.mode_refused:
-        return
-    a.mode_refused = NO_MODE
-    a.flags &= ~MODE_REFUSED
-    if a.holding or mode == a.mode_wanted:
-        return
-    a.mode_wanted = mode
-    a.waiting_cycles = 0
-    if a.state != OPERATION_ENABLED:
-        a.mode = mode
-    a.followed = 0
-
-
 cdef inline double demanded_torque(const axis_t *a) noexcept nogil:
     """Return the torque that a powered drive applies now: 0x6074, else the actual torque."""
     cdef double torque = a.demand_torque if a.torque_demand.present else a.torque
@@ -243,6 +217,15 @@ cdef void enter_mode(axis_t *a) noexcept nogil:
     begin_setpoints(a)
 
 
+cdef void refuse_mode(axes_t *x, axis_t *a) noexcept nogil:
+    """Restore the mode in force: the drive does not show the requested one."""
+    a.mode_refused = a.mode_wanted
+    a.mode_wanted = a.mode
+    a.waiting_cycles = 0
+    a.flags |= MODE_REFUSED
+    x.told |= DROPPED_SOME
+
+
 # ---- after the inputs
 
 cdef bint is_mapped(const axis_t *a) noexcept nogil:
@@ -253,10 +236,6 @@ cdef bint is_mapped(const axis_t *a) noexcept nogil:
     if quantity == VELOCITY:
         return a.target_velocity.present
     return quantity != TORQUE or a.target_torque.present
-
-
-cdef inline bint shows_mode(const axis_t *a) noexcept nogil:
-    return not a.mode_actual.present or a.mode_shown == a.mode
 
 
 cdef bint is_trusted(axes_t *x, axis_t *a) noexcept nogil:
@@ -324,341 +303,3 @@ cdef void guard_observe(axes_t *x, axis_t *a, uint8_t state_before,
         a.climbing_cycles = 0
         a.waiting_cycles = 0
         a.followed_since = number
-
-
-# ---- fallback: without set-points that count
-
-cdef void return_to(axes_t *x, axis_t *a, double target, double velocity) noexcept nogil:
-    """Move the command towards a moving set-point: velocity from the remaining distance."""
-    cdef double distance = target - a.commanded_position - velocity * x.period
-    cdef double step = a.acceleration * x.period
-    cdef double catch_up
-    if fabs(distance) <= step * x.period and fabs(a.command_velocity - velocity) <= step:
-        a.returning = 0
-        return
-    catch_up = fmin(sqrt(2 * a.acceleration * fabs(distance)), fabs(distance) / x.period)
-    velocity = approach(a.command_velocity, velocity + copysign(catch_up, distance), step)
-    a.command_velocity = fmin(fmax(velocity, -a.velocity_limit), a.velocity_limit)
-    a.commanded_position += a.command_velocity * x.period
-
-
-cdef void track(axes_t *x, axis_t *a, double target, double velocity) noexcept nogil:
-    """Command a set-point that moves at `velocity`: within the limits, or on the way back to it."""
-    cdef double held = a.commanded_position
-    cdef double step = a.velocity_limit * x.period
-    # An axis found outside its limits may stay or come back, not leave further.
-    target = clamp(a, target, fmin(a.position_min, held), fmax(a.position_max, held))
-    if a.returning:
-        return_to(x, a, target, velocity)
-        if a.returning:
-            a.flags |= FALLBACK
-            return
-    a.commanded_position = clamp(a, target, held - step, held + step)
-    a.command_velocity = (a.commanded_position - held) / x.period
-
-
-cdef double towards_limits(const axis_t *a, double velocity) noexcept nogil:
-    """Return a velocity from which the set-points still stop before a position limit."""
-    if a.position_max < INFINITY and velocity > 0:
-        velocity = fmin(velocity, sqrt(2 * a.deceleration * fmax(a.position_max - a.ghost, 0.0)))
-    if a.position_min > -INFINITY and velocity < 0:
-        velocity = fmax(velocity, -sqrt(2 * a.deceleration * fmax(a.ghost - a.position_min, 0.0)))
-    return velocity
-
-
-cdef inline double fallback_velocity(const axis_t *a) noexcept nogil:
-    """Return the velocity at which set-points stayed away. A single step is not a velocity."""
-    cdef double last = a.setpoint_velocity
-    cdef double before = a.previous_velocity
-    if last * before <= 0.0:
-        return 0.0
-    if fabs(last) > 2 * fabs(before):
-        last = before
-    return fmin(fmax(last, -a.velocity_limit), a.velocity_limit)
-
-
-cdef void fall_back_position(axes_t *x, axis_t *a, bint keep) noexcept nogil:
-    """Continue the set-points at their velocity, or decelerate them; the command tracks them."""
-    if a.fallback_cycles == 1:
-        a.ghost_velocity = fallback_velocity(a) if a.accepted >= 2 else 0.0
-    if not keep:
-        a.ghost_velocity = approach(a.ghost_velocity, 0.0, a.deceleration * x.period)
-    a.ghost_velocity = towards_limits(a, a.ghost_velocity)
-    a.ghost += a.ghost_velocity * x.period
-    track(x, a, a.ghost, a.ghost_velocity)
-
-
-cdef void fall_back(axes_t *x, axis_t *a, bint keep) noexcept nogil:
-    """Compute one cycle without a set-point that counts. `keep`: CSP may keep its velocity."""
-    cdef uint8_t quantity = quantity_of(a.mode)
-    a.flags |= FALLBACK
-    a.fallback_cycles += 1
-    if quantity == POSITION:
-        fall_back_position(x, a, keep and a.fallback_cycles <= x.keep_limit)
-    elif quantity == VELOCITY:
-        if a.fallback_cycles == 1 and a.velocity_offset.present:
-            a.commanded_velocity += a.offset_sent  # 0x60B1 adds to the target, and ends now
-        a.commanded_velocity = approach(a.commanded_velocity, 0.0, a.deceleration * x.period)
-
-
-# ---- set-points that count
-
-cdef bint is_number(axis_t *a, double value) noexcept nogil:
-    if isfinite(value):
-        return True
-    a.flags |= REFUSED
-    a.refused_cycles += 1
-    return False
-
-
-cdef bint is_accepted(axes_t *x, axis_t *a, double target, uint64_t between) noexcept nogil:
-    """Refuse a CSP set-point too far from the last accepted one."""
-    cdef double limit = a.step_limit
-    if limit == 0.0:
-        limit = fmax(STEP_FLOOR, 2 * a.velocity_limit * x.period
-                     * <double>max(between, <uint64_t>a.divider))
-    if fabs(target - a.setpoint) <= limit * STEP_TOLERANCE:
-        return True
-    a.flags |= REFUSED
-    a.refused_cycles += 1
-    return False
-
-
-cdef void follow_position(axes_t *x, axis_t *a, const target_t *t, double target) noexcept nogil:
-    cdef double held = a.commanded_position
-    cdef uint64_t stamp = t.header.stamp
-    cdef uint64_t since = a.setpoint_stamp if a.setpoint_stamp else a.followed_since
-    cdef uint64_t between = 1
-    cdef uint64_t age = 0
-    if not t.header.streamed:
-        between = stamp - since if stamp > since else 1
-        age = x.number - stamp if x.number > stamp else 0
-    if a.mode != CSP:
-        a.commanded_position = clamp(a, target, fmin(a.position_min, held), fmax(a.position_max, held))
-        a.refused_cycles = 0
-        return
-    if not is_accepted(x, a, target, between):
-        fall_back(x, a, False)
-        return
-    a.previous_velocity = a.setpoint_velocity
-    a.setpoint_velocity = (target - a.setpoint) / (x.period * <double>between)
-    a.setpoint = target
-    a.setpoint_stamp = stamp
-    if a.fallback_cycles:
-        a.returning = a.accepted > 0
-        if t.header.streamed:
-            a.previous_velocity = 0.0  # the pause between two rows is not known
-    a.accepted = min(a.accepted + 1, 2)
-    a.refused_cycles = 0
-    a.fallback_cycles = 0
-    a.ghost = target + a.setpoint_velocity * x.period * <double>age
-    track(x, a, a.ghost, a.setpoint_velocity)
-
-
-cdef bint is_leaving(const axis_t *a) noexcept nogil:
-    """Return True if the axis is outside a position limit and moves away from it."""
-    if a.position > a.position_max:
-        return a.velocity > a.standstill
-    return a.position < a.position_min and a.velocity < -a.standstill
-
-
-cdef void limit_velocity(axes_t *x, axis_t *a) noexcept nogil:
-    """Bound the commanded velocity so that the axis stops before a position limit."""
-    cdef double target = clamp(a, a.commanded_velocity, -a.velocity_limit, a.velocity_limit)
-    if a.position_max < INFINITY:
-        target = clamp(a, target, -INFINITY,
-                       sqrt(2 * a.deceleration * fmax(a.position_max - a.position, 0.0)))
-    if a.position_min > -INFINITY:
-        target = clamp(a, target,
-                       -sqrt(2 * a.deceleration * fmax(a.position - a.position_min, 0.0)), INFINITY)
-    a.commanded_velocity = target
-    a.beyond_cycles = a.beyond_cycles + 1 if is_leaving(a) else 0
-    if a.beyond_cycles > x.beyond_limit:
-        stop_axis(x, a, STOP_POSITION_LIMIT)
-
-
-cdef void follow_velocity(axes_t *x, axis_t *a, double target) noexcept nogil:
-    cdef double rate
-    if a.fallback_cycles:
-        a.returning = a.accepted > 0
-    a.accepted = 2
-    a.refused_cycles = 0
-    a.fallback_cycles = 0
-    target = clamp(a, target, -a.velocity_limit, a.velocity_limit)
-    if a.returning:
-        rate = a.acceleration if fabs(target) > fabs(a.commanded_velocity) else a.deceleration
-        a.commanded_velocity = approach(a.commanded_velocity, target, rate * x.period)
-        a.returning = a.commanded_velocity != target
-        if a.returning:
-            a.flags |= FALLBACK
-        return
-    a.commanded_velocity = target
-
-
-cdef double limited_torque(axis_t *a, double target) noexcept nogil:
-    """Return the torque within its limit, none towards a position limit that is reached and none
-    that accelerates beyond the velocity limit."""
-    target = clamp(a, target, -a.torque_limit, a.torque_limit)
-    if a.position >= a.position_max or a.velocity > a.velocity_limit:
-        target = clamp(a, target, -INFINITY, 0.0)
-    if a.position <= a.position_min or a.velocity < -a.velocity_limit:
-        target = clamp(a, target, 0.0, INFINITY)
-    return target
-
-
-cdef void follow_torque(axes_t *x, axis_t *a, double target) noexcept nogil:
-    if a.fallback_cycles:
-        a.returning = a.accepted > 0
-    a.accepted = 2
-    a.refused_cycles = 0
-    a.fallback_cycles = 0
-    if a.returning:
-        a.commanded_torque = approach(a.commanded_torque, target, a.torque_slope * x.period)
-        a.returning = a.commanded_torque != target
-        return
-    a.commanded_torque = target
-
-
-cdef void limit_torque(axes_t *x, axis_t *a) noexcept nogil:
-    a.commanded_torque = limited_torque(a, a.commanded_torque)
-    if is_leaving(a):
-        stop_axis(x, a, STOP_POSITION_LIMIT)  # without torque only the drive can brake it
-
-
-cdef void follow(axes_t *x, axis_t *a, const target_t *t, uint32_t i, bint fresh) noexcept nogil:
-    """Follow the set-point of this cycle, if there is one that counts; else fall back."""
-    cdef uint8_t quantity = quantity_of(a.mode)
-    cdef double target = t.torque[i]
-    if quantity == POSITION:
-        target = t.position[i]
-        fresh = fresh and t.header.seen >= a.followed_since
-    elif quantity == VELOCITY:
-        target = t.velocity[i]
-    if not fresh or not is_number(a, target):
-        fall_back(x, a, not x.handed_over and a.refused_cycles == 0)
-    elif quantity == POSITION:
-        follow_position(x, a, t, target)
-    elif quantity == VELOCITY:
-        follow_velocity(x, a, target)
-    elif quantity == TORQUE:
-        follow_torque(x, a, target)
-    if quantity == VELOCITY:
-        limit_velocity(x, a)
-    elif quantity == TORQUE:
-        limit_torque(x, a)
-
-
-cdef void judge_lateness(axes_t *x, axis_t *a) noexcept nogil:
-    """Stop a followed axis whose set-points have stayed away for too long."""
-    cdef uint8_t quantity = quantity_of(a.mode)
-    cdef uint32_t limit = x.late_limit_position
-    cdef uint32_t late = max(x.uncommitted, a.refused_cycles)
-    if quantity == VELOCITY:
-        limit = x.late_limit_velocity
-    elif quantity == TORQUE:
-        limit = x.late_limit_torque
-        if x.handed_over > x.handover_limit:
-            lose_axis(x, a, STOP_HANDOVER)
-            return
-    if limit > 0 and late >= limit:
-        lose_axis(x, a, STOP_REFUSED if a.refused_cycles >= limit else STOP_UNDERRUN)
-
-
-# ---- what is sent
-
-cdef void rest(axes_t *x, axis_t *a, double torque, bint fresh) noexcept nogil:
-    """Not powered: target := actual. A committed torque is sent before the brake opens."""
-    a.commanded_position = a.position
-    a.commanded_velocity = 0.0
-    a.commanded_torque = 0.0
-    a.command_velocity = 0.0
-    if (fresh and a.state == SWITCHED_ON and a.goal == ENABLED and a.armed
-            and quantity_of(a.mode) == TORQUE and isfinite(torque)):
-        a.commanded_torque = limited_torque(a, torque)
-
-
-cdef void stopping(axes_t *x, axis_t *a) noexcept nogil:
-    """Powered, but to stop: decelerate; the last torque stays until the voltage is cut."""
-    a.stop_cycles += 1
-    fall_back(x, a, False)
-    a.commanded_torque = limited_torque(a, a.commanded_torque)
-    if stop_command(x, a) == DISABLE_VOLTAGE:
-        a.commanded_torque = 0.0
-
-
-cdef void refuse_mode(axes_t *x, axis_t *a) noexcept nogil:
-    """Restore the mode in force: the drive does not show the requested one."""
-    a.mode_refused = a.mode_wanted
-    a.mode_wanted = a.mode
-    a.waiting_cycles = 0
-    a.flags |= MODE_REFUSED
-    x.told |= DROPPED_SOME
-
-
-cdef void wait_for_mode(axes_t *x, axis_t *a) noexcept nogil:
-    """The drive shows another mode than the one requested: the mode in force hands over."""
-    fall_back(x, a, False)
-    if quantity_of(a.mode) != quantity_of(a.mode_wanted):
-        prepare_mode(a, a.mode_wanted)
-    if quantity_of(a.mode) == TORQUE:
-        a.commanded_torque = limited_torque(a, a.commanded_torque)
-        if not a.holding and a.waiting_cycles > x.handover_limit:
-            lose_axis(x, a, STOP_MODE_CHANGE)
-            return
-    if a.waiting_cycles < x.mode_limit:
-        return
-    if a.holding or a.mode_wanted == a.mode:
-        stop_axis(x, a, STOP_MODE_CHANGE)
-    else:
-        refuse_mode(x, a)
-
-
-cdef void wait_for_bit_12(axes_t *x, axis_t *a) noexcept nogil:
-    """Bit 12 was shown and is lost: the drive ignores its targets."""
-    if quantity_of(a.mode) == POSITION:
-        a.flags |= FALLBACK
-        a.command_velocity = 0.0
-        a.fallback_cycles = 0
-        a.commanded_position = a.demand_position if a.position_demand.present else a.position
-    else:
-        fall_back(x, a, False)
-    if a.gap_cycles >= max(x.gap_limit, 5 * a.divider):
-        stop_axis(x, a, STOP_NOT_FOLLOWING)
-
-
-cdef void waiting(axes_t *x, axis_t *a, const target_t *t, uint32_t i, bint fresh) noexcept nogil:
-    """Powered and to be enabled, but not followed (yet)."""
-    a.waiting_cycles += 1
-    if a.mode_wanted != a.mode or (a.worked and not shows_mode(a)):
-        wait_for_mode(x, a)
-    elif a.worked and not a.holding:
-        wait_for_bit_12(x, a)
-    elif quantity_of(a.mode) == TORQUE:
-        follow(x, a, t, i, fresh)  # the brake is open: its load needs the torque
-        judge_lateness(x, a)
-    else:
-        fall_back(x, a, False)
-
-
-cdef void guard_setpoints(axes_t *x, axis_t *a, const target_t *t, uint32_t i,
-                          bint fresh) noexcept nogil:
-    """Compute what is sent to the axis in this cycle: commanded_*."""
-    cdef uint8_t quantity = quantity_of(a.mode)
-    a.flags &= DROPPED | MODE_REFUSED
-    if a.state != OPERATION_ENABLED:
-        rest(x, a, t.torque[i], fresh)
-        return
-    if quantity != POSITION:
-        a.commanded_position = a.position
-    if quantity != VELOCITY:
-        a.commanded_velocity = 0.0
-    if quantity != TORQUE:
-        a.commanded_torque = 0.0
-    if a.followed:
-        follow(x, a, t, i, fresh)
-        if a.followed:
-            judge_lateness(x, a)
-    elif a.goal != ENABLED:
-        stopping(x, a)
-    else:
-        waiting(x, a, t, i, fresh)

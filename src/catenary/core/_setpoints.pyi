@@ -1,0 +1,1 @@
+"""Set-points of one axis in one cycle; private to the core."""
