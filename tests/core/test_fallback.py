@@ -11,6 +11,7 @@ from catenary.core import (
     GOAL_DISABLED,
     GOAL_ENABLED,
     GOAL_QUICK_STOP,
+    Stream,
 )
 from catenary.plan.cycle import AxisLimits
 from catenary.plan.stop_reason import StopReason
@@ -218,6 +219,57 @@ def test_cst_keeps_its_torque_for_the_hand_over_and_stops() -> None:
     stop = log.words.index(QUICK_STOP)
     assert log.torques[stop] == 500  # never 0 N·m in the frame of the quick stop
     assert log.torques[-1] == 0
+
+
+def streamed(mode: int) -> tuple[Bench, Stream]:
+    """One axis that follows rows of a stream: 0.5 N·m, or a position that moves at 2 rad/s."""
+    b = working(mode, deceleration=100.0)
+    stream = Stream(1, 20)
+    b.engine.set_stream(stream)
+    rows = np.array([[0.002 * k, 0.0, 0.5] for k in range(1, 11)])
+    stream.write(rows.tobytes(), b.engine.number)
+    b.steps(10)
+    return b, stream
+
+
+def test_closing_a_stream_is_a_hand_over_until_the_next_commit() -> None:
+    b, _ = streamed(CST)
+    log = Recorder(b)
+    b.engine.set_stream(None)
+    b.engine.spend(20 * MS)
+    assert log.torques == [500] * 20
+    assert set(log.words) == {ENABLE}
+    b.engine.spend(5 * MS)
+    b.engine.next()
+    assert b.stop_reason[0] == StopReason.HANDOVER
+
+
+def test_a_commit_in_time_ends_the_hand_over_of_a_stream() -> None:
+    b, _ = streamed(CST)
+    b.engine.set_stream(None)
+    b.engine.spend(15 * MS)
+    b.target_torque[0] = 0.4
+    b.steps(30)
+    assert b.axis_flags[0] & 1
+    b.engine.spend(15 * MS)
+    b.engine.next()
+    assert b.stop_reason[0] == StopReason.UNDERRUN
+
+
+def test_a_closed_stream_decelerates_at_once_and_holds_without_limit() -> None:
+    b, _ = streamed(CSP)
+    log = Recorder(b)
+    b.engine.set_stream(None)
+    b.engine.spend(500 * MS)
+    assert log.positions[-1] - log.positions[0] == pytest.approx(20 - 2, abs=2)
+    assert b.axis_flags[0] & 1
+
+
+def test_an_empty_stream_is_an_underrun() -> None:
+    b, _ = streamed(CST)
+    b.engine.spend(12 * MS)
+    b.engine.next()
+    assert b.stop_reason[0] == StopReason.UNDERRUN
 
 
 # ---- enabling and bit 12

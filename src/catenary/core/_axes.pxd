@@ -150,6 +150,7 @@ cdef struct axes_t:
     uint32_t stop_asked        # counts; from any thread
     uint32_t stop_seen
     uint8_t running            # an application commits targets
+    uint8_t streamed           # the last fresh set-points were a row of a stream
     uint32_t told              # flags of the cycle that its axes set
     uint32_t moving
 
