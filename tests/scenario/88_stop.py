@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import catenary as cat
+from catenary.errors import LawError
 from catenary.plan.cycle import CyclePlan
 from catenary.virtual import ServoQuirks
 from tests.scenario.frames import SentOutputs, sent_to_axis
@@ -157,3 +158,28 @@ def test_disable_operation_slows_a_moving_axis_down() -> None:
             trace = cell.compute(cycle, 0.5)
         kept = cell.kept_torque(LOAD, EFFECT, downwards)
         assert trace.fall(before) < kept.ramp_bound(SLOW_DOWN) + cell.fall_bound() + RESOLUTION
+
+
+def writes_nan(actual, target, parameters, time):
+    for i in range(actual.n):
+        target.torque[i] = parameters[0] if time < 0.05 else float("nan")
+
+
+def test_a_law_that_fails_keeps_the_torque_in_the_frame_that_stops(tmp_path: Path) -> None:
+    """Bound: the fall until the brake has closed."""
+    pytest.importorskip("numba", reason="laws are compiled by Numba: catenary[law]")
+    recording = tmp_path / "frames.pcapng"
+    with vertical_cell(record=recording) as cell:
+        arm = cell.drives(mode="cst", velocity_limit=6.0)
+        with cat.Loop(arm) as loop:
+            plan = loop.plan.cycle
+            follow(cell, arm, loop, 100)
+            before = cell.joint
+            with pytest.raises(LawError, match="NaN"):
+                loop.run(writes_nan, parameters=[cell.gravity])
+            follow(cell, arm, loop, 300)
+            assert not cell.powered
+        assert cell.fall(before) < cell.fall_bound() + RESOLUTION
+    sent = sent_to_axis(recording, plan)
+    stop = next(k for k, each in enumerate(sent) if each.controlword == QUICK_STOP)
+    assert [each.torque for each in sent[stop - 1 : stop + 2]] == [LOAD_RAW] * 3

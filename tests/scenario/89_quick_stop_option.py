@@ -44,6 +44,7 @@ def test_csp_does_not_need_it(option: Option) -> None:
         with cat.Loop(arm) as loop:
             follow(cell, arm, loop, 300)
             before = cell.joint
+        cell.let_pass(1.0)
         assert cell.fall(before) < cell.fall_bound() + RESOLUTION
 
 

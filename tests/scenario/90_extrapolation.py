@@ -182,3 +182,21 @@ def test_pairs_of_set_points_that_alternate_are_not_continued() -> None:
             trace = cell.compute(next(loop), 0.03)
         assert trace.joint.max() - before < 0.003 + RESOLUTION
         assert all(a == b for a, b in pairwise(trace.powered))
+
+
+def test_a_velocity_offset_does_not_push_against_the_held_position() -> None:
+    """0x60B1 follows the fallback velocity. Bound: where the command ends, v · 10 ms + v² / 2a."""
+    velocity = 0.5
+    with vertical_cell() as cell:
+        arm = cell.drives(**LIMITS, columns=["velocity_offset"])
+        with cat.Loop(arm, late_limit=1.0) as loop:
+            for cycle in loop:
+                arm.target.position[:] += velocity * MS
+                arm.target["velocity_offset"][:] = velocity
+                if cycle.number == 300:
+                    break
+            last = float(arm.target.position[0]) - velocity * MS  # the one that is committed
+            trace = cell.compute(cycle, 0.8)
+            assert trace.powered.all()
+        end = last + velocity * KEEP + velocity**2 / (2 * ACCELERATION)
+        assert abs(float(trace.joint[-1]) - end) < velocity * 2 * MS + RESOLUTION

@@ -1,4 +1,4 @@
-"""Stream: set-points written ahead of their instants."""
+"""Stream: set-points written ahead of their cycles."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ Rows = npt.ArrayLike
 
 
 class Stream:
-    """Set-points that wait for their instants: one row a cycle, in the order written, natively.
+    """Set-points written ahead: one row per cycle, in the order written, taken by the cycle thread.
 
-    From the first row on the stream says the set-points, until `close`; a law that runs beside it
-    finds the row in its targets. When it runs dry the axes hold (velocity and torque go to zero),
-    `cycle.dry` is True and `dry` counts the cycles; it goes on with the next row. Any thread may
-    write, not two at a time. An axis that is enabled later follows the rows written after that.
+    From the first row until `close`, the stream sets the targets; a law that runs at the same time
+    finds the row in its targets. An empty stream is an underrun: the axes fall back and are stopped
+    after the late limit. Meanwhile `cycle.dry` is True and `dry` counts the cycles; the next row
+    ends it. Any thread may write, but only one at a time. An axis that is enabled later follows the
+    rows written after that.
     """
 
     def __init__(self, engine: core.Engine, views: Views, capacity: int) -> None:
@@ -82,5 +83,8 @@ class Stream:
         return self._ring.dry
 
     def close(self) -> None:
-        """The application, or the law, says the set-points again; rows left over are forgotten."""
+        """Hand over to the application or the law; rows that were not taken are discarded.
+
+        Until the next commit CSP and CSV decelerate and hold; CST keeps its torque for `handover`.
+        """
         self._engine.set_stream(None)
