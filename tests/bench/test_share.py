@@ -12,7 +12,7 @@ from catenary.bench.statistics import Run, combine
 
 def run(name: str, phase_ns: int) -> Run:
     samples = np.full((100, len(PHASES)), phase_ns, dtype=np.int64)
-    return combine(name, [Round(samples, lost=0, cpu_ns=1)] * 2)
+    return combine(name, [Round(samples, lost=0, cpu_per_cycle_ns=1.0)] * 2)
 
 
 def test_readers_stand_beside_a_share_without_and_that_beside_none() -> None:

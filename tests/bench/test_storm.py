@@ -13,7 +13,7 @@ from catenary.bench.upload import Upload
 
 def run(name: str, in_controller_ns: int, answers: int) -> Run:
     samples = np.full((100, len(PHASES)), in_controller_ns // 3, dtype=np.int64)
-    return combine(name, [Round(samples, lost=0, cpu_ns=1, answers=answers)] * 2)
+    return combine(name, [Round(samples, lost=0, cpu_per_cycle_ns=1.0, answers=answers)] * 2)
 
 
 def test_each_storm_stands_beside_its_calm() -> None:

@@ -41,9 +41,15 @@ def test_ratios_are_over_c() -> None:
 def test_what_a_peer_lacks_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pyigh, "find_spec", lambda _name: None)
     monkeypatch.setattr(pyigh, "has_programs", lambda: False)
-    names, left_out = pyigh.peers()
+    names, left_out = pyigh.peers(busy=True)
     assert names == ["catenary-inline", "catenary-threaded"]
     assert [each.split(":")[0] for each in left_out] == ["catenary-law", "pysoem", "c, c-ring"]
+
+
+def test_c_busy_runs_next_to_a_busy_wait_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pyigh, "has_programs", lambda: True)
+    assert "c-busy" in pyigh.peers(busy=True)[0]
+    assert "c-busy" not in pyigh.peers()[0]
 
 
 def test_c_is_compared_with_itself_and_all_with_c() -> None:

@@ -32,9 +32,25 @@ def measure_loop(
     body: str = "sine",
     spin: bool = False,
     rounds: int | None = None,
+    busy_wait: float = 0.0,
     file: Path | None = None,
 ) -> None:
-    """Prints the phases of the cycle of every peer, and writes them to `file` as JSON."""
+    """Print the timing of every peer, and write it to `file` as JSON.
+
+    Args:
+        drives: number of drives.
+        rate: of the loops [Hz].
+        seconds: of every peer.
+        peers: names of peers in addition to ours.
+        body: "sine" or "pd".
+        spin: a Python thread spins next to every loop.
+        rounds: of every peer; None: as many as keep a round below a second.
+        busy_wait: of our loops and of `c-busy` before each cycle start [s].
+        file: of the figures.
+
+    Raises:
+        ValueError: unknown peer, or a busy-wait that is not less than the period.
+    """
     from catenary.bench import loop
 
     loop.measure(
@@ -45,6 +61,7 @@ def measure_loop(
         body=body,
         spin=spin,
         rounds=rounds,
+        busy_wait=busy_wait,
         file=file,
     )
 

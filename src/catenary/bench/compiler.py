@@ -16,6 +16,7 @@ SOURCES = Path(__file__).parent / "peers"
 PROGRAMS = {
     "c": ("peer.c", "receive_recv.c"),
     "c-ring": ("peer.c", "receive_ring.c"),
+    "c-busy": ("peer.c", "receive_recv.c"),
     "three_tasks": ("three_tasks.c",),
     "reaction": ("reaction.c",),
 }

@@ -1,5 +1,7 @@
-"""What one round of a benchmark is asked to do, and what it answers: values that travel between the
-process that leads the benchmark and the worker that runs one peer once."""
+"""Job and Round: the input and the result of one peer in one round.
+
+Both travel in files between the process that runs the benchmark and the worker of one round.
+"""
 
 from __future__ import annotations
 
@@ -14,10 +16,24 @@ import numpy.typing as npt
 
 Nanoseconds = npt.NDArray[np.int64]
 
-PHASES = ("period", "lateness", "receive", "process", "send", "tail")
-"""What is measured of every cycle, in this order. Woken at instant w, planned for d:
-period = w - w of the cycle before; lateness = w - d; receive = w → inputs usable;
-process = the user's body; send = its end → the cyclic send returned; tail = → the next wait."""
+PHASES = (
+    "period",
+    "lateness",
+    "receive",
+    "process",
+    "send",
+    "tail",
+    "output_delay",
+    "input_age",
+)
+"""Phases that each peer measures in every cycle, in this order.
+
+For a cycle start d, a wake-up w and the time s at which the last cyclic send has returned:
+period = w - w of the previous cycle; lateness = w - d; receive = w → inputs usable;
+process = the body; send = its end → s; tail = s → the next wait begins; output_delay = s - d;
+input_age = s of the frame that returned the inputs → the body begins.
+In a native thread of ours: send = w → s, receive = last frame received → inputs usable.
+"""
 
 
 class Body(StrEnum):
@@ -32,19 +48,19 @@ class Job:
     drives: tuple[int, ...]  # positions on the segment
     body: Body
     period_ns: int
-    warm_up: int  # cycles that run first and are not measured
+    warm_up: int  # cycles before the measured ones
     cycles: int
-    cpu: int | None  # of the loop; None: left to the system
-    priority: int | None  # SCHED_FIFO; None: left to the system
+    cpu: int | None  # of the loop; None: any
+    priority: int | None  # SCHED_FIFO; None: unchanged
     counts_per_turn: float
     rated_torque: float  # of every drive [N·m]
     spin: bool = False  # a Python thread spins beside the loop
-    storm: bool = False  # and makes garbage that is collected again and again
+    storm: bool = False  # that thread also creates and collects garbage
     amplitude: float = 3.0  # of the sine [rad]
     stiffness: float = 0.5  # PD [N·m/rad]
     damping: float = 0.02  # PD [N·m/(rad/s)]
     second: str = ""  # interface of a ring's other end
-    busy_wait: float = 0.0  # [s] of our loops before each cycle start
+    busy_wait: float = 0.0  # [s] of our loops and `c-busy` before each cycle start
 
     @property
     def interfaces(self) -> tuple[str, ...]:
@@ -52,7 +68,7 @@ class Job:
 
     @property
     def log(self) -> int:
-        """Cycles that a loop is to remember: those of the round, and what follows them."""
+        """Length of a loop's log: all cycles of the round, and some that follow them."""
         return self.warm_up + self.cycles + 100
 
     @property
@@ -67,19 +83,19 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Round:
-    """What one peer measured in one round."""
+    """Result of one peer in one round."""
 
     samples: Nanoseconds  # (cycles, phases) [ns]; -1: did not occur in that cycle
     lost: int
-    cpu_ns: int  # processor time of the whole process over the measured cycles
+    cpu_per_cycle_ns: float  # CPU time of the process (all threads, user and system) / cycles
     scheduling: str = ""
-    late: int = 0  # cycles in which Python was late and the bus went on; threaded only
-    answers: int = 0  # to SDOs, from all devices, over the measured cycles
+    late: int = 0  # cycles sent without fresh set-points because Python was late; threaded only
+    answers: int = 0  # to SDO requests, from all devices, over the measured cycles
 
 
 class _Summary(msgspec.Struct):
     lost: int
-    cpu_ns: int
+    cpu_per_cycle_ns: float
     scheduling: str
     late: int = 0
     answers: int = 0
@@ -94,7 +110,9 @@ def read_job(path: Path) -> Job:
 
 
 def write_round(result: Round, path: Path) -> None:
-    summary = _Summary(result.lost, result.cpu_ns, result.scheduling, result.late, result.answers)
+    summary = _Summary(
+        result.lost, result.cpu_per_cycle_ns, result.scheduling, result.late, result.answers
+    )
     np.savez(
         path,
         samples=result.samples,
@@ -108,7 +126,7 @@ def read_round(path: Path) -> Round:
         return Round(
             file["samples"],
             summary.lost,
-            summary.cpu_ns,
+            summary.cpu_per_cycle_ns,
             summary.scheduling,
             summary.late,
             summary.answers,

@@ -1,20 +1,27 @@
-"""The benchmark's figures for people and for programs."""
+"""Report of `catenary bench loop`: text and JSON."""
 
 from __future__ import annotations
 
 import os
 import platform
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 
 from catenary.bench.statistics import Run
 
+HEADLINES = {
+    "output_delay": "output delay",
+    "wake_to_sent": "wake to sent",
+    "input_age": "input age",
+}
 COLUMNS = ("period", "lateness", "receive", "process", "send", "in_controller", "tail")
-FIGURES = ("p50", "p99", "p999", "max")
+FIGURES = ("p50", "p99", "max")
+NAME, FIGURE, GAP = 20, 9, "   "  # widths of a name and of a figure, between groups of figures
 
 
 def machine() -> str:
-    """Processor, how many, kernel, interpreter: what the figures hold for."""
+    """Return the processor, the number of CPUs, the kernel and the interpreter."""
     return (
         f"{processor()}, {os.cpu_count()} CPUs, {platform.system()} {platform.release()} "
         f"{preemption()}, {platform.python_implementation()} {platform.python_version()}"
@@ -56,6 +63,7 @@ def as_json(
                 **({"answers": run.answers} if run.answers else {}),
                 "scheduling": run.scheduling,
                 "timing_us": run.timing_us,
+                "rounds": asdict(run.rounds),
             }
             for run in runs
         ],
@@ -64,25 +72,66 @@ def as_json(
 
 
 def as_text(runs: Sequence[Run], ratios: Mapping[str, float]) -> str:
-    """Medians side by side, then the tails, then the ratios."""
-    blocks = [_table(runs, figure) for figure in FIGURES]
-    totals = [f"{'':18}{'cycles':>9}{'lost':>7}{'late':>7}{'CPU [us/cycle]':>16}"]
-    totals += [
-        f"{run.name:18}{run.cycles:9d}{run.lost:7d}{run.late:7d}{run.cpu_us_per_cycle:16.1f}"
-        for run in runs
+    """Return the headline figures, the phases, the counters and the ratios as tables."""
+    blocks = [_headlines(runs), *(_phases(runs, figure) for figure in FIGURES), _counters(runs)]
+    return "\n\n".join([*blocks, *([_ratios(ratios)] if ratios else [])])
+
+
+def _headlines(runs: Sequence[Run]) -> str:
+    """Output delay, input age and CPU time: the three figures that describe an execution mode."""
+    wide = FIGURE * len(FIGURES)
+    groups = GAP.join(f"{title:>{wide}}" for title in HEADLINES.values())
+    figures = GAP.join("".join(f"{name:>{FIGURE}}" for name in FIGURES) for _ in HEADLINES)
+    lines = [
+        f"{'':{NAME}}{groups}{GAP}{'CPU':>{FIGURE}}",
+        f"{'[us]':{NAME}}{figures}{GAP}{'per cycle':>{FIGURE}}",
     ]
-    quotients = [f"  {name:54}{value:7.2f}" for name, value in ratios.items()]
-    blocks += ["\n".join(totals)]
-    if quotients:
-        blocks += ["ratios of the medians\n" + "\n".join(quotients)]
-    return "\n\n".join(blocks)
+    for run in runs:
+        texts = GAP.join(
+            "".join(f"{run.timing_us[column][name]:{FIGURE}.2f}" for name in FIGURES)
+            for column in HEADLINES
+        )
+        lines.append(f"{run.name:{NAME}}{texts}{GAP}{run.cpu_us_per_cycle:{FIGURE}.2f}")
+    return "\n".join(lines)
 
 
-def _table(runs: Sequence[Run], figure: str) -> str:
-    title = {"p50": "median [us]", "p999": "p99.9 [us]"}.get(figure, f"{figure} [us]")
-    lines = [f"{title:18}" + "".join(f"{name:>15}" for name in COLUMNS)]
+def _phases(runs: Sequence[Run], figure: str) -> str:
+    title = {"p50": "phases, median [us]"}.get(figure, f"phases, {figure} [us]")
+    lines = [f"{title:{NAME}}" + "".join(f"{name:>15}" for name in COLUMNS)]
     lines += [
-        f"{run.name:18}" + "".join(f"{run.timing_us[name][figure]:15.2f}" for name in COLUMNS)
+        f"{run.name:{NAME}}" + "".join(f"{run.timing_us[name][figure]:15.2f}" for name in COLUMNS)
         for run in runs
     ]
+    return "\n".join(lines)
+
+
+def _counters(runs: Sequence[Run]) -> str:
+    lines = [f"{'':{NAME}}{'rounds':>8}{'cycles':>9}{'lost':>7}{'late':>7}"]
+    lines += [
+        f"{run.name:{NAME}}{len(run.rounds.cycles):8d}{run.cycles:9d}{run.lost:7d}{run.late:7d}"
+        for run in runs
+    ]
+    return "\n".join(lines)
+
+
+def _ratios(ratios: Mapping[str, float]) -> str:
+    """One row per pair of peers, one column per phase. The keys of `ratios`: "phase: a / b"."""
+    keys = [key.split(": ", 1) for key in ratios]
+    phases = list(dict.fromkeys(phase for phase, _ in keys))
+    pairs = list(dict.fromkeys(pair for _, pair in keys))
+    widths = [max(len(phase), 7) + 2 for phase in phases]
+    name = max(map(len, pairs), default=0) + 2
+    lines = [
+        f"{'ratios':{name}}"
+        + "".join(f"{phase:>{width}}" for phase, width in zip(phases, widths, strict=True))
+    ]
+    for pair in pairs:
+        values = [ratios.get(f"{phase}: {pair}") for phase in phases]
+        lines.append(
+            f"{pair:{name}}"
+            + "".join(
+                f"{'-' if value is None else f'{value:.2f}':>{width}}"
+                for value, width in zip(values, widths, strict=True)
+            )
+        )
     return "\n".join(lines)

@@ -1,21 +1,40 @@
-"""From samples of phases to the figures of a table: mean, min, max, sd, p50, p99, p99.9 [us]."""
+"""Statistics of rounds: mean, min, max, sd, p50, p99, p99.9 [us] of each phase, and ratios."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import median
 
 import numpy as np
 import numpy.typing as npt
 
 from catenary.bench.job import PHASES, Round
 
+Values = npt.NDArray[np.float64]
 Timing = dict[str, dict[str, float]]
+
+IN_CONTROLLER, WITH_TAIL, WAKE_TO_SENT = "in_controller", "in_controller+tail", "wake_to_sent"
+DERIVED = (IN_CONTROLLER, WITH_TAIL, WAKE_TO_SENT)
+"""Columns computed in every cycle from the phases: receive + process + send; the same + tail;
+output_delay - lateness (wake-up → last cyclic frame handed to the kernel)."""
+PER_ROUND = ("p50", "p99", "max")  # figures kept of each round
+
+
+@dataclass(frozen=True, slots=True)
+class Rounds:
+    """Figures of each round, in the order of the rounds."""
+
+    cycles: list[int]
+    lost: list[int]
+    late: list[int]
+    cpu_us_per_cycle: list[float]
+    timing_us: dict[str, dict[str, list[float | None]]]  # None: the phase did not occur
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """All rounds of one peer together."""
+    """All rounds of one peer."""
 
     name: str
     cycles: int
@@ -24,29 +43,53 @@ class Run:
     cpu_us_per_cycle: float
     scheduling: str
     timing_us: Timing
-    answers: int = 0  # to SDOs
+    rounds: Rounds
+    answers: int = 0  # to SDO requests
 
 
 def combine(name: str, rounds: Sequence[Round]) -> Run:
-    measured = np.concatenate([one.samples for one in rounds])
-    samples = np.where(measured < 0, np.nan, measured * 1e-3)
-    columns = dict(zip(PHASES, samples.T, strict=True))
-    columns["in_controller"] = columns["receive"] + columns["process"] + columns["send"]
-    # The first period of a round began in another process' time.
-    columns["period"] = np.concatenate([one.samples[1:, 0] for one in rounds]) * 1e-3
+    """Return the figures of all cycles of a peer, and those of each round."""
+    each = [columns_of(one) for one in rounds]
+    together = {column: np.concatenate([one[column] for one in each]) for column in each[0]}
+    counts = [len(one.samples) for one in rounds]
+    cpu_ns = sum(one.cpu_per_cycle_ns * count for one, count in zip(rounds, counts, strict=True))
     return Run(
         name=name,
-        cycles=len(samples),
+        cycles=sum(counts),
         lost=sum(one.lost for one in rounds),
         late=sum(one.late for one in rounds),
-        cpu_us_per_cycle=sum(one.cpu_ns for one in rounds) * 1e-3 / len(samples),
+        cpu_us_per_cycle=cpu_ns * 1e-3 / sum(counts),
         scheduling=" / ".join(sorted({one.scheduling for one in rounds})),
-        timing_us={phase: summarise(v[~np.isnan(v)]) for phase, v in columns.items()},
+        timing_us={column: summarise(values) for column, values in together.items()},
+        rounds=Rounds(
+            cycles=counts,
+            lost=[one.lost for one in rounds],
+            late=[one.late for one in rounds],
+            cpu_us_per_cycle=[round(one.cpu_per_cycle_ns * 1e-3, 3) for one in rounds],
+            timing_us={column: _per_round([one[column] for one in each]) for column in together},
+        ),
         answers=sum(one.answers for one in rounds),
     )
 
 
-def summarise(values: npt.NDArray[np.float64]) -> dict[str, float]:
+def columns_of(one: Round) -> dict[str, Values]:
+    """Return the phases and the derived columns of a round [us], without cycles that lack them."""
+    samples = np.where(one.samples < 0, np.nan, one.samples * 1e-3)
+    columns = dict(zip(PHASES, samples.T, strict=True))
+    columns[IN_CONTROLLER] = columns["receive"] + columns["process"] + columns["send"]
+    columns[WITH_TAIL] = columns[IN_CONTROLLER] + columns["tail"]
+    columns[WAKE_TO_SENT] = columns["output_delay"] - columns["lateness"]
+    columns["period"] = columns["period"][1:]  # the first one began before the round
+    return {name: values[~np.isnan(values)] for name, values in columns.items()}
+
+
+def _per_round(rounds: Sequence[Values]) -> dict[str, list[float | None]]:
+    found = [summarise(values) if len(values) else None for values in rounds]
+    return {figure: [one[figure] if one else None for one in found] for figure in PER_ROUND}
+
+
+def summarise(values: Values) -> dict[str, float]:
+    """Return the figures of at least one value."""
     p50, p99, p999 = np.percentile(values, [50.0, 99.0, 99.9])
     figures = {
         "mean": values.mean(),
@@ -60,27 +103,52 @@ def summarise(values: npt.NDArray[np.float64]) -> dict[str, float]:
     return {name: round(float(figure), 3) for name, figure in figures.items()}
 
 
+OURS = ("catenary-inline", "catenary-threaded", "catenary-law")
+PEERS = ("c", "c-ring", "c-busy", "pysoem")
 LAW_AND_STORM = ("catenary-law", "catenary-law-storm")
+CPU = "cpu_per_cycle"
+COMPARED = (
+    "output_delay",
+    WAKE_TO_SENT,
+    "input_age",
+    CPU,
+    "receive",
+    "process",
+    IN_CONTROLLER,
+    WITH_TAIL,
+)
 
 
 def ratios(runs: Sequence[Run]) -> dict[str, float]:
-    """Catenary's medians over its peers', as far as the peers ran."""
-    median = {run.name: _medians(run) for run in runs}
+    """Return the ratios of our figures to those of the peers that ran.
+
+    A ratio is computed in each interleaved round, from the medians of that round (CPU: its mean).
+    The result is the median over the rounds: a slow minute of the machine affects both sides.
+    """
+    by_name = {run.name: run for run in runs}
     found: dict[str, float] = {}
-    for ours in ("catenary-inline", "catenary-threaded", "catenary-law"):
-        for peer in ("c", "c-ring", "pysoem"):
-            if ours in median and peer in median:
-                for phase in ("receive", "process", "in_controller", "in_controller+tail"):
-                    quotient = median[ours][phase] / max(median[peer][phase], 1e-3)
-                    found[f"{phase}: {ours} / {peer}"] = round(quotient, 3)
-    law, storm = (next((r for r in runs if r.name == name), None) for name in LAW_AND_STORM)
+    for ours in OURS:
+        for peer in PEERS:
+            if ours in by_name and peer in by_name:
+                for column in COMPARED:
+                    quotient = _ratio(by_name[ours].rounds, by_name[peer].rounds, column)
+                    if quotient is not None:
+                        found[f"{column}: {ours} / {peer}"] = quotient
+    law, storm = (by_name.get(name) for name in LAW_AND_STORM)
     if law and storm:
-        quotient = storm.timing_us["in_controller"]["p999"] / law.timing_us["in_controller"]["p999"]
+        quotient = storm.timing_us[IN_CONTROLLER]["p999"] / law.timing_us[IN_CONTROLLER]["p999"]
         found["in_controller p99.9: catenary-law-storm / catenary-law"] = round(quotient, 3)
     return found
 
 
-def _medians(run: Run) -> Mapping[str, float]:
-    medians = {phase: figures["p50"] for phase, figures in run.timing_us.items()}
-    medians["in_controller+tail"] = medians["in_controller"] + medians["tail"]
-    return medians
+def _ratio(ours: Rounds, theirs: Rounds, column: str) -> float | None:
+    """Return the median of the rounds' ratios; None if no round has the column on both sides."""
+    pairs = zip(_of_rounds(ours, column), _of_rounds(theirs, column), strict=True)
+    quotients = [
+        mine / max(other, 1e-3) for mine, other in pairs if mine is not None and other is not None
+    ]
+    return round(median(quotients), 3) if quotients else None
+
+
+def _of_rounds(rounds: Rounds, column: str) -> Sequence[float | None]:
+    return rounds.cpu_us_per_cycle if column == CPU else rounds.timing_us[column]["p50"]

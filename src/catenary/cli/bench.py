@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import argparse
 
-from catenary.cli.arguments import positive_number, positive_numbers
+from catenary.cli.arguments import positive_number, positive_numbers, seconds
 from catenary.cli.bench_options import add_drives, add_file, add_rate, add_seconds
 from catenary.cli.bench_table import add_table
 from catenary.cli.bench_without_wires import (
@@ -48,10 +48,11 @@ def _add_loop(group: Commands) -> None:
         "loop",
         help="the cyclic exchange, phase by phase",
         description="Runs catenary-inline, catenary-threaded, catenary-law (where Numba is "
-        "installed) and the peers in short rounds, one after the other, on the same segment with "
-        "the same scheduling.",
+        "installed) and the peers in short rounds, in turn, on the same segment with the same "
+        "scheduling. Prints output delay, input age and CPU time per cycle, then the phases.",
         example="catenary bench loop --seconds 10 --peers c,c-ring,pysoem --json loop.json\n"
-        "catenary bench loop --drives 33 --body pd --peers pysoem",
+        "catenary bench loop --drives 33 --body pd --peers pysoem\n"
+        "catenary bench loop --busy-wait 0.00005 --peers c,c-busy",
     )
     add_drives(parser)
     add_rate(parser)
@@ -60,7 +61,7 @@ def _add_loop(group: Commands) -> None:
         "--peers",
         default="c,pysoem",
         metavar="A,B",
-        help="of c, c-ring, pysoem, catenary-law-storm (c,pysoem)",
+        help="of c, c-ring, c-busy, pysoem, catenary-law-storm (c,pysoem)",
     )
     parser.add_argument(
         "--body", choices=("sine", "pd"), default="sine", help="what the user computes (sine)"
@@ -73,6 +74,13 @@ def _add_loop(group: Commands) -> None:
         type=positive_number,
         metavar="N",
         help="of every peer, each in a fresh process (so many that each takes 0.9 s at 1 kHz)",
+    )
+    parser.add_argument(
+        "--busy-wait",
+        type=seconds,
+        default=0.0,
+        metavar="S",
+        help="busy-wait of our loops and of c-busy before each cycle start [s] (0)",
     )
     add_file(parser)
     parser.set_defaults(run=run_loop)
@@ -177,6 +185,7 @@ def run_loop(arguments: argparse.Namespace) -> int:
         body=arguments.body,
         spin=arguments.spin,
         rounds=arguments.rounds,
+        busy_wait=arguments.busy_wait,
         file=arguments.json,
     )
     return 0

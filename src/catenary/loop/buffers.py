@@ -19,9 +19,7 @@ COLUMN_BUFFERS: dict[tuple[bool, Bank], str] = {
     (True, Bank.BIT): "output_bits",
 }
 AXIS_BUFFERS = tuple(
-    each.name
-    for each in fields(Views)
-    if each.name not in (*COLUMN_BUFFERS.values(), "unit_valid")
+    each.name for each in fields(Views) if each.name not in (*COLUMN_BUFFERS.values(), "unit_valid")
 )
 
 

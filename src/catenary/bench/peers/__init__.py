@@ -24,11 +24,12 @@ MODULES = {
     "catenary-law-storm": "with_catenary_law",
     "c": "with_c",
     "c-ring": "with_c",
+    "c-busy": "with_c",
     "pysoem": "with_pysoem",
 }
 
 
 def load(name: str) -> Peer:
-    """The peer called `name`; imports nothing of the others."""
+    """Return the peer called `name`. Imports only its module."""
     peer: Peer = import_module(f"{__name__}.{MODULES[name]}").run
     return peer

@@ -30,6 +30,7 @@ static void read_job(void) {
         if (sscanf(line, "period_ns %ld", &job.period_ns) == 1) continue;
         if (sscanf(line, "cycles %ld", &job.cycles) == 1) continue;
         if (sscanf(line, "warm_up %ld", &job.warm_up) == 1) continue;
+        if (sscanf(line, "busy_wait_ns %ld", &job.busy_wait_ns) == 1) continue;
         if (sscanf(line, "amplitude %lf", &job.amplitude) == 1) continue;
         if (sscanf(line, "counts_per_rad %lf", &job.counts_per_rad) == 1) continue;
         if (sscanf(line, "counts_per_torque %lf", &job.counts_per_torque) == 1) continue;
@@ -123,6 +124,14 @@ static void pull_to_sine(double t) {
     }
 }
 
+/* Sleep until `busy_wait_ns` before the cycle start, then poll the clock. Return the time. */
+static int64_t wait_for_start(int64_t start) {
+    wait_until(start - job.busy_wait_ns);
+    int64_t now = now_ns(CLOCK_MONOTONIC);
+    while (now < start) now = now_ns(CLOCK_MONOTONIC);
+    return now;
+}
+
 /* Cycles until `state` is seen in the BRD of the frame (state 0: until the drives are enabled). */
 static int64_t reach(unsigned state, int64_t deadline) {
     for (int i = 0; i < 5000; i++) {
@@ -158,12 +167,11 @@ int main(void) {
     deadline = reach(0, deadline);
     emit();
 
-    int64_t before = 0, start = deadline;
+    int64_t before = 0, sent_at = now_ns(CLOCK_MONOTONIC), start = deadline;
     for (int64_t cycle = 0; cycle < total; cycle++) {
         if (cycle == job.warm_up) cpu = now_ns(CLOCK_PROCESS_CPUTIME_ID);
         deadline += job.period_ns;
-        wait_until(deadline);
-        int64_t woke = now_ns(CLOCK_MONOTONIC);
+        int64_t woke = wait_for_start(deadline);
         int valid = collect() && counters_right();
         int64_t inputs_ready = now_ns(CLOCK_MONOTONIC);
         double t = (double)(deadline - start) * 1e-9;
@@ -179,10 +187,13 @@ int main(void) {
             s[2] = inputs_ready - woke;
             s[3] = processed - inputs_ready;
             s[4] = out - processed;
+            s[6] = out - deadline;
+            s[7] = inputs_ready - sent_at;
             lost += !valid;
             s[5] = now_ns(CLOCK_MONOTONIC) - out;
         }
         before = woke;
+        sent_at = out;
     }
     cpu = now_ns(CLOCK_PROCESS_CPUTIME_ID) - cpu;
 

@@ -1,11 +1,11 @@
-/* What both C peers of `catenary bench loop` share: the job, the drives, the phases.
+/* Common part of the C peers of `catenary bench loop`: the job, the drives, the phases.
  *
- * These programs are the yardstick: what a careful C programmer writes by hand for this one
- * segment. Python brings the segment to PRE-OP and hands over the frame of the cycle with the
- * places of the words in it; from there on everything happens here. The two programs differ only
- * in how a frame is received (`peer_open`, `peer_receive`).
+ * These programs are the yardstick: a loop that a careful C programmer writes for this one segment.
+ * Python brings the segment to PRE-OP and passes the frame of the cycle and the offsets of the
+ * words in it. The programs do the rest. `c` and `c-ring` differ in how they receive a frame
+ * (`peer_open`, `peer_receive`); `c-busy` is `c` with a busy-wait before each cycle start.
  *
- * The order of a cycle: wait, receive the answer of the last cycle, process, send.
+ * A cycle: wait, receive the answer of the last cycle, process, send.
  */
 #ifndef CATENARY_BENCH_PEER_H
 #define CATENARY_BENCH_PEER_H
@@ -25,7 +25,8 @@
 #define AXES_MAX 256
 #define DATAGRAMS_MAX 16
 #define REQUESTS_MAX 8
-#define PHASES 6 /* period, lateness, receive, process, send, tail */
+/* The phases of job.py: period, lateness, receive, process, send, tail, output_delay, input_age. */
+#define PHASES 8
 
 enum body { BODY_SINE = 0, BODY_PD = 1 };
 
@@ -48,7 +49,7 @@ struct request {
 
 struct job {
     char interface[32], samples[512];
-    int64_t period_ns, cycles, warm_up;
+    int64_t period_ns, cycles, warm_up, busy_wait_ns;
     enum body body;
     double amplitude, counts_per_rad, counts_per_torque, stiffness, damping;
     unsigned length, al_status; /* of the frame; offset of the BRD's answer */

@@ -1,6 +1,9 @@
-"""The C peers. Catenary brings the segment to PRE-OP, sets SyncManagers and FMMUs, and closes its
-link; the C program gets the frame of the cycle and the places of the words in it, asks for SAFE-OP
-and OP itself (valid outputs must flow meanwhile) and runs the same cycle as the others."""
+"""The C peers.
+
+Catenary brings the segment to PRE-OP, sets SyncManagers and FMMUs, and closes its link. The C
+program receives the frame of the cycle and the offsets of the words in it. It requests SAFE-OP and
+OP itself, since valid outputs must flow meanwhile, and runs the same cycle as the other peers.
+"""
 
 from __future__ import annotations
 
@@ -28,6 +31,7 @@ BODY = {Body.SINE: 0, Body.PD: 1}
 MODE = {Body.SINE: "csp", Body.PD: "cst"}
 WAY_TO_OPERATIONAL = (State.PRE_OP, State.SAFE_OP, State.OP)
 DATAGRAM_HEADER = 10
+BUSY = "c-busy"  # the peer that busy-waits
 
 
 class _Answer(msgspec.Struct):
@@ -50,13 +54,16 @@ def run(job: Job) -> Round:
             raise CatenaryError(f"{job.peer}: {done.stderr.strip() or 'failed'}")
         answer = msgspec.json.decode(done.stdout, type=_Answer)
         samples = np.fromfile(folder / "samples", np.int64).reshape(-1, len(PHASES))
-    return Round(samples, answer.lost, answer.cpu_ns)
+    return Round(samples, answer.lost, answer.cpu_ns / job.cycles)
 
 
 @contextlib.contextmanager
 def ordinary_scheduling() -> Iterator[None]:
-    """The program inherits this process' priority. Bring-up needs none: where all share a processor
-    it would keep another network's segment from answering in time."""
+    """Run the block with ordinary scheduling.
+
+    The program inherits the priority of this process; the bring-up does not need it. On a shared
+    processor it would keep another network's segment from answering in time.
+    """
     policy, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
     os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
     try:
@@ -66,8 +73,7 @@ def ordinary_scheduling() -> Iterator[None]:
 
 
 def bring_up(job: Job) -> CyclePlan:
-    """Leaves the segment ready to be asked for SAFE-OP; the plan is that of Catenary's own loop, so
-    the frame is the same."""
+    """Prepare the segment for SAFE-OP. The plan is that of Catenary's loop, so the frame is too."""
     with cat.MainDevice(job.interface) as main:
         subs = main.scan()
         arm = cat.Drives(
@@ -87,6 +93,7 @@ def _settings(job: Job, folder: Path) -> Iterator[str]:
     yield f"body {BODY[job.body]}"
     for name in ("period_ns", "cycles", "warm_up", "amplitude", "stiffness", "damping"):
         yield f"{name} {getattr(job, name)}"
+    yield f"busy_wait_ns {round(job.busy_wait * 1e9) if job.peer == BUSY else 0}"
     yield f"counts_per_rad {job.counts_per_rad}"
     yield f"counts_per_torque {job.counts_per_torque}"
     for state in (*WAY_TO_OPERATIONAL, State.INIT):  # the last one is for leaving
@@ -95,11 +102,11 @@ def _settings(job: Job, folder: Path) -> Iterator[str]:
 
 
 def _places(cycle: CyclePlan) -> Iterator[str]:
-    """The frame of the cycle, and where in it the words are [bytes]."""
+    """Yield the frame of the cycle and the offsets of its words [bytes]."""
     if len(cycle.frames) != 1:
         raise CatenaryError(
-            f"the C peers know a cycle of one frame, and this one has {len(cycle.frames)}",
-            hint="fewer drives: --drives 33",
+            f"the C peers support one frame per cycle; this cycle has {len(cycle.frames)}",
+            hint="use fewer drives: --drives 33",
         )
     [frame] = cycle.frames
     yield f"frame {frame.template.hex()}"
@@ -121,12 +128,12 @@ def _axis(axis: AxisPlan, frame: FramePlan) -> list[int]:
 
 
 def _place(number: Number | None, frame: FramePlan, *, outputs: bool) -> int:
-    """From an offset in the image to one in the frame."""
+    """Convert an offset in the image to an offset in the frame."""
     if number is None or number.bit_offset % 8:
-        raise CatenaryError("the C peers need every word of the drives, on whole bytes")
+        raise CatenaryError("the C peers need all words of the drives, aligned to bytes")
     at = number.bit_offset // 8
     for datagram in frame.datagrams:
         for copy in datagram.outputs if outputs else datagram.inputs:
             if copy.image_offset <= at < copy.image_offset + copy.size:
                 return copy.frame_offset + at - copy.image_offset
-    raise CatenaryError("a word of a drive is in no frame of the cycle")
+    raise CatenaryError("no frame of the cycle contains this word of a drive")

@@ -1,5 +1,7 @@
-"""Catenary itself, as its users write it, inline and threaded; also while other threads of the
-program read objects of all devices, all the time."""
+"""Catenary as its users write it, inline and threaded.
+
+The peers with `-sdo` also read objects of all devices from other threads, without a pause.
+"""
 
 from __future__ import annotations
 
@@ -12,16 +14,17 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
 
 import catenary as cat
-from catenary.bench.job import PHASES, Body, Job, Round
+from catenary.bench.job import PHASES, Body, Job, Nanoseconds, Round
 from catenary.loop.laws.law import Law
 
 STORM = "-sdo"
-IDENTITY, SERIAL = 0x1018, 4  # what the storm asks for
-# Like the peers, it counts lost and late cycles and goes on; by default it would stop the drives.
+IDENTITY, SERIAL = 0x1018, 4  # the object that the storm reads
+# Like the peers, a loop counts lost and late cycles and continues; by default it stops the drives.
 LOST_LIMIT = 1000
-LATE_LIMIT = 10.0  # [s]: a benchmark must not stop the axes
+LATE_LIMIT = 10.0  # [s]
 MODE = {Body.SINE: "csp", Body.PD: "cst"}
 
 
@@ -41,7 +44,7 @@ def order(job: Job) -> Literal["inline", "threaded"]:
 def opened(
     job: Job, sink: cat.Share | None = None, laws: Sequence[Law] = ()
 ) -> Iterator[tuple[cat.Loop, cat.Drives]]:
-    """The loop of a round."""
+    """Open the loop of a round and its drives."""
     with cat.MainDevice(*job.interfaces) as main:
         subs = main.scan()
         arm = cat.Drives(
@@ -68,12 +71,12 @@ def opened(
 
 @contextlib.contextmanager
 def storm(subs: Sequence[cat.SubDevice]) -> Iterator[list[int]]:
-    """A thread for every device that reads one object again and again; how often each got it. They
-    run anywhere but where the loop was put: an application gives that processor away."""
+    """Run one thread per device that reads one object repeatedly; yield the number of answers of
+    each. The threads run on the other processors, as in an application with a reserved one."""
     answers = [0] * len(subs)
     stop = threading.Event()
     here = os.sched_getaffinity(0)
-    elsewhere = os.sched_getaffinity(os.getppid()) - here or here  # of who leads the benchmark
+    elsewhere = os.sched_getaffinity(os.getppid()) - here or here  # of the benchmark's own process
 
     def ask(rank: int) -> None:
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
@@ -83,7 +86,7 @@ def storm(subs: Sequence[cat.SubDevice]) -> Iterator[list[int]]:
                 subs[rank].sdo.read(IDENTITY, SERIAL, type=cat.types.UDINT)
                 answers[rank] += 1
             except cat.CatenaryError:
-                if not stop.is_set():  # behind the last cycle nobody sends any more
+                if not stop.is_set():  # after the last cycle nothing is sent
                     raise
 
     threads = [threading.Thread(target=ask, args=(rank,)) for rank in range(len(subs))]
@@ -98,7 +101,7 @@ def storm(subs: Sequence[cat.SubDevice]) -> Iterator[list[int]]:
 
 
 def body_of(arm: cat.Drives, job: Job) -> Callable[[float], None]:
-    """What is computed in a cycle, from where the axes are now."""
+    """Return the body of a cycle. The motion starts at the present positions."""
     return _sine(arm, job) if job.body is Body.SINE else _pd(arm, job)
 
 
@@ -109,28 +112,31 @@ def measure(
     answers: Sequence[int],
     body: Callable[[float], None] | None = None,
 ) -> Round:
-    """`body`: one that runs already."""
+    """Iterate the loop and return its figures. `body`: one that is running already."""
     body = body or body_of(arm, job)
-    before, cpu, answered = loop.timing.counters, 0, 0
+    before, cpu, first, answered = loop.timing.counters, 0.0, 0, 0
     last_unmeasured, end = job.warm_up - 1, job.warm_up + job.cycles
     for number, cycle in enumerate(loop):
         body(cycle.time)
         if number == last_unmeasured:
-            before, cpu = loop.timing.counters, time.process_time_ns()
-            answered = sum(answers)
+            answered, before, first = sum(answers), loop.timing.counters, cycle.number
+            cpu = time.process_time_ns()
         elif number == end:
+            cpu = (time.process_time_ns() - cpu) / (cycle.number - first)
             break
-    cpu = time.process_time_ns() - cpu
     after = loop.timing.counters
-    log = loop.log[-job.cycles - 1 : -1]  # the last one was left unfinished
-    samples = np.stack([log[f"{phase}_ns"] for phase in PHASES], axis=1).astype(np.int64)
     return Round(
-        samples,
+        samples_of(loop.log[-job.cycles - 1 : -1]),  # the last cycle is incomplete
         lost=after["lost"] - before["lost"],
-        cpu_ns=cpu,
+        cpu_per_cycle_ns=cpu,
         late=after["uncommitted"] - before["uncommitted"],
         answers=sum(answers) - answered,
     )
+
+
+def samples_of(log: npt.NDArray[np.void]) -> Nanoseconds:
+    """Return the phases of the logged cycles, shape (cycles, phases) [ns]."""
+    return np.stack([log[f"{phase}_ns"] for phase in PHASES], axis=1).astype(np.int64)
 
 
 def _sine(arm: cat.Drives, job: Job) -> Callable[[float], None]:

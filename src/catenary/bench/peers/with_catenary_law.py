@@ -9,11 +9,14 @@ from typing import Any
 import numpy as np
 
 import catenary as cat
-from catenary.bench.job import PHASES, Body, Job, Round
-from catenary.bench.peers.with_catenary import opened
+from catenary.bench.job import Body, Job, Round
+from catenary.bench.peers.with_catenary import opened, samples_of
+from catenary.loop import LawRun
 
 AMPLITUDE, STIFFNESS, DAMPING, END = range(4)  # of the parameters
 CYCLE_OK = 1  # bit of a record's flags
+NEVER = 1e9  # [s]
+LOOK = 500  # cycles between two checks that the law is still running
 
 
 @cat.law
@@ -40,18 +43,26 @@ def run(job: Job) -> Round:
 
 
 def _measure(loop: cat.Loop, law: Any, home: Any, job: Job) -> Round:
-    cycles = job.warm_up + job.cycles
-    end = (cycles - 1) * job.period_ns * 1e-9
-    cpu = time.process_time_ns()
-    loop.run(
+    running = loop.start(
         law,
         memory=home,
-        parameters=[job.amplitude, job.stiffness, job.damping, end],
-        budget=0,  # like the peers, it goes on
+        parameters=[job.amplitude, job.stiffness, job.damping, NEVER],
+        budget=0,  # a step that takes long does not end the law: the peers continue too
     )
-    cpu = time.process_time_ns() - cpu
+    _sleep(loop, running, job.warm_up, job)
+    first, cpu = running.steps, time.process_time_ns()
+    _sleep(loop, running, first + job.cycles, job)
+    cpu, cycles = time.process_time_ns() - cpu, running.steps - first
     log = loop.log
-    log = log[log["process_ns"] >= 0][-job.cycles :]
-    samples = np.stack([log[f"{phase}_ns"] for phase in PHASES], axis=1).astype(np.int64)
+    log = log[log["process_ns"] >= 0][-job.cycles :]  # not the cycle in progress
     lost = int(np.count_nonzero(log["flags"] & CYCLE_OK == 0))
-    return Round(samples, lost=lost, cpu_ns=cpu * job.cycles // cycles)
+    return Round(samples_of(log), lost=lost, cpu_per_cycle_ns=cpu / cycles)
+
+
+def _sleep(loop: cat.Loop, running: LawRun, steps: int, job: Job) -> None:
+    """Sleep until the law has made `steps` steps. The law does not need this thread meanwhile."""
+    while (left := steps - running.steps) > 0:
+        before = running.steps
+        time.sleep(min(left, LOOK) * job.period_ns * 1e-9)
+        if running.steps == before:
+            next(loop)  # raises the reason

@@ -59,7 +59,7 @@ def readers(name: str, reading: bool) -> Iterator[Child]:
     """They look for the loop before it is there. They run anywhere but where the loop was put, with
     ordinary scheduling."""
     here = os.sched_getaffinity(0)
-    elsewhere = os.sched_getaffinity(os.getppid()) - here or here  # of who leads the benchmark
+    elsewhere = os.sched_getaffinity(os.getppid()) - here or here  # of the benchmark's own process
     arguments = ["-m", __name__, name, ",".join(map(str, elsewhere)), str(int(reading))]
     with start_python(arguments) as child:
         if child.read_line(START_SECONDS) is None:

@@ -1,6 +1,8 @@
-"""PySOEM, written as its users write it: `config_init`, `config_map`, bytes packed by `struct` into
-`slave.output`, `send_processdata` and `receive_processdata`. Only the order of the cycle is chosen
-here, the same for all peers: wait, receive, process, send."""
+"""PySOEM as its users write it.
+
+`config_init`, `config_map`, bytes packed by `struct` into `slave.output`, `send_processdata` and
+`receive_processdata`. A cycle is the same for all peers: wait, receive, process, send.
+"""
 
 from __future__ import annotations
 
@@ -54,7 +56,7 @@ def _to_operational(master: Any, job: Job) -> None:
 
 
 def _enable(master: Any, drives: list[Any], job: Job) -> list[int]:
-    """Steps the drives to "operation enabled", holding; their positions then [counts]."""
+    """Enable the drives, holding their positions. Return these positions [counts]."""
     for _ in range(5000):
         _turn(master, job)
         enabled, homes = 0, []
@@ -80,20 +82,21 @@ def _measure(master: Any, drives: list[Any], homes: list[int], job: Job) -> Roun
     body = _sine(drives, homes, job) if job.body is Body.SINE else _pd(drives, homes, job)
     expected = master.expected_wkc
     now = time.monotonic_ns
-    stamps: list[tuple[int, int, int, int, int, int]] = []
+    stamps: list[tuple[int, int, int, int, int, int, int]] = []
     lost = cpu = 0
+    end = job.warm_up + job.cycles
     master.send_processdata()
-    start = deadline = now()
-    for number in range(job.warm_up + job.cycles + 1):
+    start = deadline = sent = now()
+    for number in range(end + 1):
         deadline += job.period_ns
         waiting = now()
-        if number >= job.warm_up:
-            stamps.append((waiting, deadline, 0, 0, 0, 0))
         if number == job.warm_up:
             cpu = time.process_time_ns()
+        elif number == end:
+            cpu = time.process_time_ns() - cpu
         if deadline > waiting:
             time.sleep((deadline - waiting) * 1e-9)
-        woke = now()
+        woke, sent_before = now(), sent
         counter = master.receive_processdata(RECEIVE_TIMEOUT_US)
         received = now()
         body((deadline - start) * 1e-9)
@@ -101,15 +104,14 @@ def _measure(master: Any, drives: list[Any], homes: list[int], job: Job) -> Roun
         master.send_processdata()
         sent = now()
         if number >= job.warm_up:
-            stamps[-1] = (waiting, deadline, woke, received, processed, sent)
+            stamps.append((waiting, deadline, woke, sent_before, received, processed, sent))
             lost += counter != expected
-    cpu = time.process_time_ns() - cpu
-    return Round(_phases(np.array(stamps, np.int64)), lost, cpu)
+    return Round(_phases(np.array(stamps, np.int64)), lost, cpu / job.cycles)
 
 
 def _phases(stamps: np.ndarray) -> np.ndarray:
-    """From instants to durations; the last cycle only ends the tail of the one before."""
-    waiting, deadline, woke, received, processed, sent = stamps.T
+    """Convert times to durations. The last cycle only ends the tail of the previous one."""
+    waiting, deadline, woke, sent_before, received, processed, sent = stamps.T
     durations = [
         np.diff(woke, prepend=woke[0])[:-1],
         (woke - deadline)[:-1],
@@ -117,6 +119,8 @@ def _phases(stamps: np.ndarray) -> np.ndarray:
         (processed - received)[:-1],
         (sent - processed)[:-1],
         waiting[1:] - sent[:-1],
+        (sent - deadline)[:-1],
+        (received - sent_before)[:-1],
     ]
     return np.stack(durations, axis=1)
 

@@ -18,8 +18,8 @@ from importlib.util import find_spec
 import numpy as np
 
 from catenary.bench.compiler import has_programs
-from catenary.bench.job import PHASES, Body, Job, Round
-from catenary.bench.loop import LAW, OURS, ROUND_CYCLES, make_jobs, show_progress
+from catenary.bench.job import PHASES, Body, Round
+from catenary.bench.loop import BUSY, LAW, OURS, ROUND_CYCLES, make_jobs, show_progress
 from catenary.bench.rounds import interleave
 from catenary.bench.segment import served
 from catenary.bench.statistics import Run, combine
@@ -51,7 +51,7 @@ HEADER = ("mean/max/min/sd", "period [ms]", "receive [us]", "process", "send", "
 
 
 def measure(options: Options) -> Sheet:
-    names, left_out = peers()
+    names, left_out = peers(busy=options.busy_wait > 0)
     seconds = options.seconds or SECONDS
     if options.refused:
         names, left_out = [], [f"all of ours: no private network ({options.refused})"]
@@ -79,8 +79,9 @@ def measure(options: Options) -> Sheet:
     )
 
 
-def peers() -> tuple[list[str], list[str]]:
-    """Those that this machine can run, and why others are left out."""
+def peers(*, busy: bool = False) -> tuple[list[str], list[str]]:
+    """Return the peers that this machine can run, and why others are left out. `busy`: with the C
+    program that busy-waits as our loops do."""
     names, left_out = list(OURS), []
     if find_spec("numba"):
         names.append(LAW)
@@ -91,7 +92,7 @@ def peers() -> tuple[list[str], list[str]]:
     else:
         left_out.append(f"{PYSOEM}: not installed (pip install 'catenary[peers]')")
     if has_programs():
-        return [C, C_RING, *names], left_out
+        return [C, C_RING, *([BUSY] if busy else []), *names], left_out
     return names, [*left_out, f"{C}, {C_RING}: no C compiler (sudo apt install gcc libc6-dev)"]
 
 
@@ -101,14 +102,17 @@ def run(
     cycles = round(seconds * RATE)
     rounds = options.rounds or max(ROUNDS, math.ceil(cycles / ROUND_CYCLES))
     with served(DRIVES) as segment:
-        jobs = make_jobs(names, segment, RATE, math.ceil(cycles / rounds), Body.SINE, spin=False)
-        jobs = [published_body(job, options.busy_wait) for job in jobs]
-        return interleave(jobs, rounds, show_progress, failed)
-
-
-def published_body(job: Job, busy_wait: float) -> Job:
-    """pi·sin(pi·t) for every drive."""
-    return replace(job, amplitude=math.pi, busy_wait=busy_wait)
+        jobs = make_jobs(
+            names,
+            segment,
+            RATE,
+            math.ceil(cycles / rounds),
+            Body.SINE,
+            spin=False,
+            busy_wait=options.busy_wait,
+        )
+        published = [replace(job, amplitude=math.pi) for job in jobs]  # pi·sin(pi·t)
+        return interleave(published, rounds, show_progress, failed)
 
 
 # ---- the two tests
