@@ -1,6 +1,7 @@
 from libc.stdint cimport int8_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 
 from catenary.core._handover cimport actual_t, target_t
+from catenary.core._memory cimport cat_memory
 from catenary.core._native cimport cat_image
 from catenary.core._numbers cimport number_t
 
@@ -157,6 +158,7 @@ cdef struct axes_t:
 cdef class Axes:
     """Owns the axis records and column tables."""
     cdef axes_t c
+    cdef cat_memory memory
 
 cdef void axes_read(axes_t *x, actual_t *out, uint64_t number, int64_t instant) noexcept nogil
 cdef void axes_write(axes_t *x, const target_t *target, bint fresh, uint64_t number) noexcept nogil

@@ -8,7 +8,6 @@ drive is led to a state _cia402's. Budget: 60 ns an axis and direction.
 
 from libc.math cimport INFINITY, NAN, isfinite
 from libc.stdint cimport int8_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
-from libc.stdlib cimport calloc, free
 
 from catenary.core._cia402 cimport (
     ENABLED,
@@ -30,6 +29,7 @@ from catenary.core._guard cimport (
     guard_works,
 )
 from catenary.core._handover cimport DRY, LIMITED_SOME, REFUSED_SOME
+from catenary.core._memory cimport cat_memory, cat_memory_free, memory_take
 from catenary.core._native cimport cat_load_acquire32
 from catenary.core._numbers cimport REAL as REAL_KIND
 from catenary.core._numbers cimport (
@@ -393,11 +393,11 @@ def cycles_of(duration_ns, period_ns, where):
 
 cdef class Axes:
     def __cinit__(self, plan):
-        self.c.axes = <axis_t *>calloc(len(plan.axes) + 1, sizeof(axis_t))
-        self.c.input_columns = <column_t *>calloc(len(plan.input_columns) + 1, sizeof(column_t))
-        self.c.output_columns = <column_t *>calloc(len(plan.output_columns) + 1, sizeof(column_t))
-        if not (self.c.axes and self.c.input_columns and self.c.output_columns):
-            raise MemoryError
+        cdef cat_memory *memory = &self.memory
+        inputs, outputs = len(plan.input_columns), len(plan.output_columns)
+        self.c.axes = <axis_t *>memory_take(memory, len(plan.axes) + 1, sizeof(axis_t))
+        self.c.input_columns = <column_t *>memory_take(memory, inputs + 1, sizeof(column_t))
+        self.c.output_columns = <column_t *>memory_take(memory, outputs + 1, sizeof(column_t))
         if plan.lost_limit < 1:
             raise ValueError(f"lost_limit: {plan.lost_limit}")
         self.c.period = plan.period_ns / 1e9
@@ -507,6 +507,4 @@ cdef class Axes:
         return len(columns)
 
     def __dealloc__(self):
-        free(self.c.axes)
-        free(self.c.input_columns)
-        free(self.c.output_columns)
+        cat_memory_free(&self.memory)

@@ -1,5 +1,7 @@
 from libc.stdint cimport int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 
+from catenary.core._memory cimport cat_memory
+
 cdef enum:
     SEEKING = 0                # the instants are to be set into phase
     FOLLOWING = 1              # and are being kept there
@@ -67,6 +69,7 @@ cdef struct clock_t:
 cdef class Clock:
     """Owns what a cycle knows of distributed clocks."""
     cdef clock_t c
+    cdef cat_memory memory
 
 cdef void clock_emit(clock_t *k, int64_t now) noexcept nogil
 cdef void clock_take(clock_t *k, uint8_t command, const uint8_t *data,

@@ -14,8 +14,8 @@ kept here; now and then the reference is read, and leads again once it says the 
 
 from libc.math cimport fabs
 from libc.stdint cimport int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
-from libc.stdlib cimport calloc, free
 
+from catenary.core._memory cimport cat_memory_free, memory_take
 from catenary.core._native cimport CAT_FPRD, CAT_FRMW
 
 cdef enum:
@@ -352,9 +352,9 @@ cdef class Clock:
         self.c.bound = plan.bound_ns
         self.c.bound_asked = plan.bound_ns
         self.c.follower_count = len(plan.stations)
-        self.c.followers = <follower_t *>calloc(len(plan.stations) + 1, sizeof(follower_t))
-        if self.c.followers == NULL:
-            raise MemoryError
+        self.c.followers = <follower_t *>memory_take(
+            &self.memory, len(plan.stations) + 1, sizeof(follower_t)
+        )
         for number, station in enumerate(plan.stations):
             self.c.followers[<uint32_t>number].station = station
             self.c.followers[<uint32_t>number].outside = 1
@@ -411,4 +411,4 @@ cdef class Clock:
         return self.c.changes
 
     def __dealloc__(self):
-        free(self.c.followers)
+        cat_memory_free(&self.memory)

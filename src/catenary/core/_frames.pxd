@@ -1,6 +1,7 @@
 from libc.stdint cimport int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 
 from catenary.core._clocks cimport clock_t
+from catenary.core._memory cimport cat_memory
 from catenary.core._native cimport cat_image, cat_link
 from catenary.core._lane cimport lane_t
 
@@ -116,6 +117,7 @@ cdef class Frames:
     """Owner of the templates, images and tables of one cyclic exchange."""
     cdef frames_t c
     cdef object link_owner
+    cdef cat_memory memory     # of all tables and images
     cdef make_table(self)
     cdef carry_time(self, clock_t *clock)
 

@@ -25,11 +25,11 @@ Budget for three drives in one frame: emit 0.2 us, collect 0.3 us, without the l
 from cpython.pycapsule cimport PyCapsule_GetPointer, PyCapsule_IsValid
 from libc.errno cimport EINTR
 from libc.stdint cimport int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
-from libc.stdlib cimport calloc, free
 from libc.string cimport memcpy
 
 from catenary.core._clocks cimport clock_emit, clock_t, clock_take
 from catenary.core._lane cimport lane_received
+from catenary.core._memory cimport cat_memory, cat_memory_free, memory_take
 from catenary.core._native cimport (
     CAT_AL_ERROR,
     CAT_AL_STATE,
@@ -471,23 +471,22 @@ cdef class Frames:
         for name in ("output_size", "input_size"):
             check(0 <= getattr(plan, name) < 1 << 20, f"{name}: {getattr(plan, name)}")
         units = plan.sync_units
+        cdef cat_memory *memory = &self.memory
         self.c.image.output_size = plan.output_size
         self.c.image.input_size = plan.input_size
         self.c.image.unit_count = len(units)
-        self.c.outputs = <uint8_t *>calloc(plan.output_size + IMAGE_PADDING, 1)
-        self.c.inputs = <uint8_t *>calloc(plan.input_size + IMAGE_PADDING, 1)
-        self.c.unit_valid = <uint8_t *>calloc(len(units) + 1, 1)
-        self.c.unit_fresh = <uint8_t *>calloc(len(units) + 1, 1)
-        self.c.unit_missed = <uint32_t *>calloc(len(units) + 1, sizeof(uint32_t))
-        self.c.unit_counter = <uint16_t *>calloc(len(units) + 1, sizeof(uint16_t))
-        self.c.units = <unit_t *>calloc(len(units) + 1, sizeof(unit_t))
-        if not (self.c.outputs and self.c.inputs and self.c.unit_valid and self.c.unit_fresh
-                and self.c.unit_missed and self.c.unit_counter and self.c.units):
-            raise MemoryError
+        self.c.outputs = <uint8_t *>memory_take(memory, plan.output_size + IMAGE_PADDING, 1)
+        self.c.inputs = <uint8_t *>memory_take(memory, plan.input_size + IMAGE_PADDING, 1)
+        self.c.unit_valid = <uint8_t *>memory_take(memory, len(units) + 1, 1)
+        self.c.unit_fresh = <uint8_t *>memory_take(memory, len(units) + 1, 1)
+        self.c.unit_missed = <uint32_t *>memory_take(memory, len(units) + 1, sizeof(uint32_t))
+        self.c.unit_counter = <uint16_t *>memory_take(memory, len(units) + 1, sizeof(uint16_t))
+        self.c.units = <unit_t *>memory_take(memory, len(units) + 1, sizeof(unit_t))
         for k, unit in enumerate(units):
             self.c.units[k].optional = 1 if unit.optional else 0
 
     def make_frames(self, plan):
+        cdef cat_memory *memory = &self.memory
         datagrams = [d for frame in plan.frames for d in frame.datagrams]
         copies = sum(len(d.outputs) + len(d.inputs) for d in datagrams)
         check(1 <= len(plan.frames) <= FRAMES_MAX,
@@ -495,11 +494,9 @@ cdef class Frames:
         limit = INDEX_COUNT if all(map(has_number, plan.frames)) else FRAMES_PER_CYCLE_MAX
         busiest = frames_per_cycle(plan.frames)
         check(busiest <= limit, f"frames: {busiest} in one cycle, at most {limit}")
-        self.c.frames = <frame_t *>calloc(len(plan.frames), sizeof(frame_t))
-        self.c.datagrams = <datagram_t *>calloc(len(datagrams) + 1, sizeof(datagram_t))
-        self.c.copies = <copy_t *>calloc(copies + 1, sizeof(copy_t))
-        if not (self.c.frames and self.c.datagrams and self.c.copies):
-            raise MemoryError
+        self.c.frames = <frame_t *>memory_take(memory, len(plan.frames), sizeof(frame_t))
+        self.c.datagrams = <datagram_t *>memory_take(memory, len(datagrams) + 1, sizeof(datagram_t))
+        self.c.copies = <copy_t *>memory_take(memory, copies + 1, sizeof(copy_t))
         self.c.frame_count = len(plan.frames)
         copies = 0
         for number, frame in enumerate(plan.frames):
@@ -665,13 +662,4 @@ cdef class Frames:
         self.c.image.drain = frames_drain
 
     def __dealloc__(self):
-        free(self.c.frames)
-        free(self.c.datagrams)
-        free(self.c.copies)
-        free(self.c.outputs)
-        free(self.c.inputs)
-        free(self.c.unit_valid)
-        free(self.c.unit_fresh)
-        free(self.c.unit_missed)
-        free(self.c.unit_counter)
-        free(self.c.units)
+        cat_memory_free(&self.memory)

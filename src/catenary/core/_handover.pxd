@@ -1,5 +1,6 @@
 from libc.stdint cimport int8_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 
+from catenary.core._memory cimport cat_memory
 from catenary.core._native cimport cat_triple
 
 cdef enum:  # flags of a cycle
@@ -108,7 +109,7 @@ cdef enum:
 cdef class Handover:
     """Owns the buffers between the cycle and Python."""
     cdef handover_t c
-    cdef uint8_t *memory
+    cdef cat_memory memory     # one block per direction and slot
     cdef dict counts
     cdef allocate(self)
     cdef dict views(self, void **block, tuple table, bint writable)

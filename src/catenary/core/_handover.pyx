@@ -8,11 +8,10 @@ three drives, which is the copying of some 200 bytes.
 
 from cpython.buffer cimport PyBUF_FORMAT, PyBUF_WRITABLE
 from libc.stdint cimport int8_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
-from libc.stdlib cimport free
-from libc.string cimport memcpy, memset
+from libc.string cimport memcpy
 
+from catenary.core._memory cimport cat_memory_free, memory_take
 from catenary.core._native cimport (
-    aligned_alloc,
     cat_add32,
     cat_fence,
     cat_futex_wake,
@@ -174,17 +173,14 @@ cdef class Handover:
         cdef size_t actual = (self.c.actual_size // CACHE_LINE + 1) * CACHE_LINE
         cdef size_t target = (self.c.target_size // CACHE_LINE + 1) * CACHE_LINE
         cdef size_t size = 4 * actual + TARGETS * target
+        cdef uint8_t *block = <uint8_t *>memory_take(&self.memory, size, 1)
         cdef int k
-        self.memory = <uint8_t *>aligned_alloc(CACHE_LINE, size)
-        if self.memory == NULL:
-            raise MemoryError
-        memset(self.memory, 0, size)
         for k in range(4):
-            lay(<void **>&self.c.actual[k], self.memory + k * actual, sizeof(actual_header_t),
+            lay(<void **>&self.c.actual[k], block + k * actual, sizeof(actual_header_t),
                 ACTUAL, self.counts)
             self.c.actual[k].header.axis_count = self.c.counts.axes
         for k in range(TARGETS):
-            lay(<void **>&self.c.target[k], self.memory + 4 * actual + k * target,
+            lay(<void **>&self.c.target[k], block + 4 * actual + k * target,
                 sizeof(target_header_t), TARGET, self.counts)
             self.c.target[k].header.hold = 1  # nothing was committed yet
 
@@ -256,4 +252,4 @@ cdef class Handover:
         return memoryview(field)
 
     def __dealloc__(self):
-        free(self.memory)
+        cat_memory_free(&self.memory)

@@ -1,5 +1,6 @@
 from libc.stdint cimport int64_t, uint8_t, uint32_t, uint64_t
 
+from catenary.core._memory cimport cat_memory
 from catenary.core._native cimport cat_link, cat_packet_ring
 
 cdef struct lane_t:
@@ -16,6 +17,7 @@ cdef struct lane_t:
 cdef class Lane:
     """Owner of the two rings of the acyclic queue."""
     cdef lane_t c
+    cdef cat_memory memory
 
 cdef void lane_send(lane_t *lane, const cat_link *link) noexcept nogil
 cdef void lane_received(lane_t *lane, const uint8_t *bytes, uint32_t length,

@@ -16,13 +16,11 @@ Budget: 0.05 us if nothing is queued, else what the link's send takes, at most f
 """
 
 from libc.stdint cimport int64_t, uint8_t, uint32_t, uint64_t
-from libc.stdlib cimport free
-from libc.string cimport memset
 
+from catenary.core._memory cimport cat_memory_free, memory_take
 from catenary.core._native cimport (
     CAT_FRAME_MAX,
     CAT_FRAME_MIN,
-    aligned_alloc,
     cat_add32,
     cat_fence,
     cat_futex_wait,
@@ -75,20 +73,11 @@ cdef void lane_received(lane_t *lane, const uint8_t *bytes, uint32_t length,
         cat_futex_wake(&lane.arrived)
 
 
-cdef cat_packet_ring *make_ring() except NULL:
-    # 64: the ring's head and tail keep to their own cache lines
-    cdef size_t size = (sizeof(cat_packet_ring) + 63) // 64 * 64
-    cdef void *ring = aligned_alloc(64, size)
-    if ring == NULL:
-        raise MemoryError
-    memset(ring, 0, size)
-    return <cat_packet_ring *>ring
-
-
 cdef class Lane:
     def __cinit__(self, int64_t period_ns):
-        self.c.out = make_ring()
-        self.c.back = make_ring()
+        cdef size_t size = sizeof(cat_packet_ring)
+        self.c.out = <cat_packet_ring *>memory_take(&self.memory, 1, size)
+        self.c.back = <cat_packet_ring *>memory_take(&self.memory, 1, size)
         self.c.bytes_per_cycle = <uint32_t>min(period_ns // (4 * NS_PER_BYTE), 1 << 20)
 
     def push(self, bytes frame not None):
@@ -124,5 +113,4 @@ cdef class Lane:
         return cat_ring_peek(self.c.back) != NULL
 
     def __dealloc__(self):
-        free(self.c.out)
-        free(self.c.back)
+        cat_memory_free(&self.memory)

@@ -2,6 +2,7 @@ from libc.stdint cimport int64_t, uint32_t, uint64_t
 
 from catenary.core._axes cimport axes_t
 from catenary.core._handover cimport actual_t, target_t
+from catenary.core._memory cimport cat_memory
 from catenary.core._native cimport cat_law_guard, cat_law_numbers, cat_law_step, cat_triple
 
 cdef enum:  # how a law stands
@@ -43,7 +44,7 @@ cdef struct law_t:
 cdef class Law:
     """Owns a law's numbers while it runs."""
     cdef law_t c
-    cdef double *block
+    cdef cat_memory memory_block   # all its numbers
     cdef allocate(self, exchange_t *numbers, double **place)
     cdef fill(self, exchange_t *numbers, values)
     cdef int request_memory(self) except -1

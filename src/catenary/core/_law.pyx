@@ -13,6 +13,7 @@ from libc.string cimport memcpy
 from catenary.core._axes cimport axes_t
 from catenary.core._guard cimport POSITION, TORQUE, VELOCITY, quantity_of
 from catenary.core._handover cimport actual_t, target_t
+from catenary.core._memory cimport cat_memory_free, memory_take
 from catenary.core._native cimport (
     CAT_LAW_ABORTED,
     CAT_LAW_FINISHED,
@@ -164,10 +165,8 @@ cdef class Law:
         self.c.overrun_limit = overrun_limit
         self.c.memory_in.count = self.c.memory_out.count = len(memory)
         self.c.parameters_in.count = len(parameters)
-        self.block = <double *>calloc(7 * len(memory) + 4 * len(parameters) + 1, sizeof(double))
-        if self.block == NULL:
-            raise MemoryError
-        place = self.block
+        count = 7 * len(memory) + 4 * len(parameters)
+        place = <double *>memory_take(&self.memory_block, count, sizeof(double))
         self.c.numbers.memory = place
         self.c.numbers.memory_count = len(memory)
         place += len(memory)
@@ -305,4 +304,4 @@ cdef class Law:
     def __dealloc__(self):
         with nogil:
             cat_law_guard_stop(&self.c.guard)
-        free(self.block)
+        cat_memory_free(&self.memory_block)

@@ -3,10 +3,6 @@
 from libc.stdint cimport int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 
 
-cdef extern from "<stdlib.h>" nogil:
-    void *aligned_alloc(size_t alignment, size_t size)
-
-
 cdef extern from "atomics.h" nogil:
     uint32_t cat_load_acquire32(const uint32_t *p)
     uint32_t cat_load_relaxed32(const uint32_t *p)

@@ -1,6 +1,7 @@
 from libc.stdint cimport uint32_t, uint64_t
 
 from catenary.core._handover cimport target_t
+from catenary.core._memory cimport cat_memory
 
 cdef struct stream_t:
     double *rows               # position, velocity, torque of all axes, one behind the other
@@ -14,5 +15,6 @@ cdef struct stream_t:
 cdef class Stream:
     """Owns the rows of set-points that wait for their instants."""
     cdef stream_t c
+    cdef cat_memory memory
 
 cdef bint stream_take(stream_t *s, target_t *target) noexcept nogil

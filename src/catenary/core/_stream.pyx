@@ -5,10 +5,10 @@ One thread writes, the cycle takes; neither waits for the other. Budget: 10 ns f
 """
 
 from libc.stdint cimport uint32_t, uint64_t
-from libc.stdlib cimport calloc, free
 from libc.string cimport memcpy
 
 from catenary.core._handover cimport target_t
+from catenary.core._memory cimport cat_memory_free, memory_take
 from catenary.core._native cimport cat_load_acquire64, cat_store_release64
 
 cdef enum:
@@ -43,10 +43,9 @@ cdef class Stream:
             raise ValueError(f"a stream of {capacity} rows for {axes} axes")
         self.c.axes = axes
         self.c.capacity = capacity
-        self.c.rows = <double *>calloc(<size_t>axes * capacity * QUANTITIES, sizeof(double))
-        self.c.seen = <uint64_t *>calloc(capacity, sizeof(uint64_t))
-        if self.c.rows == NULL or self.c.seen == NULL:
-            raise MemoryError
+        cdef size_t count = <size_t>axes * capacity * QUANTITIES
+        self.c.rows = <double *>memory_take(&self.memory, count, sizeof(double))
+        self.c.seen = <uint64_t *>memory_take(&self.memory, capacity, sizeof(uint64_t))
 
     def write(self, bytes rows not None, uint64_t seen):
         """Rows of 3·axes float64. How many found room."""
@@ -82,5 +81,4 @@ cdef class Stream:
         return self.c.dry
 
     def __dealloc__(self):
-        free(self.c.rows)
-        free(self.c.seen)
+        cat_memory_free(&self.memory)

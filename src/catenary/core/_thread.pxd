@@ -1,4 +1,4 @@
-from libc.stdint cimport uint32_t
+from libc.stdint cimport uint32_t, uint64_t
 from posix.types cimport pid_t
 
 cdef extern from "<pthread.h>" nogil:
@@ -35,6 +35,7 @@ cdef struct thread_t:
     uint32_t stop              # asked to end
     uint32_t ended
     int running
+    uint64_t page_faults       # of the body; complete after thread_join
 
 cdef int thread_start(thread_t *t) noexcept nogil
 cdef void thread_join(thread_t *t) noexcept nogil

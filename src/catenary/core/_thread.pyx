@@ -6,7 +6,7 @@ What is not permitted is done without and said: the cycle then runs under the or
 import errno as error_names
 
 from libc.errno cimport errno
-from libc.stdint cimport uint32_t
+from libc.stdint cimport uint32_t, uint64_t
 from libc.string cimport memset
 
 from catenary.core._native cimport (
@@ -21,7 +21,9 @@ cdef extern from *:
     #include <pthread.h>
     #include <sched.h>
     #include <signal.h>
+    #include <stdint.h>
     #include <sys/prctl.h>
+    #include <sys/resource.h>
 
     #define STACK_SIZE (512 * 1024)
     #define STACK_TOUCHED (128 * 1024)
@@ -79,6 +81,13 @@ cdef extern from *:
 
     /* The ordinary scheduler rounds waits up by 50 us unless told otherwise. */
     static void sharpen_timers(void) { prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL); }
+
+    /* Minor and major page faults of the calling thread. */
+    static uint64_t page_faults_here(void) {
+        struct rusage used;
+        if (getrusage(RUSAGE_THREAD, &used)) return 0;
+        return (uint64_t)used.ru_minflt + (uint64_t)used.ru_majflt;
+    }
     """
     int SCHED_FIFO
     int SCHED_RR
@@ -91,6 +100,7 @@ cdef extern from *:
     int save_scheduling(cat_scheduling *saved) nogil
     void restore_scheduling(const cat_scheduling *saved) nogil
     void sharpen_timers() nogil
+    uint64_t page_faults_here() nogil
 
 cdef enum:
     START_TIMEOUT_NS = 5_000_000_000
@@ -106,11 +116,14 @@ cdef void thread_schedule(thread_t *t) noexcept nogil:
 
 cdef void *thread_body(void *argument) noexcept nogil:
     cdef thread_t *t = <thread_t *>argument
+    cdef uint64_t before
     touch_stack()
     thread_schedule(t)
     cat_store_release32(&t.started, 1)
     cat_futex_wake(&t.started)
+    before = page_faults_here()
     t.body(t.argument)
+    t.page_faults += page_faults_here() - before
     cat_store_release32(&t.ended, 1)
     return NULL
 

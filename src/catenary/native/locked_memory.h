@@ -1,0 +1,131 @@
+/* Memory of the cycle: no page fault in the cycle thread, and no page swapped out where the system allows.
+ *
+ * cat_memory_take    return a zeroed part that begins at a cache line
+ * cat_memory_settle  touch every page, then lock it (real time only, before the cycle uses it)
+ * cat_memory_free    give everything back; the kernel unlocks what is unmapped
+ *
+ * A memory is a list of chunks. A chunk is a mapping of whole pages: this header, then parts one after
+ * the other. A new chunk is made when the newest has no room. Nothing is returned to a chunk: parts
+ * live as long as their owner.
+ *
+ * state  RESERVED  mapped, not touched: all that virtual time needs
+ *        TOUCHED   every page has a frame of its own; `error` says why it is not locked
+ *        LOCKED    touched, and never swapped out
+ *
+ * The kernel refuses a chunk as a whole when it exceeds RLIMIT_MEMLOCK: whoever settles first is locked
+ * first. A page is touched by an atomic addition of 0, so that an owner may settle at any time.
+ *
+ * AddressSanitizer does not know parts of a mapping. There each part is a heap block of its own.
+ */
+#ifndef CATENARY_LOCKED_MEMORY_H
+#define CATENARY_LOCKED_MEMORY_H
+
+#include <errno.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#define CAT_CACHE_LINE 64u
+#define CAT_CHUNK_SIZE (16u * 1024u)  /* at least */
+
+enum { CAT_MEMORY_RESERVED, CAT_MEMORY_TOUCHED, CAT_MEMORY_LOCKED };
+
+typedef struct cat_chunk {
+    struct cat_chunk *next;
+    size_t size;                      /* bytes, this header included */
+    size_t used;
+    int state;
+    int error;                        /* errno of mlock; 0: none */
+} cat_chunk;
+
+typedef struct cat_memory {
+    cat_chunk *chunks;                /* the newest first */
+} cat_memory;
+
+/* The sum over several memories. */
+typedef struct cat_memory_state {
+    size_t locked;                    /* bytes */
+    size_t touched;                   /* bytes that are touched and not locked */
+    int error;                        /* why, of the last one */
+} cat_memory_state;
+
+static inline size_t cat_round_up(size_t size, size_t step) { return (size + step - 1) / step * step; }
+
+static inline cat_chunk *cat_chunk_new(size_t room) {
+    size_t size = cat_round_up(sizeof(cat_chunk), CAT_CACHE_LINE) + room;
+    cat_chunk *chunk;
+#ifdef __SANITIZE_ADDRESS__
+    chunk = (cat_chunk *)aligned_alloc(CAT_CACHE_LINE, cat_round_up(size, CAT_CACHE_LINE));
+    if (!chunk) return 0;
+    __builtin_memset(chunk, 0, size);
+#else
+    if (size < CAT_CHUNK_SIZE) size = CAT_CHUNK_SIZE;
+    size = cat_round_up(size, (size_t)sysconf(_SC_PAGESIZE));
+    chunk = (cat_chunk *)mmap(0, size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (chunk == (cat_chunk *)MAP_FAILED) return 0;
+#endif
+    chunk->size = size;
+    chunk->used = cat_round_up(sizeof(cat_chunk), CAT_CACHE_LINE);
+    return chunk;
+}
+
+/* `count` zeroed elements of `size` bytes; NULL: no memory. */
+static inline void *cat_memory_take(cat_memory *memory, size_t count, size_t size) {
+    cat_chunk *chunk = memory->chunks;
+    size_t bytes;
+    if (__builtin_mul_overflow(count, size, &bytes) || bytes > SIZE_MAX / 2) return 0;
+    if (bytes == 0) bytes = 1;
+    if (!chunk || chunk->state != CAT_MEMORY_RESERVED || chunk->size - chunk->used < bytes) {
+        chunk = cat_chunk_new(bytes);
+        if (!chunk) return 0;
+        chunk->next = memory->chunks;
+        memory->chunks = chunk;
+    }
+    void *part = (uint8_t *)chunk + chunk->used;
+    chunk->used = cat_round_up(chunk->used + bytes, CAT_CACHE_LINE);
+    if (chunk->used > chunk->size) chunk->used = chunk->size;
+    return part;
+}
+
+/* Give every page of a range a frame of its own. */
+static inline void cat_touch(void *start, size_t size) {
+    size_t page = (size_t)sysconf(_SC_PAGESIZE), at;
+    volatile uint8_t *bytes = (volatile uint8_t *)start;
+    for (at = 0; at < size; at += page - ((uintptr_t)start + at) % page)
+        __atomic_fetch_add(bytes + at, 0, __ATOMIC_RELAXED);
+}
+
+static inline void cat_memory_settle(cat_memory *memory) {
+    for (cat_chunk *chunk = memory->chunks; chunk; chunk = chunk->next) {
+        if (chunk->state != CAT_MEMORY_RESERVED) continue;
+        cat_touch(chunk, chunk->size);
+        chunk->error = mlock(chunk, chunk->size) ? errno : 0;
+        chunk->state = chunk->error ? CAT_MEMORY_TOUCHED : CAT_MEMORY_LOCKED;
+    }
+}
+
+/* Add what became of a memory. */
+static inline void cat_memory_add_state(const cat_memory *memory, cat_memory_state *sum) {
+    for (const cat_chunk *chunk = memory->chunks; chunk; chunk = chunk->next) {
+        if (chunk->state == CAT_MEMORY_LOCKED) sum->locked += chunk->size;
+        if (chunk->state != CAT_MEMORY_TOUCHED) continue;
+        sum->touched += chunk->size;
+        sum->error = chunk->error;
+    }
+}
+
+static inline void cat_memory_free(cat_memory *memory) {
+    while (memory->chunks) {
+        cat_chunk *chunk = memory->chunks;
+        memory->chunks = chunk->next;
+#ifdef __SANITIZE_ADDRESS__
+        if (chunk->state == CAT_MEMORY_LOCKED) munlock(chunk, chunk->size);
+        free(chunk);
+#else
+        munmap(chunk, chunk->size);
+#endif
+    }
+}
+
+#endif
