@@ -71,6 +71,8 @@ cdef class Engine:
     cdef int spend_cycle(self) except -1
     cdef void compute(self, int64_t duration_ns) noexcept
     cdef int pass_time(self, int64_t duration) except -1
+    cdef void settle_memory(self) noexcept
+    cdef memory_text(self)
     cdef int check_reserve(self, int64_t budget) except -1
     cdef bint is_law_used(self, Law law) noexcept
     cdef bint is_stream_used(self, Stream stream) noexcept

@@ -124,7 +124,8 @@ class Engine:
     def counters(self) -> dict[str, int]:
         """Counts since construction: cycles, lost (cycles not ok), late (cycles skipped),
         uncommitted (cycles without new targets), missed_sync (frames that left later than the
-        margin before SYNC0), stale, alien, corrupt, duplicate, repeated, unprocessed (frames),
+        margin before SYNC0), page_faults (of the native thread in runs that have ended), stale,
+        alien, corrupt, duplicate, repeated, unprocessed (frames),
         lane_sent, lane_received, lane_dropped, send_errors, receive_errors."""
 
     def histograms(self) -> dict[str, dict[str, float]]:
@@ -142,8 +143,13 @@ class Engine:
 
     @property
     def scheduling(self) -> str:
-        """Scheduling that was obtained: "SCHED_FIFO 80, CPU 1", "SCHED_OTHER: not permitted (EPERM)",
-        "virtual time"."""
+        """Scheduling and memory that were obtained; "virtual time" if the link has it.
+
+        "SCHED_FIFO 80, CPU 1, 1.7 MB locked", or "SCHED_OTHER: not permitted (EPERM), 1.6 MB locked,
+        10 MB touched only (ENOMEM, RLIMIT_MEMLOCK 8 MB: raise `ulimit -l`, or grant CAP_IPC_LOCK)".
+        Cycle buffers are locked first, the log last. Memory that is touched only causes no page
+        faults while the system has enough of it.
+        """
 
     # The acyclic queue.
     def lane_push(self, frame: bytes) -> bool:

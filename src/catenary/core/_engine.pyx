@@ -53,6 +53,12 @@ from catenary.core._handover cimport (
 from catenary.core._histogram cimport histogram_add
 from catenary.core._lane cimport Lane
 from catenary.core._law cimport WAITING, Law
+from catenary.core._memory cimport (
+    cat_memory_add_state,
+    cat_memory_settle,
+    cat_memory_state,
+    memory_text,
+)
 from catenary.core._native cimport (
     CAT_AL_OP,
     CAT_LINK_SHARED_TIME,
@@ -280,6 +286,8 @@ cdef class Engine:
         self.e.done = 0
         self.left = -1
         handover_swap(self.h)  # what an earlier run left
+        if not self.virtual:
+            self.settle_memory()
         self.e.thread.body = thread_loop
         self.e.thread.argument = &self.e
         if self.native:
@@ -640,7 +648,39 @@ cdef class Engine:
     def scheduling(self):
         if self.virtual:
             return "virtual time"
-        return scheduling_text(&self.e.thread)
+        return f"{scheduling_text(&self.e.thread)}, {self.memory_text()}"
+
+    cdef void settle_memory(self) noexcept:
+        """Touch and lock what the cycle uses. The log is last: it is the first to be refused."""
+        if self.frames is not None:
+            cat_memory_settle(&self.frames.memory)
+        if self.clock is not None:
+            cat_memory_settle(&self.clock.memory)
+        cat_memory_settle(&self.axes.memory)
+        cat_memory_settle(&self.handover.memory)
+        cat_memory_settle(&self.lane.memory)
+        cat_memory_settle(&self.figures.memory)
+        cat_memory_settle(&self.figures.log_memory)
+
+    cdef memory_text(self):
+        """Return how much memory of the cycle is locked, laws and streams included."""
+        cdef cat_memory_state state = cat_memory_state(locked=0, touched=0, error=0)
+        cdef Law law
+        cdef Stream stream
+        if self.frames is not None:
+            cat_memory_add_state(&self.frames.memory, &state)
+        if self.clock is not None:
+            cat_memory_add_state(&self.clock.memory, &state)
+        cat_memory_add_state(&self.axes.memory, &state)
+        cat_memory_add_state(&self.handover.memory, &state)
+        cat_memory_add_state(&self.lane.memory, &state)
+        cat_memory_add_state(&self.figures.memory, &state)
+        cat_memory_add_state(&self.figures.log_memory, &state)
+        for law in self.laws:
+            cat_memory_add_state(&law.memory_block, &state)
+        for stream in self.streams:
+            cat_memory_add_state(&stream.memory, &state)
+        return memory_text(&state)
 
     # ---- laws
 
@@ -650,6 +690,8 @@ cdef class Engine:
         self.check_reserve(law.c.budget)
         if self.law is not None:
             self.law.supersede()
+        if not self.virtual:
+            cat_memory_settle(&law.memory_block)
         self.laws = [*self.laws, law]  # before it is offered: the cycle must not outlive it
         self.law = law
         law.c.threaded = self.native
@@ -715,6 +757,8 @@ cdef class Engine:
         if stream is not None and stream.c.axes != self.axes.c.axis_count:
             raise ValueError(f"a stream for {stream.c.axes} axes, there are {self.axes.c.axis_count}")
         if stream is not None:
+            if not self.virtual:
+                cat_memory_settle(&stream.memory)
             self.streams = [*self.streams, stream]  # before it is offered, as with laws
         self.stream = stream
         cat_pointer_offer(&self.e.cycle.stream, NULL if stream is None else &stream.c)
@@ -737,6 +781,7 @@ cdef class Engine:
             "late": self.e.cycle.late,
             "uncommitted": self.e.cycle.uncommitted,
             "missed_sync": self.e.cycle.missed_sync,
+            "page_faults": self.e.thread.page_faults,
             "stale": 0,
             "alien": 0,
             "corrupt": 0,

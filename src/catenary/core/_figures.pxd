@@ -2,11 +2,14 @@ from libc.stdint cimport uint64_t
 
 from catenary.core._cycle cimport cycle_t
 from catenary.core._histogram cimport histogram_t
+from catenary.core._memory cimport cat_memory
 
 cdef class Figures:
     """Owns the log records and the histograms of a cycle."""
     cdef cycle_t *cycle
     cdef histogram_t *spare
+    cdef cat_memory memory     # histograms
+    cdef cat_memory log_memory
     cdef uint64_t log_cycles
     cdef int attach(self, cycle_t *cycle, uint64_t log_cycles) except -1
     cdef bytes log(self)

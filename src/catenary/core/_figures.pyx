@@ -6,7 +6,6 @@ overwritten it meanwhile; histograms are reset by exchanging them for cleared on
 """
 
 from libc.stdint cimport uint64_t
-from libc.stdlib cimport calloc, free
 
 from catenary.core._cycle cimport LOG_MARGIN, PHASES, cycle_t, record_t
 from catenary.core._cycle import PHASE_NAMES
@@ -16,6 +15,7 @@ from catenary.core._histogram cimport (
     histogram_summary,
     histogram_t,
 )
+from catenary.core._memory cimport cat_memory_free, memory_take
 from catenary.core._native cimport cat_fence
 
 
@@ -25,11 +25,11 @@ cdef class Figures:
         self.cycle = cycle
         self.log_cycles = log_cycles
         cycle.records_mask = (1 << (log_cycles + LOG_MARGIN - 1).bit_length()) - 1
-        cycle.records = <record_t *>calloc(cycle.records_mask + 1, sizeof(record_t))
-        cycle.histograms = <histogram_t *>calloc(PHASES, sizeof(histogram_t))
-        self.spare = <histogram_t *>calloc(PHASES, sizeof(histogram_t))
-        if not (cycle.records and cycle.histograms and self.spare):
-            raise MemoryError
+        cycle.histograms = <histogram_t *>memory_take(&self.memory, PHASES, sizeof(histogram_t))
+        self.spare = <histogram_t *>memory_take(&self.memory, PHASES, sizeof(histogram_t))
+        cycle.records = <record_t *>memory_take(
+            &self.log_memory, cycle.records_mask + 1, sizeof(record_t)
+        )
         return 0
 
     cdef bytes log(self):
@@ -69,7 +69,5 @@ cdef class Figures:
         self.spare = old
 
     def __dealloc__(self):
-        if self.cycle != NULL:
-            free(self.cycle.records)
-            free(self.cycle.histograms)
-        free(self.spare)
+        cat_memory_free(&self.memory)
+        cat_memory_free(&self.log_memory)

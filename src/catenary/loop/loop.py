@@ -380,7 +380,7 @@ class Loop:
 
     @property
     def scheduling(self) -> str:
-        """What the thread that keeps the instants obtained."""
+        """Scheduling and locked memory that the cycle thread obtained, as text."""
         return self._opened.engine.scheduling
 
     @property
