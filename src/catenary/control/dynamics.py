@@ -104,8 +104,8 @@ class Dynamics:
 @compiles
 def inverse(memory: Row, position: Row, velocity: Row, acceleration: Row, torque: Row) -> None:
     """torque (n,) [N·m] := what this motion takes: (n,) [rad], [rad/s], [rad/s²]. `memory`: of
-    `Dynamics`. All inputs are written before the call, so that a rehearsal leaves nothing
-    behind."""
+    `Dynamics`. All inputs are written before the call: a trial step leaves nothing in the
+    model."""
     check(memory, len(position))
     v = doubles(int(memory[VELOCITY]), int(memory[VELOCITIES]))
     a = doubles(int(memory[ACCELERATION]), int(memory[VELOCITIES]))

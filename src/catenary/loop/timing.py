@@ -15,10 +15,10 @@ class Timing(Mapping[str, Mapping[str, float]]):
     period: wake-up to wake-up. lateness: cycle start → wake-up. receive: wake-up (threaded: last
     frame) → inputs usable. process: the body, or the law. send: wake-up (inline: end of the body) →
     last frame handed to the kernel. in_controller: the sum of these three. tail: post-processing
-    until the next wait. round_trip: of the last frame. output_delay: cycle start → last cyclic frame
-    handed to the kernel. input_age: frames handed to the kernel → body or law begins with their
-    inputs. interpreter: wake-up → this thread has the interpreter. Phases that did not occur are
-    left out.
+    until the next wait. round_trip: of the last frame. output_delay: cycle start → last cyclic
+    frame handed to the kernel. input_age: frames handed to the kernel → body or law begins with
+    their inputs. interpreter: wake-up → this thread has the interpreter. Phases that did not occur
+    are left out.
     """
 
     def __init__(
@@ -43,8 +43,8 @@ class Timing(Mapping[str, Mapping[str, float]]):
         waits = self._phases.get("interpreter", {}).get("p99", 0.0)
         if waits >= BUSY_SHARE * sys.getswitchinterval() * 1e6:
             rows.append(
-                f"Another Python thread keeps the interpreter for up to {waits:.0f} us (p99): end it, "
-                "run it in a process, or shorten its turns with Loop(switch_interval=20e-6)."
+                f"Another Python thread keeps the interpreter for up to {waits:.0f} us (p99): end "
+                "it, run it in a process, or shorten its turns with Loop(switch_interval=20e-6)."
             )
         counted = ", ".join(f"{self.counters[name]} {name}" for name in ("cycles", "lost", "late"))
         return "\n".join([*rows, counted])

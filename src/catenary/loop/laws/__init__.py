@@ -1,1 +1,1 @@
-"""Control laws: plain Python functions, checked, compiled, rehearsed, and run in the cycle."""
+"""Control laws: plain Python functions, checked, compiled, tried on copies, run in the cycle."""

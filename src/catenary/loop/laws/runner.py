@@ -1,4 +1,4 @@
-"""The laws of an open loop: compiled, rehearsed, started, run to their end, or run as Python."""
+"""The laws of an open loop: compiled, tried, started, run to their end, or run as Python."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class LawRunner:
         budget: float | None,
         overruns: int,
     ) -> LawRun:
-        """Compiles it if need be, rehearses it on copies, and hands it to the cycle."""
+        """Compile the law if necessary, try it on copies, and hand it to the cycle."""
         if budget is not None and not budget >= 0:
             raise ValueError(f"budget={budget} s: must not be negative")
         if overruns < 1:
@@ -66,14 +66,16 @@ class LawRunner:
             priority=self._priority,
         )
         run = LawRun(law, compiled, native, self._engine, np.array(given))
-        self._rehearse(law, native)
+        self._try(law, native)
         self._engine.start_law(native)
         self._run = run
         return run
 
-    def _rehearse(self, law: Law, native: core.Law) -> None:
-        """On copies of the present values: its pages are there when it matters, and what it would
-        do wrong in every step is found."""
+    def _try(self, law: Law, native: core.Law) -> None:
+        """Run steps on copies of the present values.
+
+        This maps the law's pages before its first cycle, and finds errors that occur in each step.
+        """
         actual, target = self._engine.blocks()
         with counted_allocations() as allocated:
             result = native.rehearse(bytes(actual), bytes(target))
