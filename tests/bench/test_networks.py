@@ -40,7 +40,7 @@ def test_the_networks_are_tallied_apart() -> None:
 
 def test_the_last_cycles_of_a_log_are_taken() -> None:
     columns = [("number", "u8"), *((f"{name}_ns", "i4") for name in KEPT)]
-    log = np.array([(n, 10 * n, n, 2 * n) for n in range(6)], dtype=columns)
+    log = np.array([(n, 10 * n, n, 2 * n, 12 * n) for n in range(6)], dtype=columns)
     found = phases_of(SimpleNamespace(log=log), 5)
     assert found["lateness"] == [10, 20, 30, 40, 50]
     assert found["send"] == [2, 4, 6, 8, 10]

@@ -82,6 +82,9 @@ def test_all_ways_run_briefly(ring: bool) -> None:
     ways = tocabi.ways_for(options)[0]
     assert names == [f"{way}, {network}" for way in ways for network in ("upper", "lower")]
     assert all(column["cycles"] > 0 for column in rate["columns"])
+    for timing in (column["timing_us"] for column in rate["columns"]):
+        assert timing["output_delay"]["min"] >= timing["lateness"]["min"]
+    assert "output delay" in sheet.text
     assert [task["name"] for task in rate["task_beside"]] == ["python"]
     [shares] = rate["shares"][tocabi.LAW]
     assert {name for name, share in shares.items() if share > 0} == {

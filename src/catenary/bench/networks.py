@@ -34,7 +34,7 @@ Positions = npt.NDArray[np.float64]  # [rad]
 DRIVES = (18, 15)  # of the published humanoid's upper and lower network
 OURS, C = "catenary", "c"
 BRING_UP = 2.0  # [s] that two programs together take at most
-KEPT = ("lateness", "receive", "send")  # phases
+KEPT = ("lateness", "receive", "send", "output_delay")  # phases
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,8 +2,9 @@
 
 Three ways in turn: one loop over both networks, whose Python body gives targets in every cycle; a
 loop with a law for each network in a process of its own, with a Python task of 1 kHz beside; and
-two C programs. Theirs waits in the cycle for the answer to its frame, ours takes up at an instant
-what was sent at the one before: compare `receive` among ours only.
+two C programs. The published loop waits in the cycle for the answer to its frame; `c` receives the
+frame of the previous cycle. Compare `receive` among ours only, and `output delay` (cycle start →
+last cyclic frame handed to the kernel) between ours and `c`.
 
 A rate holds for a way where nothing was lost, no instant passed without a cycle and no job of the
 task was missed. `--peers law --rates 4000,5000,6000` looks for the highest."""
@@ -44,7 +45,8 @@ NETWORKS = ("upper", "lower")
 LOOKED_AT = 0.8  # of what is measured: shares of the processor
 LOOP, LAW = "loop", "law"
 TASK_PERIOD, TASK_PRIORITY = 1e-3, 60  # below loops and segments
-HEADER = ("avg/max/min/sd [us]", "latency", "send", "receive", "overflows", "lost")
+HEADER = ("avg/max/min/sd [us]", "latency", "send", "receive", "output delay", "overflows", "lost")
+OUTPUT_DELAY = "output_delay"
 
 
 @dataclass(frozen=True, slots=True)
@@ -288,11 +290,19 @@ def column(name: str, rounds: Sequence[NetworkRound]) -> Column:
 def as_table(rate: int, found: Mapping[str, WayRounds]) -> str:
     columns, task = in_columns(found)
     rows = [
-        row(f"theirs: {name}", channel, "-")
+        row(f"theirs: {name}", channel, "-", "-")
         for (published, name), channel in TOCABI.items()
         if published == rate
     ]
-    rows += [row(each.name, each.channel(), f"{each.lost} of {each.cycles}") for each in columns]
+    rows += [
+        row(
+            each.name,
+            each.channel(),
+            slashed(spread_of(each.timing_us[OUTPUT_DELAY]), 2),
+            f"{each.lost} of {each.cycles}",
+        )
+        for each in columns
+    ]
     lines = [f"{rate} Hz", grid(HEADER, rows)]
     if task:
         jobs, missed = sum(each.jobs for each in task), sum(each.misses for each in task)
@@ -325,9 +335,9 @@ def holds(name: str, way: WayRounds) -> bool:
     )
 
 
-def row(name: str, channel: Channel, lost: str) -> list[str]:
+def row(name: str, channel: Channel, output_delay: str, lost: str) -> list[str]:
     texts = [slashed(each, 2) for each in (channel.latency, channel.send, channel.receive)]
-    return [name, *texts, channel.overflows, lost]
+    return [name, *texts, output_delay, channel.overflows, lost]
 
 
 def as_figures(rate: int, found: Mapping[str, WayRounds]) -> dict[str, object]:
