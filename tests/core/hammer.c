@@ -236,27 +236,47 @@ static int endless_step(const void *a, void *t, double *m, int64_t n, const doub
     return CAT_LAW_FINISHED;
 }
 
-static void *run_laws(void *argument) {
-    cat_law_guard *guard = argument;
-    static double memory[1];
-    cat_law_numbers numbers = {memory, 1, 0, 0};
+#define PAUSES 200                   /* in which the monitor is parked */
+
+static uint64_t run_short_steps(cat_law_monitor *monitor, const cat_law_numbers *numbers) {
     uint64_t wrong = 0;
-    for (int n = 0; n < 20000; n++)
-        wrong += cat_law_call(guard, short_step, 0, 0, &numbers, 0) != CAT_LAW_GOES_ON;
+    for (int pause = 0; pause < PAUSES; pause++) {
+        cat_law_monitor_activate(monitor, 20000000);
+        for (int n = 0; n < 100; n++)
+            wrong += cat_law_call(&monitor->guard, short_step, 0, 0, numbers, 0) != CAT_LAW_GOES_ON;
+        cat_law_monitor_park(monitor);
+        if (pause % 20 == 0) usleep(6000); /* longer than a check: it sleeps */
+    }
+    return wrong;
+}
+
+static void *run_laws(void *argument) {
+    cat_law_monitor *monitor = argument;
+    double memory[1] = {0};
+    cat_law_numbers numbers = {memory, 1, 0, 0};
+    uint64_t wrong = run_short_steps(monitor, &numbers);
+    cat_law_monitor_activate(monitor, 20000000);
     for (int n = 0; n < ENDLESS_STEPS; n++)
-        wrong += cat_law_call(guard, endless_step, 0, 0, &numbers, 0) != CAT_LAW_ABORTED;
+        wrong += cat_law_call(&monitor->guard, endless_step, 0, 0, &numbers, 0) != CAT_LAW_ABORTED;
+    cat_law_monitor_park(monitor);
     return (void *)(uintptr_t)wrong;
 }
 
+/* Two runners at once, as the cycle and a rehearsal: each has a monitor. */
 static uint64_t hammer_laws(void) {
-    static cat_law_guard guard;
-    pthread_t runner;
-    void *wrong;
-    if (cat_law_guard_start(&guard, 20000000, 0)) return 1;
-    pthread_create(&runner, 0, run_laws, &guard);
-    pthread_join(runner, &wrong);
-    cat_law_guard_stop(&guard);
-    return (uintptr_t)wrong;
+    static cat_law_monitor monitors[2];
+    pthread_t runners[2];
+    uint64_t sum = 0;
+    for (int k = 0; k < 2; k++)
+        if (cat_law_monitor_start(&monitors[k], 0)) return 1;
+    for (int k = 0; k < 2; k++) pthread_create(&runners[k], 0, run_laws, &monitors[k]);
+    for (int k = 0; k < 2; k++) {
+        void *wrong;
+        pthread_join(runners[k], &wrong);
+        sum += (uintptr_t)wrong;
+        cat_law_monitor_stop(&monitors[k]);
+    }
+    return sum;
 }
 
 static int report(const char *what, uint64_t wrong) {
@@ -276,7 +296,7 @@ int main(void) {
     hammer_pointer(200000, 1, &first, &second);
     failures += report("pointer (law)", first + second);
     failures += report("rows of a share", hammer_rows(200000));
-    failures += report("law guard", hammer_laws());
+    failures += report("law monitors", hammer_laws());
     return failures ? 1 : 0;
 }
 #endif

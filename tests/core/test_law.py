@@ -1,7 +1,10 @@
 """Laws in the cycle: in every order, handed over, ended, got out of. Virtual time throughout."""
 
 import ctypes
+import gc
+import os
 import subprocess
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,9 +24,11 @@ from catenary.core import (
     LAW_RAISED,
     LAW_RUNNING,
     LAW_STOPPED,
+    Engine,
     Law,
 )
 from catenary.plan.cycle import AxisLimits, Bank, Column
+from catenary.virtual import Coupler, Segment
 from tests.core.rig import (
     CST,
     DRIVE_SIZE,
@@ -31,8 +36,10 @@ from tests.core.rig import (
     PERIOD,
     Bench,
     ScriptedDrive,
+    al_status,
     axis,
     bench,
+    frame_plan,
     make_plan,
     number,
 )
@@ -378,3 +385,74 @@ def test_a_law_that_never_returns_is_given_up_and_the_bus_goes_on(
     assert b.engine.counters["lost"] == 0
     again = Law(address, [], [], budget_ns=0, overrun_limit=3, priority=0)
     assert again.rehearse(b"\0" * 64, b"\0" * 64) == 0  # its first steps do return
+
+
+# ---- the monitor
+
+
+def threads() -> set[str]:
+    return set(os.listdir("/proc/self/task"))
+
+
+def wake_ups(thread: str) -> int:
+    status = Path(f"/proc/self/task/{thread}/status").read_text()
+    return int(status.partition("voluntary_ctxt_switches:")[2].split()[0])
+
+
+def compute(seconds: float) -> None:
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        pass
+
+
+def is_asleep(thread: str) -> bool:
+    """It does not wake up within several checks. It may need one more check to fall asleep."""
+    for _ in range(50):
+        before = wake_ups(thread)
+        compute(0.03)
+        if wake_ups(thread) == before:
+            return True
+    return False
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_the_laws_of_an_engine_share_one_monitor_that_sleeps_while_none_runs(order: str) -> None:
+    b = bench(axis(0), order=order)
+    b.enable()
+    before = threads()
+    laws = [make_law(b, lambda frame: 0) for _ in range(3)]
+    assert threads() == before
+    for law in laws:
+        b.engine.start_law(law)
+        b.steps(2)
+        assert law.status == LAW_RUNNING
+        [monitor] = threads() - before
+    b.engine.stop_law()
+    b.steps(2)
+    assert is_asleep(monitor)
+    b.engine.start_law(make_law(b, lambda frame: 0))
+    b.steps(2)
+    asleep = wake_ups(monitor)
+    while wake_ups(monitor) < asleep + 3:
+        pass
+    del b
+    gc.collect()
+    assert threads() == before
+
+
+def test_a_law_after_a_restart_is_given_up_in_its_new_thread(endless: ctypes.CDLL) -> None:
+    """A new native thread may have the handle of the former one."""
+    address = ctypes.cast(endless.endless, ctypes.c_void_p).value
+    with Segment([Coupler()], clock="monotonic").open_link() as link:
+        frames = (frame_plan([al_status(1)]),)
+        plan = make_plan([], units=0, frames=frames, priority=None)
+        engine = Engine(plan, link.capsule)
+        for _ in range(3):
+            engine.start()
+            engine.run(1)
+            law = Law(address, [], [], budget_ns=0, overrun_limit=3, priority=0)
+            engine.start_law(law)
+            while not law.wait(10**9):
+                pass
+            engine.stop()
+            assert law.status == LAW_NEVER_RETURNED

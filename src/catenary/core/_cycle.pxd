@@ -6,7 +6,7 @@ from catenary.core._handover cimport actual_t, handover_t, target_t
 from catenary.core._histogram cimport histogram_t
 from catenary.core._lane cimport lane_t
 from catenary.core._law cimport law_t
-from catenary.core._native cimport cat_image, cat_link, cat_pointer, cat_sink
+from catenary.core._native cimport cat_image, cat_law_monitor, cat_link, cat_pointer, cat_sink
 from catenary.core._stream cimport stream_t
 
 cdef enum:
@@ -59,6 +59,7 @@ cdef struct cycle_t:
     handover_t *handover
     clock_t *clock             # NULL: no distributed clocks
     law_t *law                 # NULL: none runs
+    cat_law_monitor monitor    # of all laws that this cycle runs
     cat_pointer law_request    # of a law_t; CAT_POINTER_NONE: stop the law. Claimed: `law`
     cat_pointer stream         # of a stream_t; none: the application or the law sets the set-points
     const cat_sink *sink       # NULL: none

@@ -71,6 +71,7 @@ from catenary.core._law cimport (
     STOPPED_BY_APPLICATION,
     law_begin,
     law_end,
+    law_monitor_park,
     law_run,
     law_t,
     law_tell,
@@ -405,6 +406,7 @@ cdef void end_law(cycle_t *c, uint32_t status) noexcept nogil:
 cdef void forget_law(cycle_t *c) noexcept nogil:
     """The last access: from here on the engine may free the law."""
     c.law = NULL
+    law_monitor_park(&c.monitor)
     cat_pointer_release(&c.law_request)
 
 
@@ -425,7 +427,7 @@ cdef void take_law(cycle_t *c, const target_t *orders) noexcept nogil:
     target.header.hold = 1
     target.header.seen = c.number
     c.law_reserve = cycle_law_reserve(c, c.law.budget)
-    if not law_begin(c.law, c.scheduled):
+    if not law_begin(c.law, &c.monitor, c.scheduled):
         forget_law(c)
 
 
@@ -452,7 +454,7 @@ cdef bint step_law(cycle_t *c, actual_t *actual, target_t *target) noexcept nogi
     target.header.seen = c.number
     actual.header.ok = c.image.ok[0]
     memcpy(c.handover.target[BEFORE_LAW].header, target.header, c.handover.target_size)
-    goes_on = law_run(law, c.axes, actual, target, c.scheduled, c.number)
+    goes_on = law_run(law, &c.monitor, c.axes, actual, target, c.scheduled, c.number)
     c.process = now(c) - since
     if goes_on and law_took(law, c.process, c.number):
         return True
@@ -495,6 +497,7 @@ cdef void cycle_start(cycle_t *c, int64_t origin) noexcept nogil:
     c.computed = 0
     c.outstanding = 0
     c.kept = 0
+    c.monitor.guard.known = 0  # the cycle may run in another thread now
     clear_next_record(c)
 
 

@@ -52,7 +52,7 @@ from catenary.core._handover cimport (
 )
 from catenary.core._histogram cimport histogram_add
 from catenary.core._lane cimport Lane
-from catenary.core._law cimport WAITING, Law
+from catenary.core._law cimport WAITING, Law, law_monitor_start, law_monitor_stop
 from catenary.core._memory cimport (
     cat_memory_add_state,
     cat_memory_settle,
@@ -688,6 +688,7 @@ cdef class Engine:
         if not self.running:
             raise RuntimeError("the engine is not running: start it first")
         self.check_reserve(law.c.budget)
+        law_monitor_start(&self.e.cycle.monitor, law.priority)
         if self.law is not None:
             self.law.supersede()
         if not self.virtual:
@@ -828,3 +829,4 @@ cdef class Engine:
     def __dealloc__(self):
         with nogil:
             thread_join(&self.e.thread)
+        law_monitor_stop(&self.e.cycle.monitor)

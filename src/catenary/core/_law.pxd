@@ -3,7 +3,7 @@ from libc.stdint cimport int64_t, uint32_t, uint64_t
 from catenary.core._axes cimport axes_t
 from catenary.core._handover cimport actual_t, target_t
 from catenary.core._memory cimport cat_memory
-from catenary.core._native cimport cat_law_guard, cat_law_numbers, cat_law_step, cat_triple
+from catenary.core._native cimport cat_law_monitor, cat_law_numbers, cat_law_step, cat_triple
 
 cdef enum:  # how a law stands
     WAITING = 0                # not taken over by the cycle yet
@@ -22,12 +22,12 @@ cdef struct exchange_t:        # numbers that change all at once
 
 cdef struct law_t:
     cat_law_step step
-    cat_law_guard guard
     cat_law_numbers numbers    # the law's own
     exchange_t memory_in
     exchange_t memory_out
     exchange_t parameters_in
     int64_t budget             # [ns] of one step; 0: none
+    int64_t limit              # [ns] of processor time in one call: it never returns
     uint32_t overrun_limit     # steps in a row over the budget
     uint32_t overruns_in_row
     uint64_t overruns
@@ -44,6 +44,8 @@ cdef struct law_t:
 cdef class Law:
     """Owns a law's numbers while it runs."""
     cdef law_t c
+    cdef cat_law_monitor rehearsal
+    cdef int priority              # of the monitor
     cdef cat_memory memory_block   # all its numbers
     cdef allocate(self, exchange_t *numbers, double **place)
     cdef fill(self, exchange_t *numbers, values)
@@ -52,9 +54,13 @@ cdef class Law:
     cdef bint failed(self) noexcept
     cdef void supersede(self) noexcept
 
-cdef bint law_begin(law_t *law, int64_t instant) noexcept nogil
+cdef int law_monitor_start(cat_law_monitor *monitor, int priority) except -1
+cdef void law_monitor_stop(cat_law_monitor *monitor) noexcept
+cdef void law_monitor_park(cat_law_monitor *monitor) noexcept nogil
+cdef bint law_begin(law_t *law, cat_law_monitor *monitor, int64_t instant) noexcept nogil
 cdef void law_end(law_t *law, uint32_t status, uint64_t number) noexcept nogil
-cdef bint law_run(law_t *law, const axes_t *axes, const actual_t *actual, target_t *target,
-                  int64_t instant, uint64_t number) noexcept nogil
+cdef bint law_run(law_t *law, cat_law_monitor *monitor, const axes_t *axes,
+                  const actual_t *actual, target_t *target, int64_t instant,
+                  uint64_t number) noexcept nogil
 cdef void law_tell(law_t *law) noexcept nogil
 cdef bint law_took(law_t *law, int64_t duration, uint64_t number) noexcept nogil

@@ -19,7 +19,7 @@ class Law:
     `memory`: the law's own, `parameters`: the application's; at most 4096 each. `budget_ns` of one
     step, 0: none; `overrun_limit` steps in a row over it stop the drives. A step that computes for
     20 ms (twice the budget, if that is more) is given up by a thread of `priority` (SCHED_FIFO; 0: as
-    the caller). The caller keeps what the address belongs to alive. ValueError, OSError.
+    the caller). The laws of an engine share this thread; the first one sets its priority. The caller keeps what the address belongs to alive. ValueError, OSError.
     """
 
     def __init__(
@@ -57,4 +57,5 @@ class Law:
 
     def rehearse(self, actual: bytes, target: bytes) -> int:
         """A few steps on copies of the blocks and of the memory: what is slow the first time happens
-        now. What the law returned last (native/law.h)."""
+        now. What the law returned last (native/law.h). OSError if the thread that watches it cannot
+        be started."""

@@ -4,6 +4,8 @@
 The law itself is a function of native/law.h. Budget: 30 ns beside it, without memory.
 """
 
+import os
+
 from cpython.exc cimport PyErr_CheckSignals
 from libc.math cimport isfinite
 from libc.stdint cimport int64_t, uint32_t, uint64_t, uintptr_t
@@ -22,8 +24,11 @@ from catenary.core._native cimport (
     cat_futex_wait,
     cat_futex_wake,
     cat_law_call,
-    cat_law_guard_start,
-    cat_law_guard_stop,
+    cat_law_monitor,
+    cat_law_monitor_activate,
+    cat_law_monitor_park,
+    cat_law_monitor_start,
+    cat_law_monitor_stop,
     cat_law_numbers,
     cat_law_step,
     cat_load_acquire32,
@@ -68,10 +73,13 @@ cdef inline bint take(exchange_t *numbers, double *values) noexcept nogil:
 
 # ---- in the cycle
 
-cdef bint law_begin(law_t *law, int64_t instant) noexcept nogil:
-    """False: the application has thought better of it."""
+cdef bint law_begin(law_t *law, cat_law_monitor *monitor, int64_t instant) noexcept nogil:
+    """Begin with a law. Return False if the application has withdrawn it."""
     law.begun = instant
-    return cat_change32(&law.status, WAITING, RUNNING)
+    if not cat_change32(&law.status, WAITING, RUNNING):
+        return False
+    cat_law_monitor_activate(monitor, law.limit)
+    return True
 
 
 cdef void law_end(law_t *law, uint32_t status, uint64_t number) noexcept nogil:
@@ -97,14 +105,15 @@ cdef int first_not_finite(const axes_t *axes, const target_t *target) noexcept n
     return -1
 
 
-cdef bint law_run(law_t *law, const axes_t *axes, const actual_t *actual, target_t *target,
-                  int64_t instant, uint64_t number) noexcept nogil:
-    """One step; whether the law goes on afterwards. What a failed step left in `target` must not
+cdef bint law_run(law_t *law, cat_law_monitor *monitor, const axes_t *axes,
+                  const actual_t *actual, target_t *target, int64_t instant,
+                  uint64_t number) noexcept nogil:
+    """Run one step. Return True if the law goes on. What a failed step left in `target` must not
     be sent."""
     cdef int rc, axis
     take(&law.parameters_in, law.numbers.parameters)
     take(&law.memory_in, law.numbers.memory)
-    rc = cat_law_call(&law.guard, law.step, actual.header, target.header,
+    rc = cat_law_call(&monitor.guard, law.step, actual.header, target.header,
                       &law.numbers, <double>(instant - law.begun) * 1e-9)
     law.steps += 1
     if rc != CAT_LAW_GOES_ON and rc != CAT_LAW_FINISHED:
@@ -148,6 +157,25 @@ cdef bint law_took(law_t *law, int64_t duration, uint64_t number) noexcept nogil
     return False
 
 
+# ---- the monitor
+
+cdef int law_monitor_start(cat_law_monitor *monitor, int priority) except -1:
+    """Start the thread that watches the laws of one runner, unless it runs already."""
+    cdef int rc = cat_law_monitor_start(monitor, priority)
+    if rc < 0:
+        raise OSError(-rc, f"cannot start the thread that watches laws: {os.strerror(-rc)}")
+    return 0
+
+
+cdef void law_monitor_stop(cat_law_monitor *monitor) noexcept:
+    with nogil:
+        cat_law_monitor_stop(monitor)
+
+
+cdef void law_monitor_park(cat_law_monitor *monitor) noexcept nogil:
+    cat_law_monitor_park(monitor)
+
+
 # ---- the edge
 
 cdef class Law:
@@ -181,9 +209,8 @@ cdef class Law:
         for i, value in enumerate(parameters):
             self.c.numbers.parameters[i] = value
         give(&self.c.memory_out, self.c.numbers.memory)
-        rc = cat_law_guard_start(&self.c.guard, max(STUCK_NS, 2 * budget_ns), priority)
-        if rc < 0:
-            raise OSError(-rc, "the thread that watches the law cannot be started")
+        self.c.limit = max(STUCK_NS, 2 * budget_ns)
+        self.priority = priority
 
     cdef allocate(self, exchange_t *numbers, double **place):
         cdef int slot
@@ -290,18 +317,21 @@ cdef class Law:
             raise MemoryError
         copied.memory = <double *>(scratch + behind)
         try:
+            law_monitor_start(&self.rehearsal, self.priority)
+            cat_law_monitor_activate(&self.rehearsal, self.c.limit)
             for k in range(REHEARSALS):
                 memcpy(scratch, wanted, size)
                 memcpy(copied.memory, self.c.numbers.memory, numbers)
                 with nogil:
-                    rc = cat_law_call(&self.c.guard, self.c.step, source, scratch, &copied, 0.0)
+                    rc = cat_law_call(
+                        &self.rehearsal.guard, self.c.step, source, scratch, &copied, 0.0
+                    )
                 if rc == CAT_LAW_ABORTED:
                     break
             return rc
         finally:
+            law_monitor_stop(&self.rehearsal)
             free(scratch)
 
     def __dealloc__(self):
-        with nogil:
-            cat_law_guard_stop(&self.c.guard)
         cat_memory_free(&self.memory_block)

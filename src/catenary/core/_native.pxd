@@ -160,9 +160,14 @@ cdef extern from "law.h" nogil:
                                  int64_t parameter_count, double time) noexcept nogil
 
     ctypedef struct cat_law_guard:
-        pass
+        uint32_t known
 
-    int cat_law_guard_start(cat_law_guard *guard, int64_t limit, int priority)
-    void cat_law_guard_stop(cat_law_guard *guard)
+    ctypedef struct cat_law_monitor:
+        cat_law_guard guard
+
+    int cat_law_monitor_start(cat_law_monitor *monitor, int priority)
+    void cat_law_monitor_stop(cat_law_monitor *monitor)
+    void cat_law_monitor_activate(cat_law_monitor *monitor, int64_t limit)
+    void cat_law_monitor_park(cat_law_monitor *monitor)
     int cat_law_call(cat_law_guard *guard, cat_law_step step, const void *actual, void *target,
                      const cat_law_numbers *numbers, double time)

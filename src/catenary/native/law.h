@@ -1,8 +1,24 @@
-/* A control law: a function that runs natively between collect and emit, and the guard that gets the
- * thread out of one that does not come back.
+/* A control law: a function that runs in the cycle thread, and the monitor that gets the thread out of
+ * one that never returns.
  *
- * `actual` and `target` point to blocks of the core whose layout the engine tells (`law_fields`).
- * Targets start as what was commanded last; the core's limits apply to what the law leaves in them.
+ * `actual` and `target` point to blocks of the core whose layout is that of `law_fields`. Targets start
+ * as what was commanded last; the core's limits apply to what the law leaves in them.
+ *
+ * Theory of operation
+ *   A guard belongs to one thread that calls laws (the runner). `under_way` is the number of its call. A
+ *   monitor is a thread that watches one guard. Every 5 ms it compares the processor time of the runner
+ *   with that at which it first saw the call. Beyond `limit` it stores the number in `condemned` and
+ *   sends the runner a signal. The handler leaves the call by siglongjmp if it is still the same call.
+ *   Signals that come late or to another thread have no effect.
+ *
+ * state of a monitor (futex word)
+ *   PARKED  sleeps without a timeout: no law runs
+ *   ACTIVE  checks every 5 ms
+ *   ENDING  the thread ends
+ *
+ * The runner activates and parks the monitor, its owner ends it when the runner has stopped. Parking is
+ * one store: the monitor notices it at its next check. The cycle and a rehearsal in another thread have
+ * a guard and a monitor each, so that both may be inside a law at once.
  */
 #ifndef CATENARY_LAW_H
 #define CATENARY_LAW_H
@@ -16,6 +32,7 @@
 #include <time.h>
 #include <unistd.h>
 #include "atomics.h"
+#include "futex.h"
 
 #define CAT_LAW_GOES_ON 0
 #define CAT_LAW_FINISHED 1
@@ -35,23 +52,30 @@ typedef int (*cat_law_step)(const void *actual, void *target, double *memory, in
                             const double *parameters, int64_t parameter_count, double time);
 
 /* Words that two threads or the signal handler share are atomic: `under_way`, `condemned`, `task` and
- * `stop`. Lock-free atomics are safe in a signal handler (C11 §7.14.1.1). */
+ * `limit`. Lock-free atomics are safe in a signal handler (C11 §7.14.1.1). */
 typedef struct cat_law_guard {
     sigjmp_buf jump;
     uint64_t calls;               /* the runner's */
     uint64_t under_way;           /* number of the call; 0: none */
     uint64_t condemned;           /* the call that is to be given up */
+    uint64_t limit;               /* [ns] of the runner's processor time in one call */
     uint32_t task;                /* thread ID of the runner, for the kernel */
-    uint32_t stop;                /* 1: the monitor ends */
-    pthread_t runner;             /* the thread that calls */
-    pthread_t monitor;
     uint32_t known;               /* the runner is ready to be interrupted */
-    uint32_t watched;             /* the monitor runs */
-    int64_t limit;                /* [ns] of the runner's processor time; set before the monitor runs */
+    pthread_t runner;             /* the thread that calls */
 } cat_law_guard;
 
+enum { CAT_LAW_PARKED, CAT_LAW_ACTIVE, CAT_LAW_ENDING };
+
+typedef struct cat_law_monitor {
+    cat_law_guard guard;
+    uint32_t state;               /* futex word */
+    uint32_t started;             /* the thread runs; its owner's */
+    pthread_t thread;
+} cat_law_monitor;
+
 #define CAT_LAW_SIGNAL (SIGRTMIN + 7)
-#define CAT_LAW_LOOKS_NS 5000000
+#define CAT_LAW_CHECK_NS 5000000
+#define CAT_LAW_FOREVER_NS INT64_MAX
 
 static void cat_law_give_up(int number, siginfo_t *info, void *context) {
     cat_law_guard *guard = (cat_law_guard *)info->si_value.sival_ptr;
@@ -82,58 +106,82 @@ static inline void cat_law_interrupt(cat_law_guard *guard, uint32_t task) {
     syscall(SYS_rt_tgsigqueueinfo, getpid(), task, CAT_LAW_SIGNAL, &info);
 }
 
-/* Checks every 5 ms whether the same call is still under way, and how long it has computed. */
-static void *cat_law_watch(void *argument) {
-    cat_law_guard *guard = (cat_law_guard *)argument;
-    const struct timespec pause = {0, CAT_LAW_LOOKS_NS};
-    uint64_t seen = 0;
-    int64_t since = 0;
-    while (!cat_load_acquire32(&guard->stop)) {
-        uint64_t call = cat_load_acquire64(&guard->under_way);
-        uint32_t task = cat_load_relaxed32(&guard->task);
-        int64_t present = call ? cat_law_time_used(task) : -1;
-        if (present >= 0 && call != seen) {
-            since = present;
-        } else if (present >= 0 && present - since >= guard->limit) {
-            cat_store_release64(&guard->condemned, call);
-            cat_law_interrupt(guard, task);
-        }
-        seen = call;
-        clock_nanosleep(CLOCK_MONOTONIC, 0, &pause, NULL);
+typedef struct cat_law_seen {
+    uint64_t call;                /* that was under way at the last check; 0: none */
+    int64_t since;                /* processor time of its runner when it was first seen [ns] */
+} cat_law_seen;
+
+/* Give up the call that has computed for `limit`. */
+static inline void cat_law_check(cat_law_guard *guard, cat_law_seen *seen) {
+    uint64_t call = cat_load_acquire64(&guard->under_way);
+    uint32_t task = cat_load_relaxed32(&guard->task);
+    int64_t present = call ? cat_law_time_used(task) : -1;
+    if (present >= 0 && call != seen->call) {
+        seen->since = present;
+    } else if (present >= 0 && present - seen->since >= (int64_t)cat_load_relaxed64(&guard->limit)) {
+        cat_store_release64(&guard->condemned, call);
+        cat_law_interrupt(guard, task);
     }
-    return NULL;
+    seen->call = call;
 }
 
-/* Starts watching, above the caller's wishes for priority. 0 or -errno. */
-static inline int cat_law_guard_start(cat_law_guard *guard, int64_t limit, int priority) {
+static void *cat_law_watch(void *argument) {
+    cat_law_monitor *monitor = (cat_law_monitor *)argument;
+    cat_law_seen seen = {0, 0};
+    for (;;) {
+        uint32_t state = cat_load_acquire32(&monitor->state);
+        if (state == CAT_LAW_ENDING) return NULL;
+        if (state == CAT_LAW_ACTIVE) cat_law_check(&monitor->guard, &seen);
+        cat_futex_wait(&monitor->state, state,
+                       state == CAT_LAW_ACTIVE ? CAT_LAW_CHECK_NS : CAT_LAW_FOREVER_NS);
+    }
+}
+
+/* Owner: start the thread, parked. `priority` (SCHED_FIFO) above the runner's; 0: as the caller. 0 or
+ * -errno. */
+static inline int cat_law_monitor_start(cat_law_monitor *monitor, int priority) {
     struct sigaction action = {.sa_sigaction = cat_law_give_up, .sa_flags = SA_SIGINFO | SA_NODEFER};
     struct sched_param parameters = {.sched_priority = priority};
     sigset_t all, before;
     int rc;
-    if (guard->watched) return 0;
+    if (monitor->started) return 0;
     sigemptyset(&action.sa_mask);
     if (sigaction(CAT_LAW_SIGNAL, &action, NULL)) return -errno;
-    guard->limit = limit;
-    cat_store_release32(&guard->stop, 0);
+    cat_store_release32(&monitor->state, CAT_LAW_PARKED);
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
-    rc = pthread_create(&guard->monitor, NULL, cat_law_watch, guard);
+    rc = pthread_create(&monitor->thread, NULL, cat_law_watch, monitor);
     pthread_sigmask(SIG_SETMASK, &before, NULL);
     if (rc) return -rc;
-    guard->watched = 1;
-    if (priority > 0) /* refused to ordinary users: then the law's thread has none either */
-        pthread_setschedparam(guard->monitor, SCHED_FIFO, &parameters);
+    monitor->started = 1;
+    if (priority > 0) /* refused to ordinary users: then the runner has none either */
+        pthread_setschedparam(monitor->thread, SCHED_FIFO, &parameters);
     return 0;
 }
 
-static inline void cat_law_guard_stop(cat_law_guard *guard) {
-    if (!guard->watched) return;
-    cat_store_release32(&guard->stop, 1);
-    pthread_join(guard->monitor, NULL);
-    guard->watched = 0;
+/* Owner: end the thread, after the last call. */
+static inline void cat_law_monitor_stop(cat_law_monitor *monitor) {
+    if (!monitor->started) return;
+    cat_store_release32(&monitor->state, CAT_LAW_ENDING);
+    cat_futex_wake(&monitor->state);
+    pthread_join(monitor->thread, NULL);
+    monitor->started = 0;
 }
 
-/* Lets the signal through in this thread, and this one only. */
+/* Runner: watch the calls of a law from now on. One system call, as another one at its first call. */
+static inline void cat_law_monitor_activate(cat_law_monitor *monitor, int64_t limit) {
+    monitor->guard.known = 0; /* a new thread may have the pthread_t of one that has ended */
+    cat_store_release64(&monitor->guard.limit, (uint64_t)limit);
+    cat_store_release32(&monitor->state, CAT_LAW_ACTIVE);
+    cat_futex_wake(&monitor->state);
+}
+
+/* Runner: no law runs any more. */
+static inline void cat_law_monitor_park(cat_law_monitor *monitor) {
+    cat_store_release32(&monitor->state, CAT_LAW_PARKED);
+}
+
+/* Unblock the signal in this thread, and in this one only. */
 static __attribute__((noinline)) void cat_law_meet_runner(cat_law_guard *guard) {
     sigset_t ours;
     sigemptyset(&ours);
@@ -144,6 +192,7 @@ static __attribute__((noinline)) void cat_law_meet_runner(cat_law_guard *guard) 
     guard->known = 1;
 }
 
+/* CAT_LAW_ABORTED: the monitor has given up the call. */
 static inline int cat_law_call(cat_law_guard *guard, cat_law_step step, const void *actual,
                                void *target, const cat_law_numbers *n, double time) {
     int rc;
