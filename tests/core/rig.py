@@ -316,6 +316,7 @@ def make_plan(
         sync_units=tuple(SyncUnit(f"unit {k}", (k,)) for k in range(count)),
         device_count=count,
         axes=tuple(axes),
+        acyclic_ns=PERIOD * 4 // 5,
     )
     return replace(plan, **more)
 

@@ -4,7 +4,7 @@ import pytest
 
 from catenary.wire.datagram import Command, Datagram
 from catenary.wire.frame import decode_frame, encode_frame
-from tests.core.rig import MS, Bench, axis, bench
+from tests.core.rig import Bench, axis, bench
 
 
 def request(number: int = 0, size: int = 2, index: int = 0x80) -> bytes:
@@ -45,13 +45,34 @@ def test_at_most_four_a_cycle_in_their_order() -> None:
     assert [decode_frame(f).datagrams[0].address for f in lane_frames(b)] == list(range(10))
 
 
-@pytest.mark.parametrize(("period", "expected"), [(MS, 2), (MS // 4, 1), (2 * MS, 4)])
-def test_at_most_a_quarter_of_the_period_on_the_wire(period: int, expected: int) -> None:
-    b = bench(axis(0), period_ns=period, collect_deadline_ns=period // 2)
+@pytest.mark.parametrize(
+    ("budget_us", "expected"),
+    # a frame of 1428 bytes takes 116.16 us; the cyclic ones are back 100 us after the cycle start
+    [(0, 1), (100, 1), (330, 1), (333, 2), (448, 2), (449, 3), (900, 4)],
+)
+def test_only_what_fits_into_the_wire_time_left_and_one_frame_in_any_case(
+    budget_us: int, expected: int
+) -> None:
+    b = bench(axis(0), acyclic_ns=budget_us * 1000)
     for k in range(8):
         assert b.engine.lane_push(request(k, size=1400))
     b.engine.run(1)
     assert len(lane_frames(b)) == expected
+
+
+def test_a_late_body_leaves_less_of_the_wire() -> None:
+    b = bench(axis(0), order="inline", acyclic_ns=900_000)
+    b.steps(2)
+    for k in range(8):
+        assert b.engine.lane_push(request(k, size=1400))
+    b.engine.spend(600_000)
+    b.engine.next()
+    assert len(lane_frames(b)) == 2  # 300 us are left
+
+
+def test_a_negative_wire_time_is_refused() -> None:
+    with pytest.raises(ValueError, match="acyclic_ns: -1"):
+        bench(axis(0), acyclic_ns=-1)
 
 
 def test_a_full_queue_refuses() -> None:

@@ -254,12 +254,34 @@ def test_a_device_that_exceeds_a_datagram_is_refused_with_both_numbers(
 
 def test_more_frames_in_a_cycle_than_indices_are_refused_by_the_plan() -> None:
     devices = [block(k, outputs=1000, inputs=0) for k in range(33)]
-    assert len(make_plan(devices[:32]).cycle.frames) == 32
+    assert len(make_plan(devices[:32], period=5e-3).cycle.frames) == 32
     with pytest.raises(ConfigurationError) as caught:
-        make_plan(devices)
+        make_plan(devices, period=5e-3)
     assert "33 frames in one cycle, at most 32" in str(caught.value)
     assert "exact_matching=True" in str(caught.value)
-    assert len(make_plan(devices, exact_matching=True).cycle.frames) == 33
+    assert len(make_plan(devices, period=5e-3, exact_matching=True).cycle.frames) == 33
+
+
+def test_cyclic_frames_that_exceed_the_period_are_refused() -> None:
+    devices = [block(k, outputs=1000, inputs=0) for k in range(12)]
+    with pytest.raises(ConfigurationError) as caught:
+        make_plan(devices, period=1e-3)
+    assert str(caught.value).startswith(
+        "the cyclic frames take 1011.04 us at 100 Mbit/s, the period is 1000 us"
+    )
+    assert "every=" in str(caught.value)
+    turns = make_plan(devices, [Slow(2, *range(12))], period=1e-3).cycle
+    assert turns.wire_ns < 600_000  # of the busiest cycle, not of all frames
+
+
+def test_acyclic_frames_get_what_the_cyclic_ones_and_the_guard_leave() -> None:
+    plan = make_plan([block(k, outputs=1000, inputs=0) for k in range(2)], period=1e-3)
+    assert plan.cycle.acyclic_ns == 1_000_000 - plan.cycle.wire_ns - 100_000
+    left = f"{plan.cycle.acyclic_ns / 1e3:g}"
+    assert f"of 1000 us for cyclic frames, up to {left} us for acyclic frames, 10%" in str(plan)
+    full = make_plan([block(k, outputs=1000, inputs=0) for k in range(11)], period=1e-3)
+    assert full.cycle.acyclic_ns == 0
+    assert "one frame for acyclic frames" in str(full)
 
 
 def test_a_wish_for_a_device_that_is_not_there() -> None:

@@ -353,7 +353,7 @@ cdef void post_process(cycle_t *c, int64_t since, const actual_t *actual,
     cdef record_t *record
     cdef histogram_t *h = c.histograms
     cdef int64_t took
-    lane_send(c.lane, c.link)
+    lane_send(c.lane, c.link, since - c.scheduled)
     if c.number == 0:
         return
     record = record_of(c)

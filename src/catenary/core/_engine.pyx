@@ -150,7 +150,7 @@ cdef class Engine:
         else:
             self.image = image_in(image, plan)
             self.link = link_in(link)
-        self.lane = Lane(plan.period_ns)
+        self.lane = Lane(plan.acyclic_ns)
         self.axes = Axes(plan)
         if plan.clock is not None:
             self.clock = Clock(plan.clock, plan.period_ns)

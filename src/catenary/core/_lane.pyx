@@ -4,8 +4,10 @@
 Theory of operation
     One service thread pushes whole frames into `out` and pops returned ones from `back`; both are
     rings for one producer and one consumer (native/packet_ring.h). After each cycle `lane_send` sends
-    at most four frames and a quarter of the period's wire time. Frames with an index from 0x80 on
-    return through `lane_received`. The cycle never waits for the service thread.
+    at most four frames, as far as their wire time fits into what the plan leaves of the period
+    (plan/frames.py) less the part of it that has passed. The first frame is sent in any case, so that
+    a conversation never starves. Frames with an index from 0x80 on return through `lane_received`.
+    The cycle never waits for the service thread.
 
 Waking
     The service thread sets `waiting`, then sleeps while `arrived` is unchanged. The cycle increments
@@ -39,18 +41,28 @@ cdef enum:
     FIRST_INDEX = 17           # offset of the first datagram's index in an Ethernet frame
     LANE_INDICES = 0x80
     NS_PER_BYTE = 80           # 100 Mbit/s
+    FRAME_OVERHEAD = 24        # preamble, check sequence, gap
 
 
-cdef void lane_send(lane_t *lane, const cat_link *link) noexcept nogil:
-    """Send at most four frames and a quarter of the period's wire time (one frame in any case)."""
+cdef inline int64_t wire_time(uint32_t length) noexcept nogil:
+    """Return how long a frame holds a cable of 100 Mbit/s, as wire/frame.py does."""
+    return <int64_t>(max(length, CAT_FRAME_MIN) + FRAME_OVERHEAD) * NS_PER_BYTE
+
+
+cdef void lane_send(lane_t *lane, const cat_link *link, int64_t passed) noexcept nogil:
+    """Send at most four frames that fit into the wire time left; the first one in any case.
+    `passed` [ns] since the cycle start."""
     cdef const cat_packet *packet
-    cdef uint32_t count, bytes = 0
+    cdef int64_t left = lane.wire_time - passed
+    cdef uint32_t count
     lane.under_way = 0
     for count in range(FRAMES_PER_CYCLE):
         packet = cat_ring_peek(lane.out)
-        if packet == NULL or (count > 0 and bytes + packet.length > lane.bytes_per_cycle):
+        if packet == NULL:
             return
-        bytes += packet.length
+        left -= wire_time(packet.length)
+        if count > 0 and left < 0:
+            return
         if link.send(link.self, packet.bytes, packet.length) < 0:
             lane.dropped += 1
         else:
@@ -74,11 +86,14 @@ cdef void lane_received(lane_t *lane, const uint8_t *bytes, uint32_t length,
 
 
 cdef class Lane:
-    def __cinit__(self, int64_t period_ns):
+    def __cinit__(self, int64_t wire_time_ns):
+        """`wire_time_ns`: of acyclic frames per cycle, at most."""
+        if wire_time_ns < 0:
+            raise ValueError(f"acyclic_ns: {wire_time_ns}")
         cdef size_t size = sizeof(cat_packet_ring)
         self.c.out = <cat_packet_ring *>memory_take(&self.memory, 1, size)
         self.c.back = <cat_packet_ring *>memory_take(&self.memory, 1, size)
-        self.c.bytes_per_cycle = <uint32_t>min(period_ns // (4 * NS_PER_BYTE), 1 << 20)
+        self.c.wire_time = wire_time_ns
 
     def push(self, bytes frame not None):
         if not CAT_FRAME_MIN <= len(frame) <= CAT_FRAME_MAX:

@@ -195,6 +195,8 @@ class CyclePlan:
     late_limit_torque_ns: int = 10_000_000  # CST
     handover_ns: int = 20_000_000  # CST keeps its torque for this long after a law or stream ended
     stop_deadline_ns: int = 2_000_000_000  # quick stop to standstill, at most
+    wire_ns: int = 0  # wire time of the cyclic frames in the busiest cycle
+    acyclic_ns: int = 0  # wire time per cycle for acyclic frames; one frame in any case
     busy_wait_ns: int = 0  # before each cycle start; costs as much processor time
     log_cycles: int = 1000  # how far the log reaches back
     cpu: int | None = None  # of the native thread

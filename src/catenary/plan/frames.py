@@ -11,7 +11,7 @@ cycle number, and 128 frames are possible.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from catenary.errors import ConfigurationError
@@ -21,7 +21,7 @@ from catenary.plan.layout import UnitLayout
 from catenary.plan.mailboxes import MailboxArea
 from catenary.wire.datagram import HEADER_SIZE as DATAGRAM_HEADER
 from catenary.wire.datagram import OVERHEAD, Command, Datagram
-from catenary.wire.frame import HEADER_SIZE, MAXIMUM_PAYLOAD, encode_frame
+from catenary.wire.frame import HEADER_SIZE, MAXIMUM_PAYLOAD, encode_frame, wire_time_ns
 from catenary.wire.register import (
     AL_STATUS,
     SYSTEM_TIME_DIFFERENCE,
@@ -33,6 +33,7 @@ CYCLE_NUMBER_SIZE = OVERHEAD + 4  # bytes of a datagram with a number of 32 bits
 FRAMES_PER_CYCLE_MAX = 32  # an index returns after four cycles at least
 EXACT_FRAMES_MAX = 128  # all indices, 0x00 to 0x7F
 FRAMES_MAX = 1024  # of all dividers and phases together
+ACYCLIC_GUARD = 0.1  # of the period: free of acyclic frames, so that the next cycle is not delayed
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,10 +100,40 @@ def make_frames(
 
 def frames_per_cycle(frames: Sequence[FramePlan]) -> int:
     """Return an upper bound of the frames sent in one cycle: for each divider its fullest phase."""
-    counts = Counter((frame.every, frame.phase) for frame in frames)
+    return _per_cycle(frames, lambda frame: 1)
+
+
+def cyclic_wire_time_ns(frames: Sequence[FramePlan]) -> int:
+    """Return the wire time of the frames of one cycle [ns], by the same upper bound."""
+    return _per_cycle(frames, lambda frame: wire_time_ns(len(frame.template)))
+
+
+def acyclic_wire_time_ns(cyclic_ns: int, period_ns: int) -> int:
+    """Return the wire time of one cycle that is left for acyclic frames [ns].
+
+    Args:
+        cyclic_ns: Wire time of the cyclic frames [ns].
+        period_ns: Period [ns].
+
+    Raises:
+        ConfigurationError: The cyclic frames alone do not fit into the period.
+    """
+    if cyclic_ns > period_ns:
+        raise ConfigurationError(
+            f"the cyclic frames take {cyclic_ns / 1e3:g} us at 100 Mbit/s, the period is "
+            f"{period_ns / 1e3:g} us",
+            hint="a longer period, fewer objects, or some devices less often (every=...)",
+        )
+    return max(period_ns - cyclic_ns - round(ACYCLIC_GUARD * period_ns), 0)
+
+
+def _per_cycle(frames: Sequence[FramePlan], weight: Callable[[FramePlan], int]) -> int:
+    sums: Counter[tuple[int, int]] = Counter()
+    for frame in frames:
+        sums[frame.every, frame.phase] += weight(frame)
     fullest: dict[int, int] = {}
-    for (every, _), count in counts.items():
-        fullest[every] = max(fullest.get(every, 0), count)
+    for (every, _), total in sums.items():
+        fullest[every] = max(fullest.get(every, 0), total)
     return sum(fullest.values())
 
 

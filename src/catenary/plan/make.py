@@ -10,7 +10,7 @@ from catenary.errors import ConfigurationError
 from catenary.model.device import DeviceDescription, Direction
 from catenary.plan.clocks import BURST, SyncPlan, choose_clocks, make_clock_plan, make_sync
 from catenary.plan.cycle import CyclePlan, FollowedClock, Order, ReceiveMode, SyncUnit
-from catenary.plan.frames import make_frames
+from catenary.plan.frames import acyclic_wire_time_ns, cyclic_wire_time_ns, make_frames
 from catenary.plan.layout import EXACT_UNIT_MAX, UNIT_MAX, DeviceData, Layout, make_layout
 from catenary.plan.mailboxes import MailboxArea, with_mailboxes
 from catenary.plan.mapping import Mapping, make_mapping
@@ -86,7 +86,8 @@ def make_plan(
         exact_matching: every frame carries the cycle number (plan/frames.py).
 
     Raises:
-        ConfigurationError: an object cannot be mapped, or a wish contradicts another.
+        ConfigurationError: an object cannot be mapped, a wish contradicts another, or the frames do
+            not fit into the period.
     """
     period_ns = round(period * 1e9)
     if period_ns <= 0:
@@ -109,6 +110,8 @@ def make_plan(
     frames = make_frames(
         layout.units, len(devices), choice, mailboxes, exact_matching=exact_matching
     )
+    wire_ns = cyclic_wire_time_ns(frames)
+    acyclic_ns = acyclic_wire_time_ns(wire_ns, period_ns)
     tables = tuple(wish.tables(layout) for wish in wishes)
     _check_times(tables, late_limit_torque, handover)
     cycle = CyclePlan(
@@ -133,6 +136,8 @@ def make_plan(
         late_limit_torque_ns=round(late_limit_torque * 1e9),
         handover_ns=round(handover * 1e9),
         stop_deadline_ns=round(stop_deadline * 1e9),
+        wire_ns=wire_ns,
+        acyclic_ns=acyclic_ns,
         busy_wait_ns=round(busy_wait * 1e9),
         log_cycles=log,
         cpu=cpu,

@@ -9,6 +9,7 @@ from catenary.model.device import Assignment, Direction
 from catenary.plan.axis_report import AxisReport
 from catenary.plan.clocks import SyncPlan
 from catenary.plan.cycle import ClockPlan, CyclePlan, DatagramKind, DatagramPlan, FramePlan
+from catenary.plan.frames import ACYCLIC_GUARD
 from catenary.plan.layout import Layout
 from catenary.plan.numbers import entry_places
 from catenary.plan.start_up import DevicePlan
@@ -134,12 +135,22 @@ def _entries(direction: Direction, assignments: Sequence[Assignment], offset: in
 
 
 def _frames(cycle: CyclePlan) -> Iterator[str]:
+    yield _wire_time(cycle)
     yield from _exact_matching(cycle.frames)
     for number, frame in enumerate(cycle.frames):
         when = f", every {frame.every} cycles" if frame.every > 1 else ""
         yield f"frame {number}: {len(frame.template)} bytes{when}"
         for datagram in frame.datagrams:
             yield f"    {_datagram(datagram)}"
+
+
+def _wire_time(cycle: CyclePlan) -> str:
+    """The use of the wire in the busiest cycle."""
+    acyclic = f"up to {cycle.acyclic_ns / 1e3:g} us" if cycle.acyclic_ns else "one frame"
+    return (
+        f"wire time: {cycle.wire_ns / 1e3:g} us of {cycle.period_ns / 1e3:g} us for cyclic frames, "
+        f"{acyclic} for acyclic frames, {ACYCLIC_GUARD:.0%} of the period free"
+    )
 
 
 def _exact_matching(frames: Sequence[FramePlan]) -> Iterator[str]:
