@@ -163,7 +163,7 @@ cdef class Axes:
 cdef void axes_read(axes_t *x, actual_t *out, uint64_t number, int64_t instant) noexcept nogil
 cdef void axes_write(axes_t *x, const target_t *target, bint fresh, uint64_t number) noexcept nogil
 cdef void axes_hand_over(axes_t *x) noexcept nogil
-cdef void axes_apply_late(axes_t *x, const target_t *target, bint fresh) noexcept nogil
+cdef bint axes_apply_late(axes_t *x, const target_t *target, bint fresh) noexcept nogil
 cdef void axes_tell(axes_t *x, actual_t *out) noexcept nogil
 cdef void axes_follow(const axes_t *x, const actual_t *actual, target_t *target) noexcept nogil
 cdef void axes_follow_now(const axes_t *x, target_t *target) noexcept nogil

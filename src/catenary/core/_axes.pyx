@@ -312,18 +312,18 @@ cdef inline bint removes_power(const target_t *target, uint32_t i) noexcept nogi
     return target.goal[i] != ENABLED and target.goal[i] != RESET
 
 
-cdef void axes_apply_late(axes_t *x, const target_t *target, bint fresh) noexcept nogil:
+cdef bint axes_apply_late(axes_t *x, const target_t *target, bint fresh) noexcept nogil:
     """Apply late stop requests to outputs that a law has computed: stops and, where orders are
     fresh, requested states that remove power, and control bits of axes that work. What gives power
-    or resets waits for the next write, set-points and all."""
+    or resets waits for the next write, set-points and all. Return True if outputs may differ."""
     cdef axis_t *a
     cdef uint32_t i
     if apply_stop(x):
         for i in range(x.axis_count):
             lead_axis(x, &x.axes[i], target.controlword_bits[i])
-        return
+        return True
     if not fresh:
-        return
+        return False
     for i in range(x.axis_count):
         a = &x.axes[i]
         if target.request[i] != a.request and removes_power(target, i):
@@ -331,6 +331,7 @@ cdef void axes_apply_late(axes_t *x, const target_t *target, bint fresh) noexcep
             lead_axis(x, a, target.controlword_bits[i])
         elif guard_works(a):
             lead_axis(x, a, target.controlword_bits[i])
+    return True
 
 
 cdef inline void follow(target_t *target, uint32_t i, bint followed, uint64_t since,

@@ -474,6 +474,8 @@ cdef void compute_next(cycle_t *c, actual_t *actual, target_t *target) noexcept 
     """The law's part of a cycle: one step, and the outputs of the next cycle."""
     cdef bint fresh = step_law(c, actual, target)
     axes_write(c.axes, target, fresh, c.number + 1)
+    if c.image.fill != NULL:
+        c.image.fill(c.image.self)
     c.computed = 1
     if c.law != NULL:
         law_tell(c.law)
@@ -538,7 +540,8 @@ cdef void cycle_native(cycle_t *c) noexcept nogil:
         target = &c.handover.target[OF_LAW]
         if fresh:
             take_orders(c, committed)
-        axes_apply_late(c.axes, target, fresh)
+        if axes_apply_late(c.axes, target, fresh) and c.image.fill != NULL:
+            c.image.fill(c.image.self)
         c.computed = 0
         c.kept = fresh and c.law == NULL  # set-points after the end of the law
     else:

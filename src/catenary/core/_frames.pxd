@@ -108,6 +108,7 @@ cdef struct frames_t:
     uint8_t judged             # once at least
     uint8_t collected          # judged with all frames back: nothing more can come
     # for longer
+    uint8_t filled             # the templates have the outputs of the next emit
     uint8_t settled            # the last judgement found every datagram of all frames right
     uint32_t next_index
     sent_t sent[128]           # by index

@@ -105,17 +105,31 @@ cdef inline uint32_t number_in(const frame_t *frame, const uint8_t *bytes) noexc
 
 # ---- emit
 
-cdef inline void fill(frames_t *f, frame_t *frame) noexcept nogil:
-    """Write index, cycle number and outputs into the template of a frame."""
+cdef inline void fill_outputs(frames_t *f, frame_t *frame) noexcept nogil:
+    """Write the outputs into the template of a frame."""
     cdef datagram_t *d
     cdef copy_t *copy
     cdef uint32_t k, m
     for k in range(frame.first_datagram, frame.first_datagram + frame.datagram_count):
         d = &f.datagrams[k]
-        frame.template[d.offset + 1] = frame.index
         for m in range(d.first_output, d.first_output + d.output_count):
             copy = &f.copies[m]
             memcpy(frame.template + copy.frame_offset, f.outputs + copy.image_offset, copy.size)
+
+
+cdef void frames_fill(void *self) noexcept nogil:
+    cdef frames_t *f = <frames_t *>self
+    cdef uint32_t i
+    for i in range(f.frame_count):
+        fill_outputs(f, &f.frames[i])
+    f.filled = 1
+
+
+cdef inline void stamp(frames_t *f, frame_t *frame) noexcept nogil:
+    """Write index and cycle number into the template of a frame."""
+    cdef uint32_t k
+    for k in range(frame.first_datagram, frame.first_datagram + frame.datagram_count):
+        frame.template[f.datagrams[k].offset + 1] = frame.index
     if frame.number_offset:
         memcpy(frame.template + frame.number_offset, &f.serial, NUMBER_SIZE)
 
@@ -151,12 +165,15 @@ cdef int frames_emit(void *self) noexcept nogil:
         f.missing += 1
         f.missing_needed += frame.needed
         give_index(f, i)
-        fill(f, frame)
+        stamp(f, frame)
+        if not f.filled:
+            fill_outputs(f, frame)
         rc = f.link.send(f.link.self, frame.template, frame.length)
         if rc < 0:
             f.counters.send_errors += 1
             if first_error == 0:
                 first_error = rc
+    f.filled = 0
     forget_returns(f)
     return first_error
 
@@ -422,9 +439,10 @@ cdef int frames_collect(void *self, int64_t deadline) noexcept nogil:
 
 
 cdef void frames_flush(frames_t *f) noexcept nogil:
-    """Drop what arrived before the first cycle."""
+    """Drop what arrived, and what was filled, before the first cycle."""
     cdef const uint8_t *bytes
     cdef int k
+    f.filled = 0
     for k in range(4 * DRAIN_MAX):
         if f.link.receive(f.link.self, &bytes) <= 0:
             return
@@ -660,6 +678,7 @@ cdef class Frames:
         self.c.image.emit = frames_emit
         self.c.image.collect = frames_collect
         self.c.image.drain = frames_drain
+        self.c.image.fill = frames_fill
 
     def __dealloc__(self):
         cat_memory_free(&self.memory)

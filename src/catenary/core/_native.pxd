@@ -87,6 +87,7 @@ cdef extern from "image.h" nogil:
         int (*emit)(void *self) noexcept nogil
         int (*collect)(void *self, int64_t deadline) noexcept nogil
         void (*drain)(void *self) noexcept nogil
+        void (*fill)(void *self) noexcept nogil
 
 
 cdef extern from "packet_ring.h" nogil:

@@ -240,6 +240,7 @@ static int igh_exchange_open(igh_exchange *x, uint32_t units, uint32_t copies, u
     x->image.emit = igh_emit;
     x->image.collect = igh_collect;
     x->image.drain = igh_drain;
+    x->image.fill = NULL;
     return 0;
 }
 

@@ -44,6 +44,10 @@ typedef struct cat_image {
 
     /* Takes what has arrived, between two cycles: judges nothing, waits for nothing. */
     void (*drain)(void *self);
+
+    /* Copies the output image into the frames of the next emit, which then need not do it; NULL: not
+     * offered. To be called again after each later change of the output image before that emit. */
+    void (*fill)(void *self);
 } cat_image;
 
 #endif
