@@ -96,7 +96,7 @@ cdef struct cycle_t:
     uint64_t begun             # wake-ups since the start: the first has no period
     record_t *records
     uint64_t records_mask      # number of records less one; a power of two less one
-    histogram_t *histograms    # PHASES of them
+    histogram_t *histograms    # PHASES of them; exchanged by Python (acquire, release)
 
 cdef void cycle_start(cycle_t *c, int64_t origin) noexcept nogil
 cdef int cycle_wait(cycle_t *c) noexcept nogil

@@ -79,6 +79,7 @@ from catenary.core._law cimport (
 )
 from catenary.core._native cimport (
     cat_add32,
+    cat_load_acquire_pointer,
     cat_or32,
     cat_pointer_claim,
     cat_pointer_is_offered,
@@ -351,7 +352,7 @@ cdef void post_process(cycle_t *c, int64_t since, const actual_t *actual,
                        const target_t *target) noexcept nogil:
     """Acyclic frames; then the figures of the cycle, and the sink."""
     cdef record_t *record
-    cdef histogram_t *h = c.histograms
+    cdef histogram_t *h = <histogram_t *>cat_load_acquire_pointer(<void **>&c.histograms)
     cdef int64_t took
     lane_send(c.lane, c.link, since - c.scheduled)
     if c.number == 0:

@@ -16,7 +16,7 @@ from catenary.core._histogram cimport (
     histogram_t,
 )
 from catenary.core._memory cimport cat_memory_free, memory_take
-from catenary.core._native cimport cat_fence
+from catenary.core._native cimport cat_fence, cat_store_release_pointer
 
 
 cdef class Figures:
@@ -60,12 +60,12 @@ cdef class Figures:
         return histogram_counts(&self.cycle.histograms[<int>PHASE_NAMES[phase]])
 
     cdef void reset(self) noexcept:
+        """Exchange the histograms: the native thread may be adding to the old ones at this moment."""
         cdef histogram_t *old = self.cycle.histograms
         cdef int phase
         for phase in range(PHASES):
             histogram_reset(&self.spare[phase])
-        cat_fence()
-        self.cycle.histograms = self.spare
+        cat_store_release_pointer(<void **>&self.cycle.histograms, self.spare)
         self.spare = old
 
     def __dealloc__(self):

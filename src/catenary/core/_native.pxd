@@ -8,6 +8,8 @@ cdef extern from "atomics.h" nogil:
     uint32_t cat_load_relaxed32(const uint32_t *p)
     uint64_t cat_load_acquire64(const uint64_t *p)
     void cat_store_release64(uint64_t *p, uint64_t v)
+    void *cat_load_acquire_pointer(void **p)
+    void cat_store_release_pointer(void **p, void *v)
     void cat_store_release32(uint32_t *p, uint32_t v)
     bint cat_change32(uint32_t *p, uint32_t before, uint32_t after)
     uint32_t cat_add32(uint32_t *p, uint32_t v)

@@ -12,6 +12,8 @@ static inline uint32_t cat_load_relaxed32(const uint32_t *p) { return __atomic_l
 static inline uint64_t cat_load_relaxed64(const uint64_t *p) { return __atomic_load_n(p, __ATOMIC_RELAXED); }
 static inline void cat_store_release32(uint32_t *p, uint32_t v) { __atomic_store_n(p, v, __ATOMIC_RELEASE); }
 static inline void cat_store_release64(uint64_t *p, uint64_t v) { __atomic_store_n(p, v, __ATOMIC_RELEASE); }
+static inline void *cat_load_acquire_pointer(void *const *p) { return __atomic_load_n(p, __ATOMIC_ACQUIRE); }
+static inline void cat_store_release_pointer(void **p, void *v) { __atomic_store_n(p, v, __ATOMIC_RELEASE); }
 static inline uint32_t cat_exchange32(uint32_t *p, uint32_t v) { return __atomic_exchange_n(p, v, __ATOMIC_ACQ_REL); }
 /* Whether *p was `from`; then it is `to`. */
 static inline int cat_change32(uint32_t *p, uint32_t from, uint32_t to) {
