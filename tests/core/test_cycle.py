@@ -1,5 +1,7 @@
 """The three orders, the instants, the figures. Virtual time throughout."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,14 +9,20 @@ from catenary.core import (
     CYCLE_LATE,
     CYCLE_OK,
     RECORD_FIELDS,
+    Cycle,
 )
+from catenary.plan.cycle import ClockPlan, DatagramKind
+from catenary.wire.datagram import Command, Datagram
 from catenary.wire.frame import decode_frame
 from tests.core.rig import (
     MS,
     PERIOD,
     Bench,
+    al_status,
     axis,
     bench,
+    frame_plan,
+    lrw,
     make_plan,
 )
 
@@ -91,15 +99,14 @@ def test_number_time_and_instants(order: str) -> None:
     assert b.engine.counters["cycles"] == 5
 
 
-@pytest.mark.parametrize("spent", [2.5, 3.0])
-def test_inline_skips_missed_instants_and_never_bursts(spent: float) -> None:
+@pytest.mark.parametrize(("spent", "skipped"), [(2.5, 2), (3.0, 3)])
+def test_inline_skips_missed_instants_and_never_bursts(spent: float, skipped: int) -> None:
     b = bench(axis(0), order="inline")
     b.steps(2)
     sent = len(b.link.sent)
     b.engine.spend(int(spent * PERIOD))
     flags = b.engine.next()
     assert flags & CYCLE_LATE
-    skipped = 2
     assert b.engine.skipped == skipped
     assert b.engine.counters["late"] == skipped
     assert b.engine.time_ns == (2 + skipped) * PERIOD
@@ -288,3 +295,159 @@ def test_frames_of_the_former_run_are_not_taken_for_new_ones() -> None:
     b.engine.run(1)
     assert b.engine.counters["stale"] == 1
     assert decode_frame(old).datagrams[0].index == 0
+
+
+# ---- overruns
+
+
+def oversleep(b: Bench, late: int) -> None:
+    """The next wait for a cycle start ends `late` [ns] after it; the ones after are punctual."""
+    wait = b.link.table_wait_until
+    left = [late]
+
+    def sleep(_, deadline, wake_on_frame) -> int:
+        result = wait(_, deadline, wake_on_frame)
+        if not wake_on_frame:
+            b.link.time += left.pop() if left else 0
+        return result
+
+    b.link.table.wait_until = type(b.link.table.wait_until)(sleep)
+
+
+@pytest.mark.parametrize("late", [300_000, 890_000])
+def test_a_late_cycle_is_sent_if_its_frames_are_back_before_the_next_cycle_start(late: int) -> None:
+    b = bench(axis(0))  # its frames take 100 us
+    b.engine.run(3)
+    sent = len(b.link.sent)
+    oversleep(b, late)
+    b.engine.run(2)
+    log = records(b)[-2:]
+    assert log["lateness_ns"].tolist() == [late, 0]
+    assert log["scheduled_ns"].tolist() == [4 * PERIOD, 5 * PERIOD]
+    assert log["missing_frames"].tolist() == [0, 0]
+    assert len(b.link.sent) == sent + 2
+    assert b.engine.counters["late"] == 0
+
+
+@pytest.mark.parametrize("late", [910_000, 999_000, 1_500_000])
+def test_a_late_cycle_whose_frames_would_be_late_is_skipped_and_counted(late: int) -> None:
+    b = bench(axis(0))
+    b.engine.run(3)
+    sent = len(b.link.sent)
+    oversleep(b, late)
+    b.engine.run(1)
+    assert b.engine.skipped == 1
+    assert b.engine.time_ns == 4 * PERIOD
+    assert len(b.link.sent) == sent + 1
+    assert b.engine.counters["late"] == 1
+    assert b.engine.counters["lost"] == 0
+    [record] = records(b)[-1:]
+    assert record["lateness_ns"] == max(late - PERIOD, 0)
+    assert record["flags"] & CYCLE_LATE
+
+
+@pytest.mark.parametrize(("body", "skipped"), [(400_000, 0), (1_300_000, 1), (1_600_000, 1)])
+def test_inline_a_body_into_the_next_period_skips_the_cycle_start_and_loses_no_frame(
+    body: int, skipped: int
+) -> None:
+    b = bench(axis(0), order="inline")
+    b.steps(3)
+    sent = len(b.link.sent)
+    b.engine.spend(body)
+    b.engine.next()
+    b.engine.next()
+    assert b.engine.counters["late"] == skipped
+    assert b.engine.counters["lost"] == 0
+    assert len(b.link.sent) == sent + 2
+
+
+# ---- with clocks
+
+CLOCK = ClockPlan(
+    follow="reference",
+    reference=0,
+    reference_station=0x1001,
+    followers=(),
+    stations=(),
+    phase_ns=700_000,
+    wire_ns=100_000,
+    allowance_ns=200_000,
+    bandwidth=0.01,
+    rate_limit_ns=1000.0,
+    drift_limit_ns=800.0,
+    step_ns=PERIOD // 8,
+    bound_ns=1000,
+)
+
+
+class DriftingReference(Trace):
+    """A drive with the reference clock, which is `PPM` faster than the link's clock."""
+
+    PPM = 150.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        process = self.segment.process
+
+        def with_time(datagram: Datagram) -> Datagram:
+            if datagram.command != Command.FRMW:
+                return process(datagram)
+            time = round(self.link.time * (1 + self.PPM * 1e-6)) + 123_456_789
+            data = (time & 0xFFFF_FFFF).to_bytes(4, "little")
+            return replace(datagram, data=data, working_counter=1)
+
+        self.segment.process = with_time  # type: ignore[method-assign]
+
+
+def clocked(order: str) -> DriftingReference:
+    time = Datagram(Command.FRMW, 0x1001 | 0x0910 << 16, bytes(4))
+    frame = frame_plan([al_status(1), lrw(0), (DatagramKind.CLOCK, time, 1, -1)])
+    return DriftingReference(make_plan([axis(0)], order=order, frames=(frame,), clock=CLOCK))
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_cycle_time_is_the_true_time_of_the_cycle_start(order: str) -> None:
+    """Cycle starts follow the reference clock: they are no multiples of the period."""
+    b = clocked(order)
+    b.engine.run(50)
+    cycle = Cycle(b.engine)
+    first = [deadline for kind, deadline in b.events if kind == "wait"][-1]
+    for _ in range(2000):
+        b.engine.next()
+        start = [deadline for kind, deadline in b.events[-3:] if kind == "wait"][-1]
+        assert cycle.time == pytest.approx((start - first) * 1e-9, abs=1e-9)
+    assert b.engine.clock.figures()["rate"] == pytest.approx(150e-6, rel=0.05)
+    assert abs(cycle.time - 2.0) > 100e-6
+
+
+def test_threaded_frames_later_than_the_margin_are_missed_syncs() -> None:
+    b = clocked("threaded")
+    b.engine.run(50)
+    before = b.engine.counters["missed_sync"]
+    oversleep(b, 199_000)
+    b.engine.run(2)
+    assert b.engine.counters["missed_sync"] == before
+    oversleep(b, 201_000)
+    b.engine.run(2)
+    assert b.engine.counters["missed_sync"] == before + 1
+    assert b.engine.counters["late"] == 0
+
+
+def test_inline_frames_later_than_the_margin_are_missed_syncs() -> None:
+    """They leave after the body: the wake-up alone does not tell."""
+    b = clocked("inline")
+    b.steps(50)
+    before = b.engine.counters["missed_sync"]
+    b.engine.spend(199_000)
+    b.engine.next()
+    assert b.engine.counters["missed_sync"] == before
+    b.engine.spend(201_000)
+    b.engine.next()
+    assert b.engine.counters["missed_sync"] == before + 1
+
+
+def test_without_clocks_there_is_no_missed_sync() -> None:
+    b = bench(axis(0))
+    oversleep(b, 900_000)
+    b.engine.run(5)
+    assert b.engine.counters["missed_sync"] == 0

@@ -456,3 +456,23 @@ def test_a_law_after_a_restart_is_given_up_in_its_new_thread(endless: ctypes.CDL
                 pass
             engine.stop()
             assert law.status == LAW_NEVER_RETURNED
+
+
+def test_a_late_cycle_that_leaves_the_law_no_time_is_skipped_instead_of_lost() -> None:
+    b = bench(axis(0))
+    b.enable()
+    b.engine.start_law(make_law(b, lambda frame: 0, budget_ns=400_000))
+    b.steps(5)
+    wait = b.link.table_wait_until
+    late = [600_000]  # the frames are back after 700 us, the law needs the last 450 us
+
+    def oversleep(_, deadline, wake_on_frame) -> int:
+        result = wait(_, deadline, wake_on_frame)
+        if not wake_on_frame:
+            b.link.time += late.pop() if late else 0
+        return result
+
+    b.link.table.wait_until = type(b.link.table.wait_until)(oversleep)
+    b.steps(3)
+    assert b.engine.counters["lost"] == 0
+    assert b.engine.counters["late"] == 1

@@ -91,7 +91,7 @@ cdef struct cycle_t:
     bint kept                  # a commit of the application waits for the end of a law
     uint64_t lost
     uint64_t late
-    uint64_t missed_sync       # frames that left later than sync_margin
+    uint64_t missed_sync       # cycles whose frames left later than sync_margin
     uint64_t uncommitted
     uint64_t begun             # wake-ups since the start: the first has no period
     record_t *records

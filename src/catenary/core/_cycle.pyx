@@ -15,8 +15,10 @@ sent in the cycle after its last step. Requests of the application that come mea
 later, except for stops, requested states that remove power, and control bits (`axes_apply_late`).
 
 In virtual time all modes run in the caller's thread. Cycle starts are origin + k·period. A cycle that
-begins late is sent if its frames can be back before the next cycle start (`turnaround`); otherwise it
-is skipped and counted, never made up for by a burst.
+begins late is sent if its frames can be back before the next cycle start (`turnaround`), with a law
+before its reserve; otherwise it is skipped and counted, never made up for by a burst. Inline, a body
+that ends after the next cycle start skips that one: its frames cannot be back yet. With clocks, frames
+that leave later than the margin before SYNC0 are sent and counted (`missed_sync`).
 
 Phases. receive: inputs usable, from the wake-up (inline) or from the last frame (threaded). process:
 the body of the application, or the law. send: wake-up → last cyclic frame handed to the kernel
@@ -168,14 +170,19 @@ cdef inline int32_t short_ns(int64_t value) noexcept nogil:
 # ---- cycle starts
 
 cdef bint skip_missed(cycle_t *c, int64_t present) noexcept nogil:
-    """Skip the cycles that cannot be collected before their next cycle start. Return True if the
-    one that is left lies ahead."""
+    """Skip the cycles that cannot be collected before their next cycle start, and inline the one
+    that would begin before its frames can be back. Return True if the one that is left lies ahead."""
     cdef int64_t late = present - c.next
+    cdef int64_t reserve = c.law_reserve if c.law != NULL else 0
     cdef int64_t missed
-    if late <= 0:
+    if late < 0:
         return False
     missed = late // c.period
-    if not c.patient and late - missed * c.period + c.turnaround >= c.period:
+    if not c.patient and late % c.period > 0 and (
+        late % c.period + c.turnaround + reserve >= c.period
+    ):
+        missed += 1
+    if not c.patient and c.outstanding and c.sent >= c.next + missed * c.period:
         missed += 1
     if missed == 0:
         return False
@@ -310,11 +317,11 @@ cdef void send(cycle_t *c) noexcept nogil:
     cdef record_t *record = record_of(c)
     if c.clock != NULL:
         c.clock.scheduled = c.scheduled
-        if c.wake - c.scheduled > c.sync_margin:
-            c.missed_sync += 1
     c.image.emit(c.image.self)
     c.outstanding = 1
     c.sent = now(c)
+    if c.clock != NULL and c.begun > 0 and c.sent - c.scheduled > c.sync_margin:
+        c.missed_sync += 1
     record.output_delay_ns = short_ns(c.sent - c.scheduled)
 
 
