@@ -96,7 +96,8 @@ class Engine:
         """Number of cycles so far: 1 for the first."""
     @property
     def time_ns(self) -> int:
-        """Its cycle start [ns], counted from the first one of `start`."""
+        """Cycle start [ns] since the first one of `start`, on the link's clock. A multiple of the
+        period, except where cycle starts follow the reference clock."""
     @property
     def flags(self) -> int: ...
     @property

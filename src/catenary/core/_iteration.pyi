@@ -12,12 +12,14 @@ class Cycle:
     def __init__(self, engine: Engine) -> None: ...
     @property
     def number(self) -> int:
-        """0 for the first cycle of the iteration. Skipped cycles leave gaps in `time` only."""
+        """Number of the cycle, 0 for the first of the iteration. Skipped cycle starts leave gaps in
+        `time` only."""
 
     @property
     def time(self) -> float:
-        """Cycle start [s] on the link's clock, counted from the first cycle of the iteration. It is not
-        an exact multiple of the period where the cycle follows a reference clock."""
+        """Cycle start [s] since that of the first cycle of the iteration, on the link's clock. A
+        multiple of the period, except where cycle starts follow the reference clock: then it is
+        the time that has passed."""
 
     @property
     def ok(self) -> bool:
