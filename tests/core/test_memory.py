@@ -6,10 +6,12 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from catenary.core import Engine
+from catenary.link import Recorder
 from catenary.virtual import Coupler, Segment
 from tests.core.rig import al_status, bench, frame_plan, make_plan
 
@@ -55,6 +57,18 @@ def test_the_native_thread_has_no_page_faults() -> None:
         engine = make_engine(link)
         run(engine, CYCLES)
     assert engine.counters["cycles"] >= CYCLES
+    assert engine.counters["page_faults"] == 0
+
+
+def test_the_native_thread_has_no_page_faults_while_a_recorder_copies_its_frames(
+    tmp_path: Path,
+) -> None:
+    segment = Segment([Coupler(), Coupler()], clock="monotonic")
+    with Recorder(segment, tmp_path / "frames.pcapng") as link:
+        run(make_engine(link), CYCLES)
+        engine = make_engine(link)
+        run(engine, CYCLES)
+        assert link.recorded >= 2 * CYCLES
     assert engine.counters["page_faults"] == 0
 
 

@@ -8,7 +8,6 @@ nothing is dropped.
 
 from libc.errno cimport EINTR, errno
 from libc.stdint cimport int64_t, uint8_t, uint16_t, uint32_t, uint64_t
-from libc.stdlib cimport free, malloc
 from libc.string cimport memcpy
 from posix.time cimport nanosleep, timespec
 from posix.unistd cimport write
@@ -27,6 +26,13 @@ cdef extern from "atomics.h" nogil:
     uint64_t cat_load_relaxed64(const uint64_t *p)
     void cat_store_release32(uint32_t *p, uint32_t v)
     void cat_store_release64(uint64_t *p, uint64_t v)
+
+cdef extern from "locked_memory.h" nogil:
+    ctypedef struct cat_memory:
+        pass
+    void *cat_memory_take(cat_memory *memory, size_t count, size_t size)
+    void cat_memory_touch(cat_memory *memory)
+    void cat_memory_free(cat_memory *memory)
 
 cdef extern from "<pthread.h>" nogil:
     ctypedef unsigned long pthread_t
@@ -183,12 +189,13 @@ cdef class Recorder(WrapperLink):
     frames the file lacks; closing warns of them.
     """
     cdef recorder_state recorder
+    cdef cat_memory memory                # the ring
     cdef pthread_t writer
     cdef bint writing
     cdef readonly str path
 
     def __init__(self, link, path):
-        self.recorder.ring = <uint8_t *> malloc(RING_BYTES)
+        self.recorder.ring = <uint8_t *> cat_memory_take(&self.memory, 1, RING_BYTES)
         if self.recorder.ring == NULL:
             raise MemoryError(f"{RING_BYTES} bytes for the recorder's ring")
         self.path = os.fspath(path)
@@ -212,6 +219,7 @@ cdef class Recorder(WrapperLink):
         self.recorder.inner = self.inner
         self.recorder.inline_writer = (self.inner.flags & CAT_LINK_VIRTUAL_TIME) != 0
         if not self.recorder.inline_writer:
+            cat_memory_touch(&self.memory)  # not locked: the cycle's own memory comes first
             self.recorder.stamp_offset = time.time_ns() - self.inner.now(self.inner.self)
             self.start_writer()
         return 0
@@ -277,4 +285,4 @@ cdef class Recorder(WrapperLink):
         if self.writing:
             cat_store_release32(&self.recorder.stop, 1)
             pthread_join(self.writer, NULL)
-        free(self.recorder.ring)
+        cat_memory_free(&self.memory)

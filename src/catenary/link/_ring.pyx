@@ -11,7 +11,6 @@ and 2 system calls to send.
 
 from libc.errno cimport EINTR, EMSGSIZE, errno
 from libc.stdint cimport int64_t, uint8_t, uint32_t, uint64_t
-from libc.stdlib cimport calloc, free
 from libc.string cimport memcmp, memcpy
 from posix.time cimport timespec
 
@@ -28,6 +27,13 @@ from catenary.link._table cimport (
 
 from catenary.link.protocol import open_link
 from catenary.link.ring_state import ROUTES, RingState
+
+cdef extern from "locked_memory.h" nogil:
+    ctypedef struct cat_memory:
+        pass
+    void *cat_memory_take(cat_memory *memory, size_t count, size_t size)
+    void cat_memory_settle(cat_memory *memory)
+    void cat_memory_free(cat_memory *memory)
 
 cdef extern from "ring_merge.h" nogil:
     int cat_ring_merge(uint8_t *frame, uint32_t length, const uint8_t *other, uint32_t other_length)
@@ -340,19 +346,22 @@ cdef class RingLink(TableLink):
     """Owns the two links of a ring: closing closes both. `pair_wait` [s]: how long one copy of a
     frame waits for the other."""
     cdef ring_t ring
+    cdef cat_memory memory            # the slots
     cdef readonly tuple links
     cdef tuple capsules
 
     def __init__(self, first, second, double pair_wait=100e-6):
         if not 0 <= pair_wait <= 1:
             raise ValueError(f"pair_wait={pair_wait} s: from 0 to 1 s")
-        self.ring.slots = <slot_t *> calloc(SLOTS, sizeof(slot_t))
+        self.ring.slots = <slot_t *> cat_memory_take(&self.memory, SLOTS, sizeof(slot_t))
         if self.ring.slots == NULL:
             raise MemoryError
         self.open_both(first, second)
         self.ring.route = BOTH
         self.ring.pair_wait = round(pair_wait * 1e9)
         self.ring.arrived_on[0] = self.ring.arrived_on[1] = BOTH
+        if not self.ring.links[0].flags & CAT_LINK_VIRTUAL_TIME:
+            cat_memory_settle(&self.memory)
         self.table.self = &self.ring
         self.table.flags = self.ring.links[0].flags & (CAT_LINK_VIRTUAL_TIME | CAT_LINK_SHARED_TIME)
         self.table.send = ring_send
@@ -425,7 +434,7 @@ cdef class RingLink(TableLink):
         return 0
 
     def __dealloc__(self):
-        free(self.ring.slots)
+        cat_memory_free(&self.memory)
 
 
 def merge(bytes first not None, bytes second not None):

@@ -2,6 +2,7 @@
  *
  * cat_memory_take    return a zeroed part that begins at a cache line
  * cat_memory_settle  touch every page, then lock it (real time only, before the cycle uses it)
+ * cat_memory_touch   touch every page only: for memory that must not use up the limit first
  * cat_memory_free    give everything back; the kernel unlocks what is unmapped
  *
  * A memory is a list of chunks. A chunk is a mapping of whole pages: this header, then parts one after
@@ -102,6 +103,14 @@ static inline void cat_memory_settle(cat_memory *memory) {
         cat_touch(chunk, chunk->size);
         chunk->error = mlock(chunk, chunk->size) ? errno : 0;
         chunk->state = chunk->error ? CAT_MEMORY_TOUCHED : CAT_MEMORY_LOCKED;
+    }
+}
+
+static inline void cat_memory_touch(cat_memory *memory) {
+    for (cat_chunk *chunk = memory->chunks; chunk; chunk = chunk->next) {
+        if (chunk->state != CAT_MEMORY_RESERVED) continue;
+        cat_touch(chunk, chunk->size);
+        chunk->state = CAT_MEMORY_TOUCHED;
     }
 }
 
