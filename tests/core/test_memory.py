@@ -72,6 +72,11 @@ def test_the_native_thread_has_no_page_faults_while_a_recorder_copies_its_frames
     assert engine.counters["page_faults"] == 0
 
 
+no_mlock = pytest.mark.skipif(
+    os.environ.get("CATENARY_SANITIZED") == "address", reason="AddressSanitizer makes mlock a no-op"
+)
+
+
 def scheduling_with_limit(limit: int) -> str:
     command = [sys.executable, "-c", LIMITED, str(limit)]
     path = os.pathsep.join(filter(None, sys.path))
@@ -80,11 +85,13 @@ def scheduling_with_limit(limit: int) -> str:
     return done.stdout.strip()
 
 
+@no_mlock
 def test_the_cycle_is_locked_first_and_the_log_is_touched_only() -> None:
     text = scheduling_with_limit(4 * 1024 * 1024)
     assert " MB locked, 10 MB touched only (ENOMEM, RLIMIT_MEMLOCK 4 MB: raise `ulimit -l`" in text
 
 
+@no_mlock
 def test_no_right_to_lock_is_no_error() -> None:
     text = scheduling_with_limit(0)
     assert ", 0 kB locked, " in text
