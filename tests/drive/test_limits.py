@@ -44,7 +44,9 @@ def test_a_velocity_limit_given_does_not_warn() -> None:
 
 @pytest.mark.parametrize("options", [{"mode": "csv"}, {"mode": "cst"}, {"other_modes": ["cst"]}])
 def test_csv_and_cst_require_a_velocity_limit(options: dict[str, object]) -> None:
-    with pytest.raises(ValueError, match=r"3 Servo: CS[VT] need velocity_limit= .*math\.inf"):
+    with pytest.raises(
+        ValueError, match=r"3 Servo: velocity_limit= .*required in CS[VT].*math\.inf"
+    ):
         Drives([fake_sub(3)], counts_per_turn=1, **options)  # type: ignore[arg-type]
 
 

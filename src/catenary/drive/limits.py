@@ -56,8 +56,8 @@ class LimitOptions:
         unlimited = [mode.name for mode in modes if mode in (Mode.CSV, Mode.CST)]
         if self.velocity_limit is None and unlimited:
             raise ValueError(
-                f"{name}: {' and '.join(unlimited)} need velocity_limit= [rad/s] at the joint; "
-                "write Drives(velocity_limit=...), or math.inf for none"
+                f"{name}: velocity_limit= [rad/s] at the joint is required in "
+                f"{' and '.join(unlimited)}; write Drives(velocity_limit=...), or math.inf for none"
             )
         if self.velocity_limit == math.inf and Mode.CSP in modes and self.step_limit is None:
             raise ValueError(

@@ -53,7 +53,14 @@ def stopped_error(
         cycle: The plan, for its times.
         log: The last cycles, oldest first.
     """
-    told = "; ".join(stop.message + _details(stop, cycle, log) for stop in stops)
+    alike: dict[str, list[str]] = {}
+    for stop in stops:
+        what = f"stopped in cycle {stop.cycle}: {stop.reason.text}{_details(stop, cycle, log)}"
+        alike.setdefault(what, []).append(stop.name)
+    told = "; ".join(
+        f"{', '.join(names)} {'was' if len(names) == 1 else 'were'} {what}"
+        for what, names in alike.items()
+    )
     reasons = dict.fromkeys(stop.reason for stop in stops)
     advice = "; ".join(ADVICE[reason] for reason in reasons if reason in ADVICE)
     return DriveError(told, log=log, hint=f"{advice}; {GO_ON}")
