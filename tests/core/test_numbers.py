@@ -157,5 +157,6 @@ def test_bits(bits: int) -> None:
 )
 def test_impossible_numbers_name_the_column(number: Number, bank: Bank, message: str) -> None:
     plan = replace(make_plan([], units=1), input_columns=column(number, bank))
+    echo = Echo(make_plan([], units=1))
     with pytest.raises(ValueError, match=f"column x.*{message}"):
-        Engine(plan, Echo(make_plan([], units=1)).link.capsule)
+        Engine(plan, echo.link.capsule)
