@@ -501,3 +501,35 @@ def test_reasons_of_faults_and_of_drives_that_leave_by_themselves() -> None:
         b.drives[0].after = lambda before, state=state: state  # type: ignore[method-assign]
         b.steps(2)
         assert b.stop_reason[0] == reason
+
+
+# ---- the ends of streams
+
+
+def test_a_closed_stream_of_positions_is_not_continued() -> None:
+    b = working(CSP, deceleration=100.0)
+    stream = Stream(1, 100)
+    b.engine.set_stream(stream)
+    rows = np.zeros((20, 3))
+    rows[:, 0] = 0.002 * np.arange(1, 21)
+    stream.write(rows.tobytes(), b.engine.number)
+    b.steps(20)
+    b.engine.set_stream(None)
+    log = Recorder(b)
+    b.engine.spend(30 * MS)
+    assert log.positions[-1] - 40 <= 20  # 2 rad/s at 100 rad/s²
+
+
+def test_a_closed_stream_of_torques_is_a_hand_over() -> None:
+    b = working(CST)
+    stream = Stream(1, 100)
+    b.engine.set_stream(stream)
+    rows = np.zeros((20, 3))
+    rows[:, 2] = 0.5
+    stream.write(rows.tobytes(), b.engine.number)
+    b.steps(20)
+    b.engine.set_stream(None)
+    log = Recorder(b)
+    b.engine.spend(15 * MS)  # longer than the late limit
+    assert set(log.words) == {ENABLE}
+    assert set(log.torques) == {500}

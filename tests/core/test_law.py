@@ -476,3 +476,52 @@ def test_a_late_cycle_that_leaves_the_law_no_time_is_skipped_instead_of_lost() -
     b.steps(3)
     assert b.engine.counters["lost"] == 0
     assert b.engine.counters["late"] == 1
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_the_last_targets_of_a_law_are_sent_as_they_are(order: str) -> None:
+    """The torque slope shapes the return to the application's set-points only."""
+
+    def body(frame: Frame) -> int:
+        frame.target["torque"][0] = 0.8 if frame.time > 0.015 else 0.5
+        return frame.time > 0.015
+
+    b = bench(axis(0, mode=CST, torque_slope=10.0), order=order)
+    b.ask(GOAL_ENABLED)
+    b.engine.start_law(make_law(b, body))
+    b.steps(25)
+    assert b.drives[0].target_torque == 800
+
+
+@pytest.mark.parametrize("starts", [True, False])
+def test_a_waiting_call_of_an_inline_loop_keeps_the_axes_enabled(starts: bool) -> None:
+    """Its native cycles must not take the requests of an older commit over."""
+    b = bench(axis(0), order="inline")
+    b.enable()
+    b.steps(3)
+    if starts:
+        b.engine.start_law(make_law(b, lambda _: 0))
+    else:
+        b.engine.stop_law()
+    for _ in range(10):
+        b.engine.run(1)
+        assert b.drives[0].controlword == 0x0F
+
+
+def test_the_first_step_in_an_inline_loop_sees_an_estimated_velocity() -> None:
+    seen: list[float] = []
+
+    def body(frame: Frame) -> int:
+        seen.append(float(frame.actual["velocity"][0]))
+        frame.target["position"][0] += 0.002
+        return 0
+
+    b = bench(axis(0, actual_velocity=None), order="inline")
+    b.enable()
+    for _ in range(10):
+        b.target_position[0] += 0.002
+        b.engine.next()
+    b.target_position[0] += 0.002
+    b.engine.start_law(make_law(b, body))
+    b.steps(6)
+    assert seen == pytest.approx([2.0] * len(seen))

@@ -83,8 +83,12 @@ cdef inline void read_position(axis_t *a, const uint8_t *inputs, double elapsed)
             a.counts += (<int64_t>((raw - a.last_raw) << n.right)) >> n.right
         a.last_raw = raw
         a.position = <double>a.counts * n.scale + n.offset
-    if not a.actual_velocity.present:
-        a.velocity = (a.position - before) / elapsed if a.known else 0.0
+    if a.actual_velocity.present:
+        return
+    if not a.known:
+        a.velocity = 0.0
+    elif elapsed > 0:  # 0: the second collect of a cycle, when a law starts in an inline loop
+        a.velocity = (a.position - before) / elapsed
 
 
 cdef inline double demand_error(axis_t *a, const uint8_t *inputs) noexcept nogil:

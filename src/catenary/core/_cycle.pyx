@@ -327,11 +327,14 @@ cdef void send(cycle_t *c) noexcept nogil:
 
 cdef bint take_streamed(cycle_t *c, target_t *target, bint fresh, uint64_t number) noexcept nogil:
     """Take the next row of the stream for the outputs of cycle `number`. Return True for fresh
-    set-points; an empty stream is an underrun."""
+    set-points; an empty stream is an underrun, a closed one hands over."""
     cdef stream_t *stream
-    target.header.streamed = 0
     if not cat_pointer_is_offered(&c.stream):
+        if target.header.streamed and not fresh:
+            target.header.hold = 1
+        target.header.streamed = 0
         return fresh
+    target.header.streamed = 0
     stream = <stream_t *>cat_pointer_claim(&c.stream)
     if stream != NULL and stream_take(stream, target):
         target.header.hold = 0
@@ -340,6 +343,7 @@ cdef bint take_streamed(cycle_t *c, target_t *target, bint fresh, uint64_t numbe
         fresh = True
     elif stream != NULL and stream.taken > 0:
         target.header.hold = 0
+        target.header.streamed = 1
         c.axes.told |= DRY
         fresh = False
     cat_pointer_release(&c.stream)
@@ -400,13 +404,13 @@ cdef int64_t cycle_law_reserve(const cycle_t *c, int64_t budget) noexcept nogil:
 
 cdef void end_law(cycle_t *c, uint32_t status) noexcept nogil:
     """Hand over: what was committed before the law counts no longer. `status` RUNNING: the law has
-    ended itself."""
+    ended itself, its last targets are still to be sent."""
     if c.law == NULL:
         return
     c.handover.target[c.handover.target_triple.front].header.hold = 1
     c.handover.target[OF_LAW].header.hold = 1
-    axes_hand_over(c.axes)
     if status != RUNNING:
+        axes_hand_over(c.axes)
         law_end(c.law, status, c.number)
     forget_law(c)
 
@@ -487,6 +491,8 @@ cdef void compute_next(cycle_t *c, actual_t *actual, target_t *target) noexcept 
     c.computed = 1
     if c.law != NULL:
         law_tell(c.law)
+    else:
+        axes_hand_over(c.axes)
 
 
 # ---- execution modes

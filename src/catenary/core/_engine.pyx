@@ -524,8 +524,8 @@ cdef class Engine:
         cdef actual_t *actual = &self.h.actual[PRIVATE]
         cdef int64_t batch
         cdef uint32_t flags = actual.header.flags
+        self.commit(True)  # an inline loop runs native cycles around a law
         if self.e.cycle.order != INLINE:
-            self.commit(True)
             handover_swap(self.h)  # cycles are counted from the commit on
         while cycles > 0:
             batch = 1 if until_stopped else min(cycles, max(SIGNALS_NS // self.e.cycle.period, 1))
