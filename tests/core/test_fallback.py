@@ -1,5 +1,7 @@
 """Fallback, return, mode changes and stops of one axis: the rows of docs/safety.md, in the core."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,7 @@ from catenary.core import (
     GOAL_QUICK_STOP,
     Stream,
 )
-from catenary.plan.cycle import AxisLimits
+from catenary.plan.cycle import AxisLimits, SyncUnit
 from catenary.plan.stop_reason import StopReason
 from tests.core.rig import (
     COUNTS,
@@ -25,9 +27,12 @@ from tests.core.rig import (
     PERIOD,
     Bench,
     ScriptedDrive,
+    al_status,
     axis,
     bench,
     column,
+    frame_plan,
+    lrw,
     number,
 )
 
@@ -503,7 +508,186 @@ def test_reasons_of_faults_and_of_drives_that_leave_by_themselves() -> None:
         assert b.stop_reason[0] == reason
 
 
-# ---- the ends of streams
+# ---- stops: repeated, of lost devices, without a velocity
+
+
+@pytest.mark.parametrize("goal", [GOAL_QUICK_STOP, GOAL_DISABLED])
+@pytest.mark.parametrize("all_axes", [False, True])
+def test_a_stop_that_is_requested_in_every_cycle_still_ends(goal: int, all_axes: bool) -> None:
+    b = working(CST, drive=Stubborn())
+    for _ in range(100):
+        b.ask(goal)
+        if all_axes:
+            b.engine.quick_stop_all()
+        b.engine.next()
+    assert b.drives[0].controlword == DISABLE_VOLTAGE
+
+
+def test_a_lost_device_that_returns_under_power_gets_a_quick_stop_first() -> None:
+    b = working(CSP, drive=Stubborn())
+    b.segment.silent.add(0)
+    b.steps(200)
+    log = Recorder(b)
+    b.segment.silent.clear()
+    b.steps(80)
+    assert log.words[:40] == [QUICK_STOP] * 40
+    assert log.words[-1] == DISABLE_VOLTAGE
+
+
+@pytest.mark.parametrize("measured", [True, False])
+def test_quick_stop_active_ends_where_a_standstill_is_not_seen(measured: bool) -> None:
+    """The velocity is noise, or the drive has none."""
+    nothing = {"actual_velocity": None, "actual_position": None, "target_position": None}
+    b = working(CST, **({} if measured else nothing))
+    b.drives[0].stays_in_quick_stop = True
+    b.drives[0].velocity = 100
+    b.ask(GOAL_QUICK_STOP)
+    b.steps(1990)
+    assert b.drives[0].state == 5
+    b.steps(20)
+    assert b.drives[0].state == 1
+    b.ask(GOAL_ENABLED)
+    b.steps(10)
+    assert b.axis_flags[0] & 1
+
+
+@pytest.mark.parametrize("cycles_before", [0, 4])
+def test_a_stop_during_a_change_to_cst_keeps_the_torque_that_holds(cycles_before: int) -> None:
+    b, log = switching(CSP, CST)
+    if cycles_before:
+        b.steps(cycles_before)
+    b.drives[0].after = lambda before: OE  # type: ignore[method-assign]
+    b.ask(GOAL_QUICK_STOP)
+    b.steps(10)
+    stop = log.words.index(QUICK_STOP)
+    assert set(log.torques[stop:]) == {700}
+
+
+def test_csp_hold_does_not_lapse() -> None:
+    """A request to enable lapses after 10 s, a hold does not."""
+    b = working(CST, on_loss="csp_hold")
+    b.target_torque[0] = 0.5
+    b.engine.next()
+    log = Recorder(b)
+    b.engine.spend(11_000 * MS)
+    b.engine.next()
+    assert set(log.words) == {ENABLE}
+    assert b.stop_reason[0] == StopReason.UNDERRUN
+
+
+def test_refused_and_missing_set_points_count_together() -> None:
+    b = working(CST)
+    b.target_torque[0] = 0.5
+    b.steps(2)
+    log = Recorder(b)
+    for _ in range(5):
+        b.target_torque[0] = np.nan
+        b.engine.next()
+        b.engine.spend(2 * MS)
+    assert log.words.index(QUICK_STOP) == 9
+    assert b.stop_reason[0] in (StopReason.NONE, StopReason.REFUSED)
+
+
+# ---- modes: blind, by the drive itself, slow, again
+
+
+def test_a_drive_that_shows_cst_by_itself_gets_the_torque_that_holds() -> None:
+    b = working(CSP)
+    b.drives[0].torque = 700
+    b.drives[0].mode_shown = CST
+    log = Recorder(b)
+    b.steps(6)
+    assert set(log.torques[2:]) == {700}
+
+
+def test_a_powered_axis_without_any_torque_value_does_not_enter_cst() -> None:
+    b, log = switching(CSP, CST, actual_torque=None)
+    b.drives[0].mode_shown = None
+    flags = b.engine.next() | b.engine.next()
+    assert flags & CYCLE_DROPPED
+    assert b.axis_flags[0] & AXIS_MODE_REFUSED
+    assert set(log.modes) == {CSP}
+    b.ask(GOAL_DISABLED)
+    b.steps(5)
+    b.ask(GOAL_ENABLED)
+    b.steps(10)
+    assert log.modes[-1] == CST  # not powered, it may
+
+
+def test_a_refused_mode_is_tried_again_with_the_next_request() -> None:
+    b, log = switching(CSP, CST)
+    b.steps(110)
+    assert b.axis_flags[0] & AXIS_MODE_REFUSED
+    b.ask(GOAL_DISABLED)
+    b.steps(10)
+    b.drives[0].mode_shown = None
+    b.ask(GOAL_ENABLED)
+    b.steps(10)
+    assert log.modes[-1] == CST
+    assert not b.axis_flags[0] & AXIS_MODE_REFUSED
+
+
+def test_csp_is_entered_from_profile_position_at_the_actual_position() -> None:
+    b = working(1)
+    b.drives[0].moves = False
+    b.target_position[0] = 3.0  # bit 4 has not started it
+    b.steps(3)
+    b.engine.spend(2 * MS)
+    assert b.drives[0].target_position == 3000
+    b.mode_target[0] = CSP
+    log = Recorder(b)
+    b.steps(6)
+    assert {p for p, mode in zip(log.positions, log.modes, strict=True) if mode == CSP} == {0}
+
+
+class OneExchangeLater(ScriptedDrive):
+    """A drive that shows a new mode in the exchange after the one that requests it."""
+
+    def exchange(self, outputs: bytes) -> bytes:
+        self.mode_shown = self.mode
+        return super().exchange(outputs)
+
+
+@pytest.mark.parametrize(("first", "then", "every"), [(CSP, CSV, 60), (CST, CSP, 12)])
+def test_a_change_of_mode_has_time_for_some_exchanges_of_the_device(
+    first: int, then: int, every: int
+) -> None:
+    frames = (frame_plan([al_status(1)]), replace(frame_plan([lrw(0)]), every=every))
+    units = (SyncUnit("slow", (0,), every=every),)
+    b = bench(axis(0, mode=first), drives=[OneExchangeLater()], frames=frames, sync_units=units)
+    b.ask(GOAL_ENABLED)
+    b.steps(8 * every)
+    assert b.axis_flags[0] & 1
+    b.mode_target[0] = then
+    b.steps(5 * every)
+    assert b.axis_flags[0] & 1
+    assert not b.axis_flags[0] & AXIS_MODE_REFUSED
+    assert b.drives[0].mode == then
+
+
+def test_homing_does_not_judge_the_torque_set_point() -> None:
+    b = working(CSP)
+    b.mode_target[0] = 6
+    b.steps(4)
+    b.target_torque[0] = np.nan
+    b.steps(100)
+    assert b.axis_flags[0] & 1
+
+
+# ---- the brake, and the ends of laws and streams
+
+
+@pytest.mark.parametrize("late", range(8))
+def test_a_late_commit_does_not_open_the_brake_without_torque(late: int) -> None:
+    b = bench(axis(0, mode=CST), drives=[ScriptedDrive()])
+    log = Recorder(b)
+    b.ask(GOAL_ENABLED)
+    for k in range(12):
+        b.target_torque[0] = 0.5
+        if k == late:
+            b.engine.spend(1 * MS)
+        b.engine.next()
+    assert set(log.torques[log.words.index(ENABLE) :]) == {500}
 
 
 def test_a_closed_stream_of_positions_is_not_continued() -> None:

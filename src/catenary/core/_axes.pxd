@@ -89,8 +89,9 @@ cdef struct axis_t:
     uint32_t waiting_cycles    # powered, to be enabled, not followed
     uint32_t mute_cycles       # followed but for bit 12; stays at the limit
     uint32_t gap_cycles        # bit 12 was shown and is missing
-    uint32_t stop_cycles       # in OPERATION_ENABLED since the stop
-    uint32_t refused_cycles    # in a row, the target was refused
+    uint32_t stop_cycles       # powered since the stop
+    uint32_t late_cycles       # in a row without an accepted set-point, but for a hand-over
+    uint32_t refused_cycles    # of them, the target was refused
     uint32_t beyond_cycles     # in a row, outside a position limit and leaving
     # set-points: the last accepted one of CSP, and the way back to them
     double setpoint            # [rad]
@@ -146,12 +147,10 @@ cdef struct axes_t:
     uint32_t mute_limit
     uint32_t still_limit
     uint32_t beyond_limit
-    uint32_t uncommitted       # cycles in a row without new targets
     uint32_t handed_over       # cycles in a row of a hand-over
     uint32_t stop_asked        # counts; from any thread
     uint32_t stop_seen
     uint8_t running            # an application commits targets
-    uint8_t streamed           # the last fresh set-points were a row of a stream
     uint32_t told              # flags of the cycle that its axes set
     uint32_t moving
 

@@ -28,7 +28,7 @@ from catenary.core._guard cimport (
     guard_take_orders,
     guard_works,
 )
-from catenary.core._handover cimport DRY, LIMITED_SOME, REFUSED_SOME
+from catenary.core._handover cimport LIMITED_SOME, REFUSED_SOME
 from catenary.core._memory cimport cat_memory, cat_memory_free, memory_take
 from catenary.core._native cimport cat_load_acquire32
 from catenary.core._numbers cimport REAL as REAL_KIND
@@ -266,30 +266,19 @@ cdef void write_velocity_offsets(axes_t *x) noexcept nogil:
                          a.command_velocity if a.mode == CSP else 0.0)
 
 
-cdef inline bint is_stream_closed(const axes_t *x, const target_t *target, bint fresh) noexcept nogil:
-    """Return True from the end of a stream until the next commit: a hand-over. An empty stream
-    that is open is an underrun (DRY)."""
-    return x.streamed and not fresh and not target.header.streamed and not x.told & DRY
-
-
 cdef void axes_write(axes_t *x, const target_t *target, bint fresh, uint64_t number) noexcept nogil:
     """Write the committed targets, as far as they count, into the output image of cycle `number`.
     `fresh`: they were committed since the last cycle."""
     cdef axis_t *a
     cdef uint32_t i
     x.number = number
-    if target.header.hold or is_stream_closed(x, target, fresh):
+    if target.header.hold:
         x.running = 0
-        x.uncommitted = 0
         x.handed_over += 1
         fresh = False
     elif fresh:
         x.running = 1
-        x.uncommitted = 0
         x.handed_over = 0
-        x.streamed = target.header.streamed
-    else:
-        x.uncommitted += 1
     for i in range(x.axis_count):
         guard_orders(x, &x.axes[i], target, i)
     apply_stop(x)
@@ -441,10 +430,7 @@ cdef class Axes:
         cdef axis_t *a = &self.c.axes[self.c.axis_count]
         if plan.controlword is None or plan.statusword is None:
             raise ValueError(f"{name}: controlword and statusword must be mapped")
-        for size, where, number in (
-            (cycle.output_size, "controlword", plan.controlword),
-            (cycle.input_size, "statusword", plan.statusword),
-        ):
+        for where, number in (("controlword", plan.controlword), ("statusword", plan.statusword)):
             if number.bit_length != 16:
                 raise ValueError(f"{name}: {where} has {number.bit_length} bits, must be 16")
         if plan.target_position is not None and plan.actual_position is None:

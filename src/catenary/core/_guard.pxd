@@ -67,8 +67,8 @@ cdef uint16_t guard_lead(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil
 cdef void stop_axis(axes_t *x, axis_t *a, uint8_t reason) noexcept nogil
 cdef void lose_axis(axes_t *x, axis_t *a, uint8_t reason) noexcept nogil
 cdef uint16_t stop_command(axes_t *x, axis_t *a) noexcept nogil
-cdef void prepare_mode(axis_t *a, int8_t mode) noexcept nogil
-cdef void refuse_mode(axes_t *x, axis_t *a) noexcept nogil
+cdef void prepare_other_mode(axis_t *a) noexcept nogil
+cdef void refuse_mode(axes_t *x, axis_t *a, int8_t mode) noexcept nogil
 
 cdef inline bint shows_mode(const axis_t *a) noexcept nogil:
     return not a.mode_actual.present or a.mode_shown == a.mode

@@ -43,15 +43,21 @@ cdef enum:
 
 # ---- stops and requests
 
+cdef inline void begin_stop(axis_t *a) noexcept nogil:
+    """Start the sequence of a stop. A repeated request or a second reason does not restart it."""
+    a.stop_cycles = 0
+    a.followed_at_stop = a.tells and a.status & FOLLOWS_COMMAND != 0
+
+
 cdef void stop_axis(axes_t *x, axis_t *a, uint8_t reason) noexcept nogil:
     """Stop an axis for a reason; only a new request enables it again."""
-    if a.goal != DISABLED or a.holding:
+    if a.goal != DISABLED:
         a.flags |= DROPPED
         x.told |= DROPPED_SOME
         a.stop_reason = reason
         a.stop_cycle = x.number
-        a.stop_cycles = 0
-        a.followed_at_stop = a.tells and a.status & FOLLOWS_COMMAND != 0
+    if a.goal == ENABLED:
+        begin_stop(a)
     a.goal = DISABLED
     a.stopping = 1
     a.armed = 0
@@ -61,7 +67,7 @@ cdef void stop_axis(axes_t *x, axis_t *a, uint8_t reason) noexcept nogil:
 
 cdef void lose_axis(axes_t *x, axis_t *a, uint8_t reason) noexcept nogil:
     """Stop an axis whose set-points stay away, by its option `on_loss`."""
-    if a.on_loss != LOSS_CSP_HOLD or a.mode != CST or a.holding:
+    if a.on_loss != LOSS_CSP_HOLD or a.mode != CST or a.goal != ENABLED or a.holding:
         stop_axis(x, a, reason)
         return
     a.flags |= DROPPED
@@ -74,13 +80,23 @@ cdef void lose_axis(axes_t *x, axis_t *a, uint8_t reason) noexcept nogil:
     a.mode_wanted = CSP
 
 
-cdef void take_mode(axis_t *a, int8_t mode) noexcept nogil:
+cdef inline bint enters_without_torque(const axis_t *a, int8_t mode) noexcept nogil:
+    """Return True if a powered axis would enter torque control, and its load is not known."""
+    return (a.state == OPERATION_ENABLED and quantity_of(mode) == TORQUE
+            and quantity_of(a.mode) != TORQUE
+            and not a.torque_demand.present and not a.actual_torque.present)
+
+
+cdef void take_mode(axes_t *x, axis_t *a, int8_t mode) noexcept nogil:
     """Take a requested mode over. A powered axis keeps its mode until 0x6061 shows the new one."""
     if mode == a.mode_refused:
         return
     a.mode_refused = NO_MODE
     a.flags &= ~MODE_REFUSED
     if a.holding or mode == a.mode_wanted:
+        return
+    if enters_without_torque(a, mode):
+        refuse_mode(x, a, mode)
         return
     a.mode_wanted = mode
     a.waiting_cycles = 0
@@ -94,13 +110,14 @@ cdef void take_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noex
     cdef uint8_t goal
     if t.request[i] != a.request:
         a.request = t.request[i]
-        goal = t.goal[i]
+        goal = t.goal[i] if t.goal[i] <= RESET else DISABLED
+        if a.goal == ENABLED and goal != ENABLED:
+            begin_stop(a)
+        a.goal = goal
         a.clear_reset = a.state == FAULT
-        a.goal = goal if goal <= RESET else DISABLED
-        a.flags &= ~DROPPED
+        a.flags &= ~(DROPPED | MODE_REFUSED)
         a.stop_reason = STOP_NONE
-        a.stop_cycles = 0
-        a.followed_at_stop = a.tells and a.status & FOLLOWS_COMMAND != 0
+        a.mode_refused = NO_MODE
         a.stopping = 0
         a.holding = 0
         a.armed = 0
@@ -109,7 +126,7 @@ cdef void take_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noex
             a.followed = 0
         if a.lost:
             stop_axis(x, a, STOP_DEVICE_LOST)  # the request must not come true later
-    if a.goal == ENABLED and not a.followed:
+    if a.goal == ENABLED and not a.followed and not a.holding:
         if not t.header.hold:
             a.armed = 1
         if a.armed or quantity_of(a.mode) == POSITION:
@@ -121,7 +138,7 @@ cdef void take_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noex
 cdef void guard_take_orders(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nogil:
     """Take over what the application requests: mode of operation and state."""
     if t.mode[i] != a.mode_wanted or a.mode_refused != NO_MODE:
-        take_mode(a, t.mode[i])
+        take_mode(x, a, t.mode[i])
     take_request(x, a, t, i)
 
 
@@ -135,18 +152,24 @@ cdef void guard_stop(axes_t *x) noexcept nogil:
 cdef uint16_t stop_command(axes_t *x, axis_t *a) noexcept nogil:
     """Return the command for an axis in OPERATION_ENABLED that is to stop.
 
-    A drive that clears bit 12 is reacting: it has until the stop deadline for its ramp."""
+    A drive that clears bit 12 is reacting: it has until the stop deadline for its ramp. A lost device
+    may return within that time, still powered: its first frame must not cut the voltage."""
     cdef uint32_t patience = max(x.stop_patience, 4 * a.divider)
     cdef bint quick = a.goal == QUICK_STOP or (a.stopping and a.on_loss != LOSS_DISABLE)
     if quantity_of(a.mode) == TORQUE:
         patience = max(x.stop_patience_torque, 4 * a.divider)
+    if a.lost or (a.followed_at_stop and not a.status & FOLLOWS_COMMAND):
+        patience = max(patience, x.stop_limit)
     if a.stop_cycles <= patience:
-        return QUICK_STOP_COMMAND if quick else DISABLE_OPERATION
-    if a.followed_at_stop and not a.status & FOLLOWS_COMMAND and a.stop_cycles <= x.stop_limit:
         return QUICK_STOP_COMMAND if quick else DISABLE_OPERATION
     if a.stop_cycles <= patience + max(x.cut_patience, a.divider):
         return DISABLE_OPERATION
     return DISABLE_VOLTAGE
+
+
+cdef inline bint may_lose_voltage(const axes_t *x, const axis_t *a) noexcept nogil:
+    """QUICK_STOP_ACTIVE: True at rest, or after the stop deadline, as a velocity may be noise."""
+    return a.still_cycles >= x.still_limit or a.stop_cycles > x.stop_limit
 
 
 cdef uint16_t guard_lead(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil:
@@ -160,7 +183,7 @@ cdef uint16_t guard_lead(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil:
     if a.state == OPERATION_ENABLED and goal != ENABLED:
         command = stop_command(x, a)
     else:
-        if a.state == QUICK_STOP_ACTIVE and a.still_cycles < x.still_limit:
+        if a.state == QUICK_STOP_ACTIVE and not may_lose_voltage(x, a):
             goal = QUICK_STOP  # every way out disables, and the axis would coast
         command = cia402_command(a.state, goal, a.command)
     if a.clear_reset:
@@ -181,14 +204,23 @@ cdef inline double demanded_torque(const axis_t *a) noexcept nogil:
 
 
 cdef void prepare_mode(axis_t *a, int8_t mode) noexcept nogil:
-    """Set the targets with which a powered axis enters a mode without a jump."""
+    """Set the target with which a powered axis enters another mode without a jump."""
     cdef uint8_t quantity = quantity_of(mode)
+    if quantity == quantity_of(a.mode) and mode != CSP:
+        return  # the same target; that of profile position may be far away
     if quantity == POSITION:
         a.commanded_position = a.position
     elif quantity == VELOCITY:
         a.commanded_velocity = a.velocity if isfinite(a.velocity) else 0.0
     elif quantity == TORQUE:
         a.commanded_torque = demanded_torque(a)
+
+
+cdef void prepare_other_mode(axis_t *a) noexcept nogil:
+    """Set the target of the mode that a powered drive shows, or is to show, if it is not in force."""
+    cdef int8_t other = a.mode_wanted if a.mode_wanted != a.mode else a.mode_shown
+    if other != a.mode:
+        prepare_mode(a, other)
 
 
 cdef void begin_setpoints(axis_t *a) noexcept nogil:
@@ -202,6 +234,7 @@ cdef void begin_setpoints(axis_t *a) noexcept nogil:
     a.command_velocity = 0.0
     a.fallback_cycles = 0
     a.refused_cycles = 0
+    a.late_cycles = 0
     a.beyond_cycles = 0
     a.waiting_cycles = 0
     a.returning = 0
@@ -211,15 +244,14 @@ cdef void begin_setpoints(axis_t *a) noexcept nogil:
 
 cdef void enter_mode(axis_t *a) noexcept nogil:
     """0x6061 shows the requested mode: it is in force now."""
-    if quantity_of(a.mode) != quantity_of(a.mode_wanted):
-        prepare_mode(a, a.mode_wanted)
+    prepare_mode(a, a.mode_wanted)
     a.mode = a.mode_wanted
     begin_setpoints(a)
 
 
-cdef void refuse_mode(axes_t *x, axis_t *a) noexcept nogil:
-    """Restore the mode in force: the drive does not show the requested one."""
-    a.mode_refused = a.mode_wanted
+cdef void refuse_mode(axes_t *x, axis_t *a, int8_t mode) noexcept nogil:
+    """Restore the mode in force: the drive does not show the requested one, or must not enter it."""
+    a.mode_refused = mode
     a.mode_wanted = a.mode
     a.waiting_cycles = 0
     a.flags |= MODE_REFUSED
@@ -271,7 +303,7 @@ cdef void observe_requested_state(axes_t *x, axis_t *a, uint8_t state_before) no
     elif a.goal == QUICK_STOP:
         if a.state != OPERATION_ENABLED and a.state != QUICK_STOP_ACTIVE:
             a.goal = DISABLED
-        elif a.state == QUICK_STOP_ACTIVE and a.still_cycles >= x.still_limit:
+        elif a.state == QUICK_STOP_ACTIVE and may_lose_voltage(x, a):
             a.goal = DISABLED
     elif a.goal == RESET and a.state != FAULT:
         a.goal = DISABLED
@@ -285,7 +317,9 @@ cdef void guard_observe(axes_t *x, axis_t *a, uint8_t state_before,
             a.lost = 1
             stop_axis(x, a, STOP_DEVICE_LOST)
         return
-    a.lost = 0
+    if a.lost:
+        a.lost = 0
+        begin_stop(a)
     observe_requested_state(x, a, state_before)
     if a.state != OPERATION_ENABLED:
         a.mode = a.mode_wanted

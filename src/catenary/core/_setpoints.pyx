@@ -9,7 +9,7 @@ decide what is sent instead:
 - waiting: powered and to be enabled, but not followed: before bit 12 is shown, during a mode change,
   after bit 12 was lost (`waiting_cycles`);
 - hand-over (`x.handed_over`): a law or stream ended, or a call of ours waits;
-- underrun (`x.uncommitted`), or a refused set-point of this axis (`refused_cycles`);
+- underrun: no set-point was committed, or the one of this axis was refused (`late_cycles`);
 - stopping: another state was requested, or the core stopped the axis.
 
 In all of them CSP and CSV decelerate and hold, and CST keeps its torque; each is bounded in time
@@ -26,7 +26,7 @@ from libc.math cimport INFINITY, copysign, fabs, fmax, fmin, isfinite, sqrt
 from libc.stdint cimport uint8_t, uint32_t, uint64_t
 
 from catenary.core._axes cimport DROPPED, FALLBACK, LIMITED, MODE_REFUSED, REFUSED
-from catenary.core._cia402 cimport ENABLED, OPERATION_ENABLED, SWITCHED_ON
+from catenary.core._cia402 cimport ENABLED, OPERATION_ENABLED, QUICK_STOP_ACTIVE, SWITCHED_ON
 from catenary.core._guard cimport (
     CSP,
     DISABLE_VOLTAGE,
@@ -40,7 +40,7 @@ from catenary.core._guard cimport (
     TORQUE,
     VELOCITY,
     lose_axis,
-    prepare_mode,
+    prepare_other_mode,
     quantity_of,
     refuse_mode,
     shows_mode,
@@ -178,7 +178,9 @@ cdef void follow_position(axes_t *x, axis_t *a, const target_t *t, double target
         age = x.number - stamp if x.number > stamp else 0
     if a.mode != CSP:
         a.commanded_position = clamp(a, target, fmin(a.position_min, held), fmax(a.position_max, held))
+        a.ghost = a.commanded_position
         a.refused_cycles = 0
+        a.fallback_cycles = 0
         return
     if not is_accepted(x, a, target, between):
         fall_back(x, a, False)
@@ -271,12 +273,14 @@ cdef void limit_torque(axes_t *x, axis_t *a) noexcept nogil:
 cdef void follow(axes_t *x, axis_t *a, const target_t *t, uint32_t i, bint fresh) noexcept nogil:
     """Follow the set-point of this cycle, if there is one that counts; else fall back."""
     cdef uint8_t quantity = quantity_of(a.mode)
-    cdef double target = t.torque[i]
+    cdef double target = 0.0
     if quantity == POSITION:
         target = t.position[i]
         fresh = fresh and t.header.seen >= a.followed_since
     elif quantity == VELOCITY:
         target = t.velocity[i]
+    elif quantity == TORQUE:
+        target = t.torque[i]
     if not fresh or not is_number(a, target):
         fall_back(x, a, not x.handed_over and a.refused_cycles == 0)
     elif quantity == POSITION:
@@ -285,6 +289,8 @@ cdef void follow(axes_t *x, axis_t *a, const target_t *t, uint32_t i, bint fresh
         follow_velocity(x, a, target)
     elif quantity == TORQUE:
         follow_torque(x, a, target)
+    else:
+        a.fallback_cycles = 0
     if quantity == VELOCITY:
         limit_velocity(x, a)
     elif quantity == TORQUE:
@@ -295,7 +301,6 @@ cdef void judge_lateness(axes_t *x, axis_t *a) noexcept nogil:
     """Stop a followed axis whose set-points have stayed away for too long."""
     cdef uint8_t quantity = quantity_of(a.mode)
     cdef uint32_t limit = x.late_limit_position
-    cdef uint32_t late = max(x.uncommitted, a.refused_cycles)
     if quantity == VELOCITY:
         limit = x.late_limit_velocity
     elif quantity == TORQUE:
@@ -303,27 +308,34 @@ cdef void judge_lateness(axes_t *x, axis_t *a) noexcept nogil:
         if x.handed_over > x.handover_limit:
             lose_axis(x, a, STOP_HANDOVER)
             return
-    if limit > 0 and late >= limit:
-        lose_axis(x, a, STOP_REFUSED if a.refused_cycles >= limit else STOP_UNDERRUN)
+    if x.handed_over or not a.fallback_cycles:
+        a.late_cycles = 0
+        return
+    a.late_cycles += 1
+    if limit > 0 and a.late_cycles >= limit:
+        lose_axis(x, a, STOP_REFUSED if a.refused_cycles else STOP_UNDERRUN)
 
 
 # ---- what is sent
 
-cdef void rest(axes_t *x, axis_t *a, double torque, bint fresh) noexcept nogil:
-    """Not powered: target := actual. A committed torque is sent before the brake opens."""
+cdef void rest(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nogil:
+    """Not powered: target := actual. The torque committed last is sent before the brake opens."""
     a.commanded_position = a.position
     a.commanded_velocity = 0.0
     a.commanded_torque = 0.0
     a.command_velocity = 0.0
-    if (fresh and a.state == SWITCHED_ON and a.goal == ENABLED and a.armed
-            and quantity_of(a.mode) == TORQUE and isfinite(torque)):
-        a.commanded_torque = limited_torque(a, torque)
+    if a.state == QUICK_STOP_ACTIVE:
+        a.stop_cycles += 1
+    if (a.state == SWITCHED_ON and a.goal == ENABLED and a.armed and not t.header.hold
+            and quantity_of(a.mode) == TORQUE and isfinite(t.torque[i])):
+        a.commanded_torque = limited_torque(a, t.torque[i])
 
 
 cdef void stopping(axes_t *x, axis_t *a) noexcept nogil:
     """Powered, but to stop: decelerate; the last torque stays until the voltage is cut."""
     a.stop_cycles += 1
     fall_back(x, a, False)
+    prepare_other_mode(a)
     a.commanded_torque = limited_torque(a, a.commanded_torque)
     if stop_command(x, a) == DISABLE_VOLTAGE:
         a.commanded_torque = 0.0
@@ -332,19 +344,18 @@ cdef void stopping(axes_t *x, axis_t *a) noexcept nogil:
 cdef void wait_for_mode(axes_t *x, axis_t *a) noexcept nogil:
     """The drive shows another mode than the one requested: the mode in force hands over."""
     fall_back(x, a, False)
-    if quantity_of(a.mode) != quantity_of(a.mode_wanted):
-        prepare_mode(a, a.mode_wanted)
+    prepare_other_mode(a)
     if quantity_of(a.mode) == TORQUE:
         a.commanded_torque = limited_torque(a, a.commanded_torque)
-        if not a.holding and a.waiting_cycles > x.handover_limit:
+        if not a.holding and a.waiting_cycles > max(x.handover_limit, 4 * a.divider):
             lose_axis(x, a, STOP_MODE_CHANGE)
             return
-    if a.waiting_cycles < x.mode_limit:
+    if a.waiting_cycles < max(x.mode_limit, 4 * a.divider):
         return
     if a.holding or a.mode_wanted == a.mode:
         stop_axis(x, a, STOP_MODE_CHANGE)
     else:
-        refuse_mode(x, a)
+        refuse_mode(x, a, a.mode_wanted)
 
 
 cdef void wait_for_bit_12(axes_t *x, axis_t *a) noexcept nogil:
@@ -380,7 +391,7 @@ cdef void axis_setpoints(axes_t *x, axis_t *a, const target_t *t, uint32_t i,
     cdef uint8_t quantity = quantity_of(a.mode)
     a.flags &= DROPPED | MODE_REFUSED
     if a.state != OPERATION_ENABLED:
-        rest(x, a, t.torque[i], fresh)
+        rest(x, a, t, i)
         return
     if quantity != POSITION:
         a.commanded_position = a.position
