@@ -150,7 +150,6 @@ cdef struct axes_t:
     uint32_t handed_over       # cycles in a row of a hand-over
     uint32_t stop_asked        # counts; from any thread
     uint32_t stop_seen
-    uint8_t running            # an application commits targets
     uint32_t told              # flags of the cycle that its axes set
     uint32_t moving
 

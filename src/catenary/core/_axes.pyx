@@ -273,11 +273,9 @@ cdef void axes_write(axes_t *x, const target_t *target, bint fresh, uint64_t num
     cdef uint32_t i
     x.number = number
     if target.header.hold:
-        x.running = 0
         x.handed_over += 1
         fresh = False
     elif fresh:
-        x.running = 1
         x.handed_over = 0
     for i in range(x.axis_count):
         guard_orders(x, &x.axes[i], target, i)

@@ -524,7 +524,7 @@ cdef void write_committed(cycle_t *c, target_t *committed, bint fresh) noexcept 
         c.input_age = committed.header.input_age_ns
     fresh = take_streamed(c, committed, fresh, c.number)
     axes_write(c.axes, committed, fresh, c.number)
-    if not fresh and c.axes.running:
+    if not fresh and not c.axes.handed_over:
         c.flags |= UNCOMMITTED
         c.uncommitted += 1
 
