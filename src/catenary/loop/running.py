@@ -218,9 +218,8 @@ class Running:
     def refuse_powered_torque(self, call: str) -> None:
         """Raise LoopError for axes that are powered in CST: a waiting call commits no torque."""
         views = self.views
-        powered = (views.axis_state == DriveState.OPERATION_ENABLED) & (
-            views.mode_target == Mode.CST
-        )
+        in_torque = (views.mode_target == Mode.CST) | (views.mode_actual == Mode.CST)
+        powered = (views.axis_state == DriveState.OPERATION_ENABLED) & in_torque
         if not powered.any():
             return
         names = [self.plan.cycle.axes[i].name for i in np.flatnonzero(powered).tolist()]
