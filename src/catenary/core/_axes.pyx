@@ -1,9 +1,16 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
 """Axes and columns: between the bytes of the process images and arrays in SI units.
 
-An axis is a CiA 402 drive's slot; every quantity sits where the plan says, or nowhere. Position
-counters of any width are followed round to 64 bits. What may be sent is _guard's decision, how a
-drive is led to a state _cia402's. Budget: 60 ns an axis and direction.
+Theory of operation. An axis is a slot of a CiA 402 drive; each quantity has the place that the plan
+states, or none. `axes_read` runs after the inputs of a cycle: bytes → actual values, position counters
+of any width unwrapped to 64 bits (`counts`, `last_raw`), then _guard.pyx judges the axis. `axes_write`
+runs before the outputs: orders (_guard.pyx), set-points (_setpoints.pyx), controlword, bytes. A number
+is written only if it differs from what is in the image (`put_t`). `axes_apply_late` corrects outputs
+that a law has computed for a stop that came later. `axes_tell` reports the axes after the frames.
+`told` collects the flags of the cycle, `handed_over` counts the cycles of a hand-over, and
+`stop_asked` counts stop requests of any thread. _axes.pxd defines every word of an axis.
+
+Budget: 60 ns per axis and direction.
 """
 
 from libc.math cimport INFINITY, NAN, isfinite

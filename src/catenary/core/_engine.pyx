@@ -1,8 +1,16 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""Engine: owns all parts of one cyclic exchange and is the only way in from Python.
+"""Engine: owns all parts of one cyclic exchange and is the only entry from Python.
 
-Where another thread could want the GIL it is released round waits only; in virtual time not even
-there. Budget of `next` beside the link: 1 us for three drives.
+Theory of operation. In the threaded mode, `native` is set and a native thread runs the cycles; `step`
+commits the targets and waits for the newest cycle. Inline, and in virtual time, `step` runs the cycle
+in the caller's thread: `inline_outputs` and `inline_inputs`, or `lockstep` for a threaded cycle.
+`hold` runs cycles without an application: a hand-over. The GIL is released around waits only if
+another thread could need it (`alone`: not in virtual time). `law` and `stream` are the ones that
+compute the set-points; `laws` and `streams` keep every one that the cycle may still use. `committed`
+marks targets that were committed before `next`, `emitted` inline frames that were sent. `left` and
+`input_age` tell when the body began, and how old its inputs were.
+
+Budget of `next`, besides the link: 1 us for three drives.
 """
 
 import os

@@ -1,9 +1,13 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""The hand-over between the cycle and Python: private buffers that Python sees, and triple buffers
+"""Hand-over between the cycle and Python: private buffers that Python sees, and triple buffers
 (native/triple_buffer.h) both ways, so that a vector is never half old and half new.
 
-One block of memory per direction and slot, 8-byte values first. Budget: 0.1 us a direction for
-three drives, which is the copying of some 200 bytes.
+Theory of operation. One block of memory per direction and slot: a header and the arrays of one table,
+items of 8 bytes first. Slots 0 to 2 are exchanged, PRIVATE is Python's own, OF_LAW the targets of a
+law, BEFORE_LAW what the law found. `published` counts publications and is the futex word on which
+Python sleeps while `waiting`. `sticky` keeps flags of cycles that Python has not read yet.
+
+Budget: 0.1 us per direction for three drives, to copy some 200 bytes.
 """
 
 from cpython.buffer cimport PyBUF_FORMAT, PyBUF_WRITABLE

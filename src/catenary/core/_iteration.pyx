@@ -1,6 +1,6 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""What `for cycle in loop` runs through: compiled, because the first microseconds after a wait go to
-whatever is not in the caches, and a Python generator and its properties are a lot of it.
+"""Iteration of a loop. It is compiled: after a wait, the first microseconds of a cycle are spent on what
+is not in the caches, and a Python generator with its properties is a large part of that.
 """
 
 from libc.stdint cimport int64_t, uint32_t, uint64_t

@@ -1,7 +1,13 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""A law in the cycle: its numbers, handed over all at once both ways, its budget, and what ends it.
+"""A law in the cycle: its numbers, its budget, and what ends it.
 
-The law itself is a function of native/law.h. Budget: 30 ns beside it, without memory.
+Theory of operation. The law is a function of native/law.h. Parameters and a new memory reach it by
+triple buffers before a step, all at once. Its memory is copied for the application after a step: on
+request where the cycle has its own thread (`wanted`, `given`), else each time. `status` says how it
+ended and is a futex word. A step over the budget is counted; `overrun_limit` of them in a row end the
+law. One that never returns is given up by the engine's monitor.
+
+Budget: 30 ns besides the law, without memory.
 """
 
 import os

@@ -1,6 +1,6 @@
 """The native thread: SCHED_FIFO, a CPU of its own, a touched stack, no signals, never the GIL.
 
-What is not permitted is done without and said: the cycle then runs under the ordinary scheduler.
+Without the permission for one of these, the thread runs without it, and `loop.scheduling` reports it.
 """
 
 import errno as error_names
