@@ -24,6 +24,7 @@ GO = signal.SIGUSR1
 PATIENCE = 120.0  # [s] for the others to be ready
 LOOK = 500  # cycles from one look at the counters to the next
 NEVER = 1e9  # [s]
+BUDGET_SHARE = 0.1  # of the period: the frames of two networks on one processor need the rest
 
 
 def run_law(job: Job) -> NetworkRound:
@@ -32,7 +33,9 @@ def run_law(job: Job) -> NetworkRound:
     with opened(job, laws=[sine]) as (loop, arm):
         home = arm.actual.position.copy()
         parameters = [job.amplitude, job.stiffness, job.damping, NEVER]
-        loop.start(sine, memory=home, parameters=parameters, budget=0)
+        loop.start(
+            sine, memory=home, parameters=parameters, budget=BUDGET_SHARE * job.period_ns * 1e-9
+        )
         wait_to_go("ready")
         return count(loop, job)
 
