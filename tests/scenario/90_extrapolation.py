@@ -104,6 +104,35 @@ def test_the_commanded_velocity_changes_by_at_most_a_t(pause: int, tmp_path: Pat
     assert velocity[-1] == pytest.approx(1.0, abs=rounding)
 
 
+@pytest.mark.xfail(strict=True, reason="one fresh set-point ends the return: see the docstring")
+@pytest.mark.parametrize("pause", [2, 7])
+def test_a_trajectory_that_waits_for_the_application_is_no_jump(pause: int, tmp_path: Path) -> None:
+    """The application counts set-points instead of reading the time: after a pause they go on
+    where they were. The set-point that is `pause` cycles old ends the fallback, because it lies on
+    the extrapolation. The next one is followed at once, by a step back of velocity * pause.
+    Bound: acceleration of the fallback, and the set-points' own. (Found by the soak.)"""
+    velocity = 0.3
+    recording = tmp_path / "frames.pcapng"
+    with vertical_cell(record=recording) as cell:
+        arm = cell.drives(**LIMITS)
+        with cat.Loop(arm) as loop:
+            plan = loop.plan.cycle
+            cycle = follow(cell, arm, loop, 300, velocity)
+            target = arm.target.position.copy()
+            for k, cycle in enumerate(loop):
+                target += velocity * MS
+                arm.target.position[:] = target
+                if k == 100:
+                    cycle.spend(pause * MS)
+                if k == 300:
+                    break
+            last = cell.link.seen(traffic="cyclic")
+    path = commanded(recording, plan)[last - 290 : last - 1]
+    rounding = 2 / COUNTS_PER_RAD / MS
+    assert np.diff(path).min() / MS > -rounding  # never backwards: no set-point is
+    assert np.abs(np.diff(np.diff(path) / MS)).max() < velocity + ACCELERATION * MS + rounding
+
+
 def test_a_step_of_3_rad_is_refused() -> None:
     """Bound: the arm stays; at the late limit it falls until the brake has closed."""
     with vertical_cell() as cell:
