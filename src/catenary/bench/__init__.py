@@ -119,11 +119,36 @@ def measure_law(*, axes: int, file: Path | None = None) -> None:
     law_call.measure(axes=axes, file=file)
 
 
-def measure_soak(*, minutes: float, seed: int, file: Path | None = None) -> bool:
-    """Prints what random faults in virtual time did to a loop; whether all invariants held."""
-    from catenary.bench.soak import run
+def measure_soak(
+    *,
+    minutes: float,
+    seed: int,
+    wiring: str | None = None,
+    clocks: bool | None = None,
+    mode: str | None = None,
+    file: Path | None = None,
+) -> bool:
+    """Print what random faults in virtual time did to a loop; return True if all invariants held.
 
-    return run.measure(minutes=minutes, seed=seed, file=file)
+    Args:
+        minutes: of virtual time.
+        seed: of the first minute.
+        wiring: "line" or "ring"; None: both, in turn.
+        clocks: drives with distributed clocks; None: with and without, in turn.
+        mode: "csp", "csv" or "cst"; None: all, in turn.
+        file: of the figures.
+    """
+    from catenary.bench.soak import run
+    from catenary.bench.soak.setting import settings
+
+    choices = [
+        setting
+        for setting in settings()
+        if wiring in (None, setting.wiring)
+        and clocks in (None, setting.clocks)
+        and mode in (None, setting.mode)
+    ]
+    return run.measure(minutes=minutes, seed=seed, choices=choices, file=file)
 
 
 def measure_clocks(

@@ -66,15 +66,37 @@ def add_soak(group: Commands) -> None:
         group,
         "soak",
         help="random faults in virtual time, invariants checked in every cycle",
-        description="Runs a loop on a segment in this process while faults of all kinds befall it, "
-        "and judges by the virtual devices' own truth. The same seed gives the same run. Exit "
-        "status 1 if anything happened that must not.",
-        example="catenary bench soak --minutes 10 --seed 7 --json soak.json",
+        description="Runs a loop on a virtual segment while random faults of all kinds happen, and "
+        "checks the invariants by the virtual devices' own truth. The minutes take wiring, clocks "
+        "and mode of operation in turn; the options select some of them. The same seed and options "
+        "give the same run. A violation is printed with the command that repeats its minute. Exit "
+        "status 1 on any violation.",
+        example="catenary bench soak --minutes 10 --seed 7 --wiring ring --json soak.json",
     )
     parser.add_argument(
         "--minutes", type=positive_minutes, default=1.0, metavar="N", help="of virtual time (1)"
     )
-    parser.add_argument("--seed", type=int, default=1, metavar="S", help="of chance (1)")
+    parser.add_argument(
+        "--seed",
+        type=int,
+        default=1,
+        metavar="S",
+        help="of the first minute; minute k has S + k - 1 (1)",
+    )
+    parser.add_argument(
+        "--wiring", choices=("line", "ring"), help="of the segment (line and ring in turn)"
+    )
+    parser.add_argument(
+        "--clocks",
+        action=argparse.BooleanOptionalAction,
+        default=None,
+        help="drives with distributed clocks (with and without in turn)",
+    )
+    parser.add_argument(
+        "--mode",
+        choices=("csp", "csv", "cst"),
+        help="mode of operation of the drives (all in turn)",
+    )
     add_file(parser)
     parser.set_defaults(run=run_soak)
 
@@ -155,7 +177,14 @@ def run_law(arguments: argparse.Namespace) -> int:
 def run_soak(arguments: argparse.Namespace) -> int:
     from catenary import bench
 
-    held = bench.measure_soak(minutes=arguments.minutes, seed=arguments.seed, file=arguments.json)
+    held = bench.measure_soak(
+        minutes=arguments.minutes,
+        seed=arguments.seed,
+        wiring=arguments.wiring,
+        clocks=arguments.clocks,
+        mode=arguments.mode,
+        file=arguments.json,
+    )
     return 0 if held else 1
 
 

@@ -1,6 +1,7 @@
-"""The soak: random faults in virtual time against a running loop, and what must hold meanwhile.
+"""The soak: random faults in virtual time against a running loop, and invariants that must hold.
 
-cell: the machine. faults: incidents drawn by chance. effects: what each does to whom. injected:
-what was on when. witness: the invariants. objects: what is read meanwhile. minute: the application.
-run: all minutes, and what is printed.
+setting: line or ring, clocks, mode of operation. cell: the machine. faults: incidents drawn by
+chance. effects: the devices that each fault affects. injected: the faults that were on, and when.
+witness: the invariants. commands: the limits of commands. objects: objects read meanwhile. minute:
+the application. run: all minutes, and the report.
 """

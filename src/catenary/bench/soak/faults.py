@@ -1,4 +1,4 @@
-"""What befalls the machine of a soak: incidents drawn by chance."""
+"""Incidents of a soak, drawn by chance."""
 
 from __future__ import annotations
 
@@ -15,9 +15,11 @@ from catenary.bench.soak.cell import (
     SERVOS,
     TOOL,
     WITH_MAILBOX,
+    make_servo,
 )
-from catenary.bench.soak.effects import places
-from catenary.virtual import Fault, Servo
+from catenary.bench.soak.effects import fits
+from catenary.bench.soak.setting import Setting
+from catenary.virtual import Fault
 from catenary.virtual import faults as f
 from catenary.virtual.wiring import Neighbour
 
@@ -42,10 +44,11 @@ class Incident(NamedTuple):
 
 
 class Moment(NamedTuple):
-    """What a fault is drawn from: chance, and when it is to begin [s]."""
+    """Source of one fault: chance, its begin [s], and the setting."""
 
     random: Random
     at: float
+    setting: Setting
 
     def lasting(self) -> float:
         """[s], all orders of magnitude alike."""
@@ -63,7 +66,10 @@ class Moment(NamedTuple):
         return TOOL if self.random.random() < OFTEN else self.random.choice(ARM)
 
     def between(self) -> tuple[Neighbour, Neighbour]:
-        below = self.device()
+        """Return the ends of a cable. In a ring each one, because it carries on without it."""
+        below = self.random.randrange(DEVICES + 1) if self.setting.is_ring else self.device()
+        if below == DEVICES:
+            return (DEVICES - 1, "main")
         return ("main" if below == 0 else below - 1, below)
 
     def serial(self) -> int:
@@ -118,7 +124,7 @@ def _power_cycle(m: Moment) -> Drawn:
 
 def _swap(m: Moment) -> Drawn:
     device = m.servo()
-    new = Servo(name="spare", serial=m.serial())
+    new = make_servo("spare", m.serial(), m.random, m.setting)
     return (f.Swap(device=device, with_=new, at=m.at, for_=m.lasting()),)
 
 
@@ -209,14 +215,15 @@ KINDS: tuple[Callable[[Moment], Drawn], ...] = (
 )
 
 
-def draw(random: Random, now: float) -> Incident:
-    """One fault, sometimes two or three at once, or the application that does not come."""
+def draw(random: Random, now: float, setting: Setting) -> Incident:
+    """Draw one fault, sometimes two or three at once, or an application that is late."""
     if random.random() < 0.04:
         return Incident((), math.exp(random.uniform(math.log(2e-3), math.log(0.3))))
     faults: list[Fault] = []
     for _ in range(random.choice((1, 1, 1, 1, 1, 2, 2, 3))):
-        drawn = random.choice(KINDS)(Moment(random, now + random.uniform(0.001, 0.02)))
-        if not places(drawn) & places(faults):
+        moment = Moment(random, now + random.uniform(0.001, 0.02), setting)
+        drawn = random.choice(KINDS)(moment)
+        if fits(drawn, faults, ring=setting.is_ring):
             faults += drawn
     return Incident(tuple(faults))
 

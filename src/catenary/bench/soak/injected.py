@@ -1,4 +1,4 @@
-"""What has been injected into a segment, as its own log tells it, and what was on when."""
+"""Faults injected into a segment, from its own log, and the devices that they isolate."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from math import inf
 
-from catenary.bench.soak.effects import isolated, mends
+from catenary.bench.soak.effects import mends, out_of_reach
 from catenary.virtual import Fault, Segment
 from catenary.virtual import faults as f
 
@@ -32,15 +32,17 @@ class Injected:
         self._seen = 0
         self._spans: list[Span] = []
         self._on: list[Span] = []
+        self._isolated: dict[int, float] = {}  # device → since when
 
     def update(self) -> None:
-        """Takes what is new in the segment's log."""
+        """Take what is new in the segment's log."""
         log = self._segment.fault_log
         for event in log[self._seen :]:
             if event.what == "begins":
                 self._begin(event.fault, event.time)
             elif event.what == "ends":
                 self._end(partial(_is_of, event.fault), event.time)
+            self._isolate(event.time)
         self._seen = len(log)
 
     def _begin(self, fault: Fault, time: float) -> None:
@@ -57,22 +59,20 @@ class Injected:
                 span.end = time
         self._on = [span for span in self._on if span.end == inf]
 
+    def _isolate(self, time: float) -> None:
+        """Follow which devices are isolated, after a change at `time`."""
+        isolated = out_of_reach([span.fault for span in self._on], ring=self._segment.ring)
+        self._isolated = {device: self._isolated.get(device, time) for device in isolated}
+
     def between(self, start: float, end: float) -> Iterator[Fault]:
-        """Those that were on then, the latest first."""
+        """Yield the faults that were on then, the latest first."""
         for span in reversed(self._spans):
             if span.begin <= end and span.end >= start:
                 yield span.fault
 
     def isolated_since(self, device: int) -> float:
-        """Since when no outputs reach it; infinity: they do."""
-        return min(
-            (
-                span.begin
-                for span in self._spans
-                if span.end == inf and device in isolated(span.fault)
-            ),
-            default=inf,
-        )
+        """Return since when no outputs reach a device; infinity if they do."""
+        return self._isolated.get(device, inf)
 
 
 def _is_of(fault: Fault, span: Span) -> bool:

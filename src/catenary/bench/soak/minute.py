@@ -1,8 +1,7 @@
-"""One minute of a soak: an application that does what docs/safety.md leaves to applications, on a
-segment on which one incident follows another.
+"""One minute of a soak: an application on a segment on which one incident follows another.
 
-It waits until faults are over, asks again for axes that were dropped, lets in devices that are
-held, and after a loop that has ended scans and opens a new one.
+The application does what docs/safety.md leaves to applications. It waits until faults are over,
+enables stopped axes again, restores devices that are held, and opens a new loop after an error.
 """
 
 from __future__ import annotations
@@ -10,6 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from dataclasses import dataclass, field
+from math import inf
 from random import Random
 
 import catenary as cat
@@ -17,26 +17,29 @@ from catenary.bench.soak.cell import PERIOD, Wishes, make_segment
 from catenary.bench.soak.effects import may_end
 from catenary.bench.soak.faults import Incident, draw
 from catenary.bench.soak.objects import Objects
-from catenary.bench.soak.witness import OP, Phase, Violation, Witness
-from catenary.bus.event import DeviceHeld, DeviceReplaced
+from catenary.bench.soak.setting import Setting
+from catenary.bench.soak.witness import CLOCK_BOUND, OP, Phase, Violation, Witness
+from catenary.bus.event import AxisStopped, DeviceHeld, DeviceReplaced
 from catenary.bus.sub_device import SubDevice
 from catenary.errors import CatenaryError
 from catenary.model.device import Identity
 from catenary.virtual import Segment
 
 PRE_OP = 2
-RECOVERY = 5.0  # [s] after the last fault of an incident, until all are back
+RECOVERY = 5.0  # [s] after the last fault of an incident, until all devices are back
+CLOCK_RECOVERY = 10.0  # [s] until their clocks are within the bound, too
 FAILURES_MAX = 4  # sessions in a row that fail
 STEP = 0.01  # [s]
 BOOT = 0.3  # [s] after the last fault, before a scan
 ASK_AGAIN = 0.1  # [s]
+EFFECT = 0.02  # [s] after the end of a fault in which it may still have effects
 SESSION = 10  # incidents, after which a loop is left unasked
 AT_START = 0.15  # of the sessions have an incident while they begin
 
 
 @dataclass(slots=True)
 class Figures:
-    """What happened in a minute, or in many."""
+    """Counts of a minute, or of many."""
 
     cycles: int = 0
     not_ok: int = 0
@@ -46,7 +49,8 @@ class Figures:
     losses: Counter[str] = field(default_factory=Counter)
     ended: Counter[str] = field(default_factory=Counter)  # loops, by what ended them
     objects: int = 0  # read while running
-    longest_return: float = 0.0  # [s] from the end of an incident until all are well again
+    longest_return: float = 0.0  # [s] from the end of an incident until all devices are back
+    longest_lock: float = 0.0  # [s] until their clocks are within the bound, too
 
     def add(self, other: Figures) -> None:
         for name in ("cycles", "not_ok", "loops", "incidents", "objects"):
@@ -54,20 +58,29 @@ class Figures:
         for name in ("faults", "losses", "ended"):
             getattr(self, name).update(getattr(other, name))
         self.longest_return = max(self.longest_return, other.longest_return)
+        self.longest_lock = max(self.longest_lock, other.longest_lock)
 
 
 class Minute:
-    """Owns a segment, its MainDevice's application, and chance."""
+    """Owns a segment, the application of its MainDevice, and chance."""
 
-    def __init__(self, seed: int, seconds: float, segment: Segment | None = None) -> None:
+    def __init__(
+        self,
+        seed: int,
+        seconds: float,
+        setting: Setting = Setting(),  # noqa: B008
+        segment: Segment | None = None,
+    ) -> None:
         self._random = Random(seed)
         self._seconds = seconds
-        self.segment = segment or make_segment()
-        self.witness = Witness(self.segment)
+        self.setting = setting
+        self.segment = segment or make_segment(setting, Random(seed))
+        self.witness = Witness(self.segment, setting)
         self.figures = Figures()
         self.incidents: list[tuple[float, Incident]] = []
         self._incident: Incident | None = None
         self._over_at: float | None = None
+        self._returned = inf  # [s] after the end of the incident
         self._next_at = 0.0
         self._asked_at = 0.0
         self._held: set[SubDevice] = set()
@@ -79,12 +92,15 @@ class Minute:
 
     @property
     def digest(self) -> str:
-        """The same for the same run."""
+        """Digest of the run; the same for the same run."""
         return self._trace.hexdigest()
 
     def run(self) -> None:
         failures = 0
-        with cat.MainDevice(self.segment) as main:
+        ends = (
+            (self.segment.first, self.segment.second) if self.setting.is_ring else (self.segment,)
+        )
+        with cat.MainDevice(*ends) as main:
             self._main = main
             self._expected: list[Identity | tuple[int, int] | None] = [
                 (sub.identity.vendor, sub.identity.product) for sub in main.scan()
@@ -97,13 +113,13 @@ class Minute:
         self.figures.losses = self.witness.losses
 
     def _note(self, *what: object) -> None:
-        """For the digest."""
+        """Add to the digest."""
         self._trace.update(repr((round(self.segment.time, 9), *what)).encode())
 
     # A session: scan, loop, leave
 
     def _session(self) -> bool:
-        """Whether it came to cycles."""
+        """Run one session and return True if its loop ran cycles."""
         self._began = self._last = self.segment.time
         cycles = self.figures.cycles
         if self._random.random() < AT_START:
@@ -112,7 +128,7 @@ class Minute:
         try:
             self._scan_and_run()
         except CatenaryError as error:
-            self._judge_end(error, None if self.figures.cycles == cycles else self._last)
+            self._judge_end(error, None if self.figures.cycles == cycles else self._cycled)
         self.witness.judge_left(self._last)
         self.witness.enter(Phase.LEFT)
         return self.figures.cycles > cycles
@@ -122,7 +138,8 @@ class Minute:
         if self._incident is None and any(device.state != PRE_OP for device in self.segment):
             states = [device.state for device in self.segment]
             self.witness.tell("in PRE-OP after a scan", f"the states are {states}")
-        wishes = Wishes(self._main)
+        wishes = Wishes(self._main, self.setting)
+        list(self._main.events)  # of the last loop
         for positions in wishes.parts:
             self.witness.ask(positions)
         with cat.Loop(*wishes.all, period=PERIOD, on_axis_stopped="event") as loop:
@@ -137,23 +154,25 @@ class Minute:
         self.figures.ended["left unasked"] += 1
 
     def _judge_end(self, error: CatenaryError, running: float | None) -> None:
-        """`running`: the last cycle of the loop; None: it had none, and anything excuses that."""
+        """Judge an error. `running`: time of the last cycle; None: none ran, any fault excuses."""
         kind = type(error).__name__
         self.figures.ended[kind] += 1
         self._note(kind, error.message)
         since = self._began if running is None else running
         faults = list(self.witness.injected.between(since - 0.1, self.segment.time))
-        if not any(running is None or may_end(fault) for fault in faults):
+        excused = faults if running is None else may_end(faults, ring=self.segment.ring)
+        if not excused:
             self.witness.tell("no end without a reason", f"{kind}: {error.message}")
 
     def _wait_until_over(self) -> None:
-        """Time goes by without a MainDevice."""
+        """Let time pass without a loop until all faults are over."""
         deadline = self.segment.time + RECOVERY
         while not self.segment.faults_done and self.segment.time < deadline:
             self._let_pass(STEP)
         self._let_pass(BOOT)
         self._incident = self._over_at = None
         self._held.clear()
+        self.witness.give_up()
 
     def _let_pass(self, seconds: float) -> None:
         link = self._main.link
@@ -167,14 +186,14 @@ class Minute:
         # Not in the first cycle: what is enabled there holds until the first targets are committed.
         self._next_at = self.segment.time + self._random.uniform(2 * PERIOD, 0.2)
         for cycle in loop:
-            self._last = now = self.segment.time
+            self._cycled = now = self.segment.time
             self.figures.cycles += 1
             self.figures.not_ok += not cycle.ok
             self.witness.judge_cycle(cycle.ok, wishes.present)
             if cycle.number % 100 == 0:
                 self._note([part.drives.actual.position.tolist() for part in wishes.parts.values()])
-            wishes.step()
-            self._hear()
+            wishes.step(cycle.time)
+            self._hear(wishes)
             self.figures.objects += objects.step(cycle.number)
             if self._incident is not None:
                 if not self._is_over(loop, wishes, now):
@@ -186,9 +205,9 @@ class Minute:
                 self._be_late(self._inject(), cycle, wishes)
 
     def _inject(self, within: float = 0.0) -> Incident:
-        incident = draw(self._random, self.segment.time + within)
-        self.witness.calm = False
-        self._incident, self._over_at = incident, None
+        incident = draw(self._random, self.segment.time + within, self.setting)
+        self.witness.disturb()
+        self._incident, self._over_at, self._returned = incident, None, inf
         self.incidents.append((self.segment.time, incident))
         self.figures.incidents += 1
         self.figures.faults.update(incident.kinds)
@@ -198,39 +217,50 @@ class Minute:
         return incident
 
     def _be_late(self, incident: Incident, cycle: cat.Cycle, wishes: Wishes) -> None:
-        """The application does not come for a while."""
+        """Keep the application from running for a while."""
         if not incident.late:
             return
         self.witness.late_since = self.segment.time
         cycle.spend(incident.late)
         self.witness.late_since = float("inf")
 
-    def _hear(self) -> None:
+    def _hear(self, wishes: Wishes) -> None:
         for event in self._main.events:
             self._note(str(event))
             if isinstance(event, (DeviceHeld, DeviceReplaced)) and event.sub is not None:
                 self._held.add(event.sub)
+            if isinstance(event, AxisStopped) and event.sub is not None:
+                self._hear_stop(event.sub.position, wishes)
+
+    def _hear_stop(self, position: int, wishes: Wishes) -> None:
+        for positions, part in wishes.parts.items():
+            if position in positions:
+                reason = part.drives.stopped[positions.index(position)]
+                self.witness.hear_stop(position, reason=reason is not None)
 
     # After an incident
 
     def _is_over(self, loop: cat.Loop, wishes: Wishes, now: float) -> bool:
-        """Leads back what waits for the application; False: it took too long."""
+        """Restore what waits for the application; return False if it took too long."""
         if not self.segment.faults_done:
             return True
         if self._over_at is None:
             self._over_at = self._asked_at = now
+        if now < self._over_at + EFFECT:
+            return True
         for sub in self._held:
             loop.restore(sub)
         self._held.clear()
         wrong = self._wrong(wishes)
+        since = now - self._over_at
         if not wrong:
-            self.figures.longest_return = max(self.figures.longest_return, now - self._over_at)
-            self._incident = None
-            self._next_at = now + self._random.uniform(0.02, 0.3)
-            self.witness.all_well()
+            self._returned = min(self._returned, since)
+            wrong = self._wrong_clock(loop)
+        if not wrong:
+            self._end_incident(now, since)
             return True
-        if now > self._over_at + RECOVERY:
-            self.witness.tell("all back", f"{RECOVERY:g} s after the last fault: {wrong}")
+        if since > (CLOCK_RECOVERY if self._returned < since else RECOVERY):
+            self.witness.tell("all back", f"{since:.1f} s after the last fault: {wrong}")
             return False
         if now > self._asked_at + ASK_AGAIN:
             self._asked_at = now
@@ -240,13 +270,32 @@ class Minute:
                 part.drives.enable(idle)
         return True
 
+    def _end_incident(self, now: float, since: float) -> None:
+        figures = self.figures
+        figures.longest_return = max(figures.longest_return, self._returned)
+        if self.setting.clocks:
+            figures.longest_lock = max(figures.longest_lock, since)
+        self._incident = None
+        self._next_at = now + self._random.uniform(0.02, 0.3)
+        self.witness.all_well()
+
+    def _wrong_clock(self, loop: cat.Loop) -> str:
+        """Return which clock is not within the bound; empty: none."""
+        if not self.setting.clocks:
+            return ""
+        position, difference = self.witness.worst_clock()
+        if loop.clocks.locked and abs(difference) < CLOCK_BOUND / 2:
+            return ""
+        locked = "locked" if loop.clocks.locked else "not locked"
+        return f"clocks {locked}, device {position} is {difference * 1e6:+.3f} us off"
+
     def _wrong(self, wishes: Wishes) -> str:
-        """What is not as it was; empty: nothing."""
+        """Return what is not back; empty: all is."""
         states = [device.state for device in self.segment]
         if any(state != OP for state in states):
             return f"states {states}"
         gone = [position for position, there in wishes.present.items() if not there]
         if gone:
-            return f"devices {gone} do not take part"
+            return f"devices {gone} are not present"
         idle = [positions[k] for positions, part in wishes.parts.items() for k in part.idle]
         return f"devices {idle} are not enabled" if idle else ""

@@ -1,4 +1,4 @@
-"""Objects that are read while the machine is soaked: each answer comes, and is right."""
+"""Objects that are read during a soak: each answer comes, and is right."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Objects:
         faults = list(self._witness.injected.between(asked.time - 0.5, now))
         if error is not None and not isinstance(error, CatenaryError):
             raise error
-        if error is not None and not faults:
+        if error is not None and self._witness.quiet_since(asked.time - 0.5):
             what = f"device {asked.position}: {error}"
             self._witness.tell("objects are read", what, about=str(asked.position))
         garbled = any(isinstance(fault, f.Garble) for fault in faults)

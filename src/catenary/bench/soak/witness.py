@@ -1,7 +1,7 @@
-"""What must hold whatever happens, judged by the virtual devices' own truth.
+"""Invariants that hold in spite of all faults, judged by the virtual devices' own truth.
 
-`Witness` looks at every device once a millisecond of virtual time, whoever spends the time; the
-application tells it what it asks for and what every cycle of its loop looked like to it.
+`Witness` checks every device once a millisecond of virtual time, even while no cycle runs. The
+application reports its requests, the stops it was told of, and the result of each cycle.
 """
 
 from __future__ import annotations
@@ -12,27 +12,40 @@ from enum import Enum
 from math import inf
 from typing import NamedTuple
 
-from catenary.bench.soak.cell import DEVICES, OPTIONAL, PERIOD, SERVOS
-from catenary.bench.soak.effects import breaks_cable, disturbs
+from catenary.bench.soak.cell import (
+    COUPLER,
+    DEVICES,
+    OPTIONAL,
+    PERIOD,
+    POWERED,
+    SERVOS,
+    apply_loads,
+)
+from catenary.bench.soak.commands import Commands
+from catenary.bench.soak.effects import breaks_cable, disturbed
 from catenary.bench.soak.injected import Injected
+from catenary.bench.soak.setting import Setting
 from catenary.virtual import DigitalOutputs, Segment, Servo
 from catenary.virtual import faults as f
 
 LOOK = 1_000_000  # [ns] between two looks
 OP, AL_STATE = 8, 0x0F
-WATCHDOG = 0.1  # [s], of the loop
-LATE_LIMIT = 0.05  # [s], of the loop, in CSP
+WATCHDOG, WATCHDOG_TORQUE = 0.1, 0.01  # [s], of the loop; the second one in CST
+LATE_LIMIT, LATE_LIMIT_TORQUE = 0.05, 0.01  # [s], of the loop; the second one in CST
 MARGIN = 0.003  # [s]: steps of device models and looks
 BRAKING = 0.1  # [s] that a drive may take to stand
 STILL = 0.05  # [rad/s]
-FASTEST = 3.0  # [rad/s]: ten times what is commanded; a jump is faster
+FASTEST = 3.0  # [rad/s]: ten times the application's own velocity; a jump is faster
+ANNOUNCED = 20  # cycles from a stop to its event and reason
+CLOCK_BOUND = 2e-6  # [s], true difference from the reference clock: twice what the loop reports
 FLIGHT = 2.5 * PERIOD  # [s] from the sending of a frame to the end of its cycle
-AFTERWARDS = 0.012  # [s]: frames that were late come in, cables are seen to be dark
+AFTERWARDS = 0.012  # [s]: late frames arrive, controllers detect dark cables
+DETECTED = 0.002  # [s], in a ring: dark cables are detected; the other way round carries on
 REQUIRED = frozenset(range(DEVICES)) - frozenset(OPTIONAL)
 
 
 class Violation(NamedTuple):
-    """Something that must not be."""
+    """An invariant that did not hold."""
 
     time: float  # of the segment [s]
     invariant: str
@@ -43,7 +56,7 @@ class Violation(NamedTuple):
 
 
 class Phase(Enum):
-    """What the MainDevice is about."""
+    """Activity of the MainDevice."""
 
     STARTING = "starting"  # scanning, entering the loop, leaving it
     RUNNING = "running"
@@ -51,64 +64,116 @@ class Phase(Enum):
 
 
 class Witness:
-    """Owns what was seen of the devices of one segment, and what was wrong with it."""
+    """Owns the observations of the devices of one segment, and the violations."""
 
-    def __init__(self, segment: Segment) -> None:
+    def __init__(self, segment: Segment, setting: Setting) -> None:
         self.segment = segment
+        self.setting = setting
         self.injected = Injected(segment)
         self.violations: list[Violation] = []
         self.phase = Phase.LEFT
-        self.calm = False  # no fault is on, and all have been led back
-        self.late_since = inf  # [s]: when the application was there last
+        self.calm = False  # no fault is on, and all devices are back
+        self.late_since = inf  # [s]: the last time the application ran
         self.losses: Counter[str] = Counter()
+        torque = setting.mode == "cst"
+        self._late_limit = LATE_LIMIT_TORQUE if torque else LATE_LIMIT
+        self._watchdogs = {p: WATCHDOG_TORQUE if torque else WATCHDOG for p in SERVOS}
+        self._commands = {p: Commands(segment, p, setting.mode) for p in SERVOS}
         self._left = 0.0
-        self._spoiled = -inf  # when a frame was lost last
+        self._running_since = inf
+        self._quiet_since = 0.0  # end of the last incident; infinity during one
+        self._spoiled = -inf  # time of the last frame that was lost
         self._asked: set[int] = set()
         self._enabled: set[int] = set()
         self._idle_since = dict.fromkeys(SERVOS, 0.0)
         self._op_since = dict.fromkeys(range(DEVICES), inf)
+        self._unannounced: dict[int, int] = {}  # stopped axis → cycles without event and reason
+        self._announced: set[int] = set()  # since their last request
         self._told: set[tuple[str, str]] = set()
         self._look()
 
     def tell(self, invariant: str, what: str, *, about: str = "") -> None:
-        """Notes a violation, once for each `about` until the devices are all well again."""
+        """Note a violation, once for each `about` until all devices are back."""
         if (invariant, about) not in self._told:
             self._told.add((invariant, about))
             self.violations.append(Violation(self.segment.time, invariant, what))
 
-    # What the application tells
+    # Reports of the application
 
     def enter(self, phase: Phase) -> None:
         self.phase, self.calm = phase, False
+        self._unannounced.clear()
+        if phase is Phase.RUNNING:
+            self._running_since = self.segment.time
         if phase is Phase.LEFT:
             self._left = self.segment.time
-            self._asked &= self._enabled  # those out of reach go on until their watchdogs bite
+            self._asked &= self._enabled  # those out of reach go on until their watchdogs expire
 
     def ask(self, positions: tuple[int, ...]) -> None:
-        """The application asks for drives to be enabled."""
+        """The application requests that drives be enabled."""
         self._asked.update(positions)
+        self._announced.difference_update(positions)
+
+    def hear_stop(self, position: int, *, reason: bool) -> None:
+        """The application received the event of a stop; `reason`: `Drives.stopped` has one."""
+        self._announced.add(position)
+        self._unannounced.pop(position, None)
+        if not reason:
+            what = f"device {position}: an event, but no reason in `stopped`"
+            self.tell("no silent stop", what, about=str(position))
 
     def all_well(self) -> None:
-        self.calm = True
+        """All devices are back after an incident."""
+        self.calm, self._quiet_since = True, self.segment.time
         self._told.clear()
 
-    # Looks at the devices
+    def disturb(self) -> None:
+        """An incident begins."""
+        self.calm, self._quiet_since = False, inf
+
+    def give_up(self) -> None:
+        """The loop of an incident was left; the next one begins anew."""
+        self._quiet_since = self.segment.time
+
+    def quiet_since(self, time: float) -> bool:
+        """Return True if no incident was open at `time` [s] or later."""
+        return self._quiet_since <= time
+
+    # Checks of the devices
 
     def _look(self) -> None:
         self.segment.service.agenda.after(LOOK, self._look)
         self.injected.update()
+        if self.setting.mode == "cst":
+            apply_loads(self.segment)
         now = self.segment.time
         states = [device.state for device in self.segment]
         for position, state in enumerate(states):
             self._look_at_state(position, state, now)
             silent = now - self._silent_since(position)
-            if silent > WATCHDOG + MARGIN:
+            if silent > self._watchdogs.get(position, WATCHDOG) + MARGIN:
                 self._look_for_safety(position, silent)
         for position in SERVOS:
             self._look_at_drive(position, states[position], now)
+        if self.setting.clocks and self.calm and self.phase is Phase.RUNNING:
+            self._look_at_clocks()
+
+    def _look_at_clocks(self) -> None:
+        position, difference = self.worst_clock()
+        if abs(difference) > CLOCK_BOUND:
+            what = f"device {position} is {difference * 1e6:+.3f} us off without a fault"
+            self.tell("clocks within bound", what, about=str(position))
+
+    def worst_clock(self) -> tuple[int, float]:
+        """Return the drive whose clock is furthest off the reference's, and its difference [s]."""
+        core = self.segment.core
+        reference = core.system_time(COUPLER)
+        found = {p: (core.system_time(p) - reference) * 1e-9 for p in SERVOS}
+        position = max(found, key=lambda p: abs(found[p]))
+        return position, found[position]
 
     def _silent_since(self, position: int) -> float:
-        """Since when a device has had no outputs; infinity: it has them."""
+        """Return since when a device has had no outputs; infinity if it has them."""
         since = self.injected.isolated_since(position)
         return min(since, self._left) if self.phase is Phase.LEFT else since
 
@@ -133,33 +198,48 @@ class Witness:
         servo = self.segment[position]
         if not isinstance(servo, Servo):
             return
+        if state == 0:
+            self._idle_since[position] = now  # the model stands still, and goes on when it returns
         moving = state != 0 and not self._is_frozen(position)
         velocity = abs(servo.velocity_rad_s) if moving else 0.0
+        self._look_at_commands(position, servo, state, now)
         if not self._is_enabled(servo):
             if position in self._enabled:
                 self._enabled.discard(position)
                 self._asked.discard(position)
                 self._idle_since[position] = now
+                if self.phase is Phase.RUNNING and position not in self._announced:
+                    self._unannounced[position] = 0
             if velocity > STILL and now - self._idle_since[position] > BRAKING:
                 what = f"device {position} turns at {velocity:.3f} rad/s, {servo.drive_state()}"
                 self.tell("nothing moves unasked", what, about=str(position))
             return
         self._enabled.add(position)
         if position not in self._asked:
-            what = f"device {position} is enabled and nobody has asked"
+            what = f"device {position} is enabled without a request"
             self.tell("nothing moves unasked", what, about=str(position))
         if velocity > FASTEST and not self._is_garbled(now):
             what = f"device {position} jumps at {velocity:.3f} rad/s"
             self.tell("nothing moves unasked", what, about=str(position))
-        if now - self.late_since > LATE_LIMIT + BRAKING:
-            what = f"device {position} is enabled {now - self.late_since:.3f} s after Python's last"
+        if now - self.late_since > self._late_limit + BRAKING:
+            late = now - self.late_since
+            what = f"device {position} is enabled {late:.3f} s after the last set-points"
             self.tell("outputs safe", what, about=str(position))
+
+    def _look_at_commands(self, position: int, servo: Servo, state: int, now: float) -> None:
+        commands, drive = self._commands[position], servo.drive_state() if state else ""
+        excused = self._is_frozen(position) or self._is_garbled(now)
+        if state & AL_STATE != OP or drive not in POWERED or excused:
+            commands.reset()
+            return
+        for invariant, what in commands.look(servo, drive):
+            self.tell(invariant, f"device {position}: {what}", about=str(position))
 
     def _is_enabled(self, servo: Servo) -> bool:
         return servo.state != 0 and servo.drive_state() == "OPERATION ENABLED"
 
     def _is_frozen(self, position: int) -> bool:
-        """Its model stands still as it was, or has to catch up."""
+        """Return True if its model stands still, or has to catch up."""
         now = self.segment.time
         return any(
             isinstance(fault, f.Freeze) and fault.device == position
@@ -167,25 +247,26 @@ class Witness:
         )
 
     def _is_garbled(self, now: float) -> bool:
-        """Wrong positions came, and nobody could tell: a drive may have been sent to one."""
+        """Return True if wrong positions came that cannot be detected: they may be followed."""
         recent = self.injected.between(now - 0.5, now)
         return any(isinstance(fault, f.Garble) for fault in recent)
 
-    # Judges what the application sees
+    # Judging what the application sees
 
     def judge_cycle(self, ok: bool, present: Mapping[int, bool]) -> None:
-        """One cycle of the loop as the application saw it."""
+        """Judge one cycle of the loop as the application saw it."""
         self.injected.update()
         now = self.segment.time
         self._take_losses(now)
         spoiled = self._spoiled > now - FLIGHT
         recent = list(self.injected.between(now - AFTERWARDS, now))
         garbled = any(isinstance(fault, f.Garble) for fault in recent)  # counters as well
-        excused = frozenset[int]().union(*map(disturbs, recent))
+        excused = disturbed(recent, ring=self.segment.ring)
         if excused & REQUIRED:
             excused |= REQUIRED  # they share a sync unit
         if not ok and not spoiled and not excused & REQUIRED:
             self.tell("no undeclared loss", "a cycle was not ok, and nothing was injected")
+        self._judge_stops(present)
         for position, there in present.items():
             steady = now - self._op_since[position] > FLIGHT
             if not there and steady and not spoiled and position not in excused:
@@ -196,6 +277,15 @@ class Witness:
                 what = f"device {position} is out of reach, and its inputs are given for good"
                 self.tell("no silent loss", what, about=str(position))
 
+    def _judge_stops(self, present: Mapping[int, bool]) -> None:
+        """An axis that was stopped is announced while its device answers."""
+        for position in list(self._unannounced):
+            self._unannounced[position] += present[position]
+            if self._unannounced[position] > ANNOUNCED:
+                del self._unannounced[position]
+                what = f"device {position} left OPERATION ENABLED: no event in {ANNOUNCED} cycles"
+                self.tell("no silent stop", what, about=str(position))
+
     def _take_losses(self, now: float) -> None:
         for loss in self.segment.take_losses():
             self.losses[loss.cause] += 1
@@ -204,20 +294,25 @@ class Witness:
                 self.tell("no undeclared loss", f"a frame sent at {loss.time:.6f} s: {loss.cause}")
 
     def _declared(self, sent: float, cause: str) -> bool:
-        faults = list(self.injected.between(sent - AFTERWARDS, sent + FLIGHT))
+        faults = list(self.injected.between(sent - self._detected(cause), sent + FLIGHT))
+        if cause == "closed port" and self.setting.clocks and sent < self._running_since:
+            return self.segment.ring  # it is a line while the delays of its cables are measured
         if cause == "injected":
             return any(isinstance(fault, f.LoseFrames) for fault in faults)
         if cause == "corrupt":
             return any(isinstance(fault, f.Corrupt) for fault in faults)
         return any(breaks_cable(fault) for fault in faults)
 
+    def _detected(self, cause: str) -> float:
+        """Return how long before a loss its fault may have begun [s]."""
+        is_cable = cause not in ("injected", "corrupt")
+        return DETECTED if self.segment.ring and is_cable else AFTERWARDS
+
     def judge_left(self, since: float) -> None:
-        """The loop has been left: nobody is in OP who could be told."""
+        """Judge that no device within reach is in OP after the loop was left."""
         self.injected.update()
         now = self.segment.time
-        out_of_reach: set[int] = set()
-        for fault in self.injected.between(since, now):
-            out_of_reach |= disturbs(fault)
+        out_of_reach = disturbed(self.injected.between(since, now), ring=self.segment.ring)
         for position, device in enumerate(self.segment):
             if device.state & AL_STATE == OP and position not in out_of_reach:
                 self.tell("nobody left in OP", f"device {position} is", about=str(position))
