@@ -104,12 +104,11 @@ def test_the_commanded_velocity_changes_by_at_most_a_t(pause: int, tmp_path: Pat
     assert velocity[-1] == pytest.approx(1.0, abs=rounding)
 
 
-@pytest.mark.xfail(strict=True, reason="one fresh set-point ends the return: see the docstring")
 @pytest.mark.parametrize("pause", [2, 7])
 def test_a_trajectory_that_waits_for_the_application_is_no_jump(pause: int, tmp_path: Path) -> None:
     """The application counts set-points instead of reading the time: after a pause they go on
-    where they were. The set-point that is `pause` cycles old ends the fallback, because it lies on
-    the extrapolation. The next one is followed at once, by a step back of velocity * pause.
+    where they were. The set-point that is `pause` cycles old lies on the extrapolation, the next
+    one is velocity * pause behind it: the command must return to it without a step.
     Bound: acceleration of the fallback, and the set-points' own. (Found by the soak.)"""
     velocity = 0.3
     recording = tmp_path / "frames.pcapng"

@@ -198,6 +198,8 @@ cdef void follow_position(axes_t *x, axis_t *a, const target_t *t, double target
     a.fallback_cycles = 0
     a.ghost = target + a.setpoint_velocity * x.period * <double>age
     track(x, a, a.ghost, a.setpoint_velocity)
+    if age > 0:
+        a.returning = 1  # the next one may go on from the pause or from the present
 
 
 cdef bint is_leaving(const axis_t *a) noexcept nogil:
