@@ -9,6 +9,7 @@ import catenary as cat
 from catenary.errors import DriveError
 from catenary.wire.cia402 import State
 from tests.scenario.cell import Cell
+from tests.scenario.clocked import clocked_cell
 
 OVER_CURRENT = 0x2310
 
@@ -27,6 +28,25 @@ def test_a_fault_ends_the_loop_with_the_drives_own_code(cell: Cell) -> None:
     assert caught.value.log is not None
     assert len(caught.value.log) > 100  # type: ignore[arg-type]
     cell.assert_safe()
+
+
+@pytest.mark.parametrize("mode", ["csp", "csv", "cst"])
+def test_a_new_loop_resets_the_fault(mode: str) -> None:
+    """As the error's hint says. In CSV and CST the first targets come after the reset, and the
+    clocks may have an event before. (Found by the soak.)"""
+    with clocked_cell(2) as cell:
+        arm = cell.drives(mode=mode, dc=True)
+        with pytest.raises(DriveError, match="in fault") as caught, cat.Loop(arm) as loop:
+            for cycle in loop:
+                if cycle.number == 2000:
+                    cell.servos[1].inject_fault(OVER_CURRENT)
+                assert cycle.number < 3000
+        assert "open a new Loop: it resets the fault" in str(caught.value)
+        cell.servos[1].inject_fault(0)  # the cause is gone
+        with cat.Loop(arm) as loop:
+            for _ in zip(loop, range(100), strict=False):
+                pass
+            assert arm.enabled.all()
 
 
 def test_an_application_may_go_on_and_decide_itself(cell: Cell) -> None:

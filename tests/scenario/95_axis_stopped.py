@@ -14,10 +14,14 @@ import pytest
 import catenary as cat
 from catenary import events
 from catenary.errors import DriveError
+from catenary.plan.cycle import DatagramKind
 from catenary.plan.stop_reason import StopReason
+from catenary.virtual.faults import garble, lose_frames
+from tests.scenario.cell import Cell
 from tests.scenario.vertical import MS, RESOLUTION, VerticalCell, follow, vertical_cell
 
 ROOT = Path(__file__).resolve().parents[2]
+DATAGRAM_HEADER = 10  # bytes
 LATE = {"cst": "10 ms in CST", "csp": "50 ms in CSP", "csv": "50 ms in CSV"}
 
 PROGRAM = """
@@ -33,6 +37,13 @@ with vertical_cell() as cell:
     finally:
         print(cell.fall(0.0), cell.fall_bound(), cell.powered)
 """
+
+
+def al_status_offset(loop: cat.Loop) -> int:
+    """Return the offset in the cyclic frame of the AL status of all devices."""
+    [frame] = loop.plan.cycle.frames
+    offsets = [d.offset for d in frame.datagrams if d.kind is DatagramKind.AL_STATUS]
+    return offsets[0] + DATAGRAM_HEADER
 
 
 def stopped_events(cell: VerticalCell) -> list[events.AxisStopped]:
@@ -106,3 +117,23 @@ def test_the_reason_is_kept_until_the_next_request() -> None:
             follow(cell, arm, loop, 100).spend(60 * MS)
             follow(cell, arm, loop, 500)
             assert arm.stopped == (StopReason.UNDERRUN,)
+
+
+def test_a_stop_while_the_states_of_the_devices_are_read_is_announced(cell: Cell) -> None:
+    """A reply is garbled: the AL status in it is not OP, and the loop reads the states of all
+    devices. Frames are lost meanwhile, so that the core stops all axes. (Found by the soak.)"""
+    arm = cell.drives()
+    with cat.Loop(arm, on_axis_stopped="event") as loop:
+        for cycle in loop:
+            arm.target.position[:] = arm.actual.position
+            if cycle.number == 100:
+                now = cell.segment.time
+                cell.segment.inject(garble(offset=al_status_offset(loop), n=1, at=now))
+                cell.segment.inject(lose_frames(way="back", at=now + 2.5 * MS, for_=4 * MS))
+            if cycle.number > 200:
+                break
+        assert arm.stopped == (StopReason.DEVICE_LOST,) * 2
+    stops = [event for event in cell.main.events if isinstance(event, events.AxisStopped)]
+    assert [(each.axis, each.reason) for each in stops] == [
+        (name, StopReason.DEVICE_LOST) for name in arm.names
+    ]

@@ -20,6 +20,7 @@ from catenary.core import (
     CYCLE_WORKING_COUNTER,
     GOAL_ENABLED,
     GOAL_QUICK_STOP,
+    GOAL_RESET,
     RECORD_FIELDS,
     Engine,
 )
@@ -196,24 +197,38 @@ class Running:
         self._watches = [self.service.runner.submit(watch.run()) for watch in watches]
 
     def enable(self) -> None:
-        """Enables all axes. Position axes hold when this returns; velocity and torque axes wait for
-        their first targets."""
-        self.views.goal[:] = GOAL_ENABLED
-        self.views.request[:] += 1
+        """Reset faults and enable all axes. Position axes hold when this returns; velocity and
+        torque axes wait for their first targets."""
         in_position = self.views.mode_target == Mode.CSP
+        if (~in_position & self._in_fault()).any():  # their targets would come too late
+            self._request(GOAL_RESET, ~in_position & self._in_fault())
+            self._await(lambda: ~in_position & self._in_fault())
+        self._request(GOAL_ENABLED, np.ones_like(in_position))
+        self._await(lambda: in_position & (self.views.axis_flags & AXIS_FOLLOWED == 0))
+
+    def _request(self, goal: int, axes: npt.NDArray[np.bool_]) -> None:
+        self.views.goal[axes] = goal
+        self.views.request[axes] += 1
+
+    def _in_fault(self) -> npt.NDArray[np.bool_]:
+        """(n,) True for each axis that is in fault or reacts to one."""
+        return np.isin(self.views.axis_state, [int(state) for state in IN_FAULT])
+
+    def _await(self, waiting: Callable[[], npt.NDArray[np.bool_]]) -> None:
+        """Run cycles until no axis is waiting; DriveError names those that still are."""
         patience = max(ENABLE_TIMEOUT_NS, ENABLE_CYCLES * self.plan.cycle.period_ns)
         deadline = self.engine.now() + patience
         while True:
             flags = self.cycle()
             if flags & CYCLE_DROPPED:
                 self._announce_axes()
-            waiting = in_position & (self.views.axis_flags & AXIS_FOLLOWED == 0)
-            if not waiting.any():
+            axes = np.flatnonzero(waiting()).tolist()
+            if not axes:
                 return
             if flags & FATAL or self.engine.al_status != State.OP:
                 self.judge(flags, faults=False)
             if self.engine.now() > deadline:
-                raise self._drive_error(np.flatnonzero(waiting).tolist(), "cannot be enabled")
+                raise self._drive_error(axes, "cannot be enabled")
 
     def refuse_powered_torque(self, call: str) -> None:
         """Raise LoopError for axes that are powered in CST: a waiting call commits no torque."""
@@ -252,6 +267,7 @@ class Running:
             self.laws.raise_failure(self.log())
         if self.engine.al_status != State.OP and not self.watch.excuses:
             self._raise_astray()
+            stops += self._announce_axes(explained=True)  # the flags of its cycles are lost
         states = [state_of(word) for word in self.views.statusword.tolist()]
         faulty = [
             axis
@@ -264,13 +280,16 @@ class Running:
             raise self._drive_error(faulty, "in fault")
         self._raise_stopped([s for s in stops if self.watch.requires(s.device)], faults=faults)
 
-    def _announce_axes(self) -> list[StoppedAxis]:
+    def _announce_axes(self, *, explained: bool = False) -> list[StoppedAxis]:
         """Put one event for each axis that the core stopped unasked and each refused mode.
+
+        Args:
+            explained: True if no flag of a cycle asks for it: see `new_refusals`.
 
         Returns the new stops.
         """
         stops = self._axis_watch.new_stops()
-        refusals = self._axis_watch.new_refusals(explained=bool(stops))
+        refusals = self._axis_watch.new_refusals(explained=explained or bool(stops))
         now = self.engine.now() * 1e-9
         news: list[StoppedAxis | RefusedMode] = [stop for stop in stops if not stop.requested]
         for each in [*news, *refusals]:
