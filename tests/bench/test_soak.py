@@ -14,7 +14,7 @@ import catenary as cat
 from catenary.bench.soak import minute as minutes
 from catenary.bench.soak.cell import ARM, GRIPPER, TOOL, Part, make_segment
 from catenary.bench.soak.commands import DISABLE_OPERATION, ENABLE, QUICK_STOP, Commands
-from catenary.bench.soak.effects import fits, may_end, out_of_reach
+from catenary.bench.soak.effects import disturbed, fits, may_end, out_of_reach
 from catenary.bench.soak.faults import PYTHON_LATE, Incident, draw, told
 from catenary.bench.soak.minute import Minute
 from catenary.bench.soak.run import as_text, soak
@@ -183,6 +183,12 @@ def test_a_cut_isolates_the_rest_of_a_line_and_nothing_of_a_ring() -> None:
 )
 def test_what_is_out_of_reach_in_a_ring(faults: list[Fault], isolated: set[int]) -> None:
     assert out_of_reach(faults, ring=True) == isolated
+
+
+def test_every_second_frame_of_a_ring_may_be_the_same_copy() -> None:
+    faults = [f.LoseFrames(every=2, for_=1.0)]
+    assert disturbed(faults, ring=True) == set(range(7))
+    assert disturbed(faults, ring=False) == set()
 
 
 def test_two_cuts_may_only_isolate_what_is_not_required() -> None:

@@ -28,6 +28,7 @@ WITH_MAILBOX = (*SERVOS, SENSOR)
 OUTPUTS = (LAMPS, GRIPPER)
 COUNTS_PER_TURN = 2**20
 PERIOD = 1e-3  # [s]
+LATE_LIMIT, LATE_LIMIT_TORQUE = 0.05, 0.01  # [s], of the loop; the second one in CST
 AMPLITUDE, FREQUENCY = 0.2, 1.5  # [rad], [rad/s]: motion of the axes
 VELOCITY_LIMIT = 2.0  # [rad/s]
 ACCELERATION = 20.0  # [rad/s²], of fallback and return

@@ -14,6 +14,7 @@ from catenary.bench.soak.cell import (
     AMPLITUDE,
     COUNTS_PER_TURN,
     FREQUENCY,
+    LATE_LIMIT,
     PERIOD,
     TORQUE_LIMIT,
     VELOCITY_LIMIT,
@@ -25,9 +26,9 @@ from catenary.virtual import _segment as compiled
 COUNT = 2 * math.pi / COUNTS_PER_TURN  # [rad]
 SETTLED = 8  # cycles after enabling: the core's view of the drive is some cycles old
 ENABLE, QUICK_STOP, DISABLE_OPERATION = 0x0F, 0x02, 0x07
-# A return ends within one step of velocity and one of position: two steps at once at most. The
-# application's own acceleration and the rounding of three positions come on top.
-OWN = AMPLITUDE * FREQUENCY**2
+# The application changes its velocity while it is late, and the core learns of it in one cycle. A
+# return ends within one step of velocity and one of position. Three positions are rounded.
+OWN = AMPLITUDE * FREQUENCY**2 * LATE_LIMIT / PERIOD
 FASTEST_CHANGE = {
     "csp": 2 * ACCELERATION + OWN + 2 * COUNT / PERIOD**2,
     "csv": ACCELERATION + OWN + COUNT / PERIOD,

@@ -53,6 +53,8 @@ def disturbed(faults: Iterable[Fault], *, ring: bool) -> frozenset[int]:
         match fault:
             case f.Garble() | f.Delay() | f.Duplicate():
                 return ALL_DEVICES
+            case f.LoseFrames(every=2) | f.Corrupt(every=2) if ring:
+                return ALL_DEVICES  # of the two copies of each frame, always the same is hit
             case f.LeaveState() | f.RefuseState():
                 found.add(fault.device)
             case _:

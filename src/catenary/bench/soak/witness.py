@@ -15,6 +15,8 @@ from typing import NamedTuple
 from catenary.bench.soak.cell import (
     COUPLER,
     DEVICES,
+    LATE_LIMIT,
+    LATE_LIMIT_TORQUE,
     OPTIONAL,
     PERIOD,
     POWERED,
@@ -31,7 +33,6 @@ from catenary.virtual import faults as f
 LOOK = 1_000_000  # [ns] between two looks
 OP, AL_STATE = 8, 0x0F
 WATCHDOG, WATCHDOG_TORQUE = 0.1, 0.01  # [s], of the loop; the second one in CST
-LATE_LIMIT, LATE_LIMIT_TORQUE = 0.05, 0.01  # [s], of the loop; the second one in CST
 MARGIN = 0.003  # [s]: steps of device models and looks
 BRAKING = 0.1  # [s] that a drive may take to stand
 STILL = 0.05  # [rad/s]
