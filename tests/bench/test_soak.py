@@ -12,7 +12,7 @@ import pytest
 
 import catenary as cat
 from catenary.bench.soak import minute as minutes
-from catenary.bench.soak.cell import ARM, GRIPPER, TOOL, Part, make_segment
+from catenary.bench.soak.cell import GRIPPER, TOOL, Part, make_segment
 from catenary.bench.soak.commands import DISABLE_OPERATION, ENABLE, QUICK_STOP, Commands
 from catenary.bench.soak.effects import disturbed, fits, may_end, out_of_reach
 from catenary.bench.soak.faults import PYTHON_LATE, Incident, draw, told
@@ -24,8 +24,8 @@ from catenary.cli.main import main
 from catenary.loop.running import Running
 from catenary.loop.watch import Watch
 from catenary.virtual import DigitalOutputs, Fault, Segment, Servo
-from catenary.virtual import _segment as compiled
 from catenary.virtual import faults as f
+from catenary.virtual.devices.servo import Received
 
 SEED = 7
 LINE, RING, CLOCKS = Setting(), Setting("ring"), Setting("line", True)
@@ -255,13 +255,12 @@ def test_a_jump_of_the_command_is_found(monkeypatch: pytest.MonkeyPatch, mode: M
 def test_zero_torque_in_the_frame_that_stops_is_found(
     word: int, torque: int, found: list[str]
 ) -> None:
-    slots = {compiled.SLOT_CONTROLWORD: ENABLE, compiled.SLOT_TARGET_TORQUE: 150}
-    core = SimpleNamespace(slot=lambda position, number: slots[number])
-    servo = SimpleNamespace(outputs_taken_ns=0, rated_torque=2.0)
-    commands = Commands(cast("Segment", SimpleNamespace(core=core)), ARM[0], "cst")
+    received = Received(ENABLE, 0, 0, 150)
+    servo = SimpleNamespace(outputs_taken_ns=0, rated_torque=2.0, received=lambda: received)
+    commands = Commands("cst")
     broken = commands.look(cast("Servo", servo), "OPERATION ENABLED")
     servo.outputs_taken_ns += 1_000_000
-    slots |= {compiled.SLOT_CONTROLWORD: word, compiled.SLOT_TARGET_TORQUE: torque}
+    received = Received(word, 0, 0, torque)
     broken += commands.look(cast("Servo", servo), "QUICK STOP ACTIVE")
     assert [invariant for invariant, _ in broken] == found
 

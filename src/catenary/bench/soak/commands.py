@@ -20,8 +20,7 @@ from catenary.bench.soak.cell import (
     VELOCITY_LIMIT,
 )
 from catenary.bench.soak.setting import Mode
-from catenary.virtual import Segment, Servo
-from catenary.virtual import _segment as compiled
+from catenary.virtual import Servo
 
 COUNT = 2 * math.pi / COUNTS_PER_TURN  # [rad]
 SETTLED = 8  # cycles after enabling: the core's view of the drive is some cycles old
@@ -51,9 +50,7 @@ class Taken(NamedTuple):
 class Commands:
     """Owns the commands that one servo took last while it was enabled."""
 
-    def __init__(self, segment: Segment, position: int, mode: Mode) -> None:
-        self._segment = segment
-        self._position = position
+    def __init__(self, mode: Mode) -> None:
         self._mode = mode
         self.reset()
 
@@ -84,16 +81,14 @@ class Commands:
         taken_ns = servo.outputs_taken_ns
         if taken_ns is None:
             return None
-        core, position = self._segment.core, self._position
-        torque = core.slot(position, compiled.SLOT_TARGET_TORQUE)
+        received = servo.received()
         if self._mode == "csp":
-            command = core.slot(position, compiled.SLOT_TARGET_POSITION) * COUNT
+            command = received.position * COUNT
         elif self._mode == "csv":
-            command = core.slot(position, compiled.SLOT_TARGET_VELOCITY) * COUNT
+            command = received.velocity * COUNT
         else:
-            command = torque * 1e-3 * servo.rated_torque
-        controlword = core.slot(position, compiled.SLOT_CONTROLWORD)
-        return Taken(taken_ns, controlword & 0xFFFF, command, torque)
+            command = received.torque * 1e-3 * servo.rated_torque
+        return Taken(taken_ns, received.controlword & 0xFFFF, command, received.torque)
 
     def _stop(self, last: Taken, taken: Taken) -> list[Broken]:
         """Judge the frame that carries a stop."""

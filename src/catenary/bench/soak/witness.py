@@ -79,7 +79,7 @@ class Witness:
         torque = setting.mode == "cst"
         self._late_limit = LATE_LIMIT_TORQUE if torque else LATE_LIMIT
         self._watchdogs = {p: WATCHDOG_TORQUE if torque else WATCHDOG for p in SERVOS}
-        self._commands = {p: Commands(segment, p, setting.mode) for p in SERVOS}
+        self._commands = {p: Commands(setting.mode) for p in SERVOS}
         self._left = 0.0
         self._running_since = inf
         self._quiet_since = 0.0  # end of the last incident; infinity during one

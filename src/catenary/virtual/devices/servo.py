@@ -8,6 +8,7 @@ torques per mille of the rated one.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from catenary.virtual import _segment
 from catenary.virtual._motors import Motors
@@ -73,6 +74,23 @@ def _pdo(index: int, name: str, objects: tuple[int, ...], axis: int, sync_manage
         for o in objects
     )
     return Pdo(index + PDO_STRIDE * axis, name, entries, sync_manager)
+
+
+class Received(NamedTuple):
+    """Outputs of one axis: raw numbers of its objects."""
+
+    controlword: int  # 0x6040
+    position: int  # 0x607A, counts
+    velocity: int  # 0x60FF, counts per second
+    torque: int  # 0x6071, per mille of the rated torque
+
+
+RECEIVED_SLOTS = (
+    _segment.SLOT_CONTROLWORD,
+    _segment.SLOT_TARGET_POSITION,
+    _segment.SLOT_TARGET_VELOCITY,
+    _segment.SLOT_TARGET_TORQUE,
+)
 
 
 class Servo(AppliedDevice):
@@ -362,6 +380,11 @@ class Servo(AppliedDevice):
     def torque_nm(self) -> float:
         """The first axis' motor torque [N·m]."""
         return self._motors.state(self.position, 0)[2]
+
+    def received(self, axis: int = 0) -> Received:
+        """Return the outputs that the axis works with now, as raw numbers."""
+        first = _segment.SLOTS_PER_AXIS * axis
+        return Received(*(self.core.slot(self.position, first + slot) for slot in RECEIVED_SLOTS))
 
     def drive_state(self, axis: int = 0) -> str:
         """The state of the CiA 402 machine, in the standard's words."""
