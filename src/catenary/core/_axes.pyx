@@ -100,12 +100,12 @@ cdef inline void read_position(axis_t *a, const uint8_t *inputs, double elapsed)
 
 cdef inline double demand_error(axis_t *a, const uint8_t *inputs) noexcept nogil:
     """Return demanded minus actual position; both count modulo the width of their types."""
-    cdef int64_t raw
+    cdef uint64_t raw
     if a.position_demand.kind == REAL_KIND or a.actual_position.kind == REAL_KIND:
         return number_value(&a.position_demand, inputs) - a.position
-    raw = number_integer(&a.position_demand, inputs) - <int64_t>a.last_raw
-    raw = (raw << a.position_demand.right) >> a.position_demand.right
-    return <double>raw * a.position_demand.scale
+    raw = <uint64_t>number_integer(&a.position_demand, inputs) - a.last_raw
+    return <double>((<int64_t>(raw << a.position_demand.right)) >> a.position_demand.right) \
+        * a.position_demand.scale
 
 
 cdef inline void read_axis(axes_t *x, axis_t *a, const uint8_t *inputs,
