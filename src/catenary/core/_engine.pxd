@@ -32,7 +32,7 @@ cdef class Engine:
     cdef dict _buffers
     cdef bint virtual          # the link's time is virtual: everything in the caller's thread
     cdef uint16_t device_count
-    cdef bint alone            # nobody else lives by that time: waits keep the GIL
+    cdef bint alone            # no other program shares the virtual time: waits keep the GIL
     cdef Figures figures
     cdef Law law               # runs, or its end has not been seen yet; None: Python says the targets
     cdef list laws             # those the cycle may know

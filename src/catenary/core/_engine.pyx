@@ -48,7 +48,6 @@ from catenary.core._handover cimport (
     LAW_FAILED,
     NONE,
     PRIVATE,
-    STICKY,
     STOPPED,
     TARGETS,
     Handover,

@@ -19,7 +19,7 @@ from libc.stdlib cimport calloc, free
 from libc.string cimport memcpy
 
 from catenary.core._axes cimport axes_t
-from catenary.core._guard cimport POSITION, TORQUE, VELOCITY, quantity_of
+from catenary.core._guard cimport TORQUE, VELOCITY, quantity_of
 from catenary.core._handover cimport actual_t, target_t
 from catenary.core._memory cimport cat_memory_free, memory_take
 from catenary.core._native cimport (
