@@ -15,6 +15,7 @@ from catenary.virtual.devices import (
 from catenary.virtual.devices.servo_quirks import ServoQuirks
 from catenary.virtual.fault_player import FaultEvent, Loss
 from catenary.virtual.faults import Fault
+from catenary.virtual.mapping_quirks import MappingQuirks
 from catenary.virtual.plant import Joint, Plant
 from catenary.virtual.segment import FrameCounters, Segment, demo_segment
 from catenary.virtual.server import Server, serve
@@ -32,6 +33,7 @@ __all__ = [
     "Joint",
     "Junction",
     "Loss",
+    "MappingQuirks",
     "Plant",
     "Segment",
     "Server",

@@ -26,7 +26,7 @@ import msgspec
 
 from catenary.errors import ConfigurationError
 from catenary.virtual.crystal import ClockBits, Crystal
-from catenary.virtual.devices.analog_inputs import AnalogInputs
+from catenary.virtual.devices.analog_inputs import AnalogInputs, SecondPdo
 from catenary.virtual.devices.coupler import Coupler
 from catenary.virtual.devices.device import Device
 from catenary.virtual.devices.digital_inputs import DigitalInputs
@@ -35,6 +35,7 @@ from catenary.virtual.devices.junction import Junction
 from catenary.virtual.devices.servo import Servo
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
 from catenary.virtual.faults import Fault
+from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 from catenary.virtual.plant import STEP, Joint, Plant
 from catenary.virtual.segment import ClockKind, Segment
 from catenary.virtual.wiring import Place
@@ -122,6 +123,8 @@ class AnalogInputsTable(_ClockedTable, tag="analog_inputs", frozen=True, kw_only
     mailbox_bytes: int = 128
     mailbox_delay: float = 300e-6
     lrw: bool = True
+    second_pdo: SecondPdo = "none"
+    mapping: MappingQuirks = NO_MAPPING_QUIRKS
 
     def device(self) -> Device:
         return AnalogInputs(
@@ -134,6 +137,8 @@ class AnalogInputsTable(_ClockedTable, tag="analog_inputs", frozen=True, kw_only
             lrw=self.lrw,
             crystal=self.crystal.crystal(),
             clock_bits=self.clock_bits,
+            second_pdo=self.second_pdo,
+            mapping=self.mapping,
         )
 
 
@@ -154,6 +159,7 @@ class ServoTable(_ClockedTable, tag="servo", frozen=True, kw_only=True):
     lrw: bool = True
     sync_missed_limit: int = 3
     quirks: ServoQuirks = NO_QUIRKS
+    mapping: MappingQuirks = NO_MAPPING_QUIRKS
 
     def device(self) -> Device:
         return Servo(
@@ -178,6 +184,7 @@ class ServoTable(_ClockedTable, tag="servo", frozen=True, kw_only=True):
             clock_bits=self.clock_bits,
             sync_missed_limit=self.sync_missed_limit,
             quirks=self.quirks,
+            mapping=self.mapping,
         )
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
+
 # Private: no vendor of the EtherCAT Technology Group has this identity ("CTNY" in ASCII).
 VENDOR_ID = 0x43544E59
 
@@ -74,3 +76,4 @@ class Description:
     current_milliampere: int = 0
     identification: int = 0
     ports: tuple[int, ...] = (0, 1)
+    mapping: MappingQuirks = NO_MAPPING_QUIRKS

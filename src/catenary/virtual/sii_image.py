@@ -19,6 +19,7 @@ STRINGS, GENERAL, FMMU, SYNC_MANAGER, TX_PDO, RX_PDO, CLOCK, END = (
     60,
     0xFFFF,
 )
+FIXED_CONTENT = 0x0010  # of a PDO's flags
 COE_PROTOCOL = 0x0004
 HEADER_BYTES = 128
 
@@ -86,12 +87,12 @@ def _general(device: Description, strings: _Strings) -> bytes:
     )
 
 
-def _pdos(pdos: Sequence[Pdo], strings: _Strings) -> bytes:
+def _pdos(pdos: Sequence[Pdo], strings: _Strings, flags: int) -> bytes:
     out = b""
     for pdo in pdos:
         count, sync_manager = len(pdo.entries), pdo.sync_manager
         out += struct.pack(
-            "<HBBBBH", pdo.index, count, sync_manager, 0, strings.number(pdo.name), 0
+            "<HBBBBH", pdo.index, count, sync_manager, 0, strings.number(pdo.name), flags
         )
         for e in pdo.entries:
             name = strings.number(e.name)
@@ -119,8 +120,9 @@ def make_sii_image(device: Description) -> bytes:
     )
     parts.append((SYNC_MANAGER, managers))
     # All PDOs of a direction in one category, as in real terminals: SOEM reads no second one.
-    parts.append((TX_PDO, _pdos(device.tx_pdos, strings)))
-    parts.append((RX_PDO, _pdos(device.rx_pdos, strings)))
+    flags = FIXED_CONTENT if device.mapping.fixed_pdos == "declared" else 0
+    parts.append((TX_PDO, _pdos(device.tx_pdos, strings, flags)))
+    parts.append((RX_PDO, _pdos(device.rx_pdos, strings, flags)))
     if device.clock and device.axes:
         parts.append((CLOCK, _clock(strings)))
     parts.insert(0, (STRINGS, strings.encode()))

@@ -66,8 +66,8 @@ RAM_START, RAM_END = 0x1000, 0x3000
 BLOB_BYTES = 2048  # an object larger than any usual mailbox
 
 
-def mailbox_of(size: int) -> MailboxDefault:
-    return MailboxDefault(RAM_START, size, RAM_START + size, size, 0x2F)
+def mailbox_of(size: int, coe_details: int = 0x2F) -> MailboxDefault:
+    return MailboxDefault(RAM_START, size, RAM_START + size, size, coe_details)
 
 
 def process_data_areas(mailbox_size: int) -> tuple[int, int, int]:
@@ -123,7 +123,9 @@ class Application:
         self._add_communication_objects(description)
         out, into, room = process_data_areas(box.receive_size)
         self._areas = (out, into)
-        self.pdos = PdoObjects(self.dictionary, description.rx_pdos, description.tx_pdos, room)
+        self.pdos = PdoObjects(
+            self.dictionary, description.rx_pdos, description.tx_pdos, room, description.mapping
+        )
         self._sdo = SdoServer(self.dictionary, size=box.send_size - HEADER.size)
         self._information = InformationServer(self.dictionary, size=box.send_size - HEADER.size)
         self.mailbox = Mailbox(self, scheduler, self._serve_coe, delay_ns=delay_ns)

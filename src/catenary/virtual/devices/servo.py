@@ -39,6 +39,7 @@ from catenary.virtual.devices.servo_objects import (
 )
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
 from catenary.virtual.devices.synchronisation import Synchronisation
+from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 from catenary.virtual.scheduler import Scheduler
 
 STEP_NS = 250_000
@@ -122,11 +123,12 @@ class Servo(AppliedDevice):
         lrw: bool = True,
         sync_missed_limit: int = 3,
         quirks: ServoQuirks = NO_QUIRKS,
+        mapping: MappingQuirks = NO_MAPPING_QUIRKS,
     ) -> None:
         """Units: kg·m², N·m·s/rad, N·m, rad/s, rad; `max_torque_ratio` of the rated torque;
         `velocity_counts_per_turn`: the unit of 0x606C and 0x60FF, a turn a second;
         `sync_missed_limit`: SYNC0 pulses in a row without new outputs that are an error;
-        `quirks`: how the drive differs from the profile."""
+        `quirks`: how the drive differs from the profile; `mapping`: quirks of its PDOs."""
         super().__init__(
             name=name,
             alias=alias,
@@ -166,6 +168,7 @@ class Servo(AppliedDevice):
         self.position_limits = position_limits
         self.sync_missed_limit = sync_missed_limit
         self.quirks = quirks
+        self.mapping = mapping
         self._inertias = [inertia] * axes  # what the loops are tuned for
 
     def _pdos(
@@ -194,7 +197,7 @@ class Servo(AppliedDevice):
             alias=self.alias,
             emulation=False,
             pdi_type=0x05,
-            mailbox=mailbox_of(self.mailbox_bytes),
+            mailbox=mailbox_of(self.mailbox_bytes, self.mapping.coe_details),
             sync_managers=sync_managers_of(
                 self.mailbox_bytes, rx, tx, watchdog_trigger=self.quirks.watchdog_trigger
             ),
@@ -204,6 +207,7 @@ class Servo(AppliedDevice):
             clock=True,
             axes=self.axes,
             slots=self.axes * _segment.SLOTS_PER_AXIS,
+            mapping=self.mapping,
         )
 
     def started(self, scheduler: Scheduler) -> None:
