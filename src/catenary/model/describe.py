@@ -131,6 +131,8 @@ def _mailbox(sii: Sii) -> MailboxLayout | None:
     if not (receive.size and send.size):
         return None
     coe = sii.general.coe if sii.general else CoeDetails(0)
+    # Details that were never filled in deny nothing; so IgH, fsm_pdo.c (`has_general`).
+    unknown = coe == CoeDetails(0)
     protocols = MailboxProtocol(sii.header.mailbox_protocols & 0x3F)
     return MailboxLayout(
         receive.offset,
@@ -140,8 +142,8 @@ def _mailbox(sii: Sii) -> MailboxLayout | None:
         protocols,
         complete_access=CoeDetails.COMPLETE_ACCESS in coe,
         sdo_information=CoeDetails.SDO_INFORMATION in coe,
-        pdo_assign=CoeDetails.PDO_ASSIGN in coe,
-        pdo_configuration=CoeDetails.PDO_CONFIGURATION in coe,
+        pdo_assign=unknown or CoeDetails.PDO_ASSIGN in coe,
+        pdo_configuration=unknown or CoeDetails.PDO_CONFIGURATION in coe,
     )
 
 

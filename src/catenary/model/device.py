@@ -105,8 +105,9 @@ class Pdo:
     entries: tuple[Entry, ...]
     sync_manager: int | None  # assigned to by default; None: not
     fixed: bool = False  # its entries cannot be changed
-    mandatory: bool = False
+    mandatory: bool = False  # cannot be taken out of the assignment
     name: str = ""
+    excludes: frozenset[int] = frozenset()  # PDOs that cannot be assigned with it (ESI `Exclude`)
 
     @property
     def bit_length(self) -> int:
@@ -119,6 +120,7 @@ class Assignment:
 
     sync_manager: int
     pdos: tuple[Pdo, ...]
+    fixed: bool = False  # its list of PDOs (0x1C10 + SyncManager) cannot be changed
 
     @property
     def bit_length(self) -> int:
@@ -140,6 +142,14 @@ class ObjectInformation:
     output_mappable: bool = True  # as RxPDO
     input_mappable: bool = True  # as TxPDO
     name: str = ""
+
+
+class ObjectValue(NamedTuple):
+    """The value of an entry of the dictionary when it was read; None: it could not be read."""
+
+    index: int
+    subindex: int
+    data: bytes | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,8 +178,9 @@ class DeviceDescription:
     device_type: int | None = None  # object 0x1000
     slots: tuple[int, ...] = ()  # CiA 402 axes: objects + 0x800·slot
     objects: tuple[ObjectInformation, ...] = ()  # what has been asked of the dictionary
+    values: tuple[ObjectValue, ...] = ()  # of objects that a start-up list would write
     mapping_source: str = "SII"  # or "CoE"
-    notes: tuple[str, ...] = ()  # what is odd about its SII
+    notes: tuple[str, ...] = ()  # what is odd about its SII, or differs from its dictionary
 
     @property
     def profile(self) -> int | None:
@@ -199,6 +210,12 @@ class DeviceDescription:
         for known in self.objects:
             if (known.index, known.subindex) == (index, subindex):
                 return known
+        return None
+
+    def known_value(self, index: int, subindex: int) -> bytes | None:
+        for value in self.values:
+            if (value.index, value.subindex) == (index, subindex):
+                return value.data
         return None
 
     def __str__(self) -> str:
