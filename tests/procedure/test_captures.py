@@ -10,7 +10,7 @@ import pytest
 
 from catenary.model.device import Assignment, MailboxLayout, Pdo
 from catenary.model.topology import open_ports, tree
-from catenary.plan.mapping import Mapping
+from catenary.plan.pdo_mapping import Mapping
 from catenary.plan.start_up import mapping_downloads
 from catenary.procedure.exchange import Reply, Request
 from catenary.procedure.mailbox import MailboxChannel

@@ -14,7 +14,7 @@ from catenary.procedure.al_state import request_state
 from catenary.procedure.configure import configure_mailbox
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
-from catenary.procedure.pdo import read_mapping
+from catenary.procedure.pdo_offers import read_first_mapping
 from catenary.procedure.profile import read_profile
 from catenary.procedure.sii import read_image
 from catenary.procedure.sii_owner import hand_over
@@ -42,7 +42,7 @@ def find(registers: StationRegisters) -> Procedure[Found]:
 
 
 def bring_to_pre_op(device: DeviceDescription) -> Procedure[Found]:
-    """Opens the mailbox, asks for PRE-OP and reads the profile."""
+    """Opens the mailbox, asks for PRE-OP and reads the profile and the mapping."""
     station = Station(device.position, device.station_address, device.name)
     if device.mailbox is None:
         yield from hand_over(station)
@@ -54,8 +54,7 @@ def bring_to_pre_op(device: DeviceDescription) -> Procedure[Found]:
     yield from request_state(station, State.PRE_OP)
     if device.coe:
         device = yield from read_profile(channel, device)
-    if device.coe and not (device.outputs or device.inputs):
-        device = yield from read_mapping(channel, device)  # an SII without PDOs
+        device = yield from read_first_mapping(channel, device)
     return Found(device, channel)
 
 

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from catenary.drive import start_up
 from catenary.drive.arguments import (
     AxisSource,
+    PdoList,
     axis_modes,
     axis_name,
     axis_sources,
@@ -21,6 +22,7 @@ from catenary.drive.arguments import (
     mode_of,
     named_columns,
     warn_of_default_velocity,
+    written_pdos,
 )
 from catenary.drive.axis import MEASURED, Axis, column_bank
 from catenary.drive.homing import HomingMethod, Timed, run_homing
@@ -58,6 +60,9 @@ class Drives:
       enable them again when it is `present`.
     - `every`: cycles of the loop between two exchanges.
     - `dc`: distributed clocks. True: as each device's SII states; or a `DC` for all of them.
+    - `pdos`: PDOs of each device, instead of a search: `[0x1701, 0x1B01]`, or with their entries
+      `{0x1600: [(0x6040, 0, 16), (0x607A, 0, 32)]}` (index, subindex, bits). They are written even
+      if the SII says that this is impossible. A direction without PDOs here is searched.
 
     Options with one value for all axes, or a sequence of one per axis:
 
@@ -121,6 +126,7 @@ class Drives:
         required: bool = True,
         every: int = 1,
         dc: DC | bool = False,
+        pdos: PdoList = (),
     ) -> None:
         sources = axis_sources(subs)
         n = len(sources)
@@ -147,6 +153,7 @@ class Drives:
             if on_loss is None or isinstance(on_loss, str)
             else one_each("on_loss", on_loss, n),
         )
+        written = written_pdos(pdos)
         first_modes = (mode,) * n if isinstance(mode, str) else one_each("mode", mode, n)
         self.subs = tuple(sub for sub, _ in sources)
         self._columns = named_columns(columns)
@@ -165,6 +172,7 @@ class Drives:
                 every=cycles_between("every", every),
                 required=required,
                 homing=home,
+                pdos=written,
             )
             for (sub, slot), first, unit, limits, home in zip(
                 sources,

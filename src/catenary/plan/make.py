@@ -13,11 +13,12 @@ from catenary.plan.cycle import CyclePlan, FollowedClock, Order, ReceiveMode, Sy
 from catenary.plan.frames import acyclic_wire_time_ns, cyclic_wire_time_ns, make_frames
 from catenary.plan.layout import EXACT_UNIT_MAX, UNIT_MAX, DeviceData, Layout, make_layout
 from catenary.plan.mailboxes import MailboxArea, with_mailboxes
-from catenary.plan.mapping import Mapping, make_mapping
+from catenary.plan.mapping import make_mapping
+from catenary.plan.pdo_mapping import Mapping
 from catenary.plan.report import report
 from catenary.plan.start_up import DevicePlan, make_device_plan
 from catenary.plan.watchdog import choose_watchdog
-from catenary.plan.wish import DC, ObjectReference, PdoWish, Wish, WishTables
+from catenary.plan.wish import DC, ObjectReference, PdoWish, Wish, WishTables, WrittenPdo
 from catenary.wire.cia402 import Mode
 
 
@@ -176,6 +177,7 @@ def gather_wishes(wishes: Sequence[Wish], period_ns: int) -> dict[int, PdoWish]:
                 _one_clock(position, before.clock, pdos.clock),
                 math.gcd(before.every, pdos.every),
                 before.required or pdos.required,
+                _one_mapping(position, before.pdos, pdos.pdos),
             )
     return gathered
 
@@ -203,6 +205,22 @@ def _one_clock(position: int, first: DC | None, second: DC | None) -> DC | None:
             hint="give both the same dc=",
         )
     return first if second is None else second
+
+
+def _one_mapping(
+    position: int, first: tuple[WrittenPdo, ...], second: tuple[WrittenPdo, ...]
+) -> tuple[WrittenPdo, ...]:
+    """Return the PDOs that two requests write down: per direction, one of them or both alike."""
+    directions = {pdo.direction for pdo in first} & {pdo.direction for pdo in second}
+    for direction in directions:
+        if [p for p in first if p.direction is direction] != [
+            p for p in second if p.direction is direction
+        ]:
+            raise ConfigurationError(
+                f"device {position}: two requests write down different PDOs for {direction.noun}",
+                hint="give both the same pdos=, or only one of them",
+            )
+    return first + tuple(pdo for pdo in second if pdo not in first)
 
 
 def _clock_wishes(asked: dict[int, PdoWish]) -> dict[int, DC]:
@@ -241,8 +259,8 @@ def _merged(
 
 def _mappings(device: DeviceDescription, wish: PdoWish) -> tuple[Mapping, Mapping]:
     return (
-        make_mapping(device, Direction.OUTPUT, wish.outputs),
-        make_mapping(device, Direction.INPUT, wish.inputs),
+        make_mapping(device, Direction.OUTPUT, wish.outputs, wish.written(Direction.OUTPUT)),
+        make_mapping(device, Direction.INPUT, wish.inputs, wish.written(Direction.INPUT)),
     )
 
 

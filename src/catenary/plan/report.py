@@ -78,8 +78,12 @@ def _devices(devices: Sequence[DevicePlan]) -> Iterator[str]:
             yield f"    {_sync(device.sync)}"
         yield from _entries(Direction.OUTPUT, device.outputs, place.output_offset)
         yield from _entries(Direction.INPUT, device.inputs, place.input_offset)
+        if device.left_out:
+            yield f"    not exchanged (optional): {', '.join(device.left_out)}"
         if device.downloads:
             yield f"    {len(device.downloads)} SDO downloads before SAFE-OP"
+        for what, old, new in device.changes:
+            yield f"        {what}  {old or '(not read)'} → {new}"
 
 
 def _axes(cycle: CyclePlan, axes: Sequence[AxisReport]) -> Iterator[str]:

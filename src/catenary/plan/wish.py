@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
+from catenary.model.device import Direction
 from catenary.plan.axis_report import AxisReport
 from catenary.plan.cycle import AxisPlan, Column, Number
 
@@ -23,6 +24,8 @@ Bytes = npt.NDArray[np.uint8]
 Modes = npt.NDArray[np.int8]
 Cycles = npt.NDArray[np.uint64]
 
+TX_PDOS = 0x1A00  # indices of TxPDOs begin here (inputs); RxPDOs from 0x1600 (outputs)
+
 
 @dataclass(frozen=True, slots=True)
 class ObjectReference:
@@ -33,6 +36,18 @@ class ObjectReference:
     subindex: int
     bit_length: int
     required: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenPdo:
+    """A PDO that the application wrote down. `entries`: None: as the device has it."""
+
+    index: int
+    entries: tuple[ObjectReference, ...] | None = None
+
+    @property
+    def direction(self) -> Direction:
+        return Direction.OUTPUT if self.index < TX_PDOS else Direction.INPUT
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +67,7 @@ class DC:
 @dataclass(frozen=True, slots=True)
 class PdoWish:
     """The objects one device must exchange every cycle. What is mapped already stays as it is;
-    the mapping is changed only where something wished for is missing.
+    the mapping is changed only where a wanted object is missing, or as `pdos` says.
 
     A device that several wishes name is exchanged as often as any of them asks, and is required
     when any of them requires it.
@@ -66,13 +81,33 @@ class PdoWish:
     clock: DC | None = None
     every: int = 1  # exchanged every so many cycles
     required: bool = True  # the cycle is not good without it
+    pdos: tuple[WrittenPdo, ...] = ()  # exactly these, in directions that have any; else a search
+
+    def written(self, direction: Direction) -> tuple[WrittenPdo, ...]:
+        """Return the PDOs of a direction that the application wrote down."""
+        return tuple(pdo for pdo in self.pdos if pdo.direction is direction)
+
+
+class Which(NamedTuple):
+    """Which one is meant where an object is mapped more than once. 0: any."""
+
+    pdo: int = 0
+    bit_length: int = 0
+    rank: int = 0  # among those that are alike
+
+
+ANY = Which()
 
 
 class ImageLayout(Protocol):
-    """Where the mapped objects ended up."""
+    """The places of the mapped objects: of `which`, or else one of the same object."""
 
-    def output(self, device: int, index: int, subindex: int) -> Number | None: ...
-    def input(self, device: int, index: int, subindex: int) -> Number | None: ...
+    def output(
+        self, device: int, index: int, subindex: int, which: Which = ANY
+    ) -> Number | None: ...
+    def input(
+        self, device: int, index: int, subindex: int, which: Which = ANY
+    ) -> Number | None: ...
     def sync_unit(self, device: int) -> int: ...
 
 

@@ -9,7 +9,7 @@ from typing import Protocol
 from catenary.errors import ConfigurationError, DriveError, MappingError
 from catenary.model.device import DeviceDescription, Direction, mapped_entries
 from catenary.plan.cycle import Bank, Column, NumberKind
-from catenary.plan.wish import ImageLayout, ObjectReference, PdoWish, WishTables
+from catenary.plan.wish import ImageLayout, ObjectReference, PdoWish, Which, WishTables
 from catenary.wire.cia402 import Mode, Object, State, state_of
 
 COMMANDS = {
@@ -270,7 +270,8 @@ def columns_of(slaves: Sequence[SlaveBase], layout: ImageLayout) -> WishTables:
     for slave in slaves:
         for each in slave.objects:
             find = layout.output if each.direction is Direction.OUTPUT else layout.input
-            number = find(slave.position, each.index, each.subindex)
+            which = Which(bit_length=each.bit_length)
+            number = find(slave.position, each.index, each.subindex, which)
             if number is None:
                 continue
             kind = NumberKind.SIGNED if each.signed else NumberKind.UNSIGNED
