@@ -36,7 +36,7 @@ def asking(*inputs: ObjectReference, pdos: tuple[WrittenPdo, ...] = ()) -> Askin
 
 
 def assigned(main: MainDevice, index: int) -> list[int]:
-    """What the device itself has in 0x1C12 or 0x1C13."""
+    """Return the list 0x1C12 or 0x1C13 of the device itself."""
     sdo = main.subs[1].sdo
     return [sdo.read(index, k + 1, type=UINT) for k in range(sdo.read(index, 0, type=USINT))]
 

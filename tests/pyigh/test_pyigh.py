@@ -116,6 +116,19 @@ def test_inputs_and_outputs() -> None:
             buttons.read_analog(0)
 
 
+def test_an_object_that_is_mapped_twice_is_one_channel() -> None:
+    gauges = cat.AnalogInputs(channels=1, second_pdo="twice")
+    terminal = SlaveIO(0)
+    with MasterBase(cat.Segment([gauges])) as master:
+        activated(master, terminal)
+        gauges.apply_volts(0, 5.0)
+        for _ in range(20):
+            cycle(master)
+        assert terminal.read_analog(0) == 0x4000
+        with pytest.raises(ValueError, match="analogue channel 1"):
+            terminal.read_analog(1)
+
+
 def test_any_object(library: Path) -> None:
     double = Double(library)
     double.set(0, 0x6077, 0, 0xFFFE)

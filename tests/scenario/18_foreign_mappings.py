@@ -1,6 +1,6 @@
-"""Drives and terminals whose mapping is not ours to change: other PDOs at power-up than the SII
-says, PDOs that are fixed, alternatives that exclude each other, one object in two PDOs.
-The axes move, the terminals are read, and nothing is written that nobody asked for.
+"""Drives and terminals with a mapping that must stay: other PDOs at power-up than the SII says,
+PDOs that are fixed, alternatives that exclude each other, one object in two PDOs.
+The axes move, the terminals are read, and nothing is written without a request.
 """
 
 from __future__ import annotations

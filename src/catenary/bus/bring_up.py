@@ -91,7 +91,7 @@ def _describe(sub: SubDevice, wish: PdoWish) -> Procedure[DeviceDescription]:
 def _with_objects(
     channel: MailboxChannel, device: DeviceDescription, missing: Sequence[ObjectReference]
 ) -> Procedure[DeviceDescription]:
-    """What the dictionary says of the objects that are not mapped."""
+    """Return the description with the dictionary's entries of the missing objects."""
     for reference in missing:
         if device.known_object(reference.index, reference.subindex) is None:
             found = yield from read_object(channel, device, reference.index, reference.subindex)

@@ -13,6 +13,7 @@ from catenary.errors import MappingError
 from catenary.model.device import Assignment, DeviceDescription, Direction, Entry, Pdo
 from catenary.plan.cycle import Bank, Column, NumberKind
 from catenary.plan.pdo_rewrite import write_down
+from catenary.plan.pdo_search import pdo_names
 from catenary.plan.wish import (
     ANY,
     DC,
@@ -92,7 +93,7 @@ class _Channels:
         return value
 
     def pdos(self, period_ns: int) -> Mapping[int, PdoWish]:
-        """What is mapped already: nothing changes on the device, except by `pdos`."""
+        """Request what is mapped already, or `pdos`: without them nothing changes on the device."""
         wishes: dict[int, PdoWish] = {}
         for sub in self.subs:
             mine = tuple(reference(c.entry) for c in self._channels if c.device == sub.position)
@@ -195,7 +196,10 @@ def channels(
         for pdo, entry in number_entries(assignment)
     ]
     if not found:
-        raise ValueError(f"no {direction.name.lower()} process data in the devices given")
+        raise ValueError(
+            f"no {direction.name.lower()} process data in the devices given"
+            f"{_choice(devices, direction)}"
+        )
     names = unique_names([(e.name, pdo.name, str(device.position)) for device, pdo, e in found])
     for name in scale:
         if name not in names:
@@ -210,10 +214,16 @@ def channels(
     return tuple(made)
 
 
+def _choice(devices: Sequence[DeviceDescription], direction: Direction) -> str:
+    """Return the PDOs that could be assigned, if there are any."""
+    offered = [pdo for device in devices for pdo in device.pdos(direction)]
+    return f": none is assigned; choose with pdos= from {pdo_names(offered)}" if offered else ""
+
+
 def with_written(
     device: DeviceDescription, direction: Direction, pdos: Sequence[WrittenPdo]
 ) -> DeviceDescription:
-    """Return the device as if it had these PDOs; unchanged if there are none."""
+    """Return the device as if it had these PDOs; unchanged without PDOs."""
     if not pdos:
         return device
     assignments = write_down(device, direction, pdos).assignments

@@ -144,7 +144,8 @@ class ObjectInformation:
     name: str = ""
 
 
-class ObjectValue(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class ObjectValue:
     """The value of an entry of the dictionary when it was read; None: it could not be read."""
 
     index: int

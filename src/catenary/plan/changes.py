@@ -1,4 +1,4 @@
-"""What a plan changes on a device, as text with old and new values: for people to read."""
+"""Changes that a plan makes on a device, as text: old and new values."""
 
 from __future__ import annotations
 

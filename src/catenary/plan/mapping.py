@@ -114,7 +114,7 @@ def _assign_most(
     device: DeviceDescription, direction: Direction, wanted: Sequence[ObjectReference]
 ) -> Mapping | None:
     """Return a combination that carries the required objects, and as many optional ones as it can;
-    None: there is none for the required objects."""
+    None: no combination carries the required objects."""
     kept = [each for each in wanted if each.required]
     found = _assign(device, direction, kept)
     if found is None:

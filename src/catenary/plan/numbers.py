@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from catenary.model.device import Assignment, Entry, Pdo
@@ -29,7 +30,8 @@ def entry_places(assignments: Sequence[Assignment], offset: int) -> Iterator[Ent
         offset += assignment.byte_length
 
 
-class MappedNumber(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class MappedNumber:
     """One mapped object in an image."""
 
     pdo: int

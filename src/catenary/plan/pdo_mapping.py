@@ -21,8 +21,8 @@ class Mapping:
     """The process data of one device in one direction, and what must be written to get it."""
 
     assignments: tuple[Assignment, ...]
-    rewritten: tuple[Pdo, ...] = ()  # whose entries change
-    reassigned: tuple[int, ...] = ()  # SyncManagers whose list of PDOs changes
+    rewritten: tuple[Pdo, ...] = ()  # PDOs with new entries
+    reassigned: tuple[int, ...] = ()  # SyncManagers with another list of PDOs
     rejected: tuple[str, ...] = ()  # alternatives that change less, and why each failed
     left_out: tuple[ObjectReference, ...] = ()  # optional objects that it does not carry
 

@@ -38,8 +38,8 @@ class _State(NamedTuple):
 def find_combination(
     assigned: Sequence[Pdo], offered: Sequence[Pdo], wanted: Sequence[ObjectReference]
 ) -> Combination | None:
-    """Return the combination that carries all wanted objects and changes least; None: there is
-    none.
+    """Return the combination that carries all wanted objects and changes least; None: no
+    combination does.
 
     Fewest PDOs removed, then fewest added, then the device's order. Mandatory PDOs stay.
 

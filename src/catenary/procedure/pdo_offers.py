@@ -1,5 +1,5 @@
-"""What a device reports of its PDOs before a plan: differences from its SII, contents of PDOs that
-are not assigned, and what cannot be changed. Nothing is written.
+"""Reports of a device on its PDOs before a plan: differences from its SII, contents of PDOs that
+are not assigned, and lists and entries that cannot be changed. Nothing is written.
 """
 
 from __future__ import annotations

@@ -216,15 +216,16 @@ class SlaveIO(SlaveBase):
 
     def adopt(self, description: DeviceDescription) -> None:
         super().adopt(description)
-        self.objects = tuple(
-            RawObject(
-                *(entry.index, entry.subindex, entry.bit_length, direction),
-                signed=self._signed and entry.bit_length > 1,
-            )
-            for direction in Direction
-            for entry in mapped_entries(description.assignments(direction))
-            if entry.bit_length <= 64
-        )
+        # Objects go by index and subindex here: one that is mapped twice is a single channel.
+        objects: dict[tuple[Direction, int, int], RawObject] = {}
+        for direction in Direction:
+            for entry in mapped_entries(description.assignments(direction)):
+                place = (entry.index, entry.subindex)
+                if entry.bit_length <= 64:
+                    signed = self._signed and entry.bit_length > 1
+                    found = RawObject(*place, entry.bit_length, direction, signed=signed)
+                    objects.setdefault((direction, *place), found)
+        self.objects = tuple(objects.values())
 
     def read_digital(self, channel: int) -> int:
         return self.read(*self._channel(_IN, True, channel))

@@ -31,7 +31,7 @@ class MappingQuirks(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     abort_code: int = 0x0601_0002
 
     # PDOs that the dictionary has assigned at power-up, instead of those of the SII.
-    # sittner/linuxcnc-ethercat#97: an EL6900 whose PDOs are not those of its description.
+    # sittner/linuxcnc-ethercat#97: the PDOs of an EL6900 are not those of its description.
     power_up: tuple[int, ...] | None = None
 
     # PDOs that carry the same object cannot be assigned together, as the standard and compact PDOs
@@ -42,8 +42,8 @@ class MappingQuirks(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     # Objects that cannot be mapped (0x06040041), though the dictionary says that they can.
     refused_objects: tuple[int, ...] = ()
 
-    # CoE details of the SII, ETG.2010 table 5: 0x2F has all. Without bit 2 the lists of PDOs, and
-    # without bit 3 their entries, are said to be unchangeable.
+    # CoE details of the SII, ETG.2010 table 5: 0x2F has all. Without bit 2 the SII denies changes
+    # of the lists of PDOs, without bit 3 changes of their entries.
     coe_details: int = 0x2F
 
     def __post_init__(self) -> None:
