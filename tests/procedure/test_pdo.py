@@ -13,7 +13,7 @@ from catenary.plan.wish import ObjectReference, PdoWish
 from catenary.procedure.pdo import read_mapping, write_downloads
 from catenary.procedure.pdo_offers import read_first_mapping, read_offers, read_values
 from catenary.wire.coe import Abort, DownloadRequest, decode_coe
-from catenary.wire.mailbox import Mailbox
+from catenary.wire.mailbox import Mailbox, Type
 from tests.plan.devices import SERVO_INPUTS, Asking, servo
 from tests.procedure.by_hand import Dictionary, MailboxDevice, channel, coe, play
 
@@ -63,6 +63,14 @@ def test_pdos_without_entries_anywhere_are_a_note_in_a_scan() -> None:
     [note] = device.notes
     assert "its SII's is used" in note
     assert "0x1A05" in note
+
+
+def test_a_malformed_answer_about_pdos_is_a_note_in_a_scan() -> None:
+    malformed = MailboxDevice(lambda _: [Mailbox(Type.COE, b"\x00\x30\x43")])
+    device = play(read_first_mapping(channel(), servo(0)), malformed)
+    assert device.inputs == servo(0).inputs
+    [note] = device.notes
+    assert "its mapping cannot be read" in note
 
 
 def test_entries_that_differ_from_the_sii_are_a_note() -> None:

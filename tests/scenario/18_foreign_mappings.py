@@ -24,6 +24,7 @@ QUIRKS = {
     "other PDOs than in the SII": MappingQuirks(
         power_up=(0x1601, 0x1A01), fixed_lists="silent", fixed_pdos="silent"
     ),
+    "nothing at power-up": MappingQuirks(power_up=(), fixed_pdos="silent"),
     "exclusive": MappingQuirks(power_up=(0x1601, 0x1A01), exclusive=True, fixed_pdos="declared"),
 }
 

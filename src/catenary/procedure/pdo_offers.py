@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from catenary.errors import MappingError, SdoAbort
+from catenary.errors import MailboxError, MappingError, SdoAbort
 from catenary.model.device import Assignment, DeviceDescription, Direction, ObjectValue, Pdo
 from catenary.plan.pdo_mapping import ASSIGNMENT_BASE, shape
 from catenary.procedure.exchange import Procedure
@@ -28,7 +28,7 @@ def read_first_mapping(
     differs, or why the SII's is used."""
     try:
         found = yield from read_mapping(channel, device)
-    except MappingError as error:
+    except (MappingError, MailboxError) as error:
         note = f"its mapping cannot be read, its SII's is used: {error.message}"
         return replace(device, notes=(*device.notes, note))
     notes = [note for direction in Direction for note in _differences(device, found, direction)]
