@@ -12,6 +12,7 @@ from catenary.bus.sub_device import SubDevice
 from catenary.errors import ConfigurationError, SegmentError
 from catenary.link import RingLink
 from catenary.model.device import DeviceDescription, Direction, mapped_entries
+from catenary.plan.clocks import SYNC_OBJECTS
 from catenary.plan.make import Plan, gather_wishes
 from catenary.plan.start_up import DevicePlan
 from catenary.plan.wish import ObjectReference, PdoWish, Wish
@@ -78,8 +79,10 @@ def bring_to_safe_op(
 def _describe(sub: SubDevice, wish: PdoWish) -> Procedure[DeviceDescription]:
     channel = _channel(sub)
     device = yield from read_mapping(channel, sub.description)
-    start_up = [(index, subindex) for index, subindex, _ in wish.start_up]
-    device = yield from read_values(channel, device, start_up)
+    written = [(index, subindex) for index, subindex, _ in wish.start_up]
+    if wish.clock is not None:
+        written += [(index, subindex) for index in SYNC_OBJECTS for subindex in (1, 2)]
+    device = yield from read_values(channel, device, written)
     for direction, references in ((Direction.OUTPUT, wish.outputs), (Direction.INPUT, wish.inputs)):
         missing = _unmapped(device, direction, references)
         if missing or wish.written(direction):

@@ -89,9 +89,10 @@ def _refused_mapping(
         what = f"the entries of PDO 0x{step.index:04X} cannot be changed"
     else:
         what = f"its list of PDOs, 0x{step.index:04X}, cannot be changed"
+    refusal = abort.message.removeprefix(f"{channel.station}: ")
     alternatives = "".join(f"\n    {each}" for each in plan.rejected)
     return MappingError(
-        f"{channel.station}: {what}: {abort.message}"
+        f"{channel.station}: {what}: {refusal}"
         + (f"\n  tried because:{alternatives}" if alternatives else ""),
         hint="its SII allows the change, the device does not; ask only for objects that it maps, "
         "or choose other PDOs with pdos= (`catenary scan` shows the mapping)",
