@@ -19,7 +19,7 @@ from catenary.model.device import Pdo
 if TYPE_CHECKING:  # wish.py needs NumPy, a scan does not
     from catenary.plan.wish import ObjectReference
 
-STEPS_MAX = 5000  # combinations looked at: real devices need a few
+STEPS_MAX = 2000  # combinations looked at: real devices need a few
 
 
 class Combination(NamedTuple):
@@ -28,6 +28,14 @@ class Combination(NamedTuple):
     pdos: tuple[Pdo, ...]
     added: tuple[Pdo, ...] = ()
     removed: tuple[Pdo, ...] = ()
+
+
+class _Offer(NamedTuple):
+    """A PDO, with its objects as sets: the search compares them often."""
+
+    pdo: Pdo
+    entries: frozenset[tuple[int, int, int]]  # index, subindex, length
+    objects: frozenset[tuple[int, int]]
 
 
 class _State(NamedTuple):
@@ -48,7 +56,8 @@ def find_combination(
         offered: All PDOs that may be assigned to it, those of now included.
         wanted: Objects with their lengths.
     """
-    known = {pdo.index: pdo for pdo in (*offered, *assigned)}
+    known = {pdo.index: _offer(pdo) for pdo in (*offered, *assigned)}
+    places = [(each.index, each.subindex, each.bit_length) for each in wanted]
     start = frozenset(pdo.index for pdo in assigned)
     order = count()
     queue = [(0, 0, next(order), _State(start, frozenset()))]
@@ -58,8 +67,8 @@ def find_combination(
         if state in seen:
             continue
         seen.add(state)
-        chosen = [known[index] for index in state.chosen]
-        missing = next((each for each in wanted if not any_carries(chosen, each)), None)
+        carried = frozenset().union(*(known[index].entries for index in state.chosen))
+        missing = next((place for place in places if place not in carried), None)
         if missing is None:
             return _combination(assigned, known, state)
         for after in _steps(state, known, missing):
@@ -96,9 +105,7 @@ def any_carries(pdos: Sequence[Pdo], reference: ObjectReference) -> bool:
 
 def conflict(one: Pdo, other: Pdo) -> bool:
     """Return True if the two PDOs cannot be assigned together."""
-    if other.index in one.excludes or one.index in other.excludes:
-        return True
-    return bool(_objects(one) & _objects(other))
+    return _conflict(_offer(one), _offer(other))
 
 
 def object_names(references: Sequence[ObjectReference]) -> str:
@@ -111,21 +118,22 @@ def pdo_names(pdos: Sequence[Pdo]) -> str:
     return ", ".join(f"0x{pdo.index:04X}" for pdo in pdos) or "no PDO"
 
 
-def _steps(state: _State, known: dict[int, Pdo], missing: ObjectReference) -> Iterator[_State]:
+def _steps(
+    state: _State, known: dict[int, _Offer], missing: tuple[int, int, int]
+) -> Iterator[_State]:
     """Add each PDO that carries the missing object. PDOs in conflict with it leave."""
-    for pdo in known.values():
-        if pdo.index in state.chosen or not carries(pdo, missing):
+    for index, offer in known.items():
+        if index in state.chosen or missing not in offer.entries:
             continue
-        leaving = [known[index] for index in state.chosen if conflict(pdo, known[index])]
-        if any(other.mandatory or other.index in state.added for other in leaving):
+        leaving = {other for other in state.chosen if _conflict(offer, known[other])}
+        if leaving & state.added or any(known[other].pdo.mandatory for other in leaving):
             continue
-        chosen = state.chosen - {other.index for other in leaving} | {pdo.index}
-        yield _State(chosen, state.added | {pdo.index})
+        yield _State(state.chosen - leaving | {index}, state.added | {index})
 
 
-def _combination(assigned: Sequence[Pdo], known: dict[int, Pdo], state: _State) -> Combination:
+def _combination(assigned: Sequence[Pdo], known: dict[int, _Offer], state: _State) -> Combination:
     now = [pdo.index for pdo in assigned]
-    added = tuple(known[index] for index in known if index in state.added)
+    added = tuple(known[index].pdo for index in known if index in state.added)
     pdos = [pdo for pdo in assigned if pdo.index in state.chosen] + list(added)
     if now == sorted(now):  # Beckhoff's EL6731 wants PDOs in the order of their indices
         pdos.sort(key=lambda pdo: pdo.index)
@@ -133,5 +141,12 @@ def _combination(assigned: Sequence[Pdo], known: dict[int, Pdo], state: _State) 
     return Combination(tuple(pdos), added, removed)
 
 
-def _objects(pdo: Pdo) -> set[tuple[int, int]]:
-    return {(entry.index, entry.subindex) for entry in pdo.entries if entry.index}
+def _offer(pdo: Pdo) -> _Offer:
+    entries = frozenset((e.index, e.subindex, e.bit_length) for e in pdo.entries if e.index)
+    return _Offer(pdo, entries, frozenset(entry[:2] for entry in entries))
+
+
+def _conflict(one: _Offer, other: _Offer) -> bool:
+    if other.pdo.index in one.pdo.excludes or one.pdo.index in other.pdo.excludes:
+        return True
+    return not one.objects.isdisjoint(other.objects)
