@@ -203,7 +203,11 @@ class Drives:
 
     @property
     def enabled(self) -> npt.NDArray[np.bool_]:
-        """(n,) True for each axis that follows its set-points now and is `present`."""
+        """(n,) True for each axis that follows its set-points now and is `present`.
+
+        One lost exchange makes it False for that cycle, because `present` includes it. The axis
+        goes on following; to act on stopped axes, use `stopped`.
+        """
         return (self._bound().axis_flags & 1).astype(np.bool_) & self.present
 
     @property
