@@ -31,7 +31,7 @@ from catenary.drive.units import AxisUnits, one_each, per_axis
 from catenary.drive.values import Array, AxisValues
 from catenary.plan.cycle import Bank, OnLoss
 from catenary.plan.stop_reason import StopReason
-from catenary.plan.wish import DC, ImageLayout, PdoWish, Views, WishTables
+from catenary.plan.wish import DistributedClock, ImageLayout, PdoWish, Views, WishTables
 from catenary.wire.cia402 import IN_FAULT, Mode, State
 
 V = TypeVar("V")
@@ -57,7 +57,8 @@ class Drives:
     - `required`: False: the loop continues without a lost drive. Its axes hold their last values;
       enable them again when it is `present`.
     - `every`: cycles of the loop between two exchanges.
-    - `dc`: distributed clocks. True: as each device's SII states; or a `DC` for all of them.
+    - `dc`: distributed clocks. True: as each device's SII states; or a `DistributedClock` for all
+      of them.
 
     Options with one value for all axes, or a sequence of one per axis:
 
@@ -120,7 +121,7 @@ class Drives:
         columns: Sequence[str | tuple[str, AxisObject]] = (),
         required: bool = True,
         every: int = 1,
-        dc: DC | bool = False,
+        dc: DistributedClock | bool = False,
     ) -> None:
         sources = axis_sources(subs)
         n = len(sources)

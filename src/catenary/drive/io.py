@@ -12,8 +12,8 @@ from catenary.errors import MappingError
 from catenary.model.device import Assignment, DeviceDescription, Direction, Entry
 from catenary.plan.cycle import Bank, Column, NumberKind
 from catenary.plan.wish import (
-    DC,
     Bytes,
+    DistributedClock,
     ImageLayout,
     Integers,
     ObjectReference,
@@ -60,7 +60,7 @@ class _Channels:
         scale: Mapping[str, float] | None = None,
         required: bool = True,
         every: int = 1,
-        dc: DC | bool = False,
+        dc: DistributedClock | bool = False,
     ) -> None:
         self.subs = subs
         self._required = required

@@ -17,7 +17,7 @@ from catenary.plan.mapping import Mapping, make_mapping
 from catenary.plan.report import report
 from catenary.plan.start_up import DevicePlan, make_device_plan
 from catenary.plan.watchdog import choose_watchdog
-from catenary.plan.wish import DC, ObjectReference, PdoWish, Wish, WishTables
+from catenary.plan.wish import DistributedClock, ObjectReference, PdoWish, Wish, WishTables
 from catenary.wire.cia402 import Mode
 
 
@@ -196,7 +196,9 @@ def _asked(
     return asked
 
 
-def _one_clock(position: int, first: DC | None, second: DC | None) -> DC | None:
+def _one_clock(
+    position: int, first: DistributedClock | None, second: DistributedClock | None
+) -> DistributedClock | None:
     if first is not None and second is not None and first != second:
         raise ConfigurationError(
             f"device {position}: two wishes ask for different clocks: {first} and {second}",
@@ -205,7 +207,7 @@ def _one_clock(position: int, first: DC | None, second: DC | None) -> DC | None:
     return first if second is None else second
 
 
-def _clock_wishes(asked: dict[int, PdoWish]) -> dict[int, DC]:
+def _clock_wishes(asked: dict[int, PdoWish]) -> dict[int, DistributedClock]:
     return {position: wish.clock for position, wish in asked.items() if wish.clock is not None}
 
 
