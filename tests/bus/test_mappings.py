@@ -11,7 +11,7 @@ from catenary.bus import MainDevice
 from catenary.errors import MappingError
 from catenary.model.device import DeviceDescription, Direction
 from catenary.plan import ObjectReference, PdoWish
-from catenary.plan.wish import DC, WrittenPdo
+from catenary.plan.wish import DistributedClock, WrittenPdo
 from catenary.types import UINT, USINT
 from catenary.virtual import AnalogInputs, Coupler, MappingQuirks, Segment, Servo
 from catenary.wire.al import State
@@ -174,7 +174,7 @@ def test_a_plan_shows_what_would_change_with_old_and_new_values() -> None:
 
 def test_a_plan_shows_how_a_device_will_keep_time() -> None:
     with scanned() as main:
-        plan = main.plan(Asking({1: PdoWish(clock=DC())}))
+        plan = main.plan(Asking({1: PdoWish(clock=DistributedClock())}))
         changes = {c.what: (c.old, c.new) for c in plan.devices[1].changes}
         assert changes["0x1C32:01"] == ("00 00", "02 00")
         assert all(old for old, _ in changes.values())

@@ -12,7 +12,7 @@ from catenary.model.device import DeviceDescription
 from catenary.plan.clocks import SyncPlan, make_sync, start_time_ns
 from catenary.plan.cycle import DatagramKind
 from catenary.plan.make import Plan, make_plan
-from catenary.plan.wish import DC, PdoWish
+from catenary.plan.wish import DistributedClock, PdoWish
 from catenary.wire.datagram import Command, decode_datagram
 from catenary.wire.features import Feature
 from catenary.wire.sii_categories import ClockMode
@@ -32,8 +32,8 @@ def cell() -> list[DeviceDescription]:
     return [clocked(coupler(0)), lamps(1), clocked(servo(2)), clocked(servo(3))]
 
 
-def wishing(*positions: int, clock: DC | None = None) -> Asking:
-    return Asking({position: PdoWish(clock=clock or DC()) for position in positions})
+def wishing(*positions: int, clock: DistributedClock | None = None) -> Asking:
+    return Asking({position: PdoWish(clock=clock or DistributedClock()) for position in positions})
 
 
 def planned(devices: list[DeviceDescription], *positions: int, **options: object) -> Plan:
@@ -141,49 +141,55 @@ def test_a_clock_that_only_stamps() -> None:
 
 
 def test_two_wishes_for_one_clock() -> None:
-    one, other = wishing(2), wishing(2, clock=DC(shift=1e-4))
+    one, other = wishing(2), wishing(2, clock=DistributedClock(shift=1e-4))
     with pytest.raises(ConfigurationError, match="device 2: two wishes"):
         make_plan(cell(), [one, other])
     assert make_plan(cell(), [one, one, Asking({2: PdoWish()})]).devices[2].sync is not None
 
 
-def sync(wish: DC, *modes: ClockMode) -> SyncPlan:
+def sync(wish: DistributedClock, *modes: ClockMode) -> SyncPlan:
     return make_sync(clocked(servo(0), *modes), wish, PERIOD_NS)
 
 
 def test_sync_without_any_knowledge_is_sync0_at_the_beat() -> None:
-    assert sync(DC()) == SyncPlan(0x0300, PERIOD_NS, 0, 0)
+    assert sync(DistributedClock()) == SyncPlan(0x0300, PERIOD_NS, 0, 0)
 
 
 def test_sync_as_the_sii_says() -> None:
     free = ClockMode(shift_time_ns=1_882_234_944)  # of a real image: pollen_Orbita2d.bin
     mode = ClockMode(shift_time_ns=-20_000, shift_time_1_ns=5_000, assign_activate=0x0700)
-    assert sync(DC(), free, mode) == SyncPlan(0x0700, PERIOD_NS, 5_000, -20_000)
+    assert sync(DistributedClock(), free, mode) == SyncPlan(0x0700, PERIOD_NS, 5_000, -20_000)
 
 
 def test_sync_of_parts_and_multiples_of_the_period() -> None:
     part = ClockMode(sync0_factor=-4, sync1_factor=4, assign_activate=0x0700)
-    assert sync(DC(), part) == SyncPlan(0x0700, 250_000, 750_000, 0)
-    assert sync(DC(), part).span_ns == PERIOD_NS
+    assert sync(DistributedClock(), part) == SyncPlan(0x0700, 250_000, 750_000, 0)
+    assert sync(DistributedClock(), part).span_ns == PERIOD_NS
     double = ClockMode(sync0_factor=2, assign_activate=0x0300)
-    assert sync(DC(), double).cycle_ns == 2 * PERIOD_NS
+    assert sync(DistributedClock(), double).cycle_ns == 2 * PERIOD_NS
 
 
 def test_sync_as_wished() -> None:
     mode = ClockMode(shift_time_ns=-20_000, assign_activate=0x0300)
-    assert sync(DC(shift=1e-4, sync1=2e-5), mode) == SyncPlan(0x0700, PERIOD_NS, 20_000, 100_000)
-    assert sync(DC(assign_activate=0x0320), mode).assign_activate == 0x0320
+    assert sync(DistributedClock(shift=1e-4, sync1=2e-5), mode) == SyncPlan(
+        0x0700, PERIOD_NS, 20_000, 100_000
+    )
+    assert sync(DistributedClock(assign_activate=0x0320), mode).assign_activate == 0x0320
 
 
 @pytest.mark.parametrize(
     ("wish", "mode", "message"),
     [
-        (DC(assign_activate=0x0100), ClockMode(), "0x0100 starts no SYNC0"),
-        (DC(shift=1e-3), ClockMode(), "a shift of 1000 us"),
-        (DC(), ClockMode(cycle_time_ns=300_000, assign_activate=0x0300), "every 300 us"),
+        (DistributedClock(assign_activate=0x0100), ClockMode(), "0x0100 starts no SYNC0"),
+        (DistributedClock(shift=1e-3), ClockMode(), "a shift of 1000 us"),
+        (
+            DistributedClock(),
+            ClockMode(cycle_time_ns=300_000, assign_activate=0x0300),
+            "every 300 us",
+        ),
     ],
 )
-def test_sync_that_cannot_be(wish: DC, mode: ClockMode, message: str) -> None:
+def test_sync_that_cannot_be(wish: DistributedClock, mode: ClockMode, message: str) -> None:
     with pytest.raises(ConfigurationError, match=message):
         sync(wish, mode)
 

@@ -65,6 +65,13 @@ TABLES: Mapping[str, Table] = {
         of_all=False,
         real_time_us=950_000,
     ),
+    "tocabi-8k": Table(
+        "bench table tocabi --seconds 5 --rounds 1 --peers law --rates 8000 --axes 3,3",
+        45,
+        "6 axes on two networks by laws at 8 kHz for 5 s",
+        of_all=False,
+        real_time_us=950_000,
+    ),
     "cobot": Table(
         "bench table cobot --realtime --short --stretch 5",
         60,

@@ -10,7 +10,7 @@ from catenary.bus import SubDevice
 from catenary.drive.axis import MEASURED, Axis
 from catenary.drive.limits import DEFAULT_VELOCITY
 from catenary.drive.objects import NAMED_COLUMNS, AxisObject
-from catenary.plan.wish import DC, ObjectReference, WrittenPdo
+from catenary.plan.wish import DistributedClock, ObjectReference, WrittenPdo
 from catenary.wire.cia402 import Mode
 
 AxisSource: TypeAlias = SubDevice | tuple[SubDevice, int]
@@ -60,10 +60,10 @@ def warn_of_default_velocity(axes: Sequence[Axis]) -> None:
         )
 
 
-def clock_wish(dc: DC | bool) -> DC | None:
+def clock_wish(dc: DistributedClock | bool) -> DistributedClock | None:
     """What `dc=` asks for."""
     if isinstance(dc, bool):
-        return DC() if dc else None
+        return DistributedClock() if dc else None
     return dc
 
 

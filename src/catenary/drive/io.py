@@ -16,8 +16,8 @@ from catenary.plan.pdo_rewrite import write_down
 from catenary.plan.pdo_search import pdo_names
 from catenary.plan.wish import (
     ANY,
-    DC,
     Bytes,
+    DistributedClock,
     ImageLayout,
     Integers,
     ObjectReference,
@@ -67,7 +67,7 @@ class _Channels:
         scale: Mapping[str, float] | None = None,
         required: bool = True,
         every: int = 1,
-        dc: DC | bool = False,
+        dc: DistributedClock | bool = False,
         pdos: PdoList = (),
     ) -> None:
         self.subs = subs

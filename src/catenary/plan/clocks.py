@@ -24,7 +24,7 @@ from catenary.wire.clock import Activation
 from catenary.wire.frame import wire_time_ns
 
 if TYPE_CHECKING:  # needs NumPy, a scan does not
-    from catenary.plan.wish import DC
+    from catenary.plan.wish import DistributedClock
 
 SYNC_BY_ECAT = 0x0300  # AssignActivate: cyclic operation and SYNC0, controlled by EtherCAT
 BURST = 15_000  # frames: ESC data sheet I §9.1.5; KickCAT sends as many, ethercrab 10 000
@@ -90,7 +90,7 @@ class ClockChoice:
 
 def choose_clocks(
     devices: Sequence[DeviceDescription],
-    wishes: Mapping[int, DC],
+    wishes: Mapping[int, DistributedClock],
     follow: FollowedClock,
     reference: int | None = None,
 ) -> ClockChoice | None:
@@ -118,7 +118,7 @@ def choose_clocks(
     )
 
 
-def make_sync(device: DeviceDescription, wish: DC, period_ns: int) -> SyncPlan:
+def make_sync(device: DeviceDescription, wish: DistributedClock, period_ns: int) -> SyncPlan:
     """The SYNC unit of a device: what is wished for, else what its SII says, else SYNC0 alone."""
     mode = next((m for m in device.clock_modes if _starts_sync0(m.assign_activate)), None)
     cycle_ns = sync1_ns = shift_ns = 0

@@ -18,7 +18,14 @@ from catenary.plan.pdo_mapping import Mapping
 from catenary.plan.report import report
 from catenary.plan.start_up import DevicePlan, make_device_plan
 from catenary.plan.watchdog import choose_watchdog
-from catenary.plan.wish import DC, ObjectReference, PdoWish, Wish, WishTables, WrittenPdo
+from catenary.plan.wish import (
+    DistributedClock,
+    ObjectReference,
+    PdoWish,
+    Wish,
+    WishTables,
+    WrittenPdo,
+)
 from catenary.wire.cia402 import Mode
 
 
@@ -198,7 +205,9 @@ def _asked(
     return asked
 
 
-def _one_clock(position: int, first: DC | None, second: DC | None) -> DC | None:
+def _one_clock(
+    position: int, first: DistributedClock | None, second: DistributedClock | None
+) -> DistributedClock | None:
     if first is not None and second is not None and first != second:
         raise ConfigurationError(
             f"device {position}: two wishes ask for different clocks: {first} and {second}",
@@ -223,7 +232,7 @@ def _one_mapping(
     return first + tuple(pdo for pdo in second if pdo not in first)
 
 
-def _clock_wishes(asked: dict[int, PdoWish]) -> dict[int, DC]:
+def _clock_wishes(asked: dict[int, PdoWish]) -> dict[int, DistributedClock]:
     return {position: wish.clock for position, wish in asked.items() if wish.clock is not None}
 
 

@@ -51,7 +51,7 @@ class WrittenPdo:
 
 
 @dataclass(frozen=True, slots=True)
-class DC:
+class DistributedClock:
     """Distributed clocks for a device: SYNC0 every period, at the beat all devices share.
 
     `shift` [s] of its SYNC0 behind the beat (negative: before), less than a cycle; `sync1` [s]: a
@@ -78,7 +78,7 @@ class PdoWish:
     start_up: tuple[
         tuple[int, int, bytes], ...
     ] = ()  # SDO downloads in PRE-OP: index, subindex, data
-    clock: DC | None = None
+    clock: DistributedClock | None = None
     every: int = 1  # exchanged every so many cycles
     required: bool = True  # the cycle is not good without it
     pdos: tuple[WrittenPdo, ...] = ()  # exactly these, in directions that have any; else a search
