@@ -12,11 +12,13 @@ from catenary.virtual.coe.dictionary import (
     number,
     stored,
 )
+from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.crystal import EXACT, ClockBits, Crystal
 from catenary.virtual.description import Description, MappedEntry, Pdo
 from catenary.virtual.devices.application import Application, mailbox_of, sync_managers_of
 from catenary.virtual.devices.applied import AppliedDevice
 from catenary.virtual.scheduler import Scheduler
+from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 
 SLOTS = 4  # of one channel: underrange, overrange, error, value
 UNDERRANGE, OVERRANGE, ERROR, VALUE = range(SLOTS)
@@ -41,6 +43,8 @@ class AnalogInputs(AppliedDevice):
         mailbox_delay: float = 300e-6,
         crystal: Crystal = EXACT,
         clock_bits: ClockBits = 64,
+        mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS,
+        sii_quirks: SiiQuirks = NO_SII_QUIRKS,
     ) -> None:
         if not 1 <= channels <= 8:
             raise ValueError(f"analogue inputs have 1 to 8 channels, not {channels}")
@@ -53,6 +57,8 @@ class AnalogInputs(AppliedDevice):
             mailbox_delay=mailbox_delay,
             crystal=crystal,
             clock_bits=clock_bits,
+            mailbox_quirks=mailbox_quirks,
+            sii_quirks=sii_quirks,
         )
         self.channels = channels
 

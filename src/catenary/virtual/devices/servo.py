@@ -23,6 +23,7 @@ from catenary.virtual.coe.dictionary import (
     Entry,
     number,
 )
+from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.crystal import EXACT, ClockBits, Crystal
 from catenary.virtual.description import Description, MappedEntry, Pdo
 from catenary.virtual.devices.application import Application, mailbox_of, sync_managers_of
@@ -40,6 +41,7 @@ from catenary.virtual.devices.servo_objects import (
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
 from catenary.virtual.devices.synchronisation import Synchronisation
 from catenary.virtual.scheduler import Scheduler
+from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 
 STEP_NS = 250_000
 MINIMUM_CYCLE_NS = 62_500  # of SYNC0
@@ -122,11 +124,14 @@ class Servo(AppliedDevice):
         lrw: bool = True,
         sync_missed_limit: int = 3,
         quirks: ServoQuirks = NO_QUIRKS,
+        mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS,
+        sii_quirks: SiiQuirks = NO_SII_QUIRKS,
     ) -> None:
         """Units: kg·m², N·m·s/rad, N·m, rad/s, rad; `max_torque_ratio` of the rated torque;
         `velocity_counts_per_turn`: the unit of 0x606C and 0x60FF, a turn a second;
         `sync_missed_limit`: SYNC0 pulses in a row without new outputs that are an error;
-        `quirks`: how the drive differs from the profile."""
+        `quirks`: how the drive differs from the profile; `mailbox_quirks`, `sii_quirks`: how its
+        mailbox and its SII differ from the standard."""
         super().__init__(
             name=name,
             alias=alias,
@@ -136,6 +141,8 @@ class Servo(AppliedDevice):
             mailbox_delay=mailbox_delay,
             crystal=crystal,
             clock_bits=clock_bits,
+            mailbox_quirks=mailbox_quirks,
+            sii_quirks=sii_quirks,
         )
         positive = {
             "counts_per_turn": counts_per_turn,
