@@ -140,6 +140,7 @@ class ObjectInformation:
     output_mappable: bool = True  # as RxPDO
     input_mappable: bool = True  # as TxPDO
     name: str = ""
+    note: str = ""  # why the dictionary does not describe it
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +170,7 @@ class DeviceDescription:
     slots: tuple[int, ...] = ()  # CiA 402 axes: objects + 0x800·slot
     objects: tuple[ObjectInformation, ...] = ()  # what has been asked of the dictionary
     mapping_source: str = "SII"  # or "CoE"
-    notes: tuple[str, ...] = ()  # what is odd about its SII
+    notes: tuple[str, ...] = ()  # what is odd about its SII and its dictionary
 
     @property
     def profile(self) -> int | None:
