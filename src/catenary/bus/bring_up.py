@@ -20,6 +20,7 @@ from catenary.procedure.clocks import ClockMeasurement
 from catenary.procedure.configure import configure_process_data
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
+from catenary.procedure.names import name_entries
 from catenary.procedure.pdo import read_mapping, verify_mapping, write_downloads
 from catenary.procedure.profile import read_object
 from catenary.procedure.sync import bring_together, read_types, stop, write_types
@@ -77,6 +78,7 @@ def bring_to_safe_op(
 def _describe(sub: SubDevice, wish: PdoWish) -> Procedure[DeviceDescription]:
     channel = _channel(sub)
     device = yield from read_mapping(channel, sub.description)
+    device = yield from name_entries(channel, device)
     known = {(found.index, found.subindex) for found in device.objects}
     for direction, references in ((Direction.OUTPUT, wish.outputs), (Direction.INPUT, wish.inputs)):
         for reference in _unmapped(device, direction, references):
@@ -85,6 +87,8 @@ def _describe(sub: SubDevice, wish: PdoWish) -> Procedure[DeviceDescription]:
             known.add((reference.index, reference.subindex))
             found = yield from read_object(channel, device, reference.index, reference.subindex)
             device = replace(device, objects=(*device.objects, found))
+            if found.note:
+                device = replace(device, notes=(*device.notes, found.note))
     return device
 
 
