@@ -43,12 +43,12 @@ def servo(**quirks: object) -> Callable[[], Device]:
 
 
 def mailbox(**quirks: object) -> Callable[[], Device]:
-    """A servo whose mailbox differs from ETG.1000.6."""
+    """A servo with a mailbox that differs from ETG.1000.6."""
     return lambda: Servo(serial=1, mailbox_quirks=MailboxQuirks(**quirks))  # type: ignore[arg-type]
 
 
 def sii(**quirks: object) -> Callable[[], Device]:
-    """A servo whose SII differs from ETG.2010."""
+    """A servo with an SII that differs from ETG.2010."""
     return lambda: Servo(serial=1, sii_quirks=SiiQuirks(**quirks))  # type: ignore[arg-type]
 
 

@@ -126,7 +126,7 @@ class StrangeServo(Servo):
 
 
 class StrangeEeprom(Servo):
-    """Owns a servo whose EEPROM holds something else, and that accepts whatever follows from it."""
+    """Owns a servo with another content of its EEPROM. It accepts any configuration."""
 
     def __init__(self, change: Callable[[bytes], bytes]) -> None:
         super().__init__(serial=1)

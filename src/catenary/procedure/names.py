@@ -42,7 +42,7 @@ def name_entries(
 
 
 class _Names:
-    """Owns what was asked of one dictionary, so that no object is asked for twice."""
+    """Owns the descriptions of one dictionary that were read: none is read twice."""
 
     def __init__(self, channel: MailboxChannel) -> None:
         self._channel = channel

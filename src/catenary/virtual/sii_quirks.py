@@ -1,4 +1,4 @@
-"""Quirks: contents of real SIIs that differ from ETG.2010, or that nobody should trust.
+"""Quirks: contents of SIIs that differ from ETG.2010 or from their device.
 
 In TOML a quirk is a field of a table: `sii_quirks = { pdos = "absent" }`.
 """

@@ -28,15 +28,15 @@ class MailboxQuirks(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     # sent; IgH gives up after a second then (fsm_coe.c, EC_FSM_COE_DICT_TIMEOUT).
     object_list: Literal["complete", "missing", "promised"] = "complete"
 
-    # Objects that are listed and whose description is too short to be one. IgH (fsm_coe.c,
+    # Objects in the list with a description that is too short to be one. IgH (fsm_coe.c,
     # dict_desc_response) ends the whole dictionary with "Invalid data size" there.
     malformed_descriptions: tuple[int, ...] = ()
 
-    # Objects whose description is never sent. No report is known.
+    # Objects with a description that is never sent. No report is known.
     missing_descriptions: tuple[int, ...] = ()
 
-    # What every request is answered with. "unsupported": mailbox error 2, as of a device whose SII
-    # has CoE by mistake. "short": a mailbox error without its code. No report is known of "short".
+    # Answer to every request. "unsupported": mailbox error 2, as if the SII had CoE by mistake.
+    # "short": a mailbox error without its code. No report is known of "short".
     error_reply: Literal["none", "unsupported", "short"] = "none"
 
     # Each segment of an upload carries one byte. No report is known.
