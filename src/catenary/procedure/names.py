@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from catenary.errors import MailboxError, ResponseTimeout, SdoAbort
-from catenary.model.device import Assignment, DeviceDescription, Direction, Entry, Pdo
+from catenary.model.device import DeviceDescription, Direction, Entry, Pdo
 from catenary.model.text import printable
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
@@ -104,7 +104,7 @@ def _with_pdo(device: DeviceDescription, direction: Direction, named: Pdo) -> De
         return tuple(named if pdo.index == named.index else pdo for pdo in pdos)
 
     assigned = tuple(
-        Assignment(each.sync_manager, renamed(each.pdos)) for each in device.assignments(direction)
+        replace(each, pdos=renamed(each.pdos)) for each in device.assignments(direction)
     )
     if direction is Direction.OUTPUT:
         return replace(device, outputs=assigned, output_pdos=renamed(device.output_pdos))
