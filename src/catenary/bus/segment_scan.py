@@ -38,18 +38,20 @@ class Found(NamedTuple):
 def find(registers: StationRegisters) -> Procedure[Found]:
     """Bring one device to PRE-OP, or return its error: the other devices are not affected."""
     device = unread(registers)
+    station = Station(registers.position, registers.station_address)  # its name is not known yet
     try:
-        device = yield from within(READ_TIMEOUT, station_of(device), identify(registers))
-        return (yield from within(BRING_UP_TIMEOUT, station_of(device), bring_to_pre_op(device)))
+        device = yield from within(READ_TIMEOUT, station, identify(registers))
+        station = station_of(device)
+        return (yield from within(BRING_UP_TIMEOUT, station, bring_to_pre_op(device)))
     except (DecodeError, ValueError) as error:  # of a decoder: it does not know the device
-        return Found(device, error=_unreadable(device, error))
+        return Found(device, error=_unreadable(station, error))
     except CatenaryError as error:
         return Found(device, error=error)
 
 
-def _unreadable(device: DeviceDescription, error: Exception) -> SegmentError:
+def _unreadable(station: Station, error: Exception) -> SegmentError:
     return SegmentError(
-        f"{station_of(device)}: its data cannot be used: {error}",
+        f"{station}: its data cannot be used: {error}",
         hint="its EEPROM or its firmware is at fault; please report it",
     )
 
