@@ -25,7 +25,7 @@ DEMAND = ObjectReference(0x6062, 0, 32)  # in no PDO of the servo
 @contextmanager
 def scanned(**quirks: object) -> Iterator[MainDevice]:
     """A coupler and a servo with quirks of its mapping, in PRE-OP."""
-    servo = Servo(mapping=MappingQuirks(**quirks))  # type: ignore[arg-type]
+    servo = Servo(mapping_quirks=MappingQuirks(**quirks))  # type: ignore[arg-type]
     with MainDevice(Segment([Coupler(), servo])) as main:
         main.scan()
         yield main

@@ -31,7 +31,7 @@ QUIRKS = {
 
 @pytest.mark.parametrize("name", QUIRKS)
 def test_a_drive_moves_whatever_its_mapping(name: str) -> None:
-    with cell_of(Coupler(), Servo(mapping=QUIRKS[name])) as cell:
+    with cell_of(Coupler(), Servo(mapping_quirks=QUIRKS[name])) as cell:
         arm = cell.drives()
         move(cell, arm)
 
@@ -51,7 +51,7 @@ def move(cell: Cell, arm: cat.Drives) -> None:
 
 def test_a_mode_that_the_assigned_pdos_lack_exchanges_them() -> None:
     quirks = MappingQuirks(power_up=(0x1601, 0x1A01), exclusive=True, fixed_pdos="declared")
-    with cell_of(Coupler(), Servo(mapping=quirks)) as cell:
+    with cell_of(Coupler(), Servo(mapping_quirks=quirks)) as cell:
         arm = cell.drives(mode="csv")
         with cat.Loop(arm) as loop:
             arm.enable()
@@ -66,14 +66,14 @@ def test_a_mode_that_the_assigned_pdos_lack_exchanges_them() -> None:
 
 def test_a_column_that_fixed_pdos_lack_is_refused_before_anything_is_written() -> None:
     quirks = MappingQuirks(fixed_pdos="declared")
-    with cell_of(Coupler(), Servo(mapping=quirks)) as cell:
+    with cell_of(Coupler(), Servo(mapping_quirks=quirks)) as cell:
         arm = cell.drives(columns=["position_demand"])
         with pytest.raises(MappingError, match="all its PDOs are fixed"), cat.Loop(arm):
             pytest.fail("entered without the column")
 
 
 def test_pdos_are_written_down_by_the_application() -> None:
-    with cell_of(Coupler(), Servo(mapping=MappingQuirks(coe_details=0x23))) as cell:
+    with cell_of(Coupler(), Servo(mapping_quirks=MappingQuirks(coe_details=0x23))) as cell:
         pdos = {0x1601: [], 0x1A00: [(0x6041, 0, 16), (0x6064, 0, 32), (0x6062, 0, 32)]}
         arm = cell.drives(pdos=pdos, columns=["position_demand"])
         with cat.Loop(arm) as loop:

@@ -27,7 +27,7 @@ def in_pre_op(device: Device) -> MainDevice:
 
 
 def servo(**quirks: object) -> MainDevice:
-    return in_pre_op(Servo(mapping=MappingQuirks(**quirks)))  # type: ignore[arg-type]
+    return in_pre_op(Servo(mapping_quirks=MappingQuirks(**quirks)))  # type: ignore[arg-type]
 
 
 def write(main: MainDevice, index: int, subindex: int, data: bytes) -> int:
@@ -57,13 +57,13 @@ def test_a_refusal_has_the_abort_code_of_the_device() -> None:
 
 def test_only_declared_fixed_pdos_are_flagged_in_the_sii() -> None:
     for how, flag in (("no", 0), ("declared", 0x10), ("silent", 0)):
-        device = Servo(mapping=MappingQuirks(fixed_pdos=how))  # type: ignore[arg-type]
+        device = Servo(mapping_quirks=MappingQuirks(fixed_pdos=how))  # type: ignore[arg-type]
         sii = decode_sii(make_sii_image(device.description()))
         assert {pdo.flags for pdo in sii.receive_pdos + sii.transmit_pdos} == {flag}
 
 
 def test_the_permissions_of_the_sii_can_be_taken_away() -> None:
-    device = Servo(mapping=MappingQuirks(coe_details=0x03))
+    device = Servo(mapping_quirks=MappingQuirks(coe_details=0x03))
     sii = decode_sii(make_sii_image(device.description()))
     assert sii.general is not None
     assert sii.general.coe == CoeDetails.SDO | CoeDetails.SDO_INFORMATION
@@ -101,15 +101,15 @@ def test_an_object_is_in_two_pdos_with_different_sizes() -> None:
 def test_quirks_are_fields_of_a_file(tmp_path: Path) -> None:
     path = tmp_path / "segment.toml"
     path.write_text(
-        '[[device]]\nkind = "servo"\nmapping = { fixed_pdos = "silent", power_up = [0x1601] }\n'
+        '[[device]]\nkind = "servo"\nmapping_quirks = { fixed_pdos = "silent", power_up = [0x1601] }\n'
         '[[device]]\nkind = "analog_inputs"\nsecond_pdo = "compact"\n'
     )
     first, second = read_segment(path)
     assert isinstance(first, Servo)
-    assert first.mapping == MappingQuirks(fixed_pdos="silent", power_up=(0x1601,))
+    assert first.mapping_quirks == MappingQuirks(fixed_pdos="silent", power_up=(0x1601,))
     assert isinstance(second, AnalogInputs)
     assert second.second_pdo == "compact"
-    path.write_text('[[device]]\nkind = "servo"\nmapping = { coe_details = 256 }\n')
+    path.write_text('[[device]]\nkind = "servo"\nmapping_quirks = { coe_details = 256 }\n')
     with pytest.raises(ConfigurationError, match="coe_details"):
         read_segment(path)
 

@@ -21,6 +21,7 @@ from catenary.procedure.clocks import ClockMeasurement
 from catenary.procedure.configure import configure_process_data
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
+from catenary.procedure.names import name_entries
 from catenary.procedure.pdo import read_mapping, verify_mapping, write_downloads
 from catenary.procedure.pdo_offers import read_offers, read_values
 from catenary.procedure.profile import read_object
@@ -79,6 +80,7 @@ def bring_to_safe_op(
 def _describe(sub: SubDevice, wish: PdoWish) -> Procedure[DeviceDescription]:
     channel = _channel(sub)
     device = yield from read_mapping(channel, sub.description)
+    device = yield from name_entries(channel, device)
     written = [(index, subindex) for index, subindex, _ in wish.start_up]
     if wish.clock is not None:
         written += [(index, subindex) for index in SYNC_OBJECTS for subindex in (1, 2)]
@@ -99,6 +101,8 @@ def _with_objects(
         if device.known_object(reference.index, reference.subindex) is None:
             found = yield from read_object(channel, device, reference.index, reference.subindex)
             device = replace(device, objects=(*device.objects, found))
+            if found.note:
+                device = replace(device, notes=(*device.notes, found.note))
     return device
 
 

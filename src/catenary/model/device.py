@@ -142,6 +142,7 @@ class ObjectInformation:
     output_mappable: bool = True  # as RxPDO
     input_mappable: bool = True  # as TxPDO
     name: str = ""
+    note: str = ""  # why the dictionary does not describe it
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,6 +25,7 @@ from typing import Any, Literal
 import msgspec
 
 from catenary.errors import ConfigurationError
+from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.crystal import ClockBits, Crystal
 from catenary.virtual.devices.analog_inputs import AnalogInputs, SecondPdo
 from catenary.virtual.devices.coupler import Coupler
@@ -38,6 +39,7 @@ from catenary.virtual.faults import Fault
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 from catenary.virtual.plant import STEP, Joint, Plant
 from catenary.virtual.segment import ClockKind, Segment
+from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 from catenary.virtual.wiring import Place
 
 
@@ -68,6 +70,14 @@ class _Table(
 class _ClockedTable(_Table, frozen=True, kw_only=True):
     crystal: CrystalTable = CrystalTable()
     clock_bits: ClockBits = 64
+
+
+class _AppliedTable(_ClockedTable, frozen=True, kw_only=True):
+    mailbox_bytes: int = 128
+    mailbox_delay: float = 300e-6
+    lrw: bool = True
+    mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS
+    sii_quirks: SiiQuirks = NO_SII_QUIRKS
 
 
 class CouplerTable(_ClockedTable, tag="coupler", frozen=True, kw_only=True):
@@ -118,13 +128,10 @@ class DigitalInputsTable(_Table, tag="digital_inputs", frozen=True, kw_only=True
         )
 
 
-class AnalogInputsTable(_ClockedTable, tag="analog_inputs", frozen=True, kw_only=True):
+class AnalogInputsTable(_AppliedTable, tag="analog_inputs", frozen=True, kw_only=True):
     channels: int = 2
-    mailbox_bytes: int = 128
-    mailbox_delay: float = 300e-6
-    lrw: bool = True
     second_pdo: SecondPdo = "none"
-    mapping: MappingQuirks = NO_MAPPING_QUIRKS
+    mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS
 
     def device(self) -> Device:
         return AnalogInputs(
@@ -138,11 +145,13 @@ class AnalogInputsTable(_ClockedTable, tag="analog_inputs", frozen=True, kw_only
             crystal=self.crystal.crystal(),
             clock_bits=self.clock_bits,
             second_pdo=self.second_pdo,
-            mapping=self.mapping,
+            mapping_quirks=self.mapping_quirks,
+            mailbox_quirks=self.mailbox_quirks,
+            sii_quirks=self.sii_quirks,
         )
 
 
-class ServoTable(_ClockedTable, tag="servo", frozen=True, kw_only=True):
+class ServoTable(_AppliedTable, tag="servo", frozen=True, kw_only=True):
     axes: int = 1
     counts_per_turn: int = 1 << 20
     velocity_counts_per_turn: int | None = None
@@ -154,12 +163,9 @@ class ServoTable(_ClockedTable, tag="servo", frozen=True, kw_only=True):
     max_velocity: float = 350.0
     following_error_turns: float = 0.25
     position_limits: tuple[float, float] | None = None
-    mailbox_bytes: int = 128
-    mailbox_delay: float = 300e-6
-    lrw: bool = True
     sync_missed_limit: int = 3
     quirks: ServoQuirks = NO_QUIRKS
-    mapping: MappingQuirks = NO_MAPPING_QUIRKS
+    mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS
 
     def device(self) -> Device:
         return Servo(
@@ -184,7 +190,9 @@ class ServoTable(_ClockedTable, tag="servo", frozen=True, kw_only=True):
             clock_bits=self.clock_bits,
             sync_missed_limit=self.sync_missed_limit,
             quirks=self.quirks,
-            mapping=self.mapping,
+            mapping_quirks=self.mapping_quirks,
+            mailbox_quirks=self.mailbox_quirks,
+            sii_quirks=self.sii_quirks,
         )
 
 

@@ -76,4 +76,4 @@ class Description:
     current_milliampere: int = 0
     identification: int = 0
     ports: tuple[int, ...] = (0, 1)
-    mapping: MappingQuirks = NO_MAPPING_QUIRKS
+    mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS

@@ -1,6 +1,6 @@
 """Quirks of process data: mappings of real devices that cannot be changed, or differ from the SII.
 
-In TOML a quirk is a field of a table: `mapping = { fixed_pdos = "silent" }`.
+In TOML a quirk is a field of a table: `mapping_quirks = { fixed_pdos = "silent" }`.
 """
 
 from __future__ import annotations

@@ -15,12 +15,14 @@ from catenary.virtual.coe.dictionary import (
     number,
     stored,
 )
+from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.crystal import EXACT, ClockBits, Crystal
 from catenary.virtual.description import Description, MappedEntry, Pdo
 from catenary.virtual.devices.application import Application, mailbox_of, sync_managers_of
 from catenary.virtual.devices.applied import AppliedDevice
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 from catenary.virtual.scheduler import Scheduler
+from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 
 SLOTS = 4  # of one channel: underrange, overrange, error, value
 UNDERRANGE, OVERRANGE, ERROR, VALUE = range(SLOTS)
@@ -48,11 +50,13 @@ class AnalogInputs(AppliedDevice):
         crystal: Crystal = EXACT,
         clock_bits: ClockBits = 64,
         second_pdo: SecondPdo = "none",
-        mapping: MappingQuirks = NO_MAPPING_QUIRKS,
+        mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS,
+        mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS,
+        sii_quirks: SiiQuirks = NO_SII_QUIRKS,
     ) -> None:
         """`second_pdo` of each channel, 0x1A10 on. "compact": the value alone, not assigned, as in
         Beckhoff's EL30xx. "twice": assigned as well, and the value has 8 bits there; the EL3632
-        maps 0x6000:02 twice with different sizes. `mapping`: quirks of its PDOs."""
+        maps 0x6000:02 twice with different sizes. `mapping_quirks`: quirks of its PDOs."""
         if not 1 <= channels <= 8:
             raise ValueError(f"analogue inputs have 1 to 8 channels, not {channels}")
         super().__init__(
@@ -64,10 +68,12 @@ class AnalogInputs(AppliedDevice):
             mailbox_delay=mailbox_delay,
             crystal=crystal,
             clock_bits=clock_bits,
+            mailbox_quirks=mailbox_quirks,
+            sii_quirks=sii_quirks,
         )
         self.channels = channels
         self.second_pdo = second_pdo
-        self.mapping = mapping
+        self.mapping_quirks = mapping_quirks
 
     def _second(self, channel: int) -> Pdo:
         index, twice = 0x6000 + 0x10 * channel, self.second_pdo == "twice"
@@ -102,7 +108,7 @@ class AnalogInputs(AppliedDevice):
             alias=self.alias,
             emulation=False,
             pdi_type=0x05,
-            mailbox=mailbox_of(self.mailbox_bytes, self.mapping.coe_details),
+            mailbox=mailbox_of(self.mailbox_bytes, self.mapping_quirks.coe_details),
             sync_managers=sync_managers_of(self.mailbox_bytes, (), pdos),
             fmmus=(1, 2, 3),
             rx_pdos=(),
@@ -110,7 +116,7 @@ class AnalogInputs(AppliedDevice):
             clock=True,
             slots=SLOTS * self.channels,
             current_milliampere=130,
-            mapping=self.mapping,
+            mapping_quirks=self.mapping_quirks,
         )
 
     def started(self, scheduler: Scheduler) -> None:

@@ -23,6 +23,7 @@ from catenary.virtual.coe.dictionary import (
     Entry,
     number,
 )
+from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.crystal import EXACT, ClockBits, Crystal
 from catenary.virtual.description import Description, MappedEntry, Pdo
 from catenary.virtual.devices.application import Application, mailbox_of, sync_managers_of
@@ -41,6 +42,7 @@ from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
 from catenary.virtual.devices.synchronisation import Synchronisation
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 from catenary.virtual.scheduler import Scheduler
+from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 
 STEP_NS = 250_000
 MINIMUM_CYCLE_NS = 62_500  # of SYNC0
@@ -123,12 +125,15 @@ class Servo(AppliedDevice):
         lrw: bool = True,
         sync_missed_limit: int = 3,
         quirks: ServoQuirks = NO_QUIRKS,
-        mapping: MappingQuirks = NO_MAPPING_QUIRKS,
+        mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS,
+        mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS,
+        sii_quirks: SiiQuirks = NO_SII_QUIRKS,
     ) -> None:
         """Units: kg·m², N·m·s/rad, N·m, rad/s, rad; `max_torque_ratio` of the rated torque;
         `velocity_counts_per_turn`: the unit of 0x606C and 0x60FF, a turn a second;
         `sync_missed_limit`: SYNC0 pulses in a row without new outputs that are an error;
-        `quirks`: how the drive differs from the profile; `mapping`: quirks of its PDOs."""
+        `quirks`: how the drive differs from the profile; `mapping_quirks`: quirks of its PDOs;
+        `mailbox_quirks`, `sii_quirks`: how its mailbox and its SII differ from the standard."""
         super().__init__(
             name=name,
             alias=alias,
@@ -138,6 +143,8 @@ class Servo(AppliedDevice):
             mailbox_delay=mailbox_delay,
             crystal=crystal,
             clock_bits=clock_bits,
+            mailbox_quirks=mailbox_quirks,
+            sii_quirks=sii_quirks,
         )
         positive = {
             "counts_per_turn": counts_per_turn,
@@ -168,7 +175,7 @@ class Servo(AppliedDevice):
         self.position_limits = position_limits
         self.sync_missed_limit = sync_missed_limit
         self.quirks = quirks
-        self.mapping = mapping
+        self.mapping_quirks = mapping_quirks
         self._inertias = [inertia] * axes  # what the loops are tuned for
 
     def _pdos(
@@ -197,7 +204,7 @@ class Servo(AppliedDevice):
             alias=self.alias,
             emulation=False,
             pdi_type=0x05,
-            mailbox=mailbox_of(self.mailbox_bytes, self.mapping.coe_details),
+            mailbox=mailbox_of(self.mailbox_bytes, self.mapping_quirks.coe_details),
             sync_managers=sync_managers_of(
                 self.mailbox_bytes, rx, tx, watchdog_trigger=self.quirks.watchdog_trigger
             ),
@@ -207,7 +214,7 @@ class Servo(AppliedDevice):
             clock=True,
             axes=self.axes,
             slots=self.axes * _segment.SLOTS_PER_AXIS,
-            mapping=self.mapping,
+            mapping_quirks=self.mapping_quirks,
         )
 
     def started(self, scheduler: Scheduler) -> None:
