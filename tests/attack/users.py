@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 
 from tests.share.processes import Program
 
@@ -17,7 +18,7 @@ ALICE, BOB, MALLORY = 64001, 64002, 64003  # ids that no user has
 TIMEOUT = 60.0  # [s] of a program; a machine stops for a while
 MOUNTS = (
     "mount -t tmpfs tmpfs /dev/shm && mount -t tmpfs -o mode=755 tmpfs /run && "
-    "mount -t tmpfs tmpfs /tmp && echo ready && exec sleep 600"
+    "echo ready && exec sleep 600"
 )
 TOOLS = ("unshare", "nsenter", "setpriv", "mount")
 
@@ -29,7 +30,7 @@ def operators() -> grp.struct_group:
 
 @dataclass(frozen=True)
 class Machine:
-    """/run, /dev/shm and /tmp, empty, for the programs that run in them."""
+    """/run and /dev/shm, empty, for the programs that run in them."""
 
     holder: int  # the process that keeps the mounts
 
@@ -65,6 +66,7 @@ class Machine:
             running.close()
 
 
+@cache
 def refusal() -> str:
     """Say why there cannot be other users here; "" if there can."""
     if os.geteuid() != 0:
@@ -72,8 +74,10 @@ def refusal() -> str:
     lacking = [tool for tool in TOOLS if shutil.which(tool) is None]
     if lacking:
         return f"not installed: {', '.join(lacking)}"
-    tried = subprocess.run(["unshare", "--mount", "true"], capture_output=True, check=False)
-    return tried.stderr.decode().strip() if tried.returncode else ""
+    become = ["setpriv", f"--reuid={MALLORY}", f"--regid={MALLORY}", "--clear-groups"]
+    command = ["unshare", "--mount", *become, sys.executable, "-c", "import catenary"]
+    tried = subprocess.run(command, capture_output=True, text=True, check=False)
+    return (tried.stderr.strip() or "refused").splitlines()[-1] if tried.returncode else ""
 
 
 @contextmanager

@@ -148,7 +148,7 @@ def test_files_of_a_machine(tmp_path, state):
 
 
 def test_every_change_of_the_checks_can_be_made_and_undone(tmp_path, state):
-    """What they name is in the list of what may be written."""
+    """Their targets are in the list of what may be written."""
     laptop = machines.make(tmp_path, machines.LAPTOP)
     changes = examine(laptop).changes
     files = [change for change in changes if not change.target.startswith("ethtool:")]

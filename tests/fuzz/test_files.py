@@ -314,7 +314,7 @@ class Mapped:
 
 
 def look(content: bytes) -> None:
-    """What `attach` and a reader do."""
+    """Do what `attach` and a reader do."""
     layout = decode_head(content, len(content))
     try:
         reader = Reader(Mapped(content), layout)  # type: ignore[arg-type]

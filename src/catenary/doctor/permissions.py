@@ -173,7 +173,7 @@ def realtime_runtime(machine: Machine) -> int | None:
 
 
 def share_folder(machine: Machine) -> Check:
-    """Whether several users of this machine can share memory: docs/share.md."""
+    """Check the folder in which several users share memory: docs/share.md."""
     id = "share-folder"
     here = machine.path(SHARES)
     known = machine.text("/etc/group")

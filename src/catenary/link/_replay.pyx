@@ -237,7 +237,7 @@ cdef class Replay(TableLink):
         return used
 
     cdef object refusal(self, str what):
-        """The error of a file, or of the caller who gave pairs."""
+        """Return the error for a file, or for pairs."""
         kind = DecodeError if self.is_file else ValueError
         return kind(f"{self.name}: {what}")
 

@@ -78,7 +78,7 @@ REASONS = {
 
 
 class Geometry(NamedTuple):
-    """Where things lie in the memory."""
+    """Offsets of the parts of the memory."""
 
     closed: int
     holders: int
@@ -183,7 +183,7 @@ class Desk:
 
 
 def make_desk(layout: ShareLayout) -> tuple[Desk, int]:
-    """Make a desk that nobody else has yet. Returns it and the descriptor of its memory."""
+    """Make a desk that no client has yet. Returns it and the descriptor of its memory."""
     axes = len(layout.axes)
     descriptor, memory = make_sealed(f"catenary-{layout.name}", geometry(axes).size)
     try:

@@ -36,7 +36,7 @@ class DeskSocket:
         self._thread = threading.Thread(target=self._serve, name="catenary-desk", daemon=True)
         try:
             self._listening.bind(str(self.path))
-            self.path.chmod(mode)  # nobody can connect before `listen`
+            self.path.chmod(mode)  # no client can connect before `listen`
             self._listening.listen(BACKLOG)
         except BaseException:
             self.close()
@@ -70,7 +70,7 @@ class DeskSocket:
                 self._ended.wait(RETRY)
                 continue
             with client, suppress(OSError):
-                client.setblocking(False)  # a client that does not read delays nobody
+                client.setblocking(False)  # a client that does not read causes no wait
                 socket.send_fds(client, [ANSWER], [self._descriptor])
 
 

@@ -73,7 +73,7 @@ def prepare(folder: Path, mode: int) -> None:
 
 
 def trusted_owners(uid: int | None) -> tuple[int, ...]:
-    """Return whose files are opened: those of the user asked for, else one's own and root's."""
+    """Return the users whose files are opened: the one asked for, else this user and root."""
     return (os.geteuid(), 0) if uid is None else (uid,)
 
 
@@ -154,7 +154,7 @@ def remove_old_drafts(folder: Path) -> None:
 
 
 def _is_group_folder() -> bool:
-    """True if only root can have created the folder, and not everybody can write in it."""
+    """True if the folder belongs to root, and not all users can write in it."""
     try:
         status = GROUP_FOLDER.lstat()
     except OSError:

@@ -127,7 +127,7 @@ def check_status(
 
 
 def make_sealed(name: str, size: int) -> tuple[int, mmap.mmap]:
-    """Create anonymous memory that nobody can shrink or grow: the loop reads it without a fault.
+    """Create anonymous memory that no process can shrink or grow: reading it cannot fault.
 
     Returns its descriptor, which the caller owns, and a mapping.
     """

@@ -85,7 +85,7 @@ def _cache_class(folder: Path) -> Any:
     caching: Any = import_module("numba.core.caching")
 
     class Files(caching.CompileResultCacheImpl):  # type: ignore[misc]
-        """How a compiled function becomes bytes; the name of its files."""
+        """The encoding of a compiled function, and the name of its files."""
 
         def __init__(self, function: Callable[..., Any]) -> None:
             self._lineno = function.__code__.co_firstlineno
@@ -122,7 +122,7 @@ def _cache_class(folder: Path) -> Any:
 
 
 class _Place:
-    """Where the files of a function are, and what they depend on: Numba's locator."""
+    """Numba's locator: the folder of a function's files, and the source that they depend on."""
 
     def __init__(self, folder: Path, source: str) -> None:
         self._folder = folder
