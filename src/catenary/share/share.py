@@ -199,7 +199,7 @@ class Share:
             raise
 
     def _publish(self, segment: Segment, listening: DeskSocket) -> None:
-        """Give both their names, the socket first: a reader that finds the segment finds it, too."""
+        """Give both their names, the socket first: who finds the segment can connect."""
         where = segment.path.parent
         try:
             with folder.deciding(where):
