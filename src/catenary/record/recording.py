@@ -108,6 +108,8 @@ def read(path: str | os.PathLike[str], *, start: float = 0.0, end: float = np.in
     """Reads a recording, or the part between `start` and `end` seconds after its first cycle. One
     that was cut off is read as far as it is whole. RecordingError: it is none of ours, or cannot be
     read."""
+    if not start <= LONGEST or math.isnan(end):
+        raise ValueError(f"start={start} s, end={end} s: numbers of seconds")
     with Path(path).open("rb") as stream, refusing_damage(stream.name):
         return _Reader(stream, start, end).read()
 
