@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import difflib
 import fcntl
-import os
-import shlex
 import socket
 import struct
-import sys
 from dataclasses import dataclass
 
 from catenary.errors import LinkError
+from catenary.interpreter import permission_advice
 from catenary.link._raw import RawLink
 
 ETHERTYPE = 0x88A4  # EtherCAT, ETG.1000.4 §5.2
@@ -92,7 +90,7 @@ def open_socket(name: str) -> socket.socket:
         opened = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, 0)
     except PermissionError as error:
         raise LinkError(
-            f"{name}: no permission for raw Ethernet frames", hint=permission_command()
+            f"{name}: no permission for raw Ethernet frames", hint=permission_advice()
         ) from error
     try:
         opened.setblocking(False)
@@ -106,12 +104,6 @@ def open_socket(name: str) -> socket.socket:
             hint="Linux 4.20 or newer is needed",
         ) from error
     return opened
-
-
-def permission_command() -> str:
-    """What grants raw sockets, real-time scheduling and locked memory to this interpreter."""
-    interpreter = os.path.realpath(sys.executable)
-    return f"sudo setcap cap_net_raw,cap_sys_nice,cap_ipc_lock=ep {shlex.quote(interpreter)}"
 
 
 def request_ring(opened: socket.socket) -> tuple[int, str]:

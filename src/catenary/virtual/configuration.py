@@ -19,6 +19,9 @@ for = 0.8
 
 from __future__ import annotations
 
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal
 
@@ -232,21 +235,27 @@ class SegmentFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     link_loss_detection: float | Literal["enhanced", "standard"] = "enhanced"
 
 
+OUT_OF_RANGE = (ArithmeticError, LookupError, ValueError, struct.error)
 HINT = "docs/virtual.md lists the fields of devices and plants, docs/faults.md those of faults"
 
 
-def _made(table: DeviceTable, position: int, path: str | Path) -> Device:
+@contextmanager
+def _named(where: str) -> Iterator[None]:
+    """Name the place in the file if a value is out of range, whatever a constructor raises."""
     try:
-        return table.device()
-    except ValueError as error:
-        raise ConfigurationError(f"{path}: device[{position}]: {error}", hint=HINT) from error
+        yield
+    except OUT_OF_RANGE as error:
+        raise ConfigurationError(f"{where}: {error}", hint=HINT) from error
 
 
 def _device_in_fault(kind: type, given: Any) -> Any:
     """`with = {kind = "servo", ...}` of a fault."""
     if kind is not Device:
         raise NotImplementedError
-    return msgspec.convert(given, DeviceTable).device()
+    try:
+        return msgspec.convert(given, DeviceTable).device()
+    except OUT_OF_RANGE as error:
+        raise ValueError(str(error)) from error  # msgspec names the place
 
 
 def _read(path: str | Path) -> SegmentFile:
@@ -256,7 +265,7 @@ def _read(path: str | Path) -> SegmentFile:
         raise ConfigurationError(f"{path}: {error.strerror}") from error
     try:
         file = msgspec.toml.decode(content, type=SegmentFile, dec_hook=_device_in_fault)
-    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+    except (msgspec.MsgspecError, ValueError, RecursionError) as error:
         raise ConfigurationError(f"{path}: {error}", hint=HINT) from error
     if not file.device:
         raise ConfigurationError(f"{path}: a segment needs at least one [[device]]")
@@ -267,7 +276,10 @@ def read_segment(path: str | Path, *, clock: ClockKind = "virtual", ring: bool =
     """The segment of a file, with its faults; a ring where the file or the caller says so.
     ConfigurationError names the file and the field."""
     file = _read(path)
-    devices = [_made(table, position, path) for position, table in enumerate(file.device)]
+    devices = []
+    for position, table in enumerate(file.device):
+        with _named(f"{path}: device[{position}]"):
+            devices.append(table.device())
     behind: dict[int, Place] = {
         position: table.behind
         for position, table in enumerate(file.device)
@@ -282,13 +294,11 @@ def read_segment(path: str | Path, *, clock: ClockKind = "virtual", ring: bool =
             ring=ring or file.ring,
             link_loss_detection=file.link_loss_detection,
         )
-    except ValueError as error:
+    except OUT_OF_RANGE as error:
         raise ConfigurationError(f"{path}: {error}", hint=HINT) from error
     except ConfigurationError as error:
         raise ConfigurationError(f"{path}: plant: {error.message}", hint=error.hint) from error
     for number, fault in enumerate(file.fault):
-        try:
+        with _named(f"{path}: fault[{number}]"):
             segment.inject(fault)
-        except ValueError as error:
-            raise ConfigurationError(f"{path}: fault[{number}]: {error}", hint=HINT) from error
     return segment
