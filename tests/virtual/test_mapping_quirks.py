@@ -101,7 +101,8 @@ def test_an_object_is_in_two_pdos_with_different_sizes() -> None:
 def test_quirks_are_fields_of_a_file(tmp_path: Path) -> None:
     path = tmp_path / "segment.toml"
     path.write_text(
-        '[[device]]\nkind = "servo"\nmapping_quirks = { fixed_pdos = "silent", power_up = [0x1601] }\n'
+        '[[device]]\nkind = "servo"\n'
+        'mapping_quirks = { fixed_pdos = "silent", power_up = [0x1601] }\n'
         '[[device]]\nkind = "analog_inputs"\nsecond_pdo = "compact"\n'
     )
     first, second = read_segment(path)

@@ -126,7 +126,11 @@ class Application:
         out, into, room = process_data_areas(box.receive_size)
         self._areas = (out, into)
         self.pdos = PdoObjects(
-            self.dictionary, description.rx_pdos, description.tx_pdos, room, description.mapping_quirks
+            self.dictionary,
+            description.rx_pdos,
+            description.tx_pdos,
+            room,
+            description.mapping_quirks,
         )
         size = box.send_size - HEADER.size
         self._sdo = SdoServer(self.dictionary, size=size, quirks=quirks)
