@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import struct
+
 import pytest
 
 from catenary.errors import DecodeError, LinkError
 from catenary.link import Recorder, Replay
 from catenary.link.exchanges import pair, read_exchanges
-from catenary.wire.pcapng import Direction, Packet, decode_capture
+from catenary.wire.capture import decode_capture
+from catenary.wire.datagram import Command, Datagram
+from catenary.wire.frame import Frame
+from catenary.wire.pcapng import Direction, Packet
 from tests.link.python_link import PythonLink, frame
 
 QUESTION = frame(bytes(4))
@@ -89,6 +94,56 @@ def test_pairs_by_the_source_address_where_the_file_names_no_direction():
     assert pair([Packet(1, sent), Packet(2, b"alien"), Packet(3, QUESTION)]) == [
         (sent, QUESTION, 2)
     ]
+
+
+def counted(sent: bytes, by: int = 1) -> bytes:
+    """What a device that counts leaves of a frame of one datagram, source address untouched."""
+    return sent[:-2] + bytes([by, 0])
+
+
+def local(sent: bytes, bit: bool) -> bytes:
+    """A frame from an interface whose address has, or has not, the bit that controllers set."""
+    return sent[:6] + (b"\x02" if bit else b"\x00") + sent[7:]
+
+
+@pytest.mark.parametrize("bit", [True, False])
+def test_pairs_by_content_where_the_source_address_tells_nothing(bit):
+    """02:... is the address of a virtual interface; a simulator may not set the bit at all."""
+    first, second = (local(frame(bytes([n]) * 40, index=n), bit) for n in (1, 2))
+    packets = [Packet(n, data) for n, data in enumerate((first, second, counted(second)))]
+    packets += [Packet(9, counted(first)), Packet(10, first), Packet(11, first)]
+    packets += [Packet(12, counted(first, 3))]
+    assert pair(packets) == [
+        (second, counted(second), 1),
+        (first, counted(first), 9),
+        (first, counted(first, 3), 2),
+    ]
+
+
+def test_pairs_by_content_where_only_the_address_was_counted_up():
+    """A broadcast or position read that no device answers comes back uncounted."""
+    asked = Frame((Datagram(Command.APRD, 0x0130_FFFE, bytes(40), 7),), b"\x02" + bytes(5))
+    answer = Frame((Datagram(Command.APRD, 0x0130_0001, bytes(40), 7),), asked.source)
+    assert pair([Packet(1, asked.encode()), Packet(4, answer.encode())]) == [
+        (asked.encode(), answer.encode(), 3)
+    ]
+
+
+def test_what_nobody_answered_stays_unpaired_without_direction():
+    lost = local(frame(bytes(40)), True)
+    assert pair([Packet(n, lost) for n in range(5)]) == []
+
+
+def test_a_pcap_file_and_a_cut_file_replay(tmp_path):
+    question = QUESTION[:6] + b"\x00" + QUESTION[7:]
+    data = struct.pack("<IHHiIII", 0xA1B2C3D4, 2, 4, 0, 0, 65535, 1)
+    for n, each in enumerate((question, QUESTION, question)):
+        data += struct.pack("<4I", 1, n, len(each), len(each)) + each
+    path = tmp_path / "run.pcap"
+    path.write_bytes(data[:-1])
+    with Replay(path) as replay:
+        assert answered(replay, question) == QUESTION
+        assert replay.now() == 1000
 
 
 def test_a_file_that_is_no_capture_is_a_decode_error(tmp_path):

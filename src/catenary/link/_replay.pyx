@@ -174,7 +174,7 @@ cdef int replay_wait_until(void *self, int64_t deadline, int wake_on_frame) noex
 
 
 cdef class Replay(TableLink):
-    """Owns the answers of a recording: a pcapng file, or pairs of (frame sent, answer).
+    """Owns the answers of a recording: a pcapng or pcap file, or pairs of (frame sent, answer).
 
     `unmatched` counts frames that the recording has no answer for: they stay unanswered, as if
     lost. `first_unmatched` is the first of them.

@@ -1,4 +1,14 @@
-"""What a recording says a segment answered: pairs of a frame sent and the frame it came back as."""
+"""What a recording says a segment answered: pairs of a frame sent and the frame it came back as.
+
+A frame was sent or came back by the first of these that says so:
+
+1. The file: pcapng can name the direction of a packet.
+2. The source address: the first controller sets bit 1 of its first byte. This says nothing where
+   all frames of an address have the bit, because the interface's own address has it (virtual
+   interfaces, 02:...), or none has it, because a simulator does not set it.
+3. The content: a frame is sent with all working counters 0 and comes back counted. Where no device
+   counted it, controllers have still counted up a position or broadcast address.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +19,10 @@ from pathlib import Path
 from typing import NamedTuple, TypeAlias
 
 from catenary.errors import DecodeError
+from catenary.wire.capture import decode_capture
+from catenary.wire.datagram import Command
 from catenary.wire.frame import Frame, decode_frame
-from catenary.wire.pcapng import Direction, Packet, decode_capture
+from catenary.wire.pcapng import Direction, Packet
 
 
 class Exchange(NamedTuple):
@@ -21,9 +33,25 @@ class Exchange(NamedTuple):
 
 Shape: TypeAlias = tuple[tuple[int, int, int], ...]
 
+# Every controller counts their address up by one (ETG.1000.4 §5.4.1.2)
+_COUNTED_UP = frozenset(
+    (
+        *(Command.APRD, Command.APWR, Command.APRW, Command.ARMW),
+        *(Command.BRD, Command.BWR, Command.BRW),
+    )
+)
+
+
+class _Seen(NamedTuple):
+    """A packet that is an EtherCAT frame."""
+
+    packet: Packet
+    frame: Frame
+
 
 def read_exchanges(path: str | os.PathLike[str]) -> list[Exchange]:
-    """The exchanges in a pcapng file, in the order of the answers; DecodeError: no pcapng."""
+    """The exchanges in a capture, pcapng or pcap, in the order of the answers; DecodeError: no
+    capture. One that was cut off is read up to the cut."""
     return pair(decode_capture(Path(path).read_bytes()).packets)
 
 
@@ -32,20 +60,18 @@ def pair(packets: Iterable[Packet]) -> list[Exchange]:
 
     Frames that are not EtherCAT's, and those never answered, are left out.
     """
-    waiting: dict[Shape, deque[Packet]] = defaultdict(deque)
+    seen = _ethercat(packets)
+    conclusive = _conclusive_sources(seen)
+    waiting: dict[Shape, deque[_Seen]] = defaultdict(deque)
     exchanges = []
-    for packet in packets:
-        try:
-            frame = decode_frame(packet.data)
-        except DecodeError:
-            continue
-        sent = waiting[shape_of(frame)]
-        if is_outbound(packet, frame):
-            sent.append(packet)
+    for each in seen:
+        sent = waiting[shape_of(each.frame)]
+        if _is_outbound(each, sent, conclusive):
+            sent.append(each)
         elif sent:
-            question = sent.popleft()
-            latency = max(packet.time_ns - question.time_ns, 0)
-            exchanges.append(Exchange(question.data, packet.data, latency))
+            question, answer = sent.popleft().packet, each.packet
+            latency = max(answer.time_ns - question.time_ns, 0)
+            exchanges.append(Exchange(question.data, answer.data, latency))
     return exchanges
 
 
@@ -54,11 +80,39 @@ def shape_of(frame: Frame) -> Shape:
     return tuple((int(d.command), d.index, len(d.data)) for d in frame.datagrams)
 
 
-def is_outbound(packet: Packet, frame: Frame) -> bool:
-    """By the file's word, else by the bit of the source address that the first controller sets."""
-    if packet.direction is not Direction.UNKNOWN:
-        return packet.direction is Direction.OUTBOUND
-    return not frame.has_passed_controller
+def _ethercat(packets: Iterable[Packet]) -> list[_Seen]:
+    found = []
+    for packet in packets:
+        try:
+            found.append(_Seen(packet, decode_frame(packet.data)))
+        except DecodeError:
+            continue
+    return found
+
+
+def _conclusive_sources(seen: Iterable[_Seen]) -> frozenset[bytes]:
+    """The source addresses that occur with and without the bit that controllers set."""
+    found: dict[bytes, set[bool]] = defaultdict(set)
+    for each in seen:
+        found[each.frame.sender].add(each.frame.has_passed_controller)
+    return frozenset(source for source, bits in found.items() if len(bits) == 2)
+
+
+def _is_outbound(each: _Seen, waiting: Sequence[_Seen], conclusive: frozenset[bytes]) -> bool:
+    if each.packet.direction is not Direction.UNKNOWN:
+        return each.packet.direction is Direction.OUTBOUND
+    if each.frame.sender in conclusive:
+        return not each.frame.has_passed_controller
+    if any(datagram.working_counter for datagram in each.frame.datagrams):
+        return False
+    return not (waiting and _was_counted_up(waiting[0].frame, each.frame))
+
+
+def _was_counted_up(sent: Frame, frame: Frame) -> bool:
+    """True if the frame is the one sent, apart from addresses that controllers count up."""
+    pairs = list(zip(sent.datagrams, frame.datagrams, strict=True))
+    moved = [a.adp != b.adp for a, b in pairs if a.command in _COUNTED_UP]
+    return any(moved) and all(a.data == b.data and a.ado == b.ado for a, b in pairs)
 
 
 def by_question(exchanges: Sequence[Exchange]) -> dict[bytes, list[Exchange]]:
