@@ -22,6 +22,7 @@ from catenary import types
 from catenary.errors import DecodeError
 from catenary.wire import (
     al,
+    capture,
     clock,
     coe,
     datagram,
@@ -253,6 +254,7 @@ TARGETS = (
     ),
     Target("sdo_information.decode_error", sdo_information.decode_error, None, (bytes(4),)),
     Target("pcapng.decode_pcapng", pcapng.decode_pcapng, None, (CAPTURE,)),
+    Target("capture.decode_capture", capture.decode_capture, None, (CAPTURE, PCAP)),
     Target("pcap.decode_pcap", pcap.decode_pcap, None, (PCAP,)),
 )
 
