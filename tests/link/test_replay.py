@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from dataclasses import replace
 
 import pytest
 
@@ -16,6 +17,7 @@ from catenary.wire.pcapng import Direction, Packet
 from tests.link.python_link import PythonLink, frame
 
 QUESTION = frame(bytes(4))
+MS = 1_000_000
 
 
 def answered(link: Replay, sent: bytes) -> bytes | None:
@@ -111,13 +113,21 @@ def test_pairs_by_content_where_the_source_address_tells_nothing(bit):
     """02:... is the address of a virtual interface; a simulator may not set the bit at all."""
     first, second = (local(frame(bytes([n]) * 40, index=n), bit) for n in (1, 2))
     packets = [Packet(n, data) for n, data in enumerate((first, second, counted(second)))]
-    packets += [Packet(9, counted(first)), Packet(10, first), Packet(11, first)]
-    packets += [Packet(12, counted(first, 3))]
+    packets += [Packet(9, counted(first)), Packet(10, first), Packet(2 * MS, first)]
+    packets += [Packet(3 * MS, counted(first, 3))]
     assert pair(packets) == [
         (second, counted(second), 1),
         (first, counted(first), 9),
-        (first, counted(first, 3), 2),
+        (first, counted(first, 3), 3 * MS - 10),
     ]
+
+
+@pytest.mark.parametrize("seconds", [0.05, 0.2])
+def test_a_lost_frame_gets_no_answer_of_a_later_one(seconds):
+    asked, again = QUESTION[:6] + b"\x00" + QUESTION[7:], round(seconds * 1e9)
+    packets = [Packet(0, asked), Packet(again, asked), Packet(again + 5, QUESTION)]
+    [exchange] = pair(packets)
+    assert exchange.latency_ns == (5 if seconds > 0.1 else again + 5)
 
 
 def test_pairs_by_content_where_only_the_address_was_counted_up():
@@ -131,7 +141,24 @@ def test_pairs_by_content_where_only_the_address_was_counted_up():
 
 def test_what_nobody_answered_stays_unpaired_without_direction():
     lost = local(frame(bytes(40)), True)
-    assert pair([Packet(n, lost) for n in range(5)]) == []
+    assert pair([Packet(2 * MS * n, lost) for n in range(5)]) == []
+
+
+@pytest.mark.parametrize(("size", "later"), [(40, 10_000), (4, 30 * MS)])
+def test_what_comes_back_as_it_was_sent_does_so_at_once_or_padded(size, later):
+    """A read of a station that is not there: nothing in it changes on the way."""
+    asked = local(frame(bytes(size)), True)
+    packets = [Packet(0, asked), Packet(later, asked.ljust(60, b"\0"))]
+    assert pair(packets) == [(asked, packets[1].data, later)]
+
+
+def test_captures_without_a_telling_source_address_pair_alike(shared_data):
+    """The bit is set everywhere, as if the interface's own address had it."""
+    for path in sorted((shared_data / "pcap").glob("*.pcapng")):
+        packets = decode_capture(path.read_bytes()).packets
+        blind = [replace(p, data=local(p.data, True), direction=Direction.UNKNOWN) for p in packets]
+        found = [(e.sent[12:], e.answer[12:], e.latency_ns) for e in pair(blind)]
+        assert found == [(e.sent[12:], e.answer[12:], e.latency_ns) for e in pair(packets)], path
 
 
 def test_a_pcap_file_and_a_cut_file_replay(tmp_path):

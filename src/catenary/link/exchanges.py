@@ -7,7 +7,8 @@ A frame was sent or came back by the first of these that says so:
    all frames of an address have the bit, because the interface's own address has it (virtual
    interfaces, 02:...), or none has it, because a simulator does not set it.
 3. The content: a frame is sent with all working counters 0 and comes back counted. Where no device
-   counted it, controllers have still counted up a position or broadcast address.
+   counted it, controllers have still counted up a position or broadcast address. One that comes
+   back as it was sent does so at once, or padded: a master repeats it after some ms only.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from typing import NamedTuple, TypeAlias
 from catenary.errors import DecodeError
 from catenary.wire.capture import decode_capture
 from catenary.wire.datagram import Command
-from catenary.wire.frame import Frame, decode_frame
+from catenary.wire.frame import MINIMUM_SIZE, Frame, decode_frame
 from catenary.wire.pcapng import Direction, Packet
 
 
@@ -32,6 +33,11 @@ class Exchange(NamedTuple):
 
 
 Shape: TypeAlias = tuple[tuple[int, int, int], ...]
+
+LOST_NS = 100_000_000  # after which no answer comes: masters wait 2 ms (SOEM) to 50 ms (ours)
+AT_ONCE_NS = (
+    1_000_000  # in which no master repeats a frame, and a hundred devices have passed it on
+)
 
 # Every controller counts their address up by one (ETG.1000.4 §5.4.1.2)
 _COUNTED_UP = frozenset(
@@ -56,7 +62,8 @@ def read_exchanges(path: str | os.PathLike[str]) -> list[Exchange]:
 
 
 def pair(packets: Iterable[Packet]) -> list[Exchange]:
-    """Pairs each answer with the oldest unanswered frame of the same datagrams and indices.
+    """Pairs each answer with the oldest unanswered frame of the same datagrams and indices that is
+    not lost.
 
     Frames that are not EtherCAT's, and those never answered, are left out.
     """
@@ -66,6 +73,8 @@ def pair(packets: Iterable[Packet]) -> list[Exchange]:
     exchanges = []
     for each in seen:
         sent = waiting[shape_of(each.frame)]
+        while sent and each.packet.time_ns - sent[0].packet.time_ns > LOST_NS:
+            sent.popleft()
         if _is_outbound(each, sent, conclusive):
             sent.append(each)
         elif sent:
@@ -105,14 +114,18 @@ def _is_outbound(each: _Seen, waiting: Sequence[_Seen], conclusive: frozenset[by
         return not each.frame.has_passed_controller
     if any(datagram.working_counter for datagram in each.frame.datagrams):
         return False
-    return not (waiting and _was_counted_up(waiting[0].frame, each.frame))
+    return not (waiting and _came_back_uncounted(waiting[0], each))
 
 
-def _was_counted_up(sent: Frame, frame: Frame) -> bool:
-    """True if the frame is the one sent, apart from addresses that controllers count up."""
-    pairs = list(zip(sent.datagrams, frame.datagrams, strict=True))
-    moved = [a.adp != b.adp for a, b in pairs if a.command in _COUNTED_UP]
-    return any(moved) and all(a.data == b.data and a.ado == b.ado for a, b in pairs)
+def _came_back_uncounted(sent: _Seen, each: _Seen) -> bool:
+    """True if no device answered, but controllers passed the frame on."""
+    pairs = list(zip(sent.frame.datagrams, each.frame.datagrams, strict=True))
+    if any(a.data != b.data or a.ado != b.ado for a, b in pairs):
+        return False
+    if any(a.adp != b.adp for a, b in pairs):
+        return all(a.adp == b.adp or a.command in _COUNTED_UP for a, b in pairs)
+    padded = len(sent.packet.data) < MINIMUM_SIZE <= len(each.packet.data)
+    return padded or each.packet.time_ns - sent.packet.time_ns <= AT_ONCE_NS
 
 
 def by_question(exchanges: Sequence[Exchange]) -> dict[bytes, list[Exchange]]:
