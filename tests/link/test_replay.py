@@ -99,12 +99,12 @@ def test_pairs_by_the_source_address_where_the_file_names_no_direction():
 
 
 def counted(sent: bytes, by: int = 1) -> bytes:
-    """What a device that counts leaves of a frame of one datagram, source address untouched."""
+    """Return a frame of one datagram as a device counts it, with the same source address."""
     return sent[:-2] + bytes([by, 0])
 
 
 def local(sent: bytes, bit: bool) -> bytes:
-    """A frame from an interface whose address has, or has not, the bit that controllers set."""
+    """Return a frame with or without the bit that controllers set in the source address."""
     return sent[:6] + (b"\x02" if bit else b"\x00") + sent[7:]
 
 

@@ -15,7 +15,7 @@ from catenary.realtime.private_network import await_carrier
 from catenary.virtual import Coupler, DigitalOutputs, Segment, Server
 
 PERIOD = 5e-3
-PATIENCE = 20.0  # [s] of a test that waits; nothing is said about how long it takes
+PATIENCE = 20.0  # [s] deadline of every wait; no duration is asserted
 
 
 @pytest.fixture

@@ -292,11 +292,35 @@ def test_the_image_of_an_easycat_tells_each_step() -> None:
 
 
 @pytest.mark.parametrize(
-    "times", [{"sync0": 0.0}, {"sync0": -1e-3}, {"sync1": -1e-6}, {"shift": float("nan")}]
+    ("name", "value"),
+    [
+        *(("sync0", 0.0), ("sync0", -1e-3), ("sync0", 1e-12), ("sync0", 5.0)),
+        *(("sync1", -1e-6), ("sync1", 5.0), ("shift", float("nan"))),
+        *(("assign_activate", -1), ("assign_activate", 0x10000)),
+    ],
 )
-def test_impossible_times_are_refused_at_once(times: dict[str, float]) -> None:
-    with pytest.raises(ValueError, match=next(iter(times))):
-        DistributedClock(**times)  # type: ignore[arg-type]
+def test_impossible_values_are_refused_at_once(name: str, value: float) -> None:
+    with pytest.raises(ValueError, match=name):
+        DistributedClock(**{name: value})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("sync0_factor", [-32768, -3, -1, 0, 1, 32767])
+@pytest.mark.parametrize("sync1_factor", [-32768, -1, 0, 1, 32767])
+@pytest.mark.parametrize("period_ns", [10_000, PERIOD_NS, 1_000_000_000])
+def test_any_factors_make_a_plan_or_name_the_device(
+    sync0_factor: int, sync1_factor: int, period_ns: int
+) -> None:
+    mode = OpMode("DC", "", 0x0700, sync0_factor=sync0_factor, sync1_factor=sync1_factor)
+    plan, refusal = None, ""
+    try:
+        plan = make_sync(clocked(servo(0), mode), DistributedClock(), period_ns)
+    except ConfigurationError as error:
+        refusal = error.message
+    if plan is None:
+        assert "device 0 (Servo): its EEPROM (OpMode 'DC')" in refusal
+    else:
+        assert 0 < plan.cycle_ns < 1 << 32
+        assert 0 <= plan.sync1_ns < 1 << 32
 
 
 def test_what_the_application_is_told_may_be_refused() -> None:

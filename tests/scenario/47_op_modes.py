@@ -1,5 +1,5 @@
 """OpModes of real devices: SYNC1 once a period beside a faster SYNC0, SYNC1 alone, a shift of two
-seconds in an EasyCAT's EEPROM. A ring whose last device cannot close its port says so."""
+seconds in an EasyCAT's EEPROM. A last device of a ring that cannot close its port is named."""
 
 from __future__ import annotations
 

@@ -77,7 +77,7 @@ def test_resolutions(resolution, ticks, time_ns):
 
 
 def test_a_cut_block_is_left_out_and_counted():
-    """What a killed program or a full disk leaves."""
+    """A killed program or a full disk leaves such files."""
     first, second = encode_packet(Packet(1, b"first")), encode_packet(Packet(2, b"second"))
     start = encode_header() + first
     for size in range(len(second)):

@@ -26,7 +26,7 @@ class TableLink:
     def __exit__(self, *exc_info: object) -> None: ...
 
 def explained_by(link: object, number: int) -> LinkError | None:
-    """What a link knows of an errno; None: no more than its name."""
+    """Return the error of a link for an errno; None: it knows no more than its name."""
 
 class WrapperLink(TableLink):
     @property

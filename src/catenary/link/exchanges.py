@@ -1,4 +1,4 @@
-"""What a recording says a segment answered: pairs of a frame sent and the frame it came back as.
+"""Pairs in a recording: a frame sent, and the frame as it came back.
 
 A frame was sent or came back by the first of these that says so:
 

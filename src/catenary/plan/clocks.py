@@ -45,6 +45,7 @@ BOUND_NS = 1000
 
 SYNC_TYPE_SYNC0, SYNC_TYPE_SYNC1 = 2, 3  # 0x1C32:01 and 0x1C33:01, ETG.1020 §"Synchronization"
 SYNC_OBJECTS = (0x1C32, 0x1C33)
+REGISTER_END = 1 << 32  # of 0x09A0 and 0x09A4 [ns]
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +121,7 @@ def choose_clocks(
 
 
 def make_sync(device: DeviceDescription, wish: DistributedClock, period_ns: int) -> SyncPlan:
-    """The SYNC unit of a device: what is wished for, else what the OpMode in its SII says."""
+    """Return the SYNC unit of a device: as wished for, else as the OpMode in its SII says."""
     mode = _op_mode(device, wish)
     cycle_ns = _given(wish.sync0, mode.sync0_ns or _multiple(period_ns, mode.sync0_factor))
     assign = mode.assign_activate if wish.assign_activate is None else wish.assign_activate
@@ -248,6 +249,12 @@ def _check_sync(
             "SYNC signal",
             hint="its ESI file has the right one (Dc/OpMode/AssignActivate), often 0x0300: "
             f"{replace(wish, assign_activate=SYNC_BY_ECAT)}",
+        )
+    if not 0 < plan.cycle_ns < REGISTER_END or plan.sync1_ns >= REGISTER_END:
+        raise ConfigurationError(
+            f"{eeprom}: SYNC0 every {_time(plan.cycle_ns)} and SYNC1 {_time(plan.sync1_ns)} later "
+            "do not fit into registers of 32 bits [ns]",
+            hint=f"override it: {replace(wish, sync0=period_ns / 1e9, sync1=0.0)}",
         )
     if plan.cycle_ns % period_ns and period_ns % plan.cycle_ns:
         own = wish.sync0 is None

@@ -26,6 +26,7 @@ Modes = npt.NDArray[np.int8]
 Cycles = npt.NDArray[np.uint64]
 
 TX_PDOS = 0x1A00  # indices of TxPDOs begin here (inputs); RxPDOs from 0x1600 (outputs)
+SYNC_TIME_END = 4.29  # [s] the registers 0x09A0 and 0x09A4 have 32 bits [ns]
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,12 +78,14 @@ class DistributedClock:
     assign_activate: int | None = None
 
     def __post_init__(self) -> None:
-        if self.sync0 is not None and not 0 < self.sync0 < math.inf:
-            raise ValueError(f"sync0={self.sync0}: a period is positive [s]")
-        if self.sync1 is not None and not 0 <= self.sync1 < math.inf:
-            raise ValueError(f"sync1={self.sync1}: SYNC1 comes 0 s or more after SYNC0")
+        if self.sync0 is not None and not 1e-9 <= self.sync0 < SYNC_TIME_END:
+            raise ValueError(f"sync0={self.sync0}: a period of 1 ns to {SYNC_TIME_END} s")
+        if self.sync1 is not None and not 0 <= self.sync1 < SYNC_TIME_END:
+            raise ValueError(f"sync1={self.sync1}: SYNC1 comes 0 to {SYNC_TIME_END} s after SYNC0")
         if self.shift is not None and not math.isfinite(self.shift):
             raise ValueError(f"shift={self.shift}: must be a finite time [s]")
+        if self.assign_activate is not None and not 0 <= self.assign_activate <= 0xFFFF:
+            raise ValueError(f"assign_activate={self.assign_activate}: a word, 0 to 0xFFFF")
 
     def __str__(self) -> str:
         """The call that makes it, as a user writes it."""
