@@ -16,11 +16,11 @@ from catenary.procedure.exchange import Reply, Request
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.sdo import download, upload
 from catenary.procedure.station import Station
+from catenary.wire.capture import decode_capture
 from catenary.wire.coe import DownloadRequest, UploadRequest, UploadResponse, decode_coe
 from catenary.wire.datagram import Command, Datagram
 from catenary.wire.frame import decode_frame
 from catenary.wire.mailbox import decode_mailbox
-from catenary.wire.pcapng import decode_capture
 from catenary.wire.register import DL_STATUS
 from catenary.wire.sii import MailboxProtocol
 from tests.procedure.by_hand import play

@@ -177,7 +177,7 @@ cdef int replay_wait_until(void *self, int64_t deadline, int wake_on_frame) noex
 
 
 cdef class Replay(TableLink):
-    """Owns the answers of a recording: a pcapng file, or pairs of (frame sent, answer).
+    """Owns the answers of a recording: a pcapng or pcap file, or pairs of (frame sent, answer).
 
     DecodeError: the file is damaged, or has no answers; ValueError: the pairs cannot be.
 

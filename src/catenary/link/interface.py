@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import errno
 import fcntl
 import socket
 import struct
@@ -23,7 +24,7 @@ PACKET_IGNORE_OUTGOING = 23
 TPACKET_V2 = 1
 
 SIOCGIFFLAGS, SIOCGIFHWADDR = 0x8913, 0x8927  # linux/sockios.h
-IFF_UP = 1  # linux/if.h
+IFF_UP, IFF_RUNNING = 0x01, 0x40  # linux/if.h; running: there is a carrier
 ARPHRD_ETHER, ARPHRD_LOOPBACK = 1, 772  # linux/if_arp.h
 
 SLOT_SIZE = 2048  # header and one frame of 1514 bytes
@@ -76,6 +77,25 @@ def check(name: str) -> None:
         raise LinkError(f"network interface {name} is no Ethernet (ARPHRD type {kind})")
     if not flags & IFF_UP:
         raise LinkError(f"network interface {name} is down", hint=f"sudo ip link set {name} up")
+
+
+def no_link(name: str, number: int) -> LinkError | None:
+    """Return the error for frames that the kernel refuses because there is no carrier, with ENOBUFS
+    ("No buffer space available"). None: there is another reason."""
+    if number != errno.ENOBUFS:
+        return None
+    try:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
+            flags = ask(asking, SIOCGIFFLAGS, name)
+    except OSError:
+        return None  # it was renamed or removed: the plain error says as much as is known
+    if flags & (IFF_UP | IFF_RUNNING) != IFF_UP:
+        return None
+    return LinkError(
+        f"{name} has no link: the cable is unplugged or damaged, or the first device has no power",
+        hint=f"look at the link lights; is {name} the right port? `ip link show {name}` says "
+        "NO-CARRIER until there is a link. Of a veth pair, set the other end up too",
+    )
 
 
 def ask(asking: socket.socket, request: int, name: str) -> int:

@@ -17,6 +17,7 @@ from catenary.model.device import (
     Entry,
     Identity,
     MailboxLayout,
+    OpMode,
     Pdo,
     SyncManager,
 )
@@ -118,7 +119,7 @@ def _filled(bare: DeviceDescription, sii: Sii, notes: list[str]) -> DeviceDescri
         inputs=assignments(inputs),
         output_pdos=outputs,
         input_pdos=inputs,
-        clock_modes=sii.clock_modes,
+        op_modes=tuple(_op_mode(texts, mode) for mode in sii.clock_modes),
         group=texts[general.group],
         order=order,
     )
@@ -233,6 +234,19 @@ def _pdos(
             )
         )
     return tuple(found)
+
+
+def _op_mode(texts: _Texts, mode: sii_categories.ClockMode) -> OpMode:
+    return OpMode(
+        name=texts[mode.name],
+        description=texts[mode.description],
+        assign_activate=mode.assign_activate,
+        sync0_ns=mode.cycle_time_ns,
+        sync0_factor=mode.sync0_factor,
+        shift_ns=mode.shift_time_ns,
+        sync1_factor=mode.sync1_factor,
+        sync1_shift_ns=mode.shift_time_1_ns,
+    )
 
 
 class _Texts:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from catenary.wire.features import Information
 from catenary.wire.sii import MailboxProtocol
-from catenary.wire.sii_categories import ClockMode, SyncManagerUse
+from catenary.wire.sii_categories import SyncManagerUse
 
 
 class Identity(NamedTuple):
@@ -132,6 +132,21 @@ class Assignment:
 
 
 @dataclass(frozen=True, slots=True)
+class OpMode:
+    """One way of a device to use distributed clocks: Dc/OpMode of an ESI file (ETG.2000), category
+    60 of the SII (ETG.2010). Factors count periods or SYNC0 cycles, see `plan.clocks`."""
+
+    name: str = ""
+    description: str = ""
+    assign_activate: int = 0  # registers 0x0980 (low byte) and 0x0981
+    sync0_ns: int = 0  # cycle time of SYNC0; 0: `sync0_factor` says it
+    sync0_factor: int = 0
+    shift_ns: int = 0
+    sync1_factor: int = 0
+    sync1_shift_ns: int = 0
+
+
+@dataclass(frozen=True, slots=True)
 class ObjectInformation:
     """What the dictionary says of one entry (SDO information, ETG.1000.6 §5.6.3.6)."""
 
@@ -174,7 +189,7 @@ class DeviceDescription:
     parent: int | None = None  # position of the device before it in the tree
     parent_port: int | None = None
     system_time: bool = False  # it has a clock that can follow: a system time (0x0910)
-    clock_modes: tuple[ClockMode, ...] = ()  # ways to use it, the first is the default
+    op_modes: tuple[OpMode, ...] = ()  # ways to use it, the first is the default
     group: str = ""
     order: str = ""
     device_type: int | None = None  # object 0x1000

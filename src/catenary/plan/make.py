@@ -80,8 +80,8 @@ def make_plan(
         period: [s].
         watchdog: of process data [s]; 0: off; None: 0.1 s, for devices in CST the longer of 10 ms
             and five exchanges.
-        optional: positions without which the cycle is good, in addition to devices that no wish
-            requires.
+        optional: positions without which the cycle is good, in addition to devices of wishes that
+            do not require them. Devices that no wish names are required if any other one is.
         collect_share: threaded, the part of the period in which frames may come back.
         late_limit_position, late_limit_velocity, late_limit_torque: of CSP, CSV and CST [s].
         handover, stop_deadline: [s].
@@ -106,8 +106,9 @@ def make_plan(
         for device in devices
     ]
     mappings = [_mappings(device, asked.get(device.position, PdoWish())) for device in devices]
+    unasked = PdoWish(required=not asked or any(wish.required for wish in asked.values()))
     data = [
-        _device_data(device, mapping, asked.get(device.position, PdoWish()), watchdog_ns)
+        _device_data(device, mapping, asked.get(device.position, unasked), watchdog_ns)
         for device, mapping, watchdog_ns in zip(devices, mappings, watchdogs, strict=True)
     ]
     data = [replace(d, optional=d.optional or d.position in optional) for d in data]

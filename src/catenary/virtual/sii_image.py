@@ -8,6 +8,7 @@ import struct
 from collections.abc import Sequence
 
 from catenary.virtual.description import VENDOR_ID, Description, Pdo, SyncManagerDefault
+from catenary.virtual.op_modes import OpMode
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 
 STRINGS, GENERAL, FMMU, SYNC_MANAGER, TX_PDO, RX_PDO, CLOCK, END = (
@@ -107,9 +108,16 @@ def _pdos(pdos: Sequence[Pdo], strings: _Strings, quirks: SiiQuirks, flags: int)
     return out
 
 
-def _clock(strings: _Strings) -> bytes:
-    free = struct.pack("<IIIhHhBB4x", 0, 0, 0, 0, 0, 0, strings.number("FreeRun"), 0)
-    return free + struct.pack("<IIIhHhBB4x", 0, 0, 0, 0, 0x0300, 1, strings.number("DC Sync0"), 0)
+def _clock(modes: Sequence[OpMode], strings: _Strings) -> bytes:
+    return b"".join(
+        struct.pack(
+            "<IiihHhBB4x",
+            *(mode.sync0_ns, mode.shift_ns, mode.sync1_shift_ns),
+            *(mode.sync1_factor, mode.assign_activate, mode.sync0_factor),
+            *(strings.number(mode.name), 0),
+        )
+        for mode in modes
+    )
 
 
 def _category(kind: int, content: bytes) -> bytes:
@@ -135,7 +143,7 @@ def make_sii_image(device: Description, quirks: SiiQuirks = NO_SII_QUIRKS) -> by
     parts.append((TX_PDO, _pdos(device.tx_pdos, strings, quirks, flags)))
     parts.append((RX_PDO, _pdos(device.rx_pdos, strings, quirks, flags)))
     if device.clock and device.axes:
-        parts.append((CLOCK, _clock(strings)))
+        parts.append((CLOCK, _clock(device.op_modes, strings)))
     parts.insert(0, (STRINGS, strings.encode()))
     body = b"".join(_category(kind, content) for kind, content in parts if content)
     body += struct.pack("<HH", END, 0xFFFF)

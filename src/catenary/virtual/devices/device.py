@@ -84,6 +84,8 @@ class Device:
             identification=description.identification,
             ports=self.ports,
         )
+        if not description.loop_control:
+            core.ignore_loop_control(position)
         self._core, self._agenda, self.position = core, agenda, position
         self.crystal = self._crystal
         self.switch_on()

@@ -39,7 +39,7 @@ from catenary.virtual.devices.servo_objects import (
     RX,
 )
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
-from catenary.virtual.devices.synchronisation import Synchronisation
+from catenary.virtual.devices.synchronisation import DC_SYNC0, DC_SYNC1, Synchronisation
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 from catenary.virtual.scheduler import Scheduler
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
@@ -215,6 +215,8 @@ class Servo(AppliedDevice):
             axes=self.axes,
             slots=self.axes * _segment.SLOTS_PER_AXIS,
             mapping_quirks=self.mapping_quirks,
+            op_modes=self.quirks.op_modes,
+            loop_control=self.quirks.closes_ports,
         )
 
     def started(self, scheduler: Scheduler) -> None:
@@ -297,6 +299,7 @@ class Servo(AppliedDevice):
             minimum_cycle_ns=MINIMUM_CYCLE_NS,
             copy_ns=COPY_NS,
             missed_limit=self.sync_missed_limit,
+            synchronous_type=DC_SYNC1 if self.quirks.sync_signal == "sync1" else DC_SYNC0,
         )
         application.checks_watchdog = self.quirks.checks_watchdog
         for axis in range(self.axes):
