@@ -13,6 +13,7 @@ from catenary.igh._ecrt import KernelTime
 from catenary.igh.beside import Beside
 from catenary.igh.library import Library
 from catenary.igh.refusal import refused, sdo_error
+from catenary.model.device import Identity
 from catenary.wire.al import State
 
 if TYPE_CHECKING:
@@ -156,23 +157,37 @@ class Reservation:
 
     def aliases(self) -> list[int]:
         """Of all devices that are there now, by position; 0: none."""
-        info = abi.MasterInfo()
-        self.ask("ecrt_master", ctypes.byref(info), what=f"master {self.index}")
-        return [self.slave(position).alias for position in range(info.slave_count)]
+        return [self.slave(position).alias for position in range(self._present())]
 
-    def wait_preop(self, count: int) -> None:
-        """Until the master has brought its devices to PRE-OP, or has given them up: in INIT nobody
-        answers an SDO, and who has just given the master back leaves them on the way. One with
-        Ethernet over EtherCAT the master may keep in OP: it answers there too."""
+    def has(self, position: int, identity: Identity) -> bool:
+        """Return True if that device is at a position now."""
+        if position >= self._present():
+            return False
+        info = self.slave(position)
+        return (info.vendor_id, info.product_code) == identity[:2]
+
+    def wait_preop(self) -> None:
+        """Wait until the master has brought its devices to PRE-OP, or has given them up.
+
+        In INIT nothing answers an SDO, and an application that has just given the master back
+        leaves the devices on the way down. One with Ethernet over EtherCAT may stay in OP: it
+        answers there, too. A device may be lost meanwhile: each look asks for those that are there.
+        """
         begun = self.now()
         while (waited := (self.now() - begun) * 1e-9) < PREOP_TIMEOUT:
-            infos = [self.slave(position) for position in range(count)]
+            infos = [self.slave(position) for position in range(self._present())]
             states = [info.al_state & 0xF for info in infos if not info.error_flag]
             if all(state == State.PRE_OP for state in states):
                 return
             if waited >= LEAVE_OP_TIMEOUT and State.INIT not in states:
                 return
             self.wait_until(self.now() + round(LOOK * 1e9), False)
+
+    def _present(self) -> int:
+        """How many devices the master has now, whether it scans or not."""
+        info = abi.MasterInfo()
+        self.ask("ecrt_master", ctypes.byref(info), what=f"master {self.index}")
+        return int(info.slave_count)
 
     def sync_manager(self, position: int, index: int) -> abi.SyncInfo:
         """A SyncManager, without its PDOs."""
