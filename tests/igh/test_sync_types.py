@@ -1,13 +1,15 @@
-"""0x1C32:01 and 0x1C33:01: restored after a loop with clocks, or the reason is told."""
+"""0x1C32:01 and 0x1C33:01: restored after a loop with clocks, or an error with the reason."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
 import catenary as cat
-from catenary.igh import Master
+from catenary.igh import Master, carrier
+from catenary.igh.kernel_log import KernelLog
 from tests.igh.double import Double
 
 
@@ -78,6 +80,27 @@ def test_a_configuration_that_fails_leaves_no_type(main: cat.MainDevice, double:
     with pytest.raises(cat.CatenaryError, match="activat"), loop_of(main):
         pass
     assert [double.value(p, 0x1C32, 1) for p in (0, 1)] == [1, 1]
+
+
+def test_the_kernels_log_tells_a_code_that_the_device_has_forgotten(
+    main: cat.MainDevice, double: Double, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The master acknowledges an error, and the device clears its AL status code."""
+    log = tmp_path / "kmsg"
+    log.touch()
+    monkeypatch.setattr(carrier, "KernelLog", lambda: KernelLog(str(log)))
+
+    def run() -> None:
+        with loop_of(main) as loop:
+            double.state(1, 4, 1)
+            text = '3,1,1,-;EtherCAT ERROR 0-1: AL status message 0x0032: "DC PLL Sync Error".'
+            log.write_text(text)
+            for _ in range(100):
+                next(loop)
+
+    with pytest.raises(cat.errors.StateError, match="0x0032: PLL error") as caught:
+        run()
+    assert caught.value.position == 1
 
 
 def test_the_error_of_a_type_that_was_left_behind_says_so(

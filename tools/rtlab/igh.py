@@ -21,7 +21,7 @@ TABLE = "igh_table.py"
 
 
 class NotThere(LabError):
-    """There is no IgH master for this kernel: its table is skipped."""
+    """The folder has no IgH master for this kernel: the table is skipped."""
 
 
 def provide(folder: Path | None, kernel: Kernel) -> list[Entry]:

@@ -8,7 +8,13 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from catenary.bus.event import LinkLost, LinkRestored
-from catenary.errors import CatenaryError, IdentityError, RegisterError, StateError
+from catenary.errors import (
+    CatenaryError,
+    IdentityError,
+    RegisterError,
+    SegmentError,
+    StateError,
+)
 from catenary.igh import abi
 from catenary.igh.clock import KernelClock
 from catenary.igh.configure import Configuration
@@ -155,7 +161,11 @@ class KernelCarrier:
         refuses requests until it has acknowledged the error, which may clear the code.
         """
         main = self._main
-        code = self._kernel_log.status_code(main.reservation.index, main.place_of(position))
+        try:
+            place = main.place_of(position)
+        except SegmentError:
+            return 0  # it was unplugged meanwhile, and is nowhere
+        code = self._kernel_log.status_code(main.reservation.index, place)
         if code:
             return code
         sub = self._sub(position)

@@ -1,4 +1,4 @@
-/* Distributed clocks over libethercat: what the master is told in each cycle, the difference of the
+/* Distributed clocks over libethercat: what each cycle passes to the master, the difference of the
  * clocks, and a loop that follows the reference clock.
  *
  * The phase error is what the reference clock says to a frame, less our clock when the frame left,
@@ -129,7 +129,7 @@ static int64_t igh_sought(const igh_exchange *x)
 
 /* Our clock runs after the reference, by a critically damped loop of which neither the rate nor the
  * correction of one period leaves the limit. No wind-up: at the limit the rate learns nothing further
- * outwards. An error beyond an eighth of the period is no drift, and only one that lasts counts. */
+ * outwards. Nor from an error beyond an eighth of the period, and only one that lasts is corrected. */
 static void igh_follow(igh_exchange *x)
 {
     double error = (double)x->phase_error, wanted, applied;

@@ -139,7 +139,7 @@ class MainDevice(bus.MainDevice):
         self.carrier = self._kernel
 
     def _keep_sync_types(self, sub: bus.SubDevice, plan: DevicePlan) -> None:
-        """Read how a device keeps time before it is told to go by SYNC0. Without clocks, write back
+        """Read how a device keeps time, before SYNC0 is written to it. Without clocks, write back
         what could not be written when an earlier loop ended."""
         if plan.sync is None:
             self._restore_sync_types(sub)

@@ -184,7 +184,7 @@ class Reservation:
             self.wait_until(self.now() + round(LOOK * 1e9), False)
 
     def _present(self) -> int:
-        """How many devices the master has now, whether it scans or not."""
+        """Return how many devices the master has now, even while it scans."""
         info = abi.MasterInfo()
         self.ask("ecrt_master", ctypes.byref(info), what=f"master {self.index}")
         return int(info.slave_count)
