@@ -49,6 +49,14 @@ def test_types_are_restored_once_devices_are_in_pre_op(
     assert all(str(sub.state) == "PRE-OP" for sub in main.subs)
 
 
+def test_a_device_may_take_seconds_to_reach_pre_op(main: cat.MainDevice, double: Double) -> None:
+    """The master repeats a lost INIT request after 5 s (seen on a real master)."""
+    double.linger(500)  # a look takes 10 ms
+    with loop_of(main):
+        pass
+    assert [double.value(p, 0x1C32, 1) for p in (0, 1)] == [1, 1]
+
+
 def test_a_type_that_cannot_be_restored_is_told(main: cat.MainDevice, double: Double) -> None:
     def run() -> None:
         with loop_of(main):

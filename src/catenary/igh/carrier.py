@@ -241,7 +241,8 @@ class KernelCarrier:
         return (
             f"{said}, and this loop starts no SYNC0. A program that was killed may have left 2 or "
             "3 (by SYNC0 or SYNC1) there: switch the device off and on, or ethercat download -p "
-            f"{sub.position} -t uint16 0x1C32 1 1, the same with 0x1C33; or use dc=True"
+            f"{sub.position} -t uint16 0x1C32 1 0 (free run; 1: by SyncManagers), the same with "
+            "0x1C33; or use dc=True"
         )
 
     def _sync_type(self, sub: SubDevice) -> Procedure[int | None]:

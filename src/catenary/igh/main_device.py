@@ -36,6 +36,9 @@ if TYPE_CHECKING:  # plan needs NumPy, a scan does not
     from catenary.plan.start_up import DevicePlan
     from catenary.plan.wish import PdoWish, Wish
 
+# [s] An INIT request to a device that fails at that moment may be lost: the master repeats it after
+# 5 s (ec_fsm_change_timeout_ms in IgH's master/fsm_change.c). Seen at every second stop.
+RESTORE_PATIENCE = 6.0
 _EMERGENCY = struct.Struct("<HB5s")
 
 
@@ -150,7 +153,7 @@ class MainDevice(bus.MainDevice):
         """Take back what a configuration that failed has written. Its master was given back and
         reserved again. Further errors are added to `error` as notes."""
         if self.reservation.handle:
-            self.reservation.wait_preop()
+            self.reservation.wait_preop(RESTORE_PATIENCE)
             for problem in self._settle():
                 error.add_note(f"on the way down: {problem}")
 
@@ -170,7 +173,10 @@ class MainDevice(bus.MainDevice):
         what = f"deactivating master {self.reservation.index}"
         self.reservation.ask("ecrt_master_deactivate", what=what)
         self.reservation.beside.end()
-        self.reservation.wait_preop()
+        if any(sub.sync_types for sub in self.subs):
+            self.reservation.wait_preop(RESTORE_PATIENCE)
+        else:
+            self.reservation.wait_preop()
         problems = self._settle()
         if problems:
             for other in problems[1:]:
