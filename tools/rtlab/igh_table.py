@@ -10,17 +10,17 @@ import json
 import os
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import catenary as cat
 from catenary.bench.peers.with_catenary_law import sine
 from catenary.bench.segment import COUNTS_PER_TURN, PRIORITY, served
-from catenary.errors import CatenaryError
+from catenary.errors import CatenaryError, ConfigurationError
 
 FOLDER = Path("/igh")
-INIT_MODULE = 175  # the system call, x86-64
+INIT_MODULE, DELETE_MODULE = 175, 176  # system calls, x86-64
 DRIVES = 3
 CYCLES = {1000: 4002, 4000: 12_000}  # by rate [Hz]
 WAYS = ("threaded", "inline", "law")
@@ -34,11 +34,40 @@ CHANGES = "orking counter change"  # in lines of the log: of frames that the mod
 LINES = 20  # of the kernel's log, where a loop failed
 
 
+@contextlib.contextmanager
+def master_on(*interfaces: str) -> Iterator[None]:
+    """Load the module on one interface, or on both ends of a ring."""
+    roles = ("main_devices", "backup_devices")
+    addresses = (Path(f"/sys/class/net/{name}/address").read_text().strip() for name in interfaces)
+    load("ec_master", " ".join(map("=".join, zip(roles, addresses, strict=False))))
+    load("ec_generic")
+    try:
+        wait_for(NODE.exists)
+        yield
+    finally:
+        unload("ec_generic")
+        unload("ec_master")
+
+
+def wait_for(done: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + SETTLE_SECONDS
+    while not done() and time.monotonic() < deadline:
+        time.sleep(0.01)
+
+
 def load(name: str, parameters: str = "") -> None:
     content = (FOLDER / f"{name}.ko").read_bytes()
+    call(name, INIT_MODULE, content, len(content), parameters.encode())
+
+
+def unload(name: str) -> None:
+    call(name, DELETE_MODULE, name.encode(), os.O_NONBLOCK)
+
+
+def call(what: str, *arguments: int | bytes) -> None:
     libc = ctypes.CDLL(None, use_errno=True)
-    if libc.syscall(INIT_MODULE, content, len(content), parameters.encode()) != 0:
-        raise OSError(ctypes.get_errno(), f"{name}: {os.strerror(ctypes.get_errno())}")
+    if libc.syscall(*arguments) != 0:
+        raise OSError(ctypes.get_errno(), f"{what}: {os.strerror(ctypes.get_errno())}")
 
 
 class Log:
@@ -57,8 +86,8 @@ class Log:
                     yield text
 
 
-def run(way: str, rate: int, clock: str | None) -> dict[str, Any]:
-    """Return what one loop did, after it has warmed up."""
+def run(found: dict[str, Any], way: str, rate: int, clock: str | None) -> None:
+    """Add what one loop did to `found`, after it has warmed up."""
     with cat.MainDevice("igh:0") as main:
         arm = cat.Drives(
             main.scan().drives,
@@ -71,6 +100,7 @@ def run(way: str, rate: int, clock: str | None) -> dict[str, Any]:
             arm,
             period=1 / rate,
             run="inline" if way == "inline" else "threaded",
+            switch_interval=20e-6 if way == "inline" else None,  # docs/benchmarks.md
             priority=PRIORITY,
             lost_limit=1000,
             late_limit=10.0,
@@ -80,7 +110,7 @@ def run(way: str, rate: int, clock: str | None) -> dict[str, Any]:
             if way == "law":
                 home = arm.actual.position.copy()
                 loop.start(sine, memory=home, parameters=[AMPLITUDE, 0.0, 0.0, NEVER])
-            return measure(loop, way, rate, clock)
+            found |= measure(loop, way, rate, clock)
 
 
 def cycle(loop: cat.Loop, count: int, rate: int, law: bool) -> None:
@@ -98,7 +128,8 @@ def measure(loop: cat.Loop, way: str, rate: int, clock: str | None) -> dict[str,
         loop.clocks.reset()
     cycle(loop, before["cycles"] + CYCLES[rate], rate, way == "law")
     after = loop.timing.counters
-    found = {name: after[name] - before[name] for name in ("cycles", "lost", "late")}
+    counted = ("cycles", "lost", "late")
+    found: dict[str, Any] = {name: after[name] - before[name] for name in counted}
     found["log"] = [line for line in log.lines() if CHANGES in line]
     return found | ({} if clock is None else figures_of(loop.clocks))
 
@@ -114,32 +145,61 @@ def figures_of(clocks: Any) -> dict[str, Any]:
     }
 
 
+def rings() -> Iterator[dict[str, Any]]:
+    """A closed ring: a loop without clocks runs, one with clocks is refused."""
+    found: dict[str, Any] = {"rate": 1000, "way": "threaded", "clock": "none, closed ring"}
+    with (
+        served(DRIVES, ring=True) as segment,
+        master_on(segment.interface, segment.second),
+        attempt(found),
+    ):
+        run(found, "threaded", 1000, None)
+        try:
+            run({}, "threaded", 1000, "reference")
+            found["error"] = "clocks in a closed ring were not refused"
+        except ConfigurationError as refusal:
+            found["refused"] = str(refusal)
+    yield found
+
+
+def line(rate: int, way: str, clock: str | None) -> dict[str, Any]:
+    found = {"rate": rate, "way": way, "clock": clock or "none"}
+    with attempt(found):
+        run(found, way, rate, clock)
+    return found
+
+
+@contextlib.contextmanager
+def attempt(found: dict[str, Any]) -> Iterator[None]:
+    """Add an error to `found`, and what the module said."""
+    log = Log()
+    try:
+        yield
+    except CatenaryError as error:
+        found["error"], found["notes"] = str(error), getattr(error, "__notes__", [])
+        found["log"] = list(log.lines())[-LINES:]
+
+
+def lines() -> Iterator[dict[str, Any]]:
+    with served(DRIVES) as segment, master_on(segment.interface):
+        for rate, (clock, way) in itertools.product(CYCLES, CASES):
+            yield line(rate, way, clock)
+
+
 def sound(found: dict[str, Any]) -> bool:
     healthy = not found.get("error") and not found.get("lost") and not found.get("log")
     return bool(healthy and found.get("locked", True) and not found.get("jumps"))
 
 
-def main(file: Path) -> int:
+def main(arguments: Sequence[str]) -> int:
+    """`ring` alone runs the ring alone."""
     table = []
-    with served(DRIVES) as segment:
-        address = Path(f"/sys/class/net/{segment.interface}/address").read_text().strip()
-        load("ec_master", f"main_devices={address}")
-        load("ec_generic")
-        deadline = time.monotonic() + SETTLE_SECONDS
-        while not NODE.exists() and time.monotonic() < deadline:
-            time.sleep(0.01)
-        for rate, (clock, way) in itertools.product(CYCLES, CASES):
-            name, log = {"rate": rate, "way": way, "clock": clock or "none"}, Log()
-            try:
-                found = name | run(way, rate, clock)
-            except CatenaryError as error:
-                notes, said = getattr(error, "__notes__", []), list(log.lines())
-                found = name | {"error": str(error), "notes": notes, "log": said[-LINES:]}
-            print(json.dumps(found), flush=True)
-            table.append(found)
-    file.write_text(json.dumps({"runs": table}))
+    for found in rings() if "ring" in arguments else itertools.chain(lines(), rings()):
+        print(json.dumps(found), flush=True)
+        table.append(found)
+    Path(arguments[-1]).write_text(json.dumps({"runs": table}))
     return 0 if all(map(sound, table)) else 1
 
 
 if __name__ == "__main__":
-    sys.exit(main(Path(sys.argv[-1])))
+    sys.exit(main(sys.argv[1:]))
