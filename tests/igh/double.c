@@ -80,6 +80,7 @@ static struct {
     int lingering;                /* `staying` of all devices when the master is deactivated */
     uint32_t refusal;             /* abort code of downloads to 0x1C32 */
     uint32_t delay_to_next;       /* of every device, as measured [ns] */
+    int mainless;                 /* answers come by the backup interface: no monitor datagram */
     int closed_ring;              /* the last device's second port leads to a backup interface */
     volatile int blocked;         /* position whose objects do not answer, plus one */
     uint64_t reference;           /* the reference clock as the last frame found it; 0: as told */
@@ -627,7 +628,7 @@ status ecrt_master_sync_monitor_queue(ec_master_t *m)
 uint32_t ecrt_master_sync_monitor_process(ec_master_t *m)
 {
     note("sync_monitor_process");
-    if (bus.delay && monotonic() - bus.sent < bus.delay)
+    if (bus.mainless || (bus.delay && monotonic() - bus.sent < bus.delay))
         return UINT32_MAX;
     return m->monitored ? bus.spread & 0x7FFFFFFF : UINT32_MAX;
 }
@@ -899,6 +900,7 @@ void double_climb(int sends) { bus.climb = sends; }
 void double_linger(int looks) { bus.lingering = looks; }
 void double_refuse(uint32_t abort_code) { bus.refusal = abort_code; }
 void double_measured(uint32_t delay) { bus.delay_to_next = delay; }
+void double_mainless(int lost) { bus.mainless = lost; }
 void double_ring(int closed) { bus.closed_ring = closed; }
 int double_early(void) { int count = bus.early; bus.early = 0; return count; }
 void double_block(int position) { bus.blocked = position + 1; }

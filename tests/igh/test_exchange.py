@@ -124,6 +124,23 @@ def test_the_monitor_leaves_last_where_answers_are_waited_for(doubles: dict[str,
     ]
 
 
+def test_a_ring_without_its_main_interface_is_not_waited_for(doubles: dict[str, Path]) -> None:
+    """The monitor datagram goes by the main interface alone. The domains come by the other one, and
+    are not kept until the deadline."""
+    double = Double(doubles["1.6.1"])
+    with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
+        main.scan()
+        arm = cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0)
+        with cat.Loop(arm, run="threaded") as loop:
+            double.mainless(1)
+            assert all(next(loop).ok for _ in range(50))
+            double.forget()
+            assert next(loop).ok
+            assert double.calls().count("receive") < 5  # of some 40 until the deadline
+            double.mainless(0)
+            assert all(next(loop).ok for _ in range(50))
+
+
 def test_slow_answers_of_devices_that_need_not_be_there_are_found(doubles: dict[str, Path]) -> None:
     """Nobody is waited for long who was away before; but who is only slow must be heard."""
     double = Double(doubles["1.6.1"])

@@ -28,6 +28,7 @@
 #define IGH_PATIENCE_FIRST_NS 50000
 #define IGH_PATIENCE_DECAY 14         /* of patience, a cycle: 2^-14 */
 #define IGH_GRACE 2                   /* times the patience: the backup interface's frames */
+#define IGH_DEAF 16u                  /* complete without a monitor: the main interface is lost */
 #define IGH_MISSED_MAX 1000000000u
 
 static int igh_emit(void *self)
@@ -60,19 +61,21 @@ static int igh_emit(void *self)
     rc = igh_do(&x->calls, x->calls.send, x->master);
     if (rc < 0)
         x->send_errors++;
-    x->collected = x->judged = x->back = x->attended = 0;
+    x->collected = x->judged = x->heard = x->back = x->attended = 0;
     return rc < 0 ? rc : 0;
 }
 
-/* Takes what has come. Without a monitor datagram that has to be everything. */
+/* Takes what has come. Without a monitor datagram that has to be everything: it goes by the main
+ * interface alone, and where that is lost, a ring's backup interface brings the domains. */
 static void igh_receive(igh_exchange *x)
 {
     if (igh_do(&x->calls, x->calls.receive, x->master) < 0)
         x->receive_errors++;
     x->frame_stamp = igh_now(x->time);
-    if (x->marked && !x->back)
+    if (x->marked && !x->heard)
         x->monitored = x->calls.monitor_process(x->master);
-    x->back = x->back || !x->marked || x->monitored != UINT32_MAX;
+    x->heard = x->marked && x->monitored != UINT32_MAX;
+    x->back = x->heard || !x->marked || x->deaf >= IGH_DEAF;
 }
 
 /* How many of the domains that were queued are not complete. */
@@ -147,9 +150,9 @@ static void igh_wait_for_answers(igh_exchange *x, int64_t deadline)
         look = x->frame_stamp + IGH_NAP_NS;
         looks++;
     } while (!x->back && x->frame_stamp < deadline);
-    if (looks == 1)
+    if (looks == 1 && x->heard)
         x->patience -= x->patience >> IGH_PATIENCE_DECAY;
-    else if (x->back && x->patience < x->frame_stamp - x->sent)
+    else if (x->heard && x->patience < x->frame_stamp - x->sent)
         x->patience += IGH_NAP_NS;
 }
 
@@ -181,6 +184,10 @@ static int igh_collect(void *self, int64_t deadline)
     if (deadline != 0)
         missing = igh_wait_for_backup(x, deadline, missing);
     igh_judge(x);
+    if (x->heard)
+        x->deaf = 0;
+    else if (first && missing == 0 && x->deaf < IGH_DEAF)
+        x->deaf++;
     if (x->clock != IGH_NO_CLOCK)
         igh_watch_clocks(x, first);
     x->collected = missing == 0;

@@ -44,9 +44,11 @@ typedef struct igh_exchange {
     uint8_t judged;                   /* misses of this emit have been counted */
     uint8_t waits;                    /* answers are waited for: threaded */
     uint8_t marked;                   /* the monitor datagram left last of this emit */
-    uint8_t back;                     /* it has come back, and all others with it */
+    uint8_t heard;                    /* it has come back, and all others with it */
+    uint8_t back;                     /* heard, or nothing better is known */
     uint8_t attended;                 /* the clocks have been looked at after this emit */
     uint32_t monitored;               /* what it says: the OR of all 0x092C [ns] */
+    uint32_t deaf;                    /* cycles in a row that were complete without it */
     int64_t sent, patience;           /* when; how long answers take, as found [ns] */
 
     int clock;                        /* IGH_NO_CLOCK ... */

@@ -192,9 +192,9 @@ static void igh_attend_clocks(igh_exchange *x)
 /* Once they are back; else it counts, once for each emit. */
 static void igh_watch_clocks(igh_exchange *x, int first)
 {
-    if (x->back && !x->attended)
+    if (x->heard && !x->attended)
         igh_attend_clocks(x);
-    if (x->back || !first)
+    if (x->heard || !first)
         return;
     x->clock_misses++;
     x->unheard++;
