@@ -82,7 +82,7 @@ def test_the_calls_are_libethercats(library: Path) -> None:
             *("receive", "process 0", "domain_state 0"),
             *("queue 0", "application_time 0", "send"),
         ]
-    assert double.calls()[-2:] == ["deactivate", "release_master"]
+    assert double.changes()[-2:] == ["deactivate", "release_master"]
     with pytest.raises(RuntimeError, match="no process data"):
         servo.read_position()
 

@@ -34,7 +34,9 @@ def test_an_unknown_table_is_answered_with_those_there_are(capsys) -> None:
 def test_every_table_is_a_command_of_catenary_that_writes_its_figures() -> None:
     from catenary.cli.main import make_parser
 
-    for table in tables.TABLES.values():
+    commands = [table for table in tables.TABLES.values() if not table.program]
+    assert len(commands) == len(tables.TABLES) - 1  # igh is a program of the guest's own
+    for table in commands:
         asked = make_parser().parse_args(table.arguments)
         assert asked.json == Path(tables.RESULT)
 
