@@ -14,6 +14,7 @@ from catenary.virtual import (
     Device,
     DigitalOutputs,
     MailboxQuirks,
+    MappingQuirks,
     Segment,
     Servo,
     ServoQuirks,
@@ -50,6 +51,11 @@ def mailbox(**quirks: object) -> Callable[[], Device]:
 def sii(**quirks: object) -> Callable[[], Device]:
     """A servo with an SII that differs from ETG.2010."""
     return lambda: Servo(serial=1, sii_quirks=SiiQuirks(**quirks))  # type: ignore[arg-type]
+
+
+def mapping(**quirks: object) -> Callable[[], Device]:
+    """A servo with PDOs that differ from ETG.1000.6."""
+    return lambda: Servo(serial=1, mapping_quirks=MappingQuirks(**quirks))  # type: ignore[arg-type]
 
 
 def device(**options: object) -> Callable[[], Device]:
@@ -92,6 +98,14 @@ QUIRKS: dict[str, Quirk] = {
     "PDOs unnamed": Quirk(sii(pdos="unnamed")),
     "PDOs not in the SII": Quirk(sii(pdos="absent")),
     "control characters in the SII": Quirk(sii(text_prefix=CONTROL)),
+    # process data
+    "PDOs fixed": Quirk(mapping(fixed_pdos="declared")),
+    "PDOs fixed, not declared": Quirk(mapping(fixed_pdos="silent")),
+    "PDOs and lists fixed": Quirk(mapping(fixed_pdos="silent", fixed_lists="silent")),
+    "other PDOs at power-up": Quirk(mapping(power_up=(0x1601, 0x1A01))),
+    "PDOs exclude each other": Quirk(mapping(exclusive=True)),
+    "mode cannot be mapped": Quirk(mapping(refused_objects=(0x6060, 0x6061))),
+    "CoE details deny PDO changes": Quirk(mapping(coe_details=0x23)),
     # rare
     "LRD and LWR only": Quirk(device(lrw=False)),
     "clock of 32 bits": Quirk(device(clock_bits=32)),
