@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from catenary.drive import DistributedClock
 from catenary.virtual import (
     Coupler,
     Device,
@@ -20,6 +21,7 @@ from catenary.virtual import (
     ServoQuirks,
     SiiQuirks,
 )
+from catenary.virtual.op_modes import EASYCAT, EASYCAT_STORED, EL3702, SYNC1_ALONE
 
 QUIRKY, SOUND = 2, 3  # positions
 CONTROL = "\x1b[2J\r\n\x07\x9b"  # clears the screen, begins a line, rings, and a C1 sequence
@@ -33,6 +35,7 @@ class Quirk:
     broken: str = ""  # the device cannot be brought to PRE-OP: part of its error
     moves: bool = True  # it follows its targets
     notes: str = ""  # part of a note of the scan
+    clock: DistributedClock | bool = True  # `dc=` that its SII needs
 
     def segment(self) -> Segment:
         return Segment([Coupler(), DigitalOutputs(), self.make(), Servo(serial=2)])
@@ -106,6 +109,12 @@ QUIRKS: dict[str, Quirk] = {
     "PDOs exclude each other": Quirk(mapping(exclusive=True)),
     "mode cannot be mapped": Quirk(mapping(refused_objects=(0x6060, 0x6061))),
     "CoE details deny PDO changes": Quirk(mapping(coe_details=0x23)),
+    # clocks
+    "SYNC1 alone": Quirk(servo(op_modes=SYNC1_ALONE, sync_signal="sync1")),
+    "SYNC1 once a period": Quirk(servo(op_modes=EL3702[2:], sync_signal="sync1")),
+    "shift of 2 s": Quirk(servo(op_modes=EASYCAT), clock=DistributedClock(shift=0.0)),
+    "AssignActivate 0": Quirk(servo(op_modes=EASYCAT_STORED)),
+    "ports cannot be closed": Quirk(servo(closes_ports=False)),
     # rare
     "LRD and LWR only": Quirk(device(lrw=False)),
     "clock of 32 bits": Quirk(device(clock_bits=32)),

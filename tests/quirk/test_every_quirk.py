@@ -135,7 +135,7 @@ def test_clocks(quirk: Quirk) -> None:
     segment = quirk.segment()
     with cat.MainDevice(segment) as main:
         main.scan()
-        with cat.Loop(drives(main, dc=True), period=1e-3) as loop:
+        with cat.Loop(drives(main, dc=quirk.clock), period=1e-3) as loop:
             loop.wait_locked(within=1e-6, timeout=2.0)
             run_for(loop, 0.2)
             assert loop.clocks.locked
