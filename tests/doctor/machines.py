@@ -53,6 +53,7 @@ def each_cpu(name: str, text: str, count: int = 4) -> dict[str, str]:
 ROOT_USERS = "         0          0 4294967295"
 
 CONTROLLER: Files = {
+    "/etc/group": "root:x:0:",
     "/proc/version": "Linux version 6.12.43-rt (debian) #1 SMP PREEMPT_RT Debian 6.12.43-1",
     "/proc/sys/kernel/osrelease": "6.12.43+deb13-rt-amd64",
     "/sys/kernel/realtime": "1",
@@ -111,6 +112,7 @@ def controller(root: Path, **changed: str) -> Machine:
 
 
 LAPTOP: Files = {
+    "/etc/group": "root:x:0:",
     "/proc/version": "Linux version 6.8.0-45-generic (buildd) #45-Ubuntu SMP PREEMPT_DYNAMIC",
     "/proc/sys/kernel/osrelease": "6.8.0-45-generic",
     "/boot/config-6.8.0-45-generic": "CONFIG_PREEMPT_DYNAMIC=y\nCONFIG_PREEMPT_VOLUNTARY=y\n"
@@ -187,6 +189,7 @@ def container(root: Path) -> Machine:
 
 
 GUEST: Files = {
+    "/etc/group": "root:x:0:",
     "/proc/version": "Linux version 6.1.0-25-cloud-amd64 #1 SMP PREEMPT_DYNAMIC Debian",
     "/proc/sys/kernel/osrelease": "6.1.0-25-cloud-amd64",
     "/etc/os-release": "ID=debian",

@@ -180,7 +180,7 @@ def test_nothing_outside_of_the_list_is_written(tmp_path, state, target):
         (tmp_path / parts).mkdir(parents=True, exist_ok=True)
     core = tmp_path / "proc/sys/kernel/core_pattern"
     core.write_text("root")
-    with pytest.raises(OSError, match="the doctor changes no such thing"):
+    with pytest.raises(OSError, match="not a setting that the doctor changes"):
         MachineGround(tmp_path).write(target, "evil")
     assert {(tmp_path / "etc" / "passwd").read_text(), core.read_text()} == {"root"}
 
@@ -190,7 +190,7 @@ def test_undo_says_what_it_does_not_write_and_keeps_it_noted(tmp_path, state):
     (tmp_path / "etc" / "passwd").write_text("after")
     state.save([Made("/etc/passwd", "before", "after")])
     assert list(undo(MachineGround(tmp_path), state)) == [
-        "REFUSED (the doctor changes no such thing): /etc/passwd = before"
+        "REFUSED (not a setting that the doctor changes): /etc/passwd = before"
     ]
     assert (tmp_path / "etc" / "passwd").read_text() == "after"
     assert len(state.load()) == 1

@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from catenary.cli.sii_text import text_lines, tolerant
@@ -380,6 +380,7 @@ def test_a_state_of_the_doctor(folder: Path, content: bytes) -> None:
 
 
 @given(target=st.text(), before=st.text(), after=st.text())
+@example(target="\x00", before="", after="")
 def test_a_change_that_somebody_made_up(folder: Path, target: str, before: str, after: str) -> None:
     """Nothing but a refusal; what is to be undone has to be there first."""
     state = State(folder / "doctor.json", "b")

@@ -83,6 +83,7 @@ class MachineGround:
     root: Path = Path("/")
 
     def read(self, target: str) -> str:
+        check_target(target)
         if target.startswith(ETHTOOL):
             return str(ethtool.read_setting(*split(target)))
         if target.startswith(FOLDER):
@@ -90,14 +91,19 @@ class MachineGround:
         return chosen((self.root / target.lstrip("/")).read_text().strip())
 
     def write(self, target: str, value: str) -> None:
-        if not any(re.fullmatch(known, target) for known in TARGETS):
-            raise OSError(errno.EPERM, "the doctor changes no such thing", target)
+        check_target(target)
         if target.startswith(ETHTOOL):
             ethtool.write_setting(*split(target), whole_number(value, target))
         elif target.startswith(FOLDER):
             write_folder(self.root / target.removeprefix(FOLDER).lstrip("/"), value)
         else:
             (self.root / target.lstrip("/")).write_text(value)
+
+
+def check_target(target: str) -> None:
+    """Raise OSError unless the doctor may read and change this target."""
+    if not any(re.fullmatch(known, target) for known in TARGETS):
+        raise OSError(errno.EPERM, "not a setting that the doctor changes", target)
 
 
 def split(target: str) -> tuple[str, str]:
