@@ -24,7 +24,13 @@ from catenary.model.topology import open_ports
 from catenary.wire import sii_categories
 from catenary.wire.features import decode_information
 from catenary.wire.sii import CHECKSUM_WORD, MailboxProtocol, Sii, decode_sii
-from catenary.wire.sii_categories import CoeDetails, General, SyncManagerEnable, SyncManagerUse
+from catenary.wire.sii_categories import (
+    CoeDetails,
+    General,
+    GeneralFlags,
+    SyncManagerEnable,
+    SyncManagerUse,
+)
 from catenary.wire.sync_manager import Buffering, Control
 from catenary.wire.sync_manager import Direction as Flow
 
@@ -114,6 +120,7 @@ def _filled(bare: DeviceDescription, sii: Sii, notes: list[str]) -> DeviceDescri
         clock_modes=sii.clock_modes,
         group=texts[general.group],
         order=order,
+        sii_denies_lrw=bool(general.flags & GeneralFlags.NO_LRW),
     )
 
 

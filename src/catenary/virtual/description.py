@@ -1,8 +1,9 @@
-"""What a virtual device says of itself: its SII image and its objects are made of this."""
+"""The description of a virtual device, from which its SII image and its objects are made."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import zlib
+from dataclasses import dataclass, replace
 
 # Private: no vendor of the EtherCAT Technology Group has this identity ("CTNY" in ASCII).
 VENDOR_ID = 0x43544E59
@@ -57,7 +58,6 @@ class Description:
     order: str
     group: str
     product_code: int
-    revision: int
     serial: int
     alias: int
     emulation: bool  # AL status follows AL control: no microcontroller
@@ -74,3 +74,14 @@ class Description:
     current_milliampere: int = 0
     identification: int = 0
     ports: tuple[int, ...] = (0, 1)
+    lrw: bool = True
+
+    @property
+    def revision(self) -> int:
+        """Revision 1 in the upper word; in the lower one a checksum of all but the names.
+
+        Devices whose SIIs differ have different revisions: SOEM copies the SII of the first device
+        of an identity to all others (src/ec_config.c, ecx_lookup_prev_sii).
+        """
+        kind = replace(self, name="", order="", group="", serial=0, alias=0, identification=0)
+        return 0x0001_0000 | zlib.crc32(repr(kind).encode()) & 0xFFFF

@@ -33,6 +33,16 @@ class CoeDetails(IntFlag):
     COMPLETE_ACCESS = 0x20
 
 
+class GeneralFlags(IntFlag):
+    """General category byte 0x0B (ETG.1000.6 table 21)."""
+
+    SAFE_OP = 0x01
+    NO_LRW = 0x02
+    MAILBOX_DATA_LINK_LAYER = 0x04
+    IDENTIFICATION_IN_AL_STATUS = 0x08
+    IDENTIFICATION_IN_MEMORY = 0x10
+
+
 class FmmuUse(IntEnum):
     """What an FMMU is meant for."""
 

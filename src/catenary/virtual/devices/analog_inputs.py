@@ -75,7 +75,6 @@ class AnalogInputs(AppliedDevice):
             order=f"CVA{self.channels:03d}",
             group="Analogue inputs",
             product_code=0x0004_0000 + self.channels,
-            revision=0x0001_0000,
             serial=self.serial,
             alias=self.alias,
             emulation=False,
@@ -88,6 +87,7 @@ class AnalogInputs(AppliedDevice):
             clock=True,
             slots=SLOTS * self.channels,
             current_milliampere=130,
+            lrw=self.lrw,
         )
 
     def started(self, scheduler: Scheduler) -> None:

@@ -73,7 +73,7 @@ class Device:
             fmmus=8,
             sync_managers=8,
             clock_bits=self.clock_bits if description.clock else 0,
-            lrw=self.lrw,
+            lrw=description.lrw,
             identification=description.identification,
             ports=self.ports,
         )

@@ -189,7 +189,6 @@ class Servo(AppliedDevice):
             order=f"CVS{self.axes:03d}",
             group="Servo drives",
             product_code=0x0005_0000 + self.axes,
-            revision=0x0001_0000,
             serial=self.serial,
             alias=self.alias,
             emulation=False,
@@ -204,6 +203,7 @@ class Servo(AppliedDevice):
             clock=True,
             axes=self.axes,
             slots=self.axes * _segment.SLOTS_PER_AXIS,
+            lrw=self.lrw,
         )
 
     def started(self, scheduler: Scheduler) -> None:
