@@ -63,6 +63,7 @@ class Synchronisation:
         self._limit = missed_limit
         self._written: int | None = None  # 0x1C32:01
         self._cycle_written = 0  # 0x1C32:02
+        self._checked_ns = 0  # SYNC0's cycle as it was checked; 0: not by SYNC0
         self._tune()
         for index, name, copy in (
             (OUTPUTS, "SM output parameter", copy_ns),
@@ -84,23 +85,26 @@ class Synchronisation:
 
     def check(self) -> int:
         """PRE-OP → SAFE-OP: 0, or the AL status code why the clocks do not allow it."""
+        self._checked_ns = 0
         by_pdi, activation = self._core.peek(self._position, SYNC_CONTROL, 2)
         switched_on = bool(activation & ACTIVE)
         if not switched_on:
             return INVALID_DC_CONFIGURATION if self._written == DC_SYNC0 else 0
         if self._written == FREE_RUN or not activation & PULSES or by_pdi & 1:
             return INVALID_DC_CONFIGURATION
-        if self.sync0_cycle_ns < self._minimum_ns:
+        cycle_ns = self.sync0_cycle_ns
+        if cycle_ns < self._minimum_ns:
             return DC_SYNC0_CYCLE_TIME
         own = self._step_ns  # read from 0x1C32:02 in free run, it may be written back
-        if self._cycle_written not in (0, own, self.sync0_cycle_ns):
+        if self._cycle_written not in (0, own, cycle_ns):
             return DC_CYCLE_TIME
+        self._checked_ns = cycle_ns
         return 0
 
     def begin(self) -> None:
-        """SAFE-OP is entered: by its pulses from now on, if there are to be any."""
-        if self._core.peek(self._position, ACTIVATION, 1)[0] & ACTIVE:
-            self._core.run_model_by_sync0(self._position, self.sync0_cycle_ns, self._step_ns)
+        """Enter SAFE-OP as it was checked: frames may have changed the registers meanwhile."""
+        if self._checked_ns:
+            self._core.run_model_by_sync0(self._position, self._checked_ns, self._step_ns)
 
     def end(self) -> None:
         if self._is_synchronous:
