@@ -20,6 +20,7 @@ from catenary.realtime.child import Child, start_python
 from catenary.virtual import Segment
 from catenary.virtual.description import VENDOR_ID, Description
 from catenary.virtual.devices.application import BLOB_BYTES
+from tests.peers.conftest import serve_command
 
 pysoem = pytest.importorskip("pysoem", reason="PySOEM is not installed (extra `peers`)")
 
@@ -93,9 +94,7 @@ def clocked(veth: tuple[str, str], tmp_path: Path) -> Iterator[Any]:
     ours, theirs = veth
     file = tmp_path / "clocked.toml"
     file.write_text(CLOCKED)
-    with start_python(
-        ["-m", "catenary.cli", "virtual", "serve", theirs, "--config", str(file)]
-    ) as server:
+    with start_python(serve_command(theirs, file)) as server:
         assert server.read_line(20.0), "the virtual segment did not start"
         master = pysoem.Master()
         master.open(ours)
@@ -195,6 +194,50 @@ def test_a_servo_goes_through_its_states_to_a_position(master: Any) -> None:
         return abs(SERVO.unpack(servo.input)[3] - start - 100_000) <= 100
 
     cycle_until(master, arrived)
+
+
+WITHOUT_LRW = """
+[[device]]
+kind = "coupler"
+
+[[device]]
+kind = "servo"
+
+[[device]]
+kind = "servo"
+lrw = false
+
+[[device]]
+kind = "servo"
+mailbox_bytes = 256
+"""
+
+
+@pytest.fixture
+def without_lrw(veth: tuple[str, str], tmp_path: Path) -> Iterator[Any]:
+    """Three servos with three SIIs; one answers LRD and LWR only."""
+    ours, theirs = veth
+    file = tmp_path / "without_lrw.toml"
+    file.write_text(WITHOUT_LRW)
+    with start_python(serve_command(theirs, file)) as server:
+        assert server.read_line(20.0), "the virtual segment did not start"
+        master = pysoem.Master()
+        master.open(ours)
+        try:
+            find(master, 4)
+            yield master
+        finally:
+            master.state = pysoem.INIT_STATE
+            master.write_state()
+            master.close()
+
+
+@again(devices=4)
+def test_servos_with_three_siis_reach_op_and_are_all_counted(without_lrw: Any) -> None:
+    master = without_lrw
+    to_operational(master)
+    assert master.expected_wkc == 9
+    cycle_until(master, lambda: exchange(master) == 9)
 
 
 @pytest.fixture

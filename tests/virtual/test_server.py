@@ -55,7 +55,7 @@ def test_frames_leave_a_ring_at_the_other_interface(veth: tuple[str, str]) -> No
     segment = ring()
     with (
         private_network.veth_pair() as other,
-        Server(segment, veth[1], second=other[1]),
+        Server(segment, veth[1], second=other[1], max_age=None),
         wire(veth[0]) as first,
         wire(other[0]) as second,
     ):
@@ -70,7 +70,7 @@ def test_frames_leave_a_ring_at_the_other_interface(veth: tuple[str, str]) -> No
 
 
 def test_a_ring_on_one_interface_is_a_line(veth: tuple[str, str]) -> None:
-    with Server(ring(), veth[1]), wire(veth[0]) as first:
+    with Server(ring(), veth[1], max_age=None), wire(veth[0]) as first:
         first.send(BRD)
         assert answer(first) == 3
 
@@ -79,7 +79,7 @@ def test_faults_reach_a_served_segment(veth: tuple[str, str]) -> None:
     segment = Segment(
         [Coupler() for _ in range(3)], clock="monotonic", faults=[cut(between=(0, 1), at=0.01)]
     )
-    with Server(segment, veth[1]), wire(veth[0]) as first:
+    with Server(segment, veth[1], max_age=None), wire(veth[0]) as first:
         first.settimeout(0.5)  # what runs into the dark does not come back
         counters = []
         while not counters or counters[-1] != 1:
