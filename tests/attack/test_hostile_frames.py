@@ -10,6 +10,8 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 
@@ -80,14 +82,20 @@ class Wire:
         self._socket.close()
 
 
-@pytest.fixture
-def served(veth: tuple[str, str]) -> Iterator[tuple[Wire, Child]]:
+@contextmanager
+def serving(veth: tuple[str, str], *options: str) -> Iterator[tuple[Wire, Child]]:
     ours, theirs = veth
-    with start_python(["-m", "catenary.cli", "virtual", "serve", theirs]) as server:
+    with start_python(["-m", "catenary.cli", "virtual", "serve", theirs, *options]) as server:
         assert server.read_line(SECONDS), "the virtual segment did not start"
         wire = Wire(ours)
         yield wire, server
         wire.close()
+
+
+@pytest.fixture
+def served(veth: tuple[str, str]) -> Iterator[tuple[Wire, Child]]:
+    with serving(veth) as both:
+        yield both
 
 
 def applications_work(wire: Wire) -> bool:
@@ -109,6 +117,31 @@ def test_one_frame_does_not_hang_a_served_segment(served: tuple[Wire, Child]) ->
     assert applications_work(wire)
     server.process.send_signal(signal.SIGTERM)
     assert server.process.wait(SECONDS) == 0
+
+
+def test_pulses_beyond_all_bounds_keep_no_frame_waiting(
+    veth: tuple[str, str], tmp_path: Path
+) -> None:
+    """A hundred clocks that pulse every 10 us, each at its own instants: more than the machine
+    can compute in real time."""
+    file = tmp_path / "clocks.toml"
+    tables = (f'[[device]]\nkind = "coupler"\ncrystal = {{ ppm = {k}.5 }}\n' for k in range(100))
+    file.write_text("\n".join(tables))
+    with serving(veth, "--config", str(file)) as (wire, server):
+        for position in range(100):  # the first pulses soon: local times begin apart
+            address = (-position & 0xFFFF) | 0x0910 << 16
+            time_now = wire.await_answer(Command.APRD, address, bytes(8), 1)
+            start = int.from_bytes(time_now, "little") + 50_000_000
+            for register, data in (
+                (SYNC_START, struct.pack("<Q", start)),
+                (SYNC0_CYCLE, struct.pack("<I", 10_001)),
+                (SYNC_ACTIVATION, b"\x03"),
+            ):
+                wire.await_answer(Command.APWR, (-position & 0xFFFF) | register << 16, data, 1)
+        time.sleep(0.5)  # real time, over a real wire: the pulses are due
+        for _ in range(20):
+            wire.await_answer(Command.BRD, 0, b"\0", 100)
+        assert server.running
 
 
 def test_one_frame_does_not_hang_a_segment_in_virtual_time() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import time
 
 import pytest
 
@@ -73,6 +74,26 @@ def test_a_ring_on_one_interface_is_a_line(veth: tuple[str, str]) -> None:
     with Server(ring(), veth[1], max_age=None), wire(veth[0]) as first:
         first.send(BRD)
         assert answer(first) == 3
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_an_application_that_fails_ends_the_server(
+    veth: tuple[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    segment = ring()
+
+    def fail() -> int:
+        raise ArithmeticError("of the application")
+
+    monkeypatch.setattr(segment.service, "run", fail)
+    with Server(segment, veth[1]) as server, pytest.raises(ArithmeticError, match="application"):
+        raise_failure_soon(server)
+
+
+def raise_failure_soon(server: Server) -> None:
+    deadline = time.monotonic() + 20.0
+    while time.monotonic() < deadline:
+        server.raise_failure()
 
 
 def test_faults_reach_a_served_segment(veth: tuple[str, str]) -> None:
