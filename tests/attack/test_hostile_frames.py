@@ -1,4 +1,4 @@
-"""Whoever can send frames can stop neither a served segment nor its devices' applications."""
+"""No frame stops a served segment or the applications of its devices."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ AL_CONTROL, AL_STATUS = 0x0120, 0x0130
 OFFSET, SYNC_ACTIVATION, SYNC_START, SYNC0_CYCLE = 0x0920, 0x0981, 0x0990, 0x09A0
 BLOCK = 200  # frames between two questions
 
-# The clock at -2^62, the first pulse at 2^62 + 2^61: their difference is no 64-bit number.
+# The clock at -2^62, the first pulse at 2^62 + 2^61: the difference exceeds 63 bits.
 HANG = encode_frame(
     [
         Datagram(Command.BWR, OFFSET << 16, struct.pack("<q", -(2**62))),

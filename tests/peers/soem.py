@@ -77,7 +77,7 @@ class Port:
 
 @dataclass(frozen=True)
 class Record:
-    """What SOEM keeps of a device's SII."""
+    """The part of a device's SII that SOEM keeps."""
 
     identity: tuple[int, int, int]
     block_lrw: bool
@@ -158,7 +158,7 @@ class Soem:
 
     @property
     def blocks_lrw(self) -> bool:
-        """One device whose SII denies LRW is enough; the controller's features are not asked."""
+        """True if the SII of any device denies LRW. The controllers' features do not count."""
         return any(record.block_lrw for record in self.records)
 
     def map(self) -> None:
@@ -179,7 +179,7 @@ class Soem:
         self.inputs = logical - self.outputs
 
     def to_operational(self) -> list[int]:
-        """The AL status of all devices after SAFE-OP, valid outputs and OP were asked for."""
+        """Request SAFE-OP, send outputs, request OP. Return the AL status of all devices."""
         self._request(SAFE_OP)
         for _ in range(5):
             self.exchange()

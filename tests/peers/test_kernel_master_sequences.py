@@ -309,8 +309,8 @@ def test_going_down(
 def test_a_stop_is_quick_whatever_fails_meanwhile(
     master: KernelMaster, slaves: list[Slave], segment: Segment, gap: int
 ) -> None:
-    """The application stops with clocks on: drives miss their outputs before, while and after they
-    are asked for INIT. A lost request is a wait of 5 s (fsm_change.c, ec_fsm_change_timeout_ms)."""
+    """The application stops with clocks on. Drives miss their outputs before, while and after INIT
+    is requested. A lost request is a wait of 5 s (fsm_change.c, ec_fsm_change_timeout_ms)."""
     operate(master, slaves, sync0=1_000_000)
     master.domains = []
     master.run(gap)

@@ -1,5 +1,5 @@
 """SOEM's habits against the segment: one SII for each identity, LRW decided by the SII alone, and
-answers found by their index modulo 16 in a socket that nobody empties."""
+answers found by their index modulo 16 in a socket that is never emptied."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class Wire:
 
 
 def numbered(number: int) -> bytes:
-    """A write that nobody answers twice: the answer shows which frame it belongs to."""
+    """A write whose answer shows to which frame it belongs."""
     return encode_frame([Datagram(Command.BWR, USER_RAM << 16, struct.pack("<I", number))])
 
 

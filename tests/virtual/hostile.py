@@ -54,7 +54,7 @@ def send_frames(
 
 
 def main(frames: int) -> int:
-    """What tools/sanitize runs: one long sequence, with its figures."""
+    """Send one long sequence, and print its figures: for tools/sanitize."""
     with tempfile.TemporaryDirectory() as folder:
         result = send_frames(compile_frames(Path(folder)), frames, os.getpid(), frames / 1000)
     print(result.stdout + result.stderr, end="")

@@ -13,6 +13,7 @@
 enum { DEVICES = 5, STATION = 0x1001, RAM = 0x2000, SII_WORDS = 64 };
 
 static uint64_t state;
+static int calm;                     /* frames as of a MainDevice in operation, more or less */
 
 static uint64_t any(void) {
     state ^= state >> 12;
@@ -91,21 +92,21 @@ static void application(controller *c) {
     c->al_unread = 0;
     if (one_in(4))
         al_show(c, states[below(5)], (uint16_t)below(0x40));
-    if (one_in(4))
-        c->outputs_valid = (uint8_t)below(2);
+    if (calm || one_in(4))
+        c->outputs_valid = !one_in(calm ? 16 : 2);
     if (one_in(8))
         c->outputs_seen = 0;
-    if (one_in(4)) {
+    if (!calm && one_in(4)) {
         int n = (int)below(4);
         sm_registers(c, n)[7] = (uint8_t)below(2);
         sm_configured(c, n);
     }
     if (!c->axis_count)
         return;
-    if (one_in(8)) {
+    if (one_in(calm ? 32 : 8)) {
         synchronous_end(c);
         model_period(c, 250000);
-    } else if (one_in(8)) {
+    } else if (calm ? !c->synchronous.active && c->sync.active : one_in(8)) {
         int64_t cycle = 62500 + (int64_t)below(10000000), steps = (cycle + 249999) / 250000;
         synchronous_begin(c, cycle, (int)steps);
         model_period(c, cycle / steps);
@@ -127,12 +128,13 @@ static int serve(void *owner) {
     return 0;
 }
 
-static cat_segment *make_line(void) {
-    cat_segment *s = segment_make(DEVICES, 1, 0, 15000);
+static cat_segment *make_ring(void) {
+    cat_segment *s = segment_make(DEVICES, 1, 1, 15000);
     s->service = serve;
     s->owner = s;
     for (int n = 0; n < DEVICES; n++)
         cable_lay(s, n, n ? (cable_end){n - 1, 1} : (cable_end){END_FIRST, 0}, (cable_end){n, 0});
+    cable_lay(s, DEVICES, (cable_end){DEVICES - 1, 1}, (cable_end){END_SECOND, 0});
     for (int n = 0; n < DEVICES; n++)
         make_device(s, n);
     segment_light(s, 1);
@@ -228,8 +230,17 @@ static uint32_t sensible(const cat_segment *s, uint32_t ado, uint8_t *data) {
     return 16;
 }
 
+static uint32_t any_address(void) {
+    static const uint16_t operation[] = {
+        REG_END + 0x200, REG_END + 0x200, REG_END + 0x200, REG_END + 0x200, REG_SM + 16, REG_SM + 24, REG_FMMU,
+        REG_SYNC_ACTIVATION, REG_DC_SYSTEM_TIME, REG_AL_CONTROL, REG_DC_SPEED_START};
+    if (calm && !one_in(64))
+        return operation[below(sizeof operation / sizeof *operation)];
+    return one_in(8) ? below(0x10000) : REGISTERS[below(sizeof REGISTERS / sizeof *REGISTERS)];
+}
+
 static uint32_t put_datagram(const cat_segment *s, uint8_t *at, uint32_t room, int more) {
-    uint32_t ado = one_in(8) ? below(0x10000) : REGISTERS[below(sizeof REGISTERS / sizeof *REGISTERS)];
+    uint32_t ado = any_address();
     uint32_t size = one_in(16) ? below(1400) : 1 + below(16);
     if (one_in(16))
         ado -= below(8);
@@ -239,7 +250,7 @@ static uint32_t put_datagram(const cat_segment *s, uint8_t *at, uint32_t room, i
     uint32_t fitting = room >= 40 && !one_in(4) ? sensible(s, ado, data) : 0;
     size = fitting ? fitting : payload(s, ado, data, size);
     memset(at, 0, DATAGRAM_HEADER);
-    at[0] = (uint8_t)(one_in(4) ? below(256) : 1 + below(14));
+    at[0] = (uint8_t)(calm ? BWR : one_in(4) ? below(256) : 1 + below(14));
     if (at[0] >= LRD && at[0] <= LRW)
         store32(at + 2, one_in(4) ? (uint32_t)extreme(s) : below(64));
     else {
@@ -268,6 +279,7 @@ static uint32_t make_frame(const cat_segment *s, uint8_t *frame) {
 /* Power comes and goes, so that what one sequence locked (write protection) does not end the test. */
 static void restart(cat_segment *s) {
     int n = (int)below(DEVICES);
+    calm = one_in(2);
     lock(s);
     controller_power_off(&s->controllers[n]);
     segment_light(s, 1);
@@ -277,6 +289,14 @@ static void restart(cat_segment *s) {
     store16(s->controllers[n].memory + REG_STATION, (uint16_t)(STATION + n));
     if (KINDS[n].axes)
         map_axis(&s->controllers[n]);
+    unlock(s);
+}
+
+/* The second interface comes and goes: a ring, or a line. */
+static void switch_end(cat_segment *s) {
+    lock(s);
+    s->ends[1].up = (int)below(2);
+    segment_light(s, 0);
     unlock(s);
 }
 
@@ -295,15 +315,18 @@ int main(int count, char **words) {
     const uint8_t *back;
     uint64_t answered = 0, frames = count > 1 ? strtoull(words[1], NULL, 0) : 100000;
     state = 0x9E3779B97F4A7C15ull * (1 + (count > 2 ? strtoull(words[2], NULL, 0) : 0));
-    cat_segment *s = make_line();
+    cat_segment *s = make_ring();
     for (uint64_t k = 0; k < frames; k++) {
         if (one_in(128))
             restart(s);
-        line_send(&s->ends[0], frame, make_frame(s, frame));
+        if (one_in(64))
+            switch_end(s);
+        line_send(&s->ends[one_in(4)], frame, make_frame(s, frame));
         if (!wait_for(s, pauses[below(5)] + (one_in(5000) ? 100000000 : 0)))
             return 1;
-        while (line_receive(&s->ends[0], &back) > 0)
-            answered++;
+        for (int n = 0; n < 2; n++)
+            while (line_receive(&s->ends[n], &back) > 0)
+                answered++;
     }
     printf("%llu of %llu frames came back, %llu datagrams, %lld ns\n", (unsigned long long)answered,
            (unsigned long long)frames, (unsigned long long)s->counters.datagrams, (long long)s->now);

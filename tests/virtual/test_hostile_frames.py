@@ -17,7 +17,7 @@ from tests.virtual.hostile import compile_frames, send_frames
 from tests.virtual.main_device import STATION, MainDevice
 
 MS = 1_000_000
-FRAMES, SEEDS, SECONDS = 40_000, (1, 2, 3), 120.0
+FRAMES, SEEDS, SECONDS = 100_000, (1, 2, 3), 120.0
 EDGES = (0, 1, 1000, 2**31 - 1, 2**31, 2**32 - 1, 2**62, 3 * 2**61, 2**63 - 1, 2**63, 2**64 - 1)
 
 
