@@ -40,16 +40,18 @@ bits = 16
 """
 
 
-def serve_command(interface: str, file: Path) -> list[str]:
-    """`catenary virtual serve` in real time. Where the machine refuses that, late frames are
-    answered: SOEM takes an old mailbox message for a new one after a lost frame, as it does not
-    look at the mailbox counter."""
+def serve_command(interface: str, file: Path, *, max_age: float = 1e6) -> list[str]:
+    """Return the call of `catenary virtual serve` in real time, or else with `max_age` [s].
+
+    By default late frames are answered then: SOEM does not check the mailbox counter, and takes an
+    old message for a new one after a lost frame.
+    """
     command = ["-m", "catenary.cli", "virtual", "serve", interface, "--config", str(file)]
     before = os.sched_getscheduler(0), os.sched_getparam(0)
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(50))
     except PermissionError:
-        return [*command, "--max-age", "1e6"]
+        return [*command, "--max-age", str(max_age)]
     os.sched_setscheduler(0, *before)
     return [*command, "--priority", "50"]
 
