@@ -108,7 +108,7 @@ static void application(controller *c) {
         model_period(c, 250000);
     } else if (calm ? !c->synchronous.active && c->sync.active : one_in(8)) {
         int64_t cycle = 62500 + (int64_t)below(10000000), steps = (cycle + 249999) / 250000;
-        synchronous_begin(c, cycle, (int)steps);
+        synchronous_begin(c, cycle, (int)steps, one_in(4) ? SYNC_PULSE_1 : SYNC_PULSE_0);
         model_period(c, cycle / steps);
     }
     uint8_t box[64] = {0};

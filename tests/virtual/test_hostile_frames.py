@@ -10,7 +10,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from catenary.virtual import AnalogInputs, Coupler, Crystal, DigitalOutputs, Segment, Servo
+from catenary.virtual import (
+    AnalogInputs,
+    Coupler,
+    Crystal,
+    DigitalOutputs,
+    Segment,
+    Servo,
+    ServoQuirks,
+)
 from catenary.wire.datagram import Command
 from tests.virtual.clocks import ACTIVATION, OFFSET, START_TIME, SYNC0_CYCLE
 from tests.virtual.hostile import compile_frames, send_frames
@@ -124,6 +132,17 @@ def test_a_sync0_cycle_changed_after_the_check_is_not_used() -> None:
     main.write(STATION + 1, SYNC0_CYCLE, bytes(4))
     main.let_pass(3)
     assert main.al_status(STATION + 1) == (4, 0)
+
+
+def test_a_sync1_cycle_beyond_32_bits_is_refused() -> None:
+    """SYNC1 comes with the first SYNC0 after its time: up to 2^32 ns and one cycle later."""
+    main = MainDevice(Segment([Servo(quirks=ServoQuirks(sync_signal="sync1"))]))
+    main.number_stations()
+    main.map_servo(STATION, 0)
+    main.write(STATION, START_TIME, struct.pack("<Q", 2**62))
+    main.write(STATION, SYNC0_CYCLE, struct.pack("<II", MS, 2**32 - 1))
+    main.write(STATION, ACTIVATION, b"\x07")
+    assert main.request(STATION, 4) == (2 | 0x10, 0x0030)
 
 
 def test_more_objects_than_a_device_can_map_are_refused() -> None:

@@ -17,6 +17,7 @@ from catenary.virtual import (
     Junction,
     Servo,
     ServoQuirks,
+    SiiQuirks,
 )
 from catenary.virtual.description import VENDOR_ID
 from catenary.virtual.sii_image import checksum, make_sii_image
@@ -58,6 +59,7 @@ VARIANTS: list[Device] = [
     *DEVICES,
     *(Servo(lrw=lrw, mailbox_bytes=size) for lrw in (True, False) for size in (64, 128, 256)),
     Servo(quirks=ServoQuirks(watchdog_trigger=False)),
+    Servo(sii_quirks=SiiQuirks(pdos="absent")),
     *(AnalogInputs(lrw=lrw, mailbox_bytes=size) for lrw in (True, False) for size in (64, 256)),
     *(DigitalOutputs(lrw=lrw, bits=bits) for lrw in (True, False) for bits in (1, 8)),
     *(DigitalInputs(lrw=lrw, bits=bits) for lrw in (True, False) for bits in (1, 8)),
@@ -68,9 +70,9 @@ def test_one_identity_has_one_sii() -> None:
     """SOEM copies the SII of the first device of an identity (ecx_lookup_prev_sii)."""
     images: dict[tuple[int, int], set[bytes]] = {}
     for device in VARIANTS:
-        d = device.description()
-        plain = replace(d, name="", alias=0, serial=0)
-        images.setdefault((d.product_code, d.revision), set()).add(make_sii_image(plain))
+        plain = replace(device.whole_description(), name="", alias=0, serial=0)
+        image = make_sii_image(plain, device.sii_quirks)
+        images.setdefault((plain.product_code, plain.revision), set()).add(image)
     assert {len(of_one_identity) for of_one_identity in images.values()} == {1}
 
 

@@ -84,13 +84,15 @@ def run(arguments: argparse.Namespace) -> int:
 def _raise_priority(interface: str, priority: int) -> None:
     """Schedule this process, and the threads it starts, in real time."""
     from catenary.errors import LinkError
+    from catenary.interpreter import permission_advice
     from catenary.realtime.scheduling import request_scheduling
-    from catenary.virtual.server import PERMISSION
 
     scheduling = request_scheduling(priority=priority)
     if not scheduling.real_time:
         refused = "; ".join(scheduling.refusals)
-        raise LinkError(f"{interface} cannot be served in real time: {refused}", hint=PERMISSION)
+        raise LinkError(
+            f"{interface} cannot be served in real time: {refused}", hint=permission_advice()
+        )
 
 
 def _report_expired(frames: int, max_age: float, priority: int | None) -> None:

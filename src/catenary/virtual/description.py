@@ -5,6 +5,9 @@ from __future__ import annotations
 import zlib
 from dataclasses import dataclass, replace
 
+from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
+from catenary.virtual.op_modes import STANDARD, OpMode
+
 # Private: no vendor of the EtherCAT Technology Group has this identity ("CTNY" in ASCII).
 VENDOR_ID = 0x43544E59
 
@@ -74,7 +77,11 @@ class Description:
     current_milliampere: int = 0
     identification: int = 0
     ports: tuple[int, ...] = (0, 1)
+    mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS
+    op_modes: tuple[OpMode, ...] = STANDARD  # of a device with clock and axes
+    loop_control: bool = True  # its ports can be closed (0x0101)
     lrw: bool = True
+    sii_variant: str = ""  # how the SII differs from the device
 
     @property
     def revision(self) -> int:

@@ -53,6 +53,10 @@ static inline int64_t sync_ahead(uint64_t time, uint64_t now) {
     return ahead < -SYNC_HORIZON ? -SYNC_HORIZON : ahead > SYNC_HORIZON ? SYNC_HORIZON : ahead;
 }
 
+static inline int sync_reached(int awaits, uint64_t time, uint64_t now) {
+    return awaits && sync_ahead(time, now) <= 0;
+}
+
 /* The instant of the segment's clock for the earlier pulse, at the present rate. */
 static void sync_schedule(controller *c) {
     sync_unit *u = &c->sync;
@@ -104,10 +108,12 @@ static void sync_time_jumped(controller *c, int64_t when) {
 }
 
 /* SYNC1 comes its cycle time after a SYNC0, and after the first SYNC0 again that follows it. */
-static void sync_pulse1(controller *c) {
+static int sync_pulse1(controller *c) {
+    int shown = c->memory[REG_SYNC_ACTIVATION] & SYNC_PULSE_1;
     c->memory[REG_SYNC_ACTIVATION_STATUS] &= (uint8_t)~SYNC_PENDING_1;
     c->sync.awaits1 = 0;
-    c->sync.pulses1 += (c->memory[REG_SYNC_ACTIVATION] & SYNC_PULSE_1) != 0;
+    c->sync.pulses1 += shown != 0;
+    return shown;
 }
 
 /* How long a signal is up. One whose next pulse comes before it is down stays up (section I
@@ -130,27 +136,27 @@ static int sync_pulse0(controller *c) {
     if (u->awaits0)
         dc_store(c, REG_SYNC_START, (int64_t)u->next0);
     dc_store(c, REG_SYNC_NEXT1, (int64_t)u->next1);
-    if (u->next1 == now)
-        sync_pulse1(c);
-    int shown = (c->memory[REG_SYNC_ACTIVATION] & SYNC_PULSE_0) != 0;
-    u->pulses0 += shown;
-    return shown;
+    int shown = c->memory[REG_SYNC_ACTIVATION] & SYNC_PULSE_0;
+    u->pulses0 += shown != 0;
+    return u->next1 == now ? shown | sync_pulse1(c) : shown;
 }
 
-/* What is due at the segment's present. 1: the device gets a SYNC0 pulse.
+/* What is due at the segment's present. Returns the pulses that the device gets: SYNC_PULSE_0, _1.
  * The rate swings and a product of it is rounded, so that a pulse may still be a hair away at the
  * instant computed for it: counted from here on, it is at least 1 ns ahead and comes nearer. */
 static int sync_advance(controller *c) {
     sync_unit *u = &c->sync;
     dc_anchor(c, c->segment->now);
     uint64_t now = (uint64_t)dc_system_time(c, c->segment->now);
-    int pulse = 0;
-    if (u->awaits1 && sync_ahead(u->next1, now) <= 0)
-        sync_pulse1(c);
-    if (u->awaits0 && sync_ahead(u->next0, now) <= 0)
-        pulse = sync_pulse0(c);
+    int pulses = 0;
+    if (sync_reached(u->awaits1, u->next1, now) && !(u->awaits0 && sync_ahead(u->next0, u->next1) <= 0))
+        pulses = sync_pulse1(c);
+    if (sync_reached(u->awaits0, u->next0, now))
+        pulses |= sync_pulse0(c);
+    if (sync_reached(u->awaits1, u->next1, now))    /* a SYNC0 at the same time does not start the next SYNC1 */
+        pulses |= sync_pulse1(c);
     sync_schedule(c);
-    return pulse;
+    return pulses;
 }
 
 /* What a write of [first, end) in the clocks' registers sets going, latched times apart. */
