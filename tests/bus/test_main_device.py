@@ -28,6 +28,7 @@ from catenary.virtual import (
     demo_segment,
 )
 from catenary.wire.al import State
+from catenary.wire.datagram import Command
 from tests.bus.links import Echo
 from tests.plan.devices import Asking, asks
 
@@ -311,6 +312,26 @@ def test_all_kinds_of_devices_reach_safe_op_whatever_their_controller_can() -> N
         main.configure(plan)
         assert [device.state for device in segment] == [State.SAFE_OP] * 5
         assert len(plan.cycle.sync_units) == 2
+
+
+FEATURES, NO_LRW = 0x0008, 0x0200
+
+
+@pytest.mark.parametrize("by_sii", [True, False])
+def test_one_indication_is_enough_to_do_without_lrw(by_sii: bool) -> None:
+    """The SII's general category, or the controller's features."""
+    segment = Segment([Servo(lrw=not by_sii), Servo()])
+    features = int.from_bytes(segment.core.peek(0, FEATURES, 2), "little")
+    shown = features & ~NO_LRW if by_sii else features | NO_LRW
+    segment.core.poke(0, FEATURES, shown.to_bytes(2, "little"))
+    with MainDevice(segment) as main:
+        first, second = (sub.description for sub in main.scan())
+        assert (first.supports_lrw, second.supports_lrw) == (False, True)
+        plan = make_plan([first, second])
+        main.configure(plan)
+        assert [device.state for device in segment] == [State.SAFE_OP] * 2
+        units = {d.sync_unit: d.command for d in plan.cycle.frames[0].datagrams if d.sync_unit >= 0}
+        assert sorted(units.values()) == [Command.LRD, Command.LRW]
 
 
 def test_a_hundred_devices_in_few_frames() -> None:

@@ -73,6 +73,8 @@ def test_every_help_has_an_example_that_parses(name: str) -> None:
         "demo --seconds -1",
         "bench loop --drives 0",
         "virtual serve",
+        "virtual serve veth1 --priority 100",
+        "virtual serve veth1 --max-age -1",
         "bench soak --minutes 1 --json nowhere/soak.json",
     ],
 )

@@ -20,7 +20,7 @@ def test_an_emergency_arrives_over_the_wire(
     servo = Servo()
     told: list[Event] = []
     with (
-        Server(Segment([Coupler(), servo], clock="monotonic"), veth[1]),
+        Server(Segment([Coupler(), servo], clock="monotonic"), veth[1], max_age=None),
         cat.MainDevice(veth[0]) as main,
     ):
         main.on_event(told.append)

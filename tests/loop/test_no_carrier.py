@@ -25,7 +25,7 @@ def segment() -> Segment:
 
 @pytest.fixture
 def server(veth: tuple[str, str], segment: Segment) -> Iterator[Server]:
-    with Server(segment, veth[1]) as server:
+    with Server(segment, veth[1], max_age=None) as server:
         yield server
 
 
@@ -53,7 +53,7 @@ def test_optional_devices_alone_come_back_with_the_link(
             iterate_until(loop, lambda: not any(lamps.present))
             subprocess.run(["ip", "link", "set", veth[1], "up"], check=True)
             await_carrier(veth[0])
-            with Server(segment, veth[1]):
+            with Server(segment, veth[1], max_age=None):
                 iterate_until(loop, lambda: all(lamps.present))
                 assert [device.state for device in segment] == [8, 8]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -39,6 +40,22 @@ bits = 16
 """
 
 
+def serve_command(interface: str, file: Path, *, max_age: float = 1e6) -> list[str]:
+    """Return the call of `catenary virtual serve` in real time, or else with `max_age` [s].
+
+    By default late frames are answered then: SOEM does not check the mailbox counter, and takes an
+    old message for a new one after a lost frame.
+    """
+    command = ["-m", "catenary.cli", "virtual", "serve", interface, "--config", str(file)]
+    before = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(50))
+    except PermissionError:
+        return [*command, "--max-age", str(max_age)]
+    os.sched_setscheduler(0, *before)
+    return [*command, "--priority", "50"]
+
+
 @pytest.fixture
 def line(tmp_path: Path) -> Path:
     """The devices behind `served`."""
@@ -51,7 +68,6 @@ def line(tmp_path: Path) -> Path:
 def served(veth: tuple[str, str], line: Path) -> Iterator[str]:
     """An interface at the other end of which virtual devices answer, as a user starts them."""
     ours, theirs = veth
-    command = ["-m", "catenary.cli", "virtual", "serve", theirs, "--config", str(line)]
-    with start_python(command) as server:
+    with start_python(serve_command(theirs, line)) as server:
         assert server.read_line(20.0), "the virtual segment did not start"
         yield ours

@@ -31,7 +31,7 @@ def main(path: str, first: str, second: str, one: str, other: str) -> None:
     signal.signal(signal.SIGTERM, end)
     signal.signal(signal.SIGUSR1, cut_it)
     signal.signal(signal.SIGUSR2, join_it)
-    with Server(segment, first, second=second):
+    with Server(segment, first, second=second, max_age=None):
         print("ready", flush=True)
         said = 0
         while not asked_to_end.wait(0.02):

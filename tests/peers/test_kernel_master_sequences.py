@@ -305,6 +305,22 @@ def test_going_down(
     assert [device.state for device in segment] == [state] * 6
 
 
+@pytest.mark.parametrize("gap", range(9))
+def test_a_stop_is_quick_whatever_fails_meanwhile(
+    master: KernelMaster, slaves: list[Slave], segment: Segment, gap: int
+) -> None:
+    """The application stops with clocks on. Drives miss their outputs before, while and after INIT
+    is requested. A lost request is a wait of 5 s (fsm_change.c, ec_fsm_change_timeout_ms)."""
+    operate(master, slaves, sync0=1_000_000)
+    master.domains = []
+    master.run(gap)
+    start = master.link.now()
+    for slave in slaves:
+        master.change(slave, INIT)
+    assert master.link.now() - start < 100_000_000
+    assert [device.state for device in segment] == [INIT] * 6
+
+
 def test_another_master_finds_the_segment_in_op(segment: Segment) -> None:
     first = KernelMaster(segment)
     operate(first, first.scan())

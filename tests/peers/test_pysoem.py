@@ -7,6 +7,7 @@ import contextlib
 import functools
 import os
 import signal
+import statistics
 import struct
 import time
 from collections.abc import Callable, Iterator
@@ -20,6 +21,8 @@ from catenary.realtime.child import Child, start_python
 from catenary.virtual import Segment
 from catenary.virtual.description import VENDOR_ID, Description
 from catenary.virtual.devices.application import BLOB_BYTES
+from tests.peers.conftest import serve_command
+from tests.peers.soem import MAX_BUF
 
 pysoem = pytest.importorskip("pysoem", reason="PySOEM is not installed (extra `peers`)")
 
@@ -93,9 +96,7 @@ def clocked(veth: tuple[str, str], tmp_path: Path) -> Iterator[Any]:
     ours, theirs = veth
     file = tmp_path / "clocked.toml"
     file.write_text(CLOCKED)
-    with start_python(
-        ["-m", "catenary.cli", "virtual", "serve", theirs, "--config", str(file)]
-    ) as server:
+    with start_python(serve_command(theirs, file)) as server:
         assert server.read_line(20.0), "the virtual segment did not start"
         master = pysoem.Master()
         master.open(ours)
@@ -197,6 +198,73 @@ def test_a_servo_goes_through_its_states_to_a_position(master: Any) -> None:
     cycle_until(master, arrived)
 
 
+def test_a_pause_of_the_segment_leaves_no_old_answers(veth: tuple[str, str], line: Path) -> None:
+    """SOEM finds answers by index modulo 16, in a socket that it does not empty."""
+    ours, theirs = veth
+    with start_python(serve_command(theirs, line, max_age=0.002)) as server:
+        assert server.read_line(20.0), "the virtual segment did not start"
+        master = pysoem.Master()
+        master.open(ours)
+        try:
+            find(master, 6)
+            to_operational(master)
+            server.process.send_signal(signal.SIGSTOP)
+            for _ in range(100):
+                exchange(master, 2_000)
+            server.process.send_signal(signal.SIGCONT)
+            cycle_until(master, lambda: exchange(master, 2_000) == master.expected_wkc)
+            request_operational(master)
+            lags = [cycles_to(master, word) for word in [0x06, 0x00] * 3]
+            assert statistics.median_high(lags) < MAX_BUF // 2
+        finally:
+            server.process.send_signal(signal.SIGCONT)
+            master.close()
+
+
+WITHOUT_LRW = """
+[[device]]
+kind = "coupler"
+
+[[device]]
+kind = "servo"
+
+[[device]]
+kind = "servo"
+lrw = false
+
+[[device]]
+kind = "servo"
+mailbox_bytes = 256
+"""
+
+
+@pytest.fixture
+def without_lrw(veth: tuple[str, str], tmp_path: Path) -> Iterator[Any]:
+    """Three servos with three SIIs; one answers LRD and LWR only."""
+    ours, theirs = veth
+    file = tmp_path / "without_lrw.toml"
+    file.write_text(WITHOUT_LRW)
+    with start_python(serve_command(theirs, file)) as server:
+        assert server.read_line(20.0), "the virtual segment did not start"
+        master = pysoem.Master()
+        master.open(ours)
+        try:
+            find(master, 4)
+            yield master
+        finally:
+            master.state = pysoem.INIT_STATE
+            master.write_state()
+            master.close()
+
+
+@again(devices=4)
+def test_servos_with_three_siis_reach_op_and_are_all_counted(without_lrw: Any) -> None:
+    master = without_lrw
+    to_operational(master)
+    assert master.expected_wkc == 9
+    cycle_until(master, lambda: exchange(master) == 9)
+
+
 @pytest.fixture
 def ring(line: Path, veth: tuple[str, str]) -> Iterator[tuple[str, str, Child]]:
     """Both interfaces of a ring, and who serves it (serve_ring.py says what it obeys)."""
@@ -251,6 +319,10 @@ def find(master: Any, devices: int, seconds: float = 20.0) -> None:
 def to_operational(master: Any) -> None:
     master.config_map()
     assert master.state_check(pysoem.SAFEOP_STATE, 2_000_000) == pysoem.SAFEOP_STATE
+    request_operational(master)
+
+
+def request_operational(master: Any) -> None:
     master.state = pysoem.OP_STATE
     master.write_state()
 
@@ -259,12 +331,26 @@ def to_operational(master: Any) -> None:
             return True
         master.read_state()
         if any(slave.state & pysoem.STATE_ACK for slave in master.slaves):
-            # this machine stood still for longer than a watchdog: acknowledge, and once more
+            # the segment or this machine stood still for longer than a watchdog
             master.state = pysoem.OP_STATE | pysoem.STATE_ACK
             master.write_state()
         return False
 
     cycle_until(master, operational)
+
+
+def cycles_to(master: Any, controlword: int) -> int:
+    """Return how many exchanges after the controlword the statusword follows it."""
+    servo, wanted = master.slaves[SHOULDER], {0x06: 0x21, 0x00: 0x40}[controlword]
+    for _ in range(400):  # what came before has been received
+        exchange(master, 2_000)
+    servo.output = SERVO.pack(controlword, 8, 0, 0, 0)
+    for count in range(1000):
+        exchange(master, 2_000)
+        time.sleep(0.001)  # real time, over a real wire: the servo steps every 0.25 ms
+        if SERVO.unpack(servo.input)[0] & 0x6F == wanted:
+            return count
+    raise AssertionError(f"no 0x{wanted:02X} after controlword 0x{controlword:02X}")
 
 
 def cycle_until(master: Any, done: Callable[[], bool], seconds: float = 20.0) -> None:

@@ -154,6 +154,13 @@ def test_a_device_without_lrw_gets_lrd_and_lwr() -> None:
     assert cycle.sync_units[1].devices == (2,)
 
 
+def test_the_sii_alone_can_deny_lrw() -> None:
+    denied = replace(servo(2), sii_denies_lrw=True)
+    cycle = make_plan([coupler(0), servo(1), denied]).cycle
+    kinds = [(Command(d.command).name, d.sync_unit) for d in cycle.frames[0].datagrams]
+    assert kinds[1:4] == [("LRW", 0), ("LWR", 1), ("LRD", 1)]
+
+
 def test_outputs_alone_need_no_lrw() -> None:
     cycle = make_plan([lamps(0), lamps(1)]).cycle
     datagram = cycle.frames[0].datagrams[1]

@@ -132,7 +132,7 @@ def test_a_killed_process_leaves_nothing_turning_and_nothing_locked(veth: tuple[
     lamps, servo = DigitalOutputs(), Servo()
     segment = Segment([Coupler(), lamps, servo], clock="monotonic")
     with (
-        Server(segment, veth[1]),
+        Server(segment, veth[1], max_age=None),
         subprocess.Popen(
             [sys.executable, "-c", SCRIPT, veth[0]], stdout=subprocess.PIPE, text=True
         ) as child,

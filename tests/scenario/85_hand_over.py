@@ -138,7 +138,7 @@ def served_arm(nic: str) -> tuple[Server, Servo, Plant]:
     """The rig on a wire, in real time."""
     servo = Servo(name="lift", **SERVO)  # type: ignore[arg-type]
     plant = Plant(MODEL, [Joint("shoulder", GEAR, brake=150.0, brake_delay=0.030)])
-    return Server(Segment([servo], plant=plant, clock="monotonic"), nic), servo, plant
+    return Server(Segment([servo], plant=plant, clock="monotonic"), nic, max_age=None), servo, plant
 
 
 def test_on_the_machines_clock_and_real_frames(veth: tuple[str, str]) -> None:

@@ -72,7 +72,7 @@ def test_a_frame_is_answered_without_a_step(tmp_path: Path) -> None:
 
 def test_a_served_arm_swings(tmp_path: Path, veth: tuple[str, str]) -> None:
     segment = swinging(tmp_path)
-    with Server(segment, veth[1]), wire(veth[0]) as near:
+    with Server(segment, veth[1], max_age=None), wire(veth[0]) as near:
         for _ in range(20):
             near.send(BRD)
             assert answer(near) == 1
@@ -134,7 +134,7 @@ def test_in_real_time_it_stands_still_and_frames_are_answered_on(
     said: list[object] = []
     monkeypatch.setattr(threading, "excepthook", lambda what: said.append(what.exc_value))
     segment, servo = free(tmp_path, clock="monotonic")
-    with Server(segment, veth[1]) as server, wire(veth[0]) as near:
+    with Server(segment, veth[1], max_age=None) as server, wire(veth[0]) as near:
         servo.apply_load(3e9)
         until(lambda: bool(said))
         near.send(BRD)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import time
 
 import pytest
 
@@ -55,7 +56,7 @@ def test_frames_leave_a_ring_at_the_other_interface(veth: tuple[str, str]) -> No
     segment = ring()
     with (
         private_network.veth_pair() as other,
-        Server(segment, veth[1], second=other[1]),
+        Server(segment, veth[1], second=other[1], max_age=None),
         wire(veth[0]) as first,
         wire(other[0]) as second,
     ):
@@ -70,16 +71,36 @@ def test_frames_leave_a_ring_at_the_other_interface(veth: tuple[str, str]) -> No
 
 
 def test_a_ring_on_one_interface_is_a_line(veth: tuple[str, str]) -> None:
-    with Server(ring(), veth[1]), wire(veth[0]) as first:
+    with Server(ring(), veth[1], max_age=None), wire(veth[0]) as first:
         first.send(BRD)
         assert answer(first) == 3
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_an_application_that_fails_ends_the_server(
+    veth: tuple[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    segment = ring()
+
+    def fail() -> int:
+        raise ArithmeticError("of the application")
+
+    monkeypatch.setattr(segment.service, "run", fail)
+    with Server(segment, veth[1]) as server, pytest.raises(ArithmeticError, match="application"):
+        raise_failure_soon(server)
+
+
+def raise_failure_soon(server: Server) -> None:
+    deadline = time.monotonic() + 20.0
+    while time.monotonic() < deadline:
+        server.raise_failure()
 
 
 def test_faults_reach_a_served_segment(veth: tuple[str, str]) -> None:
     segment = Segment(
         [Coupler() for _ in range(3)], clock="monotonic", faults=[cut(between=(0, 1), at=0.01)]
     )
-    with Server(segment, veth[1]), wire(veth[0]) as first:
+    with Server(segment, veth[1], max_age=None), wire(veth[0]) as first:
         first.settimeout(0.5)  # what runs into the dark does not come back
         counters = []
         while not counters or counters[-1] != 1:

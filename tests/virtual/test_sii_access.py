@@ -36,13 +36,24 @@ def test_a_read_takes_time_and_gives_four_bytes(main: MainDevice) -> None:
 def test_a_read_of_eight_bytes_where_the_feature_bit_says_so(main: MainDevice) -> None:
     main.segment.core.time_sii(0, 100_000, 100_000, True)
     assert command(main, 0x0100, 12) & 0x0040
-    assert struct.unpack("<II", main.read(STATION, SII_DATA, 8)) == (0x0001_0000, 0x1234)
+    revision = Coupler().description().revision
+    assert struct.unpack("<II", main.read(STATION, SII_DATA, 8)) == (revision, 0x1234)
 
 
 def test_while_busy_nothing_else_is_accepted(main: MainDevice) -> None:
     main.write(STATION, SII_CONTROL, struct.pack("<HI", 0x0100, 8))
     assert main.write(STATION, SII_CONTROL, struct.pack("<HI", 0x0100, 10)) == 0
     main.let_pass(1)
+    assert struct.unpack("<I", main.read(STATION, SII_DATA, 4))[0] == VENDOR_ID
+
+
+def test_a_write_across_the_registers_does_not_restart_a_command(main: MainDevice) -> None:
+    main.segment.core.time_sii(0, 1_000_000, 1_000_000, False)
+    main.write(STATION, SII_CONTROL, struct.pack("<HI", 0x0100, 8))
+    main.let_pass(0.9)
+    assert main.write(STATION, SII_CONTROL - 2, bytes(16)) == 1  # the owner alone can be written
+    main.let_pass(0.2)
+    assert main.read(STATION, SII_CONTROL, 2) == b"\x80\x00"
     assert struct.unpack("<I", main.read(STATION, SII_DATA, 4))[0] == VENDOR_ID
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,10 +16,13 @@ from catenary.virtual import (
     DigitalOutputs,
     Junction,
     Servo,
+    ServoQuirks,
+    SiiQuirks,
 )
 from catenary.virtual.description import VENDOR_ID
 from catenary.virtual.sii_image import checksum, make_sii_image
 from catenary.wire.sii import decode_sii
+from catenary.wire.sii_categories import GeneralFlags
 
 DEVICES: list[Device] = [
     Coupler(),
@@ -39,6 +44,42 @@ def test_the_decoder_finds_what_was_described(device: Device) -> None:
     assert sii.header.station_alias == description.alias
     assert sii.general is not None
     assert sii.general.physical_ports == {2: 0x0011, 3: 0x0111}[len(device.ports)]
+
+
+@pytest.mark.parametrize("device", [Servo, DigitalOutputs, DigitalInputs, AnalogInputs])
+@pytest.mark.parametrize("lrw", [True, False])
+def test_lrw_is_denied_in_the_general_category(device: Callable[..., Device], lrw: bool) -> None:
+    """Byte 0x0B, bit 1: all that SOEM asks (src/ec_config.c, ecx_config_init)."""
+    sii = decode_sii(make_sii_image(device(lrw=lrw).description()))
+    assert sii.general is not None
+    assert bool(sii.general.flags & GeneralFlags.NO_LRW) is not lrw
+
+
+VARIANTS: list[Device] = [
+    *DEVICES,
+    *(Servo(lrw=lrw, mailbox_bytes=size) for lrw in (True, False) for size in (64, 128, 256)),
+    Servo(quirks=ServoQuirks(watchdog_trigger=False)),
+    Servo(sii_quirks=SiiQuirks(pdos="absent")),
+    *(AnalogInputs(lrw=lrw, mailbox_bytes=size) for lrw in (True, False) for size in (64, 256)),
+    *(DigitalOutputs(lrw=lrw, bits=bits) for lrw in (True, False) for bits in (1, 8)),
+    *(DigitalInputs(lrw=lrw, bits=bits) for lrw in (True, False) for bits in (1, 8)),
+]
+
+
+def test_one_identity_has_one_sii() -> None:
+    """SOEM copies the SII of the first device of an identity (ecx_lookup_prev_sii)."""
+    images: dict[tuple[int, int], set[bytes]] = {}
+    for device in VARIANTS:
+        plain = replace(device.whole_description(), name="", alias=0, serial=0)
+        image = make_sii_image(plain, device.sii_quirks)
+        images.setdefault((plain.product_code, plain.revision), set()).add(image)
+    assert {len(of_one_identity) for of_one_identity in images.values()} == {1}
+
+
+def test_names_aliases_and_serial_numbers_do_not_change_the_revision() -> None:
+    named = Servo(name="elbow", alias=3, serial=7).description()
+    assert named.revision == Servo().description().revision
+    assert named.revision >> 16 == 1
 
 
 def test_the_checksum_of_a_real_image(shared_data: Path) -> None:

@@ -34,9 +34,45 @@ def test_impossible_requests_from_init(main: MainDevice, state: int, code: int) 
 
 
 def test_an_error_is_kept_until_acknowledged(main: MainDevice) -> None:
+    main.sync_manager(STATION, 0, 0x1000, 128, 0x26)
+    main.sync_manager(STATION, 1, 0x1080, 128, 0x22)
     assert main.request(STATION, OP) == (INIT | ERROR, 0x0011)
-    assert main.request(STATION, INIT) == (INIT | ERROR, 0x0011)
-    assert main.request(STATION, INIT | ACKNOWLEDGE) == (INIT, 0)
+    assert main.request(STATION, PRE_OP) == (INIT | ERROR, 0x0011)
+    assert main.request(STATION, PRE_OP | ACKNOWLEDGE) == (PRE_OP, 0)
+
+
+def test_init_needs_no_acknowledgement(main: MainDevice) -> None:
+    """SSC, ecatslv.c, AL_ControlInd; SOES, esc.c, ESC_state."""
+    main.start_servo(STATION, 0)
+    assert main.request(STATION, BOOT) == (SAFE_OP | ERROR, 0x0013)
+    assert main.request(STATION, SAFE_OP) == (SAFE_OP | ERROR, 0x0013)
+    assert main.request(STATION, INIT) == (INIT, 0)
+
+
+@pytest.mark.parametrize("requested", [INIT, PRE_OP, SAFE_OP])
+def test_a_local_error_does_not_replace_a_request_to_go_down(
+    main: MainDevice, requested: int
+) -> None:
+    """IgH stops its cycle and requests INIT: the watchdog expires before the device is there."""
+    main.start_servo(STATION, 0)
+    main.exchange_logical(Command.LRW, 0, bytes(26))
+    assert main.request(STATION, OP) == (OP, 0)
+    servo_of(main).delay_state(requested, 0.15)  # the watchdog expires after 100 ms
+    main.request(STATION, requested)
+    main.let_pass(120)
+    assert main.al_status(STATION) == (SAFE_OP | ERROR, 0x001B)
+    main.let_pass(60)
+    assert main.al_status(STATION) == (requested, 0)
+
+
+def test_a_local_error_cancels_a_request_to_go_up(main: MainDevice) -> None:
+    main.start_servo(STATION, 0)
+    servo_of(main).delay_state(OP, 0.01)
+    main.exchange_logical(Command.LRW, 0, bytes(26))
+    main.request(STATION, OP)
+    servo_of(main).application.states.fail(SAFE_OP, 0x001A)
+    main.let_pass(100)
+    assert main.al_status(STATION) == (SAFE_OP | ERROR, 0x001A)
 
 
 def test_a_mailbox_unlike_the_sii_is_refused(main: MainDevice) -> None:

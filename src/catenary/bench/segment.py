@@ -9,15 +9,14 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from functools import partial
 from typing import Literal
 
+from catenary.demo.server import serve_at_priority
 from catenary.errors import LinkError
 from catenary.realtime import VirtualClock
 from catenary.realtime.child import start_python
 from catenary.realtime.private_network import veth_pair
-from catenary.realtime.scheduling import request_scheduling
-from catenary.virtual import AnalogInputs, Coupler, Segment, Servo, serve
+from catenary.virtual import AnalogInputs, Coupler, Segment, Servo
 
 START_SECONDS = 30.0
 COUNTS_PER_TURN = 2**20
@@ -90,12 +89,9 @@ def served(drives: int, inputs: int = 0, axes: int = 1, *, ring: bool = False) -
 def main(arguments: Sequence[str]) -> None:
     interface, second, drives, inputs, axes, cpu = arguments
     segment = make_segment(int(drives), int(inputs), axes=int(axes), ring=bool(second))
-    if cpu:
-        request_scheduling(priority=PRIORITY, cpu=int(cpu))
-    else:
-        request_scheduling(priority=PRIORITY - BELOW)
-    ready = partial(print, "ready", flush=True)
-    serve(segment, interface, second=second or None, ready=ready)
+    priority = PRIORITY if cpu else PRIORITY - BELOW
+    own = int(cpu) if cpu else None
+    serve_at_priority(segment, interface, priority, second=second or None, cpu=own)
 
 
 if __name__ == "__main__":

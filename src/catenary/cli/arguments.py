@@ -61,6 +61,13 @@ def positive_numbers(text: str) -> list[int]:
     return [positive_number(each) for each in text.split(",")]
 
 
+def fifo_priority(text: str) -> int:
+    value = number(text)
+    if not 1 <= value <= 99:
+        raise argparse.ArgumentTypeError(f"SCHED_FIFO has priorities 1 to 99, not {text}")
+    return value
+
+
 def positive_seconds(text: str) -> float:
     return _positive_time(text, "seconds")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from catenary.cli.arguments import fifo_priority, seconds
 from catenary.cli.parsers import Commands, add_command
 
 
@@ -24,7 +25,7 @@ def add_parser(commands: Commands) -> None:
         "digital output).",
         example="ip link add veth0 type veth peer name veth1\n"
         "ip link set veth0 up && ip link set veth1 up\n"
-        "catenary virtual serve veth1 &\n"
+        "catenary virtual serve veth1 --priority 80 &\n"
         "catenary scan veth0",
     )
     parser.add_argument("interface", metavar="NIC", help="the interface to answer on")
@@ -34,12 +35,27 @@ def add_parser(commands: Commands) -> None:
         help="close the ring here: the second interface of the MainDevice's cable redundancy",
     )
     parser.add_argument("--config", metavar="FILE.toml", help="the devices of the segment")
+    parser.add_argument(
+        "--priority",
+        type=fifo_priority,
+        metavar="N",
+        help="run at SCHED_FIFO 1 to 99 with locked memory, so that no frame waits",
+    )
+    parser.add_argument(
+        "--max-age",
+        type=seconds,
+        default=2e-3,
+        metavar="S",
+        help="lose frames that waited longer, as a cable holds none (0.002)",
+    )
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     from catenary.virtual import FaultEvent, Segment, demo_segment, serve
 
+    if arguments.priority is not None:
+        _raise_priority(arguments.interface, arguments.priority)
     ring = arguments.ring is not None
     if arguments.config is None:
         segment = demo_segment(clock="monotonic", ring=ring)
@@ -53,5 +69,33 @@ def run(arguments: argparse.Namespace) -> int:
     def tell(event: FaultEvent) -> None:
         print(f"{event.time:.3f} s: {event.fault} {event.what}", flush=True)
 
-    serve(segment, arguments.interface, second=arguments.ring, ready=say, tell=tell)
+    serve(
+        segment,
+        arguments.interface,
+        second=arguments.ring,
+        max_age=arguments.max_age,
+        ready=say,
+        tell=tell,
+    )
+    _report_expired(segment.frames.expired, arguments.max_age, arguments.priority)
     return 0
+
+
+def _raise_priority(interface: str, priority: int) -> None:
+    """Schedule this process, and the threads it starts, in real time."""
+    from catenary.errors import LinkError
+    from catenary.interpreter import permission_advice
+    from catenary.realtime.scheduling import request_scheduling
+
+    scheduling = request_scheduling(priority=priority)
+    if not scheduling.real_time:
+        refused = "; ".join(scheduling.refusals)
+        raise LinkError(
+            f"{interface} cannot be served in real time: {refused}", hint=permission_advice()
+        )
+
+
+def _report_expired(frames: int, max_age: float, priority: int | None) -> None:
+    if frames:
+        advice = "" if priority else "; --priority 80 makes this rarer"
+        print(f"{frames} frames waited longer than {max_age * 1e3:g} ms and were lost{advice}")

@@ -9,12 +9,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Literal
 
+from catenary.demo.server import serve_at_priority
 from catenary.errors import LinkError
 from catenary.link import Interface, LinkSource
 from catenary.realtime.child import start_python
 from catenary.realtime.private_network import veth_pair
-from catenary.realtime.scheduling import request_scheduling
-from catenary.virtual import demo_segment, serve
+from catenary.virtual import demo_segment
 
 START_SECONDS = 20.0
 PRIORITY = 80  # as the loop: devices do not wait for their MainDevice
@@ -42,9 +42,7 @@ def ground(refused: str | None) -> Iterator[Ground]:
 
 def main(interface: str) -> None:
     """The other process: the segment behind the other end of the cable."""
-    segment = demo_segment(clock="monotonic")
-    request_scheduling(priority=PRIORITY)  # refused to ordinary users: it then answers later
-    serve(segment, interface, ready=lambda: print("ready", flush=True))
+    serve_at_priority(demo_segment(clock="monotonic"), interface, PRIORITY)
 
 
 if __name__ == "__main__":

@@ -10,12 +10,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from catenary.demo.server import serve_at_priority
 from catenary.errors import LinkError
 from catenary.link import Interface, LinkSource
 from catenary.realtime.child import start_python
 from catenary.realtime.private_network import Private, state, veth_pair
-from catenary.realtime.scheduling import request_scheduling
-from catenary.virtual import read_segment, serve
+from catenary.virtual import read_segment
 
 START_SECONDS = 20.0
 PRIORITY = 80  # as a loop: devices do not wait for their MainDevice
@@ -52,9 +52,7 @@ def program_target(
 
 
 def main(interface: str, path: str) -> None:
-    segment = read_segment(path, clock="monotonic")
-    request_scheduling(priority=PRIORITY)  # refused to ordinary users: it then answers later
-    serve(segment, interface, ready=lambda: print("ready", flush=True))
+    serve_at_priority(read_segment(path, clock="monotonic"), interface, PRIORITY)
 
 
 if __name__ == "__main__":

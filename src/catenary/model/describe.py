@@ -30,7 +30,13 @@ from catenary.wire.frame import MAXIMUM_DATA
 from catenary.wire.mailbox import HEADER_SIZE
 from catenary.wire.register import PROCESS_RAM, SYNC_MANAGER_COUNT
 from catenary.wire.sii import CHECKSUM_WORD, MailboxArea, MailboxProtocol, Sii, decode_sii
-from catenary.wire.sii_categories import CoeDetails, General, SyncManagerEnable, SyncManagerUse
+from catenary.wire.sii_categories import (
+    CoeDetails,
+    General,
+    GeneralFlags,
+    SyncManagerEnable,
+    SyncManagerUse,
+)
 from catenary.wire.sync_manager import Buffering, Control
 from catenary.wire.sync_manager import Direction as Flow
 
@@ -122,6 +128,7 @@ def _filled(bare: DeviceDescription, sii: Sii, notes: list[str]) -> DeviceDescri
         op_modes=tuple(_op_mode(texts, mode) for mode in sii.clock_modes),
         group=texts[general.group],
         order=order,
+        sii_denies_lrw=bool(general.flags & GeneralFlags.NO_LRW),
     )
 
 

@@ -186,6 +186,7 @@ class DeviceDescription:
     output_pdos: tuple[Pdo, ...]  # all that the device has, assigned or not
     input_pdos: tuple[Pdo, ...]
     open_ports: tuple[bool, bool, bool, bool] = (True, False, False, False)
+    sii_denies_lrw: bool = False  # flag of the general category; the controller may deny it, too
     parent: int | None = None  # position of the device before it in the tree
     parent_port: int | None = None
     system_time: bool = False  # it has a clock that can follow: a system time (0x0910)
@@ -212,6 +213,14 @@ class DeviceDescription:
     def clock_bits(self) -> int:
         """Width of its system time, 64 or 32; 0: it has none."""
         return self.controller.clock_bits if self.system_time else 0
+
+    @property
+    def supports_lrw(self) -> bool:
+        """True if neither the controller nor the SII denies that LRW works.
+
+        SOEM asks the SII alone (src/ec_config.c), IgH neither of them (master/datagram_pair.c).
+        """
+        return self.controller.supports_lrw and not self.sii_denies_lrw
 
     @property
     def coe(self) -> bool:

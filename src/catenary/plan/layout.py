@@ -209,7 +209,7 @@ def _grouped(devices: Sequence[DeviceData], unit_max: int) -> list[list[DeviceDa
         if data.optional:
             groups.append([data])
             continue
-        kind = (data.description.controller.supports_lrw, data.every)
+        kind = (data.description.supports_lrw, data.every)
         rank = room.get(kind)
         if rank is not None and _fits(groups[rank], data, unit_max):
             groups[rank].append(data)
@@ -239,7 +239,7 @@ def _unit(
         optional=members[0].optional,
         every=members[0].every,
         phase=phase,
-        logical_read_write=members[0].description.controller.supports_lrw,
+        logical_read_write=members[0].description.supports_lrw,
         logical_start=logical_start,
         output_offset=output_offset,
         output_size=sum(data.output_size for data in members),

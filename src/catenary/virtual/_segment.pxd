@@ -107,7 +107,7 @@ cdef extern from "segment_memory.h" nogil:
         int slot_count, axis_count
         servo_axis *axes
     ctypedef struct frame_counters:
-        uint64_t frames, malformed, foreign, lost, datagrams
+        uint64_t frames, malformed, foreign, lost, datagrams, expired
     ctypedef struct fate:
         pass
     const fate NO_FATE

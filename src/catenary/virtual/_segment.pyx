@@ -15,7 +15,7 @@ cdef extern from "link.h":
     uint32_t CAT_FRAME_MAX
 
 cdef extern from "packet_loop.h" nogil:
-    int packet_loop(cat_segment *s, int fd, int second_fd, int stop_fd)
+    int packet_loop(cat_segment *s, int fd, int second_fd, int stop_fd, int64_t max_age)
 
 cdef extern from "segment_memory.h":
     cpdef enum:
@@ -426,7 +426,7 @@ cdef class Core:
     @property
     def counters(self):
         cdef frame_counters f = self._segment.counters
-        return f.frames, f.datagrams, f.malformed, f.foreign, f.lost
+        return f.frames, f.datagrams, f.malformed, f.foreign, f.lost, f.expired
 
     def pass_frame(self, bytes frame):
         """One frame through the line at once, as it comes back; None: it does not."""
@@ -446,10 +446,14 @@ cdef class Core:
         unlock(self._segment)
         return PyBytes_FromStringAndSize(<char *>buffer, size) if exit >= 0 else None
 
-    def answer_packets(self, int fd, int second_fd, int stop_fd):
-        """The packet loop on AF_PACKET sockets, until `stop_fd` can be read; `second_fd` -1: no
-        ring. 0 or -errno."""
+    def answer_packets(self, int fd, int second_fd, int stop_fd, int64_t max_age_ns):
+        """Run the packet loop on AF_PACKET sockets until `stop_fd` can be read. 0 or -errno.
+
+        Args:
+            second_fd: The other end of a ring; -1: none.
+            max_age_ns: Frames that were in their socket for longer are lost.
+        """
         cdef int result
         with nogil:
-            result = packet_loop(self._segment, fd, second_fd, stop_fd)
+            result = packet_loop(self._segment, fd, second_fd, stop_fd, max_age_ns)
         return result

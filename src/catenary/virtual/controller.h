@@ -89,10 +89,11 @@ typedef struct {
 } dc_clock;
 
 typedef struct {
-    int64_t next0, next1;            /* system times of the next pulses [ns], NEVER: none */
+    uint64_t next0, next1;           /* system times of the next pulses [ns], modulo 2^64 */
     int64_t due;                     /* of the earlier one, on the segment's clock */
     uint32_t pulses0, pulses1;
     uint8_t active;
+    uint8_t awaits0, awaits1;        /* there will be a next pulse */
 } sync_unit;
 
 /* A device that keeps time by SYNC0 or SYNC1, and the counters of 0x1C32 and 0x1C33. */
@@ -195,7 +196,10 @@ typedef struct {
 } cable;
 
 /* Why a frame did not come back. */
-enum loss_cause { LOSS_NO_LIGHT = 1, LOSS_CLOSED_PORT, LOSS_CIRCULATING, LOSS_IN_FLIGHT, LOSS_INJECTED, LOSS_CORRUPT };
+enum loss_cause {
+    LOSS_NO_LIGHT = 1, LOSS_CLOSED_PORT, LOSS_CIRCULATING, LOSS_IN_FLIGHT, LOSS_INJECTED, LOSS_CORRUPT,
+    LOSS_EXPIRED
+};
 
 typedef struct {
     int64_t sent;
@@ -246,7 +250,7 @@ typedef struct {
 } segment_end;
 
 typedef struct {
-    uint64_t frames, malformed, foreign, lost, datagrams;
+    uint64_t frames, malformed, foreign, lost, datagrams, expired;
 } frame_counters;
 
 typedef struct cat_segment {

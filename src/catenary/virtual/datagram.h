@@ -130,7 +130,7 @@ static void registers_written(controller *c, uint32_t first, uint32_t end, const
         clear_error_counters(c, first, end);
     if (touches(first, end, REG_WATCHDOG_DIVIDER, 2) || touches(first, end, REG_WATCHDOG_PROCESS_DATA, 2))
         watchdog_reconfigured(c);
-    if (touches(first, end, REG_SII_CONTROL, 2) && !(c->memory[REG_SII_OWNER] & 1))
+    if (touches(first, end, REG_SII_CONTROL, 2) && sii_accessible(c))
         sii_command(c, load16(c->memory + REG_SII_CONTROL));
     if (touches(first, end, REG_FMMU, MAX_FMMU * FMMU_SIZE))
         for (int n = 0; n < c->fmmu_count; n++)

@@ -1,8 +1,9 @@
-"""What a virtual device says of itself: its SII image and its objects are made of this."""
+"""The description of a virtual device, from which its SII image and its objects are made."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import zlib
+from dataclasses import dataclass, replace
 
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 from catenary.virtual.op_modes import STANDARD, OpMode
@@ -60,7 +61,6 @@ class Description:
     order: str
     group: str
     product_code: int
-    revision: int
     serial: int
     alias: int
     emulation: bool  # AL status follows AL control: no microcontroller
@@ -80,3 +80,15 @@ class Description:
     mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS
     op_modes: tuple[OpMode, ...] = STANDARD  # of a device with clock and axes
     loop_control: bool = True  # its ports can be closed (0x0101)
+    lrw: bool = True
+    sii_variant: str = ""  # how the SII differs from the device
+
+    @property
+    def revision(self) -> int:
+        """Revision 1 in the upper word; in the lower one a checksum of all but the names.
+
+        Devices whose SIIs differ have different revisions: SOEM copies the SII of the first device
+        of an identity to all others (src/ec_config.c, ecx_lookup_prev_sii).
+        """
+        kind = replace(self, name="", order="", group="", serial=0, alias=0, identification=0)
+        return 0x0001_0000 | zlib.crc32(repr(kind).encode()) & 0xFFFF

@@ -115,11 +115,16 @@ static void dc_reset_filters(controller *c, int64_t when) {
     dc_steer(c, 0, when);
 }
 
+/* The system time less the delay of the way from the reference clock, as frames carry it. */
+static inline uint64_t dc_received_time(controller *c, int64_t when) {
+    uint64_t scatter = (uint64_t)crystal_scatter(&c->clock.crystal);
+    return (uint64_t)dc_system_time(c, when) + scatter - load32(c->memory + REG_DC_DELAY);
+}
+
 /* A system time arrived by FRMW, ARMW or a plain write: steer towards it. */
 static void dc_receive_time(controller *c, uint32_t received, int64_t when) {
     dc_clock *k = &c->clock;
-    int64_t own = dc_system_time(c, when) + crystal_scatter(&k->crystal) - load32(c->memory + REG_DC_DELAY);
-    int32_t difference = (int32_t)((uint32_t)own - received);
+    int32_t difference = (int32_t)((uint32_t)dc_received_time(c, when) - received);
     k->mean += (difference - k->mean) / (1 << (c->memory[REG_DC_FILTER_DIFFERENCE] & 15));
     dc_show_difference(c);
     dc_steer(c, k->speed - k->mean, when);
@@ -127,8 +132,7 @@ static void dc_receive_time(controller *c, uint32_t received, int64_t when) {
 
 /* The system time as a frame reads it: when it passed the reference clock. */
 static inline void dc_refresh(controller *c, int64_t when) {
-    int64_t own = dc_system_time(c, when) + crystal_scatter(&c->clock.crystal);
-    dc_store(c, REG_DC_SYSTEM_TIME, own - load32(c->memory + REG_DC_DELAY));
+    dc_store(c, REG_DC_SYSTEM_TIME, (int64_t)dc_received_time(c, when));
 }
 
 /* The crystal changes its ways: what it counted so far stays counted. */

@@ -26,6 +26,7 @@ LOSS_CAUSES = {
     4: "in flight",  # a cable went dark under it
     5: "injected",
     6: "corrupt",
+    7: "expired",  # it was in the socket of a served segment for longer than `max_age`
 }
 
 End: TypeAlias = Callable[[], None]

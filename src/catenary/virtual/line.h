@@ -16,7 +16,8 @@
 
 enum {
     BYTE_NS = 80,                     /* 100 Mbit/s */
-    FRAME_OVERHEAD = 8 + 4 + 12       /* preamble, check sequence, gap */
+    FRAME_OVERHEAD = 8 + 4 + 12,      /* preamble, check sequence, gap */
+    INSTANTS_MAX = 10000              /* that are worked off before the next frame, in real time */
 };
 
 static int64_t monotonic_now(void) {
@@ -89,10 +90,11 @@ static void segment_light(cat_segment *s, int at_once) {
 
 /* Runs compiled work up to `until`, in the order of its times; in virtual time it stops where an
  * event wants the application. With a plant every instant has its turn, so that motors and joints
- * keep step however late it is; the joints come first, as encoders show what was before. */
+ * keep step however late it is; the joints come first, as encoders show what was before. In real time
+ * what exceeds INSTANTS_MAX waits: no number of SYNC0 pulses that frames ask for keeps frames waiting. */
 static void segment_work(cat_segment *s, int64_t until, int steps_plant) {
     int64_t bound = plant_bound(s, until, steps_plant);
-    while (s->next_due <= bound) {
+    for (uint32_t left = INSTANTS_MAX; s->next_due <= bound && (s->is_virtual || left > 0); left--) {
         if (s->next_due > s->now)
             s->now = s->next_due;
         int64_t instant = s->plant ? s->next_due : s->now;

@@ -1,6 +1,10 @@
 /* The segment on a NIC, or on two where it is a ring: its own small packet loop, apart from `link`,
  * so that the two judge each other. Blocks in poll; the models are stepped after the answer has left.
- * Budget from frame in to frame out: 10 us on an idle core. */
+ * Budget from frame in to frame out: 10 us on an idle core.
+ *
+ * A cable holds no frame: one that was in the socket for longer than `max_age` is lost. Its age is the
+ * difference of CLOCK_REALTIME now and when the kernel received it (SO_TIMESTAMPNS, socket(7)). If
+ * that clock is set meanwhile, the frames in the socket are too old, or count as new. */
 #ifndef CATENARY_VIRTUAL_PACKET_LOOP_H
 #define CATENARY_VIRTUAL_PACKET_LOOP_H
 
@@ -73,22 +77,48 @@ static int packet_through(cat_segment *s, const int *fds, int from, uint8_t *fra
     return result == 0 && fate.duplicate ? packet_send(fds, end, frame, length) : result;
 }
 
+/* How long a received frame was in the socket [ns]; 0: the kernel gave it no time stamp. */
+static int64_t packet_age(struct msghdr *message) {
+    for (struct cmsghdr *c = CMSG_FIRSTHDR(message); c; c = CMSG_NXTHDR(message, c)) {
+        if (c->cmsg_level != SOL_SOCKET || c->cmsg_type != SCM_TIMESTAMPNS)
+            continue;
+        struct timespec now, then;
+        memcpy(&then, CMSG_DATA(c), sizeof then);
+        clock_gettime(CLOCK_REALTIME, &now);
+        return (int64_t)(now.tv_sec - then.tv_sec) * 1000000000 + now.tv_nsec - then.tv_nsec;
+    }
+    return 0;
+}
+
+static void packet_expired(cat_segment *s, int from, int64_t age) {
+    lock(s);
+    s->counters.expired++;
+    frame_lost(s, LOSS_EXPIRED, from, monotonic_now() - age);
+    unlock(s);
+}
+
 /* 1: answered or passed over, 0: nothing there, or -errno. */
-static int packet_answer(cat_segment *s, const int *fds, int from) {
+static int packet_answer(cat_segment *s, const int *fds, int from, int64_t max_age) {
     static __thread uint8_t frame[65536 + 64];
-    struct sockaddr_ll sender;
-    socklen_t size = sizeof sender;
+    union { struct cmsghdr align; uint8_t bytes[CMSG_SPACE(sizeof(struct timespec))]; } control;
+    struct sockaddr_ll sender = {0};
+    struct iovec part = {.iov_base = frame, .iov_len = sizeof frame};
+    struct msghdr message = {.msg_name = &sender, .msg_namelen = sizeof sender, .msg_iov = &part,
+                             .msg_iovlen = 1, .msg_control = &control, .msg_controllen = sizeof control};
     if (fds[from] < 0)
         return 0;
-    ssize_t length = recvfrom(fds[from], frame, sizeof frame, MSG_DONTWAIT, (struct sockaddr *)&sender, &size);
+    ssize_t length = recvmsg(fds[from], &message, MSG_DONTWAIT);
     if (length < 0)
         return errno == EAGAIN || errno == EINTR ? 0 : -errno;
     if (sender.sll_pkttype == PACKET_OUTGOING)
         return 1;
+    int64_t age = packet_age(&message);
     if (length > (ssize_t)CAT_FRAME_MAX)
         s->counters.malformed++;
     else if (!frame_is_ours(frame, (uint32_t)length))
         s->counters.foreign++;
+    else if (age > max_age)
+        packet_expired(s, from, age);
     else {
         int result = packet_through(s, fds, from, frame, (uint32_t)length);
         return result < 0 ? result : 1;
@@ -113,12 +143,12 @@ static int packets_due(cat_segment *s, const int *fds, int64_t *next) {
 }
 
 /* Both interfaces in turn, at most 64 frames: then the models have their turn. */
-static int packets_answer(cat_segment *s, const int *fds) {
+static int packets_answer(cat_segment *s, const int *fds, int64_t max_age) {
     int answered = 1;
     for (int burst = 0; burst < 64 && answered; burst++) {
         answered = 0;
         for (int n = 0; n < 2; n++) {
-            int result = packet_answer(s, fds, n);
+            int result = packet_answer(s, fds, n, max_age);
             if (result < 0)
                 return result;
             answered |= result;
@@ -127,7 +157,7 @@ static int packets_answer(cat_segment *s, const int *fds) {
     return 0;
 }
 
-static int packet_loop(cat_segment *s, int fd, int second_fd, int stop_fd) {
+static int packet_loop(cat_segment *s, int fd, int second_fd, int stop_fd, int64_t max_age) {
     const int fds[2] = {fd, second_fd};
     struct pollfd wait[3] = {{.fd = fd, .events = POLLIN}, {.fd = stop_fd, .events = POLLIN},
                              {.fd = second_fd, .events = POLLIN}};
@@ -142,7 +172,7 @@ static int packet_loop(cat_segment *s, int fd, int second_fd, int stop_fd) {
             return -errno;
         if (wait[1].revents)
             return 0;
-        result = packets_answer(s, fds);
+        result = packets_answer(s, fds, max_age);
         if (result < 0)
             return result;
         lock(s);

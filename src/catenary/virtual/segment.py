@@ -40,6 +40,7 @@ class FrameCounters(NamedTuple):
     malformed: int
     foreign: int
     lost: int
+    expired: int  # of the lost ones: served too late (`max_age`)
 
 
 class SegmentEnd:

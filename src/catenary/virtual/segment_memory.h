@@ -97,7 +97,7 @@ static void controller_free(controller *c) {
 
 /* Nothing stands here yet: no work is due, and no port has a cable. */
 static void controller_blank(controller *c) {
-    c->sync.next0 = c->sync.next1 = c->sync.due = c->segment->dues[c->position] = NEVER;
+    c->sync.due = c->segment->dues[c->position] = NEVER;
     c->outputs.sm = c->inputs.sm = -1;
     c->step_period = c->step_due = c->watchdog_due = c->pdi_watchdog_due = c->sii.due = NEVER;
     c->sii.read_time = 200000;

@@ -24,6 +24,9 @@ SOL_PACKET, PACKET_IGNORE_OUTGOING, PACKET_QDISC_BYPASS = 263, 23, 20
 IFF_UP = 1
 PR_SET_PDEATHSIG = 1
 SIOCGIFFLAGS = 0x8913
+SO_TIMESTAMPNS = 35  # asm-generic/socket.h
+MAX_AGE = 2e-3  # [s]; SOEM gives a frame up after as long (EC_TIMEOUTRET)
+NEVER_NS = (1 << 63) - 1
 
 
 def _interface_flags(interface: str) -> int:
@@ -54,11 +57,25 @@ def _open_socket(interface: str) -> socket.socket:
     try:
         packet.setsockopt(SOL_PACKET, PACKET_IGNORE_OUTGOING, 1)
         packet.setsockopt(SOL_PACKET, PACKET_QDISC_BYPASS, 1)
+        stamp_arrivals(packet)
         packet.bind((interface, ETHERCAT))
     except OSError as error:
         packet.close()
         raise LinkError(f"{interface}: {os.strerror(error.errno or 0)}") from error
     return packet
+
+
+def stamp_arrivals(packet: socket.socket) -> None:
+    """Make the kernel note when it received each frame: the packet loop reads how old they are."""
+    packet.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
+
+
+def _age_ns(max_age: float | None) -> int:
+    if max_age is None:
+        return NEVER_NS
+    if not 0 <= max_age < 1e9:
+        raise ValueError(f"max_age must be 0 to 1e9 seconds, or None for no limit; not {max_age}")
+    return round(max_age * 1e9)
 
 
 def _raise_priority(interface: str, priority: int) -> None:
@@ -76,6 +93,8 @@ class Server:
 
     `second`: the interface of a ring's other end.
     `priority`: SCHED_FIFO 1 to 99 for the packet loop; None: as the process.
+    `max_age`: frames that waited longer for the packet loop are lost [s], as a cable holds none
+    (`frames.expired` counts them); None: all are answered.
     """
 
     def __init__(
@@ -85,6 +104,7 @@ class Server:
         *,
         second: str | None = None,
         priority: int | None = None,
+        max_age: float | None = MAX_AGE,
     ) -> None:
         if segment.clock != "monotonic":
             raise ValueError('a served segment needs real time: Segment(..., clock="monotonic")')
@@ -95,6 +115,7 @@ class Server:
         self.segment = segment
         self.interface = interface
         self._priority = priority
+        self._max_age_ns = _age_ns(max_age)
         self._socket = _open_socket(interface)
         self._second = None if second is None else self._open_second(second)
         self._stop = os.eventfd(0, os.EFD_CLOEXEC)
@@ -129,7 +150,9 @@ class Server:
                 _raise_priority(self.interface, self._priority)
             self._started.set()
             second = -1 if self._second is None else self._second.fileno()
-            result = self.segment.core.answer_packets(self._socket.fileno(), second, self._stop)
+            result = self.segment.core.answer_packets(
+                self._socket.fileno(), second, self._stop, self._max_age_ns
+            )
             if result < 0:
                 hint = "the interface went down" if -result == errno.ENETDOWN else ""
                 raise LinkError(f"{self.interface}: {os.strerror(-result)}", hint=hint)
@@ -146,6 +169,8 @@ class Server:
     def raise_failure(self) -> None:
         if self.failure is not None:
             raise self.failure
+        if self._service.failure is not None:
+            raise self._service.failure
         if self.segment.plant is not None:
             self.segment.plant.check()
 
@@ -182,20 +207,21 @@ def serve(
     *,
     second: str | None = None,
     priority: int | None = None,
+    max_age: float | None = MAX_AGE,
     with_parent: bool = False,
     ready: Callable[[], None] | None = None,
     tell: Callable[[FaultEvent], None] | None = None,
 ) -> None:
-    """Answers on `interface` until SIGINT or SIGTERM; call it in the main thread.
+    """Answer on `interface` until SIGINT or SIGTERM. Call it in the main thread.
 
-    `second`: the interface of a ring's other end.
+    `second`, `priority`, `max_age`: as of `Server`.
     `with_parent`: ends with the parent process too. `ready` is called once frames are answered,
     `tell` with each fault that began or ended.
     LinkError: no such interface, down, or not permitted.
     """
     if with_parent:
         die_with_parent()
-    server = Server(segment, interface, second=second, priority=priority)
+    server = Server(segment, interface, second=second, priority=priority, max_age=max_age)
     asked_to_end = threading.Event()
 
     def end(_signal: int, _frame: FrameType | None) -> None:

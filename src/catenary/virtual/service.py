@@ -77,6 +77,7 @@ class ServiceThread:
 
     def __init__(self, service: Service) -> None:
         self._service = service
+        self.failure: BaseException | None = None  # ended the thread
         self._event = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._stopping = False
         self._thread = threading.Thread(target=self._run, name="virtual-service", daemon=True)
@@ -88,6 +89,13 @@ class ServiceThread:
             self._service.plant.start()
 
     def _run(self) -> None:
+        try:
+            self._serve()
+        except BaseException as failure:
+            self.failure = failure
+            raise
+
+    def _serve(self) -> None:
         core = self._service.core
         while not self._stopping:
             core.advance()

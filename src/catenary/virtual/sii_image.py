@@ -23,6 +23,8 @@ STRINGS, GENERAL, FMMU, SYNC_MANAGER, TX_PDO, RX_PDO, CLOCK, END = (
 )
 FIXED_CONTENT = 0x0010  # of a PDO's flags
 COE_PROTOCOL = 0x0004
+# Flags of the general category, byte 0x0B
+NO_LRW, IDENTIFICATION_IN_MEMORY = 0x02, 0x10
 HEADER_BYTES = 128
 UNUSED = SyncManagerDefault(0, 0, 0, 0, 0)
 
@@ -82,11 +84,12 @@ def _general(device: Description, strings: _Strings) -> bytes:
     name = strings.number(device.name)  # first: SOEM shows string 1 as the name
     group, order = strings.number(device.group), strings.number(device.order)
     details = device.mailbox.coe_details if device.mailbox else 0
-    identification = 0x10 if device.identification else 0
+    flags = IDENTIFICATION_IN_MEMORY if device.identification else 0
+    flags |= 0 if device.lrw else NO_LRW
     ports = sum(1 << 4 * port for port in device.ports)  # 1: MII
     return struct.pack(
         "<BBBBxBBBBBBBhBxHH12x",
-        *(group, 0, order, name, details, 0, 0, 0, device.axes, 0, identification),
+        *(group, 0, order, name, details, 0, 0, 0, device.axes, 0, flags),
         *(device.current_milliampere, group, ports, 0x0012 if device.identification else 0),
     )
 

@@ -1,7 +1,8 @@
 """The EtherCAT state machine of a device with a microcontroller, ETG.1000.6 §6.4.
 
 A request is judged, prepared, and answered after the time such a device takes. In an error state
-nothing is obeyed until it is acknowledged.
+only INIT is obeyed without an acknowledgement, as in Beckhoff's slave stack code (SSC 5.11 to 5.13,
+ecatslv.c, AL_ControlInd) and in SOES (soes/esc.c, ESC_state).
 """
 
 from __future__ import annotations
@@ -64,6 +65,7 @@ class StateMachine:
         self._scheduler = scheduler
         self._identification = identification
         self._request = 0  # counts requests: a later one overtakes an earlier
+        self._pending: int | None = None  # the state of a request that is not answered yet
         self._waiting: tuple[bool, int] | None = None  # for OP: identify, request
         self.state = INIT
         self.code = 0
@@ -75,16 +77,17 @@ class StateMachine:
         """AL control was written."""
         control = self._device.fetch_al_control()
         requested, acknowledged = control & 0x0F, bool(control & ACKNOWLEDGE)
-        if self.code and not acknowledged:
+        if self.code and not acknowledged and requested != INIT:
             return
         self._request += 1
+        self._pending = requested
         self.code = 0
         delay = self.delays.get(requested, self.transition_ns)
         if delay is None:
             return
         refusal = self._judge(requested)
         if refusal:
-            self._later(delay, lambda: self.fail(self.state, refusal))
+            self._later(delay, lambda: self._refuse_with(refusal))
             return
         identify = bool(control & IDENTIFICATION)
         self._later(delay, lambda: self._enter(requested, identify))
@@ -110,6 +113,10 @@ class StateMachine:
             self.refused[requested] = code, None if times is None else times - 1
         return code
 
+    def _refuse_with(self, code: int) -> None:
+        self._pending = None
+        self.fail(self.state, code)
+
     def _enter(self, state: int, identify: bool) -> None:
         lack = self._device.lacks_for_op() if (self.state, state) == (SAFE_OP, OP) else 0
         if lack:
@@ -117,7 +124,7 @@ class StateMachine:
             self._waiting = identify, self._request
             self._later(TIMEOUTS_NS[lack], lambda: self.fail(SAFE_OP, lack))
             return
-        before, self.state = self.state, state
+        before, self.state, self.code, self._pending = self.state, state, 0, None
         self._device.enter_state(before, state)
         shown = IDENTIFICATION if identify and self._identification else 0
         self._device.show_al_status(state | shown, self._identification if shown else 0)
@@ -130,8 +137,15 @@ class StateMachine:
             self._enter(OP, waiting[0])
 
     def fail(self, state: int, code: int) -> None:
-        """Falls to, or stays in, `state` and shows the error."""
-        self._request += 1
+        """Fall to, or stay in, `state` and show the error.
+
+        A pending request for `state` or a lower one is answered all the same. Real stacks go down
+        at once (SSC, ecatslv.c, AL_ControlInd, OP_2_INIT), so no local error comes between. IgH
+        waits 5 s for an INIT that got lost (master/fsm_change.c, ec_fsm_change_state_status).
+        """
+        if self._pending is None or self._pending > state:
+            self._request += 1
+            self._pending = None
         before, self.state, self.code = self.state, state, code
         if before != state:
             self._device.enter_state(before, state)

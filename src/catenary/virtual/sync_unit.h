@@ -5,7 +5,10 @@
  * The unit compares for "reached": a start time that is past when the unit is activated, or that an
  * offset written meanwhile jumps over, is reached when the clock has gone round: after at most 4.3 s
  * with 32 bits, in no one's lifetime with 64. With a pulse length of 0 the device acknowledges at
- * once, so that 0x098E and 0x098F read 0. */
+ * once, so that 0x098E and 0x098F read 0.
+ *
+ * A frame writes all these times as it likes. They are counted modulo 2^64; the way to a pulse is
+ * their difference, limited to SYNC_HORIZON. A pulse that is awaited is less than 2^63 ns ahead. */
 #ifndef CATENARY_VIRTUAL_SYNC_UNIT_H
 #define CATENARY_VIRTUAL_SYNC_UNIT_H
 
@@ -37,31 +40,42 @@ static inline int clock_register_open(const controller *c, uint32_t address) {
         || !(c->memory[REG_SYNC_ACTIVATION] & SYNC_ACTIVE);
 }
 
-/* When a counter that stands at `now` reads `time`. */
-static inline int64_t sync_reached(const controller *c, int64_t time, int64_t now) {
-    if (c->has_dc == 64)
-        return time >= now ? time : NEVER;
-    return now + (int64_t)((uint32_t)time - (uint32_t)now);
+/* Waits for a counter that stands at `now` to read *time. 1: that is within 2^63 ns. */
+static inline uint8_t sync_await(const controller *c, uint64_t *time, uint64_t now) {
+    uint64_t ahead = c->has_dc == 64 ? *time - now : (uint32_t)(*time - now);
+    *time = now + ahead;
+    return ahead <= INT64_MAX;
+}
+
+/* How far `time` is ahead of `now`; 0 or negative: it is reached. */
+static inline int64_t sync_ahead(uint64_t time, uint64_t now) {
+    int64_t ahead = (int64_t)(time - now);
+    return ahead < -SYNC_HORIZON ? -SYNC_HORIZON : ahead > SYNC_HORIZON ? SYNC_HORIZON : ahead;
+}
+
+static inline int sync_reached(int awaits, uint64_t time, uint64_t now) {
+    return awaits && sync_ahead(time, now) <= 0;
 }
 
 /* The instant of the segment's clock for the earlier pulse, at the present rate. */
 static void sync_schedule(controller *c) {
     sync_unit *u = &c->sync;
-    int64_t next = u->next0 < u->next1 ? u->next0 : u->next1;
     u->due = NEVER;
-    if (next == NEVER)
+    if (!u->awaits0 && !u->awaits1)
         return;
     const dc_clock *k = &c->clock;
-    int64_t left = next - (int64_t)((uint64_t)k->local + (uint64_t)dc_offset(c));
-    if (left > SYNC_HORIZON)
-        left = SYNC_HORIZON;
+    uint64_t now = (uint64_t)k->local + (uint64_t)dc_offset(c);
+    int64_t left0 = u->awaits0 ? sync_ahead(u->next0, now) : SYNC_HORIZON;
+    int64_t left1 = u->awaits1 ? sync_ahead(u->next1, now) : SYNC_HORIZON;
+    double left = (double)(left0 < left1 ? left0 : left1);
     double rate = crystal_rate(&k->crystal, k->anchor) * (1.0 + k->correction);
-    u->due = k->anchor + (int64_t)ceil(((double)left - k->fraction) / rate);
+    u->due = k->anchor + (int64_t)ceil((left - k->fraction) / rate);
     due_at(c, u->due);
 }
 
 static void sync_stop(controller *c) {
-    c->sync.next0 = c->sync.next1 = c->sync.due = NEVER;
+    c->sync.due = NEVER;
+    c->sync.awaits0 = c->sync.awaits1 = 0;
     c->memory[REG_SYNC_ACTIVATION_STATUS] = 0;
 }
 
@@ -74,8 +88,9 @@ static void sync_activation_written(controller *c, int64_t when) {
         sync_stop(c);
     if (!u->active || was_active)
         return;
-    u->next0 = sync_reached(c, (int64_t)load64(c->memory + REG_SYNC_START), dc_system_time(c, when));
-    u->next1 = NEVER;
+    u->next0 = load64(c->memory + REG_SYNC_START);
+    u->awaits0 = sync_await(c, &u->next0, (uint64_t)dc_system_time(c, when));
+    u->awaits1 = 0;
     c->memory[REG_SYNC_ACTIVATION_STATUS] = (uint8_t)((activation & SYNC_PULSE_0 ? SYNC_PENDING_0 : 0)
                                                       | (activation & SYNC_PULSE_1 ? SYNC_PENDING_1 : 0));
     sync_schedule(c);
@@ -84,11 +99,11 @@ static void sync_activation_written(controller *c, int64_t when) {
 /* The local copy of the system time jumped: pulses it jumped over come when it has gone round. */
 static void sync_time_jumped(controller *c, int64_t when) {
     sync_unit *u = &c->sync;
-    int64_t now = dc_system_time(c, when);
-    if (u->next0 != NEVER)
-        u->next0 = sync_reached(c, u->next0, now);
-    if (u->next1 != NEVER)
-        u->next1 = sync_reached(c, u->next1, now);
+    uint64_t now = (uint64_t)dc_system_time(c, when);
+    if (u->awaits0)
+        u->awaits0 = sync_await(c, &u->next0, now);
+    if (u->awaits1)
+        u->awaits1 = sync_await(c, &u->next1, now);
     sync_schedule(c);
 }
 
@@ -96,7 +111,7 @@ static void sync_time_jumped(controller *c, int64_t when) {
 static int sync_pulse1(controller *c) {
     int shown = c->memory[REG_SYNC_ACTIVATION] & SYNC_PULSE_1;
     c->memory[REG_SYNC_ACTIVATION_STATUS] &= (uint8_t)~SYNC_PENDING_1;
-    c->sync.next1 = NEVER;
+    c->sync.awaits1 = 0;
     c->sync.pulses1 += shown != 0;
     return shown;
 }
@@ -111,14 +126,16 @@ static inline int64_t sync_hold(const controller *c) {
 static int sync_pulse0(controller *c) {
     sync_unit *u = &c->sync;
     uint32_t cycle = load32(c->memory + REG_SYNC0_CYCLE);
-    int64_t now = u->next0;
+    uint64_t now = u->next0;
     c->memory[REG_SYNC_ACTIVATION_STATUS] &= (uint8_t)~SYNC_PENDING_0;
-    u->next0 = cycle > sync_hold(c) ? now + cycle : NEVER;   /* 0: a single shot */
-    if (u->next1 == NEVER)
+    u->awaits0 = cycle > sync_hold(c);                       /* 0: a single shot */
+    u->next0 = now + cycle;
+    if (!u->awaits1)
         u->next1 = now + load32(c->memory + REG_SYNC1_CYCLE);
-    if (u->next0 != NEVER)
-        dc_store(c, REG_SYNC_START, u->next0);
-    dc_store(c, REG_SYNC_NEXT1, u->next1);
+    u->awaits1 = 1;
+    if (u->awaits0)
+        dc_store(c, REG_SYNC_START, (int64_t)u->next0);
+    dc_store(c, REG_SYNC_NEXT1, (int64_t)u->next1);
     int shown = c->memory[REG_SYNC_ACTIVATION] & SYNC_PULSE_0;
     u->pulses0 += shown != 0;
     return u->next1 == now ? shown | sync_pulse1(c) : shown;
@@ -130,13 +147,13 @@ static int sync_pulse0(controller *c) {
 static int sync_advance(controller *c) {
     sync_unit *u = &c->sync;
     dc_anchor(c, c->segment->now);
-    int64_t now = dc_system_time(c, c->segment->now);
+    uint64_t now = (uint64_t)dc_system_time(c, c->segment->now);
     int pulses = 0;
-    if (u->next1 < u->next0 && u->next1 <= now)
+    if (sync_reached(u->awaits1, u->next1, now) && !(u->awaits0 && sync_ahead(u->next0, u->next1) <= 0))
         pulses = sync_pulse1(c);
-    if (u->next0 <= now)
+    if (sync_reached(u->awaits0, u->next0, now))
         pulses |= sync_pulse0(c);
-    if (u->next1 <= now)             /* a SYNC0 at the same time does not start the next SYNC1 */
+    if (sync_reached(u->awaits1, u->next1, now))    /* a SYNC0 at the same time does not start the next SYNC1 */
         pulses |= sync_pulse1(c);
     sync_schedule(c);
     return pulses;

@@ -103,7 +103,6 @@ class AnalogInputs(AppliedDevice):
             order=f"CVA{self.channels:03d}",
             group="Analogue inputs",
             product_code=0x0004_0000 + self.channels,
-            revision=0x0001_0000,
             serial=self.serial,
             alias=self.alias,
             emulation=False,
@@ -117,6 +116,7 @@ class AnalogInputs(AppliedDevice):
             slots=SLOTS * self.channels,
             current_milliampere=130,
             mapping_quirks=self.mapping_quirks,
+            lrw=self.lrw,
         )
 
     def started(self, scheduler: Scheduler) -> None:

@@ -274,6 +274,8 @@ class Application:
 
     def _buffer_is_configured(self, n: int, assignment: int, control: int) -> bool:
         size = self.pdos.size(assignment)
+        if len(self.pdos.placed(assignment)) > _segment.MAPPED_MAX:
+            return False
         start, length, found, enabled, _full = self._buffers.settings(self._position, n)
         if size == 0:
             return not enabled or length == 0

@@ -56,7 +56,7 @@ class AppliedDevice(Device):
             self.core,
             self.position,
             scheduler,
-            self.description(),
+            self.whole_description(),
             delay_ns=self._mailbox_delay_ns,
             quirks=self.mailbox_quirks,
         )

@@ -36,7 +36,6 @@ class Coupler(Device):
             order="CVK100",
             group="Couplers",
             product_code=0x0001_0001,
-            revision=0x0001_0000,
             serial=self.serial,
             alias=self.alias,
             emulation=True,

@@ -6,6 +6,7 @@ those with a microcontroller add an `Application`.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import ClassVar
 
 from catenary.virtual._segment import FOREVER, Core
@@ -58,7 +59,12 @@ class Device:
 
     def sii_image(self) -> bytes:
         """Return the content of its EEPROM."""
-        return make_sii_image(self.description(), self.sii_quirks)
+        return make_sii_image(self.whole_description(), self.sii_quirks)
+
+    def whole_description(self) -> Description:
+        """Return the description with what the SII adds to it: a revision of its own."""
+        variant = "" if self.sii_quirks == NO_SII_QUIRKS else repr(self.sii_quirks)
+        return replace(self.description(), sii_variant=variant)
 
     @property
     def core(self) -> Core:
@@ -80,7 +86,7 @@ class Device:
             fmmus=8,
             sync_managers=8,
             clock_bits=self.clock_bits if description.clock else 0,
-            lrw=self.lrw,
+            lrw=description.lrw,
             identification=description.identification,
             ports=self.ports,
         )

@@ -51,7 +51,6 @@ class DigitalInputs(Device):
             order=f"CVI{self.bits:03d}",
             group="Digital inputs",
             product_code=0x0003_0000 + self.bits,
-            revision=0x0001_0000,
             serial=self.serial,
             alias=self.alias,
             emulation=True,
@@ -65,6 +64,7 @@ class DigitalInputs(Device):
             ram=0x0400,
             slots=1,
             current_milliampere=90,
+            lrw=self.lrw,
         )
 
     def started(self, scheduler: Scheduler) -> None:

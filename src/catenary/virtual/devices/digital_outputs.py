@@ -67,7 +67,6 @@ class DigitalOutputs(Device):
             order=f"CVO{self.bits:03d}",
             group="Digital outputs",
             product_code=0x0002_0000 + self.bits,
-            revision=0x0001_0000,
             serial=self.serial,
             alias=self.alias,
             emulation=True,
@@ -81,6 +80,7 @@ class DigitalOutputs(Device):
             ram=0x0400,
             slots=int(self.dc),
             current_milliampere=100,
+            lrw=self.lrw,
         )
 
     def started(self, scheduler: Scheduler) -> None:

@@ -27,7 +27,6 @@ class Junction(Device):
             order=f"CVJ{len(self.ports):03d}",
             group="Couplers",
             product_code=0x0001_0100 + len(self.ports),
-            revision=0x0001_0000,
             serial=self.serial,
             alias=self.alias,
             emulation=True,

@@ -199,7 +199,6 @@ class Servo(AppliedDevice):
             order=f"CVS{self.axes:03d}",
             group="Servo drives",
             product_code=0x0005_0000 + self.axes,
-            revision=0x0001_0000,
             serial=self.serial,
             alias=self.alias,
             emulation=False,
@@ -217,6 +216,7 @@ class Servo(AppliedDevice):
             mapping_quirks=self.mapping_quirks,
             op_modes=self.quirks.op_modes,
             loop_control=self.quirks.closes_ports,
+            lrw=self.lrw,
         )
 
     def started(self, scheduler: Scheduler) -> None:

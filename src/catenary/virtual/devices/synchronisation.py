@@ -39,6 +39,7 @@ OUTPUTS, INPUTS, ERROR_SETTINGS = 0x1C32, 0x1C33, 0x10F1
 SYNC_CONTROL, ACTIVATION, SYNC0_CYCLE, SYNC1_CYCLE = 0x0980, 0x0981, 0x09A0, 0x09A4
 ACTIVE = 0x01
 PULSES = {DC_SYNC0: 0x02, DC_SYNC1: 0x04}  # of 0x0981
+CYCLE_MAX_NS = 0xFFFF_FFFF
 _, _, MISSED, EXCEEDED, SHIFT_SHORT, ERROR = range(6)  # of Core.synchronous
 
 
@@ -70,6 +71,7 @@ class Synchronisation:
         self._pulses = PULSES[synchronous_type]
         self._written: int | None = None  # 0x1C32:01
         self._cycle_written = 0  # 0x1C32:02
+        self._checked_ns = 0  # the pulses' cycle as it was checked; 0: not by pulses
         self._tune()
         for index, name, copy in (
             (OUTPUTS, "SM output parameter", copy_ns),
@@ -91,6 +93,7 @@ class Synchronisation:
 
     def check(self) -> int:
         """PRE-OP → SAFE-OP: 0, or the AL status code why the clocks do not allow it."""
+        self._checked_ns = 0
         by_pdi, activation = self._core.peek(self._position, SYNC_CONTROL, 2)
         switched_on = bool(activation & ACTIVE)
         if not switched_on:
@@ -100,15 +103,19 @@ class Synchronisation:
         if self.sync0_cycle_ns < self._minimum_ns:
             return DC_SYNC0_CYCLE_TIME
         own = self._step_ns  # read from 0x1C32:02 in free run, it may be written back
-        if self._cycle_written not in (0, own, self.cycle_ns):
+        cycle_ns = self.cycle_ns
+        if cycle_ns > CYCLE_MAX_NS:
+            return INVALID_DC_CONFIGURATION
+        if self._cycle_written not in (0, own, cycle_ns):
             return DC_CYCLE_TIME
+        self._checked_ns = cycle_ns
         return 0
 
     def begin(self) -> None:
-        """SAFE-OP is entered: by its pulses from now on, if there are to be any."""
-        if self._core.peek(self._position, ACTIVATION, 1)[0] & ACTIVE:
+        """Enter SAFE-OP as it was checked: frames may have changed the registers meanwhile."""
+        if self._checked_ns:
             self._core.run_model_by_pulses(
-                self._position, self._pulses, self.cycle_ns, self._step_ns
+                self._position, self._pulses, self._checked_ns, self._step_ns
             )
 
     def end(self) -> None:

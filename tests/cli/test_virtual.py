@@ -1,0 +1,43 @@
+"""`catenary virtual serve`: what it says, and what it refuses."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import time
+
+import pytest
+
+from catenary.cli import main
+from catenary.realtime import scheduling
+from catenary.realtime.child import start_python
+from catenary.wire.datagram import Command, Datagram
+from catenary.wire.frame import encode_frame
+
+ETHERCAT = 0x88A4
+SECONDS = 30.0
+
+
+def test_lost_frames_are_reported_in_the_end(veth: tuple[str, str]) -> None:
+    """Any frame is too old for an age of 0."""
+    ours, theirs = veth
+    command = ["-m", "catenary.cli", "virtual", "serve", theirs, "--max-age", "0"]
+    with start_python(command) as server, socket.socket(socket.AF_PACKET, socket.SOCK_RAW) as wire:
+        assert server.read_line(SECONDS), "the virtual segment did not start"
+        wire.bind((ours, ETHERCAT))
+        wire.send(encode_frame([Datagram(Command.BRD, 0, b"\0")]))
+        time.sleep(0.1)  # real time, over a real wire: the frame has arrived
+        server.process.send_signal(signal.SIGTERM)
+        said = server.read_line(SECONDS)
+    assert said == "1 frames waited longer than 0 ms and were lost; --priority 80 makes this rarer"
+
+
+def test_a_priority_that_is_refused_is_an_error(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    refused = scheduling.Scheduling("SCHED_OTHER", 0, False, (0,), ("SCHED_FIFO 80 refused",))
+    monkeypatch.setattr(scheduling, "request_scheduling", lambda **_: refused)
+    assert main(["virtual", "serve", "lo", "--priority", "80"]) != 0
+    message = capsys.readouterr().err
+    assert "lo cannot be served in real time: SCHED_FIFO 80 refused" in message
+    assert "setcap" in message
