@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from catenary.cli.arguments import Entry, entry, position
 from catenary.cli.failure import UsageError
-from catenary.cli.parsers import Commands, add_command, add_json, add_target
+from catenary.cli.parsers import Commands, add_command, add_force, add_json, add_target
 
 if TYPE_CHECKING:
     from catenary.types import DataType, Value
@@ -70,6 +70,7 @@ def add_parser(commands: Commands) -> None:
 def _add_device(parser: argparse.ArgumentParser) -> None:
     add_target(parser)
     parser.add_argument("position", metavar="POSITION", type=position, help="0 is the first device")
+    add_force(parser)
 
 
 def _add_place(parser: argparse.ArgumentParser) -> None:
@@ -87,7 +88,7 @@ def run_read(arguments: argparse.Namespace) -> int:
 
     kind = _data_type(arguments.type)
     at: Entry = arguments.entry
-    with MainDevice(arguments.target) as main:
+    with MainDevice(arguments.target, force=arguments.force) as main:
         device = device_at(main.scan(), arguments.position)
         data = device.sdo.read(at.index, at.subindex)
     value = kind.decode(data) if kind else None
@@ -111,7 +112,7 @@ def run_write(arguments: argparse.Namespace) -> int:
         raise UsageError(str(error), hint="numbers are decimal or 0x...") from error
     at: Entry = arguments.entry
     data = kind.encode(value)
-    with MainDevice(arguments.target) as main:
+    with MainDevice(arguments.target, force=arguments.force) as main:
         device_at(main.scan(), arguments.position).sdo.write(at.index, at.subindex, data)
     if arguments.json:
         print(_as_json(arguments, data, value))
@@ -123,7 +124,7 @@ def run_list(arguments: argparse.Namespace) -> int:
     from catenary.cli.dictionary import as_json, as_lines, rows_of
     from catenary.target import MainDevice
 
-    with MainDevice(arguments.target) as main:
+    with MainDevice(arguments.target, force=arguments.force) as main:
         rows = rows_of(device_at(main.scan(), arguments.position), values=arguments.values)
         if arguments.json:
             print(as_json(rows))

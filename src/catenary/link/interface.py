@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from catenary.errors import LinkError
 from catenary.link._raw import RawLink
+from catenary.link.fork import forget_in_child
 
 ETHERTYPE = 0x88A4  # EtherCAT, ETG.1000.4 §5.2
 
@@ -59,6 +60,7 @@ class Interface:
         with raw:  # which is empty once the link owns the descriptor
             link = RawLink(self.name, raw, size, SLOT_SIZE, receive_path)
         link.flush()
+        forget_in_child(link)
         return link
 
 

@@ -57,8 +57,11 @@ def silence_error(
     )
 
 
-def state_error(answers: Sequence[Answer], log: object) -> StateError | None:
-    """The error for devices that left OP; None: all are there."""
+def state_error(
+    answers: Sequence[Answer], log: object, other_masters: Sequence[str] = ()
+) -> StateError | None:
+    """Return the error for devices that left OP; None if all are there. `other_masters`: evidence
+    of another master, as text."""
     astray = [answer for answer in answers if is_astray(answer)]
     if not astray:
         return None
@@ -71,11 +74,23 @@ def state_error(answers: Sequence[Answer], log: object) -> StateError | None:
         actual=(first.word or 0) & STATE_MASK,
         code=first.code,
         log=log,
-        hint=known.cause or "see its manual for what makes it leave OP",
+        hint=_suspicion(first, other_masters) or known.cause or "see its manual",
     )
     for other in astray[1:]:
         error.add_note(f"also: {described(other)}")
     return error
+
+
+def _suspicion(answer: Answer, other_masters: Sequence[str]) -> str:
+    """Return what points to another master; a device that leaves OP by itself gives a reason."""
+    if other_masters:
+        return f"another EtherCAT master is live: {'; '.join(other_masters)}; end it"
+    if answer.code or (answer.word or 0) & ERROR_FLAG:
+        return ""
+    return (
+        "it gives no reason, so its state was probably requested: look for a second master on this "
+        "line, or in another container; a device that was switched off and on shows INIT, too"
+    )
 
 
 def forgetful_error(silent: Sequence[Answer], al_status: int, log: object) -> StateError:

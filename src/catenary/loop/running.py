@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 
@@ -25,7 +26,7 @@ from catenary.core import (
     Engine,
 )
 from catenary.errors import CatenaryError, DriveError, LoopError
-from catenary.link import ring_of
+from catenary.link import forget_in_child, ring_of
 from catenary.loop.axis_watch import AxisWatch, RefusedMode, StoppedAxis, StopPolicy
 from catenary.loop.buffers import bind_wishes
 from catenary.loop.clocks import Clocks
@@ -102,6 +103,8 @@ class Running:
         self._attached = ExitStack()
         self._opened = self._left = False
         self._abandon = abandon  # leaves the loop, when the MainDevice is closed round it
+        self._process = os.getpid()
+        forget_in_child(self)
         self._stations = [sub.station for sub in main.subs]
         self._companions: Sequence[Running] = ()
         self._watches: list[Pending[None]] = []
@@ -330,9 +333,16 @@ class Running:
 
     # Leaving
 
+    def forget(self) -> None:
+        """In a forked child: the cycle, its threads and the devices are the parent's."""
+        self._left = True
+        self.engine.forget()
+
     def leave(self, guard: SignalGuard) -> list[Exception]:
         """Brings everything down, best effort: each step is taken whatever the one before met.
-        What went wrong on the way. A second time: nothing."""
+        What went wrong on the way. A second time, or in a forked child: nothing."""
+        if self._process != os.getpid():
+            self.forget()
         if self._left:
             return []
         self._left = True
@@ -422,7 +432,7 @@ class Running:
         for look in range(2):
             [answers] = self.service.converse(survey(self._stations))
             needed = [a for a in answers if self.watch.requires(a.station.position)]
-            error = state_error(needed, log)
+            error = state_error(needed, log, self.main.other_masters)
             if error is not None:
                 raise error
             silent = [answer for answer in needed if answer.word is None]
