@@ -11,11 +11,11 @@ import pytest
 from tests.attack.line_on_a_wire import LINE, served
 
 PROGRAM = """
-import multiprocessing, os, pathlib, signal, sys
+import ctypes, multiprocessing, os, pathlib, signal, sys
 import catenary as cat
 
-def in_child(what):
-    child = os.fork()
+def in_child(what, fork=os.fork):
+    child = fork()
     if child == 0:
         signal.alarm(20)  # a child that hangs is an error, too
         what()
@@ -36,7 +36,8 @@ def use():
     expect(RuntimeError, lambda: main.link)
     expect(RuntimeError, lambda: main.scan())
     expect(RuntimeError, lambda: arm.subs[0].sdo.read(0x1018, 1))
-    float(arm.actual.position[0])  # no crash: the views are there
+    # The views are there. In real time, the pages of the cycle are wiped instead of copied.
+    assert loop._running.views.statusword.any() == sys.argv[1].startswith("virtual")
     arm.target.position[:] = 1.0
     loop.log, loop.timing, loop.plan
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
@@ -79,6 +80,8 @@ good(20)
 for what in (use, leave, delete):
     assert in_child(what) == 0, what
     good(20)
+assert in_child(leave, ctypes.PyDLL(None).fork) == 0  # of a C library: without Python's hooks
+good(20)
 child = os.fork()
 if child == 0:
     signal.alarm(20)
@@ -111,6 +114,19 @@ with cat.MainDevice(sys.argv[1]):  # the child keeps neither lock nor socket
 os.kill(child, 9)
 os.waitpid(child, 0)
 """
+RECORDED = """
+import os, sys
+from catenary.link import Interface, Recorder
+from catenary.wire.pcapng import decode_capture
+
+with Recorder(Interface(sys.argv[1]), sys.argv[2]) as link:
+    child = os.fork()
+    if child:
+        assert os.waitpid(child, 0)[1] == 0
+        link.send(bytes.fromhex("ffffffffffff10101010101088a4") + bytes(46))
+if child:
+    print(len(decode_capture(open(sys.argv[2], "rb").read()).packets))
+"""
 
 
 def run(text: str, *arguments: str) -> str:
@@ -137,3 +153,7 @@ def test_the_same_in_virtual_time(tmp_path: Path, mode: str) -> None:
 
 def test_a_child_keeps_no_interface(veth: tuple[str, str]) -> None:
     assert run(ORPHAN, veth[0]) == "reopened\n"
+
+
+def test_a_child_writes_nothing_into_a_recording(veth: tuple[str, str], tmp_path: Path) -> None:
+    assert run(RECORDED, veth[0], str(tmp_path / "frames.pcapng")) == "1\n"

@@ -111,7 +111,7 @@ def test_a_ring_takes_both_interfaces(veth: tuple[str, str]) -> None:
 
 
 def test_a_master_without_our_lock_is_seen(veth: tuple[str, str], tmp_path: Path) -> None:
-    """What SOEM and IgH's generic driver open."""
+    """SOEM and IgH's generic driver open such a socket."""
     with program(SOCKET, tmp_path, veth[0], str(ETHERTYPE)) as other:
         assert other.read_line(START) == "open"
         with pytest.raises(LinkError, match=rf"PID {other.pid} .* packet socket on {veth[0]}"):

@@ -108,8 +108,7 @@ class MainDevice:
         Raises:
             LinkError: it cannot be used, or another master is live on it, and not `force`.
         """
-        if self._is_inherited:
-            self.forget()
+        self.forget()
         if self._link is not None:
             return
         link = self._source.open_link()
@@ -125,7 +124,10 @@ class MainDevice:
         forget_in_child(self)
 
     def forget(self) -> None:
-        """In a forked child: let go of the parent's link and devices. Sends nothing."""
+        """In a forked child: let go of the parent's link and devices. Sends nothing. In the process
+        that opened it: no effect."""
+        if not self._is_inherited:
+            return
         self._link = self._blocking = self._attached = self._leave_loop = None
         if self._ownership is not None:
             self._ownership.release()
@@ -154,8 +156,7 @@ class MainDevice:
     def close(self) -> None:
         """Brings all devices to INIT, best effort, and closes the link. In a forked child: no
         effect."""
-        if self._is_inherited:
-            return self.forget()
+        self.forget()
         if self._link is None:
             return
         if self._leave_loop is not None:

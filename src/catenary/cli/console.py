@@ -1,7 +1,5 @@
 """Entry point of the `catenary` command: imports all commands where Ctrl-C is handled already."""
 
-from __future__ import annotations
-
 INTERRUPTED = 130  # 128 + SIGINT
 
 

@@ -1,4 +1,4 @@
-"""What a forked child must let go of: it gets copies of the parent's links and loops.
+"""Links and loops after a fork: the child gets copies, and must let go of them.
 
 The child closes its copies of sockets, so that the kernel releases an interface with its owner.
 It sends nothing and waits for no thread: the threads of the parent are not in the child. A fork()

@@ -28,7 +28,7 @@ from catenary.wire.frame import is_alien
 NAME = "\0catenary/"  # of the lock, before the name of the interface; abstract, see unix(7)
 WAITING = 4096  # programs that may ask for the owner of a lock; nothing accepts them
 SETTLE_NS = 20_000_000  # late answers to a master that has just ended
-WINDOW_NS, WINDOWS = 40_000_000, 2  # a live master is heard in each
+WINDOW_NS, WINDOWS = 40_000_000, 2  # a live master sends frames in each
 FRAMES = 256  # read per window: more than a receive ring holds
 
 PACKETS = Path("/proc/thread-self/net/packet")  # of this thread's namespace, see packet(7)
@@ -93,7 +93,7 @@ def locked(name: str) -> socket.socket | None:
     lock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         lock.bind(NAME + name)
-        lock.listen(WAITING)  # from now on, others can ask whose it is
+        lock.listen(WAITING)  # from now on, `holder` can ask for its process
     except OSError as error:
         lock.close()
         if error.errno != errno.EADDRINUSE:
@@ -166,13 +166,13 @@ def foreign_frames(raws: Sequence[RawLink]) -> tuple[str, ...]:
     One burst is not enough: a segment may answer late to a master that has just been killed.
     """
     _pause(raws[0], SETTLE_NS)
-    heard = {raw.name for raw in raws}
+    active = {raw.name for raw in raws}
     for raw in raws:
-        _hears(raw)
+        _receives(raw)
     for _ in range(WINDOWS):
         _pause(raws[0], WINDOW_NS)
-        heard &= {raw.name for raw in raws if _hears(raw)}
-    return tuple(f"EtherCAT frames of another master arrive on {name}" for name in sorted(heard))
+        active &= {raw.name for raw in raws if _receives(raw)}
+    return tuple(f"EtherCAT frames of another master arrive on {name}" for name in sorted(active))
 
 
 def _pause(raw: RawLink, duration_ns: int) -> None:
@@ -181,12 +181,12 @@ def _pause(raw: RawLink, duration_ns: int) -> None:
         raw.wait_until(until, False)
 
 
-def _hears(raw: RawLink) -> bool:
+def _receives(raw: RawLink) -> bool:
     """Read what has arrived. Return True if an EtherCAT frame is among it."""
-    heard = False
+    active = False
     for _ in range(FRAMES):
         frame = raw.receive()
         if frame is None:
             break
-        heard = heard or not is_alien(frame)
-    return heard
+        active = active or not is_alien(frame)
+    return active

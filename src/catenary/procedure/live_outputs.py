@@ -27,7 +27,7 @@ from catenary.wire.sync_manager import SIZE, Activation, Direction, decode_sync_
 RUNNING = (State.SAFE_OP, State.OP)
 ACTIVE = 0x01  # 0x0440: the watchdog has not expired, or is off
 POLL = 0.010  # [s]
-LONGEST_NS = 5_000_000_000  # a device whose watchdog is longer cannot be judged in time
+LONGEST_NS = 5_000_000_000  # twice a longer watchdog time is too long to wait
 DIVIDER_OFFSET, DIVIDER_NS = 2, 40  # the unit of 0x0420 is (0x0400 + 2) · 40 ns
 
 
