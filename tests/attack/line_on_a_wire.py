@@ -21,18 +21,24 @@ name = "shoulder"
 # A loop that cycles until its standard input ends, and prints what it sees. On a machine that is
 # shared with other work, lost frames must not end it.
 LOOP = """
-import os, sys
+import sys
 import catenary as cat
 
-with cat.MainDevice(sys.argv[1]) as main:
-    arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=1.0)
-    options = dict(run=sys.argv[2], period=4e-3, lost_limit=1000, watchdog=0.5, priority=None)
-    with cat.Loop(arm, **options) as loop:
-        print("running", flush=True)
-        for cycle in loop:
-            arm.target.position[:] = arm.actual.position
-            if cycle.number % 25 == 0:
-                print(cycle.number, cycle.ok, arm.stopped == (None,), flush=True)
+def main(interface, run):
+    with cat.MainDevice(interface) as main:
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=1.0)
+        options = dict(run=run, period=4e-3, lost_limit=1000, watchdog=0.5, priority=None)
+        with cat.Loop(arm, **options) as loop:
+            print("running", flush=True)
+            for cycle in loop:
+                arm.target.position[:] = arm.actual.position
+                if cycle.number % 25 == 0:
+                    print(cycle.number, cycle.ok, arm.stopped == (None,), flush=True)
+
+try:
+    main(*sys.argv[1:])
+except cat.CatenaryError as error:
+    print(type(error).__name__, *str(error).split(), flush=True)
 """
 
 

@@ -153,6 +153,19 @@ def test_late_answers_to_a_killed_master_are_not_a_master(veth: tuple[str, str])
         assert ownership.foreign_frames(ownership.raw_links(link)) == ()
 
 
+def test_a_master_in_another_container(veth: tuple[str, str]) -> None:
+    text = f"import catenary as cat; cat.MainDevice({veth[0]!r}).open()"
+    command = ["unshare", "--pid", "--fork", sys.executable, "-c", text]
+    with cat.MainDevice(veth[0]):
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    if "unshare failed" in done.stderr:
+        pytest.skip("no PID namespace of its own")
+    assert (
+        f"a process that is invisible here (another container or PID namespace) has {veth[0]}"
+        in (done.stderr)
+    )
+
+
 def test_the_process_of_another_container_is_said_to_be_invisible() -> None:
     assert "invisible here" in ownership.described(0)
 
@@ -164,6 +177,17 @@ def test_a_scan_does_not_reset_a_line_in_motion(veth: tuple[str, str], tmp_path:
         assert f"PID {loop.pid}" in done.stderr
         assert "--force" in done.stderr
         assert goes_on(loop)
+
+
+def test_a_forced_scan_is_suspected_by_the_loop_that_it_ends(
+    veth: tuple[str, str], tmp_path: Path
+) -> None:
+    with served(veth[1], tmp_path), looping(veth[0], tmp_path) as loop:
+        catenary("scan", veth[0], "--force")
+        lines = iter(lambda: loop.read_line(START), None)
+        [error] = [line for line in lines if "Error" in line]
+        assert error.startswith("StateError")
+        assert "second master" in error or "another EtherCAT master" in error
 
 
 def test_a_line_in_motion_can_be_read(veth: tuple[str, str], tmp_path: Path) -> None:

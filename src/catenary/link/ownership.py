@@ -11,6 +11,7 @@ protocols (0x0003) and is not a master.
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import socket
@@ -152,12 +153,18 @@ def _holder_of_socket(inode: int) -> str:
     """Describe the process that has a socket open, as far as this user may see it."""
     wanted = f"socket:[{inode}]"
     for folder in Path("/proc").glob("[0-9]*/fd"):
-        try:
-            if any(os.readlink(entry) == wanted for entry in os.scandir(folder)):
+        with contextlib.suppress(OSError):  # ended meanwhile, or another user's
+            if wanted in map(_target, os.scandir(folder)):
                 return described(int(folder.parent.name))
-        except OSError:  # ended meanwhile, or another user's
-            continue
     return "a process that is invisible here, or the kernel's EtherCAT master,"
+
+
+def _target(entry: os.DirEntry[str]) -> str:
+    """Return what a descriptor refers to; "" if it was closed meanwhile."""
+    try:
+        return os.readlink(entry)
+    except OSError:
+        return ""
 
 
 def foreign_frames(raws: Sequence[RawLink]) -> tuple[str, ...]:

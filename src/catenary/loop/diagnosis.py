@@ -21,10 +21,11 @@ def silence_error(
     log: object,
     findings: Sequence[Finding] = (),
     mute: Sequence[int] = (),
+    tight: str = "",
 ) -> WorkingCounterError:
     """The error for `lost` bad cycles in a row; `suspects`: devices of the units that failed;
     `findings`: what silence or error counters say of the place; `mute`: devices whose inputs do not
-    come even when they are asked for alone."""
+    come even when they are asked for alone; `tight`: of a period that is perhaps too short."""
     silent = [answer.station for answer in answers if answer.word is None]
     others = [a for a in answers if a.station.position in suspects and a.word is not None]
     stray = [answer for answer in others if is_astray(answer)]
@@ -47,13 +48,23 @@ def silence_error(
     else:
         who = f"all devices answer to single reads; affected: devices {listed(suspects)}"
         who += "".join(f"; {each.where}: {each.evidence}" for each in findings)
-        hint = (
+        hint = tight or (
             "frames are lost, corrupted or late on the way: check cables and other traffic on the "
             "port; where the segment is a program on a busy machine, allow it more cycles with "
             "Loop(lost_limit=...)"
         )
     return WorkingCounterError(
         f"{lost} cycles in a row without all answers; {who}", log=log, hint=hint
+    )
+
+
+def tight_period(wire_ns: int, period_ns: int) -> str:
+    """Return a hint if the cyclic frames take most of the period; else an empty text."""
+    if 2 * wire_ns < period_ns:
+        return ""
+    return (
+        f"the cyclic frames take {wire_ns / 1e3:g} us of the period of {period_ns / 1e3:g} us at "
+        "100 Mbit/s, and every device delays them by about 1 us: use a longer period"
     )
 
 

@@ -36,6 +36,7 @@ from catenary.loop.diagnosis import (
     forgetful_error,
     silence_error,
     state_error,
+    tight_period,
 )
 from catenary.loop.error_watch import ErrorWatch
 from catenary.loop.frame_watch import FrameWatch
@@ -411,7 +412,10 @@ class Running:
         silent = [answer.station.position for answer in answers if answer.word is None]
         silence = judge_silence(self.errors.topology, self.errors.names, silent)
         [mute] = self.service.converse(probe_inputs(self._input_areas(suspects)))
-        return silence_error(answers, suspects, lost, log, findings=silence or noise, mute=mute)
+        cycle = self.plan.cycle
+        tight = tight_period(cycle.wire_ns, cycle.period_ns)
+        findings = silence or noise
+        return silence_error(answers, suspects, lost, log, findings, mute=mute, tight=tight)
 
     def _input_areas(self, positions: Sequence[int]) -> dict[int, tuple[int, int]]:
         """Where the inputs of some devices lie, as far as they have some."""
