@@ -114,6 +114,25 @@ with cat.MainDevice(sys.argv[1]):  # the child keeps neither lock nor socket
 os.kill(child, 9)
 os.waitpid(child, 0)
 """
+TERMINATED = """
+import os, signal, time
+import catenary as cat
+
+with cat.MainDevice("virtual") as main:
+    arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=1.0)
+    with cat.Loop(arm) as loop:
+        next(loop)
+        for _ in range(30):
+            child = os.fork()
+            if child == 0:
+                signal.alarm(20)
+                while True:
+                    time.sleep(1)
+            os.kill(child, signal.SIGTERM)
+            assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == -signal.SIGTERM
+        assert signal.pthread_sigmask(signal.SIG_BLOCK, []) == set()
+print("ended")
+"""
 RECORDED = """
 import os, sys
 from catenary.link import Interface, Recorder
@@ -157,3 +176,7 @@ def test_a_child_keeps_no_interface(veth: tuple[str, str]) -> None:
 
 def test_a_child_writes_nothing_into_a_recording(veth: tuple[str, str], tmp_path: Path) -> None:
     assert run(RECORDED, veth[0], str(tmp_path / "frames.pcapng")) == "1\n"
+
+
+def test_sigterm_in_the_first_moments_of_a_child_ends_it() -> None:
+    assert run(TERMINATED) == "ended\n"
