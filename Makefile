@@ -3,13 +3,14 @@
 # PYTHON=/path/to/python3.12 takes another interpreter, and makes .venv anew for it.
 # TEST="-k axis" passes options to pytest, COBOT=--realtime to `make cobot`. `make rtlab` runs the
 # benchmarks on a real-time kernel in QEMU: TABLE=quick or TABLE=pyigh,tasks instead of all of them,
-# RTLAB="--out docs/benchmarks" keeps the results there.
+# RTLAB="--out docs/benchmarks" keeps the results there. TABLE=igh wants IGH=path, a build of IgH's master.
 PYTHON ?= python3
 VENV := .venv
 TEST ?=
 COBOT ?=
 TABLE ?= all
 RTLAB ?=
+IGH ?=
 SOURCES := CMakeLists.txt pyproject.toml \
            $(shell find src -name '*.pyx' -o -name '*.pxd' -o -name '*.pxi' -o -name '*.h')
 CHECKED := src tests tools examples
@@ -37,7 +38,7 @@ cobot: $(VENV)/.with-cobot
 	@$(VENV)/bin/python -m catenary.realtime.private_network examples/cobot/cobot.py $(COBOT)
 
 rtlab: $(VENV)/.with-test
-	@$(VENV)/bin/python -m tools.rtlab $(TABLE) $(RTLAB)
+	@$(VENV)/bin/python -m tools.rtlab $(TABLE) $(if $(IGH),--igh $(abspath $(IGH))) $(RTLAB)
 
 test: $(VENV)/.with-test
 	@$(VENV)/bin/python -m catenary.realtime.private_network -m pytest $(TEST)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from catenary import control, realtime, share, types
     from catenary.bus import SubDevice
     from catenary.bus import event as events
-    from catenary.drive import DC, Drives, Inputs, Outputs, Phase, Recovery
+    from catenary.drive import DistributedClock, Drives, Inputs, Outputs, Phase, Recovery
     from catenary.errors import CatenaryError
     from catenary.loop import Cycle, Loop, law
     from catenary.share import Share, attach
@@ -36,13 +36,13 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
-    "DC",
     "AnalogInputs",
     "CatenaryError",
     "Coupler",
     "Cycle",
     "DigitalInputs",
     "DigitalOutputs",
+    "DistributedClock",
     "Drives",
     "Inputs",
     "Loop",
@@ -66,8 +66,8 @@ __all__ = [
 _VIRTUAL = ("AnalogInputs", "Coupler", "DigitalInputs", "DigitalOutputs", "Segment", "Servo")
 _HOMES = {
     "CatenaryError": "catenary.errors",
-    "DC": "catenary.drive",
     "Cycle": "catenary.loop",
+    "DistributedClock": "catenary.drive",
     "Drives": "catenary.drive",
     "Inputs": "catenary.drive",
     "Loop": "catenary.loop",

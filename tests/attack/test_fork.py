@@ -136,7 +136,7 @@ print("ended")
 RECORDED = """
 import os, sys
 from catenary.link import Interface, Recorder
-from catenary.wire.pcapng import decode_capture
+from catenary.wire.capture import decode_capture
 
 with Recorder(Interface(sys.argv[1]), sys.argv[2]) as link:
     child = os.fork()

@@ -90,3 +90,10 @@ def test_all_ways_run_briefly(ring: bool) -> None:
     assert {name for name, share in shares.items() if share > 0} == {
         f"{what}, {network}" for what in ("law", "segment") for network in tocabi.NETWORKS
     }
+
+
+def test_axes_of_each_network():
+    assert tocabi.axes_of(Options()) == (18, 15)
+    assert tocabi.axes_of(Options(axes=(3, 3))) == (3, 3)
+    with pytest.raises(ValueError, match="2 networks, not 3"):
+        tocabi.axes_of(Options(axes=(1, 2, 3)))

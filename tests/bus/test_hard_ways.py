@@ -107,8 +107,8 @@ def changed(monkeypatch: pytest.MonkeyPatch, change: Callable[[bytes], bytes]) -
     """A segment whose servo has another SII image."""
     make = virtual_device.make_sii_image
 
-    def made(description: object) -> bytes:
-        image = make(description)
+    def made(description: object, *quirks: object) -> bytes:
+        image = make(description, *quirks)
         return change(image) if description.axes else image
 
     monkeypatch.setattr(virtual_device, "make_sii_image", made)

@@ -1,9 +1,11 @@
 """A device that cannot be brought to PRE-OP: named, told when it is used, no harm to the others."""
 
+import struct
+
 import pytest
 
 import catenary as cat
-from catenary.errors import CatenaryError, StateError
+from catenary.errors import CatenaryError, MailboxError, StateError
 from catenary.wire.al import State
 
 REFUSED = 0x0016  # invalid mailbox configuration, PRE-OP
@@ -60,3 +62,54 @@ def test_further_ones_are_notes(segment: cat.Segment) -> None:
         with pytest.raises(CatenaryError, match="device 1") as caught:
             main.scan()
         assert any("device 2" in note for note in caught.value.__notes__)
+
+
+SLOW_READ, WRITE = 400_000_000, 3_000_000  # [ns] of the EEPROM
+
+
+@pytest.fixture
+def slow_segment() -> cat.Segment:
+    """The EEPROM of device 1 would take minutes."""
+    segment = cat.Segment([cat.Coupler(), cat.Servo(), cat.Servo(serial=2)])
+    segment.core.time_sii(1, SLOW_READ, WRITE, False)
+    return segment
+
+
+def test_a_slow_eeprom_does_not_hold_a_scan(slow_segment: cat.Segment) -> None:
+    segment = slow_segment
+    with cat.MainDevice(segment) as main:
+        subs = main.scan(strict=False)
+        assert segment.now_ns < 40e9
+        assert "device 1: its description was not complete within 30 s" in str(subs[1].error)
+        assert [subs[0].error, subs[2].error] == [None, None]
+        assert subs[2].sdo.read(0x1018, 4)
+
+
+def test_a_slow_eeprom_does_not_hold_a_look(slow_segment: cat.Segment) -> None:
+    with cat.MainDevice(slow_segment) as main:
+        found = main.look()
+        assert slow_segment.now_ns < 40e9
+        assert any("within 30 s" in note for note in found[1].description.notes)
+        assert found[2].identity.serial == 2
+
+
+def test_an_object_that_drips_does_not_hold_a_scan() -> None:
+    """0x1000 is announced with 4000 bytes; one of them comes in each segment, after 50 ms."""
+    device = cat.Servo(mailbox_delay=0.05)
+    segment = cat.Segment([cat.Coupler(), device, cat.Servo(serial=2)])
+    announced = struct.pack("<HBHBI", 0x3000, 0x41, 0x1000, 0, 4000)
+
+    def drip(payload: bytes) -> list[bytes]:
+        command = payload[2]
+        if command >> 5 == 3:  # segments
+            return [struct.pack("<HB7x", 0x3000, command & 0x10 | 6 << 1)]
+        return [announced]
+
+    device.application.mailbox._serve = drip
+    with cat.MainDevice(segment) as main:
+        subs = main.scan(strict=False)
+        assert segment.now_ns < 10e9
+        assert isinstance(subs[1].error, MailboxError)
+        assert str(subs[1].error).startswith("device 1 (Catenary virtual servo): SDO 0x1000:00: ")
+        assert "of 4000 bytes within 5 s" in str(subs[1].error)
+        assert subs[2].error is None

@@ -4,6 +4,7 @@ tests/record/test_recorder.py and scenarios 76 to 78."""
 from __future__ import annotations
 
 import json
+import os
 import shlex
 import sys
 from collections.abc import Iterator
@@ -65,6 +66,17 @@ def test_record_for_programs(name: str, tmp_path: Path, capsys: pytest.CaptureFi
     assert status == 0
     assert said.pop("cycles") > 100
     assert said == {"file": f"{tmp_path}/x.mcap", "lost": 0, "ended": "stopped"}
+
+
+def test_the_user_whose_share_it_is(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with shared_loop(name) as shared:
+        shared.run(10)
+        line = f"record {name} {tmp_path / 'x.mcap'} --seconds 0.01 --uid"
+        status, _, err = call(f"{line} 64001", capsys)  # an id that no user has
+        assert (status, f"there is no share '{name}'" in err) == (1, True)
+        assert call(f"{line} {os.geteuid()}", capsys)[0] == 0
 
 
 def test_an_existing_file_is_replaced_only_when_asked(

@@ -3,14 +3,26 @@
 from __future__ import annotations
 
 import shlex
+import struct
 from pathlib import Path
 
 import pytest
 
 import catenary as cat
 from catenary.cli.main import main
-from catenary.cli.sii import dump
-from catenary.wire.sii import checksum_of
+from catenary.cli.sii import as_text, dump
+from catenary.cli.sii_text import differences, word_differences
+from catenary.errors import DecodeError
+from catenary.wire.sii import Category, Header, Sii, checksum_of
+from catenary.wire.sii_categories import (
+    ClockMode,
+    General,
+    Pdo,
+    PdoEntry,
+    encode_clock_modes,
+    encode_pdos,
+    encode_strings,
+)
 
 
 @pytest.fixture
@@ -48,8 +60,11 @@ def test_text_says_what_it_means(segment: cat.Segment, capsys: pytest.CaptureFix
     assert status == 0
     assert "serial 7" in lines
     assert "name 'wrist'" in lines
-    assert "SyncManager 2: 13 bytes at 0x1100, control 0x64, enable 0x01, use 3" in lines
-    assert "RxPDO 0x1600   0x6040:00 16 bits 'Controlword'" in lines
+    assert (
+        "SyncManager 2: 13 bytes at 0x1100, control 0x64, status 0x00, enable 0x01 (ENABLED), "
+        "use 3 (OUTPUTS)" in lines
+    )
+    assert "RxPDO 0x1600   0x6040:00 16 bits UINT 'Controlword'" in lines
 
 
 def test_the_dump_leaves_out_lines_that_repeat() -> None:
@@ -144,12 +159,128 @@ def test_an_image_larger_than_the_eeprom_is_refused(
     assert "mixture of old and new" in err
 
 
+def test_a_file_is_shown_with_every_field(
+    segment: cat.Segment, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "oversampled.bin"
+    path.write_bytes(oversampled_image())
+    status, out, err = call(f"sii show {path}", capsys)
+    assert (status, err) == (0, "")
+    for line in (
+        "flags 0x12: NO_LRW, IDENTIFICATION_BY_MEMORY",
+        "identification at 0x0012",
+        "TxPDO 0x1A00 'Samples': SyncManager 3, synchronisation 1, "
+        "flags 0x0011 (MANDATORY, FIXED_CONTENT)",
+        "TxPDO 0x1A00   0x6000:01 16 bits INT 'Value', flags 0x0002",
+        "TxPDO 0x1A00   0x6000:02 3 bits type 0x77 'Value'",
+        "OpMode 0 'DcSync4': AssignActivate 0x0730",
+        "OpMode 0 'DcSync4': SYNC0 cycle 0 ns, factor -4, shift -10000 ns",
+        "OpMode 0 'DcSync4': SYNC1 factor -1, shift 1000 ns",
+        "OpMode 0 'DcSync4': description 'Value'",
+        "category 2049, +0x0000: 01 02",
+        "after the categories: 2 bytes of ff",
+    ):
+        assert line in out.splitlines()
+
+
+def oversampled_image() -> bytes:
+    """The clocks of Beckhoff's EL3702 (ESI, OpMode DcSync4), flags and types of every kind."""
+    strings = encode_strings(["DcSync4", "Samples", "Value"])
+    entries = (
+        PdoEntry(0x6000, 1, 16, data_type=0x03, name=3, flags=2),
+        PdoEntry(0x6000, 2, 3, data_type=0x77, name=3),
+    )
+    pdo = Pdo(0x1A00, entries, sync_manager=3, synchronization=1, name=2, flags=0x11)
+    mode = ClockMode(
+        shift_time_ns=-10_000,
+        shift_time_1_ns=1_000,
+        sync1_factor=-1,
+        assign_activate=0x0730,
+        sync0_factor=-4,
+        name=1,
+        description=3,
+    )
+    general = General(flags=0x12, identification_address=0x12)
+    return Sii(
+        Header(2, 3, 4),
+        (
+            Category(10, strings),
+            Category(30, general.encode()),
+            Category(50, encode_pdos([pdo])),
+            Category(60, encode_clock_modes([mode])),
+            Category(0x801, b"\x01\x02"),
+        ),
+    ).encode()
+
+
+def test_a_file_that_is_not_an_image_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "drive.hex"
+    path.write_text(":020000040000FA\n")
+    status, out, err = call(f"sii show {path}", capsys)
+    assert status == 1
+    assert "cannot be read as an image" in out
+    assert "less than a header" in err
+    assert "not Intel hex" in err
+
+
+def test_every_byte_that_differs_is_shown() -> None:
+    """A flag, a factor, filling behind a string: nothing differs without a line."""
+    image = oversampled_image()
+    for place in range(len(image)):
+        for bit in (1, 0x80):
+            other = bytearray(image)
+            other[place] ^= bit
+            try:
+                assert differences(image, bytes(other)), place
+            except DecodeError:
+                assert word_differences(image, bytes(other))
+
+
+@pytest.mark.parametrize(
+    ("place", "lines"),
+    [
+        (
+            "flags",
+            [
+                "-flags 0x12: NO_LRW, IDENTIFICATION_BY_MEMORY",
+                "+flags 0x10: IDENTIFICATION_BY_MEMORY",
+            ],
+        ),
+        (
+            "factor",
+            [
+                "-OpMode 0 'DcSync4': SYNC1 factor -1, shift 1000 ns",
+                "+OpMode 0 'DcSync4': SYNC1 factor 1, shift 1000 ns",
+            ],
+        ),
+    ],
+)
+def test_the_field_that_differs_is_named(place: str, lines: list[str]) -> None:
+    image = oversampled_image()
+    other = bytearray(image)
+    if place == "flags":
+        other[image.index(General(flags=0x12, identification_address=0x12).encode()) + 11] = 0x10
+    else:
+        start = image.index(struct.pack("<ii", -10_000, 1_000))
+        other[start + 8 : start + 10] = struct.pack("<h", 1)
+    assert differences(image, bytes(other)) == lines
+
+
+def test_real_images_are_shown_whole(shared_data: Path) -> None:
+    for path in sorted((shared_data / "sii").glob("*.bin")):
+        lines = as_text(path.read_bytes())
+        assert len(lines) > 10 or "empty" in path.name
+
+
 @pytest.mark.parametrize(
     ("line", "status", "message"),
     [
         ("sii read virtual 6", 2, "the segment has 6"),
         ("sii write virtual 1 /nowhere.bin", 1, "/nowhere.bin: No such file"),
         ("sii write virtual 1 /dev/null", 1, "0 bytes are less than a header"),
+        ("sii show /nowhere.bin", 1, "/nowhere.bin: No such file"),
     ],
 )
 def test_mistakes_name_the_thing(

@@ -26,7 +26,6 @@ def make(root: Path, files: Files, **facts: object) -> Machine:
     given = {
         "clock": STEADY,
         "permission_command": "sudo setcap ... python",
-        "own_interpreter": True,
         **facts,
     }
     return Machine(root=root, **given)  # type: ignore[arg-type]

@@ -3,11 +3,26 @@
 from __future__ import annotations
 
 import errno
+import grp
 import os
+import pwd
 
 import pytest
 
-from catenary.doctor.change import Change, MachineGround, State, StateError, apply, chosen, undo
+from catenary.doctor.change import (
+    Change,
+    MachineGround,
+    Made,
+    State,
+    StateError,
+    apply,
+    chosen,
+    open_state,
+    undo,
+)
+from catenary.doctor.examination import examine
+from catenary.doctor.permissions import HUGE_PAGES
+from tests.doctor import machines
 
 
 class Ground:
@@ -120,16 +135,133 @@ def test_a_damaged_note_is_an_error_and_not_silence(state):
 
 
 def test_files_of_a_machine(tmp_path, state):
-    pages = tmp_path / "sys" / "enabled"
-    pages.parent.mkdir()
+    pages = tmp_path / HUGE_PAGES.lstrip("/")
+    pages.parent.mkdir(parents=True)
     pages.write_text("[always] madvise never\n")
     ground = MachineGround(tmp_path)
-    assert list(apply([Change("/sys/enabled", "madvise")], ground, state)) == [
-        "done: /sys/enabled = madvise (was always)"
+    assert list(apply([Change(HUGE_PAGES, "madvise")], ground, state)) == [
+        f"done: {HUGE_PAGES} = madvise (was always)"
     ]
     assert pages.read_text() == "madvise"
     list(undo(ground, state))
     assert pages.read_text() == "always"
+
+
+def test_every_change_of_the_checks_can_be_made_and_undone(tmp_path, state):
+    """Their targets are in the list of what may be written."""
+    laptop = machines.make(tmp_path, machines.LAPTOP)
+    changes = examine(laptop).changes
+    files = [change for change in changes if not change.target.startswith("ethtool:")]
+    assert files
+    for line in apply(files, MachineGround(tmp_path), state):
+        assert line.startswith("done: ")
+    assert all(line.startswith("undone: ") for line in undo(MachineGround(tmp_path), state))
+
+
+@pytest.mark.parametrize(
+    "target",
+    [
+        "/etc/passwd",
+        "/sys/kernel/mm/transparent_hugepage/enabled/../../../../../etc/passwd",
+        "/proc/sys/kernel/core_pattern",
+        "/proc/irq/../sys/kernel/core_pattern",
+        "/proc/sys/net/ipv6/conf/../../../kernel/core_pattern/disable_ipv6",
+        "ethtool:../x/eee",
+        "ethtool:eth0/features",
+        "folder:/etc",
+        "",
+    ],
+)
+def test_nothing_outside_of_the_list_is_written(tmp_path, state, target):
+    """A state file that a test, or an attacker, has written."""
+    (tmp_path / "etc").mkdir()
+    (tmp_path / "etc" / "passwd").write_text("root")
+    for parts in ("etc", "proc/sys/kernel", "sys/kernel/mm/transparent_hugepage/enabled"):
+        (tmp_path / parts).mkdir(parents=True, exist_ok=True)
+    core = tmp_path / "proc/sys/kernel/core_pattern"
+    core.write_text("root")
+    with pytest.raises(OSError, match="the doctor changes no such thing"):
+        MachineGround(tmp_path).write(target, "evil")
+    assert {(tmp_path / "etc" / "passwd").read_text(), core.read_text()} == {"root"}
+
+
+def test_undo_says_what_it_does_not_write_and_keeps_it_noted(tmp_path, state):
+    (tmp_path / "etc").mkdir()
+    (tmp_path / "etc" / "passwd").write_text("after")
+    state.save([Made("/etc/passwd", "before", "after")])
+    assert list(undo(MachineGround(tmp_path), state)) == [
+        "REFUSED (the doctor changes no such thing): /etc/passwd = before"
+    ]
+    assert (tmp_path / "etc" / "passwd").read_text() == "after"
+    assert len(state.load()) == 1
+
+
+@pytest.mark.parametrize("value", ["", "x", "-1", "1e3", "\u0663"])
+def test_a_drivers_setting_is_a_number(value):
+    with pytest.raises(OSError, match="is not a number"):
+        MachineGround().write("ethtool:eth0/eee", value)
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a file away")
+def test_a_state_file_of_another_user_is_refused(state):
+    state.save([Made(HUGE_PAGES, "always", "madvise")])
+    os.chown(state.path, 65534, 65534)
+    with pytest.raises(StateError, match="belongs to user 65534"):
+        state.load()
+
+
+@pytest.mark.parametrize("mode", [0o620, 0o602])
+def test_a_state_file_that_others_can_write_is_refused(state, mode):
+    state.save([Made(HUGE_PAGES, "always", "madvise")])
+    state.path.chmod(mode)
+    with pytest.raises(StateError, match="what it says is not written to this machine"):
+        state.load()
+
+
+def test_a_link_is_not_followed(state, tmp_path):
+    """Neither in reading nor in writing: as root it would overwrite any file."""
+    victim = tmp_path / "victim"
+    victim.write_text("mine")
+    state.path.parent.mkdir()
+    state.path.symlink_to(victim)
+    with pytest.raises(StateError, match="does not tell what was changed"):
+        state.load()
+    state.path.unlink()
+    state.path.with_suffix(".new").symlink_to(victim)
+    state.save([])
+    assert victim.read_text() == "mine"
+    assert state.load() == []
+
+
+def test_the_state_of_root_is_not_where_a_group_can_write(monkeypatch):
+    monkeypatch.delenv("XDG_STATE_HOME", raising=False)
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    assert str(open_state().path) == "/run/catenary-doctor.json"
+
+
+def test_a_folder_comes_and_goes(tmp_path, state):
+    me = f"{pwd.getpwuid(os.geteuid()).pw_name}:{grp.getgrgid(os.getegid()).gr_name}"
+    ground, target = MachineGround(tmp_path), "folder:/run/catenary"
+    (tmp_path / "run").mkdir()
+    assert ground.read(target) == "absent"
+    list(apply([Change(target, f"3771 {me}")], ground, state))
+    assert (tmp_path / "run" / "catenary").stat().st_mode & 0o7777 == 0o3771
+    assert ground.read(target) == f"3771 {me}"
+    in_use = tmp_path / "run" / "catenary" / "share-arm"
+    in_use.touch()
+    assert list(undo(ground, state)) == [
+        "REFUSED (Directory not empty): folder:/run/catenary = absent"
+    ]
+    in_use.unlink()
+    assert list(undo(ground, state)) == ["undone: folder:/run/catenary = absent"]
+    assert not in_use.parent.exists()
+
+
+@pytest.mark.parametrize("value", ["", "777", "x root:root", "755 nobody-at-all:root", "755 root"])
+def test_a_folders_state_that_cannot_be(tmp_path, value):
+    (tmp_path / "run").mkdir()
+    with pytest.raises(OSError, match=r"is not a folder's state|no such user"):
+        MachineGround(tmp_path).write("folder:/run/catenary", value)
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from catenary.doctor.permissions import container, memory_lock, priority, raw_frames
+from catenary.doctor.permissions import (
+    container,
+    memory_lock,
+    priority,
+    raw_frames,
+    share_folder,
+)
 from tests.doctor.machines import ROOT_USERS, limits, make, status
 
 ALL = 2**41 - 1
@@ -55,10 +61,20 @@ def test_without_permission_the_command_is_given(tmp_path):
     assert (check.status, check.advice) == ("FAIL", "without root, once: sudo setcap ... python")
 
 
-def test_the_machines_own_python_is_not_to_get_it(tmp_path):
-    advice = raw_frames(make(tmp_path, {}, own_interpreter=False)).advice
-    assert "`python3 -m venv --copies`" in advice
-    assert advice.endswith("sudo setcap ... python")
+def test_the_folder_of_shares(tmp_path):
+    """Its owner is who runs the test, not root: other states are in tests/attack."""
+    group = {"/etc/group": "root:x:0:\ncatenary:x:990:alice,bob"}
+    mounts = {"/proc/mounts": "tmpfs /run tmpfs rw,nosuid 0 0"}
+    alone = share_folder(make(tmp_path / "alone", {**mounts, "/etc/group": "root:x:0:"}))
+    assert (alone.status, alone.changes) == ("PASS", ())
+    assert "groupadd --system catenary" in alone.advice
+    on_disk = share_folder(make(tmp_path / "disk", group))
+    assert (on_disk.status, on_disk.changes) == ("PASS", ())
+    ready = share_folder(make(tmp_path / "ready", {**group, **mounts}))
+    [change] = ready.changes
+    assert (ready.status, str(change)) == ("PASS", "folder:/run/catenary = 3771 root:catenary")
+    wrong = share_folder(make(tmp_path / "wrong", {**group, **mounts, "/run/catenary/": ""}))
+    assert (wrong.status, wrong.changes) == ("WARN", (change,))
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import numpy as np
 
 from catenary.errors import SdoAbort
 from catenary.plan.cycle import Number, NumberKind
-from catenary.plan.wish import PdoWish, Views, WishTables
+from catenary.plan.wish import ANY, PdoWish, Views, Which, WishTables
 
 
 @dataclass
@@ -29,10 +29,10 @@ class FakeLayout:
             {device: sizes(wish.inputs) for device, wish in wishes.items()},
         )
 
-    def output(self, device: int, index: int, subindex: int) -> Number | None:
+    def output(self, device: int, index: int, subindex: int, which: Which = ANY) -> Number | None:
         return place(self.outputs, device, index, subindex)
 
-    def input(self, device: int, index: int, subindex: int) -> Number | None:
+    def input(self, device: int, index: int, subindex: int, which: Which = ANY) -> Number | None:
         return place(self.inputs, device, index, subindex)
 
     def sync_unit(self, device: int) -> int:

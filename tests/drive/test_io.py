@@ -1,5 +1,6 @@
 """Process data by name."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -9,13 +10,16 @@ from catenary.drive.io import unique_names
 from catenary.model.device import Assignment, Direction, Entry, Pdo
 from catenary.plan.cycle import Bank, NumberKind
 from tests.drive.fakes import FakeLayout, views_of
+from tests.plan.devices import servo
 
 
 def sub_of(position: int, direction: Direction, *pdos: Pdo) -> SimpleNamespace:
     """A SubDevice with this process data in one direction."""
     assignments = (Assignment(sync_manager=0, pdos=pdos),)
     description = SimpleNamespace(
-        position=position, assignments=lambda wanted: assignments if wanted is direction else ()
+        position=position,
+        assignments=lambda wanted: assignments if wanted is direction else (),
+        pdos=lambda wanted: pdos if wanted is direction else (),
     )
     return SimpleNamespace(position=position, description=description)
 
@@ -109,6 +113,19 @@ def test_mistakes_name_the_channel() -> None:
         Outputs(sub, scale={"Value": 1.0})
     with pytest.raises(ValueError, match="no output process data"):
         Outputs(terminal(1, Direction.INPUT, 2, "Input"))
+
+
+def test_a_device_without_assigned_pdos_shows_its_choice() -> None:
+    device = replace(servo(1), inputs=())
+    sub = SimpleNamespace(position=1, description=device)
+    with pytest.raises(ValueError, match="none is assigned; choose with pdos= from 0x1A00"):
+        Inputs(sub)
+    assert len(Inputs(sub, pdos=[0x1A00]).names) == 5
+
+
+def test_numbers_that_are_no_pdos_are_refused() -> None:
+    with pytest.raises(ValueError, match="0x1C12 is not a PDO"):
+        Inputs(terminal(1, Direction.INPUT, 1, "Input"), pdos=[0x1C12])
 
 
 def test_no_device_at_all_is_another_mistake() -> None:

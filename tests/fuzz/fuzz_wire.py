@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import importlib.util
 import random
+import struct
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -21,6 +22,7 @@ from catenary import types
 from catenary.errors import DecodeError
 from catenary.wire import (
     al,
+    capture,
     clock,
     coe,
     datagram,
@@ -30,6 +32,7 @@ from catenary.wire import (
     fmmu,
     frame,
     mailbox,
+    pcap,
     pcapng,
     register,
     sdo_information,
@@ -133,6 +136,11 @@ COE = (
     coe.Abort(0x1000, 0, 0x06020000).encode(),
     coe.Emergency(0x8611, 0x21, b"12345").encode(),
     sdo_information.list_request(sdo_information.ListType.ALL).encode(),
+)
+PCAP = (
+    struct.pack("<IHHiIII", 0xA1B2C3D4, 2, 4, 0, 0, 65535, 1)
+    + struct.pack("<4I", 1, 2, len(FRAME), len(FRAME))
+    + FRAME
 )
 CAPTURE = pcapng.encode_header("eth0") + pcapng.encode_packet(pcapng.Packet(5, FRAME, "hello"))
 
@@ -245,7 +253,9 @@ TARGETS = (
         (bytes.fromhex("00100000070020000700") + b"Device type",),
     ),
     Target("sdo_information.decode_error", sdo_information.decode_error, None, (bytes(4),)),
-    Target("pcapng.decode_capture", pcapng.decode_capture, None, (CAPTURE,)),
+    Target("pcapng.decode_pcapng", pcapng.decode_pcapng, None, (CAPTURE,)),
+    Target("capture.decode_capture", capture.decode_capture, None, (CAPTURE, PCAP)),
+    Target("pcap.decode_pcap", pcap.decode_pcap, None, (PCAP,)),
 )
 
 _TELLING = (0x00, 0x01, 0x07, 0x0F, 0x7F, 0x80, 0xFE, 0xFF)

@@ -38,6 +38,7 @@ typedef struct {
     int alias, clockless, plain;  /* plain: no mailbox, its outputs in SyncManager 0 */
     int unacknowledged;           /* sends until the master has acknowledged its error */
     int booting;                  /* looks until the master has brought it to PRE-OP */
+    int staying;                  /* looks at it after a deactivation until it leaves OP */
     uint8_t emergencies[16][8];
     int first_emergency, last_emergency;
 } slave;
@@ -75,6 +76,12 @@ static struct {
     int silent;                   /* uploads that get no answer */
     int64_t delay, sent;          /* [ns] from send to the frames' return */
     int early;                    /* domains processed before their frames were back */
+    int climb;                    /* sends from one state to the next */
+    int lingering;                /* `staying` of all devices when the master is deactivated */
+    uint32_t refusal;             /* abort code of downloads to 0x1C32 */
+    uint32_t delay_to_next;       /* of every device, as measured [ns] */
+    int mainless;                 /* answers come by the backup interface: no monitor datagram */
+    int closed_ring;              /* the last device's second port leads to a backup interface */
     volatile int blocked;         /* position whose objects do not answer, plus one */
     uint64_t reference;           /* the reference clock as the last frame found it; 0: as told */
     slave all[SLAVES];
@@ -325,6 +332,8 @@ int ecrt_master_get_slave(ec_master_t *m, uint16_t position, ec_slave_info_t *in
     info->alias = bus.all[position].alias;
     if (bus.all[position].booting && --bus.all[position].booting == 0)
         bus.all[position].al = PREOP;
+    if (bus.all[position].staying && --bus.all[position].staying == 0)
+        bus.all[position].al = PREOP;
     info->al_state = bus.all[position].al;
     info->error_flag = bus.all[position].error;
     info->sync_count = bus.all[position].plain ? 1 : 4;
@@ -332,7 +341,10 @@ int ecrt_master_get_slave(ec_master_t *m, uint16_t position, ec_slave_info_t *in
     for (int k = 0; k < 2 && !bus.all[position].clockless; k++)
         info->ports[k].receive_time = 1000 + k;
     info->ports[0].link.link_up = 1;
-    info->ports[1].link.link_up = position + 1 < bus.slaves;
+    info->ports[1].link.link_up = position + 1 < bus.slaves || bus.closed_ring;
+    for (int k = 0; k < EC_MAX_PORTS; k++)
+        info->ports[k].link.loop_closed = !info->ports[k].link.link_up;
+    info->ports[0].delay_to_next_dc = bus.delay_to_next;
     strcpy(info->name, "Doubled Drive");
     return 0;
 }
@@ -418,6 +430,10 @@ int ecrt_master_sdo_download(ec_master_t *m, uint16_t position, uint16_t index, 
     while (bus.blocked == position + 1)
         pause_a_little();
     *abort_code = 0;
+    if (o != NULL && index == 0x1C32 && (bus.refusal || bus.all[position].al != PREOP)) {
+        *abort_code = bus.refusal ? bus.refusal : 0x08000022;  /* in this state: not now */
+        return -EIO;
+    }
     if (o == NULL || size != (size_t)(o->bits + 7) / 8) {
         *abort_code = o == NULL ? 0x06020000 : 0x06070010;
         return -EIO;
@@ -445,8 +461,11 @@ int ecrt_master_activate(ec_master_t *m)
 status ecrt_master_deactivate(ec_master_t *m)
 {
     note("deactivate");
-    for (int k = 0; k < bus.slaves; k++)
-        bus.all[k].al = PREOP, bus.all[k].sends = 0;
+    for (int k = 0; k < bus.slaves; k++) {
+        if ((bus.all[k].staying = bus.lingering) == 0)  /* the real one leads them down later */
+            bus.all[k].al = PREOP;
+        bus.all[k].sends = 0;
+    }
     clear(m);
     DONE(0);
 }
@@ -487,7 +506,7 @@ static void climb(slave *s, int configured)
 {
     if (!configured || !s->online || s->al == OP || s->error)
         return;
-    if (++s->sends % CLIMB == 0)
+    if (++s->sends % (bus.climb ? bus.climb : CLIMB) == 0)
         s->al *= 2;
 }
 
@@ -609,6 +628,8 @@ status ecrt_master_sync_monitor_queue(ec_master_t *m)
 uint32_t ecrt_master_sync_monitor_process(ec_master_t *m)
 {
     note("sync_monitor_process");
+    if (bus.mainless || (bus.delay && monotonic() - bus.sent < bus.delay))
+        return UINT32_MAX;
     return m->monitored ? bus.spread & 0x7FFFFFFF : UINT32_MAX;
 }
 
@@ -875,6 +896,12 @@ void double_state(int position, int al, int error)
 void double_silent(int uploads) { bus.silent = uploads; }
 void double_spread(uint32_t spread) { bus.spread = spread; }
 void double_delay(int microseconds) { bus.delay = 1000LL * microseconds; }
+void double_climb(int sends) { bus.climb = sends; }
+void double_linger(int looks) { bus.lingering = looks; }
+void double_refuse(uint32_t abort_code) { bus.refusal = abort_code; }
+void double_measured(uint32_t delay) { bus.delay_to_next = delay; }
+void double_mainless(int lost) { bus.mainless = lost; }
+void double_ring(int closed) { bus.closed_ring = closed; }
 int double_early(void) { int count = bus.early; bus.early = 0; return count; }
 void double_block(int position) { bus.blocked = position + 1; }
 void double_clockless(int position) { bus.all[position].clockless = 1; }

@@ -52,6 +52,11 @@ class Double:
         """What was called, in order, with what matters of the arguments."""
         return self._library.double_calls().decode().splitlines()
 
+    def changes(self) -> list[str]:
+        """The same without those that only look for devices and their states."""
+        looks = ("master", "get_slave", "sdo_upload")
+        return [call for call in self.calls() if not call.startswith(looks)]
+
     def __getattr__(self, name: str) -> ctypes._FuncPointer:
         return getattr(self._library, f"double_{name}")
 

@@ -130,7 +130,7 @@ def test_a_failed_configuration_leaves_nothing(double: Double, call: bytes) -> N
         double.fail(call, -errno.ENOMEM)
         with pytest.raises(CatenaryError, match=r"Cannot allocate memory"), cat.Loop(arm):
             pass
-        assert double.calls()[-2:] == ["release_master", "request_master 0"]
+        assert double.changes()[-2:] == ["release_master", "request_master 0"]
         double.fail(b"", 0)
         with cat.Loop(arm) as loop:
             assert next(loop).ok
@@ -162,7 +162,7 @@ def test_nothing_is_left_reserved(double: Double, error: type[BaseException]) ->
 
     with pytest.raises(error):
         run()
-    assert double.calls()[-2:] == ["deactivate", "release_master"]
+    assert double.changes()[-2:] == ["deactivate", "release_master"]
     assert double.reserved() == 0
 
 

@@ -56,7 +56,7 @@ def test_drives_follow(main: cat.MainDevice, double: Double, run: str) -> None:
                 break
         np.testing.assert_allclose(arm.actual.position, home + 0.1, atol=TURN / 1000)
     assert double.value(0, 0x6041, 0) & 0x6F != 0x27
-    assert double.calls()[-1] == "deactivate"
+    assert double.changes()[-1] == "deactivate"
     assert main.subs[0].state == 2
 
 
@@ -202,7 +202,7 @@ def test_a_device_that_refuses_op_is_named(main: cat.MainDevice, double: Double)
     with pytest.raises(cat.errors.StateError, match=said) as caught, cat.Loop(arm):
         pass
     assert caught.value.code == 0x001D
-    assert double.calls()[-1] == "deactivate"
+    assert double.changes()[-1] == "deactivate"
 
 
 def test_leaving_op_ends_the_loop(main: cat.MainDevice, double: Double) -> None:

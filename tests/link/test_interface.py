@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import gc
 import os
 import subprocess
 import threading
@@ -10,8 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from catenary.bus import MainDevice
 from catenary.errors import LinkError
-from catenary.link import Interface, Link, LinkSource
+from catenary.link import Interface, Link, LinkSource, Recorder, Ring
+from catenary.realtime.private_network import await_carrier
 from tests.core.hammer import compiled
 from tests.link_table import table_in
 
@@ -140,6 +143,33 @@ def test_a_network_gone_down_is_an_error_and_coming_back_is_not(pair, veth):
     assert receive_within(far, 5) == frame(bytes(46))
 
 
+@pytest.mark.parametrize("wrapped", ["raw", "recorded", "ring"])
+def test_an_interface_without_a_carrier_says_so(veth, wrapped, tmp_path):
+    """The kernel's word for it is ENOBUFS, "No buffer space available"."""
+    name, other = veth
+    link = Interface(name).open_link()
+    if wrapped == "recorded":
+        link = Recorder(link, tmp_path / "run.pcapng")
+    elif wrapped == "ring":  # both of its interfaces lose their link
+        link = Ring(link, Interface(name, mapped_ring=False)).open_link()
+    with link:
+        subprocess.run(["ip", "link", "set", other, "down"], check=True)
+        with pytest.raises(LinkError, match=f"{name} has no link: the cable") as refused:
+            link.send(frame(bytes(46)))
+        assert "No buffer space" not in str(refused.value)
+        assert "first device" in str(refused.value)
+        subprocess.run(["ip", "link", "set", other, "up"], check=True)
+        await_carrier(name)
+        link.send(frame(bytes(46)))
+
+
+def test_a_scan_without_a_carrier_says_so(veth):
+    name, other = veth
+    subprocess.run(["ip", "link", "set", other, "down"], check=True)
+    with MainDevice(Interface(name)) as main, pytest.raises(LinkError, match=f"{name} has no link"):
+        main.scan()
+
+
 def test_a_closed_link_says_so(pair):
     near = pair[0]
     capsule = near.capsule
@@ -154,6 +184,7 @@ def test_a_closed_link_says_so(pair):
 def test_a_link_can_be_closed_while_a_native_thread_uses_it(veth, mapped_ring):
     """The thread keeps reading: neither the ring nor the descriptor may go away under it."""
     hammer = compiled(Path(__file__).with_name("close_hammer.c"))
+    gc.collect()  # links of earlier tests give their descriptors back here, not below
     before = len(os.listdir("/proc/self/fd"))
     for _ in range(100):
         link = Interface(veth[0], mapped_ring=mapped_ring).open_link()

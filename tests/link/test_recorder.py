@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from catenary.link import Interface, Recorder
-from catenary.wire.pcapng import decode_capture
+from catenary.wire.capture import decode_capture
 from tests.link.dissector import dissect
 from tests.link.python_link import PythonLink, frame
 

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import struct
+from dataclasses import replace
+
 import pytest
 
 from catenary.errors import DecodeError, LinkError
 from catenary.link import Recorder, Replay
 from catenary.link.exchanges import pair, read_exchanges
-from catenary.wire.pcapng import Direction, Packet, decode_capture
+from catenary.wire.capture import decode_capture
+from catenary.wire.datagram import Command, Datagram
+from catenary.wire.frame import Frame
+from catenary.wire.pcapng import Direction, Packet
 from tests.link.python_link import PythonLink, frame
 
 QUESTION = frame(bytes(4))
+MS = 1_000_000
 
 
 def answered(link: Replay, sent: bytes) -> bytes | None:
@@ -89,6 +96,81 @@ def test_pairs_by_the_source_address_where_the_file_names_no_direction():
     assert pair([Packet(1, sent), Packet(2, b"alien"), Packet(3, QUESTION)]) == [
         (sent, QUESTION, 2)
     ]
+
+
+def counted(sent: bytes, by: int = 1) -> bytes:
+    """Return a frame of one datagram as a device counts it, with the same source address."""
+    return sent[:-2] + bytes([by, 0])
+
+
+def local(sent: bytes, bit: bool) -> bytes:
+    """Return a frame with or without the bit that controllers set in the source address."""
+    return sent[:6] + (b"\x02" if bit else b"\x00") + sent[7:]
+
+
+@pytest.mark.parametrize("bit", [True, False])
+def test_pairs_by_content_where_the_source_address_tells_nothing(bit):
+    """02:... is the address of a virtual interface; a simulator may not set the bit at all."""
+    first, second = (local(frame(bytes([n]) * 40, index=n), bit) for n in (1, 2))
+    packets = [Packet(n, data) for n, data in enumerate((first, second, counted(second)))]
+    packets += [Packet(9, counted(first)), Packet(10, first), Packet(2 * MS, first)]
+    packets += [Packet(3 * MS, counted(first, 3))]
+    assert pair(packets) == [
+        (second, counted(second), 1),
+        (first, counted(first), 9),
+        (first, counted(first, 3), 3 * MS - 10),
+    ]
+
+
+@pytest.mark.parametrize("seconds", [0.05, 0.2])
+def test_a_lost_frame_gets_no_answer_of_a_later_one(seconds):
+    asked, again = QUESTION[:6] + b"\x00" + QUESTION[7:], round(seconds * 1e9)
+    packets = [Packet(0, asked), Packet(again, asked), Packet(again + 5, QUESTION)]
+    [exchange] = pair(packets)
+    assert exchange.latency_ns == (5 if seconds > 0.1 else again + 5)
+
+
+def test_pairs_by_content_where_only_the_address_was_counted_up():
+    """A broadcast or position read that no device answers comes back uncounted."""
+    asked = Frame((Datagram(Command.APRD, 0x0130_FFFE, bytes(40), 7),), b"\x02" + bytes(5))
+    answer = Frame((Datagram(Command.APRD, 0x0130_0001, bytes(40), 7),), asked.source)
+    assert pair([Packet(1, asked.encode()), Packet(4, answer.encode())]) == [
+        (asked.encode(), answer.encode(), 3)
+    ]
+
+
+def test_what_nobody_answered_stays_unpaired_without_direction():
+    lost = local(frame(bytes(40)), True)
+    assert pair([Packet(2 * MS * n, lost) for n in range(5)]) == []
+
+
+@pytest.mark.parametrize(("size", "later"), [(40, 10_000), (4, 30 * MS)])
+def test_what_comes_back_as_it_was_sent_does_so_at_once_or_padded(size, later):
+    """A read of a station that is not there: nothing in it changes on the way."""
+    asked = local(frame(bytes(size)), True)
+    packets = [Packet(0, asked), Packet(later, asked.ljust(60, b"\0"))]
+    assert pair(packets) == [(asked, packets[1].data, later)]
+
+
+def test_captures_without_a_telling_source_address_pair_alike(shared_data):
+    """The bit is set everywhere, as if the interface's own address had it."""
+    for path in sorted((shared_data / "pcap").glob("*.pcapng")):
+        packets = decode_capture(path.read_bytes()).packets
+        blind = [replace(p, data=local(p.data, True), direction=Direction.UNKNOWN) for p in packets]
+        found = [(e.sent[12:], e.answer[12:], e.latency_ns) for e in pair(blind)]
+        assert found == [(e.sent[12:], e.answer[12:], e.latency_ns) for e in pair(packets)], path
+
+
+def test_a_pcap_file_and_a_cut_file_replay(tmp_path):
+    question = QUESTION[:6] + b"\x00" + QUESTION[7:]
+    data = struct.pack("<IHHiIII", 0xA1B2C3D4, 2, 4, 0, 0, 65535, 1)
+    for n, each in enumerate((question, QUESTION, question)):
+        data += struct.pack("<4I", 1, n, len(each), len(each)) + each
+    path = tmp_path / "run.pcap"
+    path.write_bytes(data[:-1])
+    with Replay(path) as replay:
+        assert answered(replay, question) == QUESTION
+        assert replay.now() == 1000
 
 
 def test_a_file_that_is_no_capture_is_a_decode_error(tmp_path):

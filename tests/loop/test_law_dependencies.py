@@ -46,7 +46,12 @@ def write(path: Path, text: str, age: int) -> None:
 
 def ran(folder: Path) -> list[float]:
     """[what the law gave, how often it came from the cache]"""
-    environment = {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(folder),
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "XDG_CACHE_HOME": str(folder / "cache"),
+    }
     done = subprocess.run(
         [sys.executable, str(folder / "follow.py")],
         capture_output=True,

@@ -9,7 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from catenary.model.describe import describe
-from catenary.model.device import DeviceDescription, Identity
+from catenary.model.device import DeviceDescription, Identity, mapped_entries
+from catenary.virtual import Servo, SiiQuirks
+from catenary.virtual.sii_image import make_sii_image
 from catenary.wire.sii_categories import SyncManagerUse
 
 INFORMATION = bytes((0x11, 0, 2, 0, 3, 4, 8, 0x0F, 0, 0))
@@ -120,3 +122,39 @@ def test_any_bytes_are_described(image: bytes) -> None:
 def test_any_categories_are_described(data: bytes, product: int) -> None:
     header = bytes(14) + b"\xa4\x88" + bytes(4) + product.to_bytes(4, "little")
     described(header.ljust(128, b"\x00") + data)
+
+
+def made(**quirks: object) -> DeviceDescription:
+    servo = Servo(sii_quirks=SiiQuirks(**quirks))  # type: ignore[arg-type]
+    return described(make_sii_image(servo.description(), servo.sii_quirks))
+
+
+@pytest.mark.parametrize("size", [1, 8, 15, 1487, 65535])
+def test_a_mailbox_that_no_datagram_can_carry_is_left_out_with_a_note(size: int) -> None:
+    device = made(mailbox_size=size)
+    assert device.mailbox is None
+    assert device.notes == (
+        f"its SII has a mailbox of {size} bytes at 0x1000 (16 to 1486 bytes from 0x1000 on are "
+        "possible): it is used without its mailbox",
+    )
+
+
+@pytest.mark.parametrize("size", [16, 128, 1486])
+def test_any_other_mailbox_is_used(size: int) -> None:
+    device = made(mailbox_size=size)
+    assert device.mailbox is not None
+    assert device.mailbox.send_size == size
+    assert device.notes == ()
+
+
+def test_more_sync_managers_than_the_controller_has_are_left_out_with_a_note() -> None:
+    device = made(sync_managers=17)
+    assert len(device.sync_managers) == 4  # as in INFORMATION
+    assert device.notes == ("its SII has 17 SyncManagers, its controller 4",)
+    assert made(sync_managers=4).notes == ()
+
+
+def test_control_characters_are_no_part_of_a_name() -> None:
+    device = made(text_prefix="\x1b[2J\n")
+    assert device.name == "[2JCatenary virtual servo"
+    assert all(entry.name.isprintable() for entry in mapped_entries(device.outputs))

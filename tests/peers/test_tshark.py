@@ -15,8 +15,8 @@ from catenary.errors import SdoAbort
 from catenary.link import Recorder
 from catenary.types import UDINT
 from catenary.virtual import demo_segment
+from catenary.wire.capture import decode_capture
 from catenary.wire.frame import decode_frame
-from catenary.wire.pcapng import decode_capture
 
 CYCLES = 300
 

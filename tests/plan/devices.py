@@ -20,7 +20,9 @@ from catenary.wire.sii import MailboxProtocol
 from catenary.wire.sii_categories import SyncManagerUse
 
 PORTS = (PortKind.MII, PortKind.MII, PortKind.ABSENT, PortKind.ABSENT)
-MAILBOX = MailboxLayout(0x1000, 128, 0x1080, 128, MailboxProtocol.COE)
+MAILBOX = MailboxLayout(
+    0x1000, 128, 0x1080, 128, MailboxProtocol.COE, pdo_assign=True, pdo_configuration=True
+)
 OUT, IN = SyncManagerUse.OUTPUTS, SyncManagerUse.INPUTS
 
 

@@ -8,23 +8,22 @@ from dataclasses import replace
 import pytest
 
 from catenary.errors import ConfigurationError
-from catenary.model.device import DeviceDescription
+from catenary.model.device import DeviceDescription, OpMode
 from catenary.plan.clocks import SyncPlan, make_sync, start_time_ns
 from catenary.plan.cycle import DatagramKind
 from catenary.plan.make import Plan, make_plan
-from catenary.plan.wish import DC, PdoWish
+from catenary.plan.wish import DistributedClock, PdoWish
 from catenary.wire.datagram import Command, decode_datagram
 from catenary.wire.features import Feature
-from catenary.wire.sii_categories import ClockMode
 from tests.plan.devices import Asking, coupler, lamps, servo
 
 PERIOD_NS = 1_000_000
 LONG = Feature.DISTRIBUTED_CLOCKS | Feature.DISTRIBUTED_CLOCKS_64_BIT
 
 
-def clocked(device: DeviceDescription, *modes: ClockMode) -> DeviceDescription:
+def clocked(device: DeviceDescription, *modes: OpMode) -> DeviceDescription:
     controller = replace(device.controller, features=device.controller.features | LONG)
-    return replace(device, controller=controller, system_time=True, clock_modes=modes)
+    return replace(device, controller=controller, system_time=True, op_modes=modes)
 
 
 def cell() -> list[DeviceDescription]:
@@ -32,8 +31,8 @@ def cell() -> list[DeviceDescription]:
     return [clocked(coupler(0)), lamps(1), clocked(servo(2)), clocked(servo(3))]
 
 
-def wishing(*positions: int, clock: DC | None = None) -> Asking:
-    return Asking({position: PdoWish(clock=clock or DC()) for position in positions})
+def wishing(*positions: int, clock: DistributedClock | None = None) -> Asking:
+    return Asking({position: PdoWish(clock=clock or DistributedClock()) for position in positions})
 
 
 def planned(devices: list[DeviceDescription], *positions: int, **options: object) -> Plan:
@@ -141,51 +140,187 @@ def test_a_clock_that_only_stamps() -> None:
 
 
 def test_two_wishes_for_one_clock() -> None:
-    one, other = wishing(2), wishing(2, clock=DC(shift=1e-4))
+    one, other = wishing(2), wishing(2, clock=DistributedClock(shift=1e-4))
     with pytest.raises(ConfigurationError, match="device 2: two wishes"):
         make_plan(cell(), [one, other])
     assert make_plan(cell(), [one, one, Asking({2: PdoWish()})]).devices[2].sync is not None
 
 
-def sync(wish: DC, *modes: ClockMode) -> SyncPlan:
+def sync(wish: DistributedClock, *modes: OpMode) -> SyncPlan:
     return make_sync(clocked(servo(0), *modes), wish, PERIOD_NS)
 
 
 def test_sync_without_any_knowledge_is_sync0_at_the_beat() -> None:
-    assert sync(DC()) == SyncPlan(0x0300, PERIOD_NS, 0, 0)
+    assert sync(DistributedClock()) == SyncPlan(0x0300, PERIOD_NS, 0, 0)
 
 
 def test_sync_as_the_sii_says() -> None:
-    free = ClockMode(shift_time_ns=1_882_234_944)  # of a real image: pollen_Orbita2d.bin
-    mode = ClockMode(shift_time_ns=-20_000, shift_time_1_ns=5_000, assign_activate=0x0700)
-    assert sync(DC(), free, mode) == SyncPlan(0x0700, PERIOD_NS, 5_000, -20_000)
+    free = OpMode(shift_ns=1_882_234_944)  # of a real image: pollen_Orbita2d.bin
+    mode = OpMode(shift_ns=-20_000, sync1_shift_ns=5_000, assign_activate=0x0700)
+    assert sync(DistributedClock(), free, mode) == SyncPlan(0x0700, PERIOD_NS, 5_000, -20_000)
 
 
 def test_sync_of_parts_and_multiples_of_the_period() -> None:
-    part = ClockMode(sync0_factor=-4, sync1_factor=4, assign_activate=0x0700)
-    assert sync(DC(), part) == SyncPlan(0x0700, 250_000, 750_000, 0)
-    assert sync(DC(), part).span_ns == PERIOD_NS
-    double = ClockMode(sync0_factor=2, assign_activate=0x0300)
-    assert sync(DC(), double).cycle_ns == 2 * PERIOD_NS
+    part = OpMode(sync0_factor=-4, sync1_factor=4, assign_activate=0x0700)
+    assert sync(DistributedClock(), part) == SyncPlan(0x0700, 250_000, 750_000, 0)
+    assert sync(DistributedClock(), part).span_ns == PERIOD_NS
+    double = OpMode(sync0_factor=2, assign_activate=0x0300)
+    assert sync(DistributedClock(), double).cycle_ns == 2 * PERIOD_NS
+
+
+@pytest.mark.parametrize(
+    ("mode", "sync0_ns", "sync1_ns"),
+    [
+        # Beckhoff's EL3702 with two-fold and four-fold oversampling; ecmc's notes on DC clocks
+        # compute 250 us and 750 us for the latter.
+        (OpMode("DcSync2", "", 0x0730, sync0_factor=-2, sync1_factor=-1), 500_000, 500_000),
+        (OpMode("DcSync4", "", 0x0730, sync0_factor=-4, sync1_factor=-1), 250_000, 750_000),
+        # EL7201 and EL7221-9014: SYNC1 in every period, 1 us after SYNC0
+        (
+            OpMode("DC", "", 0x0700, sync0_factor=1, sync1_factor=-1, sync1_shift_ns=1_000),
+            PERIOD_NS,
+            1_000,
+        ),
+        # SYNC0 in every second period: SYNC1 cannot come more often
+        (OpMode("DC", "", 0x0700, sync0_factor=2, sync1_factor=-1), 2 * PERIOD_NS, 0),
+    ],
+)
+def test_a_negative_factor_of_sync1_counts_periods(
+    mode: OpMode, sync0_ns: int, sync1_ns: int
+) -> None:
+    plan = sync(DistributedClock(), mode)
+    assert (plan.cycle_ns, plan.sync1_ns) == (sync0_ns, sync1_ns)
+    assert plan.span_ns == max(PERIOD_NS, sync0_ns)
+
+
+FREE = OpMode("SM_Sync or Async")
+SYNC0 = OpMode("DC", "DC-Synchron", 0x0300, sync0_factor=1)
+OVERSAMPLED = OpMode("DcSync4", "", 0x0730, sync0_factor=-4, sync1_factor=-1)
+# The only modes of a device in robert-burger/libethercat#21, "DcSync500us" and so on
+SYNC1_ALONE = OpMode("DcSync250us", "", 0x0500, sync0_factor=1, shift_ns=250_000)
+
+
+@pytest.mark.parametrize("name", ["DcSync4", "dcsync4"])
+def test_an_op_mode_is_chosen_by_its_name(name: str) -> None:
+    plan = sync(DistributedClock(op_mode=name), FREE, SYNC0, OVERSAMPLED)
+    assert plan == SyncPlan(0x0730, 250_000, 750_000, 0, "DcSync4")
+
+
+def test_without_a_name_the_first_op_mode_with_sync0() -> None:
+    assert sync(DistributedClock(), FREE, SYNC1_ALONE, SYNC0).op_mode == "DC"
+    assert sync(DistributedClock(), FREE, SYNC1_ALONE).op_mode == "DcSync250us"
+
+
+def test_an_unknown_op_mode_lists_those_there_are() -> None:
+    with pytest.raises(ConfigurationError, match=r"no OpMode 'x'; it has 'SM_Sync or Async', 'DC'"):
+        sync(DistributedClock(op_mode="x"), FREE, SYNC0)
+    with pytest.raises(ConfigurationError, match=r"no OpMode 'x'; it has none") as refused:
+        sync(DistributedClock(op_mode="x"))
+    assert "assign_activate=" in refused.value.hint
+
+
+def test_sync1_alone() -> None:
+    expected = SyncPlan(0x0500, PERIOD_NS, 0, 250_000, "DcSync250us")
+    plan = sync(DistributedClock(op_mode="DcSync250us"), FREE, SYNC0, SYNC1_ALONE)
+    assert plan == expected
+    assert plan.objects[0] == (0x1C32, 1, b"\x03\x00")  # synchronised with SYNC1
+    assert sync(DistributedClock(assign_activate=0x0500)) == SyncPlan(0x0500, PERIOD_NS, 0, 0)
 
 
 def test_sync_as_wished() -> None:
-    mode = ClockMode(shift_time_ns=-20_000, assign_activate=0x0300)
-    assert sync(DC(shift=1e-4, sync1=2e-5), mode) == SyncPlan(0x0700, PERIOD_NS, 20_000, 100_000)
-    assert sync(DC(assign_activate=0x0320), mode).assign_activate == 0x0320
+    mode = OpMode(shift_ns=-20_000, assign_activate=0x0300)
+    assert sync(DistributedClock(shift=1e-4, sync1=2e-5), mode) == SyncPlan(
+        0x0700, PERIOD_NS, 20_000, 100_000
+    )
+    assert sync(DistributedClock(assign_activate=0x0320), mode).assign_activate == 0x0320
+    assert sync(DistributedClock(sync0=5e-4), mode).cycle_ns == 500_000
+    plan = sync(DistributedClock(op_mode="DcSync4", sync0=5e-4), OVERSAMPLED)
+    assert (plan.cycle_ns, plan.sync1_ns) == (500_000, 500_000)
 
 
 @pytest.mark.parametrize(
     ("wish", "mode", "message"),
     [
-        (DC(assign_activate=0x0100), ClockMode(), "0x0100 starts no SYNC0"),
-        (DC(shift=1e-3), ClockMode(), "a shift of 1000 us"),
-        (DC(), ClockMode(cycle_time_ns=300_000, assign_activate=0x0300), "every 300 us"),
+        (
+            DistributedClock(assign_activate=0x0100),
+            OpMode(),
+            r"device 0 \(Servo\): AssignActivate 0x0100 starts no SYNC signal",
+        ),
+        (DistributedClock(shift=1e-3), OpMode(), r"device 0 \(Servo\): a shift of 1000 us"),
+        (
+            DistributedClock(),
+            OpMode("DC", sync0_ns=300_000, assign_activate=0x0300),
+            r"its EEPROM \(OpMode 'DC'\): SYNC0 every 300 us",
+        ),
+        (DistributedClock(sync0=3e-4), SYNC0, r"device 0 \(Servo\): SYNC0 every 300 us"),
+        (
+            DistributedClock(op_mode="SM_Sync or Async"),
+            FREE,
+            r"its EEPROM \(OpMode 'SM_Sync or Async'\): AssignActivate 0x0000",
+        ),
     ],
 )
-def test_sync_that_cannot_be(wish: DC, mode: ClockMode, message: str) -> None:
+def test_sync_that_cannot_be(wish: DistributedClock, mode: OpMode, message: str) -> None:
     with pytest.raises(ConfigurationError, match=message):
         sync(wish, mode)
+
+
+def test_an_implausible_shift_is_the_eeproms_and_can_be_overridden() -> None:
+    """2000200000 ns: what EasyConfigurator writes for every EasyCAT, meant in another unit
+    (Seobuk/Easycat_config, HUslave.xml: "10nS unit"; pollen_Orbita2d.xml)."""
+    easycat = OpMode("DC_Sync", "DC_Sync", 0x0300, sync0_factor=1, shift_ns=2_000_200_000)
+    with pytest.raises(
+        ConfigurationError,
+        match=r"its EEPROM \(OpMode 'DC_Sync'\): a shift of 2 s is not less than the cycle",
+    ) as refused:
+        sync(DistributedClock(), FREE, easycat)
+    assert refused.value.hint.endswith("override the EEPROM: cat.DistributedClock(shift=0.0)")
+    assert sync(DistributedClock(shift=0.0), FREE, easycat).shift_ns == 0
+
+
+def test_the_image_of_an_easycat_tells_each_step() -> None:
+    """As EasyConfigurator leaves it: its OpMode lacks AssignActivate, and the shift is one too."""
+    mode = OpMode("DC_Sync", "DC_Sync", shift_ns=1_882_234_944)  # pollen_Orbita2d.bin
+    wish = DistributedClock(op_mode="DC_Sync")
+    with pytest.raises(ConfigurationError, match="starts no SYNC signal") as refused:
+        sync(wish, FREE, mode)
+    assert "DistributedClock(op_mode='DC_Sync', assign_activate=0x0300)" in refused.value.hint
+    wish = DistributedClock(op_mode="DC_Sync", assign_activate=0x0300)
+    with pytest.raises(ConfigurationError, match=r"a shift of 1\.882 s"):
+        sync(wish, FREE, mode)
+    assert sync(DistributedClock(), FREE, mode) == SyncPlan(0x0300, PERIOD_NS, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        *(("sync0", 0.0), ("sync0", -1e-3), ("sync0", 1e-12), ("sync0", 5.0)),
+        *(("sync1", -1e-6), ("sync1", 5.0), ("shift", float("nan"))),
+        *(("assign_activate", -1), ("assign_activate", 0x10000)),
+    ],
+)
+def test_impossible_values_are_refused_at_once(name: str, value: float) -> None:
+    with pytest.raises(ValueError, match=name):
+        DistributedClock(**{name: value})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("sync0_factor", [-32768, -3, -1, 0, 1, 32767])
+@pytest.mark.parametrize("sync1_factor", [-32768, -1, 0, 1, 32767])
+@pytest.mark.parametrize("period_ns", [10_000, PERIOD_NS, 1_000_000_000])
+def test_any_factors_make_a_plan_or_name_the_device(
+    sync0_factor: int, sync1_factor: int, period_ns: int
+) -> None:
+    mode = OpMode("DC", "", 0x0700, sync0_factor=sync0_factor, sync1_factor=sync1_factor)
+    plan, refusal = None, ""
+    try:
+        plan = make_sync(clocked(servo(0), mode), DistributedClock(), period_ns)
+    except ConfigurationError as error:
+        refusal = error.message
+    if plan is None:
+        assert "device 0 (Servo): its EEPROM (OpMode 'DC')" in refusal
+    else:
+        assert 0 < plan.cycle_ns < 1 << 32
+        assert 0 <= plan.sync1_ns < 1 << 32
 
 
 def test_what_the_application_is_told_may_be_refused() -> None:

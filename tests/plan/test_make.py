@@ -17,7 +17,7 @@ from catenary.plan.wish import PdoWish, WishTables
 from catenary.wire.datagram import Command
 from catenary.wire.features import Feature
 from catenary.wire.frame import decode_frame
-from tests.plan.devices import asks, block, coupler, demo, lamps, servo
+from tests.plan.devices import Asking, asks, block, coupler, demo, lamps, servo
 
 MAILBOXES = DatagramPlan(  # of three drives, behind the 80 bytes of process data
     DatagramKind.PROCESS_DATA, Command.LRD, 122, 1, 3, -1, inputs=(Copy(132, 39, 1),)
@@ -159,6 +159,15 @@ def test_outputs_alone_need_no_lrw() -> None:
     cycle = make_plan([lamps(0), lamps(1)]).cycle
     datagram = cycle.frames[0].datagrams[1]
     assert (datagram.command, datagram.expected_counter) == (Command.LWR, 2)
+
+
+@pytest.mark.parametrize("required", [True, False])
+def test_devices_in_no_wish_are_required_if_any_other_is(required: bool) -> None:
+    wishes = [Asking({2: PdoWish(required=required)}), Asking({3: PdoWish(required=False)})]
+    units = make_plan(demo(), wishes).cycle.sync_units
+    optional = {position: unit.optional for unit in units for position in unit.devices}
+    assert optional[3]
+    assert all(optional[position] is not required for position in optional if position != 3)
 
 
 def test_an_optional_device_is_a_unit_of_its_own() -> None:

@@ -1,4 +1,4 @@
-"""Mappings: kept, chosen among what is offered, rewritten, refused with the object named."""
+"""Mappings: kept, chosen among the offered ones, rewritten, written down, refused with reasons."""
 
 from __future__ import annotations
 
@@ -6,20 +6,22 @@ from dataclasses import replace
 
 import pytest
 
-from catenary.errors import MappingError
+from catenary.errors import ConfigurationError, MappingError
 from catenary.model.device import (
+    Assignment,
     DeviceDescription,
     Direction,
     Entry,
     ObjectInformation,
+    ObjectValue,
     Pdo,
     mapped_entries,
 )
 from catenary.plan import make_plan
 from catenary.plan.mapping import make_mapping
 from catenary.plan.start_up import Download, mapping_downloads
-from catenary.plan.wish import ObjectReference
-from tests.plan.devices import SERVO_INPUTS, asks, coupler, demo, lamps, servo
+from catenary.plan.wish import ObjectReference, PdoWish, WrittenPdo
+from tests.plan.devices import SERVO_INPUTS, Asking, asks, coupler, demo, lamps, servo
 
 FOLLOWING_ERROR = ObjectReference(0x60F4, 0, 32)
 POSITION = ObjectReference(0x6064, 0, 32)
@@ -58,11 +60,104 @@ def test_a_missing_object_is_appended() -> None:
     )
 
 
-def test_fixed_pdos_refuse_and_say_what_there_is() -> None:
-    with pytest.raises(MappingError, match=r"device 0 \(Servo\): object 0x60F4:00") as caught:
+def test_an_error_names_each_alternative_and_why_it_failed() -> None:
+    with pytest.raises(MappingError) as caught:
         make_mapping(servo(0, fixed=True), Direction.INPUT, [FOLLOWING_ERROR])
-    assert "fixed" in caught.value.message
+    assert caught.value.message.splitlines() == [
+        "device 0 (Servo): its inputs cannot carry 0x60F4:00 (32 bits):",
+        "    as assigned now (0x1A00): 0x60F4:00 (32 bits) is not mapped",
+        "    another combination of its PDOs: none of its PDOs carries 0x60F4:00 (32 bits)",
+        "    rewriting a PDO: all its PDOs are fixed: 0x1A00",
+    ]
     assert "0x6064:00" in caught.value.hint
+    assert "pdos=" in caught.value.hint
+
+
+def may(device: DeviceDescription, **permissions: bool) -> DeviceDescription:
+    assert device.mailbox is not None
+    return replace(device, mailbox=replace(device.mailbox, **permissions))
+
+
+def test_a_device_that_denies_pdo_configuration_is_not_rewritten() -> None:
+    device = may(servo(0), pdo_configuration=False)
+    with pytest.raises(MappingError, match="its SII says that the entries of PDOs cannot"):
+        make_mapping(device, Direction.INPUT, [FOLLOWING_ERROR])
+
+
+def test_a_device_that_denies_pdo_assignment_keeps_its_pdos() -> None:
+    device = may(offering(servo(0, fixed=True)), pdo_assign=False)
+    with pytest.raises(MappingError, match="its SII says that 0x1C13 cannot be changed"):
+        make_mapping(device, Direction.INPUT, [FOLLOWING_ERROR])
+
+
+def test_a_list_that_the_dictionary_calls_read_only_is_not_written() -> None:
+    device = offering(servo(0))
+    [assignment] = device.inputs
+    device = replace(device, inputs=(replace(assignment, fixed=True),))
+    mapping = make_mapping(device, Direction.INPUT, [FOLLOWING_ERROR])
+    assert mapping.reassigned == ()
+    downloads = mapping_downloads(mapping)
+    assert {step.index for step in downloads} == {0x1A00}
+
+
+@pytest.mark.parametrize("offered", [False, True])
+def test_an_optional_object_never_causes_a_write(offered: bool) -> None:
+    wanted = [POSITION, replace(FOLLOWING_ERROR, required=False)]
+    device = offering(servo(0)) if offered else servo(0)
+    mapping = make_mapping(device, Direction.INPUT, wanted)
+    assert not mapping.changed
+    assert mapping.left_out == (wanted[1],)
+
+
+def test_a_rewrite_for_a_required_object_leaves_optional_ones_out() -> None:
+    """The device could refuse them, though it would take the required one."""
+    other = ObjectReference(0x60FD, 0, 32, required=False)
+    mapping = make_mapping(servo(0), Direction.INPUT, [FOLLOWING_ERROR, other])
+    [pdo] = mapping.rewritten
+    assert [entry.index for entry in pdo.entries[-2:]] == [0x6077, 0x60F4]
+    assert mapping.left_out == (other,)
+    assert [reason.split(" (")[0] for reason in mapping.rejected] == [
+        "as assigned now",
+        "another combination of its PDOs: none of its PDOs carries 0x60F4:00",
+    ]
+
+
+def test_a_written_mapping_is_tried_whatever_the_sii_says() -> None:
+    device = may(servo(0, fixed=True), pdo_configuration=False, pdo_assign=False)
+    written = [WrittenPdo(0x1A00, (POSITION, FOLLOWING_ERROR))]
+    mapping = make_mapping(device, Direction.INPUT, [POSITION], written)
+    assert [(e.index, e.name) for e in mapping.rewritten[0].entries] == [
+        (0x6064, "Position"),
+        (0x60F4, ""),
+    ]
+    assert mapping_downloads(mapping)
+
+
+def test_a_written_mapping_that_the_device_has_changes_nothing() -> None:
+    mapping = make_mapping(servo(0), Direction.INPUT, [POSITION], [WrittenPdo(0x1A00)])
+    assert not mapping.changed
+
+
+def test_a_written_mapping_without_a_required_object_is_refused() -> None:
+    written = [WrittenPdo(0x1A00, (FOLLOWING_ERROR,))]
+    with pytest.raises(MappingError, match=r"written down \(0x1A00\): 0x6064:00 \(32 bits\)"):
+        make_mapping(servo(0), Direction.INPUT, [POSITION], written)
+
+
+def test_a_written_pdo_that_nobody_knows_needs_its_entries() -> None:
+    with pytest.raises(MappingError, match="neither its dictionary nor its SII has PDO 0x1A07"):
+        make_mapping(servo(0), Direction.INPUT, [POSITION], [WrittenPdo(0x1A07)])
+
+
+def test_an_object_mapped_twice_with_different_sizes_is_accepted() -> None:
+    """EL3632: 0x6000:02."""
+    device = servo(0)
+    short = Pdo(0x1A01, (Entry(0x6064, 0, 16),), 3)
+    pdos = (*device.input_pdos, short)
+    device = replace(device, inputs=(Assignment(3, pdos),), input_pdos=pdos)
+    for bits in (16, 32):
+        wanted = [ObjectReference(0x6064, 0, bits)]
+        assert not make_mapping(device, Direction.INPUT, wanted).changed
 
 
 def test_fixed_pdos_keep_what_they_have_where_the_rest_is_not_required() -> None:
@@ -83,8 +178,9 @@ def test_a_device_without_process_data_says_so() -> None:
 
 
 def test_a_wrong_length_is_told() -> None:
-    with pytest.raises(MappingError, match="32 bits, 16 were wished"):
+    with pytest.raises(MappingError, match="is mapped with 32 bits, 16 were asked for") as caught:
         make_mapping(servo(0), Direction.INPUT, [ObjectReference(0x6064, 0, 16)])
+    assert "0x6064:00 is mapped with 32 bits already" in caught.value.message
 
 
 @pytest.mark.parametrize(
@@ -92,7 +188,7 @@ def test_a_wrong_length_is_told() -> None:
     [
         (ObjectInformation(0x60F4, 0, 0), "does not exist"),
         (ObjectInformation(0x60F4, 0, 32, input_mappable=False), "cannot be mapped"),
-        (ObjectInformation(0x60F4, 0, 16), "has 16 bits, 32 were wished"),
+        (ObjectInformation(0x60F4, 0, 16), "has 16 bits, 32 were asked for"),
     ],
 )
 def test_what_the_dictionary_says_is_believed(known: ObjectInformation, match: str) -> None:
@@ -101,10 +197,20 @@ def test_what_the_dictionary_says_is_believed(known: ObjectInformation, match: s
         make_mapping(device, Direction.INPUT, [FOLLOWING_ERROR])
 
 
-def test_a_pdo_that_would_map_an_object_twice_is_passed_over() -> None:
-    overlapping = Pdo(0x1A01, (SERVO_INPUTS[0], Entry(0x60F4, 0, 32)), None, fixed=True)
+def test_mutually_exclusive_pdos_are_exchanged() -> None:
+    other = Pdo(0x1A01, (SERVO_INPUTS[0], Entry(0x60F4, 0, 32)), None, fixed=True)
     device = servo(0)
-    device = replace(device, input_pdos=(*device.input_pdos, overlapping))
+    device = replace(device, input_pdos=(*device.input_pdos, other))
+    mapping = make_mapping(device, Direction.INPUT, [FOLLOWING_ERROR])
+    assert mapping.assignments[0].pdos == (other,)
+    assert mapping.rewritten == ()
+
+
+def test_a_mandatory_pdo_is_rewritten_rather_than_exchanged() -> None:
+    device = servo(0)
+    first = replace(device.input_pdos[0], mandatory=True)
+    other = Pdo(0x1A01, (SERVO_INPUTS[0], Entry(0x60F4, 0, 32)), None, fixed=True)
+    device = replace(device, inputs=(Assignment(3, (first,)),), input_pdos=(first, other))
     mapping = make_mapping(device, Direction.INPUT, [FOLLOWING_ERROR])
     assert [pdo.index for pdo in mapping.rewritten] == [0x1A00]
 
@@ -129,12 +235,41 @@ def offering(device: DeviceDescription) -> DeviceDescription:
     return replace(device, input_pdos=(*device.input_pdos, extra))
 
 
-def test_what_is_not_required_is_added_one_by_one() -> None:
-    """One optional object that cannot be mapped does not take the others with it."""
+def test_optional_objects_are_taken_one_by_one() -> None:
+    """One optional object that no PDO carries does not take the others with it."""
+    required = ObjectReference(0x60FD, 0, 32)
     missing = ObjectReference(0x6FFF, 0, 16, required=False)
     wanted = replace(FOLLOWING_ERROR, required=False)
-    device = replace(servo(0), objects=(ObjectInformation(0x6FFF, 0, 0),))
-    mapping = make_mapping(device, Direction.INPUT, [POSITION, missing, wanted])
+    device = offering(servo(0))
+    device = replace(
+        device, input_pdos=(*device.input_pdos, Pdo(0x1A02, (Entry(0x60FD, 0, 32),), None))
+    )
+    mapping = make_mapping(device, Direction.INPUT, [POSITION, required, missing, wanted])
     mapped = [(entry.index, entry.subindex) for entry in mapped_entries(mapping.assignments)]
     assert (0x60F4, 0) in mapped
-    assert (0x6FFF, 0) not in mapped
+    assert mapping.left_out == (missing,)
+
+
+def test_a_plan_shows_old_and_new_values() -> None:
+    devices = demo()
+    devices[3] = replace(devices[3], values=(ObjectValue(0x6060, 0, b"\x01"),))
+    wish = PdoWish(
+        inputs=(FOLLOWING_ERROR,), start_up=((0x6060, 0, b"\x08"), (0x6065, 0, b"\x01\x02"))
+    )
+    plan = make_plan(devices, [Asking({3: wish})])
+    before = "0x6041:00/16, 0x6061:00/8, 0x606C:00/32, 0x6064:00/32, 0x6077:00/16"
+    assert plan.devices[3].changes == (
+        ("0x1A00", before, f"{before}, 0x60F4:00/32"),
+        ("0x6060:00", "01", "08"),
+        ("0x6065:00", "", "01 02"),
+    )
+    assert "0x6060:00  01 → 08" in str(plan)
+    assert "0x6065:00  (not read) → 01 02" in str(plan)
+
+
+def test_two_requests_may_not_write_down_different_pdos() -> None:
+    first = Asking({3: PdoWish(pdos=(WrittenPdo(0x1A00), WrittenPdo(0x1600)))})
+    second = Asking({3: PdoWish(pdos=(WrittenPdo(0x1A01),))})
+    with pytest.raises(ConfigurationError, match="different PDOs for inputs"):
+        make_plan(demo(), [first, second])
+    make_plan(demo(), [first, first])

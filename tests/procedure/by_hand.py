@@ -69,6 +69,7 @@ class MailboxDevice:
         self.lose_back: set[int] = set()
         self.deduplicates = True
         self.repeats = True  # its last message, when it is asked to
+        self.repeats_first = False  # the message before, although a newer one waits
         self.deaf = False  # does not read its mailbox
         self.next_counter: Callable[[], int] | None = None  # instead of 1 to 7 and again
         self.spoil: Callable[[bytes], bytes] = lambda data: data  # what it does to its messages
@@ -147,8 +148,10 @@ class MailboxDevice:
         raise AssertionError(f"nobody should touch 0x{address:04X}")
 
     def _repeat(self) -> None:
-        if self._in_buffer is not None or not self._last_sent:
+        if not self._last_sent or (self._in_buffer is not None and not self.repeats_first):
             return  # what was asked for again is still there
+        if self._in_buffer is not None:
+            self._queue.appendleft(self._in_buffer)
         self._in_buffer = self._last_sent
 
 

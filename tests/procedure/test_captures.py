@@ -10,17 +10,17 @@ import pytest
 
 from catenary.model.device import Assignment, MailboxLayout, Pdo
 from catenary.model.topology import open_ports, tree
-from catenary.plan.mapping import Mapping
+from catenary.plan.pdo_mapping import Mapping
 from catenary.plan.start_up import mapping_downloads
 from catenary.procedure.exchange import Reply, Request
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.sdo import download, upload
 from catenary.procedure.station import Station
+from catenary.wire.capture import decode_capture
 from catenary.wire.coe import DownloadRequest, UploadRequest, UploadResponse, decode_coe
 from catenary.wire.datagram import Command, Datagram
 from catenary.wire.frame import decode_frame
 from catenary.wire.mailbox import decode_mailbox
-from catenary.wire.pcapng import decode_capture
 from catenary.wire.register import DL_STATUS
 from catenary.wire.sii import MailboxProtocol
 from tests.procedure.by_hand import play

@@ -22,6 +22,7 @@ class Controller:
 
     def __init__(self, patience: int = 100) -> None:
         self.control, self.patience, self.seen = BEFORE, patience, []  # type: ignore[var-annotated]
+        self.hesitates = 0  # looks at DL status before the port is closed
 
     def answer(self, request: Request) -> Reply:
         register = request.address >> 16
@@ -34,7 +35,8 @@ class Controller:
         if register == DL_CONTROL.address:
             return Reply(DL_CONTROL.pack(self.control), 1)
         assert register == DL_STATUS.address
-        closed = self.control & CLOSED_1 == CLOSED_1 and self.patience > 0
+        self.hesitates -= 1
+        closed = self.control & CLOSED_1 == CLOSED_1 and self.patience > 0 and self.hesitates < 0
         return Reply(DL_STATUS.pack(0x0400 if closed else 0x0800), 1)
 
 
@@ -43,8 +45,7 @@ def play(procedure: Procedure[int], controller: Controller) -> int:
     try:
         while True:
             step = next(procedure) if replies is None else procedure.send(replies)
-            assert isinstance(step, list)
-            replies = [controller.answer(each) for each in step]
+            replies = [controller.answer(each) for each in step] if isinstance(step, list) else []
     except StopIteration as stop:
         return int(stop.value)
 
@@ -73,7 +74,24 @@ def test_it_is_opened_again_when_the_measurement_fails() -> None:
 
 
 def test_what_took_longer_than_the_port_stays_closed_counts_for_nothing() -> None:
-    controller = Controller(patience=2)
+    controller = Controller(patience=3)
     with pytest.raises(ClockError, match="did not stay closed"):
         play(as_line(STATION, 1, seven()), controller)
     assert controller.seen[-1] == BEFORE
+
+
+def test_a_port_that_cannot_be_closed_is_named_before_anything_is_measured() -> None:
+    controller = Controller(patience=0)
+    with pytest.raises(
+        ClockError, match="port 1, the second end of the ring, cannot be closed"
+    ) as e:
+        play(as_line(STATION, 1, seven()), controller)
+    assert "processor" not in e.value.hint
+    assert "as a line" in e.value.hint
+    assert controller.seen[-1] == BEFORE
+
+
+def test_a_port_may_take_its_time_to_close() -> None:
+    controller = Controller()
+    controller.hesitates = 3
+    assert play(as_line(STATION, 1, seven()), controller) == 7

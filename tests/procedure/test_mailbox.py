@@ -172,14 +172,51 @@ def test_draining_one_that_babbles_ends_too() -> None:
     assert len(play(drain(channel(), lambda message: message), device)) < 100
 
 
-def test_counters_that_stand_still_or_jump_mean_nothing() -> None:
-    for counters in ([0, 0, 0, 0], [5, 1, 7, 2]):
-        device = MailboxDevice(Dictionary(OBJECT))
-        given = iter(counters)
-        device.next_counter = lambda given=given: next(given)  # type: ignore[misc]
-        lane = channel()
-        for _ in counters:
-            assert play(upload(lane, 0x2000, 0), device) == OBJECT[0x2000, 0]
+@pytest.mark.parametrize(
+    "counters", [[0, 0, 0, 0], [5, 1, 7, 2], [3, 3, 3, 3], [1, 1, 2, 2], [7, 7, 7, 1]]
+)
+def test_counters_that_stand_still_or_jump_mean_nothing(counters: list[int]) -> None:
+    device = MailboxDevice(Dictionary(OBJECT))
+    given = iter(counters)
+    device.next_counter = lambda: next(given)
+    lane = channel()
+    for _ in counters:
+        assert play(upload(lane, 0x2000, 0), device) == OBJECT[0x2000, 0]
+    assert lane.dropped == 0
+
+
+@pytest.mark.parametrize("counter", [0, 1, None])
+@settings(max_examples=100, deadline=None)
+@given(
+    out=st.sets(st.integers(0, 40), max_size=3),
+    back=st.sets(st.integers(0, 40), max_size=3),
+)
+def test_whatever_is_lost_segments_are_joined_with_any_counter(
+    counter: int | None, out: set[int], back: set[int]
+) -> None:
+    """0, always 1, or the standard's. Segments differ in their toggle, so no two are equal."""
+    data = bytes(i & 0xFF for i in range(700))
+    device = MailboxDevice(Dictionary({(0x2000, 1): data}))
+    if counter is not None:
+        device.next_counter = lambda: counter
+    device.repeats_first = True
+    device.lose_out, device.lose_back = out, back - out
+    assert play(upload(channel(), 0x2000, 1), device) == data
+
+
+def test_a_repetition_of_what_was_accepted_before_is_dropped() -> None:
+    """The read is lost on its way out: the device repeats the answer before, then sends the new
+    one."""
+    values = iter([b"\x01", b"\x01", b"\x02"])
+    device = MailboxDevice(lambda message: Dictionary({(0x2000, 0): next(values)})(message))
+    device.next_counter = lambda: 0  # looked at first, so that a lost read is repeated at once
+    device.repeats_first = True
+    lane = channel()
+    assert [play(upload(lane, 0x2000, 0), device) for _ in range(2)] == [b"\x01"] * 2
+    assert lane.dropped == 0
+    device.lose_out = {5}  # 0 to 3 are two writes and reads, 4 is the third write
+    assert play(upload(lane, 0x2000, 0), device) == b"\x02"
+    assert lane.dropped == 1
 
 
 def test_a_length_beyond_the_mailbox_is_the_devices_fault() -> None:

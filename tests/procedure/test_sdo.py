@@ -49,6 +49,13 @@ def test_a_mailbox_error_is_told_in_words() -> None:
         play(upload(channel(), 0x1000, 0), device)
 
 
+@pytest.mark.parametrize("data", [b"", b"\x01\x00", b"\x02\x00\x02\x00"])
+def test_a_malformed_mailbox_error_names_its_device(data: bytes) -> None:
+    device = MailboxDevice(lambda _: [Mailbox(Type.ERROR, data)])
+    with pytest.raises(MailboxError, match=r"device 3 \(Probe\).*mailbox error without a valid"):
+        play(upload(channel(), 0x1000, 0), device)
+
+
 def test_an_emergency_on_the_way_is_put_aside() -> None:
     emergency = Emergency(0x7500, 0x11, b"\x01\x02\x03\x04\x05")
     dictionary = Dictionary({(0x1000, 0): b"\x92\x01\x02\x00"})
@@ -120,6 +127,22 @@ def test_an_upload_that_never_ends_is_bounded_by_its_own_size() -> None:
     with pytest.raises(MailboxError, match="against the protocol"):
         play(upload(channel(), 0x2000, 0), device)
     assert len(device.received) <= 1000
+
+
+def test_an_upload_has_an_overall_deadline() -> None:
+    dictionary = Dictionary({(0x2000, 0): bytes(1000)})
+
+    def drip(message: Mailbox) -> list[Mailbox]:
+        request = decode_coe(message.data)
+        if isinstance(request, UploadSegmentRequest):
+            return [coe(UploadSegment(request.toggle, False, b"x"))]
+        return dictionary(message)
+
+    device = MailboxDevice(drip)
+    with pytest.raises(MailboxError, match=r"Probe.*0x2000:00: \d+ of 1000 bytes within 0.05 s"):
+        play(upload(channel(), 0x2000, 0, timeout=0.05), device)
+    assert decode_coe(device.received[-1].data) == Abort(0x2000, 0, 0x0504_0000)
+    assert len(device.received) < 500
 
 
 def test_segments_of_nothing_are_no_transfer() -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from catenary.errors import MailboxError, ResponseTimeout, SdoAbort
+from catenary.errors import ResponseTimeout, SdoAbort
 from catenary.procedure.sdo_information import (
     describe_object,
     list_objects,
@@ -55,13 +55,16 @@ def test_a_list_comes_in_fragments_that_nobody_asks_for(size: int) -> None:
     indices = tuple(range(0x1000, 0x1040))
     data = ObjectList(ListType.ALL, indices).encode()
     device = answering(lambda _: in_parts(Opcode.LIST_RESPONSE, data, size))
-    assert play(read_object_list(channel()), device) == indices
-    assert len(device.received) == 1
+    assert play(read_object_list(channel()), device) == (indices, "")
+    assert len(device.received) == 2  # the list, and how many there are
 
 
 def dictionary(request: SdoInformation) -> list[SdoInformation]:
     """A variable 0x1000 and an array 0x2000 with a gap."""
     index = int.from_bytes(request.data[:2], "little")
+    if request.opcode is Opcode.LIST_REQUEST and index == ListType.LENGTHS:
+        lengths = ObjectList(ListType.LENGTHS, (3, 0, 0, 0, 0)).encode()
+        return [SdoInformation(Opcode.LIST_RESPONSE, lengths)]
     if request.opcode is Opcode.LIST_REQUEST:
         listed = ObjectList(ListType.ALL, (0x1000, 0x2000, 0x3000)).encode()
         return [SdoInformation(Opcode.LIST_RESPONSE, listed)]
@@ -80,11 +83,13 @@ def dictionary(request: SdoInformation) -> list[SdoInformation]:
 
 
 def test_objects_that_are_listed_and_denied_are_left_out() -> None:
-    found = play(list_objects(channel()), answering(dictionary))
+    found, notes = play(list_objects(channel()), answering(dictionary))
     assert [(each.index, each.name) for each in found] == [
         (0x1000, "object 1000"),
         (0x2000, "object 2000"),
     ]
+    assert len(notes) == 1
+    assert notes[0].startswith("0x3000 cannot be described: refused with 0x06020000")
 
 
 def test_an_array_with_a_gap_is_described_without_it() -> None:
@@ -117,23 +122,86 @@ def test_a_late_answer_about_another_entry_is_not_taken() -> None:
     assert lane.dropped == 1
 
 
-def test_fragments_without_an_end_are_an_error() -> None:
+def test_fragments_without_an_end_are_cut_off_with_a_note() -> None:
     endless = [SdoInformation(Opcode.LIST_RESPONSE, b"\x01\x00" * 50, 7, True)] * 2000
-    with pytest.raises(MailboxError, match="without an end"):
-        play(read_object_list(channel()), answering(lambda _: endless))
+    indices, note = play(read_object_list(channel()), answering(lambda _: endless))
+    assert len(indices) > 10_000
+    assert note == "the list of objects was cut short: its fragments have no end"
 
 
-def test_fragments_that_stop_are_a_timeout() -> None:
-    first = in_parts(Opcode.LIST_RESPONSE, bytes(100), 10)[:3]
-    with pytest.raises(ResponseTimeout, match=r"device 3 \(Probe\): no answer"):
-        play(read_object_list(channel()), answering(lambda _: first))
+def test_of_fragments_that_stop_the_first_ones_are_kept() -> None:
+    first = in_parts(Opcode.LIST_RESPONSE, ObjectList(ListType.ALL, (0x1000,) * 50).encode(), 10)
+    indices, note = play(read_object_list(channel()), answering(lambda _: first[:3]))
+    assert indices == (0x1000,) * 14
+    assert note.startswith("the list of objects was cut short: no answer to a COE message")
 
 
-@pytest.mark.parametrize("data", [b"", b"\x01", b"\x01\x00\x00"])
-def test_an_answer_that_is_none_is_the_devices_fault(data: bytes) -> None:
+def test_a_list_that_announces_fragments_by_their_number_alone() -> None:
+    """IgH (fsm_coe.c) goes on for either of both fields."""
+    parts = in_parts(Opcode.LIST_RESPONSE, ObjectList(ListType.ALL, (0x1000,) * 9).encode(), 10)
+    plain = [SdoInformation(part.opcode, part.data, part.fragments_left) for part in parts]
+    assert play(read_object_list(channel()), answering(lambda _: plain)).indices == (0x1000,) * 9
+
+
+def test_a_list_shorter_than_the_device_counts_has_a_note() -> None:
+    def short(request: SdoInformation) -> list[SdoInformation]:
+        listed = request.data[0] == ListType.ALL
+        found = ObjectList(ListType(request.data[0]), (0x1000,) if listed else (57, 0, 0, 0, 0))
+        return [SdoInformation(Opcode.LIST_RESPONSE, found.encode())]
+
+    indices, note = play(read_object_list(channel()), answering(short))
+    assert indices == (0x1000,)
+    assert note == "the list of objects was cut short: 1 of 57 are in it"
+
+
+@pytest.mark.parametrize("data", [b"", b"\x01", b"\x00\x10\x01"])
+def test_half_an_index_at_the_end_has_a_note(data: bytes) -> None:
     device = answering(lambda _: [SdoInformation(Opcode.LIST_RESPONSE, b"\x01\x00" + data)])
-    if len(data) % 2 == 0:
-        assert play(read_object_list(channel()), device) == ()
-        return
-    with pytest.raises(MailboxError, match="answer of SDO information that is none"):
+    indices, note = play(read_object_list(channel()), device)
+    assert indices == ((0x1000,) if len(data) > 1 else ())
+    assert bool(note) is (len(data) % 2 == 1)
+    assert not note or "are not whole indices" in note
+
+
+def test_a_list_that_does_not_name_its_kind_is_no_answer() -> None:
+    device = answering(lambda _: [SdoInformation(Opcode.LIST_RESPONSE, b"\x01")])
+    with pytest.raises(ResponseTimeout, match="device 3"):
         play(read_object_list(channel()), device)
+
+
+@pytest.mark.parametrize("size", [0, 3])
+def test_an_abort_without_a_code_is_a_refusal(size: int) -> None:
+    device = answering(lambda _: [SdoInformation(Opcode.ERROR, bytes(size))])
+    with pytest.raises(SdoAbort, match=r"device 3 .*0x3000:00 refused without an abort code"):
+        play(describe_object(channel(), 0x3000), device)
+
+
+def undescribed(*broken: int) -> Callable[[SdoInformation], list[SdoInformation]]:
+    """Objects 0x1000 to 0x1009, some of them with descriptions that are too short."""
+    indices = tuple(range(0x1000, 0x100A))
+
+    def answer(request: SdoInformation) -> list[SdoInformation]:
+        index = int.from_bytes(request.data[:2], "little")
+        if request.opcode is Opcode.LIST_REQUEST:
+            found = ObjectList(ListType(index), indices if index else (10, 0, 0, 0, 0))
+            return [SdoInformation(Opcode.LIST_RESPONSE, found.encode())]
+        whole = ObjectDescription(index, 7, 0, ObjectCode.VAR, "name").encode()
+        return [SdoInformation(Opcode.OBJECT_RESPONSE, whole[:2] if index in broken else whole)]
+
+    return answer
+
+
+def test_of_an_object_that_is_not_described_the_index_is_kept() -> None:
+    found, notes = play(list_objects(channel()), answering(undescribed(0x1003, 0x1005)))
+    assert [each.index for each in found] == list(range(0x1000, 0x100A))
+    assert [each.index for each in found if not each.object_code] == [0x1003, 0x1005]
+    assert len(notes) == 1
+    assert notes[0].startswith("0x1003, 0x1005 cannot be described: an answer of SDO information")
+
+
+def test_after_three_failures_in_a_row_nothing_more_is_asked() -> None:
+    device = answering(undescribed(*range(0x1002, 0x100A)))
+    found, notes = play(list_objects(channel()), device)
+    assert len(found) == 10
+    assert len(device.received) == 2 + 5
+    assert notes[-1] == "nothing more was asked after 3 failures in a row"

@@ -82,7 +82,7 @@ def test_the_calls_are_libethercats(library: Path) -> None:
             *("receive", "process 0", "domain_state 0"),
             *("queue 0", "application_time 0", "send"),
         ]
-    assert double.calls()[-2:] == ["deactivate", "release_master"]
+    assert double.changes()[-2:] == ["deactivate", "release_master"]
     with pytest.raises(RuntimeError, match="no process data"):
         servo.read_position()
 
@@ -114,6 +114,19 @@ def test_inputs_and_outputs() -> None:
         assert buttons.read_digital(0) == 0
         with pytest.raises(ValueError, match="analogue channel 0"):
             buttons.read_analog(0)
+
+
+def test_an_object_that_is_mapped_twice_is_one_channel() -> None:
+    gauges = cat.AnalogInputs(channels=1, second_pdo="twice")
+    terminal = SlaveIO(0)
+    with MasterBase(cat.Segment([gauges])) as master:
+        activated(master, terminal)
+        gauges.apply_volts(0, 5.0)
+        for _ in range(20):
+            cycle(master)
+        assert terminal.read_analog(0) == 0x4000
+        with pytest.raises(ValueError, match="analogue channel 1"):
+            terminal.read_analog(1)
 
 
 def test_any_object(library: Path) -> None:

@@ -66,6 +66,12 @@ def test_a_field_that_is_not_there_is_answered_with_those_that_are(path: Path) -
         record.read(path)["speed"]
 
 
+@pytest.mark.parametrize("part", [{"start": np.nan}, {"start": np.inf}, {"end": np.nan}])
+def test_a_part_that_cannot_be_is_the_callers_mistake(path: Path, part: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match="numbers of seconds"):
+        record.read(path, **part)
+
+
 def test_a_file_that_is_not_there() -> None:
     with pytest.raises(FileNotFoundError):
         record.read("/nowhere/x.mcap")

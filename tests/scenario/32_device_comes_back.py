@@ -169,6 +169,46 @@ def test_unplugged_it_keeps_its_address_and_comes_back_all_the_same(cell: Cell) 
     assert all(sub.state is not None for sub in cell.subs)
 
 
+@pytest.mark.parametrize(
+    "faults",
+    [
+        [unplug(0, at=0.2, for_=0.5)],
+        [power_cycle(position, at=0.2, for_=0.5) for position in range(5)],
+    ],
+    ids=["unplugged", "switched off"],
+)
+def test_optional_devices_alone_survive_a_silent_bus(cell: Cell, faults: list[Fault]) -> None:
+    """Nothing is required, so that nothing is missing: not even the coupler before them."""
+    _, tool, gripper = wishes(cell)
+    with cat.Loop(tool, gripper) as loop:
+        cell.main.events.get()
+        for fault in faults:
+            cell.segment.inject(fault)
+        for cycle in loop:
+            assert cycle.ok
+            if cycle.number == 500:
+                assert not tool.present.any()
+                assert gripper.present == (False,)
+            if cycle.time >= 2.0:
+                break
+        assert tool.present.all()
+        assert gripper.present == (True,)
+        assert cell.states == [OP] * 5
+    told = kinds(list(cell.main.events))
+    assert set(LOST + BACK) <= set(told)
+
+
+def test_optional_devices_alone_may_be_left_behind(cell: Cell) -> None:
+    """They are silent still when the loop is left."""
+    _, tool, gripper = wishes(cell)
+    with cat.Loop(tool, gripper) as loop:
+        cell.segment.inject(unplug(0, at=0.1))
+        for cycle in loop:
+            if cycle.time >= 0.5:
+                break
+    assert not tool.present.any()
+
+
 def test_held_by_policy_until_it_is_released(cell: Cell) -> None:
     def look(cycle, arm, tool, gripper, loop) -> None:
         if cycle.number == 1000:

@@ -37,7 +37,7 @@ def test_no_pulse_is_missed(run: str, clock: str) -> None:
 @pytest.mark.parametrize("shift", [-300e-6, -50e-6, 300e-6])
 def test_a_shifted_pulse(shift: float) -> None:
     with clocked_cell(2) as cell:
-        arm = cell.drives(dc=cat.DC(shift=shift))
+        arm = cell.drives(dc=cat.DistributedClock(shift=shift))
         with cat.Loop(arm, period=1e-3) as loop:
             before = [cell.segment.core.synchronous(p)[2] for p in (2, 3)]
             run_for(loop, 0.5)

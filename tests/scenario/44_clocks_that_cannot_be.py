@@ -39,7 +39,10 @@ def test_frames_that_do_not_fit_before_the_beat(cell: Cell) -> None:
 
 def test_two_wishes_that_disagree(cell: Cell) -> None:
     one = cat.Drives(
-        cell.subs.drives, counts_per_turn=2**20, velocity_limit=100.0, dc=cat.DC(shift=1e-4)
+        cell.subs.drives,
+        counts_per_turn=2**20,
+        velocity_limit=100.0,
+        dc=cat.DistributedClock(shift=1e-4),
     )
     other = cat.Inputs(cell.subs[2], dc=True)
     with pytest.raises(ConfigurationError, match=r"device 2: two wishes"):

@@ -9,9 +9,10 @@ import pytest
 
 import catenary as cat
 from catenary.errors import ShareError
+from catenary.share.folder import own_folder
 from catenary.share.layout import HEADER, MAGIC, VERSION
 from catenary.virtual import Segment, Servo
-from tests.share.names import own_name
+from tests.share.names import own_name, state_file
 
 
 @pytest.fixture
@@ -19,7 +20,7 @@ def shared() -> Iterator[tuple[str, Path]]:
     """A name, and a file there as a loop has written it."""
     with own_name("version") as name, cat.MainDevice(Segment([Servo()])) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
-        path = Path(f"/dev/shm/catenary-{name}")
+        path = state_file(name)
         with cat.Share(name, history=0.01) as share, cat.Loop(arm, sink=share) as loop:
             next(loop)
             bytes_ = path.read_bytes()
@@ -78,5 +79,6 @@ def test_a_description_of_another_size(
 @pytest.mark.parametrize("content", [b"", b"something else", bytes(8192)])
 def test_something_else(content: bytes) -> None:
     with own_name("else") as name:
-        Path(f"/dev/shm/catenary-{name}").write_bytes(content)
+        own_folder().mkdir(0o700, exist_ok=True)
+        state_file(name).write_bytes(content)
         assert_refused(name, "is empty" if not content else "no share")

@@ -8,7 +8,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import pytest
 
@@ -16,7 +15,7 @@ import catenary as cat
 from catenary.errors import ShareError
 from catenary.share.process import this_process
 from catenary.virtual import Segment, Servo
-from tests.share.names import own_name
+from tests.share.names import own_name, state_file
 from tests.share.processes import LOOP, started
 
 LISTEN = "import sys, catenary as cat; print(cat.attach(sys.argv[1], stale=True).state)"
@@ -43,7 +42,7 @@ def test_reading_does_not_remove_it() -> None:
                 [sys.executable, "-c", LISTEN, name], capture_output=True, text=True, check=True
             )
             assert said.stdout == "dead\n"
-        assert Path(f"/dev/shm/catenary-{name}").exists()
+        assert state_file(name).exists()
         with started(LOOP, name) as second:
             assert second.line() == "running"
             assert cat.attach(name).layout.writer.pid == second.process.pid
@@ -57,7 +56,7 @@ def test_another_process_with_the_number_of_the_writer(field: str) -> None:
     written = f'"{field}":' + (f"{me.start_time}" if field == "start_time" else f'"{me.boot_id}"')
     other = written[:-2] + ("0" if written[-2] != "0" else "1") + written[-1]
     with own_name("number") as name:
-        path = Path(f"/dev/shm/catenary-{name}")
+        path = state_file(name)
         with open_share(name):
             content = path.read_bytes()
             assert cat.attach(name).alive

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from catenary.plan.cycle import AxisPlan, CyclePlan, FramePlan, Number
-from catenary.wire.pcapng import Direction, decode_capture
+from catenary.wire.capture import decode_capture
+from catenary.wire.pcapng import Direction
 
 FIRST_INDEX = 17  # offset of the first datagram's index in a frame
 CYCLIC = range(0x80)  # indices of cyclic frames

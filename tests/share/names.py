@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from catenary.share.folder import own_folder
+
 
 @contextmanager
 def own_name(what: str) -> Iterator[str]:
@@ -14,5 +16,21 @@ def own_name(what: str) -> Iterator[str]:
     try:
         yield name
     finally:
-        for path in Path("/dev/shm").glob(f"catenary*-{name}*"):
+        for path in files_of(name):
             path.unlink()
+
+
+def files_of(name: str) -> list[Path]:
+    """All files of a share, a mutex or of several with names that begin so; and drafts."""
+    folder = own_folder()
+    return [*folder.glob(f"*-{name}*"), *folder.glob(f".draft-{os.getpid()}-*")]
+
+
+def state_file(name: str) -> Path:
+    return own_folder() / f"share-{name}"
+
+
+def mutex_file(name: str) -> Path:
+    """Its folder exists, too."""
+    own_folder().mkdir(0o700, exist_ok=True)
+    return own_folder() / f"mutex-{name}"

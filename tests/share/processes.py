@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from threading import Event
 
@@ -30,11 +30,18 @@ class Program:
     """Owns a process."""
 
     def __init__(self, text: str, *arguments: str) -> None:
+        self._start([sys.executable, "-c", text, *arguments])
+
+    @classmethod
+    def of(cls, command: Sequence[str]) -> Program:
+        """Start any command."""
+        program = cls.__new__(cls)
+        program._start(command)
+        return program
+
+    def _start(self, command: Sequence[str]) -> None:
         self.process = subprocess.Popen(
-            [sys.executable, "-c", text, *arguments],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
 
     def line(self) -> str:
@@ -46,6 +53,11 @@ class Program:
         self.process.send_signal(signal.SIGKILL)
         self.process.wait(DEADLINE)
 
+    def close(self) -> None:
+        for stream in (self.process.stdin, self.process.stdout):
+            if stream is not None:
+                stream.close()
+
 
 @contextmanager
 def started(text: str, *arguments: str) -> Iterator[Program]:
@@ -54,9 +66,7 @@ def started(text: str, *arguments: str) -> Iterator[Program]:
         yield program
     finally:
         program.kill()
-        for stream in (program.process.stdin, program.process.stdout):
-            if stream is not None:
-                stream.close()
+        program.close()
 
 
 def comes_true(condition: Callable[[], bool]) -> bool:

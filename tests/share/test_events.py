@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 import catenary as cat
+from catenary.errors import ShareError
 from catenary.plan.sink import Incident
 from catenary.share.events import decode_event, encode_event
 from catenary.share.layout import EVENT_COUNT, EVENT_SIZE
@@ -29,7 +29,7 @@ def test_every_event_fits_its_row(message: str, detail: str, number: int) -> Non
 
 
 def test_what_is_no_event_is_refused() -> None:
-    with pytest.raises(msgspec.MsgspecError):
+    with pytest.raises(ShareError, match="damaged"):
         decode_event(b"[]")
 
 

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tests.share.names import files_of
+
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "attach_from_another_process.py"
 
 
@@ -19,4 +21,4 @@ def test_it_reads_and_commands() -> None:
     assert "0 Catenary virtual servo at 0.1" in first, done.stderr
     assert re.match(r"\d+ cycles, \d+ lost, fastest \d", second)
     assert len(EXAMPLE.read_text().splitlines()) <= 40
-    assert not Path("/dev/shm/catenary-example").exists()
+    assert not files_of("example")

@@ -12,6 +12,7 @@ import pytest
 
 from catenary.errors import ShareError
 from catenary.share import Mutex
+from tests.share.names import mutex_file
 
 COUNTS = 2000
 
@@ -69,15 +70,16 @@ def test_a_thread_that_ended_with_it_is_recovered_from(name: str) -> None:
 
 
 def test_the_name_stays_until_it_is_taken_away(name: str) -> None:
-    path = Path(f"/dev/shm/catenary.mutex-{name}")
+    path = mutex_file(name)
     Mutex(name, mode=0o660)
     assert path.stat().st_mode & 0o777 == 0o660
-    Mutex(name).unlink()
+    Mutex(name, mode=0o660).unlink()
     assert not path.exists()
 
 
 def test_a_file_that_is_no_mutex(name: str) -> None:
-    Path(f"/dev/shm/catenary.mutex-{name}").write_bytes(bytes(4096))
+    mutex_file(name).write_bytes(bytes(4096))
+    mutex_file(name).chmod(0o600)
     with pytest.raises(ShareError, match="no mutex"):
         Mutex(name)
 

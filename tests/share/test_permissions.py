@@ -1,4 +1,4 @@
-"""The mode of the files says who may read and command: tried as another user."""
+"""The mode says who may read and command: tried as another user. (Hostile ones: tests/attack.)"""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ import errno
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 import catenary as cat
 from catenary.errors import ShareError
+from catenary.share import folder
 from catenary.virtual import Segment, Servo
+from tests.share.names import files_of
 
 NOBODY = 65534
 TRY = """
@@ -25,15 +26,13 @@ os.setuid(65534)
 name, verb = sys.argv[1:]
 try:
     if verb == "mutex":
-        cat.share.Mutex(name)
-    elif verb == "take":
-        with cat.Share(name):
-            pass
+        cat.share.Mutex(name, uid=0)
     else:
         with cat.attach(name) as arm:
             print(arm.read()["number"] > 0)
             if verb == "command":
-                arm.lease(axes=[0])
+                with arm.lease(axes=[0], for_=600.0) as command:
+                    command.send(position=0.0)
 except cat.CatenaryError as error:
     print(error.message)
 """
@@ -55,42 +54,63 @@ def as_nobody(name: str, verb: str) -> list[str]:
         (0o604, "read", ["True"]),
         (0o604, "command", ["True", "may not be commanded"]),
         (0o606, "command", ["True"]),
-        (0o600, "take", ["belongs to another user"]),
     ],
 )
 def test_another_user(name: str, mode: int, verb: str, said: list[str]) -> None:
     with cat.MainDevice(Segment([Servo()])) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Share(name, mode=mode) as share, cat.Loop(arm, sink=share) as loop:
+            folder.prepare(folder.own_folder(), 0o606)  # as another share of this user does
             next(loop)
             found = as_nobody(name, verb)
+            next(loop)
+            share.apply(arm)
     assert len(found) == len(said)
     for line, part in zip(found, said, strict=True):
         assert part in line
 
 
-@pytest.mark.parametrize("room", [0, 1])  # for so many files
-def test_a_full_disk_is_told_and_nothing_is_left(
-    name: str, room: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    left = [room]
+@pytest.mark.parametrize("mode", [0o600, 0o660, 0o666])
+def test_only_the_writer_can_write_cycles(name: str, mode: int) -> None:
+    with cat.MainDevice(Segment([Servo()])) as main:
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
+        with cat.Share(name, mode=mode) as share, cat.Loop(arm, sink=share):
+            cycles, desk = sorted(files_of(name))
+            assert (cycles.name, cycles.stat().st_mode & 0o022) == (f"share-{name}", 0)
+            assert (desk.name, desk.stat().st_mode & 0o777) == (f"socket-{name}", mode)
 
+
+def test_a_full_disk_is_told_and_nothing_is_left(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def allocate(descriptor: int, offset: int, size: int) -> None:
-        left[0] -= 1
-        if left[0] < 0:
-            raise OSError(errno.ENOSPC, "No space left on device")
-        os.ftruncate(descriptor, size)
+        raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr("catenary.share.memory.os.posix_fallocate", allocate)
     segment = Segment([Servo()])
     with cat.MainDevice(segment) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         share = cat.Share(name)
-        no_room = pytest.raises(ShareError, match=r"/dev/shm has no room for .* MiB")
+        no_room = pytest.raises(ShareError, match=r"has no room for .* MiB")
         with no_room, share, cat.Loop(arm, sink=share):
             pass
         assert segment[0].state & 0x0F == 2  # PRE-OP
-    assert not list(Path("/dev/shm").glob(f"*{name}*"))
+    assert not files_of(name)
+
+
+def test_memory_for_commands_that_is_refused_leaves_nothing(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(name: str, size: int) -> None:
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    monkeypatch.setattr("catenary.share.desk.make_sealed", refused)
+    with cat.MainDevice(Segment([Servo()])) as main:
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
+        share = cat.Share(name)
+        with pytest.raises(OSError, match="Too many"), share, cat.Loop(arm, sink=share):
+            pass
+    assert not files_of(name)
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +12,7 @@ from catenary.errors import DriveError, ShareError
 from catenary.loop.publishing import one_sink_each
 from catenary.share.reader import Reader
 from catenary.virtual import AnalogInputs, Coupler, DigitalOutputs, Segment, Servo
+from tests.share.names import state_file
 
 TURN = 2**20
 
@@ -307,7 +307,7 @@ def test_the_mode_of_the_file_is_the_permission(name: str) -> None:
     with cat.MainDevice(segment) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=TURN, velocity_limit=100.0)
         with cat.Share(name, mode=0o640) as share, cat.Loop(arm, sink=share):
-            assert Path(f"/dev/shm/catenary-{name}").stat().st_mode & 0o777 == 0o640
+            assert state_file(name).stat().st_mode & 0o777 == 0o640
 
 
 @pytest.mark.parametrize("order", ["threaded", "inline"])

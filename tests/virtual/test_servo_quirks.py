@@ -9,6 +9,7 @@ import pytest
 
 from catenary.errors import ConfigurationError
 from catenary.virtual import Segment, Servo, ServoQuirks, read_segment
+from catenary.virtual.op_modes import OpMode
 from tests.virtual.main_device import STATION, MainDevice
 from tests.virtual.servo_drive import (
     CSP,
@@ -25,6 +26,7 @@ BIT_12 = 0x1000
 STEP = 250e-6  # s, the servo's own cycle
 NO_SUCH_OBJECT = 0x0602_0000
 INVALID_WATCHDOG_CONFIGURATION = 0x001F
+DL_CONTROL, DL_STATUS = 0x0100, 0x0110
 
 
 def drive_with(**quirks: object) -> Drive:
@@ -353,6 +355,32 @@ def test_quirks_come_from_toml(tmp_path: Path) -> None:
 def test_quirks_that_cannot_be(quirk: str, value: object) -> None:
     with pytest.raises(ValueError, match=quirk):
         ServoQuirks(**{quirk: value})  # type: ignore[arg-type]
+
+
+def test_clock_quirks_come_from_toml(tmp_path: Path) -> None:
+    path = tmp_path / "line.toml"
+    path.write_text(
+        '[[device]]\nkind = "servo"\n[device.quirks]\nsync_signal = "sync1"\ncloses_ports = false\n'
+        '[[device.quirks.op_modes]]\nname = "DC"\nassign_activate = 0x0500\nshift_ns = -1000\n'
+    )
+    [servo] = read_segment(path)
+    assert isinstance(servo, Servo)
+    assert servo.quirks == ServoQuirks(
+        op_modes=(OpMode(name="DC", assign_activate=0x0500, shift_ns=-1000),),
+        sync_signal="sync1",
+        closes_ports=False,
+    )
+
+
+def test_a_port_that_ignores_loop_control_stays_open() -> None:
+    main = MainDevice(Segment([Servo(quirks=ServoQuirks(closes_ports=False)), Servo()]))
+    for _ in range(2):  # also after a power cycle
+        main.number_stations()
+        main.write(STATION, DL_CONTROL, struct.pack("<I", 0x0007_0C01))  # port 1 closed
+        assert main.read(STATION, DL_STATUS, 2)[1] & 0x04 == 0
+        assert main.read(STATION + 1, DL_STATUS, 2)
+        main.segment[0].switch_off()
+        main.segment[0].switch_on()
 
 
 def test_quirks_survive_a_power_cycle() -> None:

@@ -9,11 +9,12 @@ from collections.abc import Callable
 
 import pytest
 
-from catenary.virtual import Coupler, Crystal, Segment, Servo
+from catenary.virtual import Coupler, Crystal, Segment, Servo, ServoQuirks
 from catenary.virtual.faults import power_cycle
+from catenary.virtual.op_modes import EASYCAT, EASYCAT_STORED, EL3702, SYNC1_ALONE, OpMode
 from catenary.wire.datagram import Command
 from catenary.wire.sii import decode_sii
-from tests.virtual.clocks import ACTIVATION, START_TIME, SYNC0_CYCLE, Clocks
+from tests.virtual.clocks import ACTIVATION, START_TIME, SYNC0_CYCLE, SYNC1_CYCLE, Clocks
 from tests.virtual.main_device import STATION
 
 MS = 1_000_000
@@ -377,3 +378,59 @@ def test_a_device_that_nobody_steers_misses_no_pulse(phase: float) -> None:
         drive.swap()
     missed = drive.segment.core.synchronous(DEVICE)[2]
     assert (missed, drive.al_status(SERVO)) == (0, (8, 0))
+
+
+# -- quirks ------------------------------------------------------------------------------------
+
+
+def test_a_drive_by_sync1_shows_that_type_alone() -> None:
+    drive = Drive(Servo(quirks=ServoQuirks(sync_signal="sync1")))
+    drive.start_mailbox(SERVO)
+    assert value(drive, 0x1C32, 4) == 0x0009  # free run, DC SYNC1
+    assert drive.download(SERVO, 0x1C32, 1, b"\x02\0") == 0x06090030
+    assert drive.download(SERVO, 0x1C32, 1, b"\x03\0") == 0
+    drive.switch_on(activation=0x03)
+    assert drive.safe_op() == (0x12, INVALID_DC)
+
+
+@pytest.mark.parametrize(("later", "every"), [(0, 1), (300_000, 1), (3 * MS, 4)])
+def test_sync1_comes_with_the_first_sync0_after_its_time(later: int, every: int) -> None:
+    drive = Drive(Servo(quirks=ServoQuirks(sync_signal="sync1")))
+    drive.start_mailbox(SERVO)
+    drive.put_number(DEVICE, SYNC1_CYCLE, "<I", later)
+    drive.switch_on(activation=0x05)
+    assert drive.safe_op() == (4, 0)
+    assert value(drive, 0x1C32, 2) == every * MS
+    drive.let_pass(40)
+    before = drive.segment.core.pulses(DEVICE)[1]
+    drive.let_pass(60)
+    sync0, sync1 = drive.segment.core.pulses(DEVICE)
+    assert sync0 == 0
+    assert sync1 - before == 60 // every
+    assert drive.segment.core.synchronous(DEVICE)[1]
+
+
+@pytest.mark.parametrize("modes", [EL3702, SYNC1_ALONE, EASYCAT, EASYCAT_STORED])
+def test_the_sii_has_the_op_modes_given(modes: tuple[OpMode, ...]) -> None:
+    drive = Drive(Servo(quirks=ServoQuirks(op_modes=modes)))
+    sii = decode_sii(drive.segment.core.sii_image(DEVICE))
+    assert [
+        (
+            *(sii.string(mode.name), mode.assign_activate, mode.cycle_time_ns, mode.sync0_factor),
+            *(mode.shift_time_ns, mode.sync1_factor, mode.shift_time_1_ns),
+        )
+        for mode in sii.clock_modes
+    ] == [
+        (
+            *(mode.name, mode.assign_activate, mode.sync0_ns, mode.sync0_factor),
+            *(mode.shift_ns, mode.sync1_factor, mode.sync1_shift_ns),
+        )
+        for mode in modes
+    ]
+
+
+def test_an_op_mode_that_does_not_fit_is_refused() -> None:
+    with pytest.raises(ValueError, match="shift_ns has 32 bits with a sign"):
+        OpMode(name="DC", shift_ns=1 << 31)
+    with pytest.raises(ValueError, match="assign_activate has 16 bits"):
+        OpMode(name="DC", assign_activate=-1)

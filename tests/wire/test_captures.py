@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from catenary.errors import DecodeError
+from catenary.wire.capture import decode_capture
 from catenary.wire.coe import (
     DownloadRequest,
     DownloadResponse,
@@ -20,7 +21,6 @@ from catenary.wire.datagram import Command, Datagram
 from catenary.wire.fmmu import decode_fmmu
 from catenary.wire.frame import Frame, decode_frame
 from catenary.wire.mailbox import Mailbox, Type, decode_mailbox
-from catenary.wire.pcapng import decode_capture
 from catenary.wire.register import (
     FMMU_COUNT,
     PROCESS_RAM,

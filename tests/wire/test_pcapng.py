@@ -16,7 +16,7 @@ from catenary.wire.pcapng import (
     Direction,
     Interface,
     Packet,
-    decode_capture,
+    decode_pcapng,
     encode_header,
     encode_packet,
     encode_statistics,
@@ -47,11 +47,11 @@ BIG_ENDIAN = (
 @given(st.lists(packets, max_size=5), st.text(max_size=10))
 def test_comes_back(values, name):
     data = encode_header(name) + b"".join(encode_packet(packet) for packet in values)
-    assert decode_capture(data) == Capture((Interface(name),), tuple(values))
+    assert decode_pcapng(data) == Capture((Interface(name),), tuple(values))
 
 
 def test_big_endian_microseconds_and_simple_packets():
-    capture = decode_capture(BIG_ENDIAN)
+    capture = decode_pcapng(BIG_ENDIAN)
     assert capture.interfaces == (Interface(resolution=6),)
     assert capture.packets == (
         Packet(1_000_007_000, b"abc", original_length=60),
@@ -62,7 +62,7 @@ def test_big_endian_microseconds_and_simple_packets():
 def test_interfaces_count_anew_in_each_section():
     data = encode_header("a") + encode_packet(Packet(1, b"x"))
     data += encode_header("b") + encode_packet(Packet(2, b"y"))
-    capture = decode_capture(data)
+    capture = decode_pcapng(data)
     assert [each.name for each in capture.interfaces] == ["a", "b"]
     assert [each.interface for each in capture.packets] == [0, 1]
 
@@ -72,20 +72,30 @@ def test_interfaces_count_anew_in_each_section():
 )
 def test_resolutions(resolution, ticks, time_ns):
     header = encode_header().replace(bytes([9, 0, 1, 0, 9]), bytes([9, 0, 1, 0, resolution]))
-    capture = decode_capture(header + encode_packet(Packet(ticks, b"")))
+    capture = decode_pcapng(header + encode_packet(Packet(ticks, b"")))
     assert capture.packets[0].time_ns == time_ns
+
+
+def test_a_cut_block_is_left_out_and_counted():
+    """A killed program or a full disk leaves such files."""
+    first, second = encode_packet(Packet(1, b"first")), encode_packet(Packet(2, b"second"))
+    start = encode_header() + first
+    for size in range(len(second)):
+        capture = decode_pcapng(start + second[:size])
+        assert [packet.data for packet in capture.packets] == [b"first"]
+        assert capture.cut == size
 
 
 def test_other_blocks_are_left_out():
     statistics = encode_statistics(5, received=3, dropped=1)
-    assert decode_capture(encode_header() + statistics).packets == ()
+    assert decode_pcapng(encode_header() + statistics).packets == ()
 
 
 @given(st.integers(0, len(BIG_ENDIAN) - 1), st.integers(0, 255))
 def test_any_byte_wrong_gives_a_value_or_decode_error(place, byte):
     data = BIG_ENDIAN[:place] + bytes([byte]) + BIG_ENDIAN[place + 1 :]
     try:
-        capture = decode_capture(data)
+        capture = decode_pcapng(data)
     except DecodeError:
         return
     assert len(capture.packets) <= 2
@@ -94,9 +104,10 @@ def test_any_byte_wrong_gives_a_value_or_decode_error(place, byte):
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
-        (b"\x00" * 11, "11 bytes left"),
+        (b"\x00" * 11, "11 bytes, no block fits"),
         (b"\x01" * 12, "does not begin with a section header"),
-        (encode_header()[:-1], "says"),
+        (encode_header()[:20], "block at byte 0 says"),
+        (encode_header() + struct.pack("<III", 6, 13, 13), "says 13 bytes"),
         (encode_header()[:8] + b"abcd" + encode_header()[12:], "byte-order magic"),
         (encode_header()[:28] + encode_packet(Packet(0, b"")), "interface 0"),
         (encode_header()[:-4] + bytes(4), "ends with another length"),
@@ -104,7 +115,7 @@ def test_any_byte_wrong_gives_a_value_or_decode_error(place, byte):
 )
 def test_refusals_say_why(data, reason):
     with pytest.raises(DecodeError, match=reason):
-        decode_capture(data)
+        decode_pcapng(data)
 
 
 @pytest.mark.parametrize(

@@ -113,10 +113,17 @@ def test_refusals_say_why():
         decode_sdo_information(bytes.fromhex("008009000000"))
     with pytest.raises(DecodeError, match="CoE service 2"):
         decode_sdo_information(bytes.fromhex("002001000000"))
-    with pytest.raises(DecodeError, match="even number"):
-        decode_object_list(b"\x01\x00\x00")
+    with pytest.raises(DecodeError, match="needs at least 2"):
+        decode_object_list(b"\x01")
     with pytest.raises(DecodeError, match="unknown kind 6"):
         decode_object_list(b"\x06\x00")
-    with pytest.raises(DecodeError, match="needs 4 bytes"):
-        decode_error(bytes(3))
+
+
+def test_an_abort_without_a_complete_code_has_none():
     assert decode_error(bytes.fromhex("00000206")) == 0x06020000
+    assert decode_error(bytes(3)) is None
+    assert decode_error(b"") is None
+
+
+def test_half_an_index_at_the_end_of_a_list_is_ignored():
+    assert decode_object_list(b"\x01\x00\x00\x10\x08").indices == (0x1000,)

@@ -20,7 +20,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from catenary.errors import CatenaryError
-from tools.rtlab import compare, image, kernel, machine, record, tables
+from tools.rtlab import compare, igh, image, kernel, machine, record, tables
+from tools.rtlab.archive import Entry
 from tools.rtlab.errors import LabError
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -69,6 +70,9 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument(
         "--compare", nargs=2, type=Path, metavar=("A", "B"), help="the medians of two runs"
     )
+    parser.add_argument(
+        "--igh", type=Path, metavar="FOLDER", help="a build of the IgH master, for its table"
+    )
     parser.add_argument("--minutes", type=float, help="the deadline of a table (its own)")
     return parser.parse_args(arguments)
 
@@ -84,7 +88,10 @@ def run(arguments: argparse.Namespace) -> None:
     for folder in (cache(), WORK, arguments.out):
         folder.mkdir(parents=True, exist_ok=True)
     system = kernel.provide(cache())
-    root = image.provide(system, REPOSITORY, WORK)
+    built = built_igh(arguments.igh, system, chosen)
+    if not chosen:
+        return
+    root = image.provide(system, REPOSITORY, WORK, built)
     for name, table in chosen.items():
         table = replace(table, command=f"{table.command} {arguments.options}".rstrip())
         found = run_table(name, table, system, root, arguments.minutes)
@@ -93,12 +100,26 @@ def run(arguments: argparse.Namespace) -> None:
         print(f"wrote {file}", flush=True)
 
 
+def built_igh(
+    folder: Path | None, system: kernel.Kernel, chosen: dict[str, tables.Table]
+) -> list[Entry]:
+    """Return what the guest gets of an IgH master. Without one its table is not run, and said."""
+    if "igh" not in chosen:
+        return []
+    try:
+        return igh.provide(folder, system)
+    except igh.NotThere as reason:
+        print(f"rtlab: igh: skipped: {reason}", flush=True)
+        del chosen["igh"]
+        return []
+
+
 def run_table(
     name: str, table: tables.Table, system: kernel.Kernel, root: Path, minutes: float | None
 ) -> dict[str, object]:
     """The record of one guest. LabError: it did not do it."""
-    print(f"rtlab: {name}: catenary {table.command}", flush=True)
-    command = [str(Path(sys.executable).with_name("catenary")), *table.arguments]
+    print(f"rtlab: {name}: {table.shown}", flush=True)
+    command = [*program(table), *table.arguments]
     job = {
         "folder": str(REPOSITORY),
         "name": name,
@@ -111,6 +132,12 @@ def run_table(
             print(text, flush=True)
         answer = guest.answer()
     return record.make(answer, table, system, REPOSITORY, guest.seconds)
+
+
+def program(table: tables.Table) -> list[str]:
+    if table.program:
+        return [sys.executable, table.program]
+    return [str(Path(sys.executable).with_name("catenary"))]
 
 
 if __name__ == "__main__":

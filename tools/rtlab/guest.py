@@ -27,6 +27,7 @@ ENVIRONMENT = {
     "LC_ALL": "C.UTF-8",
     "CATENARY_PRIVATE_NETWORK": "inside",  # the whole machine is
     "CATENARY_BENCH_PROGRAMS": "/compiled",
+    "CATENARY_LIBETHERCAT": "/igh/libethercat.so.1",  # where TABLE=igh has one
     "OPENBLAS_NUM_THREADS": "1",
     "PYTHONHASHSEED": "0",  # one run is to be as another
     "PYTHONUNBUFFERED": "1",

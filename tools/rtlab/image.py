@@ -7,7 +7,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from catenary.bench.compiler import compile_all
@@ -16,11 +16,11 @@ from tools.rtlab.archive import Entry
 from tools.rtlab.kernel import Kernel
 
 
-def provide(kernel: Kernel, repository: Path, folder: Path) -> Path:
+def provide(kernel: Kernel, repository: Path, folder: Path, more: Sequence[Entry] = ()) -> Path:
     """The image in `folder`. OSError: no room; CatenaryError: the C peers do not compile."""
     with tempfile.TemporaryDirectory(dir=folder) as programs:
         compiled = compile_all(Path(programs))
-        entries = root.entries(kernel, root.everything(repository), compiled)
+        entries = [*root.entries(kernel, root.everything(repository), compiled), *more]
     image, said = folder / "root.cpio", folder / "root.fingerprint"
     fingerprint = fingerprint_of(entries, kernel)
     if not (image.exists() and said.exists() and said.read_text() == fingerprint):

@@ -24,7 +24,7 @@ def make(
     return {
         "note": NOTE,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "command": f"catenary {table.command}",
+        "command": table.shown,
         "ns_per_instruction": 2**machine.SHIFT,
         "machine": "one processor, counted instructions, no caches",
         "kernel": answer["kernel"],

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from tools.rtlab import igh
 from tools.rtlab.errors import LabError
 
 RESULT = "FILE"  # the guest puts the path of the result in its place
@@ -19,6 +20,12 @@ class Table:
     # What real-time tasks may have, [us] of every second; -1: all. Less lets a table end that asks
     # for more than there is, and makes each switch 0.4 us longer.
     real_time_us: int = -1
+    program: str = ""  # of the guest, instead of `catenary`
+
+    @property
+    def shown(self) -> str:
+        """The command as a person reads it."""
+        return f"{self.program or 'catenary'} {self.command}".rstrip()
 
     @property
     def arguments(self) -> list[str]:
@@ -65,6 +72,13 @@ TABLES: Mapping[str, Table] = {
         of_all=False,
         real_time_us=950_000,
     ),
+    "tocabi-8k": Table(
+        "bench table tocabi --seconds 5 --rounds 1 --peers law --rates 8000 --axes 3,3",
+        45,
+        "6 axes on two networks by laws at 8 kHz for 5 s",
+        of_all=False,
+        real_time_us=950_000,
+    ),
     "cobot": Table(
         "bench table cobot --realtime --short --stretch 5",
         60,
@@ -74,6 +88,12 @@ TABLES: Mapping[str, Table] = {
     "skew": Table("bench table skew", 30, "two digital outputs at both ends of the line"),
     "interrupt": Table("bench table interrupt", 60, "reaction of a waiting task to an event"),
     "law": Table("bench law", 20, "what one call of a compiled law takes"),
+    "igh": Table(
+        "",
+        60,
+        "loops over the IgH kernel master at 1 and 4 kHz; IGH=path: a build of it",
+        program=f"{igh.FOLDER}/{igh.TABLE}",
+    ),
 }
 
 

@@ -12,6 +12,7 @@ from catenary.bus.sub_device import SubDevice
 from catenary.errors import ConfigurationError, SegmentError
 from catenary.link import RingLink
 from catenary.model.device import DeviceDescription, Direction, mapped_entries
+from catenary.plan.clocks import SYNC_OBJECTS
 from catenary.plan.make import Plan, gather_wishes
 from catenary.plan.start_up import DevicePlan
 from catenary.plan.wish import ObjectReference, PdoWish, Wish
@@ -20,7 +21,9 @@ from catenary.procedure.clocks import ClockMeasurement
 from catenary.procedure.configure import configure_process_data
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
+from catenary.procedure.names import name_entries
 from catenary.procedure.pdo import read_mapping, verify_mapping, write_downloads
+from catenary.procedure.pdo_offers import read_offers, read_values
 from catenary.procedure.profile import read_object
 from catenary.procedure.sync import bring_together, read_types, stop, write_types
 from catenary.wire.al import State
@@ -77,22 +80,39 @@ def bring_to_safe_op(
 def _describe(sub: SubDevice, wish: PdoWish) -> Procedure[DeviceDescription]:
     channel = _channel(sub)
     device = yield from read_mapping(channel, sub.description)
-    known = {(found.index, found.subindex) for found in device.objects}
+    device = yield from name_entries(channel, device)
+    written = [(index, subindex) for index, subindex, _ in wish.start_up]
+    if wish.clock is not None:
+        written += [(index, subindex) for index in SYNC_OBJECTS for subindex in (1, 2)]
+    device = yield from read_values(channel, device, written)
     for direction, references in ((Direction.OUTPUT, wish.outputs), (Direction.INPUT, wish.inputs)):
-        for reference in _unmapped(device, direction, references):
-            if (reference.index, reference.subindex) in known:
-                continue
-            known.add((reference.index, reference.subindex))
+        missing = _unmapped(device, direction, references)
+        if missing or wish.written(direction):
+            device = yield from read_offers(channel, device, direction)
+        device = yield from _with_objects(channel, device, missing)
+    return device
+
+
+def _with_objects(
+    channel: MailboxChannel, device: DeviceDescription, missing: Sequence[ObjectReference]
+) -> Procedure[DeviceDescription]:
+    """Return the description with the dictionary's entries of the missing objects."""
+    for reference in missing:
+        if device.known_object(reference.index, reference.subindex) is None:
             found = yield from read_object(channel, device, reference.index, reference.subindex)
             device = replace(device, objects=(*device.objects, found))
+            if found.note:
+                device = replace(device, notes=(*device.notes, found.note))
     return device
 
 
 def _unmapped(
     device: DeviceDescription, direction: Direction, references: Sequence[ObjectReference]
 ) -> list[ObjectReference]:
-    mapped = {(e.index, e.subindex) for e in mapped_entries(device.assignments(direction))}
-    return [each for each in references if (each.index, each.subindex) not in mapped]
+    mapped = {
+        (e.index, e.subindex, e.bit_length) for e in mapped_entries(device.assignments(direction))
+    }
+    return [r for r in references if (r.index, r.subindex, r.bit_length) not in mapped]
 
 
 def _prepare(sub: SubDevice, plan: DevicePlan) -> Procedure[None]:
@@ -105,7 +125,7 @@ def _prepare(sub: SubDevice, plan: DevicePlan) -> Procedure[None]:
         sub.sync_types = {}
     if plan.downloads:
         channel = _channel(sub)
-        yield from write_downloads(channel, plan)
+        yield from write_downloads(channel, device, plan)
         if plan.mapping_changed:
             yield from verify_mapping(channel, device, plan)
     yield from configure_process_data(sub.station, device, plan)

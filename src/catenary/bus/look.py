@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from catenary.bus.ring import check_direction, routed
 from catenary.bus.runner import BlockingRunner
-from catenary.bus.segment_scan import described, unread, with_places
+from catenary.bus.segment_scan import READ_TIMEOUT, described, unread, with_places
 from catenary.errors import CatenaryError
 from catenary.link import RingLink
 from catenary.link.ring_state import Shape
@@ -14,7 +14,7 @@ from catenary.model.device import DeviceDescription
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.sii import read_image
 from catenary.procedure.sii_owner import with_eeprom
-from catenary.procedure.station import Station
+from catenary.procedure.station import Station, within
 from catenary.procedure.stations import StationRegisters, count, read_registers
 from catenary.procedure.visit import distinct, give_addresses, read_addresses, visit
 
@@ -54,10 +54,11 @@ def _visit_from_both_ends(
 
 
 def _named(registers: StationRegisters) -> Procedure[DeviceDescription]:
-    """With what the EEPROM says of its identity; where it cannot be read, with a note why."""
+    """Return the device with the content of its EEPROM; if it cannot be read, with a note why."""
     station = Station(registers.position, registers.station_address)
     try:
-        image = yield from with_eeprom(station, read_image(station))
+        reading = within(READ_TIMEOUT, station, read_image(station))
+        image = yield from with_eeprom(station, reading)
     except CatenaryError as error:
         return replace(unread(registers), notes=(error.message,))
     return described(registers, image)

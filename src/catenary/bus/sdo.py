@@ -10,7 +10,7 @@ from catenary.bus.pending import Pending
 from catenary.errors import MailboxError, SdoAbort
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
-from catenary.procedure.sdo import UPLOAD_LIMIT, download, upload
+from catenary.procedure.sdo import UPLOAD_LIMIT, UPLOAD_TIMEOUT, download, upload
 from catenary.procedure.sdo_information import DescribedObject, describe_object, list_objects
 from catenary.types import DataType
 from catenary.wire.sdo_information import ListType, ObjectDescription
@@ -35,10 +35,17 @@ class Sdo:
 
     def __init__(self, sub: SubDevice) -> None:
         self._sub = sub
+        self.notes: tuple[str, ...] = ()  # what was missing in the last `list`
 
     @overload
     def read(
-        self, index: int, subindex: int = 0, *, complete: bool = False, limit: int = UPLOAD_LIMIT
+        self,
+        index: int,
+        subindex: int = 0,
+        *,
+        complete: bool = False,
+        limit: int = UPLOAD_LIMIT,
+        timeout: float = UPLOAD_TIMEOUT,
     ) -> bytes: ...
     @overload
     def read(
@@ -49,6 +56,7 @@ class Sdo:
         type: DataType[T],
         complete: bool = False,
         limit: int = UPLOAD_LIMIT,
+        timeout: float = UPLOAD_TIMEOUT,
     ) -> T: ...
     def read(
         self,
@@ -58,11 +66,21 @@ class Sdo:
         type: DataType[T] | None = None,
         complete: bool = False,
         limit: int = UPLOAD_LIMIT,
+        timeout: float = UPLOAD_TIMEOUT,
     ) -> T | bytes:
-        """Reads an object: bytes, or with a `type` its value. SdoAbort if the device refuses,
-        DecodeError if it is not of the type, MailboxError if it is to be longer than `limit`
-        bytes."""
-        asked = self._upload(index, subindex, complete, limit)
+        """Read an object: bytes, or with a `type` its value.
+
+        Args:
+            complete: Read all subindices from `subindex` on.
+            limit: Largest size [bytes].
+            timeout: Deadline of a transfer in several segments [s].
+
+        Raises:
+            SdoAbort: The device refuses.
+            DecodeError: The bytes are not a value of the type.
+            MailboxError: The object is longer than `limit`, or takes longer than `timeout`.
+        """
+        asked = self._upload(index, subindex, complete, limit, timeout)
         if type is None:
             return self._sub.main.converse(asked)
         return self._sub.main.converse(_decoded(asked, type))
@@ -87,7 +105,13 @@ class Sdo:
 
     @overload
     def request(
-        self, index: int, subindex: int = 0, *, complete: bool = False, limit: int = UPLOAD_LIMIT
+        self,
+        index: int,
+        subindex: int = 0,
+        *,
+        complete: bool = False,
+        limit: int = UPLOAD_LIMIT,
+        timeout: float = UPLOAD_TIMEOUT,
     ) -> Pending[bytes]: ...
     @overload
     def request(
@@ -98,6 +122,7 @@ class Sdo:
         type: DataType[T],
         complete: bool = False,
         limit: int = UPLOAD_LIMIT,
+        timeout: float = UPLOAD_TIMEOUT,
     ) -> Pending[T]: ...
     def request(
         self,
@@ -107,10 +132,11 @@ class Sdo:
         type: DataType[T] | None = None,
         complete: bool = False,
         limit: int = UPLOAD_LIMIT,
+        timeout: float = UPLOAD_TIMEOUT,
     ) -> Pending[T] | Pending[bytes]:
         """As `read`, without waiting: look at `done`, then take `result()`. Where no loop runs, the
         answer is there already."""
-        asked = self._upload(index, subindex, complete, limit)
+        asked = self._upload(index, subindex, complete, limit, timeout)
         if type is None:
             return self._sub.main.request(asked)
         return self._sub.main.request(_decoded(asked, type))
@@ -136,17 +162,32 @@ class Sdo:
         return self._sub.main.request(self._download(index, subindex, value, type, complete))
 
     def list(self, kind: ListType = ListType.ALL) -> tuple[ObjectDescription, ...]:
-        """The objects of a kind, by index, as the device itself describes them (SDO information):
-        one question an object. SdoAbort or MailboxError where it offers no such service."""
-        return self._sub.main.converse(list_objects(self._channel(), kind))
+        """Read the objects of a kind, by index, as the device describes them (SDO information).
+
+        One question is asked for each object. Of an object that the device lists and does not
+        describe, only the index is known: its `object_code` is 0. `notes` names these objects, and
+        what is missing of a list that was cut short.
+
+        Raises:
+            SdoAbort: The device refuses the list.
+            MailboxError: The device has no such service.
+        """
+        self.notes = ()
+        found, self.notes = self._sub.main.converse(list_objects(self._channel(), kind))
+        return found
 
     def describe(self, index: int) -> DescribedObject:
-        """One object with its entries: types, lengths, access, names."""
+        """Read one object with its entries: types, lengths, access, names, and notes about entries
+        that the device does not describe."""
         return self._sub.main.converse(describe_object(self._channel(index), index))
 
-    def _upload(self, index: int, subindex: int, complete: bool, limit: int) -> Procedure[bytes]:
+    def _upload(
+        self, index: int, subindex: int, complete: bool, limit: int, timeout: float
+    ) -> Procedure[bytes]:
         channel = self._channel(index, subindex, complete)
-        return upload(channel, index, subindex, complete_access=complete, limit=limit)
+        return upload(
+            channel, index, subindex, complete_access=complete, limit=limit, timeout=timeout
+        )
 
     def _download(
         self, index: int, subindex: int, value: object, type: DataType[T] | None, complete: bool

@@ -1,4 +1,4 @@
-"""What is asked of one device on its way from power-up to PRE-OP, as one procedure."""
+"""The scan of one device, from power-up to PRE-OP, as one procedure."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from catenary.errors import CatenaryError, IdentityError
+from catenary.errors import CatenaryError, DecodeError, IdentityError, SegmentError
 from catenary.model.describe import describe
 from catenary.model.device import DeviceDescription, Identity
 from catenary.model.topology import make_topology, tree
@@ -14,17 +14,21 @@ from catenary.procedure.al_state import request_state
 from catenary.procedure.configure import configure_mailbox
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
-from catenary.procedure.pdo import read_mapping
+from catenary.procedure.names import name_entries
+from catenary.procedure.pdo_offers import read_first_mapping
 from catenary.procedure.profile import read_profile
 from catenary.procedure.sii import read_image
 from catenary.procedure.sii_owner import hand_over
-from catenary.procedure.station import Station
+from catenary.procedure.station import Station, within
 from catenary.procedure.stations import StationRegisters
 from catenary.wire.al import State
 
+READ_TIMEOUT = 30.0  # [s] for the registers and the SII of one device
+BRING_UP_TIMEOUT = 30.0  # [s] from there to PRE-OP, the profile included
+
 
 class Found(NamedTuple):
-    """One device in PRE-OP, with the mailbox that brought it there; or what kept it from there."""
+    """One device in PRE-OP with its mailbox, or the error that prevented PRE-OP."""
 
     description: DeviceDescription
     channel: MailboxChannel | None = None
@@ -32,18 +36,34 @@ class Found(NamedTuple):
 
 
 def find(registers: StationRegisters) -> Procedure[Found]:
-    """Brings one device to PRE-OP, or tells what is wrong with it: the others go on."""
+    """Bring one device to PRE-OP, or return its error: the other devices are not affected."""
     device = unread(registers)
+    station = Station(registers.position, registers.station_address)  # its name is not known yet
     try:
-        device = yield from identify(registers)
-        return (yield from bring_to_pre_op(device))
+        device = yield from within(READ_TIMEOUT, station, identify(registers))
+        station = station_of(device)
+        return (yield from within(BRING_UP_TIMEOUT, station, bring_to_pre_op(device)))
+    except (DecodeError, ValueError) as error:  # of a decoder: it does not know the device
+        return Found(device, error=_unreadable(station, error))
     except CatenaryError as error:
         return Found(device, error=error)
 
 
+def _unreadable(station: Station, error: Exception) -> SegmentError:
+    return SegmentError(
+        f"{station}: its data cannot be used: {error}",
+        hint="its EEPROM or its firmware is at fault; please report it",
+    )
+
+
+def station_of(device: DeviceDescription) -> Station:
+    """Return the device as errors name it."""
+    return Station(device.position, device.station_address, device.name)
+
+
 def bring_to_pre_op(device: DeviceDescription) -> Procedure[Found]:
-    """Opens the mailbox, asks for PRE-OP and reads the profile."""
-    station = Station(device.position, device.station_address, device.name)
+    """Open the mailbox, request PRE-OP, read the profile, the mapping and names the SII lacks."""
+    station = station_of(device)
     if device.mailbox is None:
         yield from hand_over(station)
         yield from request_state(station, State.PRE_OP)
@@ -54,8 +74,8 @@ def bring_to_pre_op(device: DeviceDescription) -> Procedure[Found]:
     yield from request_state(station, State.PRE_OP)
     if device.coe:
         device = yield from read_profile(channel, device)
-    if device.coe and not (device.outputs or device.inputs):
-        device = yield from read_mapping(channel, device)  # an SII without PDOs
+        device = yield from read_first_mapping(channel, device)
+    device = yield from name_entries(channel, device)
     return Found(device, channel)
 
 

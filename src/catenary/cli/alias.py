@@ -91,8 +91,11 @@ def refuse_twins(
 
 
 def show(device: SubDevice, stored: int) -> str:
+    from catenary.cli.text import escaped
+
+    name = escaped(str(device.station))
     now = f"alias {device.alias}" if device.alias else "no alias"
     if stored == device.alias:
-        return f"{device.station}: {now}"
+        return f"{name}: {now}"
     then = f"alias {stored}" if stored else "no alias"
-    return f"{device.station}: {now}, after its next power-up {then}"
+    return f"{name}: {now}, after its next power-up {then}"

@@ -49,6 +49,12 @@ def add_table(group: Commands) -> None:
     parser.add_argument(
         "--peers", metavar="A,B", help="of tocabi: loop, law, c (those that this machine can)"
     )
+    parser.add_argument(
+        "--axes",
+        type=positive_numbers,
+        metavar="N,N",
+        help="tocabi: drives on each of its two networks (default: 18,15)",
+    )
     parser.add_argument("--ring", action="store_true", help="each network a ring, not a line")
     parser.add_argument(
         "--busy-wait",
@@ -91,6 +97,7 @@ def run_table(arguments: argparse.Namespace) -> int:
         rates=arguments.rates,
         peers=arguments.peers and [name for name in arguments.peers.split(",") if name],
         ring=arguments.ring,
+        axes=arguments.axes,
         busy_wait=arguments.busy_wait,
         example=arguments.example,
         realtime=arguments.realtime,

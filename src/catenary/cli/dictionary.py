@@ -7,10 +7,12 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from catenary.bus import SubDevice
-from catenary.errors import CatenaryError, SdoAbort
-from catenary.procedure.sdo_information import DescribedObject
+from catenary.cli.failure import one_line
+from catenary.cli.text import escaped
+from catenary.errors import CatenaryError, MailboxError, ResponseTimeout, SdoAbort
+from catenary.procedure.sdo_information import FAILURES, DescribedObject
 from catenary.types import Value, by_index
-from catenary.wire.sdo_information import Access, EntryDescription, ObjectCode
+from catenary.wire.sdo_information import Access, EntryDescription, ObjectCode, ObjectDescription
 
 ANY_READ = Access.READ_PRE_OP | Access.READ_SAFE_OP | Access.READ_OP
 ANY_WRITE = Access.WRITE_PRE_OP | Access.WRITE_SAFE_OP | Access.WRITE_OP
@@ -31,17 +33,40 @@ class Row:
     problem: str = ""  # why it has no value
 
 
-def rows_of(device: SubDevice, *, values: bool) -> Iterator[Row]:
-    """The rows of all objects, asked for one after the other."""
-    for known in device.sdo.list():
-        described = device.sdo.describe(known.index)
-        single = described.description.object_code == ObjectCode.VAR
-        if not single:
-            yield Row(known.index, None, known.name, shape(described), 0, Access(0))
-        for entry in described.entries:
-            row = _row(entry, known.name if single and not entry.name else entry.name)
-            readable = values and entry.access & Access.READ_PRE_OP
-            yield _with_value(device, entry, row) if readable else row
+def rows_of(device: SubDevice, notes: list[str], *, values: bool) -> Iterator[Row]:
+    """Yield the rows of all objects, asked for one after the other.
+
+    An object that the device does not describe has a row that says so. `notes` receives what is
+    missing, and why.
+    """
+    known = device.sdo.list()
+    notes += device.sdo.notes
+    for each in known:
+        if not (each.object_code or each.name):
+            yield _undescribed(each, "not described")
+            continue
+        try:
+            described = device.sdo.describe(each.index)
+        except FAILURES as error:
+            yield _undescribed(each, error.message)
+            continue
+        notes += described.notes
+        yield from _rows(device, described, values)
+
+
+def _undescribed(known: ObjectDescription, problem: str) -> Row:
+    return Row(known.index, None, known.name, "", 0, Access(0), problem=problem)
+
+
+def _rows(device: SubDevice, described: DescribedObject, values: bool) -> Iterator[Row]:
+    """Yield a heading for an object of several entries, and its entries."""
+    single = described.description.object_code == ObjectCode.VAR
+    if not single:
+        yield Row(described.index, None, described.name, shape(described), 0, Access(0))
+    for entry in described.entries:
+        row = _row(entry, described.name if single and not entry.name else entry.name)
+        readable = values and entry.access & Access.READ_PRE_OP
+        yield _with_value(device, entry, row) if readable else row
 
 
 def _row(entry: EntryDescription, name: str) -> Row:
@@ -54,6 +79,8 @@ def _with_value(device: SubDevice, entry: EntryDescription, row: Row) -> Row:
         data = device.sdo.read(entry.index, entry.subindex)
     except SdoAbort as error:
         return replace(row, problem=f"refused with 0x{error.code:08X}")
+    except (MailboxError, ResponseTimeout) as error:
+        return replace(row, problem=error.message)
     try:
         return replace(row, value=by_index(entry.data_type).decode(data))
     except (ValueError, CatenaryError):  # a maker's own type, or not as long as it says
@@ -90,19 +117,19 @@ def as_lines(rows: Iterable[Row]) -> Iterator[str]:
     for row in rows:
         place = f"0x{row.index:04X}" + ("" if row.subindex is None else f":{row.subindex:02X}")
         access = "" if row.subindex is None else access_text(row.access)
-        line = f"{place:9}  {row.type:14}  {access:9}  {row.name}"
+        line = f"{place:9}  {row.type:14}  {access:9}  {escaped(row.name)}"
         yield f"{line}{_value_text(row)}".rstrip()
 
 
 def _value_text(row: Row) -> str:
     if row.problem:
-        return f"  ({row.problem})"
+        return f"  ({one_line(row.problem)})"
     if row.value is None:
         return ""
     if isinstance(row.value, bytes):
         return f" = {row.value.hex(' ')}"
     if isinstance(row.value, str):
-        return f" = {row.value!r}"
+        return f" = {row.value!r}"  # escapes control characters, too
     hexadecimal = f" (0x{row.value:X})" if isinstance(row.value, int) and row.value > 9 else ""
     return f" = {row.value}{hexadecimal}"
 

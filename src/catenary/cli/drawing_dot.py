@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from catenary.cli.drawing import Drawing, Node, inner_text, port_text
+from catenary.cli.text import escaped
 from catenary.model.topology import PORT_ORDER, Cable
 from catenary.wire.error_counters import PortErrors
 
@@ -85,7 +86,7 @@ def _delay(node: Node) -> str:
 
 
 def _escaped(text: str) -> str:
-    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+    return escaped(text).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
 
 
 def _quoted(text: str) -> str:

@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Mapping
 
+from catenary.cli.text import escaped
 from catenary.errors import CatenaryError
 
 FAILED = 1
@@ -56,7 +57,14 @@ def describe(error: Exception) -> tuple[str, str]:
 
 
 def one_line(text: str) -> str:
-    return " ".join(text.split())
+    """Return the text on one line, characters of a device that are not printable escaped."""
+    return escaped(" ".join(text.split()))
+
+
+def with_hint(error: CatenaryError) -> str:
+    """Return the message of an error that does not end the command, and its hint below."""
+    hint = f"\n  hint: {one_line(error.hint)}" if error.hint else ""
+    return f"{one_line(error.message)}{hint}"
 
 
 def silence_stdout() -> int:

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from catenary.cli.arguments import positive_seconds
+from catenary.cli.arguments import number, positive_seconds
 from catenary.cli.failure import UsageError
 from catenary.cli.parsers import Commands, add_command, add_json
 
@@ -43,6 +43,9 @@ def add_parser(commands: Commands) -> None:
         help="also a share whose process has died: its last cycles, as far as it remembers them",
     )
     parser.add_argument(
+        "--uid", type=number, help="the user whose share it is (default: yours, or root's)"
+    )
+    parser.add_argument(
         "--repair",
         action="store_true",
         help="make a file whole that was cut off because the recorder was killed; no SHARE",
@@ -62,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     with stopped_by_signals() as stop:
         options = {"force": arguments.force, "stale": arguments.stale}
-        with Recorder(arguments.share, arguments.file, **options) as recorder:
+        with Recorder(arguments.share, arguments.file, uid=arguments.uid, **options) as recorder:
             if not arguments.json:
                 print(f"recording {recorder} to {arguments.file}; Ctrl-C ends", flush=True)
             recorder.run(seconds=arguments.seconds, stop=stop)

@@ -24,14 +24,15 @@ def add_parser(commands: Commands) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     from catenary.cli.devices import as_json, as_table
+    from catenary.cli.failure import one_line, with_hint
     from catenary.target import MainDevice
 
     with MainDevice(arguments.target, force=arguments.force) as main:
         devices = main.scan(strict=False)
         print(as_json(devices) if arguments.json else as_table(devices))
     for note in main.notes:
-        print(f"note: {note}", file=sys.stderr)
-    failed = [device for device in devices if device.error is not None]
-    for device in failed:
-        print(f"error: {device.error}", file=sys.stderr)
-    return 1 if failed else 0
+        print(f"note: {one_line(note)}", file=sys.stderr)
+    errors = [device.error for device in devices if device.error is not None]
+    for error in errors:
+        print(f"error: {with_hint(error)}", file=sys.stderr)
+    return 1 if errors else 0

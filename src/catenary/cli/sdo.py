@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from typing import TYPE_CHECKING
 
 from catenary.cli.arguments import Entry, entry, position
-from catenary.cli.failure import UsageError
+from catenary.cli.failure import UsageError, one_line
 from catenary.cli.parsers import Commands, add_command, add_force, add_json, add_target
+from catenary.cli.text import escaped
 
 if TYPE_CHECKING:
     from catenary.types import DataType, Value
@@ -89,13 +91,13 @@ def run_read(arguments: argparse.Namespace) -> int:
     kind = _data_type(arguments.type)
     at: Entry = arguments.entry
     with MainDevice(arguments.target, force=arguments.force) as main:
-        device = device_at(main.scan(), arguments.position)
+        device = device_at(main.scan(strict=False), arguments.position)
         data = device.sdo.read(at.index, at.subindex)
     value = kind.decode(data) if kind else None
     if arguments.json:
         print(_as_json(arguments, data, value))
     else:
-        print(value if value is not None else explain(data))
+        print(as_text(data, value))
     return 0
 
 
@@ -113,7 +115,9 @@ def run_write(arguments: argparse.Namespace) -> int:
     at: Entry = arguments.entry
     data = kind.encode(value)
     with MainDevice(arguments.target, force=arguments.force) as main:
-        device_at(main.scan(), arguments.position).sdo.write(at.index, at.subindex, data)
+        device_at(main.scan(strict=False), arguments.position).sdo.write(
+            at.index, at.subindex, data
+        )
     if arguments.json:
         print(_as_json(arguments, data, value))
     return 0
@@ -125,12 +129,16 @@ def run_list(arguments: argparse.Namespace) -> int:
     from catenary.target import MainDevice
 
     with MainDevice(arguments.target, force=arguments.force) as main:
-        rows = rows_of(device_at(main.scan(), arguments.position), values=arguments.values)
+        device = device_at(main.scan(strict=False), arguments.position)
+        notes: list[str] = []
+        rows = rows_of(device, notes, values=arguments.values)
         if arguments.json:
             print(as_json(rows))
         else:
             for line in as_lines(rows):  # as they come: a large dictionary takes seconds
                 print(line)
+    for note in notes:
+        print(f"note: {one_line(note)}", file=sys.stderr)
     return 0
 
 
@@ -148,6 +156,13 @@ def _data_type(name: str | None) -> DataType[Value] | None:
         guess = f"did you mean {near[0]}? " if near else ""
         hint = f"{guess}known: BOOL, SINT, INT, DINT, USINT, UINT, UDINT, REAL, STRING, BYTES, ..."
         raise UsageError(f"unknown data type {name!r}", hint=hint) from error
+
+
+def as_text(data: bytes, value: Value | None) -> str:
+    """Return what was read for people; control characters of a string are escaped."""
+    if value is None:
+        return explain(data)
+    return escaped(value) if isinstance(value, str) else str(value)
 
 
 def explain(data: bytes) -> str:

@@ -1,4 +1,4 @@
-"""`catenary sii read|write`: the EEPROM of a device."""
+"""`catenary sii read|show|write`: the EEPROM of a device, or its image in a file."""
 
 from __future__ import annotations
 
@@ -30,7 +30,8 @@ def add_parser(commands: Commands) -> None:
         help="read or write the EEPROM of a device",
         description="Reads or writes the EEPROM (SII) in which a device keeps its identity, "
         "mailbox and process data.",
-        example="catenary sii read eth0 2 --text\ncatenary sii write eth0 2 drive.bin --dry-run",
+        example="catenary sii read eth0 2 --text\ncatenary sii show drive.bin\n"
+        "catenary sii write eth0 2 drive.bin --dry-run",
     ).add_subparsers(title="commands", metavar="COMMAND", required=True)
     reading = add_command(
         group,
@@ -48,6 +49,16 @@ def add_parser(commands: Commands) -> None:
         "--bytes", metavar="N", type=positive_number, help="so many, instead of the size it claims"
     )
     reading.set_defaults(run=run_read)
+    showing = add_command(
+        group,
+        "show",
+        help="show an image from a file",
+        description="Shows every field of an image, as `sii read` stores it, and checks it. No "
+        "device is needed. Exit status 1 when something is wrong with it.",
+        example="catenary sii show drive.bin",
+    )
+    showing.add_argument("file", metavar="FILE", type=Path, help="the image, as its bytes")
+    showing.set_defaults(run=run_show)
     writing = add_command(
         group,
         "write",
@@ -89,6 +100,17 @@ def run_read(arguments: argparse.Namespace) -> int:
         for note in notes:
             print(f"catenary: {station}: {note}", file=sys.stderr)
     return int(bool(notes) and arguments.bytes is None)
+
+
+def run_show(arguments: argparse.Namespace) -> int:
+    from catenary.wire.sii_check import objections
+
+    image = arguments.file.read_bytes()
+    print("\n".join(as_text(image)))
+    wrong = objections(image)
+    for each in wrong:
+        print(f"catenary: {arguments.file}: {each.text}\n  hint: {each.hint}", file=sys.stderr)
+    return int(bool(wrong))
 
 
 def deliver(arguments: argparse.Namespace, image: bytes) -> None:
@@ -200,16 +222,16 @@ def refuse_unfit(image: bytes, device: SubDevice, extent: Extent, force: bool) -
 
 def report(device: SubDevice, old: bytes, new: bytes, words: int) -> list[str]:
     """What will be different."""
-    from catenary.cli.sii_text import differences, tolerant
+    from catenary.cli.sii_text import differences, word_differences
     from catenary.errors import DecodeError
 
     if not words:
         return [f"{device.station}: its EEPROM holds that already"]
     lines = [f"{device.station}: {words} of {len(new) // 2} words differ"]
     try:
-        return lines + differences(tolerant(old), tolerant(new))
-    except DecodeError as error:
-        return [*lines, f"not comparable in words: {error.message}"]
+        return lines + differences(old, new)
+    except DecodeError as error:  # one of them is not an image
+        return [*lines, f"not comparable by fields: {error.message}", *word_differences(old, new)]
 
 
 def verify(main: MainDevice, device: SubDevice, image: bytes) -> None:

@@ -121,7 +121,9 @@ def as_json(rows: Iterable[tuple[SubDevice, DeviceState]], errors: dict[int, Cat
 def complain(
     rows: Iterable[tuple[SubDevice, DeviceState]], errors: dict[int, CatenaryError]
 ) -> int:
-    """Says what went wrong to stderr; the exit status."""
+    """Print errors to stderr. Return the exit status."""
+    from catenary.cli.failure import with_hint
+
     for error in errors.values():
-        print(f"catenary: {error}", file=sys.stderr)
+        print(f"catenary: {with_hint(error)}", file=sys.stderr)
     return int(bool(errors) or any(now.error for _, now in rows))

@@ -1,12 +1,15 @@
-"""Columns of words."""
+"""Columns of words; a word may be a device's own text."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from catenary.cli.text import escaped
+
 
 def table(rows: Sequence[Sequence[str]]) -> str:
-    """The rows, each column as wide as its widest word."""
+    """Return the rows, each column as wide as its widest word."""
+    rows = [[escaped(word) for word in row] for row in rows]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return "\n".join(
         "  ".join(word.ljust(width) for word, width in zip(row, widths, strict=True)).rstrip()

@@ -521,6 +521,9 @@ cdef class Frames:
             self.make_frame(number, frame)
             for d in frame.datagrams:
                 copies = self.make_datagram(number, frame, d, copies)
+        if plan.sync_units and all(unit.optional for unit in plan.sync_units):
+            for number in range(self.c.frame_count):  # no device is required: silence is no loss
+                self.c.frames[<int>number].needed = 0
 
     def make_frame(self, uint32_t number, frame):
         cdef bytes template = bytes(frame.template)

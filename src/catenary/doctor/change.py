@@ -1,23 +1,42 @@
 """Changes of `--apply`, and how `--undo` takes them back.
 
-Only what is reversible: a value of /proc or /sys, or a setting of the card's driver, that is read
-before it is written. What was there is on disk before anything is changed. A reboot undoes all too.
+Only what is reversible: a value of /proc or /sys, a setting of the card's driver, or the folder of
+shares, which is read before it is written. What was there is on disk before anything is changed. A
+reboot undoes all too. Nothing outside of `TARGETS` is written, whatever the state file contains.
 """
 
 from __future__ import annotations
 
-import json
+import errno
 import os
+import re
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+import msgspec
+
 from catenary.doctor import ethtool
+from catenary.doctor.share_folder import read_folder, write_folder
 from catenary.errors import CatenaryError
 
 BOOT_ID = "/proc/sys/kernel/random/boot_id"
-ETHTOOL = "ethtool:"  # before NIC/SETTING, where a change is no file's
+ETHTOOL = "ethtool:"  # before NIC/SETTING, which is not a file
+FOLDER = "folder:"  # before the path of a folder
+CPU = r"/sys/devices/system/cpu/cpu\d+"
+NIC = r"[A-Za-z0-9][\w.:@-]*"
+TARGETS = (
+    rf"{CPU}/cpufreq/scaling_governor",
+    rf"{CPU}/cpuidle/state\d+/disable",
+    r"/sys/kernel/mm/transparent_hugepage/enabled",
+    r"/proc/irq/\d+/smp_affinity_list",
+    rf"/proc/sys/net/ipv6/conf/{NIC}/disable_ipv6",
+    rf"/sys/class/net/{NIC}/(gro_flush_timeout|napi_defer_hard_irqs)",
+    rf"{ETHTOOL}{NIC}/(eee|adaptive-rx|rx-usecs)",
+    rf"{FOLDER}/run/catenary",
+)
 
 
 class StateError(CatenaryError):
@@ -26,7 +45,7 @@ class StateError(CatenaryError):
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """target: a file, or `ethtool:eth0/rx-usecs`. after: what it is to hold."""
+    """target: a file, `ethtool:eth0/rx-usecs` or `folder:/run/catenary`. after: the new value."""
 
     target: str
     after: str
@@ -35,13 +54,19 @@ class Change:
         return f"{self.target} = {self.after}"
 
 
-@dataclass(frozen=True, slots=True)
-class Made:
+class Made(msgspec.Struct, frozen=True):
     """A change that was made, and what was there before."""
 
     target: str
     before: str
     after: str
+
+
+class Noted(msgspec.Struct, frozen=True):
+    """The content of the state file."""
+
+    boot: str
+    made: list[Made]
 
 
 class Ground(Protocol):
@@ -60,11 +85,17 @@ class MachineGround:
     def read(self, target: str) -> str:
         if target.startswith(ETHTOOL):
             return str(ethtool.read_setting(*split(target)))
+        if target.startswith(FOLDER):
+            return read_folder(self.root / target.removeprefix(FOLDER).lstrip("/"))
         return chosen((self.root / target.lstrip("/")).read_text().strip())
 
     def write(self, target: str, value: str) -> None:
+        if not any(re.fullmatch(known, target) for known in TARGETS):
+            raise OSError(errno.EPERM, "the doctor changes no such thing", target)
         if target.startswith(ETHTOOL):
-            ethtool.write_setting(*split(target), int(value))
+            ethtool.write_setting(*split(target), whole_number(value, target))
+        elif target.startswith(FOLDER):
+            write_folder(self.root / target.removeprefix(FOLDER).lstrip("/"), value)
         else:
             (self.root / target.lstrip("/")).write_text(value)
 
@@ -72,6 +103,13 @@ class MachineGround:
 def split(target: str) -> tuple[str, str]:
     name, _, setting = target.removeprefix(ETHTOOL).rpartition("/")
     return name, setting
+
+
+def whole_number(value: str, target: str) -> int:
+    """Raises OSError, as a driver that refuses a value."""
+    if not re.fullmatch(r"\d{1,10}", value, re.ASCII):
+        raise OSError(errno.EINVAL, f"{value!r} is not a number", target)
+    return int(value)
 
 
 def chosen(text: str) -> str:
@@ -88,27 +126,46 @@ class State:
         self.boot = boot
 
     def load(self) -> list[Made]:
-        """Oldest first; none where the machine was started anew since. StateError: no such file's
-        contents."""
+        """Return the changes, oldest first; none if the machine was started again since.
+
+        Raises StateError if the file is damaged, or if another user could have written it.
+        """
         try:
-            state = json.loads(self.path.read_text())
-            return [Made(**made) for made in state["made"]] if state["boot"] == self.boot else []
+            content = self._read()
+            noted = msgspec.json.decode(content, type=Noted)
         except FileNotFoundError:
             return []
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except (OSError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
             raise StateError(
                 f"{self.path} does not tell what was changed: {error}",
                 hint="a reboot undoes everything that --apply did; then delete the file",
             ) from error
+        return noted.made if noted.boot == self.boot else []
+
+    def _read(self) -> bytes:
+        flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+        with open(os.open(self.path, flags), "rb") as file:
+            status = os.fstat(file.fileno())
+            if status.st_uid != os.geteuid() or status.st_mode & 0o022:
+                raise StateError(
+                    f"{self.path} belongs to user {status.st_uid} (mode "
+                    f"{status.st_mode & 0o7777:o}): what it says is not written to this machine",
+                    hint="run --undo as the user who ran --apply; a reboot undoes everything, too",
+                )
+            return file.read()
 
     def save(self, made: Sequence[Made]) -> None:
-        """Whole or not at all. StateError: a full disk, or no permission."""
-        text = json.dumps({"boot": self.boot, "made": [asdict(one) for one in made]}, indent=2)
+        """Write it whole or not at all. Raises StateError: a full disk, or no permission."""
+        text = msgspec.json.format(msgspec.json.encode(Noted(self.boot, list(made))), indent=2)
         new = self.path.with_suffix(".new")
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            with new.open("w") as file:
-                file.write(text + "\n")
+            with suppress(FileNotFoundError):
+                new.unlink()
+            # O_EXCL follows no link that another user has left there.
+            flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
+            with open(os.open(new, flags, 0o600), "wb") as file:
+                file.write(text + b"\n")
                 file.flush()
                 os.fsync(file.fileno())
             new.replace(self.path)
@@ -124,11 +181,18 @@ class State:
 
 
 def open_state() -> State:
-    """Below $XDG_STATE_HOME where that is set; else /run for root, ~/.local/state for others."""
+    """Return the state below $XDG_STATE_HOME if that is set, else in /run for root and in
+    ~/.local/state for others.
+
+    /run/catenary is not used: a group may create files there.
+    """
+    boot = Path(BOOT_ID).read_text().strip()
     folder = os.environ.get("XDG_STATE_HOME")
-    if not folder:
-        folder = "/run" if os.geteuid() == 0 else str(Path.home() / ".local" / "state")
-    return State(Path(folder) / "catenary" / "doctor.json", Path(BOOT_ID).read_text().strip())
+    if not folder and os.geteuid() == 0:
+        return State(Path("/run/catenary-doctor.json"), boot)
+    return State(
+        Path(folder or Path.home() / ".local" / "state") / "catenary" / "doctor.json", boot
+    )
 
 
 def apply(changes: Sequence[Change], ground: Ground, state: State) -> Iterator[str]:

@@ -26,8 +26,8 @@ class Check:
     changes: tuple[Change, ...] = ()
 
 
-def passed(id: str, found: str, advice: str = "") -> Check:
-    return Check(id, "PASS", found, advice)
+def passed(id: str, found: str, advice: str = "", changes: tuple[Change, ...] = ()) -> Check:
+    return Check(id, "PASS", found, advice, changes)
 
 
 def warned(id: str, found: str, advice: str, changes: tuple[Change, ...] = ()) -> Check:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import gzip
 import os
 import re
-import sys
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -27,7 +26,6 @@ class Machine:
     clock: how the kernel's clock is being adjusted; None: it does not say.
     wanted_cpu: the CPU the loop is to run on, where the user said so.
     period: [s] of the loop this machine is judged for. priority: SCHED_FIFO of its thread.
-    own_interpreter: the command gives rights to this environment's Python alone.
     watched: [s] for which the card's port was watched, and sent: frames that went out meanwhile.
     """
 
@@ -41,7 +39,6 @@ class Machine:
     sent: int | None = None
     architecture: str = field(default_factory=lambda: os.uname().machine)
     permission_command: str = SET_CAPABILITIES
-    own_interpreter: bool = field(default_factory=lambda: has_own_interpreter())
 
     # files
 
@@ -189,11 +186,6 @@ CONTAINER_FILES = {  # systemd's detect-virt looks at the same; "" : its text na
     "/run/.containerenv": "podman",
     "/.dockerenv": "docker",
 }
-
-
-def has_own_interpreter() -> bool:
-    """`venv` links to the machine's Python unless told to copy it."""
-    return Path(sys.executable).resolve().is_relative_to(Path(sys.prefix).resolve())
 
 
 def natural(text: str) -> list[tuple[int, str]]:

@@ -3,7 +3,7 @@ takes away."""
 
 from __future__ import annotations
 
-from catenary.doctor.change import Change
+from catenary.doctor.change import FOLDER, Change
 from catenary.doctor.check import Check, failed, passed, skipped, warned
 from catenary.doctor.machine import (
     CAP_IPC_LOCK,
@@ -12,11 +12,14 @@ from catenary.doctor.machine import (
     Machine,
     as_list,
 )
+from catenary.doctor.share_folder import ABSENT, MODE, read_folder, wanted
 
 ENOUGH_LOCKED = 2**30  # [bytes] a Python with NumPy and Numba maps several hundred MiB
 HUGE_PAGES = "/sys/kernel/mm/transparent_hugepage/enabled"
 LIMITS = "/etc/security/limits.d/realtime.conf"
 UNLIMITED = "unlimited"
+SHARES = "/run/catenary"
+SHARE_GROUPS = ("catenary", "realtime")
 
 
 def limits_line(what: str) -> str:
@@ -83,14 +86,10 @@ def raw_frames(machine: Machine) -> Check:
     id = "permission-raw-socket"
     if machine.capable(CAP_NET_RAW):
         return passed(id, "raw Ethernet frames are permitted (CAP_NET_RAW)")
-    shared = (
-        "first an environment with a Python of its own (this one is the whole machine's, and all "
-        "its programs would get the right): `python3 -m venv --copies`; then "
-    )
     return failed(
         id,
         "no raw Ethernet frames: a network interface cannot be opened",
-        f"{shared * (not machine.own_interpreter)}without root, once: {machine.permission_command}",
+        f"without root, once: {machine.permission_command}",
     )
 
 
@@ -173,4 +172,45 @@ def realtime_runtime(machine: Machine) -> int | None:
     return None
 
 
-CHECKS = (memory_lock, priority, raw_frames, huge_pages, container)
+def share_folder(machine: Machine) -> Check:
+    """Check the folder in which several users share memory: docs/share.md."""
+    id = "share-folder"
+    here = machine.path(SHARES)
+    known = machine.text("/etc/group")
+    if known is None:
+        return skipped(id, machine.lack("/etc/group"))
+    groups = {line.partition(":")[0] for line in known.splitlines()}
+    group = next((name for name in SHARE_GROUPS if name in groups), None)
+    try:
+        now = read_folder(here)
+    except OSError as error:  # a file or a link
+        now = error.strerror or str(error)
+    if now in [wanted(name) for name in SHARE_GROUPS]:
+        return passed(id, f"group {now.rpartition(':')[2]} shares memory in {SHARES}")
+    if group is None or not in_memory(machine, "/run"):
+        return passed(
+            id,
+            "each user shares memory in /dev/shm/catenary-UID",
+            ""
+            if group
+            else "to share it among users: `sudo groupadd --system catenary`, `sudo usermod -aG "
+            "catenary USER`, then --apply",
+        )
+    change = (Change(f"{FOLDER}{SHARES}", wanted(group)),)
+    if now != ABSENT:
+        return warned(
+            id,
+            f"{SHARES} is {now}; expected {wanted(group)}: it is not used",
+            f"sudo chown root:{group} {SHARES}; sudo chmod {MODE:o} {SHARES}",
+            change,
+        )
+    return passed(id, f"--apply creates {SHARES} for group {group}", "", change)
+
+
+def in_memory(machine: Machine, folder: str) -> bool:
+    """True if it is a tmpfs: a cycle must not wait for a disk."""
+    mounts = (line.split() for line in (machine.text("/proc/mounts") or "").splitlines())
+    return any(words[1:3] == [folder, "tmpfs"] for words in mounts)
+
+
+CHECKS = (memory_lock, priority, raw_frames, huge_pages, container, share_folder)

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TypeAlias
 
 from catenary.bus import SubDevice
 from catenary.drive.axis import MEASURED, Axis
 from catenary.drive.limits import DEFAULT_VELOCITY
 from catenary.drive.objects import NAMED_COLUMNS, AxisObject
-from catenary.plan.wish import DC
+from catenary.plan.wish import DistributedClock, ObjectReference, WrittenPdo
 from catenary.wire.cia402 import Mode
 
 AxisSource: TypeAlias = SubDevice | tuple[SubDevice, int]
+PdoList: TypeAlias = Sequence[int] | Mapping[int, Sequence[tuple[int, int, int]]]
 
 EVERY_MAX = 10_000  # cycles: beyond, ask by SDO
 MODES: dict[str, Mode] = {
@@ -59,11 +60,31 @@ def warn_of_default_velocity(axes: Sequence[Axis]) -> None:
         )
 
 
-def clock_wish(dc: DC | bool) -> DC | None:
+def clock_wish(dc: DistributedClock | bool) -> DistributedClock | None:
     """What `dc=` asks for."""
     if isinstance(dc, bool):
-        return DC() if dc else None
+        return DistributedClock() if dc else None
     return dc
+
+
+def written_pdos(pdos: PdoList) -> tuple[WrittenPdo, ...]:
+    """Return the PDOs of `pdos=`, with their entries if they are given.
+
+    Raises:
+        ValueError: An index is not one of a PDO.
+    """
+    for index in pdos:
+        if not 0x1600 <= index < 0x1C00:
+            raise ValueError(
+                f"pdos: 0x{index:04X} is not a PDO; use 0x1600 to 0x19FF for outputs and 0x1A00 to "
+                "0x1BFF for inputs"
+            )
+    if not isinstance(pdos, Mapping):
+        return tuple(WrittenPdo(index) for index in pdos)
+    return tuple(
+        WrittenPdo(index, tuple(ObjectReference(*entry) for entry in entries) or None)
+        for index, entries in pdos.items()
+    )
 
 
 def mode_of(name: str) -> Mode:

@@ -15,7 +15,7 @@ from catenary.drive.units import AxisUnits
 from catenary.errors import MappingError
 from catenary.plan.axis_report import AxisReport
 from catenary.plan.cycle import AxisPlan, Bank, Column, Number, NumberKind
-from catenary.plan.wish import ImageLayout, PdoWish
+from catenary.plan.wish import ImageLayout, PdoWish, Which, WrittenPdo
 from catenary.wire.cia402 import SLOT_OFFSET, Mode
 
 TARGETS: dict[int, AxisObject] = {
@@ -46,6 +46,7 @@ class Axis:
     every: int = 1  # cycles between two exchanges
     required: bool = True  # the cycle is not good without its device
     homing: HomingMethod | None = None
+    pdos: tuple[WrittenPdo, ...] = ()  # as the application wrote them down
     settings: DriveSettings = field(default_factory=DriveSettings)  # of the drive; read in PRE-OP
 
     def index(self, base: int) -> int:
@@ -104,6 +105,7 @@ class Axis:
             start_up=start_up,
             every=self.every,
             required=self.required,
+            pdos=self.pdos,
         )
 
     @property
@@ -190,7 +192,8 @@ class Axis:
 
     def _place(self, layout: ImageLayout, wanted: AxisObject) -> Number | None:
         find = layout.output if wanted.output else layout.input
-        place = find(self.device, self.index(wanted.index), wanted.subindex)
+        which = Which(bit_length=wanted.bit_length)
+        place = find(self.device, self.index(wanted.index), wanted.subindex, which)
         if place is None or (wanted.unit is Unit.TORQUE and self.units.rated_torque is None):
             return None
         # The layout knows places and widths; signs are the standard's, unless the device says REAL.

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from catenary.drive import start_up
 from catenary.drive.arguments import (
     AxisSource,
+    PdoList,
     axis_modes,
     axis_name,
     axis_sources,
@@ -21,6 +22,7 @@ from catenary.drive.arguments import (
     mode_of,
     named_columns,
     warn_of_default_velocity,
+    written_pdos,
 )
 from catenary.drive.axis import MEASURED, Axis, column_bank
 from catenary.drive.homing import HomingMethod, Timed, run_homing
@@ -31,7 +33,7 @@ from catenary.drive.units import AxisUnits, one_each, per_axis
 from catenary.drive.values import Array, AxisValues
 from catenary.plan.cycle import Bank, OnLoss
 from catenary.plan.stop_reason import StopReason
-from catenary.plan.wish import DC, ImageLayout, PdoWish, Views, WishTables
+from catenary.plan.wish import DistributedClock, ImageLayout, PdoWish, Views, WishTables
 from catenary.wire.cia402 import IN_FAULT, Mode, State
 
 V = TypeVar("V")
@@ -57,7 +59,11 @@ class Drives:
     - `required`: False: the loop continues without a lost drive. Its axes hold their last values;
       enable them again when it is `present`.
     - `every`: cycles of the loop between two exchanges.
-    - `dc`: distributed clocks. True: as each device's SII states; or a `DC` for all of them.
+    - `dc`: distributed clocks. True: as each device's SII states; or a `DistributedClock` for all
+      of them.
+    - `pdos`: PDOs of each device, instead of a search: `[0x1701, 0x1B01]`, or with their entries
+      `{0x1600: [(0x6040, 0, 16), (0x607A, 0, 32)]}` (index, subindex, bits). They are written even
+      if the SII says that this is impossible. A direction without PDOs here is searched.
 
     Options with one value for all axes, or a sequence of one per axis:
 
@@ -120,7 +126,8 @@ class Drives:
         columns: Sequence[str | tuple[str, AxisObject]] = (),
         required: bool = True,
         every: int = 1,
-        dc: DC | bool = False,
+        dc: DistributedClock | bool = False,
+        pdos: PdoList = (),
     ) -> None:
         sources = axis_sources(subs)
         n = len(sources)
@@ -147,6 +154,7 @@ class Drives:
             if on_loss is None or isinstance(on_loss, str)
             else one_each("on_loss", on_loss, n),
         )
+        written = written_pdos(pdos)
         first_modes = (mode,) * n if isinstance(mode, str) else one_each("mode", mode, n)
         self.subs = tuple(sub for sub, _ in sources)
         self._columns = named_columns(columns)
@@ -165,6 +173,7 @@ class Drives:
                 every=cycles_between("every", every),
                 required=required,
                 homing=home,
+                pdos=written,
             )
             for (sub, slot), first, unit, limits, home in zip(
                 sources,
@@ -203,7 +212,11 @@ class Drives:
 
     @property
     def enabled(self) -> npt.NDArray[np.bool_]:
-        """(n,) True for each axis that follows its set-points now and is `present`."""
+        """(n,) True for each axis that follows its set-points now and is `present`.
+
+        One lost exchange makes it False for that cycle, because `present` includes it. The axis
+        goes on following; to act on stopped axes, use `stopped`.
+        """
         return (self._bound().axis_flags & 1).astype(np.bool_) & self.present
 
     @property

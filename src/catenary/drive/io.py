@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 from catenary.bus import SubDevice
-from catenary.drive.arguments import clock_wish, cycles_between
+from catenary.drive.arguments import PdoList, clock_wish, cycles_between, written_pdos
 from catenary.errors import MappingError
-from catenary.model.device import Assignment, DeviceDescription, Direction, Entry
+from catenary.model.device import Assignment, DeviceDescription, Direction, Entry, Pdo
 from catenary.plan.cycle import Bank, Column, NumberKind
+from catenary.plan.pdo_rewrite import write_down
+from catenary.plan.pdo_search import pdo_names
 from catenary.plan.wish import (
-    DC,
+    ANY,
     Bytes,
+    DistributedClock,
     ImageLayout,
     Integers,
     ObjectReference,
     PdoWish,
     Reals,
     Views,
+    Which,
     WishTables,
+    WrittenPdo,
 )
 
 # Data types of ETG.1000.6 table 64 that are not unsigned integers.
@@ -35,6 +41,7 @@ class Channel(NamedTuple):
     device: int
     entry: Entry
     scale: float | None  # SI value = raw · scale; None: the raw number
+    which: Which = ANY  # where the device maps the object more than once
 
     @property
     def kind(self) -> NumberKind:
@@ -60,15 +67,18 @@ class _Channels:
         scale: Mapping[str, float] | None = None,
         required: bool = True,
         every: int = 1,
-        dc: DC | bool = False,
+        dc: DistributedClock | bool = False,
+        pdos: PdoList = (),
     ) -> None:
         self.subs = subs
+        self._pdos = tuple(p for p in written_pdos(pdos) if p.direction is self.direction)
         self._required = required
         self._every = cycles_between("every", every)
         self._clock = clock_wish(dc)
         self._units: list[int] = []
         self._unit_valid: Bytes | None = None
-        self._channels = channels([sub.description for sub in subs], self.direction, scale or {})
+        devices = [with_written(sub.description, self.direction, self._pdos) for sub in subs]
+        self._channels = channels(devices, self.direction, scale or {})
         self._places: dict[str, tuple[Reals | Integers | Bytes, int]] = {}
 
     @property
@@ -83,7 +93,7 @@ class _Channels:
         return value
 
     def pdos(self, period_ns: int) -> Mapping[int, PdoWish]:
-        """What is mapped already: nothing changes on the device."""
+        """Request what is mapped already, or `pdos`: without them nothing changes on the device."""
         wishes: dict[int, PdoWish] = {}
         for sub in self.subs:
             mine = tuple(reference(c.entry) for c in self._channels if c.device == sub.position)
@@ -94,6 +104,7 @@ class _Channels:
                 clock=self._clock,
                 every=self._every,
                 required=self._required,
+                pdos=self._pdos,
             )
         return wishes
 
@@ -141,7 +152,7 @@ class Inputs(_Channels):
     `scale` turns raw numbers into floats: `Inputs(sub, scale={"Value": 10 / 0x7FFF})`.
     `required=False`: the loop goes on without a device that vanishes; its channels keep their last
     values, `present` tells. `every`: exchanged every so many cycles of the loop.
-    `dc`: distributed clocks, as for `Drives`.
+    `dc`: distributed clocks, as for `Drives`. `pdos`: these PDOs instead of those assigned now.
     """
 
     direction = Direction.INPUT
@@ -153,7 +164,8 @@ class Inputs(_Channels):
 
 class Outputs(_Channels):
     """The outputs of SubDevices, all 0 at the start: write `.bits[:]`, `.integers[:]`, `.reals[:]`,
-    or one by name: `lamps["Output 1"] = 1`. `scale`, `required`, `every`, `dc` as for `Inputs`.
+    or one by name: `lamps["Output 1"] = 1`. `scale`, `required`, `every`, `dc`, `pdos` as for
+    `Inputs`.
     What is out of its range is cut, and `cycle.limited` says so."""
 
     direction = Direction.OUTPUT
@@ -181,24 +193,49 @@ def channels(
         (device, pdo, entry)
         for device in devices
         for assignment in device.assignments(direction)
-        for pdo, entry in named_entries(assignment)
+        for pdo, entry in number_entries(assignment)
     ]
     if not found:
-        raise ValueError(f"no {direction.name.lower()} process data in the devices given")
-    names = unique_names([(entry.name, pdo, str(device.position)) for device, pdo, entry in found])
+        raise ValueError(
+            f"no {direction.name.lower()} process data in the devices given"
+            f"{_choice(devices, direction)}"
+        )
+    names = unique_names([(e.name, pdo.name, str(device.position)) for device, pdo, e in found])
     for name in scale:
         if name not in names:
             raise ValueError(f"scale: no channel {name!r}; there are: {', '.join(names)}")
-    return tuple(
-        Channel(name, device.position, entry, scale.get(name))
-        for name, (device, _, entry) in zip(names, found, strict=True)
-    )
+    alike: Counter[tuple[int, int, int, int, int]] = Counter()
+    made = []
+    for name, (device, pdo, entry) in zip(names, found, strict=True):
+        place = (device.position, pdo.index, entry.index, entry.subindex, entry.bit_length)
+        which = Which(pdo.index, entry.bit_length, alike[place])
+        alike[place] += 1
+        made.append(Channel(name, device.position, entry, scale.get(name), which))
+    return tuple(made)
 
 
-def named_entries(assignment: Assignment) -> list[tuple[str, Entry]]:
-    """(name of the PDO, entry) without gaps and without what no number can hold."""
+def _choice(devices: Sequence[DeviceDescription], direction: Direction) -> str:
+    """Return the PDOs that could be assigned, if there are any."""
+    offered = [pdo for device in devices for pdo in device.pdos(direction)]
+    return f": none is assigned; choose with pdos= from {pdo_names(offered)}" if offered else ""
+
+
+def with_written(
+    device: DeviceDescription, direction: Direction, pdos: Sequence[WrittenPdo]
+) -> DeviceDescription:
+    """Return the device as if it had these PDOs; unchanged without PDOs."""
+    if not pdos:
+        return device
+    assignments = write_down(device, direction, pdos).assignments
+    if direction is Direction.OUTPUT:
+        return replace(device, outputs=assignments)
+    return replace(device, inputs=assignments)
+
+
+def number_entries(assignment: Assignment) -> list[tuple[Pdo, Entry]]:
+    """Return all entries with their PDOs, without gaps and without what no number can hold."""
     return [
-        (pdo.name, entry)
+        (pdo, entry)
         for pdo in assignment.pdos
         for entry in pdo.entries
         if entry.index and 1 <= entry.bit_length <= 64
@@ -237,7 +274,7 @@ def column(channel: Channel, layout: ImageLayout, direction: Direction) -> Colum
     """The channel with its place."""
     entry = channel.entry
     find = layout.output if direction is Direction.OUTPUT else layout.input
-    number = find(channel.device, entry.index, entry.subindex)
+    number = find(channel.device, entry.index, entry.subindex, channel.which)
     if number is None:
         raise MappingError(f"device {channel.device}: {entry} is not in its process data")
     return Column(

@@ -66,8 +66,8 @@ cdef extern from "exchange.h" nogil:
         uint64_t clock_misses
         uint64_t send_errors
         uint64_t receive_errors
-        int64_t app_time
         int64_t sent
+        int64_t ahead
         int64_t bound
         double mean_error
         double mean_spread
@@ -75,6 +75,7 @@ cdef extern from "exchange.h" nogil:
         int64_t spread
         int64_t worst_spread
         uint64_t silent
+        uint64_t unheard
         uint64_t jumps
         uint64_t changes
         uint8_t locked
@@ -261,7 +262,7 @@ cdef class Exchange:
         return {
             "locked": bool(self.c.locked),
             "bound": self.c.bound,
-            "time": self.c.app_time + self.c.epoch + self.c.phase_error,
+            "time": self.c.sent + self.c.epoch + self.c.ahead,
             "time_sent": self.c.sent,
             "error": self.c.phase_error,
             "mean_error": self.c.mean_error,
@@ -269,7 +270,7 @@ cdef class Exchange:
             "rate": self.c.rate / max(1, self.c.period),
             "samples": self.c.clock_reads,
             "missed": self.c.clock_misses,
-            "silent": self.c.silent,
+            "silent": self.c.silent + self.c.unheard,
             "jumps": self.c.jumps,
             "spread": self.c.mean_spread,
             "worst_spread": self.c.worst_spread,

@@ -8,10 +8,17 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from catenary.bus.event import LinkLost, LinkRestored
-from catenary.errors import CatenaryError, IdentityError, RegisterError, StateError
+from catenary.errors import (
+    CatenaryError,
+    IdentityError,
+    RegisterError,
+    SegmentError,
+    StateError,
+)
 from catenary.igh import abi
 from catenary.igh.clock import KernelClock
 from catenary.igh.configure import Configuration
+from catenary.igh.kernel_log import KernelLog
 from catenary.igh.sub_device import SubDevice
 from catenary.procedure.exchange import Procedure, after
 from catenary.procedure.survey import Answer
@@ -25,6 +32,8 @@ OP_TIMEOUT = 20.0  # [s]: the master configures one device after the other
 LOOK = 0.005  # [s] between two looks
 CODE_TIMEOUT, CODE_LOOK = 0.5, 0.010  # [s]: how long, how often a device in error is asked why
 EMERGENCY_SIZE = 8
+INVALID_SYNC = 0x0030  # AL status code
+SYNC_TYPE = 0x1C32, 1  # object and subindex
 LINKS = 2  # the main one and the backup
 
 
@@ -39,6 +48,7 @@ class KernelCarrier:
         self._link_count = LINKS
         clock = configuration.clock
         self._clock = None if clock is None else KernelClock(configuration.exchange, clock)
+        self._kernel_log = KernelLog()
 
     @property
     def image(self) -> object:
@@ -52,6 +62,7 @@ class KernelCarrier:
     def end(self) -> None:
         """No call is made any more."""
         self.configuration.exchange.end()
+        self._kernel_log.close()
 
     def state(self, position: int) -> abi.ConfigState:
         """What the master says of its configuration of a device."""
@@ -144,9 +155,21 @@ class KernelCarrier:
             self._main.events.put(kind(now, None, message, (None, end)))
 
     def _status_code(self, position: int) -> Procedure[int]:
-        """0: unknown. The master refuses requests until it has acknowledged the error."""
+        """Return the AL status code of a device in error; 0: unknown.
+
+        The kernel's log has it. Without the permission to read that, ask the device: the master
+        refuses requests until it has acknowledged the error, which may clear the code.
+        """
+        main = self._main
+        try:
+            place = main.place_of(position)
+        except SegmentError:
+            return 0  # it was unplugged meanwhile, and is nowhere
+        code = self._kernel_log.status_code(main.reservation.index, place)
+        if code:
+            return code
         sub = self._sub(position)
-        deadline = self._main.link.now() + round(CODE_TIMEOUT * 1e9)
+        deadline = self._deadline()
         while self._main.link.now() < deadline:
             try:
                 data = yield from sub.read_register(AL_STATUS_CODE.address, AL_STATUS_CODE.size)
@@ -157,7 +180,7 @@ class KernelCarrier:
 
     def _not_in_op(self, waiting: Sequence[int]) -> Procedure[CatenaryError]:
         """Why the first of them is not there."""
-        sub = self._main.subs[waiting[0]]
+        sub = self._sub(waiting[0])
         try:
             info = self._main.reservation.slave(self._main.place_of(sub.position))
         except CatenaryError as error:
@@ -190,7 +213,51 @@ class KernelCarrier:
             requested=int(State.OP),
             actual=state,
             code=code,
-            hint=(status_code(code).cause if code else "")
-            or "dmesg | grep EtherCAT has the AL status code, which libethercat does not tell of a "
-            f"device in error; ethercat config -v -p {sub.position} what was configured",
+            hint=(yield from self._cause(sub, code)),
         )
+
+    def _cause(self, sub: SubDevice, code: int) -> Procedure[str]:
+        """Return the likely cause of an AL status code, and what to do next."""
+        if code == INVALID_SYNC:
+            return (yield from self._cause_of_invalid_sync(sub))
+        if code and status_code(code).cause:
+            return status_code(code).cause
+        return (
+            f"sudo dmesg | grep EtherCAT has the AL status code, which neither libethercat nor the "
+            f"device tells; ethercat config -v -p {sub.position} shows what was configured"
+        )
+
+    def _cause_of_invalid_sync(self, sub: SubDevice) -> Procedure[str]:
+        """0x0030: the SYNC unit and 0x1C32:01 contradict each other."""
+        sync = self.configuration.devices[sub.position].sync
+        kind = yield from self._sync_type(sub)
+        said = "its 0x1C32:01 could not be read" if kind is None else f"its 0x1C32:01 is {kind}"
+        if sync is not None:
+            return (
+                f"this loop starts SYNC0 every {sync.cycle_ns / 1e3:g} us with AssignActivate "
+                f"0x{sync.assign_activate:04X}, and {said}: does its ESI file have another "
+                "AssignActivate or cycle (Dc/OpMode)?"
+            )
+        return (
+            f"{said}, and this loop starts no SYNC0. A program that was killed may have left 2 or "
+            "3 (by SYNC0 or SYNC1) there: switch the device off and on, or ethercat download -p "
+            f"{sub.position} -t uint16 0x1C32 1 0 (free run; 1: by SyncManagers), the same with "
+            "0x1C33; or use dc=True"
+        )
+
+    def _sync_type(self, sub: SubDevice) -> Procedure[int | None]:
+        """Read 0x1C32:01 of a device in error. None if it does not answer soon."""
+        if not sub.description.coe:
+            return None
+        asked, deadline = sub.sdo.request(*SYNC_TYPE), self._deadline()
+        while not asked.done and self._main.link.now() < deadline:
+            yield after(CODE_LOOK)
+        if not asked.done:
+            return None
+        try:
+            return int.from_bytes(asked.result(), "little")
+        except CatenaryError:
+            return None  # it has no such object, or refuses to tell it: the hint says so
+
+    def _deadline(self) -> int:
+        return self._main.link.now() + round(CODE_TIMEOUT * 1e9)

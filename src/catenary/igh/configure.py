@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -13,10 +12,12 @@ from catenary.igh._ecrt import Exchange
 from catenary.igh.address import Address, addresses
 from catenary.igh.master import Reservation
 from catenary.model.device import DeviceDescription, Direction, Pdo
+from catenary.plan.clocks import SyncPlan
 from catenary.plan.cycle import ClockPlan
 from catenary.plan.layout import UnitLayout
 from catenary.plan.make import Plan
-from catenary.plan.start_up import WATCHDOG_DIVIDER, DevicePlan
+from catenary.plan.start_up import WATCHDOG_DIVIDER, DevicePlan, Download
+from catenary.procedure.pdo import LEFT_ALONE
 
 EMERGENCIES = 16  # kept by the master for each device
 REQUEST_SIZE = 256  # bytes of an object that is read in operation; longer ones are read blocking
@@ -48,6 +49,7 @@ class DeviceConfiguration:
     config: int
     sdo_request: int  # 0: it speaks no CoE
     register_request: int
+    sync: SyncPlan | None  # None: no SYNC signals
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,8 +128,7 @@ def _device(
     for download in plan.start_up:
         data = ctypes.create_string_buffer(download.data, len(download.data))
         if download.optional:  # the master gives a device up that refuses one of its list
-            with contextlib.suppress(SdoAbort):
-                master.download(plan.position, download.index, download.subindex, download.data)
+            _download_if_there(master, plan.position, download)
             continue
         place = (download.index, download.subindex, ctypes.addressof(data), len(data))
         what = f"{who}: start-up SDO 0x{download.index:04X}:{download.subindex:02X}"
@@ -139,7 +140,17 @@ def _device(
     if coe:
         sdo = library.ecrt_slave_config_create_sdo_request(config, 0x1000, 0, REQUEST_SIZE)
     register = library.ecrt_slave_config_create_reg_request(config, REGISTER_SIZE)
-    return DeviceConfiguration(plan.position, address, config, sdo or 0, register or 0)
+    requests = sdo or 0, register or 0
+    return DeviceConfiguration(plan.position, address, config, *requests, plan.sync)
+
+
+def _download_if_there(master: Reservation, position: int, download: Download) -> None:
+    """Write an object, unless the device does not have it or keeps it as it is."""
+    try:
+        master.download(position, download.index, download.subindex, download.data)
+    except SdoAbort as abort:
+        if abort.code not in LEFT_ALONE:
+            raise
 
 
 def _tell_process_data(master: Reservation, plan: DevicePlan, config: int, who: str) -> None:

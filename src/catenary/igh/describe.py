@@ -22,6 +22,7 @@ from catenary.model.device import (
     Pdo,
     SyncManager,
 )
+from catenary.model.text import printable
 from catenary.wire.features import Feature, Information, PortKind
 from catenary.wire.sii import MailboxProtocol
 from catenary.wire.sii_categories import SyncManagerUse
@@ -59,7 +60,7 @@ def describe(master: Reservation, position: int) -> DeviceDescription:
     managers, outputs, inputs = _process_data(master, position, syncs, coe)
     number = None if not device_type else int.from_bytes(device_type[:4], "little")
     identity = Identity(info.vendor_id, info.product_code, info.revision_number, info.serial_number)
-    name = info.name.decode("latin-1").strip()
+    name = printable(info.name.decode("latin-1"))
     links = [bool(port.link.link_up) for port in info.ports]
     return DeviceDescription(
         position=position,

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import struct
+import warnings
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, NoReturn
@@ -24,6 +24,8 @@ from catenary.igh.configure import Configuration, DeviceConfiguration, configure
 from catenary.igh.describe import describe, object_information, read_if_there
 from catenary.igh.master import Master, Reservation
 from catenary.igh.sub_device import SubDevice
+from catenary.igh.sync_types import read_types, write_types
+from catenary.igh.topology import check_delays
 from catenary.model.device import DeviceDescription, Direction, Identity, mapped_entries
 from catenary.wire.al import State
 from catenary.wire.coe import Emergency
@@ -31,8 +33,12 @@ from catenary.wire.coe import Emergency
 if TYPE_CHECKING:  # plan needs NumPy, a scan does not
     from catenary.bus.states import Outcome
     from catenary.plan.make import Plan
+    from catenary.plan.start_up import DevicePlan
     from catenary.plan.wish import PdoWish, Wish
 
+# [s] An INIT request to a device that fails at that moment may be lost: the master repeats it after
+# 5 s (ec_fsm_change_timeout_ms in IgH's master/fsm_change.c). Seen at every second stop.
+RESTORE_PATIENCE = 6.0
 _EMERGENCY = struct.Struct("<HB5s")
 
 
@@ -69,7 +75,7 @@ class MainDevice(bus.MainDevice):
         there are none. Handles of devices that are still there stay the same objects."""
         self._refuse_beside_loop()
         count = self.reservation.device_count()
-        self.reservation.wait_preop(count)
+        self.reservation.wait_preop()
         found = [describe(self.reservation, position) for position in range(count)]
         if not found:
             raise NoDeviceError(
@@ -120,34 +126,46 @@ class MainDevice(bus.MainDevice):
                 f"{self.reservation.name} is activated already: nothing can be configured any more",
                 hint="leave the loop that runs, or main.leave()",
             )
+        infos = [self.reservation.slave(sub.position) for sub in self.subs]
+        if plan.cycle.clock is not None:
+            check_delays(infos)
         for sub, device in zip(self.subs, plan.devices, strict=True):
-            if device.sync is not None and sub.description.coe:
-                self._note_sync_types(sub)
+            self._keep_sync_types(sub, device)
         found = [sub.description for sub in self.subs]
         self.clock_epoch_ns = self._epoch_ns()
-        configuration = configure(self.reservation, plan, found, self.clock_epoch_ns)
+        try:
+            configuration = configure(self.reservation, plan, found, self.clock_epoch_ns)
+        except BaseException as error:
+            self._undo(error)
+            raise
         self._kernel = KernelCarrier(self, configuration)
         self.carrier = self._kernel
 
-    def _note_sync_types(self, sub: bus.SubDevice) -> None:
-        """How a device keeps time with the bus, before it is told to go by SYNC0."""
-        from catenary.plan.clocks import SYNC_OBJECTS
+    def _keep_sync_types(self, sub: bus.SubDevice, plan: DevicePlan) -> None:
+        """Read how a device keeps time, before SYNC0 is written to it. Without clocks, write back
+        what could not be written when an earlier loop ended."""
+        if plan.sync is None:
+            self._restore_sync_types(sub)
+        elif sub.description.coe and not sub.sync_types:
+            sub.sync_types = read_types(self.reservation, sub.position)
 
-        found = {
-            index: read_if_there(self.reservation, sub.position, index, 1) or b""
-            for index in SYNC_OBJECTS
-        }
-        sub.sync_types = {index: kind for index, kind in found.items() if kind}
-
-    def _restore_sync_types(self, sub: bus.SubDevice) -> None:
-        """Told to go by SYNC0, a device would wait for it under the next program too."""
-        types, sub.sync_types = sub.sync_types, {}
-        for index, kind in types.items():
-            with contextlib.suppress(CatenaryError):  # not writable, or it is not there any more
-                self.reservation.download(sub.position, index, 1, kind)
+    def _undo(self, error: BaseException) -> None:
+        """Take back what a configuration that failed has written. Its master was given back and
+        reserved again. Further errors are added to `error` as notes."""
+        if self.reservation.handle:
+            self.reservation.wait_preop(RESTORE_PATIENCE)
+            for problem in self._settle():
+                error.add_note(f"on the way down: {problem}")
 
     def leave(self, *, timeout: float = LEAVE_TIMEOUT) -> None:
-        """Ends the operation of the master: it brings the devices back to PRE-OP by itself."""
+        """End the operation of the master, wait for PRE-OP and restore the synchronisation types.
+
+        The master brings its devices to PRE-OP by itself, within its own times.
+
+        Raises:
+            CatenaryError: A device that was told to go by SYNC0 does not reach PRE-OP, or refuses
+                its former type; further ones as notes.
+        """
         kernel, self._kernel, self.carrier = self._kernel, None, None
         if kernel is None:
             return
@@ -155,14 +173,43 @@ class MainDevice(bus.MainDevice):
         what = f"deactivating master {self.reservation.index}"
         self.reservation.ask("ecrt_master_deactivate", what=what)
         self.reservation.beside.end()
+        if any(sub.sync_types for sub in self.subs):
+            self.reservation.wait_preop(RESTORE_PATIENCE)
+        else:
+            self.reservation.wait_preop()
+        problems = self._settle()
+        if problems:
+            for other in problems[1:]:
+                problems[0].add_note(f"also: {other}")
+            raise problems[0]
+
+    def _settle(self) -> list[CatenaryError]:
+        """Read all states and restore all synchronisation types; return what went wrong."""
+        problems = []
         for sub in self.subs:
-            self._restore_sync_types(sub)
-            sub.state = State.PRE_OP
+            try:
+                self._restore_sync_types(sub)
+            except CatenaryError as problem:
+                problems.append(problem)
+        return problems
+
+    def _restore_sync_types(self, sub: bus.SubDevice) -> None:
+        """Those of a device that is away stay noted: it gets them when it is back."""
+        if not self.reservation.has(sub.position, sub.identity):
+            sub.state = None
+            return
+        state = sub.read_state()
+        if sub.sync_types:
+            write_types(self.reservation, sub.position, sub.sync_types, state)
+            sub.sync_types = {}
 
     def _bring_down(self, state: State, timeout: float = LEAVE_TIMEOUT) -> None:
         """INIT is not ours to ask for: giving the master back leaves the devices in PRE-OP."""
         self._detach()
-        self.leave()
+        try:
+            self.leave()
+        except CatenaryError as problem:  # `close` goes on: the master must be given back
+            warnings.warn(str(problem), RuntimeWarning, stacklevel=3)
 
     def configuration_of(self, position: int) -> DeviceConfiguration | None:
         """The master's handles for a device; None: it is not activated."""

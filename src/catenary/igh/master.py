@@ -13,6 +13,7 @@ from catenary.igh._ecrt import KernelTime
 from catenary.igh.beside import Beside
 from catenary.igh.library import Library
 from catenary.igh.refusal import refused, sdo_error
+from catenary.model.device import Identity
 from catenary.wire.al import State
 
 if TYPE_CHECKING:
@@ -20,8 +21,9 @@ if TYPE_CHECKING:
 
 SCAN_TIMEOUT = 30.0  # [s]: some devices answer their first SDO after seconds
 EMPTY_TIMEOUT = 3.0  # [s]: a link that has just come up finds its devices within a second
-PREOP_TIMEOUT = 15.0  # [s] from INIT; the master itself waits 10
-LEAVE_OP_TIMEOUT = 2.0  # [s] from the last user's OP back
+PREOP_TIMEOUT = 15.0  # [s] without a change, from INIT; the master itself waits 10
+LEAVE_OP_TIMEOUT = 2.0  # [s] without a change, from the last user's OP back
+SETTLE_TIMEOUT = 60.0  # [s] for all devices: the master takes one after the other
 LOOK = 0.010  # [s] between two looks
 UPLOAD_LIMIT = 1 << 16  # bytes of an object
 
@@ -156,23 +158,44 @@ class Reservation:
 
     def aliases(self) -> list[int]:
         """Of all devices that are there now, by position; 0: none."""
-        info = abi.MasterInfo()
-        self.ask("ecrt_master", ctypes.byref(info), what=f"master {self.index}")
-        return [self.slave(position).alias for position in range(info.slave_count)]
+        return [self.slave(position).alias for position in range(self._present())]
 
-    def wait_preop(self, count: int) -> None:
-        """Until the master has brought its devices to PRE-OP, or has given them up: in INIT nobody
-        answers an SDO, and who has just given the master back leaves them on the way. One with
-        Ethernet over EtherCAT the master may keep in OP: it answers there too."""
-        begun = self.now()
-        while (waited := (self.now() - begun) * 1e-9) < PREOP_TIMEOUT:
-            infos = [self.slave(position) for position in range(count)]
+    def has(self, position: int, identity: Identity) -> bool:
+        """Return True if that device is at a position now."""
+        if position >= self._present():
+            return False
+        info = self.slave(position)
+        return (info.vendor_id, info.product_code) == identity[:2]
+
+    def wait_preop(self, patience: float = LEAVE_OP_TIMEOUT) -> None:
+        """Wait until the master has brought its devices to PRE-OP, or nothing changes any more.
+
+        In INIT nothing answers an SDO, and an application that has just given the master back
+        leaves the devices on the way down. One with Ethernet over EtherCAT may stay in OP: it
+        answers there, too. A device may be lost meanwhile: each look asks for those that are there.
+
+        Args:
+            patience: How long no state may change, if none is INIT [s].
+        """
+        begun = changed = self.now()
+        before: list[int] = []
+        while self.now() - begun < SETTLE_TIMEOUT * 1e9:
+            infos = [self.slave(position) for position in range(self._present())]
             states = [info.al_state & 0xF for info in infos if not info.error_flag]
             if all(state == State.PRE_OP for state in states):
                 return
-            if waited >= LEAVE_OP_TIMEOUT and State.INIT not in states:
+            if states != before:
+                before, changed = states, self.now()
+            limit = PREOP_TIMEOUT if State.INIT in states else patience
+            if self.now() - changed >= limit * 1e9:
                 return
             self.wait_until(self.now() + round(LOOK * 1e9), False)
+
+    def _present(self) -> int:
+        """Return how many devices the master has now, even while it scans."""
+        info = abi.MasterInfo()
+        self.ask("ecrt_master", ctypes.byref(info), what=f"master {self.index}")
+        return int(info.slave_count)
 
     def sync_manager(self, position: int, index: int) -> abi.SyncInfo:
         """A SyncManager, without its PDOs."""

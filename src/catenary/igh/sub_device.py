@@ -149,7 +149,10 @@ class Sdo(bus.Sdo):
             "works",
         )
 
-    def _upload(self, index: int, subindex: int, complete: bool, limit: int) -> Procedure[bytes]:
+    def _upload(
+        self, index: int, subindex: int, complete: bool, limit: int, timeout: float
+    ) -> Procedure[bytes]:
+        """Read an object. The deadlines are those of libethercat, not `timeout`."""
         self._check(index, subindex, complete)
         if complete:
             raise ConfigurationError(

@@ -243,6 +243,11 @@ cdef class RawLink(TableLink):
             count += 1
         return count
 
+    def explain(self, int number):
+        from catenary.link.interface import no_link  # which needs this module
+
+        return no_link(self.name, number)
+
     cdef int map_ring(self, int fd, size_t size, int slot_size) except -1:
         cdef void *ring = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0)
         if ring == MAP_FAILED:

@@ -14,7 +14,10 @@ from catenary.link._table cimport CAT_FRAME_MAX, CAT_LINK_VIRTUAL_TIME, TableLin
 
 import os
 
+from catenary.errors import DecodeError
 from catenary.link.exchanges import Exchange, by_question, read_exchanges
+
+LATENCY_MAX = 900 * 10**9             # [ns] a quarter of an hour
 
 cdef enum:
     QUEUE = 64                        # answers under way; a power of two
@@ -174,23 +177,27 @@ cdef int replay_wait_until(void *self, int64_t deadline, int wake_on_frame) noex
 
 
 cdef class Replay(TableLink):
-    """Owns the answers of a recording: a pcapng file, or pairs of (frame sent, answer).
+    """Owns the answers of a recording: a pcapng or pcap file, or pairs of (frame sent, answer).
+
+    DecodeError: the file is damaged, or has no answers; ValueError: the pairs cannot be.
 
     `unmatched` counts frames that the recording has no answer for: they stay unanswered, as if
     lost. `first_unmatched` is the first of them.
     """
     cdef replay_state replay
     cdef object kept                  # the bytes that the tables point into
+    cdef bint is_file
 
     def __init__(self, recording):
-        if isinstance(recording, (str, os.PathLike)):
+        self.is_file = isinstance(recording, (str, os.PathLike))
+        if self.is_file:
             self.name = f"replay of {os.fspath(recording)}"
             exchanges = read_exchanges(recording)
         else:
             self.name = "replay"
             exchanges = [Exchange(*pair) for pair in recording]
         if not exchanges:
-            raise ValueError(f"{self.name}: no frame that came back")
+            raise self.refusal("no frame that came back")
         self.fill(by_question(exchanges), len(exchanges))
         self.table.flags = CAT_LINK_VIRTUAL_TIME
         self.table.self = &self.replay
@@ -222,16 +229,23 @@ cdef class Replay(TableLink):
         slot.first_answer = used
         slot.answer_count = <uint32_t> len(exchanges)
         for exchange in exchanges:
+            if not 0 <= exchange.latency_ns <= LATENCY_MAX:
+                raise self.refusal(f"an answer after {exchange.latency_ns} ns: a wrong time")
             self.fill_answer(&self.replay.answers[used], exchange.sent, exchange.answer)
             self.replay.answers[used].latency_ns = exchange.latency_ns
             used += 1
         return used
 
+    cdef object refusal(self, str what):
+        """Return the error for a file, or for pairs."""
+        kind = DecodeError if self.is_file else ValueError
+        return kind(f"{self.name}: {what}")
+
     cdef int fill_answer(self, answer *place, bytes sent, bytes reply) except -1:
         if not HEADER_SIZE <= len(reply) <= CAT_FRAME_MAX:
-            raise ValueError(f"{self.name}: an answer of {len(reply)} bytes")
+            raise self.refusal(f"an answer of {len(reply)} bytes")
         if sent[14:16] != reply[14:16]:
-            raise ValueError(f"{self.name}: an answer of other datagrams than its question")
+            raise self.refusal("an answer of other datagrams than its question")
         place.bytes = reply
         place.length = <uint32_t> len(reply)
         return 0

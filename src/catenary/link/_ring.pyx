@@ -25,6 +25,7 @@ from catenary.link._table cimport (
     table_of,
 )
 
+from catenary.link._table import explained_by
 from catenary.link.protocol import open_link
 from catenary.link.ring_state import ROUTES, RingState
 
@@ -425,6 +426,13 @@ cdef class RingLink(TableLink):
             "send_errors_first": self.ring.send_errors[0],
             "send_errors_second": self.ring.send_errors[1],
         }
+
+    def explain(self, int number):
+        for link in self.links:
+            explained = explained_by(link, number)
+            if explained is not None:
+                return explained
+        return None
 
     cdef int close_table(self) except -1:
         try:

@@ -1,5 +1,6 @@
 from typing import Self
 
+from catenary.errors import LinkError
 from catenary.link.protocol import Link
 
 def capsule_in_virtual_time(capsule: object) -> bool:
@@ -17,9 +18,15 @@ class TableLink:
     def receive(self) -> bytes | None: ...
     def now(self) -> int: ...
     def wait_until(self, deadline_ns: int, wake_on_frame: bool) -> bool: ...
+    def explain(self, number: int) -> LinkError | None:
+        """The error for an errno, where more is known than its name."""
+
     def close(self) -> None: ...
     def __enter__(self) -> Self: ...
     def __exit__(self, *exc_info: object) -> None: ...
+
+def explained_by(link: object, number: int) -> LinkError | None:
+    """Return the error of a link for an errno; None: it knows no more than its name."""
 
 class WrapperLink(TableLink):
     @property

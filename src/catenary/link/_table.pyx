@@ -117,7 +117,14 @@ cdef class TableLink:
             raise self.failed("wait", -status)
         return status == 1
 
+    def explain(self, int number):
+        """Return a LinkError that says more than the name of the errno; None: no more is known."""
+        return None
+
     cdef failed(self, str verb, int number):
+        explained = self.explain(number)
+        if explained is not None:
+            return explained
         hint = "the link is closed" if number == EBADF else ""
         return LinkError(f"{self.name}: cannot {verb}: {os.strerror(number)}", hint=hint)
 
@@ -137,6 +144,12 @@ cdef class TableLink:
         return f"<{type(self).__name__} {self.name}{' (closed)' if self.closed else ''}>"
 
 
+def explained_by(link, int number):
+    """Return what a link knows of an errno, see `explain`; a link written in Python may lack it."""
+    explain = getattr(link, "explain", None)
+    return None if explain is None else explain(number)
+
+
 cdef class WrapperLink(TableLink):
     """Owns the link it is wrapped round: closing closes both. A base for recorders and the like."""
 
@@ -151,6 +164,9 @@ cdef class WrapperLink(TableLink):
             CAT_LINK_SPENDS | CAT_LINK_POLLS | CAT_LINK_FORETELLS
         )
         return 0
+
+    def explain(self, int number):
+        return explained_by(self.link, number)
 
     cdef int close_table(self) except -1:
         self.link.close()

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import difflib
+import errno
 import fcntl
-import os
-import shlex
 import socket
 import struct
-import sys
 from dataclasses import dataclass
 
 from catenary.errors import LinkError
+from catenary.interpreter import permission_advice
 from catenary.link._raw import RawLink
 from catenary.link.fork import forget_in_child
 
@@ -26,7 +25,7 @@ PACKET_IGNORE_OUTGOING = 23
 TPACKET_V2 = 1
 
 SIOCGIFFLAGS, SIOCGIFHWADDR = 0x8913, 0x8927  # linux/sockios.h
-IFF_UP = 1  # linux/if.h
+IFF_UP, IFF_RUNNING = 0x01, 0x40  # linux/if.h; running: there is a carrier
 ARPHRD_ETHER, ARPHRD_LOOPBACK = 1, 772  # linux/if_arp.h
 
 SLOT_SIZE = 2048  # header and one frame of 1514 bytes
@@ -82,6 +81,25 @@ def check(name: str) -> None:
         raise LinkError(f"network interface {name} is down", hint=f"sudo ip link set {name} up")
 
 
+def no_link(name: str, number: int) -> LinkError | None:
+    """Return the error for frames that the kernel refuses because there is no carrier, with ENOBUFS
+    ("No buffer space available"). None: there is another reason."""
+    if number != errno.ENOBUFS:
+        return None
+    try:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
+            flags = ask(asking, SIOCGIFFLAGS, name)
+    except OSError:
+        return None  # it was renamed or removed: the plain error says as much as is known
+    if flags & (IFF_UP | IFF_RUNNING) != IFF_UP:
+        return None
+    return LinkError(
+        f"{name} has no link: the cable is unplugged or damaged, or the first device has no power",
+        hint=f"look at the link lights; is {name} the right port? `ip link show {name}` says "
+        "NO-CARRIER until there is a link. Of a veth pair, set the other end up too",
+    )
+
+
 def ask(asking: socket.socket, request: int, name: str) -> int:
     """The first 16 bits of an answer to one of the SIOCGIF* requests (`struct ifreq`)."""
     answer = fcntl.ioctl(asking, request, struct.pack("16s24x", name.encode()))
@@ -94,7 +112,7 @@ def open_socket(name: str) -> socket.socket:
         opened = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, 0)
     except PermissionError as error:
         raise LinkError(
-            f"{name}: no permission for raw Ethernet frames", hint=permission_command()
+            f"{name}: no permission for raw Ethernet frames", hint=permission_advice()
         ) from error
     try:
         opened.setblocking(False)
@@ -108,12 +126,6 @@ def open_socket(name: str) -> socket.socket:
             hint="Linux 4.20 or newer is needed",
         ) from error
     return opened
-
-
-def permission_command() -> str:
-    """What grants raw sockets, real-time scheduling and locked memory to this interpreter."""
-    interpreter = os.path.realpath(sys.executable)
-    return f"sudo setcap cap_net_raw,cap_sys_nice,cap_ipc_lock=ep {shlex.quote(interpreter)}"
 
 
 def request_ring(opened: socket.socket) -> tuple[int, str]:

@@ -25,7 +25,7 @@ from catenary.core import (
     RECORD_FIELDS,
     Engine,
 )
-from catenary.errors import CatenaryError, DriveError, LoopError
+from catenary.errors import CatenaryError, DriveError, LinkError, LoopError
 from catenary.link import forget_in_child, ring_of
 from catenary.loop.axis_watch import AxisWatch, RefusedMode, StoppedAxis, StopPolicy
 from catenary.loop.buffers import bind_wishes
@@ -394,7 +394,11 @@ class Running:
                 raise watch.error
 
     def _take_down(self, guard: SignalGuard) -> None:
-        self.main.leave()
+        try:
+            self.main.leave()
+        except LinkError:
+            if any(self.watch.requires(sub.position) for sub in self.main.subs):
+                raise  # else the loop has ended as it ran: without its devices
 
     # Errors
 

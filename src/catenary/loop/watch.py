@@ -79,6 +79,16 @@ class Charge:
     released: bool = False
 
 
+def required_positions(plan: Plan) -> frozenset[int]:
+    """The devices without which the loop ends: all but the optional ones. None if everything that
+    is exchanged is optional: a coupler before optional devices is then not required either."""
+    units = plan.cycle.sync_units
+    if units and all(unit.optional for unit in units):
+        return frozenset()
+    optional = {position for unit in units if unit.optional for position in unit.devices}
+    return frozenset(device.position for device in plan.devices) - optional
+
+
 class Watch:
     """Owns the standing of every device of one network."""
 
@@ -95,11 +105,9 @@ class Watch:
         on_return: Policy = "restore",
         on_replacement: Policy = "hold",
     ) -> None:
-        optional = {
-            position for unit in plan.cycle.sync_units if unit.optional for position in unit.devices
-        }
+        required = required_positions(plan)
         self._charges = [
-            Charge(sub, device, device.position not in optional, device.identity)
+            Charge(sub, device, device.position in required, device.identity)
             for sub, device in zip(main.subs, plan.devices, strict=True)
         ]
         self._all_required = all(charge.required for charge in self._charges)

@@ -17,18 +17,26 @@ from catenary.model.device import (
     Entry,
     Identity,
     MailboxLayout,
+    OpMode,
     Pdo,
     SyncManager,
 )
+from catenary.model.text import printable
 from catenary.model.topology import open_ports
 from catenary.wire import sii_categories
+from catenary.wire.coe import SDO_SIZE
 from catenary.wire.features import decode_information
-from catenary.wire.sii import CHECKSUM_WORD, MailboxProtocol, Sii, decode_sii
+from catenary.wire.frame import MAXIMUM_DATA
+from catenary.wire.mailbox import HEADER_SIZE
+from catenary.wire.register import PROCESS_RAM, SYNC_MANAGER_COUNT
+from catenary.wire.sii import CHECKSUM_WORD, MailboxArea, MailboxProtocol, Sii, decode_sii
 from catenary.wire.sii_categories import CoeDetails, General, SyncManagerEnable, SyncManagerUse
 from catenary.wire.sync_manager import Buffering, Control
 from catenary.wire.sync_manager import Direction as Flow
 
 NOT_ASSIGNED = 0xFF
+MAILBOX_MIN = HEADER_SIZE + SDO_SIZE  # bytes: the shortest SDO message
+RAM_END = 0x10000
 _MANDATORY, _FIXED_CONTENT = 0x0001, 0x0010  # PDO flags, ETG.2010 table 14
 _CHECKSUM_DISABLED = struct.pack("<H", 0x88A4)
 _UNPROGRAMMED = (bytes(4), b"\xff\xff\xff\xff")
@@ -93,7 +101,7 @@ def _decoded(image: bytes, notes: list[str]) -> Sii | None:
 
 def _filled(bare: DeviceDescription, sii: Sii, notes: list[str]) -> DeviceDescription:
     header = sii.header
-    managers = _sync_managers(sii)
+    managers = _sync_managers(sii, bare.controller.sync_manager_count, notes)
     texts = _Texts(sii)
     outputs = _pdos(texts, sii.receive_pdos, managers, SyncManagerUse.OUTPUTS, notes)
     inputs = _pdos(texts, sii.transmit_pdos, managers, SyncManagerUse.INPUTS, notes)
@@ -105,13 +113,13 @@ def _filled(bare: DeviceDescription, sii: Sii, notes: list[str]) -> DeviceDescri
         bare,
         identity=Identity(header.vendor, header.product, header.revision, header.serial),
         name=name or order or nameless,  # as SOEM and IgH show it
-        mailbox=_mailbox(sii),
+        mailbox=_mailbox(sii, notes),
         sync_managers=managers,
         outputs=assignments(outputs),
         inputs=assignments(inputs),
         output_pdos=outputs,
         input_pdos=inputs,
-        clock_modes=sii.clock_modes,
+        op_modes=tuple(_op_mode(texts, mode) for mode in sii.clock_modes),
         group=texts[general.group],
         order=order,
     )
@@ -126,11 +134,21 @@ def assignments(pdos: tuple[Pdo, ...]) -> tuple[Assignment, ...]:
     )
 
 
-def _mailbox(sii: Sii) -> MailboxLayout | None:
+def _mailbox(sii: Sii, notes: list[str]) -> MailboxLayout | None:
     receive, send = sii.header.standard_receive, sii.header.standard_send
     if not (receive.size and send.size):
         return None
+    impossible = [area for area in (receive, send) if not _is_possible(area)]
+    if impossible:
+        notes.append(
+            f"its SII has a mailbox of {impossible[0].size} bytes at 0x{impossible[0].offset:04X} "
+            f"({MAILBOX_MIN} to {MAXIMUM_DATA} bytes from 0x{PROCESS_RAM:04X} on are possible): "
+            "it is used without its mailbox"
+        )
+        return None
     coe = sii.general.coe if sii.general else CoeDetails(0)
+    # Details that were never filled in deny nothing; so IgH, fsm_pdo.c (`has_general`).
+    unknown = coe == CoeDetails(0)
     protocols = MailboxProtocol(sii.header.mailbox_protocols & 0x3F)
     return MailboxLayout(
         receive.offset,
@@ -140,12 +158,24 @@ def _mailbox(sii: Sii) -> MailboxLayout | None:
         protocols,
         complete_access=CoeDetails.COMPLETE_ACCESS in coe,
         sdo_information=CoeDetails.SDO_INFORMATION in coe,
-        pdo_assign=CoeDetails.PDO_ASSIGN in coe,
-        pdo_configuration=CoeDetails.PDO_CONFIGURATION in coe,
+        pdo_assign=unknown or CoeDetails.PDO_ASSIGN in coe,
+        pdo_configuration=unknown or CoeDetails.PDO_CONFIGURATION in coe,
     )
 
 
-def _sync_managers(sii: Sii) -> tuple[SyncManager, ...]:
+def _is_possible(area: MailboxArea) -> bool:
+    """Return True if one datagram can carry the mailbox and it is in the process-data memory."""
+    end = area.offset + area.size
+    return (
+        MAILBOX_MIN <= area.size <= MAXIMUM_DATA and area.offset >= PROCESS_RAM and end <= RAM_END
+    )
+
+
+def _sync_managers(sii: Sii, supported: int, notes: list[str]) -> tuple[SyncManager, ...]:
+    """Return those that the controller has (register 0x0005; 0: it does not say)."""
+    count = min(supported or SYNC_MANAGER_COUNT, SYNC_MANAGER_COUNT)
+    if len(sii.sync_managers) > count:
+        notes.append(f"its SII has {len(sii.sync_managers)} SyncManagers, its controller {count}")
     return tuple(
         SyncManager(
             index,
@@ -155,7 +185,7 @@ def _sync_managers(sii: Sii) -> tuple[SyncManager, ...]:
             entry.control,
             SyncManagerEnable.ENABLED in entry.enable,
         )
-        for index, entry in enumerate(sii.sync_managers)
+        for index, entry in enumerate(sii.sync_managers[:count])
     )
 
 
@@ -206,15 +236,24 @@ def _pdos(
     return tuple(found)
 
 
+def _op_mode(texts: _Texts, mode: sii_categories.ClockMode) -> OpMode:
+    return OpMode(
+        name=texts[mode.name],
+        description=texts[mode.description],
+        assign_activate=mode.assign_activate,
+        sync0_ns=mode.cycle_time_ns,
+        sync0_factor=mode.sync0_factor,
+        shift_ns=mode.shift_time_ns,
+        sync1_factor=mode.sync1_factor,
+        sync1_shift_ns=mode.shift_time_1_ns,
+    )
+
+
 class _Texts:
     """The printable part of an image's strings, by number from 1; empty where there is none."""
 
     def __init__(self, sii: Sii) -> None:
-        self._strings = ["", *(_tidy(text) for text in sii.strings)]
+        self._strings = ["", *(printable(text) for text in sii.strings)]
 
     def __getitem__(self, number: int) -> str:
         return self._strings[number] if number < len(self._strings) else ""
-
-
-def _tidy(text: str) -> str:
-    return "".join(c for c in text if c.isprintable()).strip()

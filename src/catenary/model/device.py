@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from catenary.wire.features import Information
 from catenary.wire.sii import MailboxProtocol
-from catenary.wire.sii_categories import ClockMode, SyncManagerUse
+from catenary.wire.sii_categories import SyncManagerUse
 
 
 class Identity(NamedTuple):
@@ -105,8 +105,9 @@ class Pdo:
     entries: tuple[Entry, ...]
     sync_manager: int | None  # assigned to by default; None: not
     fixed: bool = False  # its entries cannot be changed
-    mandatory: bool = False
+    mandatory: bool = False  # cannot be taken out of the assignment
     name: str = ""
+    excludes: frozenset[int] = frozenset()  # PDOs that cannot be assigned with it (ESI `Exclude`)
 
     @property
     def bit_length(self) -> int:
@@ -119,6 +120,7 @@ class Assignment:
 
     sync_manager: int
     pdos: tuple[Pdo, ...]
+    fixed: bool = False  # its list of PDOs (0x1C10 + SyncManager) cannot be changed
 
     @property
     def bit_length(self) -> int:
@@ -127,6 +129,21 @@ class Assignment:
     @property
     def byte_length(self) -> int:
         return (self.bit_length + 7) // 8
+
+
+@dataclass(frozen=True, slots=True)
+class OpMode:
+    """One way of a device to use distributed clocks: Dc/OpMode of an ESI file (ETG.2000), category
+    60 of the SII (ETG.2010). Factors count periods or SYNC0 cycles, see `plan.clocks`."""
+
+    name: str = ""
+    description: str = ""
+    assign_activate: int = 0  # registers 0x0980 (low byte) and 0x0981
+    sync0_ns: int = 0  # cycle time of SYNC0; 0: `sync0_factor` says it
+    sync0_factor: int = 0
+    shift_ns: int = 0
+    sync1_factor: int = 0
+    sync1_shift_ns: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,6 +157,16 @@ class ObjectInformation:
     output_mappable: bool = True  # as RxPDO
     input_mappable: bool = True  # as TxPDO
     name: str = ""
+    note: str = ""  # why the dictionary does not describe it
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectValue:
+    """The value of an entry of the dictionary when it was read; None: it could not be read."""
+
+    index: int
+    subindex: int
+    data: bytes | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,14 +189,15 @@ class DeviceDescription:
     parent: int | None = None  # position of the device before it in the tree
     parent_port: int | None = None
     system_time: bool = False  # it has a clock that can follow: a system time (0x0910)
-    clock_modes: tuple[ClockMode, ...] = ()  # ways to use it, the first is the default
+    op_modes: tuple[OpMode, ...] = ()  # ways to use it, the first is the default
     group: str = ""
     order: str = ""
     device_type: int | None = None  # object 0x1000
     slots: tuple[int, ...] = ()  # CiA 402 axes: objects + 0x800·slot
     objects: tuple[ObjectInformation, ...] = ()  # what has been asked of the dictionary
+    values: tuple[ObjectValue, ...] = ()  # of objects that a start-up list would write
     mapping_source: str = "SII"  # or "CoE"
-    notes: tuple[str, ...] = ()  # what is odd about its SII
+    notes: tuple[str, ...] = ()  # what is odd about its SII, or differs from its dictionary
 
     @property
     def profile(self) -> int | None:
@@ -199,6 +227,12 @@ class DeviceDescription:
         for known in self.objects:
             if (known.index, known.subindex) == (index, subindex):
                 return known
+        return None
+
+    def known_value(self, index: int, subindex: int) -> bytes | None:
+        for value in self.values:
+            if (value.index, value.subindex) == (index, subindex):
+                return value.data
         return None
 
     def __str__(self) -> str:

@@ -14,17 +14,17 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from catenary.errors import ConfigurationError
-from catenary.model.device import DeviceDescription
+from catenary.model.device import DeviceDescription, OpMode
 from catenary.plan.cycle import ClockPlan, FollowedClock, FramePlan, Order
 from catenary.wire.clock import Activation
 from catenary.wire.frame import wire_time_ns
 
 if TYPE_CHECKING:  # needs NumPy, a scan does not
-    from catenary.plan.wish import DC
+    from catenary.plan.wish import DistributedClock
 
 SYNC_BY_ECAT = 0x0300  # AssignActivate: cyclic operation and SYNC0, controlled by EtherCAT
 BURST = 15_000  # frames: ESC data sheet I §9.1.5; KickCAT sends as many, ethercrab 10 000
@@ -45,6 +45,7 @@ BOUND_NS = 1000
 
 SYNC_TYPE_SYNC0, SYNC_TYPE_SYNC1 = 2, 3  # 0x1C32:01 and 0x1C33:01, ETG.1020 §"Synchronization"
 SYNC_OBJECTS = (0x1C32, 0x1C33)
+REGISTER_END = 1 << 32  # of 0x09A0 and 0x09A4 [ns]
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +56,7 @@ class SyncPlan:
     cycle_ns: int  # of SYNC0
     sync1_ns: int  # SYNC1 so long after SYNC0
     shift_ns: int  # of SYNC0 behind the beat
+    op_mode: str = ""  # name of the OpMode in the SII that it follows
 
     @property
     def activation(self) -> Activation:
@@ -90,7 +92,7 @@ class ClockChoice:
 
 def choose_clocks(
     devices: Sequence[DeviceDescription],
-    wishes: Mapping[int, DC],
+    wishes: Mapping[int, DistributedClock],
     follow: FollowedClock,
     reference: int | None = None,
 ) -> ClockChoice | None:
@@ -118,25 +120,21 @@ def choose_clocks(
     )
 
 
-def make_sync(device: DeviceDescription, wish: DC, period_ns: int) -> SyncPlan:
-    """The SYNC unit of a device: what is wished for, else what its SII says, else SYNC0 alone."""
-    mode = next((m for m in device.clock_modes if _starts_sync0(m.assign_activate)), None)
-    cycle_ns = sync1_ns = shift_ns = 0
-    if mode is not None:
-        cycle_ns = mode.cycle_time_ns or _multiple(period_ns, mode.sync0_factor)
-        sync1_ns = max(mode.sync1_factor - 1, 0) * cycle_ns + mode.shift_time_1_ns
-        shift_ns = mode.shift_time_ns
-    assign = wish.assign_activate
-    if assign is None:
-        assign = mode.assign_activate if mode is not None else SYNC_BY_ECAT
+def make_sync(device: DeviceDescription, wish: DistributedClock, period_ns: int) -> SyncPlan:
+    """Return the SYNC unit of a device: as wished for, else as the OpMode in its SII says."""
+    mode = _op_mode(device, wish)
+    cycle_ns = _given(wish.sync0, mode.sync0_ns or _multiple(period_ns, mode.sync0_factor))
+    assign = mode.assign_activate if wish.assign_activate is None else wish.assign_activate
     if wish.sync1 is not None:
-        sync1_ns = round(wish.sync1 * 1e9)
         assign |= Activation.SYNC1 << 8
-    if wish.shift is not None:
-        shift_ns = round(wish.shift * 1e9)
-    cycle_ns = cycle_ns or period_ns
-    plan = SyncPlan(assign, cycle_ns, max(0, sync1_ns), shift_ns)
-    _check_sync(device, plan, period_ns)
+    plan = SyncPlan(
+        assign,
+        cycle_ns,
+        _given(wish.sync1, _sync1_ns(mode, cycle_ns, period_ns)),
+        _given(wish.shift, mode.shift_ns),
+        mode.name,
+    )
+    _check_sync(device, wish, plan, period_ns)
     return plan
 
 
@@ -215,24 +213,73 @@ def _no_clock(device: DeviceDescription, why: str) -> ConfigurationError:
     )
 
 
-def _check_sync(device: DeviceDescription, plan: SyncPlan, period_ns: int) -> None:
-    if not _starts_sync0(plan.assign_activate):
+def _op_mode(device: DeviceDescription, wish: DistributedClock) -> OpMode:
+    """The OpMode of that name; without a name the first one that starts a SYNC signal."""
+    if wish.op_mode is not None:
+        return _named_mode(device, wish.op_mode)
+    for starts in (_starts_sync0, _starts_sync):
+        for mode in device.op_modes:
+            if starts(mode.assign_activate):
+                return mode
+    return OpMode(assign_activate=SYNC_BY_ECAT)
+
+
+def _named_mode(device: DeviceDescription, name: str) -> OpMode:
+    for mode in device.op_modes:
+        if mode.name.casefold() == name.casefold():
+            return mode
+    known = ", ".join(repr(mode.name) for mode in device.op_modes)
+    raise ConfigurationError(
+        f"{device}: its EEPROM has no OpMode {name!r}; it has {known or 'none'}",
+        hint="choose one of these" * bool(known)
+        or "write what its ESI file says: cat.DistributedClock(assign_activate=..., sync0=...)",
+    )
+
+
+def _check_sync(
+    device: DeviceDescription, wish: DistributedClock, plan: SyncPlan, period_ns: int
+) -> None:
+    """ConfigurationError for what cannot be. A value of the EEPROM is named as such, because
+    nothing in the program shows it."""
+    eeprom = f"{device}: its EEPROM (OpMode {plan.op_mode!r})"
+    if not _starts_sync(plan.assign_activate):
+        own = wish.assign_activate is None
         raise ConfigurationError(
-            f"{device}: AssignActivate 0x{plan.assign_activate:04X} starts no SYNC0",
-            hint="its ESI file says the right one (Dc/OpMode/AssignActivate), often 0x0300",
+            f"{eeprom if own else device}: AssignActivate 0x{plan.assign_activate:04X} starts no "
+            "SYNC signal",
+            hint="its ESI file has the right one (Dc/OpMode/AssignActivate), often 0x0300: "
+            f"{replace(wish, assign_activate=SYNC_BY_ECAT)}",
+        )
+    if not 0 < plan.cycle_ns < REGISTER_END or plan.sync1_ns >= REGISTER_END:
+        raise ConfigurationError(
+            f"{eeprom}: SYNC0 every {_time(plan.cycle_ns)} and SYNC1 {_time(plan.sync1_ns)} later "
+            "do not fit into registers of 32 bits [ns]",
+            hint=f"override it: {replace(wish, sync0=period_ns / 1e9, sync1=0.0)}",
         )
     if plan.cycle_ns % period_ns and period_ns % plan.cycle_ns:
+        own = wish.sync0 is None
         raise ConfigurationError(
-            f"{device}: its SYNC0 comes every {plan.cycle_ns / 1e3:g} us, which does not go with a "
-            f"period of {period_ns / 1e3:g} us",
-            hint="one must be a multiple of the other",
+            f"{eeprom if own else device}: SYNC0 every {plan.cycle_ns / 1e3:g} us does not go with "
+            f"a period of {period_ns / 1e3:g} us",
+            hint="one must be a multiple of the other; change the period"
+            + f", or override the EEPROM: {replace(wish, sync0=period_ns / 1e9)}" * own,
         )
     if abs(plan.shift_ns) >= plan.span_ns:
+        own = wish.shift is None
         raise ConfigurationError(
-            f"{device}: a shift of {plan.shift_ns / 1e3:g} us is no less than its cycle of "
-            f"{plan.span_ns / 1e3:g} us",
-            hint="shifts lie within one cycle, before or behind the beat",
+            f"{eeprom if own else device}: a shift of {_time(plan.shift_ns)} is not less than the "
+            f"cycle of {_time(plan.span_ns)}",
+            hint="shifts lie within one cycle"
+            + f"; override the EEPROM: {replace(wish, shift=0.0)}" * own,
         )
+
+
+def _time(ns: int) -> str:
+    return f"{ns / 1e9:.4g} s" if abs(ns) >= 1_000_000_000 else f"{ns / 1e3:g} us"
+
+
+def _given(seconds: float | None, else_ns: int) -> int:
+    return else_ns if seconds is None else round(seconds * 1e9)
 
 
 def _starts_sync0(assign_activate: int) -> bool:
@@ -240,8 +287,29 @@ def _starts_sync0(assign_activate: int) -> bool:
     return assign_activate & SYNC_BY_ECAT == SYNC_BY_ECAT
 
 
+def _starts_sync(assign_activate: int) -> bool:
+    """SYNC0 or SYNC1. A device may use SYNC1 alone (0x0500): robert-burger/libethercat#21."""
+    signals = Activation(assign_activate >> 8)
+    running = Activation.CYCLIC_OPERATION in signals
+    return running and bool(signals & (Activation.SYNC0 | Activation.SYNC1))
+
+
 def _multiple(period_ns: int, factor: int) -> int:
     """ETG.2000, Dc/OpMode/CycleTimeSync0@Factor: so many periods, or a part of one."""
     if factor < 0:
         return period_ns // -factor
     return period_ns * (factor or 1)
+
+
+def _sync1_ns(mode: OpMode, cycle_ns: int, period_ns: int) -> int:
+    """Register 0x09A4: the time from SYNC0 to the SYNC1 that follows it.
+
+    ETG.2000, Dc/OpMode/CycleTimeSync1@Factor: SYNC1 comes every so many SYNC0 cycles; negative:
+    every so many periods. Its cycle is that of SYNC0 plus the register (Beckhoff, ESC data sheet I
+    §9.2.3.5; so SOEM's `ecx_dcsync01` and IgH, master/fsm_slave_config.c). An EL3702 with four-fold
+    oversampling has the factors -4 and -1: 250 us and 750 us at 1 ms (ecmc's notes on DC clocks).
+    """
+    span_ns = -mode.sync1_factor * period_ns
+    if mode.sync1_factor >= 0:
+        span_ns = (mode.sync1_factor or 1) * cycle_ns
+    return max(0, span_ns - cycle_ns + mode.sync1_shift_ns)

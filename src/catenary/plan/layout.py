@@ -18,13 +18,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from catenary.errors import ConfigurationError, MappingError
 from catenary.model.device import Assignment, DeviceDescription, Direction
 from catenary.plan.cycle import Number
-from catenary.plan.numbers import numbers
+from catenary.plan.numbers import MappedNumber, find_number, numbers
+from catenary.plan.wish import ANY, Which
 from catenary.wire.sync_manager import WATCHDOG_TRIGGER
 
 LOGICAL_BASE = 0x0001_0000
@@ -138,14 +139,14 @@ class Layout:
     devices: tuple[DeviceLayout, ...]
     output_size: int
     input_size: int
-    outputs: tuple[Mapping[tuple[int, int], Number], ...]  # by position, then index, subindex
-    inputs: tuple[Mapping[tuple[int, int], Number], ...]
+    outputs: tuple[tuple[MappedNumber, ...], ...]  # by position
+    inputs: tuple[tuple[MappedNumber, ...], ...]
 
-    def output(self, device: int, index: int, subindex: int) -> Number | None:
-        return self.outputs[device].get((index, subindex))
+    def output(self, device: int, index: int, subindex: int, which: Which = ANY) -> Number | None:
+        return find_number(self.outputs[device], index, subindex, which)
 
-    def input(self, device: int, index: int, subindex: int) -> Number | None:
-        return self.inputs[device].get((index, subindex))
+    def input(self, device: int, index: int, subindex: int, which: Which = ANY) -> Number | None:
+        return find_number(self.inputs[device], index, subindex, which)
 
     def sync_unit(self, device: int) -> int:
         return self.devices[device].sync_unit

@@ -18,11 +18,19 @@ from catenary.plan.frames import (
 )
 from catenary.plan.layout import EXACT_UNIT_MAX, UNIT_MAX, DeviceData, Layout, make_layout
 from catenary.plan.mailboxes import MailboxArea, with_mailboxes
-from catenary.plan.mapping import Mapping, make_mapping
+from catenary.plan.mapping import make_mapping
+from catenary.plan.pdo_mapping import Mapping
 from catenary.plan.report import report
 from catenary.plan.start_up import DevicePlan, make_device_plan
 from catenary.plan.watchdog import choose_watchdog
-from catenary.plan.wish import DC, ObjectReference, PdoWish, Wish, WishTables
+from catenary.plan.wish import (
+    DistributedClock,
+    ObjectReference,
+    PdoWish,
+    Wish,
+    WishTables,
+    WrittenPdo,
+)
 from catenary.wire.cia402 import Mode
 
 PERIOD_MIN, PERIOD_MAX = 1e-6, 1000.0  # [s]; the core's limits are wider
@@ -79,8 +87,8 @@ def make_plan(
         period: [s].
         watchdog: of process data [s]; 0: off; None: 0.1 s, for devices in CST the longer of 10 ms
             and five exchanges.
-        optional: positions without which the cycle is good, in addition to devices that no wish
-            requires.
+        optional: positions without which the cycle is good, in addition to devices of wishes that
+            do not require them. Devices that no wish names are required if any other one is.
         collect_share: threaded, the part of the period in which frames may come back.
         late_limit_position, late_limit_velocity, late_limit_torque: of CSP, CSV and CST [s].
         handover, stop_deadline: [s].
@@ -103,8 +111,9 @@ def make_plan(
         for device in devices
     ]
     mappings = [_mappings(device, asked.get(device.position, PdoWish())) for device in devices]
+    unasked = PdoWish(required=not asked or any(wish.required for wish in asked.values()))
     data = [
-        _device_data(device, mapping, asked.get(device.position, PdoWish()), watchdog_ns)
+        _device_data(device, mapping, asked.get(device.position, unasked), watchdog_ns)
         for device, mapping, watchdog_ns in zip(devices, mappings, watchdogs, strict=True)
     ]
     data = [replace(d, optional=d.optional or d.position in optional) for d in data]
@@ -191,6 +200,7 @@ def gather_wishes(wishes: Sequence[Wish], period_ns: int) -> dict[int, PdoWish]:
                 _one_clock(position, before.clock, pdos.clock),
                 math.gcd(before.every, pdos.every),
                 before.required or pdos.required,
+                _one_mapping(position, before.pdos, pdos.pdos),
             )
     return gathered
 
@@ -211,7 +221,9 @@ def _asked(
     return asked
 
 
-def _one_clock(position: int, first: DC | None, second: DC | None) -> DC | None:
+def _one_clock(
+    position: int, first: DistributedClock | None, second: DistributedClock | None
+) -> DistributedClock | None:
     if first is not None and second is not None and first != second:
         raise ConfigurationError(
             f"device {position}: two wishes ask for different clocks: {first} and {second}",
@@ -220,7 +232,23 @@ def _one_clock(position: int, first: DC | None, second: DC | None) -> DC | None:
     return first if second is None else second
 
 
-def _clock_wishes(asked: dict[int, PdoWish]) -> dict[int, DC]:
+def _one_mapping(
+    position: int, first: tuple[WrittenPdo, ...], second: tuple[WrittenPdo, ...]
+) -> tuple[WrittenPdo, ...]:
+    """Return the PDOs that two requests write down: per direction, one of them or both alike."""
+    directions = {pdo.direction for pdo in first} & {pdo.direction for pdo in second}
+    for direction in directions:
+        if [p for p in first if p.direction is direction] != [
+            p for p in second if p.direction is direction
+        ]:
+            raise ConfigurationError(
+                f"device {position}: two requests write down different PDOs for {direction.noun}",
+                hint="give both the same pdos=, or only one of them",
+            )
+    return first + tuple(pdo for pdo in second if pdo not in first)
+
+
+def _clock_wishes(asked: dict[int, PdoWish]) -> dict[int, DistributedClock]:
     return {position: wish.clock for position, wish in asked.items() if wish.clock is not None}
 
 
@@ -256,8 +284,8 @@ def _merged(
 
 def _mappings(device: DeviceDescription, wish: PdoWish) -> tuple[Mapping, Mapping]:
     return (
-        make_mapping(device, Direction.OUTPUT, wish.outputs),
-        make_mapping(device, Direction.INPUT, wish.inputs),
+        make_mapping(device, Direction.OUTPUT, wish.outputs, wish.written(Direction.OUTPUT)),
+        make_mapping(device, Direction.INPUT, wish.inputs, wish.written(Direction.INPUT)),
     )
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from catenary.model.device import Assignment, Entry, Pdo
 from catenary.plan.cycle import Number, NumberKind
+from catenary.plan.wish import Which
 from catenary.types import Integer, Real, by_index
 
 
@@ -28,14 +30,42 @@ def entry_places(assignments: Sequence[Assignment], offset: int) -> Iterator[Ent
         offset += assignment.byte_length
 
 
-def numbers(assignments: Sequence[Assignment], offset: int) -> dict[tuple[int, int], Number]:
-    """The mapped objects by (index, subindex); of one mapped twice, the first place."""
-    found: dict[tuple[int, int], Number] = {}
-    for _, entry, bit in entry_places(assignments, offset):
-        if entry.index:
-            number = Number(bit, entry.bit_length, number_kind(entry.data_type))
-            found.setdefault((entry.index, entry.subindex), number)
-    return found
+@dataclass(frozen=True, slots=True)
+class MappedNumber:
+    """One mapped object in an image."""
+
+    pdo: int
+    index: int
+    subindex: int
+    number: Number
+
+
+def numbers(assignments: Sequence[Assignment], offset: int) -> tuple[MappedNumber, ...]:
+    """Return the mapped objects in the order of the image, gaps left out."""
+    return tuple(
+        MappedNumber(
+            pdo.index,
+            entry.index,
+            entry.subindex,
+            Number(bit, entry.bit_length, number_kind(entry.data_type)),
+        )
+        for pdo, entry, bit in entry_places(assignments, offset)
+        if entry.index
+    )
+
+
+def find_number(
+    mapped: Sequence[MappedNumber], index: int, subindex: int, which: Which
+) -> Number | None:
+    """Return the place of an object: of `which` if it is mapped like this, else the first."""
+    found = [each for each in mapped if (each.index, each.subindex) == (index, subindex)]
+    if not found:
+        return None
+    if which.bit_length:
+        found = [each for each in found if each.number.bit_length == which.bit_length] or found
+    if which.pdo:
+        found = [each for each in found if each.pdo == which.pdo] or found
+    return found[which.rank if which.rank < len(found) else 0].number
 
 
 def number_kind(data_type: int) -> NumberKind:

@@ -78,8 +78,12 @@ def _devices(devices: Sequence[DevicePlan]) -> Iterator[str]:
             yield f"    {_sync(device.sync)}"
         yield from _entries(Direction.OUTPUT, device.outputs, place.output_offset)
         yield from _entries(Direction.INPUT, device.inputs, place.input_offset)
+        if device.left_out:
+            yield f"    not exchanged (optional): {', '.join(device.left_out)}"
         if device.downloads:
             yield f"    {len(device.downloads)} SDO downloads before SAFE-OP"
+        for what, old, new in device.changes:
+            yield f"        {what}  {old or '(not read)'} → {new}"
 
 
 def _axes(cycle: CyclePlan, axes: Sequence[AxisReport]) -> Iterator[str]:
@@ -103,9 +107,11 @@ def _axes(cycle: CyclePlan, axes: Sequence[AxisReport]) -> Iterator[str]:
 def _sync(sync: SyncPlan) -> str:
     """One device's SYNC signals, and what its application is told of them."""
     second = f", SYNC1 {sync.sync1_ns / 1e3:g} us later" * (Activation.SYNC1 in sync.activation)
+    hidden = "" if Activation.SYNC0 in sync.activation else " (not shown to the device)"
+    mode = f", OpMode {sync.op_mode!r}" * bool(sync.op_mode)
     return (
-        f"SYNC0 every {sync.cycle_ns / 1e3:g} us, {sync.shift_ns / 1e3:+g} us to the beat{second}, "
-        f"AssignActivate 0x{sync.assign_activate:04X}"
+        f"SYNC0 every {sync.cycle_ns / 1e3:g} us{hidden}, {sync.shift_ns / 1e3:+g} us to the beat"
+        f"{second}, AssignActivate 0x{sync.assign_activate:04X}{mode}"
     )
 
 

@@ -1,7 +1,8 @@
 """What is written to one device between PRE-OP and SAFE-OP: SDOs, then registers.
 
 The order inside a changed mapping is the one of ETG.1020 §"PDO mapping": empty the assignment,
-empty and fill the mapping, fill the assignment. Only what differs is written.
+empty and fill the mapping, fill the assignment. Only what differs is written. An assignment that
+cannot be changed is not emptied.
 """
 
 from __future__ import annotations
@@ -11,13 +12,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from catenary.model.device import Assignment, DeviceDescription, Direction, Entry, Identity, Pdo
+from catenary.plan.changes import Change, mapping_changes, value_changes
 from catenary.plan.clocks import SyncPlan
 from catenary.plan.layout import DeviceLayout
-from catenary.plan.mapping import Mapping
+from catenary.plan.pdo_mapping import ASSIGNMENT_BASE, Mapping, shape
 
 WATCHDOG_DIVIDER = 2498  # (2498 + 2) · 40 ns = 100 µs, the controller's reset value
 WATCHDOG_UNIT_NS = (WATCHDOG_DIVIDER + 2) * 40
-ASSIGNMENT_BASE = 0x1C10  # + SyncManager
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +48,14 @@ class DevicePlan:
     mapping_changed: bool  # the downloads begin with a new mapping
     watchdog_ns: int  # of process data; 0: off
     sync: SyncPlan | None = None  # None: no SYNC signals
+    changes: tuple[Change, ...] = ()  # what the downloads change, with old and new values
+    rejected: tuple[str, ...] = ()  # mappings that change less, and why each failed
+    left_out: tuple[str, ...] = ()  # optional objects that are not exchanged
+
+    @property
+    def new_mapping(self) -> tuple[Download, ...]:
+        """The first downloads: the new mapping."""
+        return self.downloads[: len(self.downloads) - len(self.start_up)]
 
     @property
     def watchdog_count(self) -> int:
@@ -82,7 +91,33 @@ def make_device_plan(
         mapping_changed=outputs.changed or inputs.changed,
         watchdog_ns=watchdog_ns,
         sync=sync,
+        changes=(
+            *mapping_changes(device, Direction.OUTPUT, outputs),
+            *mapping_changes(device, Direction.INPUT, inputs),
+            *value_changes(device, [(d.index, d.subindex, d.data) for d in (*wished, *clocks)]),
+        ),
+        rejected=outputs.rejected + inputs.rejected,
+        left_out=tuple(
+            f"0x{each.index:04X}:{each.subindex:02X}" for each in outputs.left_out + inputs.left_out
+        ),
     )
+
+
+def restoring_downloads(device: DeviceDescription, plan: DevicePlan) -> tuple[Download, ...]:
+    """Return the downloads that bring back the mapping that the device had before the plan."""
+    downloads: list[Download] = []
+    for direction in Direction:
+        difference = _difference(device, direction, plan.assignments(direction))
+        changed = {pdo.index for pdo in difference.rewritten}
+        before = device.assignments(direction)
+        touched = {*difference.reassigned} | {
+            each.sync_manager
+            for each in plan.assignments(direction)
+            if any(pdo.index in changed for pdo in each.pdos)
+        }
+        rewritten = tuple(pdo for pdo in device.pdos(direction) if pdo.index in changed)
+        downloads += mapping_downloads(Mapping(before, rewritten, tuple(touched)))
+    return tuple(downloads)
 
 
 def renewed(plan: DevicePlan, device: DeviceDescription) -> DevicePlan:
@@ -100,13 +135,13 @@ def renewed(plan: DevicePlan, device: DeviceDescription) -> DevicePlan:
 def _difference(
     device: DeviceDescription, direction: Direction, wanted: tuple[Assignment, ...]
 ) -> Mapping:
-    entries = {pdo.index: _shape(pdo) for pdo in device.pdos(direction)}
+    entries = {pdo.index: shape(pdo) for pdo in device.pdos(direction)}
     now = device.assignments(direction)
     lists = {each.sync_manager: [pdo.index for pdo in each.pdos] for each in now}
     return Mapping(
         wanted,
         rewritten=tuple(
-            pdo for each in wanted for pdo in each.pdos if entries.get(pdo.index) != _shape(pdo)
+            pdo for each in wanted for pdo in each.pdos if entries.get(pdo.index) != shape(pdo)
         ),
         reassigned=tuple(
             each.sync_manager
@@ -114,10 +149,6 @@ def _difference(
             if lists.get(each.sync_manager, []) != [pdo.index for pdo in each.pdos]
         ),
     )
-
-
-def _shape(pdo: Pdo) -> tuple[tuple[int, int, int], ...]:
-    return tuple((entry.index, entry.subindex, entry.bit_length) for entry in pdo.entries)
 
 
 def mapping_downloads(mapping: Mapping) -> tuple[Download, ...]:
@@ -130,15 +161,26 @@ def mapping_downloads(mapping: Mapping) -> tuple[Download, ...]:
         )
         if not touched:
             continue
-        index = ASSIGNMENT_BASE + assignment.sync_manager
-        downloads.append(Download(index, 0, b"\x00"))
-        for pdo in assignment.pdos:
-            if pdo.index in rewritten:
-                downloads.extend(_pdo_downloads(pdo))
-        for rank, pdo in enumerate(assignment.pdos, start=1):
-            downloads.append(Download(index, rank, struct.pack("<H", pdo.index)))
-        downloads.append(Download(index, 0, bytes([len(assignment.pdos)])))
+        contents = [
+            step
+            for pdo in assignment.pdos
+            if pdo.index in rewritten
+            for step in _pdo_downloads(pdo)
+        ]
+        keeps_list = assignment.fixed and assignment.sync_manager not in mapping.reassigned
+        downloads += contents if keeps_list else _assigned(assignment, contents)
     return tuple(downloads)
+
+
+def _assigned(assignment: Assignment, contents: Sequence[Download]) -> list[Download]:
+    index = ASSIGNMENT_BASE + assignment.sync_manager
+    ranks = enumerate(assignment.pdos, start=1)
+    return [
+        Download(index, 0, b"\x00"),
+        *contents,
+        *(Download(index, rank, struct.pack("<H", pdo.index)) for rank, pdo in ranks),
+        Download(index, 0, bytes([len(assignment.pdos)])),
+    ]
 
 
 def _pdo_downloads(pdo: Pdo) -> list[Download]:

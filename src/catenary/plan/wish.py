@@ -5,13 +5,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
+from catenary.model.device import Direction
 from catenary.plan.axis_report import AxisReport
 from catenary.plan.cycle import AxisPlan, Column, Number
 
@@ -22,6 +24,9 @@ Serials = npt.NDArray[np.uint32]
 Bytes = npt.NDArray[np.uint8]
 Modes = npt.NDArray[np.int8]
 Cycles = npt.NDArray[np.uint64]
+
+TX_PDOS = 0x1A00  # indices of TxPDOs begin here (inputs); RxPDOs from 0x1600 (outputs)
+SYNC_TIME_END = 4.29  # [s] the registers 0x09A0 and 0x09A4 have 32 bits [ns]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,23 +41,73 @@ class ObjectReference:
 
 
 @dataclass(frozen=True, slots=True)
-class DC:
-    """Distributed clocks for a device: SYNC0 every period, at the beat all devices share.
+class WrittenPdo:
+    """A PDO that the application wrote down. `entries`: None: as the device has it."""
 
-    `shift` [s] of its SYNC0 behind the beat (negative: before), less than a cycle; `sync1` [s]: a
-    SYNC1 so long after its SYNC0; `assign_activate`: registers 0x0980 and 0x0981 as its ESI file
-    has them. None: as its SII says; where that says nothing, 0, no SYNC1 and 0x0300.
+    index: int
+    entries: tuple[ObjectReference, ...] | None = None
+
+    @property
+    def direction(self) -> Direction:
+        return Direction.OUTPUT if self.index < TX_PDOS else Direction.INPUT
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DistributedClock:
+    """Distributed clocks of a device: SYNC signals, in phase with those of all other devices.
+
+    What is None comes from an OpMode of the device's SII. Without a name this is the first one that
+    starts SYNC0, else the first one that starts SYNC1. If there is none: SYNC0 every period, no
+    shift, no SYNC1, 0x0300.
+
+    Args:
+        op_mode: name of the OpMode, as in the ESI file; upper and lower case are the same.
+        sync0: period of SYNC0 [s], a multiple or a whole part of the loop's period.
+        sync1: time from SYNC0 to SYNC1 [s].
+        shift: time of SYNC0 after the common SYNC0 time [s]; negative: before. Less than a cycle.
+        assign_activate: registers 0x0980 and 0x0981, as in the ESI file; 0x0500: SYNC1 alone.
+
+    Raises:
+        ValueError: a time is impossible.
     """
 
-    shift: float | None = None
+    op_mode: str | None = None
+    sync0: float | None = None
     sync1: float | None = None
+    shift: float | None = None
     assign_activate: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.sync0 is not None and not 1e-9 <= self.sync0 < SYNC_TIME_END:
+            raise ValueError(f"sync0={self.sync0}: a period of 1 ns to {SYNC_TIME_END} s")
+        if self.sync1 is not None and not 0 <= self.sync1 < SYNC_TIME_END:
+            raise ValueError(f"sync1={self.sync1}: SYNC1 comes 0 to {SYNC_TIME_END} s after SYNC0")
+        if self.shift is not None and not math.isfinite(self.shift):
+            raise ValueError(f"shift={self.shift}: must be a finite time [s]")
+        if self.assign_activate is not None and not 0 <= self.assign_activate <= 0xFFFF:
+            raise ValueError(f"assign_activate={self.assign_activate}: a word, 0 to 0xFFFF")
+
+    def __str__(self) -> str:
+        """The call that makes it, as a user writes it."""
+        given = [
+            f"{name}={value!r}"
+            for name, value in (
+                ("op_mode", self.op_mode),
+                ("sync0", self.sync0),
+                ("sync1", self.sync1),
+                ("shift", self.shift),
+            )
+            if value is not None
+        ]
+        if self.assign_activate is not None:
+            given.append(f"assign_activate=0x{self.assign_activate:04X}")
+        return f"cat.DistributedClock({', '.join(given)})"
 
 
 @dataclass(frozen=True, slots=True)
 class PdoWish:
     """The objects one device must exchange every cycle. What is mapped already stays as it is;
-    the mapping is changed only where something wished for is missing.
+    the mapping is changed only where a wanted object is missing, or as `pdos` says.
 
     A device that several wishes name is exchanged as often as any of them asks, and is required
     when any of them requires it.
@@ -63,16 +118,36 @@ class PdoWish:
     start_up: tuple[
         tuple[int, int, bytes], ...
     ] = ()  # SDO downloads in PRE-OP: index, subindex, data
-    clock: DC | None = None
+    clock: DistributedClock | None = None
     every: int = 1  # exchanged every so many cycles
     required: bool = True  # the cycle is not good without it
+    pdos: tuple[WrittenPdo, ...] = ()  # exactly these, in directions that have any; else a search
+
+    def written(self, direction: Direction) -> tuple[WrittenPdo, ...]:
+        """Return the PDOs of a direction that the application wrote down."""
+        return tuple(pdo for pdo in self.pdos if pdo.direction is direction)
+
+
+class Which(NamedTuple):
+    """Which one is meant where an object is mapped more than once. 0: any."""
+
+    pdo: int = 0
+    bit_length: int = 0
+    rank: int = 0  # among those that are alike
+
+
+ANY = Which()
 
 
 class ImageLayout(Protocol):
-    """Where the mapped objects ended up."""
+    """The places of the mapped objects: of `which`, or else one of the same object."""
 
-    def output(self, device: int, index: int, subindex: int) -> Number | None: ...
-    def input(self, device: int, index: int, subindex: int) -> Number | None: ...
+    def output(
+        self, device: int, index: int, subindex: int, which: Which = ANY
+    ) -> Number | None: ...
+    def input(
+        self, device: int, index: int, subindex: int, which: Which = ANY
+    ) -> Number | None: ...
     def sync_unit(self, device: int) -> int: ...
 
 

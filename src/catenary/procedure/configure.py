@@ -66,7 +66,7 @@ def configure_process_data(
     if plan.layout.mailbox is not None:
         requests.append(_mailbox_fmmu(station, plan.layout.mailbox))
     used_fmmus = len(plan.layout.fmmus) + (plan.layout.mailbox is not None)
-    for number in range(used_fmmus, device.controller.fmmu_count):
+    for number in range(used_fmmus, min(device.controller.fmmu_count, register.FMMU_COUNT)):
         block = register.fmmu(number)
         requests.append(write(Command.FPWR, station.address, block, bytes(block.size)))
     watchdog = _watchdog_registers(plan)

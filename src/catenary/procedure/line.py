@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import TypeVar
 
 from catenary.errors import CatenaryError, ClockError
-from catenary.procedure.exchange import Procedure, read, write
+from catenary.procedure.exchange import Procedure, after, read, write
 from catenary.procedure.station import Station, answered
 from catenary.wire.datagram import Command
 from catenary.wire.dl import DlStatus, Loop
@@ -16,30 +16,53 @@ T = TypeVar("T")
 
 TEMPORARY = 1 << 1  # the loops return to what they were after about a second: also if we are killed
 LOOPS = 8  # the first bit of port 0's
+LOOKS, PAUSE = 10, 1e-3  # [s] until a port is closed: controllers do so with the end of the frame
 
 
 def as_line(station: Station, port: int, procedure: Procedure[T]) -> Procedure[T]:
-    """Runs `procedure` with a port closed, and opens it again. ClockError where that took longer
-    than the device keeps it closed: what was measured then counts for nothing."""
+    """Run `procedure` with a port closed, and open it again.
+
+    ClockError: the port cannot be closed, or it opened by itself before the end, so that what was
+    measured counts for nothing.
+    """
     [reply] = yield [read(Command.FPRD, station.address, DL_CONTROL)]
     before = DL_CONTROL.unpack(answered(reply, station, "DL control"))
     closed = before | Loop.CLOSED << LOOPS + 2 * port
     yield from _write(station, closed | TEMPORARY)
     try:
+        yield from _await_closed(station, port)
         result = yield from procedure
     except CatenaryError:
         yield from _write(station, before & ~TEMPORARY)
         raise
-    [reply] = yield [read(Command.FPRD, station.address, DL_STATUS)]
-    status = DlStatus.from_word(DL_STATUS.unpack(answered(reply, station, "DL status")))
+    still_closed = yield from _is_closed(station, port)
     yield from _write(station, before & ~TEMPORARY)
-    if not status.ports[port].loop_closed:
+    if not still_closed:
         raise ClockError(
             f"{station}: port {port}, the second end of the ring, did not stay closed while the "
             "delays were measured",
-            hint="it does so for a second: give the program a processor of its own",
+            hint="it opens by itself after a second: give the program a processor of its own",
         )
     return result
+
+
+def _await_closed(station: Station, port: int) -> Procedure[None]:
+    for _ in range(LOOKS):
+        if (yield from _is_closed(station, port)):
+            return
+        yield after(PAUSE)
+    raise ClockError(
+        f"{station}: port {port}, the second end of the ring, cannot be closed: DL control "
+        "(0x0100) was written, DL status (0x0110) still shows an open loop",
+        hint="its controller lacks loop control, so that delays cannot be measured in this ring: "
+        "let another device be the second end, or use the ring as a line, with one interface",
+    )
+
+
+def _is_closed(station: Station, port: int) -> Procedure[bool]:
+    [reply] = yield [read(Command.FPRD, station.address, DL_STATUS)]
+    status = DlStatus.from_word(DL_STATUS.unpack(answered(reply, station, "DL status")))
+    return status.ports[port].loop_closed
 
 
 def _write(station: Station, control: int) -> Procedure[None]:

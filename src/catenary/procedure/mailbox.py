@@ -8,8 +8,10 @@ which jams mailboxes (SOEM#684):
 - A lost write: nobody knows whether it arrived. An answer within a grace says that it did; else
   the message is written again with the same counter, by which the device tells the repetition.
 
-The counter of what the device sends only tells duplicates; devices may start it anywhere and may
-leave it 0 (ethercrab#236).
+The counter of what the device sends only identifies repetitions. Devices may start it anywhere,
+leave it 0 (ethercrab#236) or at another value, or copy ours (KickCAT, CoE/mailbox/response.cc). So
+a message is dropped only if a repetition was requested, and the message equals the last accepted
+one in every byte. SOEM (ecx_mbxreceive) and IgH (fsm_coe.c) compare no counter on reception.
 """
 
 from __future__ import annotations
@@ -241,15 +243,15 @@ def _fetch(channel: MailboxChannel, deadline: Deadline) -> Procedure[Mailbox | N
 
 
 def _look(channel: MailboxChannel) -> Procedure[tuple[bool, Mailbox | None, int]]:
-    """(whether there was a message, the message unless it was a duplicate, when).
+    """Return (True if there was a message, the message unless it was a repetition, time [ns]).
 
     A small mailbox is read in the same frame that looks: an empty one is not changed by it, and
-    answers with a working counter of 0. Only where counters tell duplicates: when the frame is
-    lost, nobody knows whether there was a message in it. It is looked for as it is; only when
-    nothing comes within a grace is the device asked for its last message again, because some stacks
-    do not know how to repeat.
+    answers with a working counter of 0. This is done only where counters identify repetitions: if
+    the frame is lost, it is unknown whether it took a message. The mailbox is then read as it is.
+    Only if nothing arrives within a grace period is the device asked to repeat its last message,
+    because some stacks cannot repeat.
     """
-    careful = not channel.received_counter or channel.layout.send_size > EAGER_MAX
+    careful = not channel.counts or channel.layout.send_size > EAGER_MAX
     if careful or channel.unsure_ns is not None:
         return (yield from _look_first(channel))
     station = channel.station
@@ -293,7 +295,7 @@ def _read_request(channel: MailboxChannel) -> Request:
 
 
 def _take(channel: MailboxChannel) -> Procedure[Mailbox | None]:
-    """Reads the full mailbox; None for a duplicate of what was read before, or for nothing."""
+    """Read the full mailbox. Return None for a repetition of what was read before, or nothing."""
     for _ in range(RECOVERIES):
         [reply] = yield [_read_request(channel)]
         if not reply.lost:
@@ -315,17 +317,14 @@ def _decoded(channel: MailboxChannel, data: bytes) -> Mailbox | None:
             f"{channel.station}: a mailbox message that is none: {error}",
             hint="its firmware is at fault; a capture of the bring-up shows the bytes",
         ) from error
-    if message.counter and message.counter == channel.received_counter:
-        channel.dropped += 1
-        return None
-    channel.received_counter = message.counter
-    return message
+    return message if channel.accept(message) else None
 
 
 def _ask_again(channel: MailboxChannel) -> Procedure[bool]:
     """Repeat request and acknowledge of SyncManager 1, ETG.1000.4 §6.7.2: the device puts its
     last message into the buffer once more. Whether there is one now."""
     channel.repeat_requested = not channel.repeat_requested
+    channel.repetitions += 1
     activation = Activation.ENABLE
     if channel.repeat_requested:
         activation |= Activation.REPEAT_REQUEST
@@ -355,11 +354,7 @@ def _sorted(
     channel: MailboxChannel, message: Mailbox, accept: Callable[[Mailbox], T | None]
 ) -> T | None:
     if message.type is Type.ERROR:
-        reply = decode_error(message.data)
-        raise MailboxError(
-            f"{channel.station} answers with mailbox error 0x{reply.code:04X}: {reply.text}",
-            hint="the device does not offer this mailbox service",
-        )
+        raise _error_reply(channel, message)
     emergency = _emergency(message)
     if emergency is not None:
         channel.hear(emergency)
@@ -368,6 +363,19 @@ def _sorted(
     if answer is None:
         channel.dropped += 1
     return answer
+
+
+def _error_reply(channel: MailboxChannel, message: Mailbox) -> MailboxError:
+    """Return the error for a mailbox error reply, also for a malformed one."""
+    try:
+        reply = decode_error(message.data)
+        what = f"0x{reply.code:04X}: {reply.text}"
+    except DecodeError as error:
+        what = f"without a valid code ({error.message})"
+    return MailboxError(
+        f"{channel.station} answers with mailbox error {what}",
+        hint="the device does not offer this mailbox service",
+    )
 
 
 def _emergency(message: Mailbox) -> coe.Emergency | None:

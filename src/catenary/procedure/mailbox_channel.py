@@ -10,6 +10,7 @@ from typing import NamedTuple, TypeAlias
 from catenary.model.device import MailboxLayout
 from catenary.procedure.station import Station
 from catenary.wire import coe
+from catenary.wire.mailbox import Mailbox
 
 EMERGENCIES_KEPT = 64
 THINKS_FIRST_NS = 100_000
@@ -37,7 +38,9 @@ class MailboxChannel:
     station: Station
     layout: MailboxLayout
     counter: int = 0  # of what was written last
-    received_counter: int = 0  # of what was read last
+    received: Mailbox | None = None  # message that was accepted last
+    counts: bool = False  # its counter differed from that of the message before, and from 0
+    repetitions: int = 0  # requested from the device, and not read yet
     received_ns: int = 0  # when that was
     repeat_requested: bool = False  # state of the toggle bit
     emergencies: deque[Heard] = field(default_factory=lambda: deque(maxlen=EMERGENCIES_KEPT))
@@ -48,14 +51,30 @@ class MailboxChannel:
     thinks_ns: int = 0  # the device, before it answers, at least
     unsure_ns: int | None = None  # when a frame was lost that may have taken a message
     owed: bool = False  # a question was given up; its answer may still come
+    undescribed: int = 0  # answers of SDO information in a row that were missing or malformed
     emptied: bool = False  # configured anew since the question was asked: nobody will answer it
 
     def reset(self) -> None:
         """After the SyncManagers were configured anew."""
-        self.counter = self.received_counter = 0
-        self.repeat_requested = self.owed = False
+        self.counter = self.repetitions = 0
+        self.received = None
+        self.counts = self.repeat_requested = self.owed = False
         self.unsure_ns = None
         self.emptied = True
+
+    def accept(self, message: Mailbox) -> bool:
+        """Return False for a repetition of the last accepted message, else accept this one.
+
+        An equal message is a repetition only if one was requested: a device whose counter does not
+        change sends equal answers to equal questions.
+        """
+        expected, self.repetitions = self.repetitions > 0, max(self.repetitions - 1, 0)
+        if expected and message == self.received:
+            self.dropped += 1
+            return False
+        before = self.received.counter if self.received is not None else 0
+        self.received, self.counts = message, message.counter not in (0, before)
+        return True
 
     def learn(self, empty_ns: int | None) -> None:
         """An answer is there; at `empty_ns` it was not yet (None: nobody had looked). Nobody looks

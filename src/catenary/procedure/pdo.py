@@ -3,6 +3,7 @@ plan differs, read again to verify."""
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 from catenary.errors import MappingError, SdoAbort
@@ -13,7 +14,8 @@ from catenary.model.device import (
     Entry,
     Pdo,
 )
-from catenary.plan.start_up import ASSIGNMENT_BASE, DevicePlan
+from catenary.plan.pdo_mapping import ASSIGNMENT_BASE
+from catenary.plan.start_up import DevicePlan, Download, restoring_downloads
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.sdo import download, upload
@@ -26,7 +28,10 @@ LEFT_ALONE = NOT_THERE | {0x0601_0000, 0x0601_0002, 0x0609_0030, 0x0800_0020, 0x
 def read_mapping(
     channel: MailboxChannel, device: DeviceDescription
 ) -> Procedure[DeviceDescription]:
-    """The description with what is mapped now. Devices without 0x1C1x keep what their SII says."""
+    """Return the description with the mapping that the device has now.
+
+    A direction whose 0x1C1x cannot be read keeps what the SII says; so in IgH (fsm_pdo.c).
+    """
     outputs = yield from _read_direction(channel, device, Direction.OUTPUT)
     inputs = yield from _read_direction(channel, device, Direction.INPUT)
     return replace(
@@ -39,33 +44,75 @@ def read_mapping(
     )
 
 
-def write_downloads(channel: MailboxChannel, plan: DevicePlan) -> Procedure[None]:
-    """The plan's SDO downloads in their order. A refused mapping names its object."""
-    for step in plan.downloads:
+def write_downloads(
+    channel: MailboxChannel, device: DeviceDescription, plan: DevicePlan
+) -> Procedure[None]:
+    """Write the plan's SDO downloads in their order.
+
+    `device` has the mapping of before. It is written back, as far as the device allows, if the new
+    one is refused.
+
+    Raises:
+        MappingError: The device refused the new mapping. Names the object and the alternatives.
+        SdoAbort: It refused another download.
+    """
+    for step in plan.new_mapping:
         try:
             yield from download(channel, step.index, step.subindex, step.data)
         except SdoAbort as abort:
-            if step.optional and abort.code in LEFT_ALONE:
-                continue
-            if step.entry is None:
+            yield from restore_mapping(channel, device, plan)
+            raise _refused_mapping(channel, plan, step, abort) from abort
+    for step in plan.start_up:
+        try:
+            yield from download(channel, step.index, step.subindex, step.data)
+        except SdoAbort as abort:
+            if not (step.optional and abort.code in LEFT_ALONE):
                 raise
-            raise MappingError(
-                f"{channel.station}: object {step.entry} cannot be mapped into PDO "
-                f"0x{step.index:04X}: {abort.message}",
-                hint=abort.hint,
-            ) from abort
+
+
+def restore_mapping(
+    channel: MailboxChannel, device: DeviceDescription, plan: DevicePlan
+) -> Procedure[None]:
+    """Write the mapping of before, as far as the device allows. SOEM and IgH leave the device
+    without one, so that its next scan finds no process data."""
+    for step in restoring_downloads(device, plan):
+        with suppress(SdoAbort):
+            yield from download(channel, step.index, step.subindex, step.data)
+
+
+def _refused_mapping(
+    channel: MailboxChannel, plan: DevicePlan, step: Download, abort: SdoAbort
+) -> MappingError:
+    if step.entry is not None:
+        what = f"object {step.entry} cannot be mapped into PDO 0x{step.index:04X}"
+    elif step.index < ASSIGNMENT_BASE:
+        what = f"the entries of PDO 0x{step.index:04X} cannot be changed"
+    else:
+        what = f"its list of PDOs, 0x{step.index:04X}, cannot be changed"
+    refusal = abort.message.removeprefix(f"{channel.station}: ")
+    alternatives = "".join(f"\n    {each}" for each in plan.rejected)
+    return MappingError(
+        f"{channel.station}: {what}: {refusal}"
+        + (f"\n  tried because:{alternatives}" if alternatives else ""),
+        hint="its SII allows the change, the device does not; ask only for objects that it maps, "
+        "or choose other PDOs with pdos= (`catenary scan` shows the mapping)",
+    )
 
 
 def verify_mapping(
     channel: MailboxChannel, device: DeviceDescription, plan: DevicePlan
 ) -> Procedure[None]:
-    """Reads the mapping again after it was written; MappingError where the device took something
-    else."""
+    """Read the mapping again after it was written, and write the old one back if it differs.
+
+    Raises:
+        MappingError: The device took another mapping than the one written.
+    """
     for direction in Direction:
         found = yield from _read_direction(channel, device, direction)
         wanted = _shape(plan.assignments(direction))
         if found is None or _shape(found) == wanted:
             continue
+        yield from restore_mapping(channel, device, plan)
         raise MappingError(
             f"{channel.station}: took a mapping of {direction.noun} that is not the one "
             f"written: {_text(_shape(found))} instead of {_text(wanted)}",
@@ -92,13 +139,14 @@ def _text(shape: _Shape) -> str:
 def _read_direction(
     channel: MailboxChannel, device: DeviceDescription, direction: Direction
 ) -> Procedure[tuple[Assignment, ...] | None]:
-    """None: the dictionary has no assignment for this direction."""
+    """Return the assignments; None: the dictionary shows none of this direction."""
     known = {pdo.index: pdo for pdo in device.pdos(direction)}
-    assignments = []
+    before = {each.sync_manager: each for each in device.assignments(direction)}
+    shown = False
     for manager in device.sync_managers:
         if manager.use is not direction.use:
             continue
-        indices = yield from _read_list(channel, ASSIGNMENT_BASE + manager.index)
+        indices = yield from read_list(channel, ASSIGNMENT_BASE + manager.index)
         if indices is None:
             continue
         pdos = []
@@ -106,14 +154,15 @@ def _read_direction(
             index = int.from_bytes(data[:2], "little")
             if index:  # 0: a place kept free
                 pdos.append((yield from _read_pdo(channel, index, known.get(index), manager.index)))
-        assignments.append(Assignment(manager.index, tuple(pdos)))
-    return tuple(assignments) if assignments else None
+        before[manager.index] = Assignment(manager.index, tuple(pdos))
+        shown = True
+    return tuple(before[number] for number in sorted(before)) if shown else None
 
 
 def _read_pdo(
     channel: MailboxChannel, index: int, known: Pdo | None, sync_manager: int
 ) -> Procedure[Pdo]:
-    words = yield from _read_list(channel, index)
+    words = yield from read_list(channel, index)
     if words is None:
         if known is None:
             raise MappingError(
@@ -122,11 +171,15 @@ def _read_pdo(
                 hint="write 0x1C12 and 0x1C13 anew, or restore its defaults (0x1011)",
             )
         return replace(known, sync_manager=sync_manager)
-    names = {(e.index, e.subindex): e for e in known.entries} if known else {}
-    entries = tuple(_entry(data, names) for data in words)
     if known is None:
-        return Pdo(index, entries, sync_manager)
-    return replace(known, entries=entries, sync_manager=sync_manager)
+        return Pdo(index, read_entries(words, ()), sync_manager)
+    return replace(known, entries=read_entries(words, known.entries), sync_manager=sync_manager)
+
+
+def read_entries(words: list[bytes], known: tuple[Entry, ...]) -> tuple[Entry, ...]:
+    """Return the entries of a mapping object, with names and types of those that are known."""
+    names = {(entry.index, entry.subindex): entry for entry in known}
+    return tuple(_entry(data, names) for data in words)
 
 
 def _entry(data: bytes, names: dict[tuple[int, int], Entry]) -> Entry:
@@ -138,17 +191,15 @@ def _entry(data: bytes, names: dict[tuple[int, int], Entry]) -> Entry:
     return replace(named, bit_length=bits)
 
 
-def _read_list(channel: MailboxChannel, index: int) -> Procedure[list[bytes] | None]:
-    """Subindices 1 to n of a list object; None where the device does not have it."""
+def read_list(channel: MailboxChannel, index: int) -> Procedure[list[bytes] | None]:
+    """Return subindices 1 to n of a list object; None if the device does not let it be read."""
     try:
         count = (yield from upload(channel, index, 0))[:1]
         items = []
         for subindex in range(1, int.from_bytes(count, "little") + 1):
             items.append((yield from upload(channel, index, subindex)))
-    except SdoAbort as abort:
-        if abort.code in NOT_THERE:
-            return None
-        raise
+    except SdoAbort:
+        return None
     return items
 
 

@@ -10,11 +10,12 @@ from dataclasses import replace
 
 from catenary.errors import SdoAbort
 from catenary.model.device import DeviceDescription, ObjectInformation
+from catenary.model.text import printable
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.sdo import upload
-from catenary.procedure.sdo_information import read_entry_description
-from catenary.wire.sdo_information import Access
+from catenary.procedure.sdo_information import describe_entry
+from catenary.wire.sdo_information import Access, EntryDescription
 
 DEVICE_TYPE = 0x1000
 STATUSWORD = 0x6041
@@ -23,6 +24,8 @@ PROFILE_DRIVE = 402
 PROFILE_MODULAR = 5001
 SLOT_STRIDE = 0x800
 SLOTS_MAX = 16  # 0x6000 to 0xDFFF
+SMALL_LIMIT = 4096  # bytes: these objects have up to 4, one wished for may be a string
+SMALL_TIMEOUT = 5.0  # [s] for one of them
 
 
 def read_profile(
@@ -45,34 +48,29 @@ def read_profile(
 def read_object(
     channel: MailboxChannel, device: DeviceDescription, index: int, subindex: int
 ) -> Procedure[ObjectInformation]:
-    """What the dictionary says of an entry. Bit length 0: it does not exist. Where the device has
-    no SDO information, its length is found by reading it, and mapping it is left to the device."""
-    mailbox = device.mailbox
-    if mailbox is not None and mailbox.sdo_information:
-        found = yield from _describe(channel, index, subindex)
-        if found is not None:
-            return found
+    """Return what the dictionary has of an entry. Bit length 0: it does not exist.
+
+    If the device does not describe it by SDO information, its length is found by reading it, and
+    mapping it is left to the device.
+    """
+    note = ""
+    if device.mailbox is not None and device.mailbox.sdo_information:
+        entry, note = yield from describe_entry(channel, index, subindex)
+        if entry is not None:
+            return _information(entry)
     data = yield from _upload_if_there(channel, index, subindex)
-    return ObjectInformation(index, subindex, 0 if data is None else 8 * len(data))
+    return ObjectInformation(index, subindex, 0 if data is None else 8 * len(data), note=note)
 
 
-def _describe(
-    channel: MailboxChannel, index: int, subindex: int
-) -> Procedure[ObjectInformation | None]:
-    """By SDO information; None where the device answers with an error."""
-
-    try:
-        entry = yield from read_entry_description(channel, index, subindex)
-    except SdoAbort:
-        return None
+def _information(entry: EntryDescription) -> ObjectInformation:
     return ObjectInformation(
-        index,
-        subindex,
+        entry.index,
+        entry.subindex,
         entry.bit_length,
         entry.data_type,
         Access.RXPDO_MAPPABLE in entry.access,
         Access.TXPDO_MAPPABLE in entry.access,
-        entry.name,
+        printable(entry.name),
     )
 
 
@@ -97,8 +95,10 @@ def _listed_axes(channel: MailboxChannel) -> Procedure[tuple[int, ...]]:
 
 
 def _upload_if_there(channel: MailboxChannel, index: int, subindex: int) -> Procedure[bytes | None]:
-    """None where the device refuses: whatever the reason, the object is of no use."""
+    """Return None if the device refuses: whatever the reason, the object is of no use."""
     try:
-        return (yield from upload(channel, index, subindex))
+        return (
+            yield from upload(channel, index, subindex, limit=SMALL_LIMIT, timeout=SMALL_TIMEOUT)
+        )
     except SdoAbort:
         return None

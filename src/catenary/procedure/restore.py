@@ -114,7 +114,7 @@ def bring_to_safe_op(
     if channel is not None and device.coe:
         found = yield from read_mapping(channel, device)
         again = renewed(plan, found)
-        yield from write_downloads(channel, again)
+        yield from write_downloads(channel, found, again)
         if again.mapping_changed:
             yield from verify_mapping(channel, device, again)
     yield from configure_process_data(station, device, plan)

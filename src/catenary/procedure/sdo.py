@@ -8,6 +8,7 @@ from typing import TypeVar
 from catenary.errors import DecodeError, MailboxError, SdoAbort
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel, converse, exclusively, tell
+from catenary.procedure.station import Deadline
 from catenary.wire.abort import abort_code
 from catenary.wire.coe import (
     EXPEDITED_MAXIMUM,
@@ -32,9 +33,11 @@ SEGMENT_OVERHEAD = HEADER_SIZE + 3  # mailbox header, CoE header, command
 INITIATE_OVERHEAD = HEADER_SIZE + SDO_SIZE
 ABORT_PROTOCOL = 0x0504_0001  # command specifier not valid or unknown
 ABORT_TOGGLE = 0x0503_0000
+ABORT_TIMEOUT = 0x0504_0000
 ABORT_LENGTH = 0x0607_0012  # data type does not match, length too high
 ABORT_MEMORY = 0x0504_0005  # out of memory
 UPLOAD_LIMIT = 1 << 20  # bytes: more than any object of a device we know
+UPLOAD_TIMEOUT = 60.0  # [s] for all segments: 1 MiB in mailboxes of 128 bytes, 7 ms each
 
 
 def upload(
@@ -44,14 +47,30 @@ def upload(
     *,
     complete_access: bool = False,
     limit: int = UPLOAD_LIMIT,
+    timeout: float = UPLOAD_TIMEOUT,
 ) -> Procedure[bytes]:
-    """Reads one object. SdoAbort if the device refuses; MailboxError if it announces more than
-    `limit` bytes, or sends more than it has announced."""
-    return exclusively(channel, _upload(channel, index, subindex, complete_access, limit))
+    """Read one object.
+
+    Args:
+        complete_access: Read all subindices from `subindex` on.
+        limit: Largest size [bytes].
+        timeout: Deadline of the whole transfer [s]; each message has its own, too.
+
+    Raises:
+        SdoAbort: The device refuses.
+        MailboxError: The device announces more than `limit` bytes, sends more than it has
+            announced, or needs longer than `timeout`.
+    """
+    return exclusively(channel, _upload(channel, index, subindex, complete_access, limit, timeout))
 
 
 def _upload(
-    channel: MailboxChannel, index: int, subindex: int, complete_access: bool, limit: int
+    channel: MailboxChannel,
+    index: int,
+    subindex: int,
+    complete_access: bool,
+    limit: int,
+    timeout: float,
 ) -> Procedure[bytes]:
     first = yield from _ask(
         channel,
@@ -71,7 +90,11 @@ def _upload(
         )
     data = bytearray(first.data)
     toggle, last = False, False
+    deadline = Deadline(timeout)
     while not last:
+        if deadline.passed_at(channel.received_ns):
+            yield from tell(channel, Type.COE, Abort(index, subindex, ABORT_TIMEOUT).encode())
+            raise _too_slow(channel, (index, subindex), len(data), first.size, timeout)
         segment = yield from _ask(
             channel, UploadSegmentRequest(toggle), UploadSegment, (index, subindex)
         )
@@ -83,6 +106,17 @@ def _upload(
         data += segment.data
         toggle, last = not toggle, segment.last
     return bytes(data)
+
+
+def _too_slow(
+    channel: MailboxChannel, place: tuple[int, int], received: int, size: int, timeout: float
+) -> MailboxError:
+    index, subindex = place
+    return MailboxError(
+        f"{channel.station}: SDO 0x{index:04X}:{subindex:02X}: {received} of {size} bytes within "
+        f"{timeout:g} s",
+        hint="if the device is known to be slow, read with a longer timeout",
+    )
 
 
 def download(
@@ -177,16 +211,21 @@ def _break_off(
 
 
 def refused(
-    channel: MailboxChannel, index: int, subindex: int, code: int, *, what: str = ""
+    channel: MailboxChannel, index: int, subindex: int, code: int | None, *, what: str = ""
 ) -> SdoAbort:
-    """The error for an abort code. `what` was refused: an SDO to the object, if not said."""
-    known = abort_code(code)
+    """Return the error for an abort code.
+
+    Args:
+        code: None if the device gave no complete one; the error has code 0 then.
+        what: What was refused; empty: an SDO to the object.
+    """
+    known = abort_code(code or 0)
+    why = "without an abort code" if code is None else f"with 0x{code:08X}: {known.text}"
     return SdoAbort(
-        f"{channel.station}: {what or f'SDO 0x{index:04X}:{subindex:02X}'} refused with "
-        f"0x{code:08X}: {known.text}",
+        f"{channel.station}: {what or f'SDO 0x{index:04X}:{subindex:02X}'} refused {why}",
         position=channel.station.position,
         index=index,
         subindex=subindex,
-        code=code,
+        code=code or 0,
         hint=known.hint or "the manual of the device lists its objects",
     )

@@ -1,11 +1,13 @@
-"""Whom a conversation is with, and what an answer of theirs must look like."""
+"""The device of a conversation, checks of its replies, and deadlines."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from catenary.errors import ResponseTimeout, SegmentError
-from catenary.procedure.exchange import Reply
+from catenary.procedure.exchange import Procedure, Reply
+
+T = TypeVar("T")
 
 
 class Station(NamedTuple):
@@ -61,6 +63,31 @@ class Deadline:
             self._left_ns -= min(time_ns - self._seen_ns, self.seconds * 1e9 / 4)
         self._seen_ns = time_ns
         return self._left_ns < 0
+
+
+def within(seconds: float, station: Station, procedure: Procedure[T]) -> Procedure[T]:
+    """Run a procedure with an overall deadline.
+
+    Raises:
+        ResponseTimeout: The procedure has not ended after `seconds`.
+    """
+    deadline = Deadline(seconds)
+    try:
+        step = next(procedure)
+        while True:
+            replies = yield step
+            if replies and deadline.passed(replies[-1]):
+                break
+            step = procedure.send(replies)
+    except StopIteration as stop:
+        result: T = stop.value
+        return result
+    finally:
+        procedure.close()
+    raise ResponseTimeout(
+        f"{station}: its description was not complete within {seconds:g} s",
+        hint="it answers, but too slowly: update its firmware, or take it off the segment",
+    )
 
 
 class Pace:

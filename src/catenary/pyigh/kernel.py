@@ -11,6 +11,7 @@ from catenary.igh.configure import Domain
 from catenary.model.device import Direction
 from catenary.plan.cycle import Number
 from catenary.plan.make import Plan
+from catenary.plan.wish import Which
 from catenary.pyigh.slaves import Cell, RawObject, SlaveBase
 
 if TYPE_CHECKING:
@@ -130,7 +131,7 @@ def _cells(slave: SlaveBase, plan: Plan, domains: Sequence[Domain]) -> dict[tupl
     for each in slave.objects:
         output = each.direction is Direction.OUTPUT
         find = plan.layout.output if output else plan.layout.input
-        number = find(slave.position, *each.place)
+        number = find(slave.position, *each.place, Which(bit_length=each.bit_length))
         if number is not None:
             domain = domains[plan.layout.sync_unit(slave.position)]
             copies = domain.outputs if output else domain.inputs

@@ -9,7 +9,7 @@ from typing import Protocol
 from catenary.errors import ConfigurationError, DriveError, MappingError
 from catenary.model.device import DeviceDescription, Direction, mapped_entries
 from catenary.plan.cycle import Bank, Column, NumberKind
-from catenary.plan.wish import ImageLayout, ObjectReference, PdoWish, WishTables
+from catenary.plan.wish import ImageLayout, ObjectReference, PdoWish, Which, WishTables
 from catenary.wire.cia402 import Mode, Object, State, state_of
 
 COMMANDS = {
@@ -216,15 +216,16 @@ class SlaveIO(SlaveBase):
 
     def adopt(self, description: DeviceDescription) -> None:
         super().adopt(description)
-        self.objects = tuple(
-            RawObject(
-                *(entry.index, entry.subindex, entry.bit_length, direction),
-                signed=self._signed and entry.bit_length > 1,
-            )
-            for direction in Direction
-            for entry in mapped_entries(description.assignments(direction))
-            if entry.bit_length <= 64
-        )
+        # Objects go by index and subindex here: one that is mapped twice is a single channel.
+        objects: dict[tuple[Direction, int, int], RawObject] = {}
+        for direction in Direction:
+            for entry in mapped_entries(description.assignments(direction)):
+                place = (entry.index, entry.subindex)
+                if entry.bit_length <= 64:
+                    signed = self._signed and entry.bit_length > 1
+                    found = RawObject(*place, entry.bit_length, direction, signed=signed)
+                    objects.setdefault((direction, *place), found)
+        self.objects = tuple(objects.values())
 
     def read_digital(self, channel: int) -> int:
         return self.read(*self._channel(_IN, True, channel))
@@ -270,7 +271,8 @@ def columns_of(slaves: Sequence[SlaveBase], layout: ImageLayout) -> WishTables:
     for slave in slaves:
         for each in slave.objects:
             find = layout.output if each.direction is Direction.OUTPUT else layout.input
-            number = find(slave.position, each.index, each.subindex)
+            which = Which(bit_length=each.bit_length)
+            number = find(slave.position, each.index, each.subindex, which)
             if number is None:
                 continue
             kind = NumberKind.SIGNED if each.signed else NumberKind.UNSIGNED

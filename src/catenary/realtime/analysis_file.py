@@ -40,7 +40,7 @@ def read_demands(path: str | Path) -> list[Demand]:
     try:
         file = msgspec.toml.decode(Path(path).read_bytes(), type=TaskFile)
         return [table.demand() for table in file.task]
-    except (msgspec.MsgspecError, ValueError) as error:
+    except (msgspec.MsgspecError, ValueError, ArithmeticError, RecursionError) as error:
         raise ConfigurationError(
             f"{path}: {error}",
             hint="every [[task]] has name, period and execution, and may have deadline, blocking, "

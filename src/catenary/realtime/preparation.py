@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import gc
 import os
-import shlex
 import struct
 import sys
 from collections.abc import Callable
@@ -13,16 +12,14 @@ from types import TracebackType
 from typing import Self
 
 from catenary.errors import RealtimeError
+from catenary.interpreter import permission_advice
 from catenary.realtime import libc
 from catenary.realtime._stack import touch_stack
 from catenary.realtime.scheduling import lock_all_memory, locked_kilobytes
 
 TOUCHED_STACK = 128 * 1024  # [bytes], as the core's own thread does
 LATENCY_DEVICE = "/dev/cpu_dma_latency"
-SET_CAPABILITIES = (
-    "sudo setcap cap_net_raw,cap_sys_nice,cap_ipc_lock=ep "
-    f"{shlex.quote(os.path.realpath(sys.executable))}"
-)
+SET_CAPABILITIES = permission_advice()
 
 HOW_TO_GET = {
     "locked memory": f"run as root, or once: {SET_CAPABILITIES}; or `ulimit -l unlimited` by a "

@@ -9,8 +9,11 @@ from __future__ import annotations
 import os
 import struct
 from collections.abc import Iterator
+from contextlib import contextmanager
 from io import BytesIO
 from typing import Any, BinaryIO, NamedTuple
+
+import msgspec
 
 from catenary.errors import RecordingError
 from catenary.record.extra import require
@@ -23,6 +26,20 @@ METADATA, DATA_END = 0x0C, 0x0F
 LAYOUT_RECORD = "catenary.layout"  # the metadata that begins a recording
 END_RECORD = "catenary.end"  # and the one that ends it
 LARGEST_CHUNK = 1 << 28  # [bytes] what is longer is no chunk of ours, but damage
+
+
+@contextmanager
+def refusing_damage(name: str) -> Iterator[None]:
+    """Turn whatever a damaged file makes the libraries raise into a RecordingError."""
+    damage: tuple[type[Exception], ...] = (
+        *(require("mcap.exceptions").McapError, msgspec.MsgspecError, struct.error),
+        *(ArithmeticError, LookupError, MemoryError, RecursionError, TypeError, ValueError),
+    )
+    try:
+        yield
+    except damage as error:
+        what = f"{type(error).__name__}: {error}"
+        raise RecordingError(f"{name} is damaged ({what})") from error
 
 
 class Place(NamedTuple):
@@ -88,7 +105,8 @@ def decode_record(data: bytes) -> Any:
 def chunk_bytes(chunk: Any) -> bytes | None:
     """What a chunk holds; None where it is damaged."""
     reader: Any = require("mcap.stream_reader")
-    damage = (ValueError, RuntimeError, require("zstandard").ZstdError)
+    unknown: Any = require("mcap.exceptions").McapError
+    damage = (ValueError, RuntimeError, MemoryError, unknown, require("zstandard").ZstdError)
     if chunk.uncompressed_size > LARGEST_CHUNK:
         return None
     try:

@@ -42,8 +42,9 @@ class Recorder:
 
     It begins with the oldest cycle that the share remembers. `take` writes what is new; `run` does
     so until the loop ends. `share`: a name, or what `cat.attach` gave; `stale`: also one whose
-    process has died, for its last cycles. RecordingError: the file exists (without `force`), or the
-    extra is not installed; OSError: the file cannot be made.
+    process has died, for its last cycles; `uid`: of another user (`cat.attach`). RecordingError:
+    the file exists (without `force`), or the extra is not installed; OSError: the file cannot be
+    made.
     """
 
     def __init__(
@@ -53,12 +54,13 @@ class Recorder:
         *,
         force: bool = False,
         stale: bool = False,
+        uid: int | None = None,
     ) -> None:
         self.path = Path(path)
         self.cycles = 0  # written
         self.lost = 0  # overwritten before they were taken
         self.ended = ""  # why, once it has
-        self._share = attach(share, stale=stale) if isinstance(share, str) else share
+        self._share = attach(share, stale=stale, uid=uid) if isinstance(share, str) else share
         self._own = isinstance(share, str)
         self._number = 0  # of the last cycle taken
         self._serial = 0  # of the last event taken

@@ -25,7 +25,7 @@ from catenary.record.channels import (
     make_channels,
     topic,
 )
-from catenary.record.layout import TIME, Layout
+from catenary.record.layout import NUMBER, TIME, Layout
 from catenary.record.mcap_records import (
     CHANNEL,
     CHUNK,
@@ -40,6 +40,7 @@ from catenary.record.mcap_records import (
     decode_record,
     places,
     read_record,
+    refusing_damage,
 )
 from catenary.share import SharedEvent
 
@@ -107,7 +108,9 @@ def read(path: str | os.PathLike[str], *, start: float = 0.0, end: float = np.in
     """Reads a recording, or the part between `start` and `end` seconds after its first cycle. One
     that was cut off is read as far as it is whole. RecordingError: it is none of ours, or cannot be
     read."""
-    with Path(path).open("rb") as stream:
+    if not start <= LONGEST or math.isnan(end):
+        raise ValueError(f"start={start} s, end={end} s: numbers of seconds")
+    with Path(path).open("rb") as stream, refusing_damage(stream.name):
         return _Reader(stream, start, end).read()
 
 
@@ -194,10 +197,16 @@ class _Reader:
         try:
             layout = msgspec.json.decode(text, type=Layout)
             make_channels(layout)
-        except (msgspec.MsgspecError, TypeError, ValueError, OverflowError, MemoryError) as error:
+            numbers = [layout.dtype[name].kind for name in (TIME, NUMBER)]
+        except (msgspec.MsgspecError, TypeError, ValueError, LookupError, MemoryError) as error:
             raise RecordingError(
                 f"{self._stream.name}: the description of its cycles is damaged: {error}"
             ) from error
+        if not 0.0 < layout.period < math.inf or not set(numbers) <= set("iu"):
+            raise RecordingError(
+                f"{self._stream.name}: the description of its cycles is damaged: period "
+                f"{layout.period} s, {TIME} and {NUMBER} of kinds {numbers}"
+            )
         return layout
 
 

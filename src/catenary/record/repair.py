@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from catenary.record.mcap_records import MAGIC
+from catenary.record.mcap_records import MAGIC, refusing_damage
 from catenary.record.output import lock
 from catenary.record.summary import Summary, encode_end, find_whole
 
@@ -45,7 +45,8 @@ def repair(path: str | os.PathLike[str], *, end: Mapping[str, object] | None = N
     with Path(path).open("r+b", buffering=0) as stream:
         lock(stream.fileno(), path)
         before = os.fstat(stream.fileno()).st_size
-        summary = find_whole(stream)
+        with refusing_damage(stream.name):
+            summary = find_whole(stream)
         if is_whole(path):
             return Repaired(False, 0, len(summary.chunks), summary.seconds)
         words = {key: str(value) for key, value in (end or CUT_OFF).items()}

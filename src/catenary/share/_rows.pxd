@@ -25,7 +25,7 @@ cdef extern from "ring.h" nogil:
     void ring_end(const ring_view *v)
     int ring_copy(const ring_view *v, uint64_t number, uint8_t *bytes)
     uint64_t ring_copy_newest(const ring_view *v, uint8_t *bytes)
-    uint64_t ring_copy_rows(const ring_view *v, uint64_t first, uint64_t last, uint8_t *bytes,
+    uint64_t ring_copy_rows(const ring_view *v, uint64_t first, uint64_t rows, uint8_t *bytes,
                             uint64_t *end)
     int ring_wait(const ring_view *v, uint64_t seen, int64_t deadline)
 

@@ -77,7 +77,7 @@ cdef class Ring:
         rows = bytearray((newest - first + 1) * self.view.size)
         place = <uint8_t *>PyByteArray_AS_STRING(rows)
         with nogil:
-            copied = ring_copy_rows(&self.view, first, newest, place, &end)
+            copied = ring_copy_rows(&self.view, first, newest - first + 1, place, &end)
         del rows[copied * self.view.size :]
         # What was overwritten behind the last row copied is for the next call to count.
         return rows, end - after - copied if copied else 0

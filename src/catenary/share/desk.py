@@ -1,6 +1,9 @@
 """The desk: where clients leave commands for a loop, and who may command which axis.
 
-A file of its own, since clients write in it. Behind the head lie the mutex, the holders (for every
+Sealed memory without a name, since clients write in it; they get it over a socket
+(desk_socket.py). Clients trust each other, because they share a mutex, whose robust list holds
+pointers; the loop trusts none of them: it never takes the mutex, and bounds whatever it reads.
+Behind the head lie the mutex, the holders (for every
 axis the serial of the lease it belongs to, 0: nobody's), the places (one for each client) and the
 ring of each place. Clients change it under the mutex alone. The loop never takes the mutex: it
 learns of a lease by the word that publishes it (`_words.pyx`), writes two words of a place only,
@@ -9,20 +12,24 @@ how far it has read and which lease it has ended, and says in the end that it is
 
 from __future__ import annotations
 
+import mmap
+import os
 import struct
 from enum import IntEnum
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from catenary.errors import ShareError
-from catenary.share import _rows, memory
+from catenary.share import _rows
 from catenary.share._mutex import MUTEX_SIZE, SharedMutex
 from catenary.share._rows import Ring
 from catenary.share._words import Words
+from catenary.share.desk_socket import request_descriptor
 from catenary.share.layout import VERSION, ShareLayout
-from catenary.share.memory import Segment
+from catenary.share.memory import make_sealed, map_sealed
 from catenary.share.process import Process
 
 MAGIC = b"CATADESK"
@@ -71,7 +78,7 @@ REASONS = {
 
 
 class Geometry(NamedTuple):
-    """Where things lie in the file."""
+    """Offsets of the parts of the memory."""
 
     closed: int
     holders: int
@@ -104,22 +111,22 @@ def memory_aligned(offset: int) -> int:
 class Desk:
     """Owns one process' sight of the desk of a loop."""
 
-    def __init__(self, segment: Segment, layout: ShareLayout, *, fresh: bool = False) -> None:
+    def __init__(self, memory: mmap.mmap, layout: ShareLayout, *, fresh: bool = False) -> None:
         axes = len(layout.axes)
         where = geometry(axes)
-        self.segment = segment
+        self._memory = memory
         self._boot_id = layout.writer.boot_id
         self.row = row_dtype(axes)
-        self.mutex = SharedMutex(segment.memory, memory_aligned(HEAD.size), fresh=fresh)
-        self.holders = np.frombuffer(segment.memory, "<u8", axes, where.holders)
-        self.places = np.frombuffer(segment.memory, PLACE, PLACES, where.places)
+        self.mutex = SharedMutex(memory, memory_aligned(HEAD.size), fresh=fresh)
+        self.holders = np.frombuffer(memory, "<u8", axes, where.holders)
+        self.places = np.frombuffer(memory, PLACE, PLACES, where.places)
         self.leases, self.ended, self.taken, self.deadlines_ns = (
             self._words(where.places, name) for name in ("lease", "ended", "taken", "deadline_ns")
         )
-        self._closed = Words(segment.memory, where.closed, 1)
+        self._closed = Words(memory, where.closed, 1)
         self.rings = [
             Ring(
-                segment.memory,
+                memory,
                 where.rings + k * where.ring_size,
                 COMMANDS,
                 self.row.itemsize,
@@ -172,23 +179,25 @@ class Desk:
     def _words(self, places: int, name: str) -> Words:
         """A field of every place."""
         assert PLACE.fields is not None
-        return Words(self.segment.memory, places + PLACE.fields[name][1], PLACES, PLACE.itemsize)
+        return Words(self._memory, places + PLACE.fields[name][1], PLACES, PLACE.itemsize)
 
 
-def make_desk(layout: ShareLayout, mode: int) -> Desk:
-    """A desk nobody sees yet."""
-    path = memory.path_of(layout.name, "commands")
-    segment = memory.create(path, geometry(len(layout.axes)).size, mode)
-    head = HEAD.pack(MAGIC, VERSION, len(layout.axes), layout.run.encode())
-    segment.memory[: HEAD.size] = head
-    return Desk(segment, layout, fresh=True)
-
-
-def open_desk(layout: ShareLayout) -> Desk:
-    """The desk of a running loop. ShareError: there is none for us."""
-    path = memory.path_of(layout.name, "commands")
+def make_desk(layout: ShareLayout) -> tuple[Desk, int]:
+    """Make a desk that no client has yet. Returns it and the descriptor of its memory."""
+    axes = len(layout.axes)
+    descriptor, memory = make_sealed(f"catenary-{layout.name}", geometry(axes).size)
     try:
-        segment = memory.open_segment(path, writable=True)
+        memory[: HEAD.size] = HEAD.pack(MAGIC, VERSION, axes, layout.run.encode())
+        return Desk(memory, layout, fresh=True), descriptor
+    except BaseException:
+        os.close(descriptor)
+        raise
+
+
+def open_desk(layout: ShareLayout, path: Path, owner: int) -> Desk:
+    """Open the desk of a running loop, over its socket. Raises ShareError if it cannot."""
+    try:
+        descriptor = request_descriptor(path, owner)
     except FileNotFoundError as error:
         raise ShareError(f"the share {layout.name!r} takes no commands") from error
     except PermissionError as error:
@@ -196,11 +205,13 @@ def open_desk(layout: ShareLayout) -> Desk:
             f"the share {layout.name!r} may not be commanded: {path} belongs to another user",
             hint="its writer can allow it: cat.Share(..., mode=0o660) for the group",
         ) from error
-    if segment.size != geometry(len(layout.axes)).size:
-        raise ShareError(f"{path} does not belong to the share {layout.name!r}")
-    magic, version, axes, run = HEAD.unpack(segment.memory[: HEAD.size])
-    if (magic, version, axes, run.decode()) != (MAGIC, VERSION, len(layout.axes), layout.run):
+    memory = map_sealed(descriptor, geometry(len(layout.axes)).size)
+    magic, version, axes, run = HEAD.unpack(memory[: HEAD.size])
+    if (magic, version, axes, run) != (MAGIC, VERSION, len(layout.axes), layout.run.encode()):
         raise ShareError(
             f"the loop of the share {layout.name!r} is another one by now", hint="attach again"
         )
-    return Desk(segment, layout)
+    try:
+        return Desk(memory, layout)
+    except ValueError as error:
+        raise ShareError(f"the desk of the share {layout.name!r} is damaged: {error}") from error

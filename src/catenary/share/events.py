@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import msgspec
 
+from catenary.errors import ShareError
 from catenary.plan.sink import Incident
 from catenary.share.layout import EVENT_SIZE
 
@@ -55,4 +56,8 @@ def encodable(value: object) -> object:
 
 
 def decode_event(row: bytes | bytearray) -> SharedEvent:
-    return msgspec.json.decode(row.rstrip(b"\0"), type=SharedEvent)
+    """Return the event of a row. Raises ShareError if the row is damaged."""
+    try:
+        return msgspec.json.decode(row.rstrip(b"\0"), type=SharedEvent)
+    except (msgspec.MsgspecError, ValueError, RecursionError) as error:
+        raise ShareError(f"an event of the share is damaged: {error}") from error

@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+import math
 import mmap
 import struct
 import uuid
@@ -30,6 +31,17 @@ ALIGNMENT = 4096
 EVENT_SIZE = 1024  # bytes of an event
 EVENT_COUNT = 256
 ROWS_MIN = 64
+NUMBERS = frozenset("biuf")  # kinds of NumPy's types
+# What msgspec and NumPy raise for a description that cannot be.
+DAMAGE = (
+    msgspec.MsgspecError,
+    MemoryError,
+    OverflowError,
+    RecursionError,
+    SyntaxError,
+    TypeError,
+    ValueError,
+)
 
 Clock = Literal["monotonic", "virtual"]
 
@@ -155,8 +167,11 @@ def decode_head(memory: mmap.mmap | bytes, size: int) -> ShareLayout:
     try:
         layout = msgspec.json.decode(memory[HEADER.size : HEADER.size + length], type=ShareLayout)
         fits = layout.size <= size and layout.dtype.itemsize == layout.rows.size
-    except (msgspec.MsgspecError, ValueError, OverflowError) as error:
+        plain = {np.dtype(field.dtype).kind for field in layout.fields} <= NUMBERS
+    except DAMAGE as error:
         raise ShareError(f"its description is broken: {error}") from error
     if not fits:
         raise ShareError("its description does not fit its size")
+    if not plain or not 0.0 < layout.period < math.inf:
+        raise ShareError("its description is broken: fields are not numbers, or a wrong period")
     return layout

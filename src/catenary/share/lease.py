@@ -35,8 +35,14 @@ class Lease:
         self._for_ns = round(for_ * 1e9)
         self._pid = os.getpid()
         with locked(desk):
-            self._place = self._take_place()
-            self._serial = self._take_axes()
+            try:
+                self._place = self._take_place()
+                self._serial = self._take_axes()
+            except (ValueError, OverflowError) as error:
+                raise LeaseError(
+                    f"the desk of the share {layout.name!r} is damaged: {error}",
+                    hint="another client has written into it; open the loop again",
+                ) from error
 
     def send(
         self,
@@ -164,7 +170,11 @@ class Lease:
 @contextmanager
 def locked(desk: Desk) -> Iterator[None]:
     """The desk for this client alone. LeaseError: another one was stopped while it had it."""
-    if desk.mutex.lock(PATIENCE_NS) is None:
+    try:
+        taken = desk.mutex.lock(PATIENCE_NS)
+    except OSError as error:
+        raise LeaseError(f"the mutex of the desk is damaged: {error.strerror}") from error
+    if taken is None:
         raise LeaseError(
             f"another client has held the desk for {PATIENCE_NS * 1e-9:g} s",
             hint="it was stopped, by a debugger or SIGSTOP: let it go on, or end it",

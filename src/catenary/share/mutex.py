@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import TracebackType
 
 from catenary.errors import ShareError
-from catenary.share import memory
+from catenary.share import folder, memory
 from catenary.share._mutex import MUTEX_SIZE, SharedMutex
 
 FOR_EVER_NS = 1 << 62
@@ -20,21 +21,28 @@ class Mutex:
 
     A waiter of high priority lends it to the owner (priority inheritance); the lock of an owner
     that has died goes to the next, who is told. For slow paths: a loop never waits for it. It is
-    made by whoever names it first, with `mode` as its permissions, and stays until `unlink`.
+    made by whoever names it first, and stays until `unlink`.
+
+    Who has a mutex can crash the others: it holds pointers of the C library. Share it with users
+    whom you trust. It is refused if another user owns it, or if more users may write in it than
+    `mode` says. `uid`: open the mutex of this user, which exists already.
     """
 
-    def __init__(self, name: str, *, mode: int = 0o600) -> None:
+    def __init__(self, name: str, *, mode: int = 0o600, uid: int | None = None) -> None:
         self.name = name
-        self.path = memory.path_of(name, "mutex")
+        self._file = folder.file_name(folder.MUTEX, name)
         self.recovered = False  # whether the last lock was taken from an owner that had died
         try:
-            self._mutex = self._attached(mode)
+            self.path, self._mutex = self._attached(mode, uid)
         except PermissionError as error:
             raise ShareError(
-                f"the mutex {name!r} belongs to another user", hint=f"see {self.path}"
+                f"the mutex {name!r} belongs to another user ({error.filename})",
+                hint="its owner can allow it: Mutex(..., mode=0o660) for the group",
             ) from error
+        except FileNotFoundError as error:
+            raise ShareError(f"there is no mutex {name!r} of user {uid}") from error
         except ValueError as error:
-            raise ShareError(f"{self.path}: {error}") from error
+            raise ShareError(f"the mutex {name!r}: {error}") from error
 
     def acquire(self, timeout: float | None = None) -> bool:
         """Waits for it, at most `timeout` [s]; whether it is ours. RuntimeError: it was already."""
@@ -64,12 +72,22 @@ class Mutex:
     ) -> None:
         self.release()
 
-    def _attached(self, mode: int) -> SharedMutex:
-        with memory.deciding():
+    def _attached(self, mode: int, uid: int | None) -> tuple[Path, SharedMutex]:
+        if uid is not None:
+            return _opened(folder.find(self._file, uid), mode, uid)
+        own = folder.own_folder()
+        folder.prepare(own, mode)
+        with folder.deciding(own):
             try:
-                return SharedMutex(memory.open_segment(self.path, writable=True).memory, 0)
+                return _opened(own / self._file, mode, None)
             except FileNotFoundError:
-                segment = memory.create(self.path, MUTEX_SIZE, mode)
+                segment = memory.create(own, MUTEX_SIZE, mode)
                 made = SharedMutex(segment.memory, 0, fresh=True)
-                segment.publish(self.path)
-                return made
+                segment.publish(own / self._file)
+                return segment.path, made
+
+
+def _opened(path: Path, mode: int, uid: int | None) -> tuple[Path, SharedMutex]:
+    owners = folder.trusted_owners(uid)
+    segment = memory.open_segment(path, owners, writable=True, granted=mode)
+    return path, SharedMutex(segment.memory, 0)

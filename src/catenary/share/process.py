@@ -26,7 +26,14 @@ class Process(msgspec.Struct, frozen=True):
         return _start_time(self.pid) == self.start_time and self.boot_id == _boot_id()
 
     def __str__(self) -> str:
-        return f"process {self.pid} ({self.command})" if self.command else f"process {self.pid}"
+        """The command is the process' own word: control characters are shown as '?'."""
+        command = "".join(c if c.isprintable() else "?" for c in self.command)
+        return f"process {self.pid} ({command})" if command else f"process {self.pid}"
+
+
+def is_running(pid: int) -> bool:
+    """True if a process has this number now."""
+    return _start_time(pid) is not None
 
 
 def this_process() -> Process:

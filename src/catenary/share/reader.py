@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from catenary.errors import ShareError
-from catenary.share import memory
+from catenary.share import folder, memory
 from catenary.share._rows import Ring
 from catenary.share.desk import Desk, open_desk
 from catenary.share.events import SharedEvent, decode_event
@@ -28,43 +28,53 @@ Rows = npt.NDArray[np.void]
 State = Literal["running", "ended", "dead"]
 
 
-def attach(name: str, *, stale: bool = False, patience: Iterable[object] = ()) -> Reader:
-    """The cycles that another process shares as `name`, for reading; leave it by `with`.
+def attach(
+    name: str, *, stale: bool = False, uid: int | None = None, patience: Iterable[object] = ()
+) -> Reader:
+    """Map the cycles that another process shares as `name`, for reading; leave it by `with`.
 
-    `stale`: also one whose writer has died, to see its last cycles. `patience`: it is tried again
-    after each item, a task's jobs for one (`attach(name, patience=task)`). ShareError: there is
-    none, it may not be read, its writer is dead, or it has the layout of another version.
+    Args:
+        name: of the share.
+        stale: accept one whose writer has died, to see its last cycles.
+        uid: the user whose share it is. None: this user or root; others are refused, because the
+            owner of a share can crash its readers.
+        patience: try again after each item, a task's jobs for one (`attach(name, patience=task)`).
+
+    Raises:
+        ShareError: there is none, it may not be read, it belongs to another user, its writer is
+            dead, or it has the layout of another version.
     """
     waiting = iter(patience)
     while True:
         try:
-            return _attached(name, stale)
+            return _attached(name, stale, uid)
         except ShareError:
             if next(waiting, END) is END:
                 raise
 
 
-def _attached(name: str, stale: bool) -> Reader:
-    path = memory.path_of(name)
+def _attached(name: str, stale: bool, uid: int | None) -> Reader:
+    file = folder.file_name(folder.STATE, name)
     try:
-        segment = memory.open_segment(path)
+        segment = memory.open_segment(folder.find(file, uid), folder.trusted_owners(uid))
         layout = decode_head(segment.memory, segment.size)
     except FileNotFoundError as error:
-        others = ", ".join(map(repr, memory.names())) or "none"
+        others = ", ".join(map(repr, folder.names(uid))) or "none"
         raise ShareError(
             f"there is no share {name!r}; there are: {others}",
-            hint="it is there while a Loop with sink=cat.Share(...) is open",
+            hint="it is there while a Loop with sink=cat.Share(...) is open; uid= names another "
+            "user's",
         ) from error
     except PermissionError as error:
         raise ShareError(
-            f"the share {name!r} may not be read: {path} belongs to another user",
+            f"the share {name!r} may not be read: {error.filename} belongs to another user",
             hint="its writer can allow it: cat.Share(..., mode=0o640) for the group",
         ) from error
     except ShareError as error:
         raise ShareError(f"the share {name!r}: {error.message}", hint=error.hint) from error
     try:
         reader = Reader(segment, layout)
-    except ValueError as error:
+    except (ValueError, OverflowError) as error:
         raise ShareError(f"the share {name!r}: its description is broken: {error}") from error
     if reader.state == "dead" and not stale:
         raise ShareError(
@@ -95,6 +105,9 @@ class Reader:
             Ring(segment.memory, events.offset, events.count, events.size),
         )
         self._seen = 0
+        self._owner = segment.owner
+        _, _, share = segment.path.name.partition("-")
+        self._socket = segment.path.with_name(folder.file_name(folder.SOCKET, share))
         self._desk: Desk | None = None
 
     def __enter__(self) -> Reader:
@@ -171,7 +184,7 @@ class Reader:
         if not self.alive:
             raise ShareError(f"the loop of the share {self.layout.name!r} has ended")
         if self._desk is None:
-            self._desk = open_desk(self.layout)
+            self._desk = open_desk(self.layout, self._socket, self._owner)
         return lease_of(self._desk, self.layout, axes, for_)
 
     def _has_news(self, deadline_ns: int) -> bool:

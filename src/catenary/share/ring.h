@@ -89,13 +89,15 @@ static inline uint64_t ring_copy_newest(const ring_view *v, uint8_t *bytes) {
     return 0;
 }
 
-/* Rows `first` to `last`, one behind the other, those that are still there; how many. `end`: the
- * number of the last one copied, first - 1 where there was none. */
-static inline uint64_t ring_copy_rows(const ring_view *v, uint64_t first, uint64_t last, uint8_t *bytes,
+/* Rows `first` to `first + rows - 1`, one behind the other, those that are still there; how many.
+ * `end`: the number of the last one copied, first - 1 where there was none. The loop is bounded by
+ * a count: `number` comes from shared memory, where a client can write 2^64 - 1. */
+static inline uint64_t ring_copy_rows(const ring_view *v, uint64_t first, uint64_t rows, uint8_t *bytes,
                                       uint64_t *end) {
     uint64_t copied = 0;
     *end = first - 1;
-    for (uint64_t number = first; number <= last; number++) {
+    for (uint64_t k = 0; k < rows; k++) {
+        uint64_t number = first + k;
         if (!ring_copy(v, number, bytes + copied * v->size)) continue;
         copied++;
         *end = number;

@@ -5,22 +5,25 @@ from __future__ import annotations
 import os
 import threading
 import time
+from pathlib import Path
 from types import TracebackType
 
 import numpy as np
 
 from catenary.errors import ShareError
 from catenary.plan.sink import Incident, SinkLayout
-from catenary.share import memory
+from catenary.share import folder, memory
 from catenary.share._rows import CycleWriter, Ring
 from catenary.share.commands import Command, Commanded, CommandReader, LeaseEnd, apply
 from catenary.share.desk import Desk, Values, make_desk
+from catenary.share.desk_socket import DeskSocket
 from catenary.share.events import encode_event
 from catenary.share.layout import ShareLayout, decode_head, encode_head, make_layout
 from catenary.share.memory import Segment
 from catenary.share.process import this_process
 
 HISTORY = 2.0  # [s]
+OTHERS_WRITE = 0o022  # of the cycles: a reader that could truncate them would end the loop
 
 
 class Share:
@@ -30,10 +33,12 @@ class Share:
             for cycle in loop: ...
 
     Others `cat.attach("arm")`; nothing they do delays the loop. `history` [s] of cycles are kept.
-    `mode`: the permissions of the files, as of chmod: 0o600, this user alone; 0o640, the group
-    may read; 0o660, and command. One loop at a time; each loop that is opened with the share begins
-    a segment of its own, whose cycles count from 1: who is attached to the one before sees its end,
-    and attaches again. ShareError: the name belongs to a living process.
+    `mode`: permissions as of chmod: 0o600, this user alone; 0o640, the group may read; 0o660, and
+    command. Nobody but this user can write into the file of the cycles, whatever `mode` is.
+
+    One loop at a time. Each loop that is opened with the share begins a segment of its own, whose
+    cycles count from 1: who is attached to the one before sees its end, and attaches again.
+    ShareError: the name belongs to a running process.
     """
 
     def __init__(self, name: str, *, history: float = HISTORY, mode: int = 0o600) -> None:
@@ -42,13 +47,15 @@ class Share:
         if not 0 <= mode <= 0o777:
             raise ValueError(f"mode={mode:#o}: permissions as of chmod, such as 0o600")
         self.name = name
-        self.path = memory.path_of(name)
+        self._file = folder.file_name(folder.STATE, name)
+        self._socket_file = folder.file_name(folder.SOCKET, name)
         self._history = history
         self._mode = mode
         self._entered = False
         self._pid = 0  # of the process that entered it
         self._segment: Segment | None = None
         self._desk: Desk | None = None
+        self._socket: DeskSocket | None = None
         self._commands: CommandReader | None = None
         self._layout: ShareLayout | None = None
         self._cycles: CycleWriter | None = None
@@ -73,8 +80,6 @@ class Share:
         self.close()
         if self._segment is not None:
             self._segment.unlink()
-        if self._desk is not None:
-            self._desk.segment.unlink()
         self._segment = self._desk = None
 
     # Commands of other processes, for the thread that iterates
@@ -139,13 +144,14 @@ class Share:
             opened=time.time(),
             writer=this_process(),
         )
-        segment, desk = self._make_files(made)
+        segment, desk, listening = self._make_files(made)
         blocks = (layout.record_size, layout.actual_size, layout.target_size)
         rows, events = made.rows, made.events
         cycles = CycleWriter(
             segment.memory, rows.offset, rows.count, rows.size, blocks, writable=True
         )
-        self._publish(segment, desk.segment)
+        self._publish(segment, listening)
+        self._socket = listening
         self._segment, self._layout, self._cycles = segment, made, cycles
         self._dtype = made.dtype
         self._desk, self._commands = desk, CommandReader(desk, made)
@@ -171,50 +177,57 @@ class Share:
             self._cycles = self._events = None
             if self._desk is not None:
                 self._desk.end_all()
+            if self._socket is not None:
+                self._socket.close()
+                self._socket = None
 
     def _is_a_copy(self) -> bool:
         """Of the process that owns it, in a child by fork: its leaving ends nothing."""
         return self._pid != os.getpid()
 
-    def _make_files(self, made: ShareLayout) -> tuple[Segment, Desk]:
-        """Whole, and seen by nobody yet. ShareError: no room."""
-        segment = memory.create(self.path, made.size, self._mode)
-        head = encode_head(made)
-        segment.memory[: len(head)] = head
+    def _make_files(self, made: ShareLayout) -> tuple[Segment, Desk, DeskSocket]:
+        """Make all of it as drafts. Raises ShareError if there is no room."""
+        where = folder.own_folder()
+        segment = memory.create(where, made.size, self._mode & ~OTHERS_WRITE)
         try:
-            return segment, make_desk(made, self._mode)
+            head = encode_head(made)
+            segment.memory[: len(head)] = head
+            desk, descriptor = make_desk(made)
+            return segment, desk, DeskSocket(where, descriptor, self._mode)
         except BaseException:
             segment.path.unlink()
             raise
 
-    def _publish(self, segment: Segment, desk: Segment) -> None:
-        """The desk first: who finds the segment finds its desk."""
+    def _publish(self, segment: Segment, listening: DeskSocket) -> None:
+        """Give both their names, the socket first: who finds the segment can connect."""
+        where = segment.path.parent
         try:
-            with memory.deciding():
+            with folder.deciding(where):
                 self._refuse_taken()
-                desk.publish(memory.path_of(self.name, "commands"))
-                segment.publish(self.path)
+                listening.publish(where / self._socket_file)
+                segment.publish(where / self._file)
         except BaseException as error:
-            for draft in (segment, desk):
-                draft.path.unlink(missing_ok=True)
-            if isinstance(error, PermissionError):  # /dev/shm lets only owners replace files
-                raise self._belongs_to_another() from error
+            segment.path.unlink(missing_ok=True)
+            listening.close()
+            if isinstance(error, PermissionError):  # in a sticky folder only owners replace files
+                raise self._belongs_to_another(where / self._file) from error
             raise
 
     def _refuse_taken(self) -> None:
-        """A name whose writer lives is not ours; one whose writer is dead may be replaced."""
+        """Refuse the name of a running writer. That of a dead writer can be replaced."""
         if self._segment is not None and self._segment.is_published:
             return
+        path = folder.own_folder() / self._file
         try:
-            found = memory.open_segment(self.path)
+            found = memory.open_segment(path, (os.geteuid(),))
             layout = decode_head(found.memory, found.size)
         except FileNotFoundError:
             return
         except PermissionError as error:
-            raise self._belongs_to_another() from error
+            raise self._belongs_to_another(path) from error
         except ShareError as error:
             raise ShareError(
-                f"{self.path} is in the way: {error.message}",
+                f"{path} is in the way: {error.message}",
                 hint="choose another name, or remove it",
             ) from error
         if layout.writer.is_alive:
@@ -223,7 +236,5 @@ class Share:
                 hint="choose another name, or end that process",
             )
 
-    def _belongs_to_another(self) -> ShareError:
-        return ShareError(
-            f"the share {self.name!r} belongs to another user", hint=f"see {self.path}"
-        )
+    def _belongs_to_another(self, path: Path) -> ShareError:
+        return ShareError(f"the share {self.name!r} belongs to another user", hint=f"see {path}")

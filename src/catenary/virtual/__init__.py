@@ -1,6 +1,7 @@
 """A virtual EtherCAT segment at register level: in this process, in virtual time, or on a NIC."""
 
 from catenary.virtual import faults
+from catenary.virtual.coe.quirks import MailboxQuirks
 from catenary.virtual.configuration import read_segment
 from catenary.virtual.crystal import Crystal
 from catenary.virtual.devices import (
@@ -15,9 +16,11 @@ from catenary.virtual.devices import (
 from catenary.virtual.devices.servo_quirks import ServoQuirks
 from catenary.virtual.fault_player import FaultEvent, Loss
 from catenary.virtual.faults import Fault
+from catenary.virtual.mapping_quirks import MappingQuirks
 from catenary.virtual.plant import Joint, Plant
 from catenary.virtual.segment import FrameCounters, Segment, demo_segment
 from catenary.virtual.server import Server, serve
+from catenary.virtual.sii_quirks import SiiQuirks
 
 __all__ = [
     "AnalogInputs",
@@ -32,11 +35,14 @@ __all__ = [
     "Joint",
     "Junction",
     "Loss",
+    "MailboxQuirks",
+    "MappingQuirks",
     "Plant",
     "Segment",
     "Server",
     "Servo",
     "ServoQuirks",
+    "SiiQuirks",
     "demo_segment",
     "faults",
     "read_segment",

@@ -92,7 +92,7 @@ cdef extern from "segment_memory.h" nogil:
         uint8_t *memory
         uint32_t memory_size, events
         uint8_t emulation, al_unread, frozen, outputs_valid, outputs_seen, powered, mute
-        uint8_t has_dc, no_lrw
+        uint8_t has_dc, no_lrw, fixed_loops
         int fmmu_count
         port *ports
         uint16_t identification, emergency
@@ -152,7 +152,7 @@ cdef extern from "segment_memory.h" nogil:
     void slots_refresh(controller *)
     void dc_tune(controller *, double error, double swing, double turn, double scatter, int64_t when)
     void model_period(controller *, int64_t period)
-    void synchronous_begin(controller *, int64_t cycle, int steps)
+    void synchronous_begin(controller *, int64_t cycle, int steps, uint8_t signal)
     void synchronous_end(controller *)
     void sync_schedule(controller *)
     int64_t dc_system_time(const controller *, int64_t when)

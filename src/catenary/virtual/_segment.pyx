@@ -336,16 +336,21 @@ cdef class Core:
         model_period(c, period_ns)
         unlock(self._segment)
 
-    def run_model_by_sync0(self, int position, int64_t cycle_ns, int64_t longest_step_ns):
-        """Steps the device's model at SYNC0 pulses, `cycle_ns` apart, and between them in equal
-        steps of at most `longest_step_ns`."""
+    def ignore_loop_control(self, int position):
+        """The ports follow their links, whatever DL control says."""
+        self._at(position).fixed_loops = 1
+
+    def run_model_by_pulses(self, int position, int signal, int64_t cycle_ns,
+                            int64_t longest_step_ns):
+        """Steps the device's model at the pulses of `signal`, its bit in 0x0981, `cycle_ns` apart,
+        and between them in equal steps of at most `longest_step_ns`."""
         cdef controller *c = self._at(position)
         cdef int64_t steps
         if not 1000 <= cycle_ns < 1 << 32 or longest_step_ns < 1000:
-            raise ValueError(f"a device cycle of {cycle_ns} ns is shorter than 1 us, or no SYNC0 cycle")
+            raise ValueError(f"a device cycle of {cycle_ns} ns is shorter than 1 us, or no SYNC cycle")
         steps = (cycle_ns + longest_step_ns - 1) // longest_step_ns
         lock(self._segment)
-        synchronous_begin(c, cycle_ns, steps)
+        synchronous_begin(c, cycle_ns, steps, <uint8_t>signal)
         model_period(c, cycle_ns // steps)
         unlock(self._segment)
 

@@ -19,14 +19,18 @@ for = 0.8
 
 from __future__ import annotations
 
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal
 
 import msgspec
 
 from catenary.errors import ConfigurationError
+from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.crystal import ClockBits, Crystal
-from catenary.virtual.devices.analog_inputs import AnalogInputs
+from catenary.virtual.devices.analog_inputs import AnalogInputs, SecondPdo
 from catenary.virtual.devices.coupler import Coupler
 from catenary.virtual.devices.device import Device
 from catenary.virtual.devices.digital_inputs import DigitalInputs
@@ -35,8 +39,10 @@ from catenary.virtual.devices.junction import Junction
 from catenary.virtual.devices.servo import Servo
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
 from catenary.virtual.faults import Fault
+from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 from catenary.virtual.plant import STEP, Joint, Plant
 from catenary.virtual.segment import ClockKind, Segment
+from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 from catenary.virtual.wiring import Place
 
 
@@ -67,6 +73,14 @@ class _Table(
 class _ClockedTable(_Table, frozen=True, kw_only=True):
     crystal: CrystalTable = CrystalTable()
     clock_bits: ClockBits = 64
+
+
+class _AppliedTable(_ClockedTable, frozen=True, kw_only=True):
+    mailbox_bytes: int = 128
+    mailbox_delay: float = 300e-6
+    lrw: bool = True
+    mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS
+    sii_quirks: SiiQuirks = NO_SII_QUIRKS
 
 
 class CouplerTable(_ClockedTable, tag="coupler", frozen=True, kw_only=True):
@@ -117,11 +131,10 @@ class DigitalInputsTable(_Table, tag="digital_inputs", frozen=True, kw_only=True
         )
 
 
-class AnalogInputsTable(_ClockedTable, tag="analog_inputs", frozen=True, kw_only=True):
+class AnalogInputsTable(_AppliedTable, tag="analog_inputs", frozen=True, kw_only=True):
     channels: int = 2
-    mailbox_bytes: int = 128
-    mailbox_delay: float = 300e-6
-    lrw: bool = True
+    second_pdo: SecondPdo = "none"
+    mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS
 
     def device(self) -> Device:
         return AnalogInputs(
@@ -134,10 +147,14 @@ class AnalogInputsTable(_ClockedTable, tag="analog_inputs", frozen=True, kw_only
             lrw=self.lrw,
             crystal=self.crystal.crystal(),
             clock_bits=self.clock_bits,
+            second_pdo=self.second_pdo,
+            mapping_quirks=self.mapping_quirks,
+            mailbox_quirks=self.mailbox_quirks,
+            sii_quirks=self.sii_quirks,
         )
 
 
-class ServoTable(_ClockedTable, tag="servo", frozen=True, kw_only=True):
+class ServoTable(_AppliedTable, tag="servo", frozen=True, kw_only=True):
     axes: int = 1
     counts_per_turn: int = 1 << 20
     velocity_counts_per_turn: int | None = None
@@ -149,11 +166,9 @@ class ServoTable(_ClockedTable, tag="servo", frozen=True, kw_only=True):
     max_velocity: float = 350.0
     following_error_turns: float = 0.25
     position_limits: tuple[float, float] | None = None
-    mailbox_bytes: int = 128
-    mailbox_delay: float = 300e-6
-    lrw: bool = True
     sync_missed_limit: int = 3
     quirks: ServoQuirks = NO_QUIRKS
+    mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS
 
     def device(self) -> Device:
         return Servo(
@@ -178,6 +193,9 @@ class ServoTable(_ClockedTable, tag="servo", frozen=True, kw_only=True):
             clock_bits=self.clock_bits,
             sync_missed_limit=self.sync_missed_limit,
             quirks=self.quirks,
+            mapping_quirks=self.mapping_quirks,
+            mailbox_quirks=self.mailbox_quirks,
+            sii_quirks=self.sii_quirks,
         )
 
 
@@ -217,21 +235,27 @@ class SegmentFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     link_loss_detection: float | Literal["enhanced", "standard"] = "enhanced"
 
 
+OUT_OF_RANGE = (ArithmeticError, LookupError, ValueError, struct.error)
 HINT = "docs/virtual.md lists the fields of devices and plants, docs/faults.md those of faults"
 
 
-def _made(table: DeviceTable, position: int, path: str | Path) -> Device:
+@contextmanager
+def _named(where: str) -> Iterator[None]:
+    """Name the place in the file if a value is out of range, whatever a constructor raises."""
     try:
-        return table.device()
-    except ValueError as error:
-        raise ConfigurationError(f"{path}: device[{position}]: {error}", hint=HINT) from error
+        yield
+    except OUT_OF_RANGE as error:
+        raise ConfigurationError(f"{where}: {error}", hint=HINT) from error
 
 
 def _device_in_fault(kind: type, given: Any) -> Any:
     """`with = {kind = "servo", ...}` of a fault."""
     if kind is not Device:
         raise NotImplementedError
-    return msgspec.convert(given, DeviceTable).device()
+    try:
+        return msgspec.convert(given, DeviceTable).device()
+    except OUT_OF_RANGE as error:
+        raise ValueError(str(error)) from error  # msgspec names the place
 
 
 def _read(path: str | Path) -> SegmentFile:
@@ -241,7 +265,7 @@ def _read(path: str | Path) -> SegmentFile:
         raise ConfigurationError(f"{path}: {error.strerror}") from error
     try:
         file = msgspec.toml.decode(content, type=SegmentFile, dec_hook=_device_in_fault)
-    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+    except (msgspec.MsgspecError, ValueError, RecursionError) as error:
         raise ConfigurationError(f"{path}: {error}", hint=HINT) from error
     if not file.device:
         raise ConfigurationError(f"{path}: a segment needs at least one [[device]]")
@@ -252,7 +276,10 @@ def read_segment(path: str | Path, *, clock: ClockKind = "virtual", ring: bool =
     """The segment of a file, with its faults; a ring where the file or the caller says so.
     ConfigurationError names the file and the field."""
     file = _read(path)
-    devices = [_made(table, position, path) for position, table in enumerate(file.device)]
+    devices = []
+    for position, table in enumerate(file.device):
+        with _named(f"{path}: device[{position}]"):
+            devices.append(table.device())
     behind: dict[int, Place] = {
         position: table.behind
         for position, table in enumerate(file.device)
@@ -267,13 +294,11 @@ def read_segment(path: str | Path, *, clock: ClockKind = "virtual", ring: bool =
             ring=ring or file.ring,
             link_loss_detection=file.link_loss_detection,
         )
-    except ValueError as error:
+    except OUT_OF_RANGE as error:
         raise ConfigurationError(f"{path}: {error}", hint=HINT) from error
     except ConfigurationError as error:
         raise ConfigurationError(f"{path}: plant: {error.message}", hint=error.hint) from error
     for number, fault in enumerate(file.fault):
-        try:
+        with _named(f"{path}: fault[{number}]"):
             segment.inject(fault)
-        except ValueError as error:
-            raise ConfigurationError(f"{path}: fault[{number}]: {error}", hint=HINT) from error
     return segment

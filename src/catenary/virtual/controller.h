@@ -95,7 +95,7 @@ typedef struct {
     uint8_t active;
 } sync_unit;
 
-/* A device that keeps time by SYNC0, and the counters of 0x1C32 and 0x1C33. */
+/* A device that keeps time by SYNC0 or SYNC1, and the counters of 0x1C32 and 0x1C33. */
 typedef struct {
     int64_t cycle, minimum, copy_time;            /* [ns] */
     int64_t last;                    /* segment time of the last pulse */
@@ -103,6 +103,7 @@ typedef struct {
     uint16_t limit, missed_in_a_row;
     uint16_t missed, exceeded, shift_short;       /* 0x0B, 0x0C, 0x0D */
     uint8_t active, seen, error;     /* seen: pulses come */
+    uint8_t signal;                  /* the bit in 0x0981 of the pulses it keeps time by */
 } synchronous_cycle;
 
 /* One object of a device in its process data: bits of a SyncManager buffer <-> a slot. */
@@ -134,6 +135,7 @@ typedef struct controller {
     uint8_t emulation;               /* AL status follows AL control; no microcontroller */
     uint8_t has_dc;                  /* bits of its clock: 0, 32 or 64 */
     uint8_t no_lrw;
+    uint8_t fixed_loops;             /* it ignores loop control (0x0101) */
     uint8_t al_unread;               /* the PDI has not yet fetched AL control */
     uint8_t frozen;                  /* injected: the application stands still */
     uint8_t outputs_valid;           /* the application takes the outputs: OP and fed */

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
+from catenary.virtual.op_modes import STANDARD, OpMode
+
 # Private: no vendor of the EtherCAT Technology Group has this identity ("CTNY" in ASCII).
 VENDOR_ID = 0x43544E59
 
@@ -74,3 +77,6 @@ class Description:
     current_milliampere: int = 0
     identification: int = 0
     ports: tuple[int, ...] = (0, 1)
+    mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS
+    op_modes: tuple[OpMode, ...] = STANDARD  # of a device with clock and axes
+    loop_control: bool = True  # its ports can be closed (0x0101)

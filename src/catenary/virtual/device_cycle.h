@@ -1,5 +1,5 @@
 /* When a device's model steps, and when its process data changes hands: at its own cycle ("free
- * run"), or by SYNC0 pulses ("DC Sync0", ETG.1020 §0x1C32).
+ * run"), or by SYNC0 pulses ("DC Sync0", ETG.1020 §0x1C32). In the same way by SYNC1 ("DC Sync1").
  *
  * With SYNC0 the device latches its inputs and takes over its outputs at the pulse, and its own cycle
  * is a part of SYNC0's, locked to it: a pulse restarts the count. Where pulses stay away the own
@@ -119,13 +119,11 @@ static void pins_sync0(controller *c) {
         outputs_accept(c);
 }
 
-/* A SYNC0 pulse, now. */
-static void model_sync0(controller *c) {
+/* A pulse that the device keeps time by, now. */
+static void model_pulse(controller *c) {
     synchronous_cycle *d = &c->synchronous;
     int64_t now = c->segment->now;
-    if (c->emulation)
-        pins_sync0(c);
-    if (!d->active || c->frozen)
+    if (c->frozen)
         return;
     d->exceeded += d->seen && now - d->last < d->minimum;
     d->last = now;
@@ -148,10 +146,12 @@ static void model_sync0(controller *c) {
     c->step_due = now + c->step_period + (d->left == 0 ? c->step_period / 2 : 0);
 }
 
-/* From now on the device keeps time by SYNC0, `cycle` apart, in `steps` steps of its own. */
-static void synchronous_begin(controller *c, int64_t cycle, int steps) {
+/* From now on the device keeps time by pulses of `signal` (SYNC_PULSE_0 or _1), `cycle` apart, in
+ * `steps` steps of its own. */
+static void synchronous_begin(controller *c, int64_t cycle, int steps, uint8_t signal) {
     synchronous_cycle *d = &c->synchronous;
     d->cycle = cycle;
+    d->signal = signal;
     d->steps = steps;
     d->left = d->seen = d->error = 0;
     d->missed_in_a_row = 0;
@@ -175,8 +175,11 @@ static inline void model_period(controller *c, int64_t period) {
 /* All work of the model that is due now: a pulse comes before a step. */
 static inline void device_advance(controller *c) {
     int64_t now = c->segment->now;
-    if (c->sync.due <= now && sync_advance(c))
-        model_sync0(c);
+    int pulses = c->sync.due <= now ? sync_advance(c) : 0;
+    if (c->emulation && pulses & SYNC_PULSE_0)
+        pins_sync0(c);
+    if (c->synchronous.active && pulses & c->synchronous.signal)
+        model_pulse(c);
     if (c->step_due > now)
         return;
     model_step(c);

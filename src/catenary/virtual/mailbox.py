@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from typing import Protocol
 
+from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.scheduler import Scheduler
 
 HEADER = struct.Struct("<HHBB")  # length, address, channel and priority, type and counter
@@ -38,11 +39,13 @@ class Mailbox:
         serve: Callable[[bytes], Iterable[bytes]],
         *,
         delay_ns: int,
+        quirks: MailboxQuirks = NO_MAILBOX_QUIRKS,
     ) -> None:
         self._ports = ports
         self._scheduler = scheduler
         self._serve = serve
         self._delay_ns = delay_ns
+        self._quirks = quirks
         self.silent = False
         self.requests = 0
         self.reset()
@@ -53,6 +56,7 @@ class Mailbox:
         self._in_buffer: bytes | None = None
         self._last_read: bytes | None = None
         self._counter = 0
+        self._request_counter = 0
         self._fetching = False
 
     def silence(self, silent: bool) -> None:
@@ -82,10 +86,14 @@ class Mailbox:
 
     def _answers(self, request: bytes) -> Iterable[tuple[int, bytes]]:
         length, _address, _channel, kind = HEADER.unpack_from(request)
+        self._request_counter = kind >> 4 & 7
         payload = request[HEADER.size : HEADER.size + length]
         protocol = kind & 0x0F
         if length > len(request) - HEADER.size:
             return [(ERROR_PROTOCOL, struct.pack("<HH", 1, ERROR_SIZE))]
+        if self._quirks.error_reply != "none":
+            reply = struct.pack("<HH", 1, ERROR_UNSUPPORTED_PROTOCOL)
+            return [(ERROR_PROTOCOL, reply[: 2 if self._quirks.error_reply == "short" else 4])]
         if protocol != COE_PROTOCOL:
             return [(ERROR_PROTOCOL, struct.pack("<HH", 1, ERROR_UNSUPPORTED_PROTOCOL))]
         if length < 3:
@@ -94,9 +102,13 @@ class Mailbox:
 
     def _queue(self, answer: tuple[int, bytes]) -> None:
         protocol, payload = answer
-        self._counter = self._counter % 7 + 1
-        header = HEADER.pack(len(payload), 0, 0, protocol | self._counter << 4)
+        header = HEADER.pack(len(payload), 0, 0, protocol | self._next_counter() << 4)
         self._waiting.append(header + payload)
+
+    def _next_counter(self) -> int:
+        self._counter = self._counter % 7 + 1
+        given = {"echoed": self._request_counter, "stuck": 1, "zero": 0}
+        return given.get(self._quirks.counter, self._counter)
 
     def send(self, payload: bytes) -> None:
         """An unasked CoE message: an emergency. The queue is short, as a device's is."""

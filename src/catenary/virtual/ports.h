@@ -15,7 +15,7 @@ enum loop_mode { LOOP_AUTO = 0, LOOP_AUTO_CLOSE = 1, LOOP_OPEN = 2, LOOP_CLOSED 
 #define TEMPORARY_USE_NS 1000000000
 
 static inline int loop_mode_of(const controller *c, int p) {
-    return c->memory[REG_DL_CONTROL + 1] >> (2 * p) & 3;
+    return c->fixed_loops ? LOOP_AUTO : c->memory[REG_DL_CONTROL + 1] >> (2 * p) & 3;
 }
 
 /* DL status: bits 4 to 7 links; from bit 8 on, loop closed and communication, port by port. */

@@ -6,16 +6,15 @@ import ctypes
 import errno
 import fcntl
 import os
-import shlex
 import signal
 import socket
 import struct
-import sys
 import threading
 from collections.abc import Callable
 from types import FrameType
 
 from catenary.errors import LinkError
+from catenary.interpreter import permission_advice
 from catenary.virtual.fault_player import FaultEvent
 from catenary.virtual.segment import Segment
 from catenary.virtual.service import ServiceThread
@@ -25,10 +24,6 @@ SOL_PACKET, PACKET_IGNORE_OUTGOING, PACKET_QDISC_BYPASS = 263, 23, 20
 IFF_UP = 1
 PR_SET_PDEATHSIG = 1
 SIOCGIFFLAGS = 0x8913
-PERMISSION = (
-    "sudo setcap cap_net_raw,cap_sys_nice,cap_ipc_lock=ep "
-    f"{shlex.quote(os.path.realpath(sys.executable))}"
-)
 
 
 def _interface_flags(interface: str) -> int:
@@ -53,7 +48,9 @@ def _open_socket(interface: str) -> socket.socket:
     try:
         packet = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, 0)
     except PermissionError:
-        raise LinkError(f"raw frames on {interface} are not permitted", hint=PERMISSION) from None
+        raise LinkError(
+            f"raw frames on {interface} are not permitted", hint=permission_advice()
+        ) from None
     try:
         packet.setsockopt(SOL_PACKET, PACKET_IGNORE_OUTGOING, 1)
         packet.setsockopt(SOL_PACKET, PACKET_QDISC_BYPASS, 1)
@@ -69,7 +66,8 @@ def _raise_priority(interface: str, priority: int) -> None:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
     except PermissionError:
         raise LinkError(
-            f"the packet loop on {interface} may not run at SCHED_FIFO {priority}", hint=PERMISSION
+            f"the packet loop on {interface} may not run at SCHED_FIFO {priority}",
+            hint=permission_advice(),
         ) from None
 
 

@@ -7,7 +7,9 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 
-from catenary.virtual.description import VENDOR_ID, Description, Pdo
+from catenary.virtual.description import VENDOR_ID, Description, Pdo, SyncManagerDefault
+from catenary.virtual.op_modes import OpMode
+from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 
 STRINGS, GENERAL, FMMU, SYNC_MANAGER, TX_PDO, RX_PDO, CLOCK, END = (
     10,
@@ -19,18 +21,21 @@ STRINGS, GENERAL, FMMU, SYNC_MANAGER, TX_PDO, RX_PDO, CLOCK, END = (
     60,
     0xFFFF,
 )
+FIXED_CONTENT = 0x0010  # of a PDO's flags
 COE_PROTOCOL = 0x0004
 HEADER_BYTES = 128
+UNUSED = SyncManagerDefault(0, 0, 0, 0, 0)
 
 
 class _Strings:
     """Owns the string category: each string once, numbered from 1; 0 is none."""
 
-    def __init__(self) -> None:
+    def __init__(self, prefix: str) -> None:
         self.texts: list[bytes] = []
+        self._prefix = prefix
 
     def number(self, text: str) -> int:
-        encoded = text.encode("latin-1", "replace")[:255]
+        encoded = (self._prefix + text).encode("latin-1", "replace")[:255] if text else b""
         if not encoded or (encoded not in self.texts and len(self.texts) == 255):
             return 0
         if encoded not in self.texts:
@@ -51,7 +56,7 @@ def checksum(configuration: bytes) -> int:
     return crc
 
 
-def _header(device: Description, size: int) -> bytes:
+def _header(device: Description, size: int, mailbox_size: int | None) -> bytes:
     pdi_control = device.pdi_type | (0x0100 if device.emulation else 0)
     configuration = struct.pack("<HHHHH4x", pdi_control, 0, 100, 0, device.alias)
     words = configuration + struct.pack("<H", checksum(configuration))
@@ -64,9 +69,9 @@ def _header(device: Description, size: int) -> bytes:
         words += struct.pack(
             "<5H",
             box.receive_offset,
-            box.receive_size,
+            box.receive_size if mailbox_size is None else mailbox_size,
             box.send_offset,
-            box.send_size,
+            box.send_size if mailbox_size is None else mailbox_size,
             COE_PROTOCOL,
         )
     words = words.ljust(124, b"\0")
@@ -86,22 +91,33 @@ def _general(device: Description, strings: _Strings) -> bytes:
     )
 
 
-def _pdos(pdos: Sequence[Pdo], strings: _Strings) -> bytes:
+def _pdos(pdos: Sequence[Pdo], strings: _Strings, quirks: SiiQuirks, flags: int) -> bytes:
+    if quirks.pdos == "absent":
+        return b""
+
+    def number(name: str) -> int:
+        return 0 if quirks.pdos == "unnamed" else strings.number(name)
+
     out = b""
     for pdo in pdos:
         count, sync_manager = len(pdo.entries), pdo.sync_manager
-        out += struct.pack(
-            "<HBBBBH", pdo.index, count, sync_manager, 0, strings.number(pdo.name), 0
-        )
+        out += struct.pack("<HBBBBH", pdo.index, count, sync_manager, 0, number(pdo.name), flags)
         for e in pdo.entries:
-            name = strings.number(e.name)
+            name = number(e.name)
             out += struct.pack("<HBBBBH", e.index, e.subindex, name, e.data_type, e.bits, 0)
     return out
 
 
-def _clock(strings: _Strings) -> bytes:
-    free = struct.pack("<IIIhHhBB4x", 0, 0, 0, 0, 0, 0, strings.number("FreeRun"), 0)
-    return free + struct.pack("<IIIhHhBB4x", 0, 0, 0, 0, 0x0300, 1, strings.number("DC Sync0"), 0)
+def _clock(modes: Sequence[OpMode], strings: _Strings) -> bytes:
+    return b"".join(
+        struct.pack(
+            "<IiihHhBB4x",
+            *(mode.sync0_ns, mode.shift_ns, mode.sync1_shift_ns),
+            *(mode.sync1_factor, mode.assign_activate, mode.sync0_factor),
+            *(strings.number(mode.name), 0),
+        )
+        for mode in modes
+    )
 
 
 def _category(kind: int, content: bytes) -> bytes:
@@ -109,24 +125,29 @@ def _category(kind: int, content: bytes) -> bytes:
     return struct.pack("<HH", kind, len(padded) // 2) + padded
 
 
-def make_sii_image(device: Description) -> bytes:
-    """The whole EEPROM, a power of two of at least 2 KiB, unused bytes 0xFF."""
-    strings = _Strings()
+def make_sii_image(device: Description, quirks: SiiQuirks = NO_SII_QUIRKS) -> bytes:
+    """Return the whole EEPROM, a power of two of at least 2 KiB, unused bytes 0xFF."""
+    strings = _Strings(quirks.text_prefix)
+    sync_managers = device.sync_managers
+    if quirks.sync_managers is not None:
+        filled = (*sync_managers, *[UNUSED] * quirks.sync_managers)
+        sync_managers = filled[: quirks.sync_managers]
     parts = [(GENERAL, _general(device, strings)), (FMMU, bytes(device.fmmus))]
     managers = b"".join(
         struct.pack("<HHBBBB", s.start, s.length, s.control, 0, s.enable, s.kind)
-        for s in device.sync_managers
+        for s in sync_managers
     )
     parts.append((SYNC_MANAGER, managers))
     # All PDOs of a direction in one category, as in real terminals: SOEM reads no second one.
-    parts.append((TX_PDO, _pdos(device.tx_pdos, strings)))
-    parts.append((RX_PDO, _pdos(device.rx_pdos, strings)))
+    flags = FIXED_CONTENT if device.mapping_quirks.fixed_pdos == "declared" else 0
+    parts.append((TX_PDO, _pdos(device.tx_pdos, strings, quirks, flags)))
+    parts.append((RX_PDO, _pdos(device.rx_pdos, strings, quirks, flags)))
     if device.clock and device.axes:
-        parts.append((CLOCK, _clock(strings)))
+        parts.append((CLOCK, _clock(device.op_modes, strings)))
     parts.insert(0, (STRINGS, strings.encode()))
     body = b"".join(_category(kind, content) for kind, content in parts if content)
     body += struct.pack("<HH", END, 0xFFFF)
     size = 2048
     while size < HEADER_BYTES + len(body):
         size *= 2
-    return (_header(device, size) + body).ljust(size, b"\xff")
+    return (_header(device, size, quirks.mailbox_size) + body).ljust(size, b"\xff")

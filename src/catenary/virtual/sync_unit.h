@@ -93,10 +93,12 @@ static void sync_time_jumped(controller *c, int64_t when) {
 }
 
 /* SYNC1 comes its cycle time after a SYNC0, and after the first SYNC0 again that follows it. */
-static void sync_pulse1(controller *c) {
+static int sync_pulse1(controller *c) {
+    int shown = c->memory[REG_SYNC_ACTIVATION] & SYNC_PULSE_1;
     c->memory[REG_SYNC_ACTIVATION_STATUS] &= (uint8_t)~SYNC_PENDING_1;
     c->sync.next1 = NEVER;
-    c->sync.pulses1 += (c->memory[REG_SYNC_ACTIVATION] & SYNC_PULSE_1) != 0;
+    c->sync.pulses1 += shown != 0;
+    return shown;
 }
 
 /* How long a signal is up. One whose next pulse comes before it is down stays up (section I
@@ -117,27 +119,27 @@ static int sync_pulse0(controller *c) {
     if (u->next0 != NEVER)
         dc_store(c, REG_SYNC_START, u->next0);
     dc_store(c, REG_SYNC_NEXT1, u->next1);
-    if (u->next1 == now)
-        sync_pulse1(c);
-    int shown = (c->memory[REG_SYNC_ACTIVATION] & SYNC_PULSE_0) != 0;
-    u->pulses0 += shown;
-    return shown;
+    int shown = c->memory[REG_SYNC_ACTIVATION] & SYNC_PULSE_0;
+    u->pulses0 += shown != 0;
+    return u->next1 == now ? shown | sync_pulse1(c) : shown;
 }
 
-/* What is due at the segment's present. 1: the device gets a SYNC0 pulse.
+/* What is due at the segment's present. Returns the pulses that the device gets: SYNC_PULSE_0, _1.
  * The rate swings and a product of it is rounded, so that a pulse may still be a hair away at the
  * instant computed for it: counted from here on, it is at least 1 ns ahead and comes nearer. */
 static int sync_advance(controller *c) {
     sync_unit *u = &c->sync;
     dc_anchor(c, c->segment->now);
     int64_t now = dc_system_time(c, c->segment->now);
-    int pulse = 0;
-    if (u->next1 <= now)
-        sync_pulse1(c);
+    int pulses = 0;
+    if (u->next1 < u->next0 && u->next1 <= now)
+        pulses = sync_pulse1(c);
     if (u->next0 <= now)
-        pulse = sync_pulse0(c);
+        pulses |= sync_pulse0(c);
+    if (u->next1 <= now)             /* a SYNC0 at the same time does not start the next SYNC1 */
+        pulses |= sync_pulse1(c);
     sync_schedule(c);
-    return pulse;
+    return pulses;
 }
 
 /* What a write of [first, end) in the clocks' registers sets going, latched times apart. */

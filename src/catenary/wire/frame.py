@@ -59,6 +59,11 @@ class Frame:
         """
         return bool(self.source[0] & PASSED_CONTROLLER)
 
+    @property
+    def sender(self) -> bytes:
+        """Its source address without the bit that controllers set."""
+        return bytes((self.source[0] & ~PASSED_CONTROLLER,)) + self.source[1:]
+
     def encode(self) -> bytes:
         """Its bytes, without a frame check sequence. ValueError if it is too long or empty."""
         if not self.datagrams:

@@ -2,7 +2,10 @@
 in both byte orders; writing with one interface and times in ns.
 
     capture = encode_header("eth0") + b"".join(encode_packet(packet) for packet in packets)
-    decode_capture(capture).packets == tuple(packets)
+    decode_pcapng(capture).packets == tuple(packets)
+
+A last block that was cut off, by a program that was killed or a full disk, is left out:
+`Capture.cut` counts its bytes. Wireshark reads such files in the same way.
 """
 
 from __future__ import annotations
@@ -73,6 +76,7 @@ class Capture:
 
     interfaces: tuple[Interface, ...]
     packets: tuple[Packet, ...]
+    cut: int = 0  # bytes at the end, of a block that was cut off
 
 
 def encode_header(interface_name: str = "") -> bytes:
@@ -110,10 +114,12 @@ def encode_statistics(time_ns: int, *, received: int, dropped: int) -> bytes:
     return _block(_STATISTICS, body)
 
 
-def decode_capture(data: bytes) -> Capture:
-    """The capture in a file's bytes. A last block that was cut off is an error too."""
+def decode_pcapng(data: bytes) -> Capture:
+    """The capture in a file's bytes, up to where it was cut off. DecodeError: no pcapng."""
     state = _State()
+    end = 0
     for block in _blocks(data):
+        end = block.end
         if block.kind == _SECTION:
             state.first_interface = len(state.interfaces)
         elif block.kind == _INTERFACE:
@@ -122,7 +128,7 @@ def decode_capture(data: bytes) -> Capture:
             state.packets.append(_decode_enhanced(block, state))
         elif block.kind == _SIMPLE_PACKET:
             state.packets.append(_decode_simple(block, state))
-    return Capture(tuple(state.interfaces), tuple(state.packets))
+    return Capture(tuple(state.interfaces), tuple(state.packets), cut=len(data) - end)
 
 
 @dataclass(slots=True)
@@ -144,6 +150,7 @@ class _Block(NamedTuple):
     kind: int
     order: str  # "<" or ">"
     body: bytes
+    end: int  # its end in the file
 
     def unpack(self, layout: str) -> tuple[int, ...]:
         """The fields at its start."""
@@ -154,21 +161,26 @@ class _Block(NamedTuple):
 
 
 def _blocks(data: bytes) -> Iterator[_Block]:
+    """Every whole block. The first one must be whole."""
     offset, order = 0, ""
     while offset < len(data):
         if offset + _MINIMUM_BLOCK > len(data):
-            raise DecodeError(f"pcapng: {len(data) - offset} bytes left at {offset}, no block fits")
+            if offset:
+                return
+            raise DecodeError(f"pcapng: {len(data)} bytes, no block fits")
         if data[offset : offset + 4] == b"\x0a\x0d\x0d\x0a":
             order = _byte_order(data[offset + 8 : offset + 12])
         if not order:
             raise DecodeError("pcapng: does not begin with a section header")
         kind, length = struct.unpack_from(order + "II", data, offset)
         end = offset + length
-        if length < _MINIMUM_BLOCK or length % 4 or end > len(data):
+        if length < _MINIMUM_BLOCK or length % 4 or (end > len(data) and not offset):
             raise DecodeError(f"pcapng: block at byte {offset} says {length} bytes")
+        if end > len(data):
+            return
         if struct.unpack_from(order + "I", data, end - 4)[0] != length:
             raise DecodeError(f"pcapng: block at byte {offset} ends with another length")
-        yield _Block(kind, order, bytes(data[offset + 8 : end - 4]))
+        yield _Block(kind, order, bytes(data[offset + 8 : end - 4]), end)
         offset = end
 
 

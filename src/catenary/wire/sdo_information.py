@@ -146,9 +146,10 @@ class ObjectList:
 
 def decode_object_list(data: bytes) -> ObjectList:
     """The list in the joined data of LIST_RESPONSEs."""
-    if len(data) < 2 or len(data) % 2:
-        raise DecodeError(f"object list: {len(data)} bytes, needs an even number from 2")
-    kind, *indices = struct.unpack(f"<{len(data) // 2}H", data)
+    if len(data) < 2:
+        raise DecodeError(f"object list: {len(data)} bytes, needs at least 2")
+    # The rest of a list that was cut short may be half an index.
+    kind, *indices = struct.unpack_from(f"<{len(data) // 2}H", data)
     try:
         return ObjectList(ListType(kind), tuple(indices))
     except ValueError:
@@ -228,8 +229,10 @@ def decode_entry_description(data: bytes) -> EntryDescription:
     )
 
 
-def decode_error(data: bytes) -> int:
-    """The abort code in the data of an ERROR."""
-    if len(data) < 4:
-        raise DecodeError(f"SDO information error: needs 4 bytes, received {len(data)}")
-    return int.from_bytes(data[:4], "little")
+def decode_error(data: bytes) -> int | None:
+    """Return the abort code in the data of an ERROR, None if it is not complete.
+
+    KickCAT (CoE/mailbox/response.cc, SDOInformationMessage::abort) appends the code and does not
+    count it, so that the message ends before it.
+    """
+    return int.from_bytes(data[:4], "little") if len(data) >= 4 else None

@@ -62,6 +62,36 @@ class SyncManagerEnable(IntFlag):
     OP_ONLY = 0x08
 
 
+class GeneralFlags(IntFlag):
+    """The flags of the general category, byte 0x0B."""
+
+    SAFE_OP = 0x01
+    NO_LRW = 0x02  # one datagram that reads and writes is not for this device
+    MAILBOX_DATA_LINK_LAYER = 0x04
+    IDENTIFICATION_BY_AL_STATUS = 0x08
+    IDENTIFICATION_BY_MEMORY = 0x10  # at General.identification_address
+
+
+class PdoFlags(IntFlag):
+    """The flags of a PDO; the last four are reserved, but named in ETG.2010."""
+
+    MANDATORY = 0x0001
+    DEFAULT = 0x0002
+    OVERSAMPLE = 0x0004
+    FIXED_CONTENT = 0x0010
+    VIRTUAL_CONTENT = 0x0020
+    DOWNLOAD_ANYWAY = 0x0040
+    FROM_MODULE = 0x0080
+    MODULE_ALIGN = 0x0100
+    DEPENDS_ON_SLOT = 0x0200
+    DEPENDS_ON_SLOT_GROUP = 0x0400
+    OVERWRITTEN_BY_MODULE = 0x0800
+    CONFIGURABLE = 0x1000
+    AUTOMATIC_NAME = 0x2000
+    NO_AUTOMATIC_EXCLUDE = 0x4000
+    WRITABLE = 0x8000
+
+
 _NO_DETAILS = CoeDetails(0)
 
 

@@ -28,6 +28,7 @@ class Options:
     rates: tuple[int, ...] | None = None  # [Hz]
     peers: tuple[str, ...] | None = None  # of those that the table compares
     ring: bool = False
+    axes: tuple[int, ...] | None = None  # drives on each network
     busy_wait: float = 0.0  # [s] of our loops before each cycle start
     example: Path | None = None  # the program of examples/cobot
     realtime: bool = False  # on the machine's clock, where virtual time is the default

@@ -75,14 +75,17 @@ def measure(options: Options) -> Sheet:
         rate: run(rate, seconds, rounds, ways, options, failed) if ways else {} for rate in rates
     }
     shape = "rings" if options.ring else "lines"
+    axes = axes_of(options)
     blocks = [as_table(rate, of_ways) for rate, of_ways in found.items()]
     return Sheet(
         title=f"TOCABI, 18 + 15 axes on two networks; {TOCABI_CONDITIONS}",
-        conditions=f"ours: virtual drives, two {shape} of veth, {rounds} x {seconds / rounds:g} s",
+        conditions=f"ours: {' + '.join(map(str, axes))} virtual drives, two {shape} of veth, "
+        f"{rounds} x {seconds / rounds:g} s",
         text="\n\n".join([*blocks, "\n".join(as_verdicts(found)), *as_failures(failed)]),
         figures={
             "published": {f"{rate}, {name}": c._asdict() for (rate, name), c in TOCABI.items()},
             "ring": options.ring,
+            "axes": axes,
             "seconds": seconds,
             "rounds": rounds,
             "rounds_done_again": failed,
@@ -90,6 +93,14 @@ def measure(options: Options) -> Sheet:
         },
         left_out=left_out,
     )
+
+
+def axes_of(options: Options) -> tuple[int, ...]:
+    """Return the number of drives on each network. ValueError unless there are two networks."""
+    axes = options.axes or DRIVES
+    if len(axes) != len(NETWORKS):
+        raise ValueError(f"tocabi has {len(NETWORKS)} networks, not {len(axes)}: --axes 6,6")
+    return axes
 
 
 @dataclass(slots=True)
@@ -149,7 +160,7 @@ def run(
     """All ways in turn, round by round."""
     found = {name: WayRounds([], [], []) for name in ways}
     with contextlib.ExitStack() as stack:
-        segments = [stack.enter_context(served(n, ring=options.ring)) for n in DRIVES]
+        segments = [stack.enter_context(served(n, ring=options.ring)) for n in axes_of(options)]
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="catenary-bench-")))
         cycles = round(seconds * rate / rounds)
         jobs = [

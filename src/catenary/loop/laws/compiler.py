@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
 from catenary.errors import LawError
+from catenary.loop.laws.cache import make_cache
 from catenary.loop.laws.checks import check_source
-from catenary.loop.laws.dependencies import dependencies
 from catenary.loop.laws.law import Law
 from catenary.loop.laws.layout import LawLayout
 
@@ -54,7 +54,7 @@ class CompiledLaw:
 
 
 def compile_law(law: Law, layout: LawLayout) -> CompiledLaw:
-    """Compiles, or takes from Numba's cache. LawError says what cannot be, and where."""
+    """Compile, or take from the cache (cache.py). LawError says what cannot be, and where."""
     check_source(law.function)
     numba = _numba(law)
     inner = _inner(numba, law.function)
@@ -101,23 +101,12 @@ def _numba(law: Law) -> Any:
 
 
 def _inner(numba: Any, function: Callable[..., Any]) -> Any:
-    """The law itself; from the cache where its source is a file."""
+    """Return the law itself; from the cache if its source is a file."""
     inner = numba.njit(boundscheck=True, error_model="numpy", nogil=True)(function)
-    # no place for a cache: typed at a prompt, or a folder that is read-only
-    with suppress(RuntimeError):
-        inner._cache = _cache(function)
+    cache = make_cache(function)
+    if cache is not None:
+        inner._cache = cache
     return inner
-
-
-def _cache(function: Callable[..., Any]) -> Any:
-    """Numba's cache of a function, with all that it depends on in the key."""
-    caching: Any = import_module("numba.core.caching")
-    used = dependencies(function)
-
-    def index_key(self: Any, signature: Any, codegen: Any) -> tuple[Any, ...]:
-        return (*caching.FunctionCache._index_key(self, signature, codegen), used)
-
-    return type("LawCache", (caching.FunctionCache,), {"_index_key": index_key})(function)
 
 
 def _returned(numba: Any, law: Law, inner: Any, layout: LawLayout) -> str:

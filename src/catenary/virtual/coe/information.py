@@ -13,11 +13,13 @@ from catenary.virtual.coe.dictionary import (
     UNKNOWN_COMMAND,
     Dictionary,
 )
+from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 
 SDO_INFORMATION = 8
 LIST_REQUEST, LIST, OBJECT_REQUEST, OBJECT, ENTRY_REQUEST, ENTRY, ERROR = range(1, 8)
 INCOMPLETE = 0x80
 HEADER = 2 + 4
+ABORT_SIZE = 4
 
 
 def _message(opcode: int, payload: bytes, left: int = 0) -> bytes:
@@ -28,8 +30,11 @@ def _message(opcode: int, payload: bytes, left: int = 0) -> bytes:
 class InformationServer:
     """Owns nothing but the way to the dictionary it describes."""
 
-    def __init__(self, dictionary: Dictionary, *, size: int) -> None:
+    def __init__(
+        self, dictionary: Dictionary, *, size: int, quirks: MailboxQuirks = NO_MAILBOX_QUIRKS
+    ) -> None:
         self._dictionary = dictionary
+        self._quirks = quirks
         self._room = (size - HEADER) & ~1
 
     def serve(self, payload: bytes) -> Iterable[bytes]:
@@ -38,10 +43,19 @@ class InformationServer:
         if opcode == LIST_REQUEST and len(body) >= 2:
             return self._lists(struct.unpack_from("<H", body)[0])
         if opcode == OBJECT_REQUEST and len(body) >= 2:
-            return [self._object(struct.unpack_from("<H", body)[0])]
+            return self._objects(struct.unpack_from("<H", body)[0])
         if opcode == ENTRY_REQUEST and len(body) >= 4:
             return [self._entry(*struct.unpack_from("<HBB", body))]
-        return [_message(ERROR, struct.pack("<I", UNKNOWN_COMMAND))]
+        return [self._error(UNKNOWN_COMMAND)]
+
+    def _error(self, code: int) -> bytes:
+        counted = 0 if self._quirks.uncounted_aborts else ABORT_SIZE
+        return _message(ERROR, struct.pack("<I", code)[:counted])
+
+    def _described(self, opcode: int, head: bytes, name: str) -> bytes:
+        """Return a description; a name that is longer than the mailbox is cut."""
+        text = (self._quirks.text_prefix + name).encode("latin-1", "replace")
+        return _message(opcode, (head + text)[: self._room])
 
     def _indices(self, kind: int) -> list[int]:
         objects = list(self._dictionary.objects.values())
@@ -56,29 +70,40 @@ class InformationServer:
         if kind == 0:
             content = struct.pack("<5H", *(len(self._indices(k)) for k in range(1, 6)))
         elif kind > 5:
-            return [_message(ERROR, struct.pack("<I", UNKNOWN_COMMAND))]
+            return [self._error(UNKNOWN_COMMAND)]
         else:
             indices = self._indices(kind)
             content = struct.pack(f"<{len(indices)}H", *indices)
         content = struct.pack("<H", kind) + content
         parts = [content[k : k + self._room] for k in range(0, len(content), self._room)]
-        return [_message(LIST, part, len(parts) - 1 - k) for k, part in enumerate(parts)]
+        if kind and self._quirks.object_list == "missing":
+            parts = parts[: max(len(parts) - 1, 1)]
+        messages = [_message(LIST, part, len(parts) - 1 - k) for k, part in enumerate(parts)]
+        promised = kind and self._quirks.object_list == "promised"
+        return messages[: max(len(messages) - 1, 1)] if promised else messages
+
+    def _objects(self, index: int) -> list[bytes]:
+        if index in self._quirks.missing_descriptions:
+            return []
+        if index in self._quirks.malformed_descriptions:
+            return [_message(OBJECT, struct.pack("<H", index))]
+        return [self._object(index)]
 
     def _object(self, index: int) -> bytes:
         found = self._dictionary.objects.get(index)
         if found is None:
-            return _message(ERROR, struct.pack("<I", NO_OBJECT))
+            return self._error(NO_OBJECT)
         highest = 0 if found.code == 7 else found.highest
         head = struct.pack("<HHBB", index, found.data_type, highest, found.code)
-        return _message(OBJECT, head + found.name.encode("latin-1", "replace"))
+        return self._described(OBJECT, head, found.name)
 
     def _entry(self, index: int, subindex: int, information: int) -> bytes:
         found = self._dictionary.objects.get(index)
         if found is None or subindex not in found.entries:
             code = NO_OBJECT if found is None else NO_SUBINDEX
-            return _message(ERROR, struct.pack("<I", code))
+            return self._error(code)
         entry = found.entries[subindex]
         head = struct.pack(
             "<HBBHHH", index, subindex, information & 0, entry.data_type, entry.bits, entry.access
         )
-        return _message(ENTRY, head + entry.name.encode("latin-1", "replace"))
+        return self._described(ENTRY, head, entry.name)

@@ -28,9 +28,11 @@ from catenary.virtual.coe.dictionary import (
     Entry,
 )
 from catenary.virtual.description import Pdo
+from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 
 RX_ASSIGNMENT, TX_ASSIGNMENT = 0x1C12, 0x1C13
 ENTRIES_MAX, PDOS_MAX = 32, 16
+LOCAL_CONTROL = 0x0800_0021
 
 
 class _Table:
@@ -66,9 +68,15 @@ class PdoObjects:
     """Owns which objects are in the process data of a device, and where."""
 
     def __init__(
-        self, dictionary: Dictionary, rx: Sequence[Pdo], tx: Sequence[Pdo], limit: int
+        self,
+        dictionary: Dictionary,
+        rx: Sequence[Pdo],
+        tx: Sequence[Pdo],
+        limit: int,
+        quirks: MappingQuirks = NO_MAPPING_QUIRKS,
     ) -> None:
         self._dictionary = dictionary
+        self._quirks = quirks
         self._limit_bits = 8 * limit
         self._mappings: dict[int, _Table] = {}
         self._assigned = {
@@ -82,6 +90,8 @@ class PdoObjects:
             table = self._mappings[pdo.index] = _Table("<I", packed, ENTRIES_MAX)
             self._add(pdo.index, pdo.name, table, UNSIGNED32, flag)
         assigned = [pdo.index for pdo in pdos if pdo.sync_manager != 0xFF]
+        if self._quirks.power_up is not None:
+            assigned = [pdo.index for pdo in pdos if pdo.index in self._quirks.power_up]
         table = _Table("<H", assigned, PDOS_MAX)
         allowed = [pdo.index for pdo in pdos]
         self._add(index, name, table, UNSIGNED16, flag, allowed)
@@ -96,10 +106,14 @@ class PdoObjects:
         flag: int,
         allowed: list[int] | None = None,
     ) -> None:
-        access = READ_ANY | WRITE_PRE_OP
+        quirks = self._quirks
+        fixed = quirks.fixed_pdos if allowed is None else quirks.fixed_lists
+        access = READ_ANY if fixed == "declared" else READ_ANY | WRITE_PRE_OP
         bits = 16 if data_type == UNSIGNED16 else 32
 
         def write_count(data: bytes) -> None:
+            if fixed != "no":
+                raise Abort(quirks.abort_code)
             count = data[0]
             if count > len(table.places):
                 raise Abort(MAPPING_TOO_LONG if allowed is None else OUT_OF_RANGE)
@@ -111,6 +125,8 @@ class PdoObjects:
                 raise
 
         def write_place(place: int, data: bytes) -> None:
+            if fixed != "no":
+                raise Abort(quirks.abort_code)
             if table.count:
                 raise Abort(SUBINDEX_0_FIRST)
             value = table.unpack(data)
@@ -142,6 +158,8 @@ class PdoObjects:
         index, subindex, bits = value >> 16, value >> 8 & 0xFF, value & 0xFF
         if index == 0:  # a gap
             return
+        if index in self._quirks.refused_objects:
+            raise Abort(CANNOT_BE_MAPPED)
         try:
             entry = self._dictionary.entry(index, subindex)
         except Abort:
@@ -153,7 +171,11 @@ class PdoObjects:
         if allowed is not None:
             if any(pdo not in allowed for pdo in table.values):
                 raise Abort(CANNOT_BE_MAPPED)
-            bits = sum(value & 0xFF for pdo in table.values for value in self._mappings[pdo].values)
+            values = [value for pdo in table.values for value in self._mappings[pdo].values]
+            places = [value >> 8 for value in values if value >> 16]
+            if self._quirks.exclusive and len(set(places)) < len(places):
+                raise Abort(LOCAL_CONTROL)
+            bits = sum(value & 0xFF for value in values)
         else:
             for value in table.values:
                 self._check_entry(value, flag)

@@ -18,6 +18,7 @@ from catenary.virtual.coe.dictionary import (
     Abort,
     Dictionary,
 )
+from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 
 SDO_REQUEST, SDO_RESPONSE = 2, 3
 COE_HEADER = 2
@@ -52,8 +53,11 @@ def _aborted(index: int, subindex: int, code: int) -> bytes:
 class SdoServer:
     """Owns the one transfer a device has under way. `size`: of the mailbox without its header."""
 
-    def __init__(self, dictionary: Dictionary, *, size: int) -> None:
+    def __init__(
+        self, dictionary: Dictionary, *, size: int, quirks: MailboxQuirks = NO_MAILBOX_QUIRKS
+    ) -> None:
         self._dictionary = dictionary
+        self._drip = quirks.drip
         self._room = size - COE_HEADER
         self._transfer: _Transfer | None = None
 
@@ -157,7 +161,7 @@ class SdoServer:
 
     def _upload_segment(self, command: int) -> bytes:
         transfer = self._segment(command, download=False)
-        room = self._room - SEGMENT_HEADER
+        room = 1 if self._drip else self._room - SEGMENT_HEADER
         part, transfer.data = transfer.data[:room], transfer.data[room:]
         last = not transfer.data
         if last:

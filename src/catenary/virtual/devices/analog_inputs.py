@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from catenary.virtual.coe.dictionary import (
     BOOLEAN,
+    INTEGER8,
     INTEGER16,
     MAP_TX,
     READ_ANY,
@@ -12,16 +15,21 @@ from catenary.virtual.coe.dictionary import (
     number,
     stored,
 )
+from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.crystal import EXACT, ClockBits, Crystal
 from catenary.virtual.description import Description, MappedEntry, Pdo
 from catenary.virtual.devices.application import Application, mailbox_of, sync_managers_of
 from catenary.virtual.devices.applied import AppliedDevice
+from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 from catenary.virtual.scheduler import Scheduler
+from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 
 SLOTS = 4  # of one channel: underrange, overrange, error, value
 UNDERRANGE, OVERRANGE, ERROR, VALUE = range(SLOTS)
 FULL_SCALE = 0x7FFF
 CONVERSION_NS = 500_000
+
+SecondPdo = Literal["none", "compact", "twice"]
 
 
 class AnalogInputs(AppliedDevice):
@@ -41,7 +49,14 @@ class AnalogInputs(AppliedDevice):
         mailbox_delay: float = 300e-6,
         crystal: Crystal = EXACT,
         clock_bits: ClockBits = 64,
+        second_pdo: SecondPdo = "none",
+        mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS,
+        mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS,
+        sii_quirks: SiiQuirks = NO_SII_QUIRKS,
     ) -> None:
+        """`second_pdo` of each channel, 0x1A10 on. "compact": the value alone, not assigned, as in
+        Beckhoff's EL30xx. "twice": assigned as well, and the value has 8 bits there; the EL3632
+        maps 0x6000:02 twice with different sizes. `mapping_quirks`: quirks of its PDOs."""
         if not 1 <= channels <= 8:
             raise ValueError(f"analogue inputs have 1 to 8 channels, not {channels}")
         super().__init__(
@@ -53,8 +68,19 @@ class AnalogInputs(AppliedDevice):
             mailbox_delay=mailbox_delay,
             crystal=crystal,
             clock_bits=clock_bits,
+            mailbox_quirks=mailbox_quirks,
+            sii_quirks=sii_quirks,
         )
         self.channels = channels
+        self.second_pdo = second_pdo
+        self.mapping_quirks = mapping_quirks
+
+    def _second(self, channel: int) -> Pdo:
+        index, twice = 0x6000 + 0x10 * channel, self.second_pdo == "twice"
+        value = (8, "Value", INTEGER8) if twice else (16, "Value", INTEGER16)
+        name = f"AI compact channel {channel + 1}"
+        entries = (MappedEntry(index, 0x11, *value),)
+        return Pdo(0x1A10 + channel, name, entries, 3 if twice else 0xFF)
 
     def _pdo(self, channel: int) -> Pdo:
         index = 0x6000 + 0x10 * channel
@@ -70,6 +96,8 @@ class AnalogInputs(AppliedDevice):
 
     def description(self) -> Description:
         pdos = tuple(self._pdo(k) for k in range(self.channels))
+        if self.second_pdo != "none":
+            pdos += tuple(self._second(k) for k in range(self.channels))
         return Description(
             name=self.name,
             order=f"CVA{self.channels:03d}",
@@ -80,7 +108,7 @@ class AnalogInputs(AppliedDevice):
             alias=self.alias,
             emulation=False,
             pdi_type=0x05,
-            mailbox=mailbox_of(self.mailbox_bytes),
+            mailbox=mailbox_of(self.mailbox_bytes, self.mapping_quirks.coe_details),
             sync_managers=sync_managers_of(self.mailbox_bytes, (), pdos),
             fmmus=(1, 2, 3),
             rx_pdos=(),
@@ -88,6 +116,7 @@ class AnalogInputs(AppliedDevice):
             clock=True,
             slots=SLOTS * self.channels,
             current_milliampere=130,
+            mapping_quirks=self.mapping_quirks,
         )
 
     def started(self, scheduler: Scheduler) -> None:

@@ -30,6 +30,7 @@ from catenary.virtual.coe.dictionary import (
 )
 from catenary.virtual.coe.information import SDO_INFORMATION, InformationServer
 from catenary.virtual.coe.pdo_objects import RX_ASSIGNMENT, TX_ASSIGNMENT, PdoObjects
+from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.coe.sdo_server import SDO_REQUEST, SdoServer
 from catenary.virtual.description import (
     VENDOR_ID,
@@ -66,8 +67,8 @@ RAM_START, RAM_END = 0x1000, 0x3000
 BLOB_BYTES = 2048  # an object larger than any usual mailbox
 
 
-def mailbox_of(size: int) -> MailboxDefault:
-    return MailboxDefault(RAM_START, size, RAM_START + size, size, 0x2F)
+def mailbox_of(size: int, coe_details: int = 0x2F) -> MailboxDefault:
+    return MailboxDefault(RAM_START, size, RAM_START + size, size, coe_details)
 
 
 def process_data_areas(mailbox_size: int) -> tuple[int, int, int]:
@@ -108,6 +109,7 @@ class Application:
         description: Description,
         *,
         delay_ns: int,
+        quirks: MailboxQuirks = NO_MAILBOX_QUIRKS,
     ) -> None:
         box = description.mailbox
         if box is None:
@@ -120,20 +122,27 @@ class Application:
         self.checks_watchdog = False  # refuses SAFE-OP with 0x001F (ServoQuirks)
         self.states = StateMachine(self, scheduler, description.identification)
         self.dictionary = Dictionary(lambda: self.states.state)
-        self._add_communication_objects(description)
+        self._add_communication_objects(description, quirks.text_prefix)
         out, into, room = process_data_areas(box.receive_size)
         self._areas = (out, into)
-        self.pdos = PdoObjects(self.dictionary, description.rx_pdos, description.tx_pdos, room)
-        self._sdo = SdoServer(self.dictionary, size=box.send_size - HEADER.size)
-        self._information = InformationServer(self.dictionary, size=box.send_size - HEADER.size)
-        self.mailbox = Mailbox(self, scheduler, self._serve_coe, delay_ns=delay_ns)
+        self.pdos = PdoObjects(
+            self.dictionary,
+            description.rx_pdos,
+            description.tx_pdos,
+            room,
+            description.mapping_quirks,
+        )
+        size = box.send_size - HEADER.size
+        self._sdo = SdoServer(self.dictionary, size=size, quirks=quirks)
+        self._information = InformationServer(self.dictionary, size=size, quirks=quirks)
+        self.mailbox = Mailbox(self, scheduler, self._serve_coe, delay_ns=delay_ns, quirks=quirks)
         self._gate(mailbox=False, process_data=False)
 
-    def _add_communication_objects(self, d: Description) -> None:
+    def _add_communication_objects(self, d: Description, text_prefix: str) -> None:
         add = self.dictionary.add_variable
         add(0x1000, number("Device type", UNSIGNED32, 0x0002_0192 if d.axes else 0x0000_1389))
         add(0x1001, Entry("Error register", UNSIGNED8, 8, 0x07, self._error_register))
-        add(0x1008, text("Manufacturer device name", d.name))
+        add(0x1008, text("Manufacturer device name", text_prefix + d.name))
         add(0x1009, text("Manufacturer hardware version", "1"))
         add(0x100A, text("Manufacturer software version", "1.0"))
         identity = zip(

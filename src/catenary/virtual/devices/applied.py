@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from catenary.virtual.coe.quirks import MailboxQuirks
 from catenary.virtual.crystal import ClockBits, Crystal
 from catenary.virtual.devices.application import Application
 from catenary.virtual.devices.device import Device
 from catenary.virtual.scheduler import Scheduler
+from catenary.virtual.sii_quirks import SiiQuirks
 
 
 class AppliedDevice(Device):
@@ -22,6 +24,8 @@ class AppliedDevice(Device):
         mailbox_delay: float,
         crystal: Crystal,
         clock_bits: ClockBits,
+        mailbox_quirks: MailboxQuirks,
+        sii_quirks: SiiQuirks,
     ) -> None:
         super().__init__(
             name=name,
@@ -30,12 +34,14 @@ class AppliedDevice(Device):
             lrw=lrw,
             crystal=crystal,
             clock_bits=clock_bits,
+            sii_quirks=sii_quirks,
         )
         if not 32 <= mailbox_bytes <= 1024 or mailbox_bytes % 2:
             raise ValueError(f"a mailbox has 32 to 1024 bytes, an even number, not {mailbox_bytes}")
         if not 0 <= mailbox_delay <= 10:
             raise ValueError(f"a mailbox answers after 0 to 10 s, not {mailbox_delay}")
         self.mailbox_bytes = mailbox_bytes
+        self.mailbox_quirks = mailbox_quirks
         self._mailbox_delay_ns = round(mailbox_delay * 1e9)
         self._application: Application | None = None
 
@@ -52,6 +58,7 @@ class AppliedDevice(Device):
             scheduler,
             self.description(),
             delay_ns=self._mailbox_delay_ns,
+            quirks=self.mailbox_quirks,
         )
         self.add_objects(self._application)
 

@@ -13,6 +13,7 @@ from catenary.virtual.crystal import EXACT, ClockBits, Crystal
 from catenary.virtual.description import Description
 from catenary.virtual.scheduler import Agenda, Scheduler
 from catenary.virtual.sii_image import make_sii_image
+from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 
 INIT, PRE_OP, SAFE_OP, OP = 1, 2, 4, 8
 RESET_DELAY_NS, RESET_NS = 100_000, 20_000_000  # the EEPROM is loaded again
@@ -34,6 +35,7 @@ class Device:
         lrw: bool,
         crystal: Crystal = EXACT,
         clock_bits: ClockBits = 64,
+        sii_quirks: SiiQuirks = NO_SII_QUIRKS,
     ) -> None:
         if not 0 <= alias <= 0xFFFF:
             raise ValueError(f"alias {alias} is no 16-bit number")
@@ -44,6 +46,7 @@ class Device:
         self.serial = serial
         self.lrw = lrw
         self.clock_bits = clock_bits
+        self.sii_quirks = sii_quirks
         self._crystal = crystal
         self._core: Core | None = None
         self._agenda: Agenda | None = None
@@ -52,6 +55,10 @@ class Device:
 
     def description(self) -> Description:
         raise NotImplementedError
+
+    def sii_image(self) -> bytes:
+        """Return the content of its EEPROM."""
+        return make_sii_image(self.description(), self.sii_quirks)
 
     @property
     def core(self) -> Core:
@@ -67,7 +74,7 @@ class Device:
         core.make_controller(
             position,
             ram=description.ram,
-            sii=make_sii_image(description),
+            sii=self.sii_image(),
             slots=description.slots,
             axes=description.axes,
             fmmus=8,
@@ -77,6 +84,8 @@ class Device:
             identification=description.identification,
             ports=self.ports,
         )
+        if not description.loop_control:
+            core.ignore_loop_control(position)
         self._core, self._agenda, self.position = core, agenda, position
         self.crystal = self._crystal
         self.switch_on()

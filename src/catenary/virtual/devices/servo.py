@@ -23,6 +23,7 @@ from catenary.virtual.coe.dictionary import (
     Entry,
     number,
 )
+from catenary.virtual.coe.quirks import NO_MAILBOX_QUIRKS, MailboxQuirks
 from catenary.virtual.crystal import EXACT, ClockBits, Crystal
 from catenary.virtual.description import Description, MappedEntry, Pdo
 from catenary.virtual.devices.application import Application, mailbox_of, sync_managers_of
@@ -38,8 +39,10 @@ from catenary.virtual.devices.servo_objects import (
     RX,
 )
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
-from catenary.virtual.devices.synchronisation import Synchronisation
+from catenary.virtual.devices.synchronisation import DC_SYNC0, DC_SYNC1, Synchronisation
+from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 from catenary.virtual.scheduler import Scheduler
+from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 
 STEP_NS = 250_000
 MINIMUM_CYCLE_NS = 62_500  # of SYNC0
@@ -122,11 +125,15 @@ class Servo(AppliedDevice):
         lrw: bool = True,
         sync_missed_limit: int = 3,
         quirks: ServoQuirks = NO_QUIRKS,
+        mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS,
+        mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS,
+        sii_quirks: SiiQuirks = NO_SII_QUIRKS,
     ) -> None:
         """Units: kg·m², N·m·s/rad, N·m, rad/s, rad; `max_torque_ratio` of the rated torque;
         `velocity_counts_per_turn`: the unit of 0x606C and 0x60FF, a turn a second;
         `sync_missed_limit`: SYNC0 pulses in a row without new outputs that are an error;
-        `quirks`: how the drive differs from the profile."""
+        `quirks`: how the drive differs from the profile; `mapping_quirks`: quirks of its PDOs;
+        `mailbox_quirks`, `sii_quirks`: how its mailbox and its SII differ from the standard."""
         super().__init__(
             name=name,
             alias=alias,
@@ -136,6 +143,8 @@ class Servo(AppliedDevice):
             mailbox_delay=mailbox_delay,
             crystal=crystal,
             clock_bits=clock_bits,
+            mailbox_quirks=mailbox_quirks,
+            sii_quirks=sii_quirks,
         )
         positive = {
             "counts_per_turn": counts_per_turn,
@@ -166,6 +175,7 @@ class Servo(AppliedDevice):
         self.position_limits = position_limits
         self.sync_missed_limit = sync_missed_limit
         self.quirks = quirks
+        self.mapping_quirks = mapping_quirks
         self._inertias = [inertia] * axes  # what the loops are tuned for
 
     def _pdos(
@@ -194,7 +204,7 @@ class Servo(AppliedDevice):
             alias=self.alias,
             emulation=False,
             pdi_type=0x05,
-            mailbox=mailbox_of(self.mailbox_bytes),
+            mailbox=mailbox_of(self.mailbox_bytes, self.mapping_quirks.coe_details),
             sync_managers=sync_managers_of(
                 self.mailbox_bytes, rx, tx, watchdog_trigger=self.quirks.watchdog_trigger
             ),
@@ -204,6 +214,9 @@ class Servo(AppliedDevice):
             clock=True,
             axes=self.axes,
             slots=self.axes * _segment.SLOTS_PER_AXIS,
+            mapping_quirks=self.mapping_quirks,
+            op_modes=self.quirks.op_modes,
+            loop_control=self.quirks.closes_ports,
         )
 
     def started(self, scheduler: Scheduler) -> None:
@@ -286,6 +299,7 @@ class Servo(AppliedDevice):
             minimum_cycle_ns=MINIMUM_CYCLE_NS,
             copy_ns=COPY_NS,
             missed_limit=self.sync_missed_limit,
+            synchronous_type=DC_SYNC1 if self.quirks.sync_signal == "sync1" else DC_SYNC0,
         )
         application.checks_watchdog = self.quirks.checks_watchdog
         for axis in range(self.axes):

@@ -10,6 +10,8 @@ from typing import Literal
 
 import msgspec
 
+from catenary.virtual.op_modes import STANDARD, OpMode
+
 MODES = (6, 8, 9, 10)  # homing, CSP, CSV, CST
 OPTION_CODES = range(-(1 << 15), 1 << 15)
 
@@ -50,6 +52,19 @@ class ServoQuirks(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     # Modes that 0x6061 never shows, though 0x6060 accepts them. ipa320/ipa_canopen#29: a drive that
     # changes its mode only before operation enabled.
     refused_modes: tuple[int, ...] = ()
+
+    # Category 60 of the SII: the device's ways to use distributed clocks. `virtual.op_modes` has
+    # those of an EL3702 (SYNC1 with a negative factor), of a device with SYNC1 alone, and of an
+    # EasyCAT (a shift of 2.0 s), with sources.
+    op_modes: tuple[OpMode, ...] = STANDARD
+
+    # The signal that the drive keeps time by. "sync1": clocks without SYNC1 are refused, 0x1C32:04
+    # shows DC Sync1 alone; robert-burger/libethercat#21: OP is reached with 0x0500 only.
+    sync_signal: Literal["sync0", "sync1"] = "sync0"
+
+    # Its ports can be closed by loop control, 0x0101. False: DL status never shows it;
+    # leducp/KickCAT, lib/slave/src/ESC/EmulatedESC.cc evaluates bit 24 of DL control alone.
+    closes_ports: bool = True
 
     # SyncManager 2 triggers the watchdog: control byte 0x64 in the SII. False: 0x24, as in three
     # SIIs of leducp/KickCAT (examples/slave: lan9252/freedom-k64f, lan9252/rpi and

@@ -1,8 +1,9 @@
 """How a device keeps time with the bus: 0x1C32 outputs, 0x1C33 inputs (ETG.1020 §5.2.1, "sync
 manager parameters"), 0x10F1 the limit of missed events; and what it demands of the SYNC unit.
 
-Two types: 0 free run, 2 DC Sync0. Unless 0x1C32:01 was written, the SYNC unit decides: a device
-whose SYNC0 is switched on when it goes to SAFE-OP keeps time by it, as common device stacks do.
+Two types: 0 free run, 2 DC Sync0; or 3 DC Sync1 instead, as a quirk. Unless 0x1C32:01 was
+written, the SYNC unit decides: a device whose signal is switched on when it goes to SAFE-OP keeps
+time by it, as common device stacks do.
 """
 
 from __future__ import annotations
@@ -31,11 +32,13 @@ from catenary.virtual.state_machine import (
     INVALID_DC_CONFIGURATION,
 )
 
-FREE_RUN, DC_SYNC0 = 0, 2
-SUPPORTED = 0x0001 | 0x0004  # 0x1C32:04: free run; bits 2 and 3: DC, SYNC0
+FREE_RUN, DC_SYNC0, DC_SYNC1 = 0, 2, 3
+# 0x1C32:04: free run; bits 2 to 4: DC, 1: SYNC0, 2: SYNC1
+SUPPORTED = {DC_SYNC0: 0x0001 | 0x0004, DC_SYNC1: 0x0001 | 0x0008}
 OUTPUTS, INPUTS, ERROR_SETTINGS = 0x1C32, 0x1C33, 0x10F1
-SYNC_CONTROL, ACTIVATION, SYNC0_CYCLE = 0x0980, 0x0981, 0x09A0
-ACTIVE, PULSES = 0x01, 0x02
+SYNC_CONTROL, ACTIVATION, SYNC0_CYCLE, SYNC1_CYCLE = 0x0980, 0x0981, 0x09A0, 0x09A4
+ACTIVE = 0x01
+PULSES = {DC_SYNC0: 0x02, DC_SYNC1: 0x04}  # of 0x0981
 _, _, MISSED, EXCEEDED, SHIFT_SHORT, ERROR = range(6)  # of Core.synchronous
 
 
@@ -52,15 +55,19 @@ class Synchronisation:
         minimum_cycle_ns: int,
         copy_ns: int,
         missed_limit: int,
+        synchronous_type: int = DC_SYNC0,
     ) -> None:
         """`step_ns`: the device's own cycle; `minimum_cycle_ns` of SYNC0; `copy_ns`: how long
-        before SYNC0 outputs have to be there; `missed_limit`: pulses in a row without new ones."""
+        before a pulse outputs have to be there; `missed_limit`: pulses in a row without new ones;
+        `synchronous_type`: which signal it keeps time by."""
         self._core = core
         self._position = position
         self._step_ns = step_ns
         self._minimum_ns = minimum_cycle_ns
         self._copy_ns = copy_ns
         self._limit = missed_limit
+        self._synchronous = synchronous_type
+        self._pulses = PULSES[synchronous_type]
         self._written: int | None = None  # 0x1C32:01
         self._cycle_written = 0  # 0x1C32:02
         self._tune()
@@ -87,27 +94,29 @@ class Synchronisation:
         by_pdi, activation = self._core.peek(self._position, SYNC_CONTROL, 2)
         switched_on = bool(activation & ACTIVE)
         if not switched_on:
-            return INVALID_DC_CONFIGURATION if self._written == DC_SYNC0 else 0
-        if self._written == FREE_RUN or not activation & PULSES or by_pdi & 1:
+            return INVALID_DC_CONFIGURATION if self._written == self._synchronous else 0
+        if self._written == FREE_RUN or not activation & self._pulses or by_pdi & 1:
             return INVALID_DC_CONFIGURATION
         if self.sync0_cycle_ns < self._minimum_ns:
             return DC_SYNC0_CYCLE_TIME
         own = self._step_ns  # read from 0x1C32:02 in free run, it may be written back
-        if self._cycle_written not in (0, own, self.sync0_cycle_ns):
+        if self._cycle_written not in (0, own, self.cycle_ns):
             return DC_CYCLE_TIME
         return 0
 
     def begin(self) -> None:
         """SAFE-OP is entered: by its pulses from now on, if there are to be any."""
         if self._core.peek(self._position, ACTIVATION, 1)[0] & ACTIVE:
-            self._core.run_model_by_sync0(self._position, self.sync0_cycle_ns, self._step_ns)
+            self._core.run_model_by_pulses(
+                self._position, self._pulses, self.cycle_ns, self._step_ns
+            )
 
     def end(self) -> None:
         if self._is_synchronous:
             self._core.run_model(self._position, self._step_ns)
 
     def awaits_pulses(self) -> bool:
-        """It keeps time by SYNC0, and no pulse has come."""
+        """It keeps time by pulses, and none has come."""
         active, seen = self._core.synchronous(self._position)[:2]
         return active and not seen
 
@@ -118,21 +127,31 @@ class Synchronisation:
         return int.from_bytes(self._core.peek(self._position, SYNC0_CYCLE, 4), "little")
 
     @property
+    def cycle_ns(self) -> int:
+        """Time between two pulses of its signal: SYNC1 comes with the first SYNC0 after the time
+        that its register says (Beckhoff, ESC data sheet I §9.2.3.5)."""
+        sync0_ns = self.sync0_cycle_ns
+        if self._synchronous == DC_SYNC0 or not sync0_ns:
+            return sync0_ns
+        later = int.from_bytes(self._core.peek(self._position, SYNC1_CYCLE, 4), "little")
+        return (later // sync0_ns + 1) * sync0_ns
+
+    @property
     def _is_synchronous(self) -> bool:
         return self._core.synchronous(self._position)[0]
 
     def _type(self) -> int:
         if self._is_synchronous:
-            return DC_SYNC0
+            return self._synchronous
         return FREE_RUN if self._written is None else self._written
 
     def _type_to(self, wanted: int) -> None:
-        if wanted not in (FREE_RUN, DC_SYNC0):
+        if wanted not in (FREE_RUN, self._synchronous):
             raise Abort(OUT_OF_RANGE)
         self._written = wanted
 
     def _cycle(self) -> int:
-        return self.sync0_cycle_ns if self._is_synchronous else self._cycle_written or self._step_ns
+        return self.cycle_ns if self._is_synchronous else self._cycle_written or self._step_ns
 
     def _cycle_to(self, cycle_ns: int) -> None:
         self._cycle_written = cycle_ns
@@ -158,7 +177,7 @@ class Synchronisation:
             0x01: entry("Sync mode", UNSIGNED16, self._type, self._type_to),
             0x02: entry("Cycle time", UNSIGNED32, self._cycle, self._cycle_to),
             0x03: number("Shift time", UNSIGNED32, 0),  # outputs are valid at the pulse
-            0x04: number("Sync modes supported", UNSIGNED16, SUPPORTED),
+            0x04: number("Sync modes supported", UNSIGNED16, SUPPORTED[self._synchronous]),
             0x05: number("Minimum cycle time", UNSIGNED32, self._minimum_ns),
             0x06: number("Calc and copy time", UNSIGNED32, copy_ns),
             0x07: number("Minimum delay time", UNSIGNED32, 0),

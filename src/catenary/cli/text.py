@@ -1,0 +1,16 @@
+"""Text of devices on a terminal: data, never control."""
+
+from __future__ import annotations
+
+
+def escaped(text: str) -> str:
+    r"""Return the text with every character escaped that is not printable: `"\x1b[2J"`.
+
+    Device names, object names and strings come from EEPROMs and dictionaries. Their escape
+    sequences could clear the terminal, and a line break could imitate our own output.
+    """
+    return "".join(c if c.isprintable() else _escape(c) for c in text)
+
+
+def _escape(character: str) -> str:
+    return character.encode("unicode_escape").decode("ascii")

@@ -1,0 +1,70 @@
+"""0x1C32:01 and 0x1C33:01 of a device: how it keeps time.
+
+They are read before a loop with clocks and written back after it. Else the device would wait for
+SYNC0 in the next program, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from catenary.errors import CatenaryError, StateError
+from catenary.igh.describe import read_if_there
+from catenary.igh.master import Reservation
+from catenary.plan.clocks import SYNC_OBJECTS
+from catenary.procedure.al_state import DeviceState
+from catenary.wire.al import State
+
+
+def read_types(master: Reservation, position: int) -> dict[int, bytes]:
+    """Read the synchronisation types that the device has, by index."""
+    found = {index: read_if_there(master, position, index, 1) for index in SYNC_OBJECTS}
+    return {index: kind for index, kind in found.items() if kind}
+
+
+def write_types(
+    master: Reservation, position: int, types: Mapping[int, bytes], state: DeviceState
+) -> None:
+    """Write the types back that differ from what the device has now, in PRE-OP.
+
+    Args:
+        master: The reserved master.
+        position: Where the device is now.
+        types: By index, as `read_types` found them.
+        state: Of the device.
+
+    Raises:
+        StateError: The device is in another state, where it would refuse them.
+        CatenaryError: It refuses them, or does not answer.
+    """
+    if state.state is not State.PRE_OP or state.error:
+        raise StateError(
+            f"device {position} is not in PRE-OP but in {state.state or 'an unknown state'}: "
+            f"{_named(types)} cannot be restored, and it goes on waiting for SYNC0",
+            position=position,
+            requested=int(State.PRE_OP),
+            actual=state.word,
+            code=state.code,
+            hint=_by_hand(position, types),
+        )
+    for index, kind in types.items():
+        if read_if_there(master, position, index, 1) == kind:
+            continue
+        try:
+            master.download(position, index, 1, kind)
+        except CatenaryError as error:
+            error.hint = _by_hand(position, {index: kind})
+            raise
+
+
+def _named(types: Mapping[int, bytes]) -> str:
+    return " and ".join(f"0x{index:04X}:01" for index in types)
+
+
+def _by_hand(position: int, types: Mapping[int, bytes]) -> str:
+    values = {index: int.from_bytes(kind, "little") for index, kind in types.items()}
+    commands = "; ".join(
+        f"ethercat download -p {position} -t uint16 0x{index:04X} 1 {value}"
+        for index, value in values.items()
+    )
+    return f"a loop without clocks will not start; switch the device off and on, or: {commands}"

@@ -1,0 +1,31 @@
+"""The Python interpreter of this program, and how it gets the rights that a loop needs."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+
+CAPABILITIES = "cap_net_raw,cap_sys_nice,cap_ipc_lock=ep"
+WARNING = "; whoever may run this file gets raw sockets: limit them by its group and `chmod 750`"
+
+
+def is_own(executable: str, prefix: str, base_prefix: str) -> bool:
+    """True if the file that `setcap` would change belongs to one environment alone.
+
+    `python -m venv` links to the Python that it was called with, unless told `--copies`. Arguments
+    as in `sys`.
+    """
+    inside = Path(executable).resolve().is_relative_to(Path(prefix).resolve())
+    return inside and (prefix != base_prefix or (Path(prefix) / "conda-meta").is_dir())
+
+
+def permission_advice() -> str:
+    """Return what grants raw sockets, real-time scheduling and locked memory without root."""
+    real = Path(sys.executable).resolve()
+    if is_own(sys.executable, sys.prefix, sys.base_prefix):
+        return f"sudo setcap {CAPABILITIES} {shlex.quote(str(real))}{WARNING}"
+    return (
+        f"`python3 -m venv --copies .venv`, because {real} also runs other programs; install "
+        f"catenary there; then sudo setcap {CAPABILITIES} .venv/bin/python{WARNING}"
+    )

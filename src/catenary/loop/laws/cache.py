@@ -1,0 +1,138 @@
+"""The cache of compiled laws: Numba's format, in a folder that only this user can write.
+
+Numba unpickles what it finds in its cache: who can write there runs code as the user of the law.
+Numba's own choice is `__pycache__` next to the source, which may belong to another user, be
+writable for a group, or be set by $NUMBA_CACHE_DIR. Ours is ~/.cache/catenary/laws (below
+$XDG_CACHE_HOME if that is set), with mode 0700.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import os
+import re
+import stat
+import sys
+import warnings
+from collections.abc import Callable
+from contextlib import suppress
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from catenary.loop.laws.dependencies import dependencies
+
+OTHERS_WRITE = 0o022
+
+
+def make_cache(function: Callable[..., Any]) -> Any | None:
+    """Return Numba's cache of a function, with all that it depends on in the key.
+
+    None if its source is not a file, or, with a warning, if there is no private folder.
+    """
+    source = inspect.getfile(function)
+    if not os.path.exists(source):  # typed at a prompt, or in a zip
+        return None
+    try:
+        folder = private_folder(cache_folder())
+    except (OSError, RuntimeError) as error:  # RuntimeError: no home
+        warnings.warn(
+            f"compiled laws are not kept, each start compiles again: {error}. Only you and root "
+            "may own or write the folders of the cache; $XDG_CACHE_HOME names another place",
+            RuntimeWarning,
+            stacklevel=2,
+        )
+        return None
+    return _cache_class(folder)(function)
+
+
+def cache_folder() -> Path:
+    """Return where compiled laws are kept."""
+    given = os.environ.get("XDG_CACHE_HOME", "")
+    base = Path(given) if os.path.isabs(given) else Path.home() / ".cache"
+    return base / "catenary" / "laws"
+
+
+def private_folder(folder: Path) -> Path:
+    """Create a folder that only this user can write, mode 0700. Returns it without links.
+
+    Raises OSError if that is not possible, or if another user could exchange the folder or a file
+    in it. The folders above count, too, as in OpenSSH's StrictModes (misc.c, safe_path).
+    """
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    real = folder.resolve()
+    status = real.stat()
+    if status.st_uid != os.geteuid():
+        raise PermissionError(f"{folder} belongs to user {status.st_uid}")
+    if stat.S_IMODE(status.st_mode) != 0o700:
+        real.chmod(0o700)
+    for place in real.parents:
+        above = place.stat()
+        if above.st_uid not in (0, os.geteuid()):
+            raise PermissionError(f"{place} belongs to user {above.st_uid}")
+        if above.st_mode & OTHERS_WRITE and not above.st_mode & stat.S_ISVTX:
+            raise PermissionError(f"others can write in {place}")
+    for path in real.glob("*.nb[ci]"):  # from before the folder was private
+        found = path.lstat()
+        if found.st_uid != os.geteuid() or found.st_mode & OTHERS_WRITE:
+            raise PermissionError(f"others can write {path}")
+    return real
+
+
+def _cache_class(folder: Path) -> Any:
+    """Return Numba's cache with our place and our key. Its own choice of a place is left out."""
+    caching: Any = import_module("numba.core.caching")
+
+    class Files(caching.CompileResultCacheImpl):  # type: ignore[misc]
+        """The encoding of a compiled function, and the name of its files."""
+
+        def __init__(self, function: Callable[..., Any]) -> None:
+            self._lineno = function.__code__.co_firstlineno
+            self._locator = _Place(folder, inspect.getfile(function))
+            name = re.sub(r"\W+", "", function.__qualname__)
+            place = f"{self._locator._py_file}:{self._lineno}"
+            version = f"py{sys.version_info[0]}{sys.version_info[1]}"
+            self._filename_base = (
+                f"{name}-{hashlib.sha256(place.encode()).hexdigest()[:16]}.{version}"
+            )
+
+    class LawCache(caching.FunctionCache):  # type: ignore[misc]
+        """The cache of one law. What cannot be read is compiled again."""
+
+        _impl_class = Files
+
+        def _index_key(self, signature: Any, codegen: Any) -> tuple[Any, ...]:
+            used = dependencies(self._py_func)
+            return (*super()._index_key(signature, codegen), used)
+
+        def load_overload(self, signature: Any, target_context: Any) -> Any:
+            try:
+                return super().load_overload(signature, target_context)
+            except Exception:  # what pickle raises for a file that a full disk has cut
+                with suppress(OSError):
+                    self.flush()
+                return None
+
+        def save_overload(self, signature: Any, data: Any) -> None:
+            with suppress(OSError):  # no room: the law runs without
+                super().save_overload(signature, data)
+
+    return LawCache
+
+
+class _Place:
+    """Numba's locator: the folder of a function's files, and the source that they depend on."""
+
+    def __init__(self, folder: Path, source: str) -> None:
+        self._folder = folder
+        self._py_file = os.path.abspath(source)  # Numba names it in warnings
+
+    def ensure_cache_path(self) -> None:
+        """`private_folder` has created it."""
+
+    def get_cache_path(self) -> str:
+        return str(self._folder)
+
+    def get_source_stamp(self) -> bytes:
+        return hashlib.sha256(Path(self._py_file).read_bytes()).digest()

@@ -1,0 +1,8 @@
+"""Text of devices: names in the SII and in the object dictionary."""
+
+from __future__ import annotations
+
+
+def printable(text: str) -> str:
+    """Return the printable characters of a name, without spaces at its ends."""
+    return "".join(c for c in text if c.isprintable()).strip()

@@ -1,0 +1,60 @@
+"""Changes that a plan makes on a device, as text: old and new values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from catenary.model.device import DeviceDescription, Direction, Pdo
+from catenary.plan.pdo_mapping import ASSIGNMENT_BASE, Mapping
+
+
+class Change(NamedTuple):
+    """One object of a device that gets another value. `old`: empty if it is not known."""
+
+    what: str
+    old: str
+    new: str
+
+
+def mapping_changes(
+    device: DeviceDescription, direction: Direction, mapping: Mapping
+) -> list[Change]:
+    """Return the lists of PDOs and of entries that change."""
+    before = {each.sync_manager: each.pdos for each in device.assignments(direction)}
+    known = {pdo.index: pdo for pdo in device.pdos(direction)}
+    changes = [
+        Change(
+            f"0x{ASSIGNMENT_BASE + each.sync_manager:04X}",
+            _pdo_list(before.get(each.sync_manager, ())),
+            _pdo_list(each.pdos),
+        )
+        for each in mapping.assignments
+        if each.sync_manager in mapping.reassigned
+    ]
+    for pdo in mapping.rewritten:
+        old = _entry_list(known[pdo.index]) if pdo.index in known else ""
+        changes.append(Change(f"0x{pdo.index:04X}", old, _entry_list(pdo)))
+    return changes
+
+
+def value_changes(
+    device: DeviceDescription, start_up: Sequence[tuple[int, int, bytes]]
+) -> list[Change]:
+    """Return the objects of a start-up list that do not have their values yet."""
+    changes = []
+    for index, subindex, data in start_up:
+        old = device.known_value(index, subindex)
+        if old != data:
+            text = "" if old is None else old.hex(" ")
+            changes.append(Change(f"0x{index:04X}:{subindex:02X}", text, data.hex(" ")))
+    return changes
+
+
+def _pdo_list(pdos: Sequence[Pdo]) -> str:
+    return ", ".join(f"0x{pdo.index:04X}" for pdo in pdos) or "none"
+
+
+def _entry_list(pdo: Pdo) -> str:
+    texts = (f"0x{e.index:04X}:{e.subindex:02X}/{e.bit_length}" for e in pdo.entries)
+    return ", ".join(texts) or "none"

@@ -1,0 +1,146 @@
+"""New entries for a PDO: the missing objects, or what the application wrote down."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from catenary.errors import MappingError
+from catenary.model.device import DeviceDescription, Direction, Entry, Pdo, mapped_entries
+from catenary.plan.pdo_mapping import Mapping, process_data_channel, with_pdos
+from catenary.plan.pdo_search import carries, pdo_names
+
+if TYPE_CHECKING:  # wish.py needs NumPy, a scan does not
+    from catenary.plan.wish import ObjectReference, WrittenPdo
+
+ENTRIES_MAX = 254  # subindices of a mapping object, ETG.1000.6 table 75
+
+
+def rewrite_refusal(
+    device: DeviceDescription, direction: Direction, missing: Sequence[ObjectReference]
+) -> str:
+    """Return why the missing objects cannot be added to a PDO; empty if they can."""
+    if device.mailbox is None or not device.coe:
+        return "it has no CoE mailbox to change its mapping"
+    for reference in missing:
+        reason = _not_mappable(device, direction, reference)
+        if reason:
+            return f"0x{reference.index:04X}:{reference.subindex:02X} {reason}"
+        if reason := _other_length(device, direction, reference):
+            return reason
+    if not device.mailbox.pdo_configuration:
+        return "its SII says that the entries of PDOs cannot be changed"
+    if _changeable(device, direction) is None:
+        pdos = device.pdos(direction)
+        return f"all its PDOs are fixed: {pdo_names(pdos)}" if pdos else "its PDOs are not known"
+    return ""
+
+
+def rewrite(
+    device: DeviceDescription,
+    direction: Direction,
+    missing: Sequence[ObjectReference],
+    required: Sequence[ObjectReference],
+) -> Mapping:
+    """Return the mapping with the missing objects appended to a PDO that is not fixed.
+
+    Without room for all, the PDO carries only the required objects that are in no other PDO.
+    """
+    pdo = _changeable(device, direction)
+    assert pdo is not None
+    assigned = _assigned(device, direction)
+    others = [other for other in assigned if other.index != pdo.index]
+    new = tuple(dict.fromkeys(_entry(device, each) for each in missing))
+    grown = replace(pdo, entries=pdo.entries + new)
+    if len(grown.entries) > ENTRIES_MAX:
+        alone = [each for each in required if not any(carries(p, each) for p in others)]
+        grown = replace(pdo, entries=tuple(dict.fromkeys(_entry(device, r) for r in alone)))
+    if len(others) == len(assigned):
+        return with_pdos(device, direction, [*assigned, grown])
+    pdos = [grown if other.index == pdo.index else other for other in assigned]
+    return with_pdos(device, direction, pdos)
+
+
+def write_down(
+    device: DeviceDescription, direction: Direction, written: Sequence[WrittenPdo]
+) -> Mapping:
+    """Return the mapping of exactly these PDOs, in this order.
+
+    Raises:
+        MappingError: The entries of a PDO are neither written down nor known, or the device has no
+            SyncManager for them.
+    """
+    known = {pdo.index: pdo for pdo in device.pdos(direction)}
+    pdos = []
+    for each in written:
+        pdo = known.get(each.index, Pdo(each.index, (), None))
+        if each.entries is not None:
+            pdo = replace(pdo, entries=tuple(_entry(device, entry) for entry in each.entries))
+        elif each.index not in known:
+            raise MappingError(
+                f"{device}: neither its dictionary nor its SII has PDO 0x{each.index:04X}",
+                hint=f"write its entries down; the device has {pdo_names(device.pdos(direction))}",
+            )
+        pdos.append(pdo)
+    return with_pdos(device, direction, pdos)
+
+
+def _changeable(device: DeviceDescription, direction: Direction) -> Pdo | None:
+    """Return the first assigned PDO that is not fixed; else one that could be assigned."""
+    assigned = _assigned(device, direction)
+    channel = process_data_channel(device, direction)
+    locked = any(a.fixed for a in device.assignments(direction) if a.sync_manager == channel)
+    taken = {pdo.index for a in device.assignments(direction) for pdo in a.pdos}
+    unassigned = [p for p in device.pdos(direction) if p.index not in taken and not locked]
+    return next((pdo for pdo in (*assigned, *unassigned) if not pdo.fixed), None)
+
+
+def _assigned(device: DeviceDescription, direction: Direction) -> tuple[Pdo, ...]:
+    channel = process_data_channel(device, direction)
+    for assignment in device.assignments(direction):
+        if assignment.sync_manager == channel:
+            return assignment.pdos
+    return ()
+
+
+def _not_mappable(
+    device: DeviceDescription, direction: Direction, reference: ObjectReference
+) -> str:
+    """Return the dictionary's objection. The device itself judges an object never read: it refuses
+    the mapping before SAFE-OP."""
+    known = device.known_object(reference.index, reference.subindex)
+    if known is None:
+        return ""
+    if known.bit_length == 0:
+        return "does not exist in its object dictionary"
+    mappable = known.output_mappable if direction is Direction.OUTPUT else known.input_mappable
+    if not mappable:
+        return "exists but cannot be mapped"
+    if known.bit_length != reference.bit_length:
+        return f"has {known.bit_length} bits, {reference.bit_length} were asked for"
+    return ""
+
+
+def _other_length(
+    device: DeviceDescription, direction: Direction, reference: ObjectReference
+) -> str:
+    """Return the objection to an object that would be mapped a second time with another length."""
+    for entry in mapped_entries(device.assignments(direction)):
+        if (entry.index, entry.subindex) == (reference.index, reference.subindex):
+            place = f"0x{entry.index:04X}:{entry.subindex:02X}"
+            return f"{place} is mapped with {entry.bit_length} bits already"
+    return ""
+
+
+def _entry(device: DeviceDescription, reference: ObjectReference) -> Entry:
+    """Return the entry, with the name and type of the dictionary or of the device's PDOs."""
+    place = (reference.index, reference.subindex, reference.bit_length)
+    known = device.known_object(reference.index, reference.subindex)
+    if known is not None:
+        return Entry(*place, known.name, known.data_type)
+    for pdo in (*device.output_pdos, *device.input_pdos):
+        for entry in pdo.entries:
+            if (entry.index, entry.subindex, entry.bit_length) == place:
+                return entry
+    return Entry(*place)

@@ -1,0 +1,111 @@
+"""Names of mapped entries and PDOs from the object dictionary, where the SII has none.
+
+Some SIIs name neither. SOEM's slaveinfo.c asks the dictionary, too (SDO information, ETG.1000.6
+§5.6.3). Names are useful, not necessary: whatever the device answers, nothing fails here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from catenary.errors import MailboxError, ResponseTimeout, SdoAbort
+from catenary.model.device import DeviceDescription, Direction, Entry, Pdo
+from catenary.model.text import printable
+from catenary.procedure.exchange import Procedure
+from catenary.procedure.mailbox import MailboxChannel
+from catenary.procedure.sdo_information import (
+    FAILURES_MAX,
+    describe_entry,
+    read_object_description,
+)
+from catenary.procedure.station import Deadline
+from catenary.wire.sdo_information import ObjectCode, ObjectDescription
+
+TIMEOUT = 5.0  # [s] for all names of one device
+
+
+def name_entries(
+    channel: MailboxChannel, device: DeviceDescription
+) -> Procedure[DeviceDescription]:
+    """Return the description with names of all assigned entries and PDOs, as far as known."""
+    if device.mailbox is None or not (device.mailbox.coe and device.mailbox.sdo_information):
+        return device
+    dictionary = _Names(channel)
+    for direction in Direction:
+        assignments = device.assignments(direction)
+        for pdo in (pdo for assignment in assignments for pdo in assignment.pdos):
+            named = yield from dictionary.name(pdo)
+            if named != pdo:
+                device = _with_pdo(device, direction, named)
+    return device
+
+
+class _Names:
+    """Owns the descriptions of one dictionary that were read: none is read twice."""
+
+    def __init__(self, channel: MailboxChannel) -> None:
+        self._channel = channel
+        self._deadline = Deadline(TIMEOUT)
+        self._objects: dict[int, ObjectDescription | None] = {}
+
+    def name(self, pdo: Pdo) -> Procedure[Pdo]:
+        """Return the PDO with a name, and with names of its entries."""
+        if not pdo.name:
+            pdo = replace(pdo, name=(yield from self._object_name(pdo.index)))
+        entries = []
+        for entry in pdo.entries:
+            named = entry
+            if entry.index and not entry.name:
+                named = replace(entry, name=(yield from self._entry_name(entry)))
+            entries.append(named)
+        return replace(pdo, entries=tuple(entries))
+
+    def _entry_name(self, entry: Entry) -> Procedure[str]:
+        """Return the name of the entry, or that of its object if it has none of its own."""
+        known = yield from self._object(entry.index)
+        if known is not None and known.object_code == ObjectCode.VAR:
+            return printable(known.name)
+        if self._ended:
+            return ""
+        found, _ = yield from describe_entry(self._channel, entry.index, entry.subindex)
+        if found is not None and printable(found.name):
+            return printable(found.name)
+        return f"{printable(known.name)} {entry.subindex}" if known and known.name else ""
+
+    def _object_name(self, index: int) -> Procedure[str]:
+        found = yield from self._object(index)
+        return "" if found is None else printable(found.name)
+
+    def _object(self, index: int) -> Procedure[ObjectDescription | None]:
+        if index in self._objects or self._ended:
+            return self._objects.get(index)
+        self._objects[index] = None
+        try:
+            self._objects[index] = yield from read_object_description(self._channel, index)
+            self._channel.undescribed = 0
+        except SdoAbort:
+            pass  # no such object, or no name: it keeps none
+        except (MailboxError, ResponseTimeout):
+            self._channel.undescribed += 1
+        return self._objects[index]
+
+    @property
+    def _ended(self) -> bool:
+        """True if the device answers too slowly, or not at all."""
+        late = self._deadline.passed_at(self._channel.received_ns)
+        return late or self._channel.undescribed >= FAILURES_MAX
+
+
+def _with_pdo(device: DeviceDescription, direction: Direction, named: Pdo) -> DeviceDescription:
+    """Return the description with one PDO replaced, wherever it occurs."""
+
+    def renamed(pdos: Iterable[Pdo]) -> tuple[Pdo, ...]:
+        return tuple(named if pdo.index == named.index else pdo for pdo in pdos)
+
+    assigned = tuple(
+        replace(each, pdos=renamed(each.pdos)) for each in device.assignments(direction)
+    )
+    if direction is Direction.OUTPUT:
+        return replace(device, outputs=assigned, output_pdos=renamed(device.output_pdos))
+    return replace(device, inputs=assigned, input_pdos=renamed(device.input_pdos))

@@ -1,0 +1,125 @@
+"""Reports of a device on its PDOs before a plan: differences from its SII, contents of PDOs that
+are not assigned, and lists and entries that cannot be changed. Nothing is written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from catenary.errors import MailboxError, MappingError, SdoAbort
+from catenary.model.device import Assignment, DeviceDescription, Direction, ObjectValue, Pdo
+from catenary.plan.pdo_mapping import ASSIGNMENT_BASE, shape
+from catenary.procedure.exchange import Procedure
+from catenary.procedure.mailbox import MailboxChannel
+from catenary.procedure.pdo import read_entries, read_list, read_mapping
+from catenary.procedure.sdo import upload
+from catenary.procedure.sdo_information import read_entry_description
+from catenary.wire.sdo_information import Access
+
+OFFERS_MAX = 64  # PDOs read in one direction; an EL6731 has 250 of them
+READABLE = Access.READ_PRE_OP | Access.READ_SAFE_OP | Access.READ_OP
+
+
+def read_first_mapping(
+    channel: MailboxChannel, device: DeviceDescription
+) -> Procedure[DeviceDescription]:
+    """Return the description with the mapping that the device reports. Notes show where its SII
+    differs, or why the SII's is used."""
+    try:
+        found = yield from read_mapping(channel, device)
+    except (MappingError, MailboxError) as error:
+        note = f"its mapping cannot be read, its SII's is used: {error.message}"
+        return replace(device, notes=(*device.notes, note))
+    notes = [note for direction in Direction for note in _differences(device, found, direction)]
+    return replace(found, notes=(*device.notes, *notes))
+
+
+def read_offers(
+    channel: MailboxChannel, device: DeviceDescription, direction: Direction
+) -> Procedure[DeviceDescription]:
+    """Return the description with the entries of PDOs that are not assigned, and with `fixed` as
+    the dictionary says. For a direction in which objects are missing."""
+    taken = {pdo.index for each in device.assignments(direction) for pdo in each.pdos}
+    known = {pdo.index: pdo for pdo in device.pdos(direction)}
+    for index in [index for index in known if index not in taken][:OFFERS_MAX]:
+        words = yield from read_list(channel, index)
+        if words is not None:
+            entries = read_entries(words, known[index].entries)
+            known[index] = replace(known[index], entries=entries)
+    for index in taken & set(known):
+        if (yield from _is_read_only(channel, device, index)):
+            known[index] = replace(known[index], fixed=True)
+    assignments = []
+    for each in device.assignments(direction):
+        locked = yield from _is_read_only(channel, device, ASSIGNMENT_BASE + each.sync_manager)
+        pdos = tuple(known.get(pdo.index, pdo) for pdo in each.pdos)
+        assignments.append(Assignment(each.sync_manager, pdos, each.fixed or locked))
+    return _with(device, direction, tuple(assignments), tuple(known.values()))
+
+
+def read_values(
+    channel: MailboxChannel, device: DeviceDescription, places: Sequence[tuple[int, int]]
+) -> Procedure[DeviceDescription]:
+    """Return the description with the values of these objects, for a plan to show."""
+    values = []
+    for index, subindex in dict.fromkeys(places):
+        try:
+            data = yield from upload(channel, index, subindex)
+        except SdoAbort:
+            values.append(ObjectValue(index, subindex, None))
+        else:
+            values.append(ObjectValue(index, subindex, data))
+    return replace(device, values=tuple(values))
+
+
+def _is_read_only(
+    channel: MailboxChannel, device: DeviceDescription, index: int
+) -> Procedure[bool]:
+    """Return True if the dictionary says that subindex 0 cannot be written in PRE-OP. An entry
+    without any right to read it tells nothing: some devices leave the access word empty."""
+    if device.mailbox is None or not device.mailbox.sdo_information:
+        return False
+    try:
+        entry = yield from read_entry_description(channel, index, 0)
+    except SdoAbort:
+        return False
+    return bool(entry.access & READABLE) and Access.WRITE_PRE_OP not in entry.access
+
+
+def _with(
+    device: DeviceDescription,
+    direction: Direction,
+    assignments: tuple[Assignment, ...],
+    pdos: tuple[Pdo, ...],
+) -> DeviceDescription:
+    if direction is Direction.OUTPUT:
+        return replace(device, outputs=assignments, output_pdos=pdos)
+    return replace(device, inputs=assignments, input_pdos=pdos)
+
+
+def _differences(
+    described: DeviceDescription, found: DeviceDescription, direction: Direction
+) -> Iterator[str]:
+    """Yield the differences between the SII and the dictionary. An SII without PDOs has none."""
+    if not described.pdos(direction):
+        return
+    before = {each.sync_manager: each.pdos for each in described.assignments(direction)}
+    known = {pdo.index: pdo for pdo in described.pdos(direction)}
+    for each in found.assignments(direction):
+        now, then = _indices(each.pdos), _indices(before.get(each.sync_manager, ()))
+        if now != then:
+            yield f"SyncManager {each.sync_manager} carries PDOs {now}, its SII says {then}"
+        for pdo in each.pdos:
+            other = known.get(pdo.index)
+            if other is not None and shape(other) != shape(pdo):
+                yield f"PDO 0x{pdo.index:04X} has {_contents(pdo)}, its SII says {_contents(other)}"
+
+
+def _indices(pdos: Sequence[Pdo]) -> str:
+    return ", ".join(f"0x{pdo.index:04X}" for pdo in pdos) or "none"
+
+
+def _contents(pdo: Pdo) -> str:
+    texts = (f"0x{i:04X}:{sub:02X}/{bits}" for i, sub, bits in shape(pdo))
+    return ", ".join(texts) or "no entries"

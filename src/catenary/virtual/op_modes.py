@@ -1,0 +1,68 @@
+"""OpModes of a virtual device: what category 60 of its SII says of distributed clocks (ETG.2010).
+
+In TOML: `quirks = { op_modes = [{ name = "DC", assign_activate = 0x0700, sync1_factor = -1 }] }`.
+"""
+
+from __future__ import annotations
+
+import msgspec
+
+
+class OpMode(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One way to use distributed clocks. Times in ns, as in the SII."""
+
+    name: str
+    assign_activate: int = 0  # registers 0x0980 (low byte) and 0x0981
+    sync0_ns: int = 0
+    sync0_factor: int = 0
+    shift_ns: int = 0
+    sync1_factor: int = 0
+    sync1_shift_ns: int = 0
+
+    def __post_init__(self) -> None:
+        for name, bits in (("sync0_ns", 32), ("assign_activate", 16)):
+            if not 0 <= getattr(self, name) < 1 << bits:
+                raise ValueError(f"OpMode {self.name!r}: {name} has {bits} bits without sign")
+        for name, bits in (
+            *(("shift_ns", 32), ("sync1_shift_ns", 32)),
+            *(("sync0_factor", 16), ("sync1_factor", 16)),
+        ):
+            if not -(1 << bits - 1) <= getattr(self, name) < 1 << bits - 1:
+                raise ValueError(f"OpMode {self.name!r}: {name} has {bits} bits with a sign")
+
+
+FREE_RUN = OpMode(name="FreeRun")
+STANDARD = (FREE_RUN, OpMode(name="DC Sync0", assign_activate=0x0300, sync0_factor=1))
+
+# The ESI of Beckhoff's EL3702, as ecmc's notes on DC clocks quote it: four samples in a period,
+# SYNC1 once a period. A servo with it needs `sync_signal="sync1"`.
+EL3702 = (
+    *STANDARD,
+    OpMode(
+        name="DcSync4",
+        assign_activate=0x0730,
+        sync0_factor=-4,
+        shift_ns=-10_000,
+        sync1_factor=-1,
+    ),
+)
+
+# The ESI in robert-burger/libethercat#21: no mode with SYNC0; TwinCAT starts SYNC1 alone.
+SYNC1_ALONE = (
+    OpMode(name="DcSync500us", assign_activate=0x0500, sync0_factor=1, shift_ns=500_000),
+    OpMode(name="DcSync250us", assign_activate=0x0500, sync0_factor=1, shift_ns=250_000),
+    OpMode(name="FreeRun"),
+)
+
+# What AB&T's EasyConfigurator writes for every EasyCAT: a shift of 2.0 s, in its comment "10nS
+# unit" (Seobuk/Easycat_config, HUslave.xml; pollen-robotics' pollen_Orbita2d.xml).
+EASYCAT = (
+    OpMode(name="SM_Sync or Async"),
+    OpMode(name="DC_Sync", assign_activate=0x0300, sync0_factor=1, shift_ns=2_000_200_000),
+)
+
+# The same as one tool stores it: no AssignActivate, another shift (pollen_Orbita2d.bin).
+EASYCAT_STORED = (
+    OpMode(name="SM_Sync or Async"),
+    OpMode(name="DC_Sync", shift_ns=1_882_234_944),
+)

@@ -1,0 +1,211 @@
+"""Other users against shares and mutexes: what they read, command, lock, take and break.
+
+Alice runs a loop; Bob is an operator, of her group; Mallory is neither.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from catenary.doctor.share_folder import wanted
+from tests.attack.users import ALICE, BOB, MALLORY, Machine, operators
+
+LOOP = """
+import sys
+import catenary as cat
+with cat.MainDevice(cat.Segment([cat.Servo()])) as main:
+    arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
+    with cat.Share("arm", mode=int(sys.argv[1], 8)) as share, cat.Loop(arm, sink=share) as loop:
+        next(loop)
+        print("running", flush=True)
+        while not sys.stdin.closed:
+            next(loop)
+            if ends := share.apply(arm):
+                print(*ends, arm.actual.position[0], sep="; ", flush=True)
+"""
+MAKE_FOLDER = """
+import sys
+from pathlib import Path
+from catenary.doctor.share_folder import write_folder
+write_folder(Path("/run/catenary"), sys.argv[1])
+"""
+COMMAND = f"""
+import catenary as cat
+with cat.attach("arm", uid={ALICE}) as arm, arm.lease(axes=[0], for_=600.0) as command:
+    print(arm.read()["number"] > 0)
+    before = arm.number
+    command.send(position=0.001)
+    while arm.read()["commanded_position"][0] != 0.001:
+        arm.wait(timeout=10.0)
+    print("moved")
+"""
+SAY = """
+import catenary as cat
+def said(action):
+    try:
+        action()
+    except (cat.CatenaryError, OSError) as error:
+        print(type(error).__name__, str(getattr(error, "message", error)))
+    else:
+        print("done")
+"""
+
+
+def make_group_folder(machine: Machine) -> None:
+    assert machine.run(0, MAKE_FOLDER, wanted(operators().gr_name)) == []
+
+
+def test_operators_share_a_robot(machine: Machine) -> None:
+    """In /run/catenary, as `catenary doctor --apply` makes it; Mallory is not let in."""
+    make_group_folder(machine)
+    with machine.started(ALICE, LOOP, "660", group=True) as loop:
+        assert loop.line() == "running"
+        assert machine.run(BOB, COMMAND, group=True) == ["True", "moved"]
+        assert "released" in loop.line()
+        [line] = machine.run(MALLORY, f'{SAY}\nsaid(lambda: cat.attach("arm", uid={ALICE}))')
+        assert "may not be read" in line
+
+
+def test_operators_share_a_robot_without_a_common_folder(machine: Machine) -> None:
+    """Bob's only group is Alice's: the folder lets him pass, but neither list nor lock."""
+    with machine.started(ALICE, LOOP, "660") as loop:
+        assert loop.line() == "running"
+        become = f"import os; os.setgroups([]); os.setgid({ALICE}); os.setuid({BOB})\n"
+        assert machine.run(0, become + COMMAND) == ["True", "moved"]
+        look = f"{SAY}import os\nsaid(lambda: os.open('/dev/shm/catenary-{ALICE}', os.O_RDONLY))"
+        [line] = machine.run(0, become + look)
+        assert line.startswith("PermissionError")
+
+
+@pytest.mark.parametrize("mode", ["600", "666"])
+def test_a_stranger_cannot_lock_or_write(machine: Machine, mode: str) -> None:
+    """`flock` on /dev/shm stopped every share of every user."""
+    lock = """
+import fcntl, os
+fcntl.flock(os.open("/dev/shm", os.O_RDONLY), fcntl.LOCK_EX)
+print("locked", flush=True)
+input()
+"""
+    attempts = f"""{SAY}
+import os
+folder = "/dev/shm/catenary-{ALICE}"
+said(lambda: os.open(folder, os.O_RDONLY))
+said(lambda: os.open(folder + "/x", os.O_RDWR | os.O_CREAT))
+said(lambda: os.truncate(folder + "/share-arm", 0))
+said(lambda: os.rename(folder + "/share-arm", folder + "/y"))
+"""
+    with machine.started(MALLORY, lock) as mallory:
+        assert mallory.line() == "locked"
+        with machine.started(ALICE, LOOP, mode) as loop:
+            assert loop.line() == "running"
+            lines = machine.run(MALLORY, attempts)
+            assert [line.split()[0] for line in lines] == ["PermissionError"] * 4
+
+
+def test_who_takes_a_users_folder_is_named(machine: Machine) -> None:
+    """Denial, not deception: /dev/shm is open to everybody. /run/catenary cannot be taken."""
+    assert machine.run(MALLORY, f"import os; os.mkdir('/dev/shm/catenary-{ALICE}', 0o777)") == []
+    take = f'{SAY}\nsaid(lambda: cat.share.Mutex("tool"))'
+    [line] = machine.run(ALICE, take)
+    assert f"was made by user {MALLORY}, not by you" in line
+    make_group_folder(machine)
+    assert machine.run(ALICE, take, group=True) == ["done"]
+
+
+def test_a_share_of_another_user_is_refused_unless_asked_for(machine: Machine) -> None:
+    """The owner of a share can crash its readers: SIGBUS where it truncates the file."""
+    make_group_folder(machine)
+    with machine.started(MALLORY, LOOP, "644", group=True) as loop:
+        assert loop.line() == "running"
+        [line] = machine.run(ALICE, f'{SAY}\nsaid(lambda: cat.attach("arm"))', group=True)
+        assert f"belongs to another user ({MALLORY})" in line
+        asked = f'{SAY}\nsaid(lambda: cat.attach("arm", uid={MALLORY}))'
+        assert machine.run(ALICE, asked, group=True) == ["done"]
+        taken = f'{SAY}\nsaid(lambda: cat.Share("arm").__enter__())'
+        [line] = machine.run(ALICE, taken, group=True)
+        assert "is in the way" in line
+
+
+def test_roots_share_needs_no_word(machine: Machine) -> None:
+    with machine.started(0, LOOP, "644") as loop:
+        assert loop.line() == "running"
+        assert machine.run(ALICE, f'{SAY}\nsaid(lambda: cat.attach("arm"))') == ["done"]
+
+
+def test_a_mutex_of_another_user_is_refused_unless_asked_for(machine: Machine) -> None:
+    """Its robust list holds pointers: a made file crashed the C library (SIGSEGV)."""
+    make_group_folder(machine)
+    evil = """
+import os
+from pathlib import Path
+from catenary.share import Mutex
+mutex = Mutex("tool", mode=0o666)
+data = bytearray(mutex.path.read_bytes())
+data[16 + 16 : 16 + 40] = b"\\x41" * 24
+mutex.path.write_bytes(data)
+mutex.path.chmod(0o666)
+"""
+    assert machine.run(MALLORY, evil, group=True) == []
+    [line] = machine.run(ALICE, f'{SAY}\nsaid(lambda: cat.share.Mutex("tool"))', group=True)
+    assert f"belongs to another user ({MALLORY})" in line
+    asked = f'{SAY}\nsaid(lambda: cat.share.Mutex("tool", uid={MALLORY}))'
+    [line] = machine.run(ALICE, asked, group=True)
+    assert "more users can write there than you asked for" in line
+
+
+def test_operators_use_a_mutex_together(machine: Machine) -> None:
+    make_group_folder(machine)
+    made = 'from catenary.share import Mutex\nwith Mutex("tool", mode=0o660): print("mine")'
+    assert machine.run(ALICE, made, group=True) == ["mine"]
+    theirs = made.replace("mode=0o660", f"mode=0o660, uid={ALICE}")
+    assert machine.run(BOB, theirs, group=True) == ["mine"]
+
+
+HOSTILE_OPERATOR = f"""{SAY}
+import fcntl, mmap, os, sys
+from catenary.share import desk, desk_socket
+folder = "/run/catenary"
+said(lambda: os.truncate(folder + "/share-arm", 0))
+said(lambda: os.unlink(folder + "/share-arm"))
+said(lambda: os.unlink(folder + "/socket-arm"))
+kept = []
+take = desk.map_sealed
+def keep(descriptor, size):
+    kept.append(os.dup(descriptor))
+    return take(descriptor, size)
+desk.map_sealed = keep
+arm = cat.attach("arm", uid={ALICE})
+lease = arm.lease(axes=[0], for_=600.0)
+[memory] = kept
+size = os.fstat(memory).st_size
+said(lambda: os.ftruncate(memory, 0))
+said(lambda: os.ftruncate(memory, 2 * size))
+said(lambda: fcntl.fcntl(memory, fcntl.F_ADD_SEALS, fcntl.F_SEAL_WRITE))
+mapped = mmap.mmap(memory, size)
+for pattern in (b"\\xff", b"\\x00", b"\\x7f", b"\\x01"):
+    mapped[64:] = pattern * (size - 64)
+    before = arm.number
+    while arm.number < before + 100 and arm.wait(timeout=10.0):
+        pass
+    print(arm.number >= before + 100)
+import ctypes
+PUNCH_HOLE, KEEP_SIZE = 2, 1
+libc = ctypes.CDLL(None, use_errno=True)
+libc.fallocate.argtypes = [ctypes.c_int, ctypes.c_int, ctypes.c_int64, ctypes.c_int64]
+assert libc.fallocate(memory, PUNCH_HOLE | KEEP_SIZE, 0, size) == 0
+before = arm.number
+while arm.number < before + 100 and arm.wait(timeout=10.0):
+    pass
+print(arm.number >= before + 100)
+"""
+
+
+def test_an_operator_cannot_break_the_loop(machine: Machine) -> None:
+    """Bob may command. He cannot shorten any memory that the loop uses, nor hang it by numbers."""
+    make_group_folder(machine)
+    with machine.started(ALICE, LOOP, "660", group=True) as loop:
+        assert loop.line() == "running"
+        lines = machine.run(BOB, HOSTILE_OPERATOR, group=True)
+        assert [line.split()[0] for line in lines[:6]] == ["PermissionError"] * 6
+        assert lines[6:] == ["True"] * 5
+        assert loop.process.poll() is None

@@ -1,0 +1,160 @@
+"""Text of devices is data: no command prints its control characters."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from catenary.cli.failure import describe, one_line, with_hint
+from catenary.cli.main import main
+from catenary.cli.tables import table
+from catenary.cli.text import escaped
+from catenary.errors import MailboxError
+
+EVIL = "\x1b[2J\r\n\x9b31m\u202e"
+SEGMENT = """
+[[device]]
+kind = "servo"
+name = "arm"
+mailbox_quirks = { text_prefix = "\\u001b[2J\\r\\n\\u0007\\u009b", object_list = "missing" }
+sii_quirks = { text_prefix = "\\u001b[2J\\r\\n\\u0007\\u009b", mailbox_size = %d }
+"""
+
+
+@pytest.fixture
+def target(tmp_path: Path) -> str:
+    return made(tmp_path, 128)
+
+
+def made(folder: Path, mailbox_size: int) -> str:
+    path = folder / "evil.toml"
+    path.write_text(SEGMENT % mailbox_size)
+    return f"virtual:{path}"
+
+
+def call(line: str, capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    status = main(line.split())
+    printed = capsys.readouterr()
+    return status, printed.out, printed.err
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "scan {}",
+        "scan {} --json",
+        "state {}",
+        "state {} --json",
+        "graph {}",
+        "graph {} --dot",
+        "diag {}",
+        "diag {} --json",
+        "alias {} 0",
+        "alias {} 0 --json",
+        "sdo read {} 0 0x1008",
+        "sdo read {} 0 0x1008 --type STRING",
+        "sdo read {} 0 0x1008 --type STRING --json",
+        "sdo read {} 0 0x5FFF",
+        "sdo list {}  0",
+        "sdo list {} 0 --values",
+        "sdo list {} 0 --values --json",
+    ],
+)
+def test_no_command_prints_control_characters(
+    command: str, target: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, out, err = call(command.format(target), capsys)
+    assert out or err
+    assert all(line.isprintable() for line in (out + err).split("\n"))
+    assert "internal error" not in err
+
+
+def test_an_error_of_the_scan_is_escaped_too(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, out, err = call(f"scan {made(tmp_path, 65535)}", capsys)
+    assert status == 1
+    assert "failed" in out
+    assert "error: device 0" in err
+    assert all(line.isprintable() for line in (out + err).split("\n"))
+
+
+def test_a_string_is_shown_with_its_escapes(
+    target: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, out, _ = call(f"sdo read {target} 0 0x1008 --type STRING", capsys)
+    assert out == "\\x1b[2J\\r\\n\\x07\\x9barm\n"
+
+
+def test_a_list_that_was_cut_short_is_printed_with_a_note(
+    target: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, out, err = call(f"sdo list {target} 0 --json", capsys)
+    assert status == 0
+    assert {0x1000, 0x1018} <= {row["index"] for row in json.loads(out)}
+    assert err.startswith("note: the list of objects was cut short: ")
+
+
+@pytest.mark.parametrize(
+    "quirks",
+    [
+        "malformed_descriptions = [0x1008, 0x1018]",
+        "missing_descriptions = [0x1008]",
+        "uncounted_aborts = true",
+        'object_list = "promised"',
+    ],
+)
+def test_sdo_list_prints_what_the_device_describes(
+    quirks: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "quirk.toml"
+    path.write_text(f'[[device]]\nkind = "servo"\nmailbox_quirks = {{ {quirks} }}\n')
+    for option in ("", " --values --json"):
+        status, out, _ = call(f"sdo list virtual:{path} 0{option}", capsys)
+        assert status == 0
+        assert "Statusword" in out or quirks.startswith("object_list")
+        assert "Device type" in out
+
+
+def test_an_object_without_a_description_has_a_row_and_a_note(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "quirk.toml"
+    path.write_text(
+        '[[device]]\nkind = "servo"\nmailbox_quirks = { malformed_descriptions = [0x1008] }\n'
+    )
+    _, out, err = call(f"sdo list virtual:{path} 0", capsys)
+    assert re.search(r"^0x1008 +\(not described\)$", out, re.MULTILINE)
+    assert err.startswith("note: 0x1008 cannot be described: an answer of SDO information")
+    _, out, _ = call(f"sdo list virtual:{path} 0 --json", capsys)
+    [row] = [row for row in json.loads(out) if row["index"] == 0x1008]
+    assert (row["subindex"], row["problem"]) == (None, "not described")
+
+
+def test_another_devices_error_does_not_keep_one_from_being_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "broken.toml"
+    path.write_text(
+        '[[device]]\nkind = "servo"\nsii_quirks = { mailbox_size = 8 }\n'
+        '[[device]]\nkind = "servo"\nserial = 2\n'
+    )
+    status, out, _ = call(f"sdo read virtual:{path} 1 0x1018:4 --type UDINT", capsys)
+    assert (status, out) == (0, "2\n")
+    status, out, err = call(f"sdo read virtual:{path} 0 0x1018:4 --type UDINT", capsys)
+    assert (status, out) == (1, "")
+    assert "device 0" in err
+
+
+def test_what_is_escaped() -> None:
+    assert escaped(EVIL) == r"\x1b[2J\r\n\x9b31m\u202e"
+    assert escaped("Größe 5 µm, 20 °C") == "Größe 5 µm, 20 °C"
+    assert table([("a", EVIL)]) == "a  " + escaped(EVIL)
+    error = MailboxError(f"device 1 ({EVIL}) is odd", hint=f"ask {EVIL}")
+    assert one_line(EVIL) == r"\x1b[2J \x9b31m\u202e"
+    assert with_hint(error).count("\n") == 1
+    assert all(line.isprintable() for line in with_hint(error).split("\n"))
+    assert all(part.isprintable() for part in describe(error))

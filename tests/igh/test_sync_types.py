@@ -1,0 +1,125 @@
+"""0x1C32:01 and 0x1C33:01: restored after a loop with clocks, or an error with the reason."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import catenary as cat
+from catenary.igh import Master, carrier
+from catenary.igh.kernel_log import KernelLog
+from tests.igh.double import Double
+
+
+@pytest.fixture
+def main(double: Double) -> Iterator[cat.MainDevice]:
+    with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
+        main.scan()
+        yield main
+
+
+def loop_of(main: cat.MainDevice) -> cat.Loop:
+    return cat.Loop(
+        cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0, dc=True)
+    )
+
+
+def test_devices_keep_time_as_before_when_a_loop_with_clocks_ends(
+    main: cat.MainDevice, double: Double
+) -> None:
+    """Else the next program, without clocks, would find them waiting for SYNC0 (seen on a real
+    master: AL status 0x0030)."""
+    with loop_of(main):
+        assert double.value(0, 0x1C32, 1) == 2
+    assert double.value(0, 0x1C32, 1) == 1
+    with cat.Loop(cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0)) as loop:
+        assert next(loop).ok
+
+
+def test_types_are_restored_once_devices_are_in_pre_op(
+    main: cat.MainDevice, double: Double
+) -> None:
+    """The master leads them down after it was deactivated; in OP they refuse 0x1C32."""
+    double.linger(20)
+    with loop_of(main):
+        assert double.value(1, 0x1C32, 1) == 2
+    assert [double.value(p, 0x1C32, 1) for p in (0, 1)] == [1, 1]
+    assert all(str(sub.state) == "PRE-OP" for sub in main.subs)
+
+
+def test_a_device_may_take_seconds_to_reach_pre_op(main: cat.MainDevice, double: Double) -> None:
+    """The master repeats a lost INIT request after 5 s (seen on a real master)."""
+    double.linger(500)  # a look takes 10 ms
+    with loop_of(main):
+        pass
+    assert [double.value(p, 0x1C32, 1) for p in (0, 1)] == [1, 1]
+
+
+def test_a_type_that_cannot_be_restored_is_told(main: cat.MainDevice, double: Double) -> None:
+    def run() -> None:
+        with loop_of(main):
+            double.refuse(0x06090030)
+
+    with pytest.raises(cat.errors.SdoAbort, match="0x06090030") as caught:
+        run()
+    assert "ethercat download -p 0 -t uint16 0x1C32 1 1" in caught.value.hint
+    assert any("device 1" in note for note in caught.value.__notes__)
+
+
+def test_a_device_that_stays_up_is_told(main: cat.MainDevice, double: Double) -> None:
+    def run() -> None:
+        with loop_of(main):
+            double.linger(1_000_000)
+
+    with pytest.raises(cat.errors.StateError, match=r"device 0 is not in PRE-OP but in OP.*0x1C32"):
+        run()
+    assert all(str(sub.state) == "OP" for sub in main.subs)  # as read, not as it should be
+    double.linger(0)
+    double.state(0, 2, 0)
+    double.state(1, 2, 0)
+    with cat.Loop(cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0)):
+        assert double.value(0, 0x1C32, 1) == 1  # made up for
+
+
+def test_a_configuration_that_fails_leaves_no_type(main: cat.MainDevice, double: Double) -> None:
+    double.fail(b"activate", -5)
+    with pytest.raises(cat.CatenaryError, match="activat"), loop_of(main):
+        pass
+    assert [double.value(p, 0x1C32, 1) for p in (0, 1)] == [1, 1]
+
+
+def test_the_kernels_log_tells_a_code_that_the_device_has_forgotten(
+    main: cat.MainDevice, double: Double, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The master acknowledges an error, and the device clears its AL status code."""
+    log = tmp_path / "kmsg"
+    log.touch()
+    monkeypatch.setattr(carrier, "KernelLog", lambda: KernelLog(str(log)))
+
+    def run() -> None:
+        with loop_of(main) as loop:
+            double.state(1, 4, 1)
+            text = '3,1,1,-;EtherCAT ERROR 0-1: AL status message 0x0032: "DC PLL Sync Error".'
+            log.write_text(text)
+            for _ in range(100):
+                next(loop)
+
+    with pytest.raises(cat.errors.StateError, match="0x0032: PLL error") as caught:
+        run()
+    assert caught.value.position == 1
+
+
+def test_the_error_of_a_type_that_was_left_behind_says_so(
+    main: cat.MainDevice, double: Double
+) -> None:
+    """A program that was killed wrote 2 into 0x1C32:01: AL status code 0x0030."""
+    double.set(0, 0x1C32, 1, 2)
+    double.register(0, 0x0134, 0x0030)
+    plain = cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0)
+    double.state(0, 2, 1)
+    with pytest.raises(cat.errors.StateError, match="0x0030") as caught, cat.Loop(plain):
+        pass
+    assert "0x1C32:01 is 2" in caught.value.hint
+    assert "ethercat download -p 0" in caught.value.hint

@@ -1,0 +1,114 @@
+"""Folders of shares: locks with a deadline, drafts that a kill has left, whose files are found."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from catenary.errors import ShareError
+from catenary.share import folder
+from tests.share.processes import started
+
+HOLD = """
+import fcntl, os, sys
+fcntl.flock(os.open(sys.argv[1], os.O_RDONLY), fcntl.LOCK_EX)
+print("locked", flush=True)
+sys.stdin.readline()
+"""
+
+
+def test_a_lock_is_waited_for_until_a_deadline(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(folder, "LOCK_PATIENCE", 0.02)
+    with started(HOLD, str(tmp_path)) as holder:
+        assert holder.line() == "locked"
+        locked = pytest.raises(ShareError, match=f"locked for .* by process {holder.process.pid}")
+        with locked, folder.deciding(tmp_path):
+            pass
+    with folder.deciding(tmp_path):
+        pass
+
+
+def ended_process() -> int:
+    with subprocess.Popen([sys.executable, "-c", ""]) as process:
+        return process.pid
+
+
+@pytest.mark.parametrize(
+    ("alive", "age", "stays"), [(False, 100.0, False), (False, 0.0, True), (True, 100.0, True)]
+)
+def test_drafts_of_killed_processes_are_removed(
+    tmp_path: Path, alive: bool, age: float, stays: bool
+) -> None:
+    draft = tmp_path / f".draft-{os.getpid() if alive else ended_process()}-0123"
+    draft.touch()
+    now = draft.stat().st_mtime
+    os.utime(draft, (now - age, now - age))
+    (tmp_path / ".draft-x").touch()
+    folder.remove_old_drafts(tmp_path)
+    assert draft.exists() == stays
+    assert (tmp_path / ".draft-x").exists()
+
+
+@pytest.fixture
+def user_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """As /dev/shm, and no common folder."""
+    monkeypatch.setattr(folder, "USER_FOLDERS", tmp_path)
+    monkeypatch.setattr(folder, "GROUP_FOLDER", tmp_path / "none")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("file_mode", "folder_mode"), [(0o600, 0o700), (0o640, 0o710), (0o604, 0o701), (0o664, 0o711)]
+)
+def test_others_can_pass_where_a_file_is_for_them(
+    user_folders: Path, file_mode: int, folder_mode: int
+) -> None:
+    own = folder.own_folder()
+    assert own == user_folders / f"catenary-{os.geteuid()}"
+    folder.prepare(own, file_mode)
+    assert own.stat().st_mode & 0o7777 == folder_mode
+    folder.prepare(own, 0o600)  # another file keeps what the first one needs
+    assert own.stat().st_mode & 0o7777 == folder_mode
+
+
+def test_a_folder_that_was_open_is_closed(user_folders: Path) -> None:
+    own = folder.own_folder()
+    own.mkdir()
+    own.chmod(0o777)
+    folder.prepare(own, 0o600)
+    assert own.stat().st_mode & 0o066 == 0
+
+
+def test_what_is_in_the_folders_place_is_refused(user_folders: Path) -> None:
+    folder.own_folder().touch()
+    with pytest.raises(ShareError, match="was made by user"):
+        folder.prepare(folder.own_folder(), 0o600)
+
+
+def test_a_common_folder_that_everybody_may_write_is_not_used(
+    user_folders: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    common = user_folders / "common"
+    common.mkdir()
+    monkeypatch.setattr(folder, "GROUP_FOLDER", common)
+    common.chmod(0o777)
+    assert folder.own_folder() == folder.user_folder(os.geteuid())
+    common.chmod(0o755)
+    if os.geteuid() == 0:  # else it is not root's
+        assert folder.own_folder() == common
+
+
+def test_what_is_not_there(user_folders: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        folder.find("share-arm", None)
+    assert folder.names(None) == []
+    folder.prepare(folder.own_folder(), 0o600)
+    (folder.own_folder() / "share-arm").touch()
+    assert folder.find("share-arm", None) == folder.own_folder() / "share-arm"
+    assert folder.names(None) == ["arm"]

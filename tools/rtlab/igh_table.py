@@ -1,0 +1,213 @@
+# The table `igh`, run inside the guest: the module of the IgH master on one end of a pair of
+# interfaces, a virtual segment on the other, and our loops over it. It stands alone, as guest.py
+# does: of this folder the guest has only these two. Ends with status 1 if anything was lost.
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import itertools
+import json
+import os
+import sys
+import time
+from collections.abc import Callable, Container, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import catenary as cat
+from catenary.bench.peers.with_catenary_law import sine
+from catenary.bench.segment import COUNTS_PER_TURN, PRIORITY, served
+from catenary.errors import CatenaryError, ConfigurationError
+
+FOLDER = Path("/igh")
+INIT_MODULE, DELETE_MODULE = 175, 176  # system calls, x86-64
+DRIVES = 3
+CYCLES = {1000: 4002, 4000: 12_000}  # by rate [Hz]
+WAYS = ("threaded", "inline", "law")
+CASES = (*itertools.product((None, "reference"), WAYS), ("main", "threaded"))  # clock, way
+WARM_UP = 1.5  # [s]: after it nothing may be lost; the module logs its bring-up for up to 1 s
+AMPLITUDE = 0.1  # [rad]
+NEVER = 1e9  # [s]
+NODE = Path("/dev/EtherCAT0")
+SETTLE_SECONDS = 10.0
+CHANGES = "orking counter change"  # in lines of the log: of frames that the module missed
+LINES = 20  # of the kernel's log, where a loop failed
+
+
+@contextlib.contextmanager
+def master_on(*interfaces: str) -> Iterator[None]:
+    """Load the module on one interface, or on both ends of a ring."""
+    roles = ("main_devices", "backup_devices")
+    addresses = (Path(f"/sys/class/net/{name}/address").read_text().strip() for name in interfaces)
+    load("ec_master", " ".join(map("=".join, zip(roles, addresses, strict=False))))
+    load("ec_generic")
+    try:
+        wait_for(NODE.exists)
+        yield
+    finally:
+        unload("ec_generic")
+        unload("ec_master")
+
+
+def wait_for(done: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + SETTLE_SECONDS
+    while not done() and time.monotonic() < deadline:
+        time.sleep(0.01)
+
+
+def load(name: str, parameters: str = "") -> None:
+    content = (FOLDER / f"{name}.ko").read_bytes()
+    call(name, INIT_MODULE, content, len(content), parameters.encode())
+
+
+def unload(name: str) -> None:
+    call(name, DELETE_MODULE, name.encode(), os.O_NONBLOCK)
+
+
+def call(what: str, *arguments: int | bytes) -> None:
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.syscall(*arguments) != 0:
+        raise OSError(ctypes.get_errno(), f"{what}: {os.strerror(ctypes.get_errno())}")
+
+
+class Log:
+    """Owns a place in the kernel's log."""
+
+    def __init__(self) -> None:
+        self._file = os.open("/dev/kmsg", os.O_RDONLY | os.O_NONBLOCK)
+        os.lseek(self._file, 0, os.SEEK_END)
+
+    def lines(self) -> Iterator[str]:
+        """Return what the master has logged since."""
+        with contextlib.suppress(BlockingIOError):
+            while record := os.read(self._file, 8192):
+                text = record.decode(errors="replace").partition(";")[2].splitlines()[0]
+                if "EtherCAT" in text:
+                    yield text
+
+
+def run(found: dict[str, Any], way: str, rate: int, clock: str | None) -> None:
+    """Add what one loop did to `found`, after it has warmed up."""
+    with cat.MainDevice("igh:0") as main:
+        arm = cat.Drives(
+            main.scan().drives,
+            counts_per_turn=COUNTS_PER_TURN,
+            velocity_limit=100.0,
+            dc=clock is not None,
+        )
+        options: dict[str, Any] = {} if clock is None else {"clock": clock}
+        with cat.Loop(
+            arm,
+            period=1 / rate,
+            run="inline" if way == "inline" else "threaded",
+            switch_interval=20e-6 if way == "inline" else None,  # docs/benchmarks.md
+            priority=PRIORITY,
+            lost_limit=1000,
+            late_limit=10.0,
+            laws=[sine] if way == "law" else [],
+            **options,
+        ) as loop:
+            if way == "law":
+                home = arm.actual.position.copy()
+                loop.start(sine, memory=home, parameters=[AMPLITUDE, 0.0, 0.0, NEVER])
+            found |= measure(loop, way, rate, clock)
+
+
+def cycle(loop: cat.Loop, cycles: int, rate: int, law: bool) -> None:
+    """Exchange so many cycles. A law needs no thread meanwhile."""
+    if not law:
+        first = next(loop).number
+        while next(loop).number < first + cycles:
+            pass  # reading the counters takes longer than 250 us: an inline loop would be late
+        return
+    last = loop.timing.counters["cycles"] + cycles
+    while loop.timing.counters["cycles"] < last:
+        time.sleep(100 / rate)
+        next(loop)
+
+
+def measure(loop: cat.Loop, way: str, rate: int, clock: str | None) -> dict[str, Any]:
+    cycle(loop, round(WARM_UP * rate), rate, way == "law")
+    log, before = Log(), loop.timing.counters
+    if clock is not None:
+        loop.clocks.reset()
+    cycle(loop, CYCLES[rate], rate, way == "law")
+    after = loop.timing.counters
+    counted = ("cycles", "lost", "late")
+    found: dict[str, Any] = {name: after[name] - before[name] for name in counted}
+    found["log"] = [line for line in log.lines() if CHANGES in line]
+    return found | ({} if clock is None else figures_of(loop.clocks))
+
+
+def figures_of(clocks: Any) -> dict[str, Any]:
+    differences = clocks.largest_differences
+    return {
+        "locked": clocks.locked,
+        "jumps": clocks.jumps,
+        "missed": clocks.missed,
+        "phase_error_us": round(clocks.largest_phase_error * 1e6, 3),
+        "differences_us": {device: round(d * 1e6, 3) for device, d in differences.items()},
+    }
+
+
+def rings() -> Iterator[dict[str, Any]]:
+    """A closed ring: a loop without clocks runs, one with clocks is refused."""
+    found: dict[str, Any] = {"rate": 1000, "way": "threaded", "clock": "none, closed ring"}
+    with (
+        served(DRIVES, ring=True) as segment,
+        master_on(segment.interface, segment.second),
+        attempt(found),
+    ):
+        run(found, "threaded", 1000, None)
+        try:
+            run({}, "threaded", 1000, "reference")
+            found["error"] = "clocks in a closed ring were not refused"
+        except ConfigurationError as refusal:
+            found["refused"] = str(refusal)
+    yield found
+
+
+def line(rate: int, way: str, clock: str | None) -> dict[str, Any]:
+    found = {"rate": rate, "way": way, "clock": clock or "none"}
+    with attempt(found):
+        run(found, way, rate, clock)
+    return found
+
+
+@contextlib.contextmanager
+def attempt(found: dict[str, Any]) -> Iterator[None]:
+    """Add an error to `found`, and what the module said."""
+    log = Log()
+    try:
+        yield
+    except CatenaryError as error:
+        found["error"], found["notes"] = str(error), getattr(error, "__notes__", [])
+        found["log"] = list(log.lines())[-LINES:]
+
+
+def lines(chosen: Container[str]) -> Iterator[dict[str, Any]]:
+    with served(DRIVES) as segment, master_on(segment.interface):
+        for rate, (clock, way) in itertools.product(CYCLES, CASES):
+            if str(rate) in chosen and way in chosen:
+                yield line(rate, way, clock)
+
+
+def sound(found: dict[str, Any]) -> bool:
+    healthy = not found.get("error") and not found.get("lost") and not found.get("log")
+    return bool(healthy and found.get("locked", True) and not found.get("jumps"))
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run all, or those that the words before the file choose: rates, ways, `ring`."""
+    *words, _json, file = arguments
+    chosen = set(words) or {*map(str, CYCLES), *WAYS, "ring"}
+    table = []
+    for found in itertools.chain(lines(chosen), rings() if "ring" in chosen else ()):
+        print(json.dumps(found), flush=True)
+        table.append(found)
+    Path(file).write_text(json.dumps({"runs": table}))
+    return 0 if all(map(sound, table)) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
