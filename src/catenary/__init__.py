@@ -13,10 +13,7 @@ Names load when they are used: `import catenary` costs nothing and imports no Nu
 would keep a process from entering a network namespace.
 """
 
-from __future__ import annotations
-
-from importlib import import_module
-from typing import TYPE_CHECKING
+TYPE_CHECKING = False  # of `typing`, which takes longer to import than all of this
 
 if TYPE_CHECKING:
     from catenary import control, realtime, share, types
@@ -87,6 +84,8 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> object:
+    from importlib import import_module
+
     if name in ("control", "errors", "realtime", "share", "types"):
         return import_module(f"catenary.{name}")
     if name == "events":

@@ -29,7 +29,8 @@ class ConfigurationError(CatenaryError):
 
 
 class LinkError(CatenaryError):
-    """A network interface that cannot be used: unknown, down, or not permitted."""
+    """A network interface that cannot be used: unknown, down, not permitted, or in use by another
+    master."""
 
 
 class NoDeviceError(CatenaryError):

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from catenary.bench.tables import TABLES
-from catenary.cli import main
+from catenary.cli.main import main
 
 
 def test_the_help_explains_each(capsys: pytest.CaptureFixture[str]) -> None:

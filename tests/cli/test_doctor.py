@@ -8,7 +8,7 @@ import socket
 import pytest
 
 from catenary import doctor
-from catenary.cli import main
+from catenary.cli.main import main
 from catenary.doctor import examination
 from tests.doctor import machines
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from catenary.cli import main
+from catenary.cli.main import main
 from tests.igh.double import Double, build
 
 

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from catenary.cli import main
+from catenary.cli.main import main
 
 EXAMPLE = """
 [[task]]

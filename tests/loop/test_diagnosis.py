@@ -44,6 +44,19 @@ def test_who_left_op_is_told_with_the_reason() -> None:
     assert "0x001B" in str(error)
 
 
+def test_a_state_left_without_a_reason_suspects_a_second_master() -> None:
+    error = state_error([Answer(SERVO, State.PRE_OP)], LOG)
+    assert error is not None
+    assert "look for a second master" in error.hint
+
+
+def test_a_second_master_that_is_seen_is_named() -> None:
+    answers = [Answer(SERVO, State.SAFE_OP | 0x10, 0x001B)]
+    error = state_error(answers, LOG, ["PID 42 (scan) has an EtherCAT packet socket on eth0"])
+    assert error is not None
+    assert "PID 42 (scan)" in error.hint
+
+
 def test_all_in_op_is_no_error() -> None:
     assert state_error([Answer(COUPLER, State.OP), Answer(SERVO, State.OP)], LOG) is None
 

@@ -1,11 +1,13 @@
 """What Loop refuses before it touches the segment."""
 
 import contextlib
+import math
+from typing import Literal
 
 import pytest
 
 import catenary as cat
-from catenary.errors import DriveError
+from catenary.errors import ConfigurationError, DriveError, WorkingCounterError
 from catenary.virtual import Segment, Servo
 
 
@@ -16,6 +18,9 @@ from catenary.virtual import Segment, Servo
         ({"busy_wait": -1e-6}, "less than the period"),
         ({"collect_deadline": 1.5}, "share of the period"),
         ({"run": "fast"}, "threaded"),
+        ({"period": 0.0}, "period=0.0 s: must be 1e-06 to 1000 s"),
+        ({"period": -1e-3}, "period=-0.001 s"),
+        ({"period": math.nan}, "period=nan s"),
     ],
 )
 def test_refuses_what_cannot_be(asked: dict, named: str) -> None:
@@ -24,7 +29,25 @@ def test_refuses_what_cannot_be(asked: dict, named: str) -> None:
             main.scan().drives, mode="csp", counts_per_turn=2**20, velocity_limit=100.0
         )
         with pytest.raises(ValueError, match=named):
-            cat.Loop(arm, period=1e-3, **{"run": "inline", **asked})
+            cat.Loop(arm, **{"period": 1e-3, "run": "inline", **asked})
+
+
+@pytest.mark.parametrize(
+    ("run", "period", "error"),
+    [
+        ("threaded", 1e-6, ConfigurationError),
+        ("threaded", 10e-6, ConfigurationError),  # too late for the collect deadline
+        ("inline", 8e-6, ConfigurationError),
+        ("inline", 10e-6, WorkingCounterError),  # too short for the delays of the device
+    ],
+)
+def test_a_period_too_short_for_the_frames_names_their_time(
+    run: Literal["threaded", "inline"], period: float, error: type[Exception]
+) -> None:
+    with cat.MainDevice(Segment([Servo()])) as main:
+        arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
+        with pytest.raises(error, match=r"the cyclic frames take 8\.4 us"):
+            cat.Loop(arm, period=period, run=run).__enter__()
 
 
 def test_the_log_reaches_back_as_far_as_asked() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import replace
 
 import pytest
@@ -290,12 +291,25 @@ def test_cyclic_frames_that_exceed_the_period_are_refused() -> None:
     assert turns.wire_ns < 600_000  # of the busiest cycle, not of all frames
 
 
+def test_frames_that_cannot_be_back_in_time_are_refused() -> None:
+    devices = [block(k, outputs=1000, inputs=0) for k in range(10)]
+    with pytest.raises(ConfigurationError) as caught:
+        make_plan(devices, period=1e-3)
+    assert str(caught.value).startswith(
+        "period=0.001 s is too short: the cyclic frames take 842.72 us at 100 Mbit/s, and must be "
+        "back 800 us after the cycle start"
+    )
+    make_plan(devices, period=1e-3, order="inline")
+
+
 def test_acyclic_frames_get_what_the_cyclic_ones_and_the_guard_leave() -> None:
     plan = make_plan([block(k, outputs=1000, inputs=0) for k in range(2)], period=1e-3)
     assert plan.cycle.acyclic_ns == 1_000_000 - plan.cycle.wire_ns - 100_000
     left = f"{plan.cycle.acyclic_ns / 1e3:g}"
     assert f"of 1000 us for cyclic frames, up to {left} us for acyclic frames, 10%" in str(plan)
-    full = make_plan([block(k, outputs=1000, inputs=0) for k in range(11)], period=1e-3)
+    full = make_plan(
+        [block(k, outputs=1000, inputs=0) for k in range(11)], period=1e-3, collect_share=1.0
+    )
     assert full.cycle.acyclic_ns == 0
     assert "one frame for acyclic frames" in str(full)
 
@@ -308,7 +322,11 @@ def test_a_wish_for_a_device_that_is_not_there() -> None:
 @pytest.mark.parametrize(
     ("period", "watchdog", "match"),
     [
-        (0.0, 0.1, "period"),
+        (0.0, 0.1, "period=0.0 s: must be 1e-06 to 1000 s"),
+        (-1e-3, 0.1, "period=-0.001 s"),
+        (math.nan, 0.1, "period=nan s"),
+        (math.inf, 0.1, "period=inf s"),
+        (1e-7, 0.1, "period=1e-07 s"),
         (1e-3, 1e-3, "expire"),
         (1e-3, 10.0, "watchdog"),
         (1e-3, -0.1, "watchdog"),

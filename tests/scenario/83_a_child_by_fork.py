@@ -26,7 +26,9 @@ with cat.MainDevice(cat.Segment([cat.Servo()])) as main:
     if child == 0:
         command.__exit__(None, None, None)
         share.__exit__(None, None, None)
-        os._exit(0)  # the loop's threads are not in the child: its own block is not left
+        loop.__exit__(None, None, None)
+        main.__exit__(None, None, None)
+        os._exit(0)
     os.waitpid(child, 0)
     before = reader.number
     next(loop)

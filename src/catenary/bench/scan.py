@@ -67,7 +67,8 @@ def once(name: str, interface: str) -> BringUp:
 
 @contextmanager
 def with_catenary(interface: str) -> Iterator[int]:
-    with cat.MainDevice(interface) as main:
+    # PySOEM does not look for another master either.
+    with cat.MainDevice(interface, force=True) as main:
         yield len(main.scan())
 
 

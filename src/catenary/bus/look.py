@@ -24,7 +24,7 @@ def look(
 ) -> tuple[DeviceDescription, ...]:
     """All devices in the order of their positions, with their parents."""
     runner.flush()
-    device_count = runner.run(count())
+    device_count = runner.run(count()).devices
     if ring is not None:
         check_direction(ring.state)
     if ring is not None and ring.state.shape in (Shape.CUT, Shape.SECOND_ONLY):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from functools import partial
@@ -17,10 +18,19 @@ from catenary.bus.sdo import Objects, read_each
 from catenary.bus.segment_scan import Found, check_identity, find, oddities, with_places
 from catenary.bus.sub_device import SubDevice
 from catenary.bus.sub_devices import SubDevices
-from catenary.errors import CatenaryError, SegmentError
-from catenary.link import Link, LinkSource, lives_in_virtual_time, ring_of
+from catenary.errors import CatenaryError, LinkError, SegmentError
+from catenary.link import (
+    Link,
+    LinkSource,
+    Ownership,
+    forget_in_child,
+    lives_in_virtual_time,
+    other_sockets,
+    ring_of,
+)
 from catenary.model.device import Identity
 from catenary.procedure.exchange import Procedure
+from catenary.procedure.live_outputs import Running, find_refreshed, find_running
 from catenary.procedure.mailbox import Heard
 from catenary.procedure.stations import (
     StationRegisters,
@@ -30,7 +40,7 @@ from catenary.procedure.stations import (
     duplicate_aliases,
     reset,
 )
-from catenary.wire.al import State
+from catenary.wire.al import STATE_MASK, State
 
 if TYPE_CHECKING:  # plan needs NumPy, a scan does not
     from catenary.bus.diagnosis import Diagnosis
@@ -53,9 +63,12 @@ class MainDevice:
                 print(sub.position, sub.name, sub.identity)
 
     Leaving the block brings all devices to INIT, whatever happened in it.
+
+    It is the only one on its network interfaces: opening is refused while another master is live.
+    `force=True` opens all the same. A forked child cannot use it, and leaves its devices alone.
     """
 
-    def __init__(self, source: LinkSource) -> None:
+    def __init__(self, source: LinkSource, *, force: bool = False) -> None:
         self.subs = SubDevices()
         self.notes: tuple[str, ...] = ()  # what the last scan found odd
         self.clock_delays_ns: tuple[int | None, ...] = ()  # behind the first clock, by position
@@ -65,6 +78,9 @@ class MainDevice:
         self._callbacks = Callbacks()
         self.events.listen(self._callbacks.tell)
         self._source = source
+        self._force = force
+        self._ownership: Ownership | None = None
+        self._process = 0  # the one that has opened it
         self._link: Link | None = None
         self._blocking: BlockingRunner | None = None
         self._attached: Runner | None = None
@@ -73,8 +89,8 @@ class MainDevice:
     @property
     def link(self) -> Link:
         """The open link."""
-        if self._link is None:
-            raise RuntimeError("the MainDevice is not open: use it in a with block")
+        if self._link is None or self._is_inherited:
+            raise self._not_open()
         return self._link
 
     @property
@@ -87,14 +103,60 @@ class MainDevice:
         return self._runner.counts
 
     def open(self) -> None:
-        """Opens the link. LinkError if it cannot be used. Nothing is sent."""
-        if self._link is None:
-            self._link = self._source.open_link()
-            self._callbacks.in_thread = not lives_in_virtual_time(self._link)
-            self._blocking = BlockingRunner(self._link)
+        """Open the link. Nothing is sent. A network interface is listened to for 0.1 s.
+
+        Raises:
+            LinkError: it cannot be used, or another master is live on it, and not `force`.
+        """
+        self.forget()
+        if self._link is not None:
+            return
+        link = self._source.open_link()
+        try:
+            self._ownership = Ownership(link, force=self._force)
+        except BaseException:
+            link.close()
+            raise
+        self._link = link
+        self._process = os.getpid()
+        self._callbacks.in_thread = not lives_in_virtual_time(link)
+        self._blocking = BlockingRunner(link)
+        forget_in_child(self)
+
+    def forget(self) -> None:
+        """In a forked child: let go of the parent's link and devices. Sends nothing. In the process
+        that opened it: no effect."""
+        if not self._is_inherited:
+            return
+        self._link = self._blocking = self._attached = self._leave_loop = None
+        if self._ownership is not None:
+            self._ownership.release()
+
+    @property
+    def _is_inherited(self) -> bool:
+        """True in a child that was forked while it was open."""
+        return self._process not in (0, os.getpid())
+
+    def _not_open(self) -> RuntimeError:
+        if self._is_inherited:
+            return RuntimeError(
+                f"the MainDevice was opened by process {self._process}: a forked child cannot use "
+                "it; read in the parent, or open a MainDevice of its own when the parent is done"
+            )
+        return RuntimeError("the MainDevice is not open: use it in a with block")
+
+    @property
+    def other_masters(self) -> tuple[str, ...]:
+        """Evidence of another master on the network interfaces, as text: found when it was opened
+        with `force`, or by its packet socket now."""
+        if self._link is None or self._ownership is None:
+            return ()
+        return self._ownership.others or other_sockets(self._link)
 
     def close(self) -> None:
-        """Brings all devices to INIT, best effort, and closes the link."""
+        """Brings all devices to INIT, best effort, and closes the link. In a forked child: no
+        effect."""
+        self.forget()
         if self._link is None:
             return
         if self._leave_loop is not None:
@@ -105,6 +167,8 @@ class MainDevice:
                     self._bring_down(State.INIT)
         finally:
             link, self._link, self._blocking, self._attached = self._link, None, None, None
+            if self._ownership is not None:
+                self._ownership.release()
             link.close()
             self._callbacks.close()
 
@@ -137,10 +201,14 @@ class MainDevice:
         A device that cannot be read or brought there does not keep the others from it. `strict`:
         its error is raised then, with those of further ones as notes, and `subs` has all handles;
         else it is in `SubDevice.error`, and raised when the device is used.
+
+        LinkError: another master refreshes the outputs of a device, and not `force`. Devices that
+        a killed program left in SAFE-OP or OP are reset; `notes` names them.
         """
         runner = self._runner
         runner.flush()
-        device_count = runner.run(count())
+        device_count, states = runner.run(count())
+        running_notes = self._judge_running(runner, device_count, states)
         runner.run(reset(device_count))
         registers, ring_notes = self._addressed(runner, device_count)
         found = runner.run_all([find(each) for each in registers])
@@ -152,6 +220,7 @@ class MainDevice:
             ]
         )
         self.notes = (
+            *running_notes,
             *ring_notes,
             *(
                 f"devices {positions} have the same alias {alias}"
@@ -166,6 +235,30 @@ class MainDevice:
         if expected is not None:
             self._check_expected(expected)
         return self.subs
+
+    def _judge_running(
+        self, runner: BlockingRunner, device_count: int, states: int
+    ) -> tuple[str, ...]:
+        """Return a note on devices that another program has left in SAFE-OP or OP."""
+        if states & STATE_MASK <= State.BOOT:
+            return ()
+        running = runner.run(find_running(device_count))
+        if not self._force:
+            self._refuse_refreshed(runner, running)
+        if not running:
+            return ()
+        left = ", ".join(map(str, running))
+        return (f"{left}: left so by another program, which was perhaps killed; now reset",)
+
+    def _refuse_refreshed(self, runner: BlockingRunner, running: Sequence[Running]) -> None:
+        refreshed = runner.run(find_refreshed(running))
+        if refreshed:
+            raise LinkError(
+                f"another EtherCAT master is live on {self.link.name}: it refreshes the outputs of "
+                f"{', '.join(f'device {position}' for position in refreshed)} (0x0440)",
+                hint="a scan would reset devices that may be in motion. End that master, perhaps "
+                "one at the other end of the line; to scan all the same, pass force=True (--force)",
+            )
 
     def _addressed(
         self, runner: BlockingRunner, device_count: int
@@ -252,8 +345,9 @@ class MainDevice:
         objects wished for that are not. Raises the error of a device that is not in PRE-OP."""
         self._raise_errors()
         from catenary.bus.bring_up import describe_mappings
+        from catenary.plan.make import period_in_ns
 
-        describe_mappings(self._runner, self.subs, wishes, round(period * 1e9))
+        describe_mappings(self._runner, self.subs, wishes, period_in_ns(period))
 
     def configure(self, plan: Plan) -> None:
         """Tells every device its part of the plan and brings all to SAFE-OP."""
@@ -285,7 +379,7 @@ class MainDevice:
     def converse(self, procedure: Procedure[T]) -> T:
         """Runs a procedure, alone or beside the running loop."""
         while True:
-            runner: Runner = self._attached or self._runner
+            runner = self._any_runner
             try:
                 return runner.run(procedure)
             except LinkLent:
@@ -298,7 +392,7 @@ class MainDevice:
         """Lets a procedure go on beside the running loop. Without one it has ended when this
         returns."""
         while True:
-            runner: Runner = self._attached or self._runner
+            runner = self._any_runner
             with contextlib.suppress(LinkLent):
                 return runner.submit(procedure)
 
@@ -322,9 +416,16 @@ class MainDevice:
         self._attached = self._leave_loop = None
 
     @property
+    def _any_runner(self) -> Runner:
+        """That of the running loop, or our own."""
+        if self._is_inherited:
+            raise self._not_open()
+        return self._attached or self._runner
+
+    @property
     def _runner(self) -> BlockingRunner:
-        if self._blocking is None:
-            raise RuntimeError("the MainDevice is not open: use it in a with block")
+        if self._blocking is None or self._is_inherited:
+            raise self._not_open()
         if self._attached is not None:
             raise RuntimeError("not possible while a loop runs on this MainDevice")
         return self._blocking

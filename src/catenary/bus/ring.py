@@ -102,7 +102,7 @@ def end_for_clocks(
 ) -> RingEnd | None:
     """The port to close while delays are measured; None: the ring is cut right there, and a line
     already. ClockError where it is cut elsewhere: frames from two ends bring no common time."""
-    device_count = runner.run(count())  # renews the state
+    device_count = runner.run(count()).devices  # renews the state
     topology = make_topology([device.open_ports for device in devices], ring=True)
     state = ring.state
     if state.shape is not Shape.CLOSED:

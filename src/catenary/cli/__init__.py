@@ -1,5 +1,1 @@
 """The command line: one file per command, which imports what it needs only when it runs."""
-
-from catenary.cli.main import main
-
-__all__ = ["main"]

@@ -2,6 +2,6 @@
 
 import sys
 
-from catenary.cli import main
+from catenary.cli.console import main
 
 sys.exit(main())

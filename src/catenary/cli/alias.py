@@ -8,7 +8,14 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from catenary.cli.arguments import number
-from catenary.cli.parsers import Commands, add_command, add_json, add_position, add_target
+from catenary.cli.parsers import (
+    Commands,
+    add_command,
+    add_json,
+    add_position,
+    add_target,
+    note_other_masters,
+)
 
 if TYPE_CHECKING:
     from catenary.bus import MainDevice, SubDevice
@@ -45,7 +52,10 @@ def run(arguments: argparse.Namespace) -> int:
     from catenary.procedure.sii_owner import with_eeprom
     from catenary.target import MainDevice
 
-    with MainDevice(arguments.target) as main:
+    reads = arguments.value is None
+    with MainDevice(arguments.target, force=reads) as main:
+        if reads:
+            note_other_masters(main)
         devices = main.look()
         device = device_at(devices, arguments.position)
         if arguments.value is not None:

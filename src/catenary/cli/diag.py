@@ -7,7 +7,14 @@ import json
 from typing import TYPE_CHECKING
 
 from catenary.cli.arguments import positive_seconds
-from catenary.cli.parsers import Commands, add_command, add_json, add_target
+from catenary.cli.parsers import (
+    Commands,
+    add_command,
+    add_force,
+    add_json,
+    add_target,
+    note_other_masters,
+)
 
 if TYPE_CHECKING:
     from catenary.bus.diagnosis import Diagnosis
@@ -32,6 +39,7 @@ def add_parser(commands: Commands) -> None:
         "--seconds", metavar="N", type=positive_seconds, help="watch for so long; only what is new"
     )
     parser.add_argument("--clear", action="store_true", help="then set all counters to zero")
+    add_force(parser)
     add_json(parser)
     parser.set_defaults(run=run)
 
@@ -42,7 +50,10 @@ def run(arguments: argparse.Namespace) -> int:
     from catenary.target import MainDevice
 
     sent = 0
-    with MainDevice(arguments.target) as main:
+    reads = not arguments.clear
+    with MainDevice(arguments.target, force=reads or arguments.force) as main:
+        if reads:
+            note_other_masters(main)
         subs = main.look()
         found = main.diagnose(subs=subs)
         if arguments.seconds is not None:

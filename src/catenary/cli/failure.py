@@ -11,7 +11,6 @@ from catenary.errors import CatenaryError
 
 FAILED = 1
 USAGE = 2
-INTERRUPTED = 130  # 128 + SIGINT
 BROKEN_PIPE = 141  # 128 + SIGPIPE
 FILE_HINTS: Mapping[type[OSError], str] = {
     FileExistsError: "a folder is wanted, and there is a file of that name",

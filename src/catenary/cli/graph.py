@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from catenary.cli.parsers import Commands, add_command, add_target
+from catenary.cli.parsers import Commands, add_command, add_target, note_other_masters
 
 if TYPE_CHECKING:
     from catenary.bus import MainDevice, SubDevice
@@ -34,7 +34,8 @@ def run(arguments: argparse.Namespace) -> int:
     from catenary.cli.drawing_dot import as_dot
     from catenary.target import MainDevice
 
-    with MainDevice(arguments.target) as main:
+    with MainDevice(arguments.target, force=True) as main:  # it only reads
+        note_other_masters(main)
         subs = main.look()
         drawing = draw(arguments.target, main, subs)
     print(as_dot(drawing) if arguments.dot else as_text(drawing))

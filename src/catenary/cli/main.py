@@ -24,7 +24,8 @@ from catenary.cli import (
     state,
     virtual,
 )
-from catenary.cli.failure import INTERRUPTED, USAGE, report, silence_stdout
+from catenary.cli.console import INTERRUPTED
+from catenary.cli.failure import USAGE, report, silence_stdout
 
 DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import argparse
 import shutil
+import sys
 import textwrap
 from typing import TYPE_CHECKING, TypeAlias
 
 from catenary.cli.arguments import position
 
 if TYPE_CHECKING:
+    from catenary.bus import MainDevice
+
     Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 else:
     Commands = object
@@ -45,6 +48,18 @@ def add_target(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "target", metavar="TARGET", help="eth0, virtual, virtual:FILE.toml ...: catenary --help"
     )
+
+
+def add_force(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--force", action="store_true", help="though another master uses the interface"
+    )
+
+
+def note_other_masters(main: MainDevice) -> None:
+    """Tell on stderr that a command reads a line which another master drives."""
+    for other in main.other_masters:
+        print(f"note: {other}; this command only reads", file=sys.stderr)
 
 
 def add_position(parser: argparse.ArgumentParser) -> None:

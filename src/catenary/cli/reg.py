@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING
 
 from catenary.cli.arguments import number, positive_number
 from catenary.cli.failure import UsageError
-from catenary.cli.parsers import Commands, add_command, add_json, add_position, add_target
+from catenary.cli.parsers import (
+    Commands,
+    add_command,
+    add_force,
+    add_json,
+    add_position,
+    add_target,
+    note_other_masters,
+)
 
 if TYPE_CHECKING:
     from catenary.wire.register_names import AnyRegister
@@ -54,6 +62,7 @@ def add_parser(commands: Commands) -> None:
     _add_place(writing)
     writing.add_argument("value", metavar="VALUE", help="2498, 0x9C2 or '01 02 0a'")
     writing.add_argument("--size", metavar="BYTES", type=positive_number, help="of a number")
+    add_force(writing)
     add_json(writing)
     writing.set_defaults(run=run_write)
 
@@ -75,7 +84,8 @@ def run_read(arguments: argparse.Namespace) -> int:
             f"no register is known to begin at 0x{address:04X}", hint="say how many bytes: SIZE"
         )
     _check(address, size)
-    with MainDevice(arguments.target) as main:
+    with MainDevice(arguments.target, force=True) as main:  # it only reads
+        note_other_masters(main)
         device = device_at(main.look(names=False), arguments.position)
         data = main.converse(read_register(device.station, address, size))
     print(as_json(arguments, address, register, data) if arguments.json else show(register, data))
@@ -90,7 +100,7 @@ def run_write(arguments: argparse.Namespace) -> int:
     address, size, register = place(arguments.address, arguments.size)
     data = value_bytes(arguments.value, size, address)
     _check(address, len(data))
-    with MainDevice(arguments.target) as main:
+    with MainDevice(arguments.target, force=arguments.force) as main:
         device = device_at(main.look(names=False), arguments.position)
         main.converse(write_register(device.station, address, data))
     if arguments.json:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from catenary.cli.parsers import Commands, add_command, add_json, add_target
+from catenary.cli.parsers import Commands, add_command, add_force, add_json, add_target
 
 
 def add_parser(commands: Commands) -> None:
@@ -17,6 +17,7 @@ def add_parser(commands: Commands) -> None:
         example="catenary scan eth0\ncatenary scan virtual --json",
     )
     add_target(parser)
+    add_force(parser)
     add_json(parser)
     parser.set_defaults(run=run)
 
@@ -26,7 +27,7 @@ def run(arguments: argparse.Namespace) -> int:
     from catenary.cli.failure import one_line, with_hint
     from catenary.target import MainDevice
 
-    with MainDevice(arguments.target) as main:
+    with MainDevice(arguments.target, force=arguments.force) as main:
         devices = main.scan(strict=False)
         print(as_json(devices) if arguments.json else as_table(devices))
     for note in main.notes:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from catenary.cli.arguments import Entry, entry, position
 from catenary.cli.failure import UsageError, one_line
-from catenary.cli.parsers import Commands, add_command, add_json, add_target
+from catenary.cli.parsers import Commands, add_command, add_force, add_json, add_target
 from catenary.cli.text import escaped
 
 if TYPE_CHECKING:
@@ -72,6 +72,7 @@ def add_parser(commands: Commands) -> None:
 def _add_device(parser: argparse.ArgumentParser) -> None:
     add_target(parser)
     parser.add_argument("position", metavar="POSITION", type=position, help="0 is the first device")
+    add_force(parser)
 
 
 def _add_place(parser: argparse.ArgumentParser) -> None:
@@ -89,7 +90,7 @@ def run_read(arguments: argparse.Namespace) -> int:
 
     kind = _data_type(arguments.type)
     at: Entry = arguments.entry
-    with MainDevice(arguments.target) as main:
+    with MainDevice(arguments.target, force=arguments.force) as main:
         device = device_at(main.scan(strict=False), arguments.position)
         data = device.sdo.read(at.index, at.subindex)
     value = kind.decode(data) if kind else None
@@ -113,7 +114,7 @@ def run_write(arguments: argparse.Namespace) -> int:
         raise UsageError(str(error), hint="numbers are decimal or 0x...") from error
     at: Entry = arguments.entry
     data = kind.encode(value)
-    with MainDevice(arguments.target) as main:
+    with MainDevice(arguments.target, force=arguments.force) as main:
         device_at(main.scan(strict=False), arguments.position).sdo.write(
             at.index, at.subindex, data
         )
@@ -127,7 +128,7 @@ def run_list(arguments: argparse.Namespace) -> int:
     from catenary.cli.dictionary import as_json, as_lines, rows_of
     from catenary.target import MainDevice
 
-    with MainDevice(arguments.target) as main:
+    with MainDevice(arguments.target, force=arguments.force) as main:
         device = device_at(main.scan(strict=False), arguments.position)
         notes: list[str] = []
         rows = rows_of(device, notes, values=arguments.values)

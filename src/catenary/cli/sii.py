@@ -8,7 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from catenary.cli.arguments import positive_number
-from catenary.cli.parsers import Commands, add_command, add_position, add_target
+from catenary.cli.parsers import (
+    Commands,
+    add_command,
+    add_position,
+    add_target,
+    note_other_masters,
+)
 
 if TYPE_CHECKING:
     from catenary.bus import MainDevice, SubDevice
@@ -81,7 +87,8 @@ def run_read(arguments: argparse.Namespace) -> int:
     from catenary.target import MainDevice
     from catenary.wire.sii_check import objections
 
-    with MainDevice(arguments.target) as main:
+    with MainDevice(arguments.target, force=True) as main:  # it only reads
+        note_other_masters(main)
         station = device_at(main.look(names=False), arguments.position).station
         extent = main.converse(with_eeprom(station, read_extent(station)))
         size = min(arguments.bytes or extent.size, extent.limit) // 2 * 2

@@ -9,7 +9,14 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from catenary.cli.arguments import position
-from catenary.cli.parsers import Commands, add_command, add_json, add_target
+from catenary.cli.parsers import (
+    Commands,
+    add_command,
+    add_force,
+    add_json,
+    add_target,
+    note_other_masters,
+)
 
 if TYPE_CHECKING:
     from catenary.bus import SubDevice
@@ -36,6 +43,7 @@ def add_parser(commands: Commands) -> None:
     parser.add_argument(
         "--position", "-p", metavar="N", type=position, help="this device alone; 0 is the first"
     )
+    add_force(parser)
     add_json(parser)
     parser.set_defaults(run=run)
 
@@ -55,7 +63,10 @@ def run(arguments: argparse.Namespace) -> int:
     from catenary.target import MainDevice
     from catenary.wire.al import State
 
-    with MainDevice(arguments.target) as main:
+    reads = arguments.state is None
+    with MainDevice(arguments.target, force=reads or arguments.force) as main:
+        if reads:
+            note_other_masters(main)
         devices = main.look()
         if arguments.position is not None:
             device_at(devices, arguments.position)

@@ -42,12 +42,14 @@ cdef class Engine:
     cdef bint saved_scheduling
     cdef bint native           # the cycle runs in its own thread
     cdef bint running
+    cdef bint forgotten        # this is a forked child: the cycle is the parent's
     cdef bint committed        # the targets of the next step are on their way already
     cdef bint emitted          # inline: the frames of this cycle are on their way
     cdef object sink           # keeps what is given the cycles alive
     cdef int64_t left          # when `next` returned [ns]; -1: no application since
     cdef int64_t input_age     # at that time [ns]
 
+    cdef not_running(self)
     cdef uint32_t step(self, int64_t timeout_ns=*) except? 0xFFFFFFFF
     cdef bint is_native_cycle(self, bint application) noexcept nogil
     cdef void follow(self) noexcept

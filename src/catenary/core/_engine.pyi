@@ -87,6 +87,10 @@ class Engine:
     def stop(self) -> None:
         """End the native thread and release the link; a no-op if not running."""
 
+    def forget(self) -> None:
+        """In a forked child: let go of the parent's cycle without touching it. Give the calling
+        thread its scheduling back. From now on, every call that needs cycles raises RuntimeError."""
+
     def now(self) -> int:
         """The link's clock [ns]."""
 

@@ -287,6 +287,8 @@ cdef class Engine:
         cdef int rc
         if self.running:
             raise RuntimeError("the engine is running")
+        if self.forgotten:
+            raise self.not_running()
         if self.frames is not None:
             frames_flush(&self.frames.c)
         self.e.error = 0
@@ -320,6 +322,21 @@ cdef class Engine:
             scheduling_restore(&self.scheduling_before)
             self.saved_scheduling = False
 
+    def forget(self):
+        thread_join(&self.e.thread)
+        law_monitor_stop(&self.e.cycle.monitor)
+        if self.saved_scheduling:
+            scheduling_restore(&self.scheduling_before)
+            self.saved_scheduling = False
+        self.running = False
+        self.forgotten = True
+
+    cdef not_running(self):
+        """Return the error for a call that needs cycles."""
+        if self.forgotten:
+            return RuntimeError("the loop runs in the parent process: a forked child cannot use it")
+        return RuntimeError("the engine is not running: start it first")
+
     # ---- steps
 
     def next(self, int64_t timeout_ns=0):
@@ -340,7 +357,7 @@ cdef class Engine:
     cdef uint32_t step(self, int64_t timeout_ns=0) except? 0xFFFFFFFF:
         """`timeout_ns` 0: a second and some periods."""
         if not self.running:
-            raise RuntimeError("the engine is not running: start it first")
+            raise self.not_running()
         if timeout_ns == 0:
             timeout_ns = SILENCE_NS + 4 * self.e.cycle.period
         if self.native:
@@ -521,7 +538,7 @@ cdef class Engine:
 
     def run(self, int64_t cycles):
         if not self.running:
-            raise RuntimeError("the engine is not running: start it first")
+            raise self.not_running()
         flags = self.hold(cycles, False, 0)
         self.left = -1
         return flags | self.flags_since()
@@ -596,7 +613,7 @@ cdef class Engine:
         if duration_ns < 0:
             raise ValueError(f"duration_ns: {duration_ns}")
         if not self.running:
-            raise RuntimeError("the engine is not running: start it first")
+            raise self.not_running()
         if not self.virtual:
             self.compute(duration_ns)
             return
@@ -647,7 +664,7 @@ cdef class Engine:
 
     def run_until_stopped(self, int64_t timeout_ns):
         if not self.running:
-            raise RuntimeError("the engine is not running: start it first")
+            raise self.not_running()
         self.hold(1 << 62, True, self.now_ns() + timeout_ns)
         return self.h.actual[PRIVATE].header.moving == 0
 
@@ -693,7 +710,7 @@ cdef class Engine:
 
     def start_law(self, Law law not None):
         if not self.running:
-            raise RuntimeError("the engine is not running: start it first")
+            raise self.not_running()
         self.check_reserve(law.c.budget)
         law_monitor_start(&self.e.cycle.monitor, law.priority)
         if self.law is not None:

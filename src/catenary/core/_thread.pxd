@@ -23,6 +23,7 @@ ctypedef void (*body_t)(void *argument) noexcept nogil
 
 cdef struct thread_t:
     pthread_t handle
+    pid_t owner                # the process it lives in
     body_t body
     void *argument
     int priority               # SCHED_FIFO; 0: as it is

@@ -1,13 +1,18 @@
 """The native thread: SCHED_FIFO, a CPU of its own, a touched stack, no signals, never the GIL.
 
 Without the permission for one of these, the thread runs without it, and `loop.scheduling` reports it.
+
+A forked child has no copy of the thread. `thread_join` returns there at once, and the pages of the stack
+that cycles use are wiped instead of copied (native/locked_memory.h). The pages above them hold glibc's
+description of the thread, which the child needs. The thread keeps its pages before it ends: glibc reuses
+stacks, and the next thread may fork.
 """
 
 import errno as error_names
 
 from libc.errno cimport errno
 from libc.stdint cimport uint32_t, uint64_t
-from libc.string cimport memset
+from posix.unistd cimport getpid
 
 from catenary.core._native cimport (
     cat_futex_wait,
@@ -22,17 +27,33 @@ cdef extern from *:
     #include <sched.h>
     #include <signal.h>
     #include <stdint.h>
+    #include <sys/mman.h>
     #include <sys/prctl.h>
     #include <sys/resource.h>
+    #include <unistd.h>
 
     #define STACK_SIZE (512 * 1024)
     #define STACK_TOUCHED (128 * 1024)
 
-    /* Faults the pages in now rather than in a cycle. */
-    static __attribute__((noinline)) void touch_stack(void) {
+    typedef struct stack_part {
+        char *start;
+        size_t size;
+    } stack_part;
+
+    /* Faults the pages in now rather than in a cycle. Returns those that are whole and below the frame of
+     * the caller. */
+    static __attribute__((noinline)) stack_part touch_stack(void) {
         volatile char pages[STACK_TOUCHED];
+        uintptr_t page = (uintptr_t)sysconf(_SC_PAGESIZE);
+        uintptr_t start = ((uintptr_t)pages + page - 1) / page * page;
+        uintptr_t end = ((uintptr_t)pages + STACK_TOUCHED) / page * page;
         for (unsigned i = 0; i < STACK_TOUCHED; i += 1024) pages[i] = 0;
+        stack_part part = {(char *)start, end - start};
+        madvise(part.start, part.size, MADV_WIPEONFORK);
+        return part;
     }
+
+    static void keep_stack(stack_part part) { madvise(part.start, part.size, MADV_KEEPONFORK); }
 
     /* A thread that takes no signals: they belong to Python's. */
     static int create_thread(pthread_t *handle, void *(*body)(void *), void *argument) {
@@ -91,7 +112,10 @@ cdef extern from *:
     """
     int SCHED_FIFO
     int SCHED_RR
-    void touch_stack() nogil
+    ctypedef struct stack_part:
+        pass
+    stack_part touch_stack() nogil
+    void keep_stack(stack_part part) nogil
     int create_thread(pthread_t *handle, void *(*body)(void *) noexcept nogil, void *argument) nogil
     int pthread_join(pthread_t handle, void **result) nogil
     int set_priority(int priority) nogil
@@ -117,13 +141,14 @@ cdef void thread_schedule(thread_t *t) noexcept nogil:
 cdef void *thread_body(void *argument) noexcept nogil:
     cdef thread_t *t = <thread_t *>argument
     cdef uint64_t before
-    touch_stack()
+    cdef stack_part stack = touch_stack()
     thread_schedule(t)
     cat_store_release32(&t.started, 1)
     cat_futex_wake(&t.started)
     before = page_faults_here()
     t.body(t.argument)
     t.page_faults += page_faults_here() - before
+    keep_stack(stack)
     cat_store_release32(&t.ended, 1)
     return NULL
 
@@ -138,16 +163,17 @@ cdef int thread_start(thread_t *t) noexcept nogil:
     if rc != 0:
         return -rc
     t.running = 1
+    t.owner = getpid()
     while not cat_load_acquire32(&t.started):
         cat_futex_wait(&t.started, 0, START_TIMEOUT_NS)
     return 0
 
 
 cdef void thread_join(thread_t *t) noexcept nogil:
-    if not t.running:
-        return
-    cat_store_release32(&t.stop, 1)
-    pthread_join(t.handle, NULL)
+    """End the thread. In a forked child there is none."""
+    if t.running and t.owner == getpid():
+        cat_store_release32(&t.stop, 1)
+        pthread_join(t.handle, NULL)
     t.running = 0
 
 

@@ -92,9 +92,9 @@ class MainDevice(bus.MainDevice):
     def read_mappings(self, *wishes: Wish, period: float = 1e-3) -> None:
         """Brings the descriptions up to date: what is mapped, and how long objects are that are
         wished for and not mapped."""
-        from catenary.plan.make import gather_wishes
+        from catenary.plan.make import gather_wishes, period_in_ns
 
-        asked = gather_wishes(wishes, round(period * 1e9))
+        asked = gather_wishes(wishes, period_in_ns(period))
         for sub in self.subs:
             renewed = describe(self.reservation, sub.position)
             _check_same(sub.description, renewed)

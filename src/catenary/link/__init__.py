@@ -9,7 +9,9 @@ from catenary.link._recorder import Recorder
 from catenary.link._replay import Replay
 from catenary.link._table import capsule_in_virtual_time
 from catenary.link.fault import Fault
+from catenary.link.fork import forget_in_child
 from catenary.link.interface import Interface
+from catenary.link.ownership import Ownership, other_sockets
 from catenary.link.protocol import Link, LinkSource
 from catenary.link.ring import Ring, RingLink, ring_of
 
@@ -19,11 +21,14 @@ __all__ = [
     "Interface",
     "Link",
     "LinkSource",
+    "Ownership",
     "Recorder",
     "Replay",
     "Ring",
     "RingLink",
+    "forget_in_child",
     "lives_in_virtual_time",
+    "other_sockets",
     "ring_of",
 ]
 

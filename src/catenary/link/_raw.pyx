@@ -228,6 +228,13 @@ cdef class RawLink(TableLink):
         self.table.now = raw_now
         self.table.wait_until = raw_wait_until
 
+    def fileno(self):
+        return self.raw.fd
+
+    def forget(self):
+        """In a forked child: close its copies of ring and socket. The parent's stay open."""
+        self.close()
+
     def flush(self):
         """Drops what has been received so far; says how many frames."""
         cdef const uint8_t *frame = NULL

@@ -10,7 +10,8 @@ from libc.errno cimport EINTR, errno
 from libc.stdint cimport int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 from libc.string cimport memcpy
 from posix.time cimport nanosleep, timespec
-from posix.unistd cimport write
+from posix.types cimport pid_t
+from posix.unistd cimport getpid, write
 
 from catenary.link._table cimport CAT_LINK_VIRTUAL_TIME, WrapperLink, cat_link
 
@@ -192,6 +193,7 @@ cdef class Recorder(WrapperLink):
     cdef cat_memory memory                # the ring
     cdef pthread_t writer
     cdef bint writing
+    cdef pid_t owner                      # the process that writes: in a forked child nothing does
     cdef readonly str path
 
     def __init__(self, link, path):
@@ -199,6 +201,7 @@ cdef class Recorder(WrapperLink):
         if self.recorder.ring == NULL:
             raise MemoryError(f"{RING_BYTES} bytes for the recorder's ring")
         self.path = os.fspath(path)
+        self.owner = getpid()
         self.recorder.fd = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
         try:
             self.wrap(link)
@@ -247,11 +250,11 @@ cdef class Recorder(WrapperLink):
         return cat_load_relaxed64(&self.recorder.dropped)
 
     cdef int stop_writer(self) except -1:
-        if self.writing:
+        if self.writing and self.owner == getpid():
             cat_store_release32(&self.recorder.stop, 1)
             with nogil:
                 pthread_join(self.writer, NULL)
-            self.writing = False
+        self.writing = False
         return 0
 
     cdef int close_table(self) except -1:
@@ -263,6 +266,9 @@ cdef class Recorder(WrapperLink):
         return 0
 
     cdef int finish_file(self) except -1:
+        if self.owner != getpid():
+            os.close(self.recorder.fd)  # a copy: the parent goes on writing
+            return 0
         with nogil:
             drain(&self.recorder)
         number = self.recorder.write_error
@@ -282,7 +288,7 @@ cdef class Recorder(WrapperLink):
         warnings.warn(f"{self.path} {what}", RuntimeWarning, stacklevel=2)
 
     def __dealloc__(self):
-        if self.writing:
+        if self.writing and self.owner == getpid():
             cat_store_release32(&self.recorder.stop, 1)
             pthread_join(self.writer, NULL)
         cat_memory_free(&self.memory)

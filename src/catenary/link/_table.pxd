@@ -30,6 +30,7 @@ cdef extern from "link.h" nogil:
 
 
 cdef class TableLink:
+    cdef object __weakref__
     cdef cat_link table
     cdef readonly str name
     cdef int close_table(self) except -1

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from catenary.errors import LinkError
 from catenary.interpreter import permission_advice
 from catenary.link._raw import RawLink
+from catenary.link.fork import forget_in_child
 
 ETHERTYPE = 0x88A4  # EtherCAT, ETG.1000.4 §5.2
 
@@ -58,6 +59,7 @@ class Interface:
         with raw:  # which is empty once the link owns the descriptor
             link = RawLink(self.name, raw, size, SLOT_SIZE, receive_path)
         link.flush()
+        forget_in_child(link)
         return link
 
 

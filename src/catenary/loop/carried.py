@@ -74,7 +74,8 @@ class CarriedRunning(Running):
     def _raise_astray(self) -> None:
         log = self.log()
         [answers] = self.service.converse(self._carrier.survey())
-        error = state_error([a for a in answers if self.watch.requires(a.station.position)], log)
+        needed = [a for a in answers if self.watch.requires(a.station.position)]
+        error = state_error(needed, log)
         if error is not None:
             raise error
 

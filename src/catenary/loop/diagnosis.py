@@ -21,10 +21,11 @@ def silence_error(
     log: object,
     findings: Sequence[Finding] = (),
     mute: Sequence[int] = (),
+    tight: str = "",
 ) -> WorkingCounterError:
     """The error for `lost` bad cycles in a row; `suspects`: devices of the units that failed;
     `findings`: what silence or error counters say of the place; `mute`: devices whose inputs do not
-    come even when they are asked for alone."""
+    come even when they are asked for alone; `tight`: of a period that is perhaps too short."""
     silent = [answer.station for answer in answers if answer.word is None]
     others = [a for a in answers if a.station.position in suspects and a.word is not None]
     stray = [answer for answer in others if is_astray(answer)]
@@ -47,7 +48,7 @@ def silence_error(
     else:
         who = f"all devices answer to single reads; affected: devices {listed(suspects)}"
         who += "".join(f"; {each.where}: {each.evidence}" for each in findings)
-        hint = (
+        hint = tight or (
             "frames are lost, corrupted or late on the way: check cables and other traffic on the "
             "port; where the segment is a program on a busy machine, allow it more cycles with "
             "Loop(lost_limit=...)"
@@ -57,8 +58,21 @@ def silence_error(
     )
 
 
-def state_error(answers: Sequence[Answer], log: object) -> StateError | None:
-    """The error for devices that left OP; None: all are there."""
+def tight_period(wire_ns: int, period_ns: int) -> str:
+    """Return a hint if the cyclic frames take most of the period; else an empty text."""
+    if 2 * wire_ns < period_ns:
+        return ""
+    return (
+        f"the cyclic frames take {wire_ns / 1e3:g} us of the period of {period_ns / 1e3:g} us at "
+        "100 Mbit/s, and every device delays them by about 1 us: use a longer period"
+    )
+
+
+def state_error(
+    answers: Sequence[Answer], log: object, other_masters: Sequence[str] = ()
+) -> StateError | None:
+    """Return the error for devices that left OP; None if all are there. `other_masters`: evidence
+    of another master, as text."""
     astray = [answer for answer in answers if is_astray(answer)]
     if not astray:
         return None
@@ -71,11 +85,23 @@ def state_error(answers: Sequence[Answer], log: object) -> StateError | None:
         actual=(first.word or 0) & STATE_MASK,
         code=first.code,
         log=log,
-        hint=known.cause or "see its manual for what makes it leave OP",
+        hint=_suspicion(first, other_masters) or known.cause or "see its manual",
     )
     for other in astray[1:]:
         error.add_note(f"also: {described(other)}")
     return error
+
+
+def _suspicion(answer: Answer, other_masters: Sequence[str]) -> str:
+    """Return what points to another master; a device that leaves OP by itself gives a reason."""
+    if other_masters:
+        return f"another EtherCAT master is live: {'; '.join(other_masters)}; end it"
+    if answer.code or (answer.word or 0) & ERROR_FLAG:
+        return ""
+    return (
+        "it gives no reason, so its state was probably requested: look for a second master on this "
+        "line, or in another container; a device that was switched off and on shows INIT, too"
+    )
 
 
 def forgetful_error(silent: Sequence[Answer], al_status: int, log: object) -> StateError:

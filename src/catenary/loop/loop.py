@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import warnings
+import weakref
 from collections.abc import Callable, Sequence
 from functools import partial
 from types import TracebackType
@@ -40,7 +41,7 @@ from catenary.loop.timing import Timing
 from catenary.loop.watch import Policy
 from catenary.plan.clocks import BURST
 from catenary.plan.cycle import FollowedClock, ReceiveMode
-from catenary.plan.make import Plan, make_plan
+from catenary.plan.make import Plan, make_plan, period_in_ns
 from catenary.plan.sink import Sink
 from catenary.wire.al import State
 
@@ -138,6 +139,7 @@ class Loop:
             raise ValueError(f'run={run!r}: "threaded" or "inline"')
         if clock not in ("reference", "main"):
             raise ValueError(f'clock={clock!r}: "reference" or "main"')
+        period_in_ns(period)
         if not 0 <= busy_wait < period:
             raise ValueError(f"busy_wait={busy_wait} s: must be less than the period of {period} s")
         if switch_interval is not None and not 1e-6 <= switch_interval <= 1.0:
@@ -188,12 +190,14 @@ class Loop:
         self._guard = SignalGuard((Loop.__exit__.__code__, Loop._leave.__code__))
         self._running: Running | None = None
         self._iteration: Iteration | None = None
+        self._finalizer: weakref.finalize[..., Loop] | None = None
 
     def __enter__(self) -> Loop:
         try:
             self._guard.install()
             self._running = self._iteration = None
-            self._running = self._prepared(self._abandon)
+            self._running = self._prepared(self._abandoned())
+            self._leave_at_the_latest([self._running])
             self._running.open()
             if self._enable:
                 self._running.enable()
@@ -432,10 +436,24 @@ class Loop:
             priority=self._priority,
         )
 
+    def _abandoned(self) -> Callable[[], object]:
+        """Return what leaves the loop when its MainDevice is closed. It does not keep the loop."""
+        method = weakref.WeakMethod(self._abandon)
+
+        def abandon() -> None:
+            if (leave := method()) is not None:
+                leave()
+
+        return abandon
+
     def _abandon(self) -> None:
         """The MainDevice is being closed while the loop is open."""
         for problem in self._leave():
             warnings.warn(f"the loop was left open: {problem}", RuntimeWarning, stacklevel=2)
+
+    def _leave_at_the_latest(self, runnings: Sequence[Running]) -> None:
+        """Leave the loop when it is deleted, or when the program ends, if it is open then."""
+        self._finalizer = weakref.finalize(self, leave_open_loop, runnings, self._guard)
 
     def _tell_end(self, error: BaseException) -> None:
         if self._running is not None:
@@ -448,3 +466,23 @@ class Loop:
             return take_down(self._main)
         finally:
             self._guard.restore()
+            if self._finalizer is not None:
+                self._finalizer.detach()
+
+
+def leave_open_loop(runnings: Sequence[Running], guard: SignalGuard) -> None:
+    """Stop the axes of a loop that nothing refers to any more, and warn."""
+    if not any(running.is_open for running in runnings):
+        return
+    warnings.warn(
+        "a Loop was not left: its axes are stopped now. Use it in a with block",
+        ResourceWarning,
+        stacklevel=2,
+    )
+    for running in runnings:
+        if running.is_open:
+            running.stop_axes_at_once()
+    for running in runnings:
+        for problem in running.leave(guard):
+            warnings.warn(f"the loop was not left: {problem}", RuntimeWarning, stacklevel=2)
+    guard.restore()

@@ -128,8 +128,9 @@ class NetworksLoop(Loop):
             self._dead: set[int] = set()  # by identity: those that have died and are not back
             self._cycles: NetworksCycle | None = None
             for network in self.networks:
-                network._running = network._prepared(self._abandon)
+                network._running = network._prepared(self._abandoned())
                 self._all.append(network._running)
+            self._leave_at_the_latest(self._all)
             self._share_time()
             for running in self._all:
                 running.open(self._all[0].engine.origin)
@@ -264,6 +265,8 @@ class NetworksLoop(Loop):
                     problems += take_down(network._main)
         finally:
             self._guard.restore()
+            if self._finalizer is not None:
+                self._finalizer.detach()
         return problems
 
     def _brake(self) -> None:

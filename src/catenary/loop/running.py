@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 
@@ -25,7 +26,7 @@ from catenary.core import (
     Engine,
 )
 from catenary.errors import CatenaryError, DriveError, LinkError, LoopError
-from catenary.link import ring_of
+from catenary.link import forget_in_child, ring_of
 from catenary.loop.axis_watch import AxisWatch, RefusedMode, StoppedAxis, StopPolicy
 from catenary.loop.buffers import bind_wishes
 from catenary.loop.clocks import Clocks
@@ -35,6 +36,7 @@ from catenary.loop.diagnosis import (
     forgetful_error,
     silence_error,
     state_error,
+    tight_period,
 )
 from catenary.loop.error_watch import ErrorWatch
 from catenary.loop.frame_watch import FrameWatch
@@ -102,6 +104,8 @@ class Running:
         self._attached = ExitStack()
         self._opened = self._left = False
         self._abandon = abandon  # leaves the loop, when the MainDevice is closed round it
+        self._process = os.getpid()
+        forget_in_child(self)
         self._stations = [sub.station for sub in main.subs]
         self._companions: Sequence[Running] = ()
         self._watches: list[Pending[None]] = []
@@ -330,9 +334,16 @@ class Running:
 
     # Leaving
 
+    def forget(self) -> None:
+        """In a forked child: the cycle, its threads and the devices are the parent's."""
+        self._left = True
+        self.engine.forget()
+
     def leave(self, guard: SignalGuard) -> list[Exception]:
         """Brings everything down, best effort: each step is taken whatever the one before met.
-        What went wrong on the way. A second time: nothing."""
+        What went wrong on the way. A second time, or in a forked child: nothing."""
+        if self._process != os.getpid():
+            self.forget()
         if self._left:
             return []
         self._left = True
@@ -405,7 +416,10 @@ class Running:
         silent = [answer.station.position for answer in answers if answer.word is None]
         silence = judge_silence(self.errors.topology, self.errors.names, silent)
         [mute] = self.service.converse(probe_inputs(self._input_areas(suspects)))
-        return silence_error(answers, suspects, lost, log, findings=silence or noise, mute=mute)
+        cycle = self.plan.cycle
+        tight = tight_period(cycle.wire_ns, cycle.period_ns)
+        findings = silence or noise
+        return silence_error(answers, suspects, lost, log, findings, mute=mute, tight=tight)
 
     def _input_areas(self, positions: Sequence[int]) -> dict[int, tuple[int, int]]:
         """Where the inputs of some devices lie, as far as they have some."""
@@ -426,7 +440,7 @@ class Running:
         for look in range(2):
             [answers] = self.service.converse(survey(self._stations))
             needed = [a for a in answers if self.watch.requires(a.station.position)]
-            error = state_error(needed, log)
+            error = state_error(needed, log, self.main.other_masters)
             if error is not None:
                 raise error
             silent = [answer for answer in needed if answer.word is None]

@@ -1,8 +1,9 @@
-"""Ctrl-C and SIGTERM while a loop is open: leaving is never cut short half-way.
+"""Ctrl-C, SIGTERM and SIGHUP while a loop is open: leaving is never cut short half-way.
 
 Only in the main thread, where Python delivers signals. Outside of leaving, Ctrl-C does what it did
-before and SIGTERM, where nobody handles it, raises SystemExit: both end in the loop's `__exit__`.
-While the loop is being left neither raises: each asks to hurry.
+before. SIGTERM and SIGHUP (the terminal or the ssh connection is gone) raise SystemExit unless the
+application handles them. All end in the loop's `__exit__`. While the loop is being left none
+raises: each asks to hurry. A signal that is ignored stays ignored: `nohup` ignores SIGHUP.
 """
 
 from __future__ import annotations
@@ -13,12 +14,14 @@ from collections.abc import Callable
 from types import CodeType, FrameType
 from typing import TypeAlias
 
+from catenary.link import forget_in_child
+
 Handler: TypeAlias = Callable[[int, FrameType | None], object] | int | None
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class SignalGuard:
-    """Owns the handlers of SIGINT and SIGTERM while a loop is open.
+    """Owns the handlers of SIGINT, SIGTERM and SIGHUP while a loop is open.
 
     `leaving`: the code objects of the functions that leave; a signal that finds one of them on the
     stack only sets `hurry`. (A flag set by those functions would leave a gap at their first line.)
@@ -40,12 +43,17 @@ class SignalGuard:
                 continue
             self._before[number] = before
             signal.signal(number, self._handle)
+        forget_in_child(self)
 
     def restore(self) -> None:
         """Gives the signals back."""
         while self._before:
             number, before = self._before.popitem()
             signal.signal(number, before)
+
+    def forget(self) -> None:
+        """In a forked child: signals end the child as if there were no loop."""
+        self.restore()
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         if self._is_leaving(frame):
@@ -54,10 +62,10 @@ class SignalGuard:
         before = self._before.get(signal.Signals(number))
         if callable(before):
             before(number, frame)
-        elif number == signal.SIGTERM:
-            raise SystemExit(128 + number)  # what a shell reports of a process ended by SIGTERM
-        else:
+        elif number == signal.SIGINT:
             raise KeyboardInterrupt
+        else:
+            raise SystemExit(128 + number)  # what a shell reports of a process ended by a signal
 
     def _is_leaving(self, frame: FrameType | None) -> bool:
         while frame is not None:

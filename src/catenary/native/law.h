@@ -71,6 +71,7 @@ typedef struct cat_law_monitor {
     uint32_t state;               /* futex word */
     uint32_t started;             /* the thread runs; its owner's */
     pthread_t thread;
+    pid_t owner;                  /* the process that the thread lives in: a forked child has none */
 } cat_law_monitor;
 
 #define CAT_LAW_SIGNAL (SIGRTMIN + 7)
@@ -154,6 +155,7 @@ static inline int cat_law_monitor_start(cat_law_monitor *monitor, int priority) 
     pthread_sigmask(SIG_SETMASK, &before, NULL);
     if (rc) return -rc;
     monitor->started = 1;
+    monitor->owner = getpid();
     if (priority > 0) /* refused to ordinary users: then the runner has none either */
         pthread_setschedparam(monitor->thread, SCHED_FIFO, &parameters);
     return 0;
@@ -161,10 +163,11 @@ static inline int cat_law_monitor_start(cat_law_monitor *monitor, int priority) 
 
 /* Owner: end the thread, after the last call. */
 static inline void cat_law_monitor_stop(cat_law_monitor *monitor) {
-    if (!monitor->started) return;
-    cat_store_release32(&monitor->state, CAT_LAW_ENDING);
-    cat_futex_wake(&monitor->state);
-    pthread_join(monitor->thread, NULL);
+    if (monitor->started && monitor->owner == getpid()) {
+        cat_store_release32(&monitor->state, CAT_LAW_ENDING);
+        cat_futex_wake(&monitor->state);
+        pthread_join(monitor->thread, NULL);
+    }
     monitor->started = 0;
 }
 

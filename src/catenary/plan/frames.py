@@ -127,6 +127,18 @@ def acyclic_wire_time_ns(cyclic_ns: int, period_ns: int) -> int:
     return max(period_ns - cyclic_ns - round(ACYCLIC_GUARD * period_ns), 0)
 
 
+def check_return(cyclic_ns: int, period_ns: int, deadline_ns: int) -> None:
+    """Raise ConfigurationError if the cyclic frames cannot be back by the collect deadline."""
+    if cyclic_ns > deadline_ns:
+        raise ConfigurationError(
+            f"period={period_ns * 1e-9:g} s is too short: the cyclic frames take "
+            f"{cyclic_ns / 1e3:g} us at 100 Mbit/s, and must be back {deadline_ns / 1e3:g} us "
+            "after the cycle start",
+            hint="a longer period, fewer objects, some devices less often (every=...), or a later "
+            "collect_deadline=... of the Loop",
+        )
+
+
 def _per_cycle(frames: Sequence[FramePlan], weight: Callable[[FramePlan], int]) -> int:
     sums: Counter[tuple[int, int]] = Counter()
     for frame in frames:

@@ -10,7 +10,12 @@ from catenary.errors import ConfigurationError
 from catenary.model.device import DeviceDescription, Direction
 from catenary.plan.clocks import BURST, SyncPlan, choose_clocks, make_clock_plan, make_sync
 from catenary.plan.cycle import CyclePlan, FollowedClock, Order, ReceiveMode, SyncUnit
-from catenary.plan.frames import acyclic_wire_time_ns, cyclic_wire_time_ns, make_frames
+from catenary.plan.frames import (
+    acyclic_wire_time_ns,
+    check_return,
+    cyclic_wire_time_ns,
+    make_frames,
+)
 from catenary.plan.layout import EXACT_UNIT_MAX, UNIT_MAX, DeviceData, Layout, make_layout
 from catenary.plan.mailboxes import MailboxArea, with_mailboxes
 from catenary.plan.mapping import make_mapping
@@ -27,6 +32,8 @@ from catenary.plan.wish import (
     WrittenPdo,
 )
 from catenary.wire.cia402 import Mode
+
+PERIOD_MIN, PERIOD_MAX = 1e-6, 1000.0  # [s]; the core's limits are wider
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,9 +104,7 @@ def make_plan(
         ConfigurationError: an object cannot be mapped, a wish contradicts another, or the frames do
             not fit into the period.
     """
-    period_ns = round(period * 1e9)
-    if period_ns <= 0:
-        raise ValueError(f"period must be positive, not {period}")
+    period_ns = period_in_ns(period)
     asked = _asked(devices, wishes, period_ns)
     watchdogs = [
         choose_watchdog(device, asked.get(device.position, PdoWish()), watchdog, period_ns)
@@ -121,13 +126,16 @@ def make_plan(
     )
     wire_ns = cyclic_wire_time_ns(frames)
     acyclic_ns = acyclic_wire_time_ns(wire_ns, period_ns)
+    collect_ns = round(period_ns * collect_share)
+    if order == "threaded":
+        check_return(wire_ns, period_ns, collect_ns)
     tables = tuple(wish.tables(layout) for wish in wishes)
     _check_times(tables, late_limit_torque, handover)
     cycle = CyclePlan(
         period_ns=period_ns,
         order=order,
         receive_mode=receive_mode,
-        collect_deadline_ns=round(period_ns * collect_share),
+        collect_deadline_ns=collect_ns,
         output_size=layout.output_size,
         input_size=layout.input_size,
         frames=frames,
@@ -170,6 +178,13 @@ def make_plan(
         )
     )
     return Plan(cycle, plans, layout, tables, mailboxes)
+
+
+def period_in_ns(period: float) -> int:
+    """Return a period in [ns]. ValueError unless it is between 1 us and 1000 s."""
+    if not PERIOD_MIN <= period <= PERIOD_MAX:
+        raise ValueError(f"period={period} s: must be {PERIOD_MIN:g} to {PERIOD_MAX:g} s")
+    return round(period * 1e9)
 
 
 def gather_wishes(wishes: Sequence[Wish], period_ns: int) -> dict[int, PdoWish]:

@@ -136,5 +136,7 @@ def _refused(station: Station, target: State, now: DeviceState, what: str) -> St
         requested=int(target),
         actual=now.word & 0x0F,
         code=now.code,
-        hint=known.cause or "read its AL status again; its manual lists what it needs",
+        hint=known.cause
+        or "read its AL status again; its manual lists what it needs. Without an "
+        "error code, look for a second master on this line that requests states, too",
     )

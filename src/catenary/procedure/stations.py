@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from catenary.errors import NoDeviceError, SegmentError, StateError
 from catenary.procedure.exchange import Procedure, Request, after, physical, read, write
@@ -42,8 +43,15 @@ class StationRegisters:
     system_time: bool = False  # answers to 0x0910: some clocks only stamp receive times
 
 
-def count() -> Procedure[int]:
-    """How many devices process a broadcast. NoDeviceError if none does."""
+class Counted(NamedTuple):
+    """Answer of all devices to one broadcast."""
+
+    devices: int
+    states: int  # the OR of all AL status words
+
+
+def count() -> Procedure[Counted]:
+    """Count the devices that process a broadcast. NoDeviceError if none does."""
     [reply] = yield [read(Command.BRD, 0, AL_STATUS)]
     if reply.lost:
         raise NoDeviceError(
@@ -55,7 +63,7 @@ def count() -> Procedure[int]:
             "no device: frames come back unprocessed (working counter 0)",
             hint="`lo`, a bridge or a switch echoes frames; take the port the segment is wired to",
         )
-    return reply.working_counter
+    return Counted(reply.working_counter, AL_STATUS.unpack(reply.data))
 
 
 def reset(device_count: int) -> Procedure[None]:

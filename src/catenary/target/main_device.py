@@ -19,9 +19,18 @@ class MainDevice(bus.MainDevice):
                 print(sub.position, sub.name, sub.identity, sub.state)
 
     Leaving the block brings all devices to INIT, whatever happened in it.
+
+    Opening is refused while another master is live on the interface (docs/networks.md).
+    `force=True` opens all the same; on the kernel master it has no effect.
     """
 
-    def __new__(cls, target: str | LinkSource, second: str | LinkSource | None = None) -> Self:
+    def __new__(
+        cls,
+        target: str | LinkSource,
+        second: str | LinkSource | None = None,
+        *,
+        force: bool = False,
+    ) -> Self:
         """A source may bring a MainDevice of its own: the IgH kernel master does."""
         named = isinstance(target, str) and target.strip().startswith(f"{IGH}:")
         make = getattr(source_of(target) if named else target, "main_device", None)
@@ -30,9 +39,15 @@ class MainDevice(bus.MainDevice):
             return own
         return super().__new__(cls)
 
-    def __init__(self, target: str | LinkSource, second: str | LinkSource | None = None) -> None:
+    def __init__(
+        self,
+        target: str | LinkSource,
+        second: str | LinkSource | None = None,
+        *,
+        force: bool = False,
+    ) -> None:
         source = source_of(target)
-        super().__init__(source if second is None else Ring(source, source_of(second)))
+        super().__init__(source if second is None else Ring(source, source_of(second)), force=force)
 
 
 def source_of(target: str | LinkSource) -> LinkSource:

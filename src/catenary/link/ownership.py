@@ -1,0 +1,199 @@
+"""One MainDevice per network interface, and what shows that another master uses it.
+
+A MainDevice holds an abstract Unix socket named after the interface. Such names belong to a
+network namespace. The kernel releases them when their process ends, also by SIGKILL. Masters
+that do not know this lock are seen by their packet sockets, or by their frames.
+
+SOEM (oshw/linux/nicdrv.c) and IgH's generic driver (devices/generic.c) open a packet socket for
+0x88A4 and bind it to the interface: /proc/net/packet lists it. A capture program asks for all
+protocols (0x0003) and is not a master.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import socket
+import struct
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from catenary.errors import LinkError
+from catenary.link._raw import RawLink
+from catenary.link._ring import RingLink
+from catenary.link.interface import ETHERTYPE
+from catenary.link.protocol import Link
+from catenary.wire.frame import is_alien
+
+NAME = "\0catenary/"  # of the lock, before the name of the interface; abstract, see unix(7)
+WAITING = 4096  # programs that may ask for the owner of a lock; nothing accepts them
+SETTLE_NS = 20_000_000  # late answers to a master that has just ended
+WINDOW_NS, WINDOWS = 40_000_000, 2  # a live master sends frames in each
+FRAMES = 256  # read per window: more than a receive ring holds
+
+PACKETS = Path("/proc/thread-self/net/packet")  # of this thread's namespace, see packet(7)
+HINT = (
+    "end it first. force=True (--force) opens the interface all the same: two masters then disturb "
+    "each other, and a scan stops the devices of both"
+)
+
+
+class Ownership:
+    """Owns the locks of the network interfaces that a link uses.
+
+    `others` describes what shows another master, where `force` went on in spite of it.
+    """
+
+    def __init__(self, link: Link, *, force: bool = False) -> None:
+        """Take the interfaces. Waits 0.1 s for frames of others, unless `force`.
+
+        Raises:
+            LinkError: another master is live on one of them, and not `force`.
+        """
+        self._locks: list[socket.socket] = []
+        raws = raw_links(link)
+        try:
+            self.others = tuple(self._lock(raws)) or other_sockets(link)
+            if force or not raws:
+                return
+            self.others = self.others or foreign_frames(raws)
+        except BaseException:
+            self.release()
+            raise
+        if self.others:
+            self.release()
+            raise LinkError(f"another EtherCAT master is live: {'; '.join(self.others)}", hint=HINT)
+
+    def _lock(self, raws: Sequence[RawLink]) -> Iterator[str]:
+        for raw in raws:
+            lock = locked(raw.name)
+            if lock is None:
+                yield f"{holder(raw.name)} has {raw.name} open"
+            else:
+                self._locks.append(lock)
+
+    def release(self) -> None:
+        """Close this process's copies. Another process gets the lock when all copies are closed."""
+        while self._locks:
+            self._locks.pop().close()
+
+
+def raw_links(link: Link) -> tuple[RawLink, ...]:
+    """Return the links of network interfaces that a link is, or is made of."""
+    if isinstance(link, RawLink):
+        return (link,)
+    if isinstance(link, RingLink):
+        return tuple(raw for each in link.links for raw in raw_links(each))
+    inner = getattr(link, "link", None)
+    return () if inner is None else raw_links(inner)
+
+
+def locked(name: str) -> socket.socket | None:
+    """Return the lock of an interface, or None if another MainDevice holds it."""
+    lock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        lock.bind(NAME + name)
+        lock.listen(WAITING)  # from now on, `holder` can ask for its process
+    except OSError as error:
+        lock.close()
+        if error.errno != errno.EADDRINUSE:
+            raise
+        return None
+    return lock
+
+
+def holder(name: str) -> str:
+    """Describe the process that holds the lock of an interface."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as asking:
+        asking.setblocking(False)
+        try:
+            asking.connect(NAME + name)
+            credentials = asking.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12)
+        except OSError:  # released meanwhile, or too many have asked
+            return "a process that does not tell its number"
+    return described(struct.unpack("3i", credentials)[0])
+
+
+def described(pid: int) -> str:
+    """Describe a process: "PID 42 (python3)"."""
+    if pid == 0:  # unix(7): a process of another PID namespace
+        return "a process that is invisible here (another container or PID namespace)"
+    if pid == os.getpid():
+        return f"this process (PID {pid})"
+    try:
+        name = Path(f"/proc/{pid}/comm").read_text(errors="replace").strip()
+    except OSError:
+        return f"PID {pid}, which has ended: a child that it forked"
+    return f"PID {pid} ({''.join(c if c.isprintable() else '?' for c in name)})"
+
+
+def other_sockets(link: Link) -> tuple[str, ...]:
+    """Describe the packet sockets for EtherCAT of others on the interfaces of a link."""
+    return tuple(
+        f"{_holder_of_socket(inode)} has an EtherCAT packet socket on {raw.name}"
+        for raw in raw_links(link)
+        for inode in _ethercat_sockets(raw.name)
+        if inode != os.fstat(raw.fileno()).st_ino
+    )
+
+
+def _ethercat_sockets(name: str) -> list[int]:
+    """Return the inodes of the packet sockets for 0x88A4 that are bound to an interface."""
+    try:
+        interface = socket.if_nametoindex(name)
+        rows = [line.split() for line in PACKETS.read_text().splitlines()[1:]]
+    except OSError:  # the interface was removed, or a container without /proc
+        return []
+    # sk RefCnt Type Proto Iface R Rmem User Inode
+    return [int(r[8]) for r in rows if int(r[3], 16) == ETHERTYPE and int(r[4]) == interface]
+
+
+def _holder_of_socket(inode: int) -> str:
+    """Describe the process that has a socket open, as far as this user may see it."""
+    wanted = f"socket:[{inode}]"
+    for folder in Path("/proc").glob("[0-9]*/fd"):
+        with contextlib.suppress(OSError):  # ended meanwhile, or another user's
+            if wanted in map(_target, os.scandir(folder)):
+                return described(int(folder.parent.name))
+    return "a process that is invisible here, or the kernel's EtherCAT master,"
+
+
+def _target(entry: os.DirEntry[str]) -> str:
+    """Return what a descriptor refers to; "" if it was closed meanwhile."""
+    try:
+        return os.readlink(entry)
+    except OSError:
+        return ""
+
+
+def foreign_frames(raws: Sequence[RawLink]) -> tuple[str, ...]:
+    """Describe the interfaces on which EtherCAT frames arrive while this process sends nothing.
+
+    One burst is not enough: a segment may answer late to a master that has just been killed.
+    """
+    _pause(raws[0], SETTLE_NS)
+    active = {raw.name for raw in raws}
+    for raw in raws:
+        _receives(raw)
+    for _ in range(WINDOWS):
+        _pause(raws[0], WINDOW_NS)
+        active &= {raw.name for raw in raws if _receives(raw)}
+    return tuple(f"EtherCAT frames of another master arrive on {name}" for name in sorted(active))
+
+
+def _pause(raw: RawLink, duration_ns: int) -> None:
+    until = raw.now() + duration_ns
+    while raw.now() < until:
+        raw.wait_until(until, False)
+
+
+def _receives(raw: RawLink) -> bool:
+    """Read what has arrived. Return True if an EtherCAT frame is among it."""
+    active = False
+    for _ in range(FRAMES):
+        frame = raw.receive()
+        if frame is None:
+            break
+        active = active or not is_alien(frame)
+    return active

@@ -1,0 +1,134 @@
+"""Devices found in SAFE-OP or OP: left so by a master that was killed, or driven by a live one.
+
+The process-data watchdog tells which (ETG.1000.4 §6.3; ET1100 datasheet, section II, 0x0420 and
+0x0440): without writes of ours it expires, unless another master goes on refreshing the outputs.
+Devices are addressed by position (APRD): they may not have their station addresses yet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from catenary.errors import DecodeError
+from catenary.procedure.exchange import Procedure, Reply, Request, after, physical, read
+from catenary.wire.al import ERROR_FLAG, STATE_MASK, State
+from catenary.wire.datagram import Command
+from catenary.wire.register import (
+    AL_STATUS,
+    SYNC_MANAGERS_SUPPORTED,
+    WATCHDOG_DIVIDER,
+    WATCHDOG_STATUS_PROCESS_DATA,
+    WATCHDOG_TIME_PROCESS_DATA,
+    sync_manager,
+)
+from catenary.wire.sync_manager import SIZE, Activation, Direction, decode_sync_manager
+
+RUNNING = (State.SAFE_OP, State.OP)
+ACTIVE = 0x01  # 0x0440: the watchdog has not expired, or is off
+POLL = 0.010  # [s]
+LONGEST_NS = 5_000_000_000  # twice a longer watchdog time is too long to wait
+DIVIDER_OFFSET, DIVIDER_NS = 2, 40  # the unit of 0x0420 is (0x0400 + 2) · 40 ns
+
+
+class Running(NamedTuple):
+    """A device that was found in SAFE-OP or OP."""
+
+    position: int
+    state: State
+    error: bool
+    sync_managers: int  # how many it has
+
+    def __str__(self) -> str:
+        return f"device {self.position} in {self.state}{' with an error' * self.error}"
+
+
+def find_running(device_count: int) -> Procedure[list[Running]]:
+    """Return the devices in SAFE-OP or OP. Changes nothing.
+
+    In a cut ring, two devices at the same distance from both ends answer together; they are left
+    out.
+    """
+    replies = yield [
+        read(Command.APRD, -position, register)
+        for position in range(device_count)
+        for register in (AL_STATUS, SYNC_MANAGERS_SUPPORTED)
+    ]
+    found = []
+    for position in range(device_count):
+        status, supported = replies[2 * position : 2 * position + 2]
+        word = AL_STATUS.unpack(status.data)
+        if _answers(status) and word & STATE_MASK in RUNNING:
+            count = SYNC_MANAGERS_SUPPORTED.unpack(supported.data)
+            state, error = State(word & STATE_MASK), bool(word & ERROR_FLAG)
+            found.append(Running(position, state, error, count))
+    return found
+
+
+def find_refreshed(running: Sequence[Running]) -> Procedure[list[int]]:
+    """Return the positions in OP whose outputs another master refreshes, waiting for at most twice
+    their watchdog times. Changes nothing.
+
+    Only a device whose watchdog is on and triggered by its outputs can tell. SAFE-OP is left out:
+    a watchdog that was never triggered looks like one that is active.
+    """
+    watched = {}
+    for device in running:
+        if device.state is State.OP:
+            time_ns = yield from _watchdog_time(device)
+            if time_ns:
+                watched[device.position] = time_ns
+    start: int | None = None
+    refreshed: list[int] = []
+    while watched and not refreshed:
+        replies = yield [
+            read(Command.APRD, -position, WATCHDOG_STATUS_PROCESS_DATA) for position in watched
+        ]
+        start = replies[0].time_ns if start is None else start
+        for position, reply in zip(list(watched), replies, strict=True):
+            status = WATCHDOG_STATUS_PROCESS_DATA.unpack(reply.data)
+            if not _answers(reply) or not status & ACTIVE:
+                del watched[position]
+            elif reply.time_ns - start >= 2 * watched[position]:
+                refreshed.append(position)
+        yield after(POLL)
+    return refreshed
+
+
+def _watchdog_time(device: Running) -> Procedure[int]:
+    """Return the watchdog time of a device [ns]; 0 if its outputs do not trigger a watchdog."""
+    count = min(device.sync_managers, 16)
+    replies = yield [
+        read(Command.APRD, -device.position, WATCHDOG_DIVIDER),
+        read(Command.APRD, -device.position, WATCHDOG_TIME_PROCESS_DATA),
+        Request(
+            Command.APRD,
+            physical(-device.position, sync_manager(0).address),
+            bytes(max(count, 1) * SIZE),
+            True,
+        ),
+    ]
+    if not all(map(_answers, replies)) or not _triggers(replies[2].data):
+        return 0
+    divider = WATCHDOG_DIVIDER.unpack(replies[0].data)
+    time_ns = (divider + DIVIDER_OFFSET) * DIVIDER_NS
+    time_ns *= WATCHDOG_TIME_PROCESS_DATA.unpack(replies[1].data)
+    return time_ns if 2 * time_ns <= LONGEST_NS else 0
+
+
+def _triggers(blocks: bytes) -> bool:
+    """Return True if a SyncManager of outputs is on and triggers the watchdog."""
+    for start in range(0, len(blocks), SIZE):
+        try:
+            each = decode_sync_manager(blocks[start : start + SIZE])
+        except DecodeError:
+            continue
+        writes = each.control.direction is Direction.WRITE and each.length > 0
+        if writes and each.control.watchdog and each.activation & Activation.ENABLE:
+            return True
+    return False
+
+
+def _answers(reply: Reply) -> bool:
+    """Return True if one device has answered."""
+    return not reply.lost and reply.working_counter == 1
