@@ -17,7 +17,7 @@ from typing import Any
 import catenary as cat
 from catenary.bench.peers.with_catenary_law import sine
 from catenary.bench.segment import COUNTS_PER_TURN, PRIORITY, served
-from catenary.errors import CatenaryError, ConfigurationError
+from catenary.errors import CatenaryError, ConfigurationError, NoDeviceError
 
 FOLDER = Path("/igh")
 INIT_MODULE, DELETE_MODULE = 175, 176  # system calls, x86-64
@@ -25,6 +25,8 @@ DRIVES = 3
 CYCLES = {1000: 4002, 4000: 12_000}  # by rate [Hz]
 WAYS = ("threaded", "inline", "law")
 CASES = (*itertools.product((None, "reference"), WAYS), ("main", "threaded"))  # clock, way
+# The drives fault (0x8700) in its bring-up: three periods, 750 us, without new outputs.
+LEFT_OUT = (4000, "reference", "inline")
 WARM_UP = 1.5  # [s]: after it nothing may be lost; the module logs its bring-up for up to 1 s
 AMPLITUDE = 0.1  # [rad]
 NEVER = 1e9  # [s]
@@ -158,12 +160,14 @@ def rings() -> Iterator[dict[str, Any]]:
         master_on(segment.interface, segment.second),
         attempt(found),
     ):
-        run(found, "threaded", 1000, None)
         try:
+            run(found, "threaded", 1000, None)
             run({}, "threaded", 1000, "reference")
             found["error"] = "clocks in a closed ring were not refused"
         except ConfigurationError as refusal:
             found["refused"] = str(refusal)
+        except NoDeviceError:
+            found["left_out"] = "the module was built for one interface"
     yield found
 
 
@@ -188,7 +192,7 @@ def attempt(found: dict[str, Any]) -> Iterator[None]:
 def lines(chosen: Container[str]) -> Iterator[dict[str, Any]]:
     with served(DRIVES) as segment, master_on(segment.interface):
         for rate, (clock, way) in itertools.product(CYCLES, CASES):
-            if str(rate) in chosen and way in chosen:
+            if str(rate) in chosen and way in chosen and (rate, clock, way) != LEFT_OUT:
                 yield line(rate, way, clock)
 
 
@@ -202,7 +206,8 @@ def main(arguments: Sequence[str]) -> int:
     *words, _json, file = arguments
     chosen = set(words) or {*map(str, CYCLES), *WAYS, "ring"}
     table = []
-    for found in itertools.chain(lines(chosen), rings() if "ring" in chosen else ()):
+    rows = lines(chosen) if chosen & {*map(str, CYCLES)} else ()
+    for found in itertools.chain(rows, rings() if "ring" in chosen else ()):
         print(json.dumps(found), flush=True)
         table.append(found)
     Path(file).write_text(json.dumps({"runs": table}))
