@@ -133,6 +133,22 @@ with cat.MainDevice("virtual") as main:
         assert signal.pthread_sigmask(signal.SIG_BLOCK, []) == set()
 print("ended")
 """
+INTERRUPTED = """
+import ctypes, functools, os, signal
+import catenary as cat
+
+with cat.MainDevice("virtual") as main:
+    arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=1.0)
+    with cat.Loop(arm) as loop:
+        next(loop)
+        kill = ctypes.CDLL(None).kill  # unlike os.kill, it runs no handler
+        os.register_at_fork(before=functools.partial(kill, os.getpid(), signal.SIGTERM))
+        try:
+            if os.fork() == 0:
+                os._exit(0)
+        except SystemExit as end:
+            print("ended with", end.code)
+"""
 RECORDED = """
 import os, sys
 from catenary.link import Interface, Recorder
@@ -180,3 +196,7 @@ def test_a_child_writes_nothing_into_a_recording(veth: tuple[str, str], tmp_path
 
 def test_sigterm_in_the_first_moments_of_a_child_ends_it() -> None:
     assert run(TERMINATED) == "ended\n"
+
+
+def test_sigterm_while_the_parent_forks_ends_the_parent() -> None:
+    assert run(INTERRUPTED) == "ended with 143\n"

@@ -12,12 +12,10 @@ wait for that child for ever.
 from __future__ import annotations
 
 import os
-import signal
-import threading
 import weakref
 from typing import Protocol
 
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+from catenary.link._fork_signals import hold, release
 
 
 class Inherited(Protocol):
@@ -37,25 +35,12 @@ def forget_in_child(owner: Inherited) -> None:
     _OWNERS.add(owner)
 
 
-_before = threading.local()  # the forking thread's `mask` of signals
-
-
-def _hold_signals() -> None:
-    _before.mask = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING) if _OWNERS else None
-
-
-def _release_signals() -> None:
-    if _before.mask is not None:
-        signal.pthread_sigmask(signal.SIG_SETMASK, _before.mask)
-
-
 def _forget_all() -> None:
     for owner in list(_OWNERS):
         owner.forget()
     _OWNERS.clear()
-    _release_signals()
 
 
-os.register_at_fork(
-    before=_hold_signals, after_in_parent=_release_signals, after_in_child=_forget_all
-)
+os.register_at_fork(after_in_child=_forget_all)
+# Registered last, so that a child is ended only after it has let go
+os.register_at_fork(before=hold, after_in_parent=release, after_in_child=release)

@@ -1,0 +1,38 @@
+"""Hold SIGINT, SIGTERM and SIGHUP in the calling thread while it forks.
+
+Compiled, because Python runs signal handlers in functions written in Python and in
+`signal.pthread_sigmask`. What a handler raises within a hook of fork is lost: a program would go on
+after Ctrl-C. Here a signal waits until `os.fork` has returned.
+"""
+
+cdef extern from *:
+    """
+    #include <signal.h>
+
+    static __thread sigset_t mask_before;
+    static __thread int held;
+
+    static void hold_signals(void) {
+        sigset_t ending;
+        sigemptyset(&ending);
+        sigaddset(&ending, SIGINT);
+        sigaddset(&ending, SIGTERM);
+        sigaddset(&ending, SIGHUP);
+        held = pthread_sigmask(SIG_BLOCK, &ending, &mask_before) == 0;
+    }
+
+    static void release_signals(void) {
+        if (held) pthread_sigmask(SIG_SETMASK, &mask_before, NULL);
+        held = 0;
+    }
+    """
+    void hold_signals() nogil
+    void release_signals() nogil
+
+
+def hold():
+    hold_signals()
+
+
+def release():
+    release_signals()
