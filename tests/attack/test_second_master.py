@@ -77,6 +77,25 @@ def test_another_process_is_named(veth: tuple[str, str], tmp_path: Path) -> None
             pass
 
 
+def test_of_two_that_open_at_the_same_time_one_is_refused(
+    veth: tuple[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The second one has opened its socket when the first one takes the lock and looks around."""
+    late = Interface(veth[0]).open_link()
+    monkeypatch.setattr(ownership, "_pause", lambda raw, duration_ns: late.close())
+    with cat.MainDevice(veth[0]):
+        pass
+
+
+def test_a_refused_ring_takes_no_further_lock(veth: tuple[str, str]) -> None:
+    """Else two rings that open at the same time could refuse each other."""
+    first, second = sorted(veth)
+    with cat.MainDevice(first), cat.MainDevice(second), pytest.raises(LinkError) as refused:
+        cat.MainDevice(second, first).open()
+    assert f"has {first} open" in refused.value.message
+    assert second not in refused.value.message
+
+
 def test_force_opens_all_the_same(veth: tuple[str, str], tmp_path: Path) -> None:
     with program(HOLDER, tmp_path, veth[0]) as holder:
         assert holder.read_line(START) == "open"

@@ -22,6 +22,7 @@ from pathlib import Path
 from catenary.errors import LinkError
 from catenary.link._raw import RawLink
 from catenary.link._ring import RingLink
+from catenary.link.fork import forget_in_child
 from catenary.link.interface import ETHERTYPE
 from catenary.link.protocol import Link
 from catenary.wire.frame import is_alien
@@ -52,9 +53,10 @@ class Ownership:
             LinkError: another master is live on one of them, and not `force`.
         """
         self._locks: list[socket.socket] = []
+        forget_in_child(self)
         raws = raw_links(link)
         try:
-            self.others = tuple(self._lock(raws)) or other_sockets(link)
+            self.others = tuple(self._lock(raws, force)) or lasting_sockets(link)
             if force or not raws:
                 return
             self.others = self.others or foreign_frames(raws)
@@ -65,13 +67,20 @@ class Ownership:
             self.release()
             raise LinkError(f"another EtherCAT master is live: {'; '.join(self.others)}", hint=HINT)
 
-    def _lock(self, raws: Sequence[RawLink]) -> Iterator[str]:
-        for raw in raws:
+    def _lock(self, raws: Sequence[RawLink], force: bool) -> Iterator[str]:
+        """In the order of names, and none after a refusal: else two rings refuse each other."""
+        for raw in sorted(raws, key=lambda each: each.name):
             lock = locked(raw.name)
-            if lock is None:
-                yield f"{holder(raw.name)} has {raw.name} open"
-            else:
+            if lock is not None:
                 self._locks.append(lock)
+                continue
+            yield f"{holder(raw.name)} has {raw.name} open"
+            if not force:
+                return
+
+    def forget(self) -> None:
+        """In a forked child: close its copies."""
+        self.release()
 
     def release(self) -> None:
         """Close this process's copies. Another process gets the lock when all copies are closed."""
@@ -133,9 +142,25 @@ def other_sockets(link: Link) -> tuple[str, ...]:
     return tuple(
         f"{_holder_of_socket(inode)} has an EtherCAT packet socket on {raw.name}"
         for raw in raw_links(link)
-        for inode in _ethercat_sockets(raw.name)
-        if inode != os.fstat(raw.fileno()).st_ino
+        for inode in _others(raw)
     )
+
+
+def lasting_sockets(link: Link) -> tuple[str, ...]:
+    """Describe these sockets of others if they are still there after 20 ms.
+
+    A MainDevice that is refused by our lock has opened its socket before, and closes it at once.
+    Without this wait, of two that open at the same time both would be refused.
+    """
+    if not any(_others(raw) for raw in raw_links(link)):
+        return ()
+    _pause(raw_links(link)[0], SETTLE_NS)
+    return other_sockets(link)
+
+
+def _others(raw: RawLink) -> list[int]:
+    own = os.fstat(raw.fileno()).st_ino
+    return [inode for inode in _ethercat_sockets(raw.name) if inode != own]
 
 
 def _ethercat_sockets(name: str) -> list[int]:
