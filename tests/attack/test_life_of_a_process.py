@@ -38,6 +38,22 @@ with warnings.catch_warnings(record=True) as caught:
     del loop
 print([each.category.__name__ for each in caught], state())
 """
+DELETED_ELSEWHERE = """
+import threading
+
+def delete():
+    global loop
+    del loop
+
+thread = threading.Thread(target=delete)
+thread.start()
+thread.join()
+print(state())
+try:
+    os.kill(os.getpid(), signal.SIGTERM)
+except SystemExit:
+    print("still handled")
+"""
 HANGUP = """
 import contextlib
 
@@ -69,12 +85,26 @@ def run(text: str, *, ignored: bool = False) -> tuple[str, str]:
 
 
 def test_a_deleted_loop_is_left_with_a_warning() -> None:
-    assert run(DELETED)[0].startswith("['ResourceWarning'] 2\n")
+    assert run(DELETED)[0].startswith("['RuntimeWarning'] 2\n")
+
+
+def test_axes_are_stopped_where_warnings_are_errors() -> None:
+    out, err = run('import warnings; warnings.simplefilter("error")\ndel loop\nprint(state())')
+    assert out.startswith("2\n")
+    assert "a Loop was not left" in err
+
+
+def test_a_loop_can_be_deleted_in_another_thread() -> None:
+    """The garbage collector runs in any thread."""
+    out, err = run(DELETED_ELSEWHERE)
+    assert out.startswith("2\n")
+    assert "ValueError" not in err
+    assert "still handled" in out
 
 
 def test_a_loop_left_open_is_left_at_the_end() -> None:
     out, err = run("")
-    assert "ResourceWarning: a Loop was not left: its axes are stopped now" in err
+    assert "RuntimeWarning: a Loop was not left: its axes have been stopped" in err
     assert "Traceback" not in err
     assert out == "at the end 2\n"
 

@@ -187,7 +187,9 @@ class Loop:
             raise ValueError(f"cpu={cpu}: one network has one thread, on one CPU")
         self._cpu = cpu
         self._priority = priority
-        self._guard = SignalGuard((Loop.__exit__.__code__, Loop._leave.__code__))
+        self._guard = SignalGuard(
+            (Loop.__exit__.__code__, Loop._leave.__code__, leave_open_loop.__code__)
+        )
         self._running: Running | None = None
         self._iteration: Iteration | None = None
         self._finalizer: weakref.finalize[..., Loop] | None = None
@@ -471,18 +473,15 @@ class Loop:
 
 
 def leave_open_loop(runnings: Sequence[Running], guard: SignalGuard) -> None:
-    """Stop the axes of a loop that nothing refers to any more, and warn."""
+    """Stop the axes of a loop that nothing refers to any more, then warn: a warning may be an
+    error."""
     if not any(running.is_open for running in runnings):
         return
-    warnings.warn(
-        "a Loop was not left: its axes are stopped now. Use it in a with block",
-        ResourceWarning,
-        stacklevel=2,
-    )
     for running in runnings:
         if running.is_open:
             running.stop_axes_at_once()
-    for running in runnings:
-        for problem in running.leave(guard):
-            warnings.warn(f"the loop was not left: {problem}", RuntimeWarning, stacklevel=2)
+    problems = [problem for running in runnings for problem in running.leave(guard)]
     guard.restore()
+    text = "a Loop was not left: its axes have been stopped. Use it in a with block"
+    text += "".join(f"; {problem}" for problem in problems)
+    warnings.warn(text, RuntimeWarning, stacklevel=2)

@@ -46,7 +46,10 @@ class SignalGuard:
         forget_in_child(self)
 
     def restore(self) -> None:
-        """Gives the signals back."""
+        """Give the signals back. In another thread, where Python cannot do that, the handlers stay
+        and do what was done before them."""
+        if threading.current_thread() is not threading.main_thread():
+            return
         while self._before:
             number, before = self._before.popitem()
             signal.signal(number, before)
