@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import socket
 import time
 
@@ -112,3 +113,15 @@ def test_faults_reach_a_served_segment(veth: tuple[str, str]) -> None:
             assert len(counters) < 100_000
     assert counters[0] == 3
     assert set(counters) <= {3, None, 1}
+
+
+def test_a_forked_child_does_not_end_it(veth: tuple[str, str]) -> None:
+    segment = Segment([Coupler()], clock="monotonic")
+    with Server(segment, veth[1], max_age=None) as server, wire(veth[0]) as first:
+        child = os.fork()
+        if child == 0:
+            server.stop()
+            os._exit(0)
+        assert os.waitpid(child, 0)[1] == 0
+        first.send(BRD)
+        assert answer(first) == 1

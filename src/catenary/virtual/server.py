@@ -123,6 +123,7 @@ class Server:
         self._thread = threading.Thread(target=self._run, name="virtual-packets", daemon=True)
         self._started = threading.Event()
         self._ended = threading.Event()
+        self._process = os.getpid()
         self.failure: LinkError | None = None
 
     def _open_second(self, interface: str) -> socket.socket:
@@ -175,7 +176,13 @@ class Server:
             self.segment.plant.check()
 
     def stop(self) -> None:
+        """End the packet loop and release the interfaces. A forked child only closes its copies."""
         if self._socket.fileno() < 0:
+            return
+        if self._process != os.getpid():
+            for copy in (self._socket, self._second):
+                if copy is not None:
+                    copy.close()
             return
         os.eventfd_write(self._stop, 1)
         self._thread.join()
