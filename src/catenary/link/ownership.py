@@ -38,6 +38,10 @@ HINT = (
     "end it first. force=True (--force) opens the interface all the same: two masters then disturb "
     "each other, and a scan stops the devices of both"
 )
+OWN_HINT = (
+    "a MainDevice of this program has it: close() that one first, as a with block does. In a "
+    "notebook, close it before its cell runs again, or restart the kernel"
+)
 
 
 class Ownership:
@@ -65,7 +69,7 @@ class Ownership:
             raise
         if self.others:
             self.release()
-            raise LinkError(f"another EtherCAT master is live: {'; '.join(self.others)}", hint=HINT)
+            raise _refused(self.others)
 
     def _lock(self, raws: Sequence[RawLink], force: bool) -> Iterator[str]:
         """In the order of names, and none after a refusal: else two rings refuse each other."""
@@ -86,6 +90,12 @@ class Ownership:
         """Close this process's copies. Another process gets the lock when all copies are closed."""
         while self._locks:
             self._locks.pop().close()
+
+
+def _refused(others: Sequence[str]) -> LinkError:
+    own = described(os.getpid())
+    hint = OWN_HINT if any(each.startswith(own) for each in others) else HINT
+    return LinkError(f"another EtherCAT master is live: {'; '.join(others)}", hint=hint)
 
 
 def raw_links(link: Link) -> tuple[RawLink, ...]:
