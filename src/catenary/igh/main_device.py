@@ -53,6 +53,13 @@ class MainDevice(bus.MainDevice):
         super().__init__(source)
         self._kernel: KernelCarrier | None = None
 
+    def forget(self) -> None:
+        """In a forked child: let go of the parent's master."""
+        if self._is_inherited and self._kernel is not None:
+            self._kernel.end()
+            self._kernel = self.carrier = None
+        super().forget()
+
     @property
     def reservation(self) -> Reservation:
         """The reserved master."""

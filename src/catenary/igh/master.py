@@ -13,6 +13,7 @@ from catenary.igh._ecrt import KernelTime
 from catenary.igh.beside import Beside
 from catenary.igh.library import Library
 from catenary.igh.refusal import refused, sdo_error
+from catenary.link import forget_in_child
 from catenary.model.device import Identity
 from catenary.wire.al import State
 
@@ -70,6 +71,7 @@ class Reservation:
         self.handle = 0
         self.beside = Beside()
         self.reserve()
+        forget_in_child(self)
 
     @property
     def name(self) -> str:
@@ -109,6 +111,13 @@ class Reservation:
         handle, self.handle = self.handle, 0
         if handle:
             self.beside.end()
+            self.library.ecrt_release_master(handle)
+
+    def forget(self) -> None:
+        """In a forked child: close its copies of the device file and the process data. The kernel
+        takes the master back when all copies are closed, so the parent's goes on."""
+        handle, self.handle = self.handle, 0
+        if handle:
             self.library.ecrt_release_master(handle)
 
     def renew(self) -> None:
