@@ -188,6 +188,22 @@ def test_the_process_of_another_container_is_said_to_be_invisible() -> None:
     assert "invisible here" in ownership.described(0)
 
 
+def test_a_lock_that_the_system_refuses_is_a_link_error(
+    veth: tuple[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ownership, "NAME", "\0" + 200 * "x")  # longer than an address may be
+    with pytest.raises(LinkError, match=f"{veth[0]}: its lock cannot be taken"):
+        cat.MainDevice(veth[0]).open()
+
+
+def test_without_proc_only_locks_and_frames_show_a_master(
+    veth: tuple[str, str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(ownership, "PACKETS", tmp_path / "missing")
+    with cat.MainDevice(veth[0]) as main:
+        assert main.other_masters == ()
+
+
 def test_a_scan_does_not_reset_a_line_in_motion(veth: tuple[str, str], tmp_path: Path) -> None:
     with served(veth[1], tmp_path), looping(veth[0], tmp_path) as loop:
         done = catenary("scan", veth[0])

@@ -116,9 +116,9 @@ def locked(name: str) -> socket.socket | None:
         lock.listen(WAITING)  # from now on, `holder` can ask for its process
     except OSError as error:
         lock.close()
-        if error.errno != errno.EADDRINUSE:
-            raise
-        return None
+        if error.errno == errno.EADDRINUSE:
+            return None
+        raise LinkError(f"{name}: its lock cannot be taken: {error}") from error
     return lock
 
 

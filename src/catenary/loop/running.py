@@ -175,8 +175,8 @@ class Running:
 
     @property
     def is_open(self) -> bool:
-        """Whether its cycle runs."""
-        return self._opened and not self._left
+        """True if its cycle runs, in this process."""
+        return self._opened and not self._left and self._process == os.getpid()
 
     def open(self, origin_ns: int = 0) -> None:
         """From SAFE-OP to OP: the cycle starts, and valid outputs flow while the states change.
