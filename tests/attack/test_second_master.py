@@ -188,6 +188,16 @@ def test_the_process_of_another_container_is_said_to_be_invisible() -> None:
     assert "invisible here" in ownership.described(0)
 
 
+def test_whoever_keeps_the_lock_without_a_right_to_the_interface(veth: tuple[str, str]) -> None:
+    """Any user may bind a name of an abstract socket."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as stranger:
+        stranger.bind(ownership.NAME + veth[0])
+        with pytest.raises(LinkError, match="a process that does not tell its number"):
+            cat.MainDevice(veth[0]).open()
+        with cat.MainDevice(veth[0], force=True) as main:
+            assert veth[0] in main.other_masters[0]
+
+
 def test_a_lock_that_the_system_refuses_is_a_link_error(
     veth: tuple[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
