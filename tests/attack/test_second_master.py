@@ -76,6 +76,22 @@ def test_another_process_is_named(veth: tuple[str, str], tmp_path: Path) -> None
             pass
 
 
+def test_an_error_while_closing_keeps_no_interface(veth: tuple[str, str]) -> None:
+    """As where a loop was left open, and warnings are errors."""
+
+    def leave_loop() -> None:
+        raise RuntimeWarning("the loop was left open")
+
+    main = cat.MainDevice(veth[0])
+    main.open()
+    main._leave_loop = leave_loop
+    with pytest.raises(RuntimeWarning):
+        main.close()
+    assert not main.is_open
+    with cat.MainDevice(veth[0]):
+        pass
+
+
 def test_of_two_that_open_at_the_same_time_one_is_refused(
     veth: tuple[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -159,17 +159,22 @@ class MainDevice:
         self.forget()
         if self._link is None:
             return
-        if self._leave_loop is not None:
-            self._leave_loop()  # a loop that was left open must not go on without its link
         try:
+            if self._leave_loop is not None:
+                self._leave_loop()  # a loop that was left open must not go on without its link
             if self.subs:
                 with contextlib.suppress(CatenaryError):  # the segment may be gone, so we go too
                     self._bring_down(State.INIT)
         finally:
-            link, self._link, self._blocking, self._attached = self._link, None, None, None
-            if self._ownership is not None:
-                self._ownership.release()
+            self._release()
+
+    def _release(self) -> None:
+        link, self._link, self._blocking, self._attached = self.link, None, None, None
+        try:
             link.close()
+        finally:
+            if self._ownership is not None:  # last: the next owner finds no socket of ours
+                self._ownership.release()
             self._callbacks.close()
 
     def on_event(self, callback: Callback) -> None:
