@@ -135,9 +135,10 @@ with cat.MainDevice("virtual") as main:
 print("ended")
 """
 INTERRUPTED = """
-import ctypes, functools, os, signal
+import ctypes, functools, os, signal, warnings
 import catenary as cat
 
+warnings.simplefilter("ignore", DeprecationWarning)  # Python 3.12 warns of a fork with threads
 with cat.MainDevice("virtual") as main:
     arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=1.0)
     with cat.Loop(arm) as loop:
