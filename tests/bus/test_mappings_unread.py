@@ -112,7 +112,7 @@ def test_a_slow_mailbox_does_not_hold_a_plan() -> None:
         odd.application.mailbox.delay(1_600_000_000)
         before = segment.now_ns
         start_up = tuple((0x2200 + k, 0, b"\x00") for k in range(40))
-        with pytest.raises(ResponseTimeout, match="device 1 .* not complete within 60 s"):
+        with pytest.raises(ResponseTimeout, match=r"device 1 .* not complete within 60 s"):
             main.plan(asking(1, OPTIONAL, start_up=start_up))
         assert segment.now_ns - before < 70e9
 
@@ -167,4 +167,3 @@ def test_a_value_that_is_never_sent_is_shown_as_not_read() -> None:
         plan = main.plan(asking(1, POSITION, start_up=((0x6060, 0, b"\x08"),)))
         assert "0x6060:00  (not read) → 08" in str(plan)
         main.configure(plan)
-

@@ -152,9 +152,7 @@ def _prepare(sub: SubDevice, plan: DevicePlan) -> Procedure[None]:
     yield from configure_process_data(sub.station, device, plan)
 
 
-def _write(
-    channel: MailboxChannel, device: DeviceDescription, plan: DevicePlan
-) -> Procedure[None]:
+def _write(channel: MailboxChannel, device: DeviceDescription, plan: DevicePlan) -> Procedure[None]:
     yield from write_downloads(channel, device, plan)
     if plan.mapping_changed:
         yield from verify_mapping(channel, device, plan)

@@ -220,7 +220,8 @@ class Sdo:
 
 def read_each(sub: SubDevice, places: Sequence[tuple[int, int]]) -> Procedure[Objects]:
     """Read objects one after the other. Objects that the device refuses are left out."""
-    return within(EACH_TIMEOUT, sub.station, _read_each(sub.sdo._channel(), places), "its settings were")
+    reading = _read_each(sub.sdo._channel(), places)
+    return (yield from within(EACH_TIMEOUT, sub.station, reading, "its settings were"))
 
 
 def _read_each(channel: MailboxChannel, places: Sequence[tuple[int, int]]) -> Procedure[Objects]:
