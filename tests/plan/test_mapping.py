@@ -90,6 +90,14 @@ def test_a_device_that_denies_pdo_assignment_keeps_its_pdos() -> None:
         make_mapping(device, Direction.INPUT, [FOLLOWING_ERROR])
 
 
+def test_a_device_that_denies_pdo_assignment_gets_no_other_pdo_to_rewrite() -> None:
+    device = servo(0, fixed=True)
+    free = Pdo(0x1A01, (), None)
+    device = may(replace(device, input_pdos=(*device.input_pdos, free)), pdo_assign=False)
+    with pytest.raises(MappingError, match="are fixed, and no other one can be assigned"):
+        make_mapping(device, Direction.INPUT, [FOLLOWING_ERROR])
+
+
 def test_a_list_that_the_dictionary_calls_read_only_is_not_written() -> None:
     device = offering(servo(0))
     [assignment] = device.inputs
