@@ -117,6 +117,14 @@ def test_an_optional_object_never_causes_a_write(offered: bool) -> None:
     assert mapping.left_out == (wanted[1],)
 
 
+def test_an_optional_object_that_is_mapped_with_another_length_is_not_left_out() -> None:
+    """`Drives` uses it as it is."""
+    torque = ObjectReference(0x6077, 0, 32, required=False)  # 16 bits are mapped
+    mapping = make_mapping(servo(0), Direction.INPUT, [POSITION, torque])
+    assert not mapping.changed
+    assert mapping.left_out == ()
+
+
 def test_a_rewrite_for_a_required_object_leaves_optional_ones_out() -> None:
     """The device could refuse them, though it would take the required one."""
     other = ObjectReference(0x60FD, 0, 32, required=False)
