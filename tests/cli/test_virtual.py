@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from catenary.cli import main
+from catenary.cli.main import main
 from catenary.realtime import scheduling
 from catenary.realtime.child import start_python
 from catenary.wire.datagram import Command, Datagram

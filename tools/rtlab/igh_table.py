@@ -167,7 +167,7 @@ def rings() -> Iterator[dict[str, Any]]:
         except ConfigurationError as refusal:
             found["refused"] = str(refusal)
         except NoDeviceError:
-            found["left_out"] = "the module was built for one interface"
+            found["left_out"] = "no device found: is the module built for one interface?"
     yield found
 
 
