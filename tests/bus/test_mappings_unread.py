@@ -167,3 +167,22 @@ def test_a_value_that_is_never_sent_is_shown_as_not_read() -> None:
         plan = main.plan(asking(1, POSITION, start_up=((0x6060, 0, b"\x08"),)))
         assert "0x6060:00  (not read) → 08" in str(plan)
         main.configure(plan)
+
+
+def test_a_synchronisation_type_that_is_refused_oddly_does_not_end_a_bring_up() -> None:
+    """0x08000000, a general error, instead of the code for an object that does not exist."""
+    odd = Servo()
+    segment = make_segment(odd)
+
+    def refuse(payload: bytes) -> list[bytes] | None:
+        if payload[3:5] not in (b"\x32\x1c", b"\x33\x1c"):
+            return None
+        return [struct.pack("<HB", 0x2000, 0x80) + payload[3:6] + struct.pack("<I", 0x0800_0000)]
+
+    answer_uploads(odd, refuse)
+    with MainDevice(segment) as main:
+        main.scan()
+        arm = cat.Drives(main.subs.drives, counts_per_turn=2**20, velocity_limit=100.0, dc=True)
+        with cat.Loop(arm) as loop:
+            next(loop)
+            assert {device.state for device in segment} == {8}
