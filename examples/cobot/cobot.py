@@ -120,7 +120,7 @@ def main_control(place, cost, period, target, share, state, torque, phase, rows,
     with cat.MainDevice(read_segment(target, clock=place) if place else target) as main:
         arm = cat.Drives(main.scan().drives, mode="cst", required=False, **AXES)
         recovery, measured = cat.Recovery(arm), Measured(virtual=bool(place))
-        with cat.Loop(arm, sink=share, lost_limit=PATIENCE, watchdog=0.02, **options) as loop:
+        with cat.Loop(arm, sink=share, watchdog=0.02, **options) as loop:
             for cycle in loop:
                 q, v = arm.actual.position, arm.actual.velocity
                 row = rows.take()
@@ -135,6 +135,8 @@ def main_control(place, cost, period, target, share, state, torque, phase, rows,
                     arm.target.torque[i] = control.cascade(memory, parameters, i, *joint, period)
                 cycle.spend(cost)
                 lost = 0 if arm.present.all() else lost + 1
+                if lost > PATIENCE:
+                    raise cat.CatenaryError(f"the bus has been lost for {PATIENCE} cycles")
                 silence = [each.look() for each in silences]
                 before, handled = handled, hit.number
                 signs = {"key": handled > before, "lost bus": lost > 1, "dry set-points": dry}
