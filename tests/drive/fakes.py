@@ -9,7 +9,8 @@ import numpy as np
 
 from catenary.errors import SdoAbort
 from catenary.plan.cycle import Number, NumberKind
-from catenary.plan.wish import ANY, PdoWish, Views, Which, WishTables
+from catenary.plan.numbers import ANY, Which
+from catenary.plan.wish import PdoWish, Views, WishTables
 
 
 @dataclass

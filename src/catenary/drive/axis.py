@@ -15,7 +15,8 @@ from catenary.drive.units import AxisUnits
 from catenary.errors import MappingError
 from catenary.plan.axis_report import AxisReport
 from catenary.plan.cycle import AxisPlan, Bank, Column, Number, NumberKind
-from catenary.plan.wish import ImageLayout, PdoWish, Which, WrittenPdo
+from catenary.plan.numbers import Which
+from catenary.plan.wish import ImageLayout, PdoWish, WrittenPdo
 from catenary.wire.cia402 import SLOT_OFFSET, Mode
 
 TARGETS: dict[int, AxisObject] = {

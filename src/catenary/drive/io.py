@@ -12,10 +12,10 @@ from catenary.drive.arguments import PdoList, clock_wish, cycles_between, writte
 from catenary.errors import MappingError
 from catenary.model.device import Assignment, DeviceDescription, Direction, Entry, Pdo
 from catenary.plan.cycle import Bank, Column, NumberKind
+from catenary.plan.numbers import ANY, Which
 from catenary.plan.pdo_rewrite import write_down
 from catenary.plan.pdo_search import pdo_names
 from catenary.plan.wish import (
-    ANY,
     Bytes,
     DistributedClock,
     ImageLayout,
@@ -24,7 +24,6 @@ from catenary.plan.wish import (
     PdoWish,
     Reals,
     Views,
-    Which,
     WishTables,
     WrittenPdo,
 )

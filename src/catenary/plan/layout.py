@@ -24,8 +24,7 @@ from dataclasses import dataclass
 from catenary.errors import ConfigurationError, MappingError
 from catenary.model.device import Assignment, DeviceDescription, Direction
 from catenary.plan.cycle import Number
-from catenary.plan.numbers import MappedNumber, find_number, numbers
-from catenary.plan.wish import ANY, Which
+from catenary.plan.numbers import ANY, MappedNumber, Which, find_number, numbers
 from catenary.wire.sync_manager import WATCHDOG_TRIGGER
 
 LOGICAL_BASE = 0x0001_0000

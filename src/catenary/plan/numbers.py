@@ -8,8 +8,18 @@ from typing import NamedTuple
 
 from catenary.model.device import Assignment, Entry, Pdo
 from catenary.plan.cycle import Number, NumberKind
-from catenary.plan.wish import Which
 from catenary.types import Integer, Real, by_index
+
+
+class Which(NamedTuple):
+    """Selection of one place where an object is mapped more than once. 0: any."""
+
+    pdo: int = 0
+    bit_length: int = 0
+    rank: int = 0  # among those that are alike
+
+
+ANY = Which()
 
 
 class EntryPlace(NamedTuple):

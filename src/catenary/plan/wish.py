@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,7 @@ import numpy.typing as npt
 from catenary.model.device import Direction
 from catenary.plan.axis_report import AxisReport
 from catenary.plan.cycle import AxisPlan, Column, Number
+from catenary.plan.numbers import ANY, Which
 
 Reals = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -126,17 +127,6 @@ class PdoWish:
     def written(self, direction: Direction) -> tuple[WrittenPdo, ...]:
         """Return the PDOs of a direction that the application wrote down."""
         return tuple(pdo for pdo in self.pdos if pdo.direction is direction)
-
-
-class Which(NamedTuple):
-    """Which one is meant where an object is mapped more than once. 0: any."""
-
-    pdo: int = 0
-    bit_length: int = 0
-    rank: int = 0  # among those that are alike
-
-
-ANY = Which()
 
 
 class ImageLayout(Protocol):

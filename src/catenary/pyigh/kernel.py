@@ -11,7 +11,7 @@ from catenary.igh.configure import Domain
 from catenary.model.device import Direction
 from catenary.plan.cycle import Number
 from catenary.plan.make import Plan
-from catenary.plan.wish import Which
+from catenary.plan.numbers import Which
 from catenary.pyigh.slaves import Cell, RawObject, SlaveBase
 
 if TYPE_CHECKING:

@@ -9,7 +9,8 @@ from typing import Protocol
 from catenary.errors import ConfigurationError, DriveError, MappingError
 from catenary.model.device import DeviceDescription, Direction, mapped_entries
 from catenary.plan.cycle import Bank, Column, NumberKind
-from catenary.plan.wish import ImageLayout, ObjectReference, PdoWish, Which, WishTables
+from catenary.plan.numbers import Which
+from catenary.plan.wish import ImageLayout, ObjectReference, PdoWish, WishTables
 from catenary.wire.cia402 import Mode, Object, State, state_of
 
 COMMANDS = {
