@@ -198,6 +198,25 @@ while arm.number < before + 100 and arm.wait(timeout=10.0):
     pass
 print(arm.number >= before + 100)
 """
+BADLY_NAMED_OPERATOR = f"""
+from pathlib import Path
+import catenary as cat
+with cat.attach("arm", uid={ALICE}) as arm, arm.lease(axes=[0], for_=600.0) as command:
+    Path("/proc/self/comm").write_bytes(b"\\xff) Z 1")
+    before = arm.number
+    while arm.number < before + 100 and arm.wait(timeout=10.0):
+        command.send(position=0.0)
+    print(arm.number >= before + 100)
+"""
+
+
+def test_an_operators_process_can_have_any_name(machine: Machine) -> None:
+    """The loop asks the kernel for it. A name that is not UTF-8 ended the loop."""
+    make_group_folder(machine)
+    with machine.started(ALICE, LOOP, "660", group=True) as loop:
+        assert loop.line() == "running"
+        assert machine.run(BOB, BADLY_NAMED_OPERATOR, group=True) == ["True"]
+        assert "released" in loop.line()
 
 
 def test_an_operator_cannot_break_the_loop(machine: Machine) -> None:
