@@ -64,7 +64,7 @@ def user_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("file_mode", "folder_mode"), [(0o600, 0o700), (0o640, 0o710), (0o604, 0o701), (0o664, 0o711)]
+    ("file_mode", "folder_mode"), [(0o600, 0o700), (0o640, 0o711), (0o604, 0o711), (0o664, 0o711)]
 )
 def test_others_can_pass_where_a_file_is_for_them(
     user_folders: Path, file_mode: int, folder_mode: int
@@ -99,9 +99,12 @@ def test_a_common_folder_that_everybody_may_write_is_not_used(
     monkeypatch.setattr(folder, "GROUP_FOLDER", common)
     common.chmod(0o777)
     assert folder.own_folder() == folder.user_folder(os.geteuid())
-    common.chmod(0o755)
+    common.chmod(0o2770)  # not sticky: its group could replace the files of others
+    assert folder.own_folder() == folder.user_folder(os.geteuid())
     if os.geteuid() == 0:  # else it is not root's
-        assert folder.own_folder() == common
+        for mode in (0o755, 0o3771):
+            common.chmod(mode)
+            assert folder.own_folder() == common
 
 
 def test_what_is_not_there(user_folders: Path) -> None:

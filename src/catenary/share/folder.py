@@ -154,17 +154,25 @@ def remove_old_drafts(folder: Path) -> None:
 
 
 def _is_group_folder() -> bool:
-    """True if the folder belongs to root, and not all users can write in it."""
+    """True if the folder belongs to root, not all users can write in it, and it is sticky.
+
+    Without the sticky bit, its group could rename and remove the files of others.
+    """
     try:
         status = GROUP_FOLDER.lstat()
     except OSError:
         return False
-    return stat.S_ISDIR(status.st_mode) and status.st_uid == 0 and not status.st_mode & 0o002
+    mode = status.st_mode
+    closed = not mode & 0o002 and (mode & stat.S_ISVTX or not mode & 0o020)
+    return stat.S_ISDIR(mode) and status.st_uid == 0 and bool(closed)
 
 
 def _passage(mode: int) -> int:
-    """Return the search permissions that files of `mode` need from their folder."""
-    return (0o010 if mode & 0o070 else 0) | (0o001 if mode & 0o007 else 0)
+    """Return the search permissions that files of `mode` need from their folder.
+
+    All users pass: the group of a file can be another one than that of its folder (newgrp(1)).
+    """
+    return 0o011 if mode & 0o077 else 0
 
 
 def _lock(descriptor: int, folder: Path) -> None:
