@@ -39,6 +39,10 @@ with cat.attach("arm", uid={ALICE}) as arm, arm.lease(axes=[0], for_=600.0) as c
         arm.wait(timeout=10.0)
     print("moved")
 """
+TRY_NAMESPACE = """
+import subprocess
+print(subprocess.run(["unshare", "--user", "--map-root-user", "true"]).returncode)
+"""
 SAY = """
 import catenary as cat
 def said(action):
@@ -110,6 +114,22 @@ def test_who_takes_a_users_folder_is_named(machine: Machine) -> None:
     assert f"was made by user {MALLORY}, not by you" in line
     make_group_folder(machine)
     assert machine.run(ALICE, take, group=True) == ["done"]
+
+
+def test_users_in_namespaces_of_their_own_take_no_folder_of_root(machine: Machine) -> None:
+    """Each is root in a private network without privileges."""
+    take = f"""
+import subprocess, sys
+program = {f'{SAY}said(lambda: cat.share.Mutex("tool"))'!r}
+private = ["unshare", "--user", "--map-root-user"] if len(sys.argv) > 1 else []
+subprocess.run([*private, sys.executable, "-c", program], check=True)
+"""
+    for user in (ALICE, BOB):
+        if machine.run(user, TRY_NAMESPACE) != ["0"]:
+            pytest.skip("no user namespaces for ordinary users")
+        assert machine.run(user, take, "private") == ["done"]
+        assert machine.run(user, take) == ["done"]  # the same mutex
+    assert machine.run(0, take) == ["done"]
 
 
 def test_a_share_of_another_user_is_refused_unless_asked_for(machine: Machine) -> None:

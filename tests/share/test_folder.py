@@ -77,6 +77,16 @@ def test_others_can_pass_where_a_file_is_for_them(
     assert own.stat().st_mode & 0o7777 == folder_mode
 
 
+def test_a_folder_has_the_users_id_outside_of_the_namespace(
+    user_folders: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An ordinary user is root in a private network, and took the folder of the real one."""
+    (tmp_path / "uid_map").write_text("         0      64001          1\n")
+    monkeypatch.setattr(folder, "USER_IDS", tmp_path / "uid_map")
+    assert folder.user_folder(0) == user_folders / "catenary-64001"
+    assert folder.user_folder(7) == user_folders / "catenary-7"  # it has no id there
+
+
 def test_a_folder_that_was_open_is_closed(user_folders: Path) -> None:
     own = folder.own_folder()
     own.mkdir()

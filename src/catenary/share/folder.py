@@ -22,6 +22,7 @@ from catenary.share.process import is_running
 
 GROUP_FOLDER = Path("/run/catenary")
 USER_FOLDERS = Path("/dev/shm")
+USER_IDS = Path("/proc/self/uid_map")
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 STATE, SOCKET, MUTEX = "share", "socket", "mutex"  # a file's name begins with its kind
 DRAFT = ".draft-"
@@ -48,7 +49,11 @@ def own_folder() -> Path:
 
 
 def user_folder(uid: int) -> Path:
-    return USER_FOLDERS / f"catenary-{uid}"
+    """Return the folder of a user, named after the id outside of this user namespace.
+
+    Without privileges, a private network has a user namespace in which everybody is root.
+    """
+    return USER_FOLDERS / f"catenary-{_outside(uid)}"
 
 
 def prepare(folder: Path, mode: int) -> None:
@@ -151,6 +156,16 @@ def remove_old_drafts(folder: Path) -> None:
         with suppress(OSError):  # another user's, or already removed
             if time.time() - path.lstat().st_mtime > DRAFT_AGE:
                 path.unlink()
+
+
+def _outside(uid: int) -> int:
+    """Return a user's id in the parent of this user namespace: user_namespaces(7)."""
+    with suppress(OSError):
+        for line in USER_IDS.read_text().splitlines():
+            inside, outside, count = map(int, line.split())
+            if inside <= uid < inside + count:
+                return outside + uid - inside
+    return uid
 
 
 def _is_group_folder() -> bool:
