@@ -268,7 +268,7 @@ def test_what_a_killed_program_left_in_op_is_reset_and_reported(
         with cat.MainDevice(veth[0]) as main:
             main.scan()
             assert "device 0 in OP" in main.notes[0]
-            assert "left so by another program" in main.notes[0]
+            assert "left by another program" in main.notes[0]
             assert {str(sub.state) for sub in main.subs} == {"PRE-OP"}
 
 

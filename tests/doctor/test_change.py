@@ -214,7 +214,7 @@ def test_a_state_file_of_another_user_is_refused(state):
 def test_a_state_file_that_others_can_write_is_refused(state, mode):
     state.save([Made(HUGE_PAGES, "always", "madvise")])
     state.path.chmod(mode)
-    with pytest.raises(StateError, match="what it says is not written to this machine"):
+    with pytest.raises(StateError, match="its content is not written to this machine"):
         state.load()
 
 

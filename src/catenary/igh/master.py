@@ -181,7 +181,7 @@ class Reservation:
 
         In INIT nothing answers an SDO, and an application that has just given the master back
         leaves the devices on the way down. One with Ethernet over EtherCAT may stay in OP: it
-        answers there, too. A device may be lost meanwhile: each look asks for those that are there.
+        answers there, too. Devices may be lost meanwhile: only those that are present count.
 
         Args:
             patience: How long no state may change, if none is INIT [s].

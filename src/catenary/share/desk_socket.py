@@ -1,8 +1,8 @@
 """The socket next to a share: over it, clients get the memory for their commands (SCM_RIGHTS).
 
-The memory itself has no name, because a file of a name can be truncated by whoever may write in it,
-and the loop would get a SIGBUS. unix(7), memfd_create(2). The kernel checks the socket's
-permissions when a client connects; the client checks with SO_PEERCRED who answers.
+The memory has no name, because whoever may write in a file can truncate it: the loop would get a
+SIGBUS. The kernel checks the socket's permissions when a client connects. The client checks with
+SO_PEERCRED which user answers. unix(7), memfd_create(2).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ ANSWER = b"desk"
 BACKLOG = 16
 PATIENCE = 2.0  # [s]
 RETRY = 0.1  # [s] after an accept that failed: the process has no descriptor left
-PAUSE = 0.002  # [s] after each client, and until the next attempt of a client that found a queue
+PAUSE = 0.002  # [s] after each client; before a client tries again
 CREDENTIALS = struct.Struct("3i")  # pid, uid, gid: struct ucred
 
 
@@ -84,7 +84,7 @@ def request_descriptor(path: Path, owner: int) -> int:
 
     Raises:
         FileNotFoundError, PermissionError: from the kernel.
-        ShareError: nobody answers, or not a process of user `owner`.
+        ShareError: no process answers, or one that is not of user `owner`.
     """
     flags = socket.SOCK_SEQPACKET | socket.SOCK_CLOEXEC
     with socket.socket(socket.AF_UNIX, flags) as asking:
@@ -107,7 +107,7 @@ def request_descriptor(path: Path, owner: int) -> int:
 
 
 def _connect(asking: socket.socket, path: Path) -> None:
-    """Connect, also if other clients fill the queue now: the kernel then refuses with EAGAIN."""
+    """Connect. While other clients fill the queue, the kernel refuses with EAGAIN: try again."""
     deadline = time.monotonic() + PATIENCE
     while True:
         try:

@@ -27,7 +27,7 @@ NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 STATE, SOCKET, MUTEX = "share", "socket", "mutex"  # a file's name begins with its kind
 DRAFT = ".draft-"
 DRAFT_AGE = 60.0  # [s] a draft exists for milliseconds
-LOCK_PATIENCE = 2.0  # [s] so does a lock
+LOCK_PATIENCE = 2.0  # [s] a lock lasts as briefly
 LOCK_PAUSE = 0.005
 
 
@@ -51,7 +51,7 @@ def own_folder() -> Path:
 def user_folder(uid: int) -> Path:
     """Return the folder of a user, named after the id outside of this user namespace.
 
-    Without privileges, a private network has a user namespace in which everybody is root.
+    An ordinary user is root in the user namespace of a private network.
     """
     return USER_FOLDERS / f"catenary-{_outside(uid)}"
 
@@ -143,7 +143,7 @@ def deciding(folder: Path) -> Iterator[None]:
 
 
 def draft_path(folder: Path) -> Path:
-    """Return a name that no reader looks for. A socket's path has at most 107 bytes."""
+    """Return a name that readers do not open. A socket's path has at most 107 bytes."""
     return folder / f"{DRAFT}{os.getpid()}-{os.urandom(4).hex()}"
 
 

@@ -26,7 +26,7 @@ class Process(msgspec.Struct, frozen=True):
         return _start_time(self.pid) == self.start_time and self.boot_id == _boot_id()
 
     def __str__(self) -> str:
-        """The command is the process' own word: control characters are shown as '?'."""
+        """Return number and command. Control characters in the command become '?'."""
         command = "".join(c if c.isprintable() else "?" for c in self.command)
         return f"process {self.pid} ({command})" if command else f"process {self.pid}"
 

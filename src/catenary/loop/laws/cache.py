@@ -1,6 +1,6 @@
 """The cache of compiled laws: Numba's format, in a folder that only this user can write.
 
-Numba unpickles what it finds in its cache: who can write there runs code as the user of the law.
+Numba unpickles the files of its cache: a user who can write there runs code as the user of the law.
 Numba's own choice is `__pycache__` next to the source, which may belong to another user, be
 writable for a group, or be set by $NUMBA_CACHE_DIR. Ours is ~/.cache/catenary/laws (below
 $XDG_CACHE_HOME if that is set), with mode 0700.
@@ -110,7 +110,7 @@ def _refuse_foreign(place: Path, status: os.stat_result) -> None:
 
 
 def _cache_class(folder: Path) -> Any:
-    """Return Numba's cache with our place and our key. Its own choice of a place is left out."""
+    """Return Numba's cache with our folder and our key, instead of its own choice of a folder."""
     caching: Any = import_module("numba.core.caching")
 
     class Files(caching.CompileResultCacheImpl):  # type: ignore[misc]
@@ -144,7 +144,7 @@ def _cache_class(folder: Path) -> Any:
                 return None
 
         def save_overload(self, signature: Any, data: Any) -> None:
-            with suppress(OSError):  # no room: the law runs without
+            with suppress(OSError):  # the disk is full: the law runs without
                 super().save_overload(signature, data)
 
     return LawCache
