@@ -169,7 +169,7 @@ def test_the_segment_at_the_other_end_is_not_a_master(
 
 
 def test_frames_of_a_master_elsewhere(veth: tuple[str, str], tmp_path: Path) -> None:
-    """It sends from the other end of the line, so this machine has neither lock nor socket."""
+    """A master at the other end of the line: neither its lock nor its socket is here."""
     with program(SENDER, tmp_path, veth[1], FRAME.hex()) as sender:
         assert sender.read_line(START) == "sending"
         with pytest.raises(LinkError, match=f"frames of another master arrive on {veth[0]}"):

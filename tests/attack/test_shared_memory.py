@@ -117,7 +117,7 @@ def test_who_takes_a_users_folder_is_named(machine: Machine) -> None:
 
 
 def test_users_in_namespaces_of_their_own_take_no_folder_of_root(machine: Machine) -> None:
-    """Each is root in a private network without privileges."""
+    """An ordinary user is root in a private network, and took the folder of the real root."""
     take = f"""
 import subprocess, sys
 program = {f'{SAY}said(lambda: cat.share.Mutex("tool"))'!r}
@@ -133,7 +133,7 @@ subprocess.run([*private, sys.executable, "-c", program], check=True)
 
 
 def test_a_share_of_another_user_is_refused_unless_asked_for(machine: Machine) -> None:
-    """The owner of a share can crash its readers: SIGBUS where it truncates the file."""
+    """The owner of a share can crash its readers by truncating the file (SIGBUS)."""
     make_group_folder(machine)
     with machine.started(MALLORY, LOOP, "644", group=True) as loop:
         assert loop.line() == "running"
@@ -153,7 +153,7 @@ def test_roots_share_needs_no_word(machine: Machine) -> None:
 
 
 def test_a_mutex_of_another_user_is_refused_unless_asked_for(machine: Machine) -> None:
-    """Its robust list holds pointers: a made file crashed the C library (SIGSEGV)."""
+    """Its robust list holds pointers: a forged file crashed the C library (SIGSEGV)."""
     make_group_folder(machine)
     evil = """
 import os
@@ -240,7 +240,7 @@ def test_an_operators_process_can_have_any_name(machine: Machine) -> None:
 
 
 def test_an_operator_cannot_break_the_loop(machine: Machine) -> None:
-    """Bob may command. He cannot shorten any memory that the loop uses, nor hang it by numbers."""
+    """Bob may command. He cannot shorten memory that the loop uses, or hang it by numbers."""
     make_group_folder(machine)
     with machine.started(ALICE, LOOP, "660", group=True) as loop:
         assert loop.line() == "running"

@@ -148,7 +148,7 @@ def test_files_of_a_machine(tmp_path, state):
 
 
 def test_every_change_of_the_checks_can_be_made_and_undone(tmp_path, state):
-    """Their targets are in the list of what may be written."""
+    """The targets of all changes are in `TARGETS`."""
     laptop = machines.make(tmp_path, machines.LAPTOP)
     changes = examine(laptop).changes
     files = [change for change in changes if not change.target.startswith("ethtool:")]
@@ -173,7 +173,7 @@ def test_every_change_of_the_checks_can_be_made_and_undone(tmp_path, state):
     ],
 )
 def test_nothing_outside_of_the_list_is_written(tmp_path, state, target):
-    """A state file that a test, or an attacker, has written."""
+    """A state file with any content."""
     (tmp_path / "etc").mkdir()
     (tmp_path / "etc" / "passwd").write_text("root")
     for parts in ("etc", "proc/sys/kernel", "sys/kernel/mm/transparent_hugepage/enabled"):

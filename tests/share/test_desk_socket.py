@@ -1,4 +1,4 @@
-"""The socket that hands out the memory for commands: who answers, and who does not."""
+"""The socket that sends clients the memory for commands: answers, silence and deadlines."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_a_full_queue_is_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         with pytest.raises(ShareError, match="Resource temporarily unavailable"):
             request_descriptor(tmp_path / "socket-x", os.geteuid())
         monkeypatch.setattr("time.sleep", lambda seconds: full.accept()[0].close())
-        with pytest.raises(ShareError, match="timed out"):  # connected, but nobody answers
+        with pytest.raises(ShareError, match="timed out"):  # connected, but without an answer
             request_descriptor(tmp_path / "socket-x", os.geteuid())
         first.close()
 

@@ -1,4 +1,4 @@
-"""Folders of shares: locks with a deadline, drafts that a kill has left, whose files are found."""
+"""Folders of shares: locks with a deadline, drafts of killed processes, owners of files."""
 
 from __future__ import annotations
 
