@@ -111,7 +111,7 @@ def test_who_takes_a_users_folder_is_named(machine: Machine) -> None:
     assert machine.run(MALLORY, f"import os; os.mkdir('/dev/shm/catenary-{ALICE}', 0o777)") == []
     take = f'{SAY}\nsaid(lambda: cat.share.Mutex("tool"))'
     [line] = machine.run(ALICE, take)
-    assert f"was made by user {MALLORY}, not by you" in line
+    assert f"belongs to user {MALLORY} (you are {ALICE})" in line
     make_group_folder(machine)
     assert machine.run(ALICE, take, group=True) == ["done"]
 

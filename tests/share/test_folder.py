@@ -97,7 +97,7 @@ def test_a_folder_that_was_open_is_closed(user_folders: Path) -> None:
 
 def test_what_is_in_the_folders_place_is_refused(user_folders: Path) -> None:
     folder.own_folder().touch()
-    with pytest.raises(ShareError, match="was made by user"):
+    with pytest.raises(ShareError, match="and is not a folder"):
         folder.prepare(folder.own_folder(), 0o600)
 
 

@@ -66,9 +66,10 @@ def prepare(folder: Path, mode: int) -> None:
     with suppress(FileExistsError):
         folder.mkdir(0o700)
     status = folder.lstat()
-    if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.geteuid():
+    kind = "" if stat.S_ISDIR(status.st_mode) else ", and is not a folder"
+    if kind or status.st_uid != os.geteuid():
         raise ShareError(
-            f"{folder} was made by user {status.st_uid}, not by you (user {os.geteuid()})",
+            f"{folder} belongs to user {status.st_uid} (you are {os.geteuid()}){kind}",
             hint="remove it as root; `sudo catenary doctor --apply` creates /run/catenary instead",
         )
     present = stat.S_IMODE(status.st_mode)
