@@ -208,7 +208,7 @@ def test_whoever_keeps_the_lock_without_a_right_to_the_interface(veth: tuple[str
     """Any user may bind a name of an abstract socket."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as stranger:
         stranger.bind(ownership.NAME + veth[0])
-        with pytest.raises(LinkError, match="a process that does not tell its number"):
+        with pytest.raises(LinkError, match="a process that does not report its number"):
             cat.MainDevice(veth[0]).open()
         with cat.MainDevice(veth[0], force=True) as main:
             assert veth[0] in main.other_masters[0]

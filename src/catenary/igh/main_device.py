@@ -54,7 +54,7 @@ class MainDevice(bus.MainDevice):
         self._kernel: KernelCarrier | None = None
 
     def forget(self) -> None:
-        """In a forked child: let go of the parent's master."""
+        """Let go of the parent's master in a forked child."""
         if self._is_inherited and self._kernel is not None:
             self._kernel.end()
             self._kernel = self.carrier = None

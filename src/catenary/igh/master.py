@@ -114,8 +114,8 @@ class Reservation:
             self.library.ecrt_release_master(handle)
 
     def forget(self) -> None:
-        """In a forked child: close its copies of the device file and the process data. The kernel
-        takes the master back when all copies are closed, so the parent's goes on."""
+        """Close the copies of a forked child: device file and process data. The kernel takes the
+        master back when all copies are closed, so the parent's goes on."""
         handle, self.handle = self.handle, 0
         if handle:
             self.library.ecrt_release_master(handle)

@@ -72,7 +72,11 @@ class Ownership:
             raise _refused(self.others)
 
     def _lock(self, raws: Sequence[RawLink], force: bool) -> Iterator[str]:
-        """In the order of names, and none after a refusal: else two rings refuse each other."""
+        """Take the locks in the order of names. Yield the holder of one that is taken; stop there
+        unless `force`.
+
+        Without this order, two rings would refuse each other.
+        """
         for raw in sorted(raws, key=lambda each: each.name):
             lock = locked(raw.name)
             if lock is not None:
@@ -83,7 +87,7 @@ class Ownership:
                 return
 
     def forget(self) -> None:
-        """In a forked child: close its copies."""
+        """Close the copies of a forked child."""
         self.release()
 
     def release(self) -> None:
