@@ -90,6 +90,14 @@ def test_a_device_that_denies_pdo_assignment_keeps_its_pdos() -> None:
         make_mapping(device, Direction.INPUT, [FOLLOWING_ERROR])
 
 
+def test_a_device_that_denies_pdo_assignment_gets_no_other_pdo_to_rewrite() -> None:
+    device = servo(0, fixed=True)
+    free = Pdo(0x1A01, (), None)
+    device = may(replace(device, input_pdos=(*device.input_pdos, free)), pdo_assign=False)
+    with pytest.raises(MappingError, match="are fixed, and no other one can be assigned"):
+        make_mapping(device, Direction.INPUT, [FOLLOWING_ERROR])
+
+
 def test_a_list_that_the_dictionary_calls_read_only_is_not_written() -> None:
     device = offering(servo(0))
     [assignment] = device.inputs
@@ -107,6 +115,14 @@ def test_an_optional_object_never_causes_a_write(offered: bool) -> None:
     mapping = make_mapping(device, Direction.INPUT, wanted)
     assert not mapping.changed
     assert mapping.left_out == (wanted[1],)
+
+
+def test_an_optional_object_that_is_mapped_with_another_length_is_not_left_out() -> None:
+    """`Drives` uses it as it is."""
+    torque = ObjectReference(0x6077, 0, 32, required=False)  # 16 bits are mapped
+    mapping = make_mapping(servo(0), Direction.INPUT, [POSITION, torque])
+    assert not mapping.changed
+    assert mapping.left_out == ()
 
 
 def test_a_rewrite_for_a_required_object_leaves_optional_ones_out() -> None:

@@ -219,6 +219,32 @@ def test_a_repetition_of_what_was_accepted_before_is_dropped() -> None:
     assert lane.dropped == 1
 
 
+@pytest.mark.parametrize("counter", [0, 1])
+def test_repetitions_of_one_question_do_not_hide_the_answer_to_the_next(counter: int) -> None:
+    """Two reads of one answer are lost, so two repetitions are requested and one arrives. Equal
+    answers to the next questions are not repetitions."""
+    device = MailboxDevice(lambda message: Dictionary({(0x2000, 0): values.pop(0)})(message))
+    values = [b"\x01", b"\x02", b"\x02", b"\x02"]
+    device.next_counter = lambda: counter
+    lane = channel()
+    assert play(upload(lane, 0x2000, 0), device) == b"\x01"
+    device.lose_back = {3, 4}  # 0 and 1 are the first write and read
+    assert [play(upload(lane, 0x2000, 0), device) for _ in range(3)] == [b"\x02"] * 3
+
+
+def test_a_device_that_cannot_repeat_answers_the_next_question() -> None:
+    """The read is lost, and so is the answer. The next one equals the last accepted one."""
+    device = MailboxDevice(Dictionary(OBJECT))
+    device.next_counter = lambda: 1
+    device.repeats = False
+    lane = channel()
+    assert [play(upload(lane, 0x2000, 0), device) for _ in range(2)] == [OBJECT[0x2000, 0]] * 2
+    device.lose_back = {5}
+    with pytest.raises(MailboxError, match="does not acknowledge the repeat request"):
+        play(upload(lane, 0x2000, 0), device)
+    assert play(upload(lane, 0x2000, 0), device) == OBJECT[0x2000, 0]
+
+
 def test_a_length_beyond_the_mailbox_is_the_devices_fault() -> None:
     device = MailboxDevice(Dictionary(OBJECT))
     device.spoil = lambda data: (60000).to_bytes(2, "little") + data[2:]

@@ -49,3 +49,15 @@ def test_a_device_that_describes_nothing_delays_a_scan_by_seconds_only() -> None
 def test_what_the_sii_names_is_not_asked_for() -> None:
     malformed = MailboxQuirks(malformed_descriptions=(*MAPPED, 0x1600, 0x1A00))
     assert names(Servo(mailbox_quirks=malformed)) == names(Servo())
+
+
+def test_types_of_the_dictionary_are_those_the_sii_would_have() -> None:
+    """Without them a negative position would be read as a large positive one."""
+
+    def types(device: AppliedDevice) -> list[int]:
+        with cat.MainDevice(Segment([device])) as main:
+            [assignment] = main.scan()[0].description.inputs
+            return [entry.data_type for pdo in assignment.pdos for entry in pdo.entries]
+
+    assert types(Servo(sii_quirks=SiiQuirks(pdos="absent"))) == types(Servo())
+    assert all(types(Servo()))

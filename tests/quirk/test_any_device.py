@@ -12,14 +12,16 @@ from hypothesis import strategies as st
 
 import catenary as cat
 from catenary.errors import CatenaryError
+from catenary.plan import ObjectReference, PdoWish
 from catenary.types import UDINT
 from catenary.virtual import Coupler, DigitalOutputs, Segment, Servo
 from catenary.virtual.devices.application import Application
 from catenary.virtual.sii_image import checksum
 from catenary.wire.al import State
+from tests.plan.devices import Asking
 
 STRANGE, SOUND = 2, 3  # positions
-SCAN_MAX, LIST_MAX = 65.0, 120.0  # [s] of virtual time
+SCAN_MAX, LIST_MAX, PLAN_MAX = 65.0, 120.0, 70.0  # [s] of virtual time
 COE = 3
 SDO_REQUEST, SDO_RESPONSE, SDO_INFORMATION = 2, 3, 8
 
@@ -158,6 +160,22 @@ def assert_others_are_found(segment: Segment) -> None:
         assert_named(subs[STRANGE].error)
         if subs[STRANGE].error is None:
             assert_listed(main, subs[STRANGE])
+            assert_planned(main, SOUND)
+            assert_planned(main, STRANGE)
+
+
+def assert_planned(main: cat.MainDevice, position: int) -> None:
+    """A plan is made in a bounded time, or the error names the strange device."""
+    wish = PdoWish(
+        inputs=(ObjectReference(0x6041, 0, 16), ObjectReference(0x60F4, 0, 32, required=False)),
+        start_up=((0x6060, 0, b"\x08"),),
+    )
+    before = main.link.now()
+    try:
+        main.plan(Asking({position: wish}))
+    except CatenaryError as error:
+        assert_named(error)
+    assert main.link.now() - before < PLAN_MAX * 1e9
 
 
 def assert_listed(main: cat.MainDevice, sub: cat.SubDevice) -> None:

@@ -9,7 +9,13 @@ from catenary.bus.ring import end_for_clocks
 from catenary.bus.runner import BlockingRunner
 from catenary.bus.segment_scan import check_identity
 from catenary.bus.sub_device import SubDevice
-from catenary.errors import ConfigurationError, SegmentError
+from catenary.errors import (
+    ConfigurationError,
+    MailboxError,
+    MappingError,
+    ResponseTimeout,
+    SegmentError,
+)
 from catenary.link import RingLink
 from catenary.model.device import DeviceDescription, Direction, mapped_entries
 from catenary.plan.clocks import SYNC_OBJECTS
@@ -25,8 +31,12 @@ from catenary.procedure.names import name_entries
 from catenary.procedure.pdo import read_mapping, verify_mapping, write_downloads
 from catenary.procedure.pdo_offers import read_offers, read_values
 from catenary.procedure.profile import read_object
+from catenary.procedure.station import within
 from catenary.procedure.sync import bring_together, read_types, stop, write_types
 from catenary.wire.al import State
+
+READ_TIMEOUT = 60.0  # [s] for what a plan needs of one device: hundreds of slow SDOs
+WRITE_TIMEOUT = 60.0  # [s] for the objects that a plan writes to one device, and reads again
 
 
 def describe_mappings(
@@ -36,7 +46,7 @@ def describe_mappings(
     dictionary says of the objects wished for that are not."""
     asked = gather_wishes(wishes, period_ns)
     with_coe = [sub for sub in subs if sub.description.coe]
-    found = runner.run_all([_describe(sub, asked.get(sub.position, PdoWish())) for sub in with_coe])
+    found = runner.run_all([_renewed(sub, asked.get(sub.position)) for sub in with_coe])
     for sub, description in zip(with_coe, found, strict=True):
         sub.description = description
 
@@ -77,6 +87,18 @@ def bring_to_safe_op(
     return measured
 
 
+def _renewed(sub: SubDevice, wish: PdoWish | None) -> Procedure[DeviceDescription]:
+    """Return the description as it is now. A device that no request names keeps the one of the scan
+    if it does not answer."""
+    reading = within(READ_TIMEOUT, sub.station, _describe(sub, wish or PdoWish()))
+    try:
+        return (yield from reading)
+    except (MailboxError, MappingError, ResponseTimeout):
+        if wish is not None:
+            raise
+        return sub.description
+
+
 def _describe(sub: SubDevice, wish: PdoWish) -> Procedure[DeviceDescription]:
     channel = _channel(sub)
     device = yield from read_mapping(channel, sub.description)
@@ -89,7 +111,8 @@ def _describe(sub: SubDevice, wish: PdoWish) -> Procedure[DeviceDescription]:
         missing = _unmapped(device, direction, references)
         if missing or wish.written(direction):
             device = yield from read_offers(channel, device, direction)
-        device = yield from _with_objects(channel, device, missing)
+        required = [each for each in missing if each.required]
+        device = yield from _with_objects(channel, device, required)
     return device
 
 
@@ -124,11 +147,15 @@ def _prepare(sub: SubDevice, plan: DevicePlan) -> Procedure[None]:
         yield from write_types(_channel(sub), sub.sync_types)
         sub.sync_types = {}
     if plan.downloads:
-        channel = _channel(sub)
-        yield from write_downloads(channel, device, plan)
-        if plan.mapping_changed:
-            yield from verify_mapping(channel, device, plan)
+        writing = _write(_channel(sub), device, plan)
+        yield from within(WRITE_TIMEOUT, sub.station, writing, "its configuration was")
     yield from configure_process_data(sub.station, device, plan)
+
+
+def _write(channel: MailboxChannel, device: DeviceDescription, plan: DevicePlan) -> Procedure[None]:
+    yield from write_downloads(channel, device, plan)
+    if plan.mapping_changed:
+        yield from verify_mapping(channel, device, plan)
 
 
 def _channel(sub: SubDevice) -> MailboxChannel:

@@ -12,6 +12,7 @@ from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.sdo import UPLOAD_LIMIT, UPLOAD_TIMEOUT, download, upload
 from catenary.procedure.sdo_information import DescribedObject, describe_object, list_objects
+from catenary.procedure.station import within
 from catenary.types import DataType
 from catenary.wire.sdo_information import ListType, ObjectDescription
 
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from catenary.bus.sub_device import SubDevice
 
 T = TypeVar("T")
+
+EACH_TIMEOUT = 60.0  # [s] for all objects of one device that are read before a loop
 
 Objects: TypeAlias = dict[tuple[int, int], bytes]  # by index and subindex
 
@@ -217,8 +220,12 @@ class Sdo:
 
 def read_each(sub: SubDevice, places: Sequence[tuple[int, int]]) -> Procedure[Objects]:
     """Read objects one after the other. Objects that the device refuses are left out."""
+    reading = _read_each(sub.sdo._channel(), places)
+    return (yield from within(EACH_TIMEOUT, sub.station, reading, "its settings were"))
+
+
+def _read_each(channel: MailboxChannel, places: Sequence[tuple[int, int]]) -> Procedure[Objects]:
     found: Objects = {}
-    channel = sub.sdo._channel()
     for index, subindex in places:
         with suppress(SdoAbort):
             found[index, subindex] = yield from upload(channel, index, subindex)

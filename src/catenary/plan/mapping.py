@@ -69,7 +69,8 @@ def make_mapping(
     else:
         mapping = _search(device, direction, wanted)
     _check_size(device, direction, mapping)
-    left_out = [each for each in _missing(mapping, wanted) if not each.required]
+    mapped = {(entry.index, entry.subindex) for entry in mapped_entries(mapping.assignments)}
+    left_out = [each for each in wanted if (each.index, each.subindex) not in mapped]
     return replace(mapping, left_out=tuple(left_out))
 
 

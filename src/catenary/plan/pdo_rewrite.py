@@ -33,6 +33,8 @@ def rewrite_refusal(
         return "its SII says that the entries of PDOs cannot be changed"
     if _changeable(device, direction) is None:
         pdos = device.pdos(direction)
+        if not all(pdo.fixed for pdo in pdos):
+            return "its assigned PDOs are fixed, and no other one can be assigned"
         return f"all its PDOs are fixed: {pdo_names(pdos)}" if pdos else "its PDOs are not known"
     return ""
 
@@ -87,10 +89,11 @@ def write_down(
 
 
 def _changeable(device: DeviceDescription, direction: Direction) -> Pdo | None:
-    """Return the first assigned PDO that is not fixed; else one that could be assigned."""
+    """Return the first assigned PDO that is not fixed; else one that can be assigned."""
     assigned = _assigned(device, direction)
     channel = process_data_channel(device, direction)
-    locked = any(a.fixed for a in device.assignments(direction) if a.sync_manager == channel)
+    locked = device.mailbox is None or not device.mailbox.pdo_assign
+    locked |= any(a.fixed for a in device.assignments(direction) if a.sync_manager == channel)
     taken = {pdo.index for a in device.assignments(direction) for pdo in a.pdos}
     unassigned = [p for p in device.pdos(direction) if p.index not in taken and not locked]
     return next((pdo for pdo in (*assigned, *unassigned) if not pdo.fixed), None)

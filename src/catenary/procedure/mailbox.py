@@ -89,6 +89,8 @@ def converse(
     channel.owed, channel.emptied = True, False
     for _ in range(RECOVERIES):
         sent, stale = yield from _post(channel, message)
+        if sent and not stale:
+            channel.repetitions = 0  # the mailbox was empty: none of them is still to come
         if sent and channel.thinks_ns:
             yield after(channel.thinks_ns * 1e-9)
         if stale and (older := (yield from _take(channel))) is not None:

@@ -1,4 +1,5 @@
-"""Names of mapped entries and PDOs from the object dictionary, where the SII has none.
+"""Names of mapped entries and PDOs, and data types, from the object dictionary, where the SII has
+none. Without a data type, an entry would be read as an unsigned integer.
 
 Some SIIs name neither. SOEM's slaveinfo.c asks the dictionary, too (SDO information, ETG.1000.6
 §5.6.3). Names are useful, not necessary: whatever the device answers, nothing fails here.
@@ -20,6 +21,7 @@ from catenary.procedure.sdo_information import (
     read_object_description,
 )
 from catenary.procedure.station import Deadline
+from catenary.types import by_index
 from catenary.wire.sdo_information import ObjectCode, ObjectDescription
 
 TIMEOUT = 5.0  # [s] for all names of one device
@@ -55,23 +57,22 @@ class _Names:
             pdo = replace(pdo, name=(yield from self._object_name(pdo.index)))
         entries = []
         for entry in pdo.entries:
-            named = entry
-            if entry.index and not entry.name:
-                named = replace(entry, name=(yield from self._entry_name(entry)))
-            entries.append(named)
+            is_nameless = entry.index and not entry.name
+            entries.append((yield from self._named(entry)) if is_nameless else entry)
         return replace(pdo, entries=tuple(entries))
 
-    def _entry_name(self, entry: Entry) -> Procedure[str]:
-        """Return the name of the entry, or that of its object if it has none of its own."""
+    def _named(self, entry: Entry) -> Procedure[Entry]:
+        """Return the entry with its name, or that of its object if it has none of its own."""
         known = yield from self._object(entry.index)
         if known is not None and known.object_code == ObjectCode.VAR:
-            return printable(known.name)
+            return _completed(entry, printable(known.name), known.data_type)
         if self._ended:
-            return ""
+            return entry
         found, _ = yield from describe_entry(self._channel, entry.index, entry.subindex)
-        if found is not None and printable(found.name):
-            return printable(found.name)
-        return f"{printable(known.name)} {entry.subindex}" if known and known.name else ""
+        name = printable(found.name) if found is not None else ""
+        if not name and known and known.name:
+            name = f"{printable(known.name)} {entry.subindex}"
+        return _completed(entry, name, found.data_type if found is not None else 0)
 
     def _object_name(self, index: int) -> Procedure[str]:
         found = yield from self._object(index)
@@ -95,6 +96,15 @@ class _Names:
         """True if the device answers too slowly, or not at all."""
         late = self._deadline.passed_at(self._channel.received_ns)
         return late or self._channel.undescribed >= FAILURES_MAX
+
+
+def _completed(entry: Entry, name: str, data_type: int) -> Entry:
+    """Return the entry with a name, and with a data type of its length if it has none."""
+    try:
+        fits = by_index(data_type).bit_length == entry.bit_length
+    except ValueError:
+        fits = False
+    return replace(entry, name=name, data_type=entry.data_type or data_type * fits)
 
 
 def _with_pdo(device: DeviceDescription, direction: Direction, named: Pdo) -> DeviceDescription:

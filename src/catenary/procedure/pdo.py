@@ -18,6 +18,7 @@ from catenary.plan.pdo_mapping import ASSIGNMENT_BASE
 from catenary.plan.start_up import DevicePlan, Download, restoring_downloads
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
+from catenary.procedure.profile import SMALL_LIMIT, SMALL_TIMEOUT
 from catenary.procedure.sdo import download, upload
 
 NOT_THERE = frozenset((0x0602_0000, 0x0609_0011))  # no such object, no such subindex
@@ -194,13 +195,17 @@ def _entry(data: bytes, names: dict[tuple[int, int], Entry]) -> Entry:
 def read_list(channel: MailboxChannel, index: int) -> Procedure[list[bytes] | None]:
     """Return subindices 1 to n of a list object; None if the device does not let it be read."""
     try:
-        count = (yield from upload(channel, index, 0))[:1]
+        count = (yield from _upload(channel, index, 0))[:1]
         items = []
         for subindex in range(1, int.from_bytes(count, "little") + 1):
-            items.append((yield from upload(channel, index, subindex)))
+            items.append((yield from _upload(channel, index, subindex)))
     except SdoAbort:
         return None
     return items
+
+
+def _upload(channel: MailboxChannel, index: int, subindex: int) -> Procedure[bytes]:
+    return upload(channel, index, subindex, limit=SMALL_LIMIT, timeout=SMALL_TIMEOUT)
 
 
 def _joined(

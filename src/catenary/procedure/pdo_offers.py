@@ -7,16 +7,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from catenary.errors import MailboxError, MappingError, SdoAbort
+from catenary.errors import MailboxError, MappingError, ResponseTimeout, SdoAbort
 from catenary.model.device import Assignment, DeviceDescription, Direction, ObjectValue, Pdo
 from catenary.plan.pdo_mapping import ASSIGNMENT_BASE, shape
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.pdo import read_entries, read_list, read_mapping
 from catenary.procedure.sdo import upload
-from catenary.procedure.sdo_information import read_entry_description
+from catenary.procedure.sdo_information import describe_entry
+from catenary.procedure.station import within
 from catenary.wire.sdo_information import Access
 
+MAPPING_TIMEOUT = 15.0  # [s] for the mapping of one device in a scan
 OFFERS_MAX = 64  # PDOs read in one direction; an EL6731 has 250 of them
 READABLE = Access.READ_PRE_OP | Access.READ_SAFE_OP | Access.READ_OP
 
@@ -26,9 +28,10 @@ def read_first_mapping(
 ) -> Procedure[DeviceDescription]:
     """Return the description with the mapping that the device reports. Notes show where its SII
     differs, or why the SII's is used."""
+    reading = within(MAPPING_TIMEOUT, channel.station, read_mapping(channel, device))
     try:
-        found = yield from read_mapping(channel, device)
-    except (MappingError, MailboxError) as error:
+        found = yield from reading
+    except (MappingError, MailboxError, ResponseTimeout) as error:
         note = f"its mapping cannot be read, its SII's is used: {error.message}"
         return replace(device, notes=(*device.notes, note))
     notes = [note for direction in Direction for note in _differences(device, found, direction)]
@@ -39,11 +42,17 @@ def read_offers(
     channel: MailboxChannel, device: DeviceDescription, direction: Direction
 ) -> Procedure[DeviceDescription]:
     """Return the description with the entries of PDOs that are not assigned, and with `fixed` as
-    the dictionary says. For a direction in which objects are missing."""
+    the dictionary says. For a direction in which objects are missing.
+
+    After a reply that is missing or malformed, the entries of the other PDOs are those of the SII.
+    """
     taken = {pdo.index for each in device.assignments(direction) for pdo in each.pdos}
     known = {pdo.index: pdo for pdo in device.pdos(direction)}
     for index in [index for index in known if index not in taken][:OFFERS_MAX]:
-        words = yield from read_list(channel, index)
+        try:
+            words = yield from read_list(channel, index)
+        except (MailboxError, ResponseTimeout):
+            break
         if words is not None:
             entries = read_entries(words, known[index].entries)
             known[index] = replace(known[index], entries=entries)
@@ -61,13 +70,16 @@ def read_offers(
 def read_values(
     channel: MailboxChannel, device: DeviceDescription, places: Sequence[tuple[int, int]]
 ) -> Procedure[DeviceDescription]:
-    """Return the description with the values of these objects, for a plan to show."""
+    """Return the description with the values of these objects, for a plan to show. After a reply
+    that is missing or malformed, the others are not read."""
     values = []
     for index, subindex in dict.fromkeys(places):
         try:
             data = yield from upload(channel, index, subindex)
         except SdoAbort:
             values.append(ObjectValue(index, subindex, None))
+        except (MailboxError, ResponseTimeout):
+            break
         else:
             values.append(ObjectValue(index, subindex, data))
     return replace(device, values=tuple(values))
@@ -80,9 +92,8 @@ def _is_read_only(
     without any right to read it is inconclusive: some devices leave the access word empty."""
     if device.mailbox is None or not device.mailbox.sdo_information:
         return False
-    try:
-        entry = yield from read_entry_description(channel, index, 0)
-    except SdoAbort:
+    entry, _ = yield from describe_entry(channel, index, 0)
+    if entry is None:
         return False
     return bool(entry.access & READABLE) and Access.WRITE_PRE_OP not in entry.access
 

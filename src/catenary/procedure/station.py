@@ -65,8 +65,10 @@ class Deadline:
         return self._left_ns < 0
 
 
-def within(seconds: float, station: Station, procedure: Procedure[T]) -> Procedure[T]:
-    """Run a procedure with an overall deadline.
+def within(
+    seconds: float, station: Station, procedure: Procedure[T], what: str = "its description was"
+) -> Procedure[T]:
+    """Run a procedure with an overall deadline. `what`: what it reads or writes, for the error.
 
     Raises:
         ResponseTimeout: The procedure has not ended after `seconds`.
@@ -85,7 +87,7 @@ def within(seconds: float, station: Station, procedure: Procedure[T]) -> Procedu
     finally:
         procedure.close()
     raise ResponseTimeout(
-        f"{station}: its description was not complete within {seconds:g} s",
+        f"{station}: {what} not complete within {seconds:g} s",
         hint="it answers, but too slowly: update its firmware, or take it off the segment",
     )
 

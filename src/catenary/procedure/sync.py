@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 
 from catenary.errors import ClockError, SdoAbort
 from catenary.model.device import DeviceDescription
@@ -128,14 +129,11 @@ def start(
 
 
 def read_types(channel: MailboxChannel) -> Procedure[dict[int, bytes]]:
-    """How a device keeps time with the bus: 0x1C32:01 and 0x1C33:01, those that it has."""
+    """Return how a device keeps time with the bus: 0x1C32:01 and 0x1C33:01, those that it shows."""
     found = {}
     for index in SYNC_OBJECTS:
-        try:
+        with suppress(SdoAbort):
             found[index] = yield from upload(channel, index, 1)
-        except SdoAbort as abort:
-            if abort.code not in LEFT_ALONE:
-                raise
     return found
 
 
