@@ -71,7 +71,7 @@ def looping(interface: str, folder: Path, run: str = "threaded") -> Iterator[Chi
 
 
 def goes_on(child: Child) -> bool:
-    """Return True if a loop does further good cycles, with power. A busy machine may lose some."""
+    """Return True if a loop runs further good cycles with power. A busy machine may lose some."""
     while child.read_line(0.0) is not None:
         pass
     seen = [child.read_line(START) or "ended" for _ in range(8)]

@@ -1,6 +1,6 @@
 """A client that may command writes anything into the desk: the loop reads it without a fault.
 
-The mutex at the beginning is left out: the loop never takes it, and clients trust each other.
+The mutex is left out: the loop never takes it, and clients trust each other.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Numba unpickles its cache: who writes a file there runs code as the user of the law.
+"""Numba unpickles its cache: a user who writes a file there runs code as the user of the law.
 
 The folder of the source belongs to another user, or $NUMBA_CACHE_DIR names one that does.
 """
@@ -75,7 +75,7 @@ def test_a_planted_cache_is_not_read(tmp_path: Path, place: str) -> None:
     index = Path(run(["-c", NUMBAS_OWN, str(law), "where"], environment))
     index.write_bytes(pickle.dumps(Evil(marker)))
     run(["-c", NUMBAS_OWN, str(law), "load"], environment)
-    assert marker.exists()  # Numba's own cache is how it was done
+    assert marker.exists()  # Numba's own cache reads it
     marker.rmdir()
     assert run([str(law)], environment) == "7.0"
     assert not marker.exists()

@@ -169,7 +169,7 @@ def test_the_segment_at_the_other_end_is_not_a_master(
 
 
 def test_frames_of_a_master_elsewhere(veth: tuple[str, str], tmp_path: Path) -> None:
-    """It sends from the other end of the line, so this machine has neither lock nor socket."""
+    """A master at the other end of the line: neither its lock nor its socket is here."""
     with program(SENDER, tmp_path, veth[1], FRAME.hex()) as sender:
         assert sender.read_line(START) == "sending"
         with pytest.raises(LinkError, match=f"frames of another master arrive on {veth[0]}"):
@@ -208,7 +208,7 @@ def test_whoever_keeps_the_lock_without_a_right_to_the_interface(veth: tuple[str
     """Any user may bind a name of an abstract socket."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as stranger:
         stranger.bind(ownership.NAME + veth[0])
-        with pytest.raises(LinkError, match="a process that does not tell its number"):
+        with pytest.raises(LinkError, match="a process that does not report its number"):
             cat.MainDevice(veth[0]).open()
         with cat.MainDevice(veth[0], force=True) as main:
             assert veth[0] in main.other_masters[0]
@@ -268,7 +268,7 @@ def test_what_a_killed_program_left_in_op_is_reset_and_reported(
         with cat.MainDevice(veth[0]) as main:
             main.scan()
             assert "device 0 in OP" in main.notes[0]
-            assert "left so by another program" in main.notes[0]
+            assert "left by another program" in main.notes[0]
             assert {str(sub.state) for sub in main.subs} == {"PRE-OP"}
 
 

@@ -39,6 +39,10 @@ with cat.attach("arm", uid={ALICE}) as arm, arm.lease(axes=[0], for_=600.0) as c
         arm.wait(timeout=10.0)
     print("moved")
 """
+TRY_NAMESPACE = """
+import subprocess
+print(subprocess.run(["unshare", "--user", "--map-root-user", "true"]).returncode)
+"""
 SAY = """
 import catenary as cat
 def said(action):
@@ -107,13 +111,29 @@ def test_who_takes_a_users_folder_is_named(machine: Machine) -> None:
     assert machine.run(MALLORY, f"import os; os.mkdir('/dev/shm/catenary-{ALICE}', 0o777)") == []
     take = f'{SAY}\nsaid(lambda: cat.share.Mutex("tool"))'
     [line] = machine.run(ALICE, take)
-    assert f"was made by user {MALLORY}, not by you" in line
+    assert f"belongs to user {MALLORY} (you are {ALICE})" in line
     make_group_folder(machine)
     assert machine.run(ALICE, take, group=True) == ["done"]
 
 
+def test_users_in_namespaces_of_their_own_take_no_folder_of_root(machine: Machine) -> None:
+    """An ordinary user is root in a private network, and took the folder of the real root."""
+    take = f"""
+import subprocess, sys
+program = {f'{SAY}said(lambda: cat.share.Mutex("tool"))'!r}
+private = ["unshare", "--user", "--map-root-user"] if len(sys.argv) > 1 else []
+subprocess.run([*private, sys.executable, "-c", program], check=True)
+"""
+    for user in (ALICE, BOB):
+        if machine.run(user, TRY_NAMESPACE) != ["0"]:
+            pytest.skip("no user namespaces for ordinary users")
+        assert machine.run(user, take, "private") == ["done"]
+        assert machine.run(user, take) == ["done"]  # the same mutex
+    assert machine.run(0, take) == ["done"]
+
+
 def test_a_share_of_another_user_is_refused_unless_asked_for(machine: Machine) -> None:
-    """The owner of a share can crash its readers: SIGBUS where it truncates the file."""
+    """The owner of a share can crash its readers by truncating the file (SIGBUS)."""
     make_group_folder(machine)
     with machine.started(MALLORY, LOOP, "644", group=True) as loop:
         assert loop.line() == "running"
@@ -133,7 +153,7 @@ def test_roots_share_needs_no_word(machine: Machine) -> None:
 
 
 def test_a_mutex_of_another_user_is_refused_unless_asked_for(machine: Machine) -> None:
-    """Its robust list holds pointers: a made file crashed the C library (SIGSEGV)."""
+    """Its robust list holds pointers: a forged file crashed the C library (SIGSEGV)."""
     make_group_folder(machine)
     evil = """
 import os
@@ -198,10 +218,29 @@ while arm.number < before + 100 and arm.wait(timeout=10.0):
     pass
 print(arm.number >= before + 100)
 """
+BADLY_NAMED_OPERATOR = f"""
+from pathlib import Path
+import catenary as cat
+with cat.attach("arm", uid={ALICE}) as arm, arm.lease(axes=[0], for_=600.0) as command:
+    Path("/proc/self/comm").write_bytes(b"\\xff) Z 1")
+    before = arm.number
+    while arm.number < before + 100 and arm.wait(timeout=10.0):
+        command.send(position=0.0)
+    print(arm.number >= before + 100)
+"""
+
+
+def test_an_operators_process_can_have_any_name(machine: Machine) -> None:
+    """The loop asks the kernel for it. A name that is not UTF-8 ended the loop."""
+    make_group_folder(machine)
+    with machine.started(ALICE, LOOP, "660", group=True) as loop:
+        assert loop.line() == "running"
+        assert machine.run(BOB, BADLY_NAMED_OPERATOR, group=True) == ["True"]
+        assert "released" in loop.line()
 
 
 def test_an_operator_cannot_break_the_loop(machine: Machine) -> None:
-    """Bob may command. He cannot shorten any memory that the loop uses, nor hang it by numbers."""
+    """Bob may command. He cannot shorten memory that the loop uses, or hang it by numbers."""
     make_group_folder(machine)
     with machine.started(ALICE, LOOP, "660", group=True) as loop:
         assert loop.line() == "running"

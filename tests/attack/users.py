@@ -24,7 +24,7 @@ TOOLS = ("unshare", "nsenter", "setpriv", "mount")
 
 
 def operators() -> grp.struct_group:
-    """A group that exists, other than root's."""
+    """Return a group that exists, other than root's."""
     return next(group for group in grp.getgrall() if group.gr_gid)
 
 
@@ -68,7 +68,7 @@ class Machine:
 
 @cache
 def refusal() -> str:
-    """Say why there cannot be other users here; "" if there can."""
+    """Return why there cannot be other users here; "" if there can."""
     if os.geteuid() != 0:
         return "only root can become another user"
     lacking = [tool for tool in TOOLS if shutil.which(tool) is None]
@@ -82,7 +82,7 @@ def refusal() -> str:
 
 @contextmanager
 def machine() -> Iterator[Machine]:
-    """Mounts that nobody else has."""
+    """Yield a machine with mounts of its own."""
     with subprocess.Popen(
         ["unshare", "--mount", "--propagation", "private", "sh", "-c", MOUNTS],
         stdout=subprocess.PIPE,

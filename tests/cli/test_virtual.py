@@ -1,4 +1,4 @@
-"""`catenary virtual serve`: what it says, and what it refuses."""
+"""`catenary virtual serve`: output and refusals."""
 
 from __future__ import annotations
 

@@ -148,7 +148,7 @@ def test_files_of_a_machine(tmp_path, state):
 
 
 def test_every_change_of_the_checks_can_be_made_and_undone(tmp_path, state):
-    """Their targets are in the list of what may be written."""
+    """The targets of all changes are in `TARGETS`."""
     laptop = machines.make(tmp_path, machines.LAPTOP)
     changes = examine(laptop).changes
     files = [change for change in changes if not change.target.startswith("ethtool:")]
@@ -173,7 +173,7 @@ def test_every_change_of_the_checks_can_be_made_and_undone(tmp_path, state):
     ],
 )
 def test_nothing_outside_of_the_list_is_written(tmp_path, state, target):
-    """A state file that a test, or an attacker, has written."""
+    """A state file with any content."""
     (tmp_path / "etc").mkdir()
     (tmp_path / "etc" / "passwd").write_text("root")
     for parts in ("etc", "proc/sys/kernel", "sys/kernel/mm/transparent_hugepage/enabled"):
@@ -214,7 +214,7 @@ def test_a_state_file_of_another_user_is_refused(state):
 def test_a_state_file_that_others_can_write_is_refused(state, mode):
     state.save([Made(HUGE_PAGES, "always", "madvise")])
     state.path.chmod(mode)
-    with pytest.raises(StateError, match="what it says is not written to this machine"):
+    with pytest.raises(StateError, match="its content is not written to this machine"):
         state.load()
 
 

@@ -62,7 +62,7 @@ def test_without_permission_the_command_is_given(tmp_path):
 
 
 def test_the_folder_of_shares(tmp_path):
-    """Its owner is who runs the test, not root: other states are in tests/attack."""
+    """The user of the test owns it, not root: other states are in tests/attack."""
     group = {"/etc/group": "root:x:0:\ncatenary:x:990:alice,bob"}
     mounts = {"/proc/mounts": "tmpfs /run tmpfs rw,nosuid 0 0"}
     alone = share_folder(make(tmp_path / "alone", {**mounts, "/etc/group": "root:x:0:"}))

@@ -1,4 +1,4 @@
-"""Files that anybody may hand to a user: each parser gives a value or its documented error."""
+"""Files from strangers: each parser returns a value or raises its documented error."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def toml(value: object) -> str:
 
 
 def names_of(part: Any) -> dict[str, list[str]]:
-    """The fields of each kind of table: what the file's type says."""
+    """The fields of each kind of table, from the type of the file."""
     [field] = [each for each in msgspec.structs.fields(SegmentFile) if each.name == part]
     members = field.type.__args__[0].__args__
     return {
@@ -181,7 +181,7 @@ def test_an_image_of_an_eeprom(image: bytes) -> None:
     with_error(lambda: text_lines(tolerant(image)), DecodeError)
 
 
-# Recordings: whole chunks with right checksums, whose content somebody has made up
+# Recordings: whole chunks with right checksums and invented content
 
 ROWS_LAYOUT = make_recording_layout(1)
 ROWS = make_rows(ROWS_LAYOUT, 3)
@@ -382,7 +382,7 @@ def test_a_state_of_the_doctor(folder: Path, content: bytes) -> None:
 @given(target=st.text(), before=st.text(), after=st.text())
 @example(target="\x00", before="", after="")
 def test_a_change_that_somebody_made_up(folder: Path, target: str, before: str, after: str) -> None:
-    """Nothing but a refusal; what is to be undone has to be there first."""
+    """Saving and undoing end without an error, or with the documented one."""
     state = State(folder / "doctor.json", "b")
     with_error(lambda: state.save([Made(target, before, after)]), StateError, UnicodeEncodeError)
     with_error(lambda: list(undo(MachineGround(folder), state)), StateError)

@@ -1,4 +1,4 @@
-"""Compiled laws are kept where nobody else can write; elsewhere they are not, with a warning."""
+"""Compiled laws are kept only where no other user can write; otherwise there is a warning."""
 
 from __future__ import annotations
 
@@ -62,6 +62,60 @@ def test_a_folder_of_another_user_is_refused(tmp_path: Path, given: str) -> None
     os.chown(folder if given == "laws" else folder.parent, NOBODY, NOBODY)
     with pytest.raises(PermissionError, match=f"belongs to user {NOBODY}"):
         private_folder(folder)
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a folder away")
+def test_root_with_the_home_of_a_user_creates_and_changes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """sudo can keep HOME: the user's links must not choose what root creates or makes private."""
+    home, target = tmp_path / "home", tmp_path / "etc"
+    target.mkdir(mode=0o755)
+    home.mkdir()
+    os.chown(home, NOBODY, NOBODY)
+    monkeypatch.setenv("HOME", str(home))
+    refused = f"belongs to user {NOBODY}"
+    with pytest.raises(PermissionError, match=refused):
+        private_folder(home / ".cache" / "laws")
+    assert not list(home.iterdir())
+    (home / "laws").symlink_to(target)
+    with pytest.raises(PermissionError, match=refused):
+        private_folder(home / "laws")
+    assert target.stat().st_mode & 0o777 == 0o755
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a link away")
+def test_a_link_of_another_user_is_refused(tmp_path: Path) -> None:
+    tmp_path.chmod(0o1777)  # sticky: others can create names there
+    (tmp_path / "place").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "place")
+    os.lchown(tmp_path / "link", NOBODY, NOBODY)
+    with pytest.raises(PermissionError, match=f"link belongs to user {NOBODY}"):
+        private_folder(tmp_path / "link" / "laws")
+    assert not list((tmp_path / "place").iterdir())
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a folder away")
+def test_folders_above_the_home_do_not_count(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They belong to user 65534 in a user namespace, such as that of an ordinary user's demo."""
+    home = tmp_path / "homes" / "alice"
+    home.mkdir(parents=True)
+    os.chown(home.parent, NOBODY, NOBODY)
+    monkeypatch.setenv("HOME", str(home))
+    assert private_folder(home / ".cache" / "laws") == home / ".cache" / "laws"
+    monkeypatch.setenv("HOME", str(tmp_path))
+    with pytest.raises(PermissionError, match=f"belongs to user {NOBODY}"):
+        private_folder(home / ".cache" / "laws")
+
+
+def test_a_link_in_the_place_of_the_folder_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "place").mkdir(mode=0o755)
+    (tmp_path / "laws").symlink_to(tmp_path / "place")
+    with pytest.raises(PermissionError, match="is a link"):
+        private_folder(tmp_path / "laws")
+    assert (tmp_path / "place").stat().st_mode & 0o777 == 0o755
 
 
 def test_a_link_is_followed_once(tmp_path: Path) -> None:

@@ -94,7 +94,7 @@ class Record:
 
 
 class Soem:
-    """Owns the way of ecx_config_init, ecx_config_map_group and the exchange of process data."""
+    """Plays ecx_config_init, ecx_config_map_group and the exchange of process data."""
 
     def __init__(self, segment: Segment) -> None:
         self.main = MainDevice(segment)

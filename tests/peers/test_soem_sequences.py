@@ -75,7 +75,7 @@ class Wire:
 
 
 def numbered(number: int) -> bytes:
-    """A write whose answer shows to which frame it belongs."""
+    """A write with the number of its frame in the answer."""
     return encode_frame([Datagram(Command.BWR, USER_RAM << 16, struct.pack("<I", number))])
 
 

@@ -194,7 +194,7 @@ def test_counters_that_stand_still_or_jump_mean_nothing(counters: list[int]) -> 
 def test_whatever_is_lost_segments_are_joined_with_any_counter(
     counter: int | None, out: set[int], back: set[int]
 ) -> None:
-    """0, always 1, or the standard's. Segments differ in their toggle, so no two are equal."""
+    """Counters of 0, always 1, or as in the standard. Segments differ in their toggle bit."""
     data = bytes(i & 0xFF for i in range(700))
     device = MailboxDevice(Dictionary({(0x2000, 1): data}))
     if counter is not None:

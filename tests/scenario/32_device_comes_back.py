@@ -178,7 +178,7 @@ def test_unplugged_it_keeps_its_address_and_comes_back_all_the_same(cell: Cell) 
     ids=["unplugged", "switched off"],
 )
 def test_optional_devices_alone_survive_a_silent_bus(cell: Cell, faults: list[Fault]) -> None:
-    """Nothing is required, so that nothing is missing: not even the coupler before them."""
+    """No device is required, so none is missing: not even the coupler before them."""
     _, tool, gripper = wishes(cell)
     with cat.Loop(tool, gripper) as loop:
         cell.main.events.get()
@@ -199,7 +199,7 @@ def test_optional_devices_alone_survive_a_silent_bus(cell: Cell, faults: list[Fa
 
 
 def test_optional_devices_alone_may_be_left_behind(cell: Cell) -> None:
-    """They are silent still when the loop is left."""
+    """The devices are still silent when the loop is left."""
     _, tool, gripper = wishes(cell)
     with cat.Loop(tool, gripper) as loop:
         cell.segment.inject(unplug(0, at=0.1))

@@ -1,4 +1,4 @@
-"""The socket that hands out the memory for commands: who answers, and who does not."""
+"""The socket that sends clients the memory for commands: answers, silence and deadlines."""
 
 from __future__ import annotations
 
@@ -46,6 +46,22 @@ def test_a_client_that_asks_and_does_not_read_delays_nobody(served: Path) -> Non
     os.close(request_descriptor(served, os.geteuid()))
     for each in silent:
         each.close()
+
+
+def test_a_full_queue_is_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The kernel refuses a client at once if others fill the queue, whatever its time-out."""
+    monkeypatch.setattr(desk_socket, "PATIENCE", 0.02)
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as full:
+        full.bind(str(tmp_path / "socket-x"))
+        full.listen(0)
+        first = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        first.connect(str(tmp_path / "socket-x"))
+        with pytest.raises(ShareError, match="Resource temporarily unavailable"):
+            request_descriptor(tmp_path / "socket-x", os.geteuid())
+        monkeypatch.setattr("time.sleep", lambda seconds: full.accept()[0].close())
+        with pytest.raises(ShareError, match="timed out"):  # connected, but without an answer
+            request_descriptor(tmp_path / "socket-x", os.geteuid())
+        first.close()
 
 
 def test_a_socket_that_a_killed_process_has_left(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Folders of shares: locks with a deadline, drafts that a kill has left, whose files are found."""
+"""Folders of shares: locks with a deadline, drafts of killed processes, owners of files."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def user_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("file_mode", "folder_mode"), [(0o600, 0o700), (0o640, 0o710), (0o604, 0o701), (0o664, 0o711)]
+    ("file_mode", "folder_mode"), [(0o600, 0o700), (0o640, 0o711), (0o604, 0o711), (0o664, 0o711)]
 )
 def test_others_can_pass_where_a_file_is_for_them(
     user_folders: Path, file_mode: int, folder_mode: int
@@ -77,6 +77,16 @@ def test_others_can_pass_where_a_file_is_for_them(
     assert own.stat().st_mode & 0o7777 == folder_mode
 
 
+def test_a_folder_has_the_users_id_outside_of_the_namespace(
+    user_folders: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An ordinary user is root in a private network, and took the folder of the real one."""
+    (tmp_path / "uid_map").write_text("         0      64001          1\n")
+    monkeypatch.setattr(folder, "USER_IDS", tmp_path / "uid_map")
+    assert folder.user_folder(0) == user_folders / "catenary-64001"
+    assert folder.user_folder(7) == user_folders / "catenary-7"  # it has no id there
+
+
 def test_a_folder_that_was_open_is_closed(user_folders: Path) -> None:
     own = folder.own_folder()
     own.mkdir()
@@ -87,7 +97,7 @@ def test_a_folder_that_was_open_is_closed(user_folders: Path) -> None:
 
 def test_what_is_in_the_folders_place_is_refused(user_folders: Path) -> None:
     folder.own_folder().touch()
-    with pytest.raises(ShareError, match="was made by user"):
+    with pytest.raises(ShareError, match="and is not a folder"):
         folder.prepare(folder.own_folder(), 0o600)
 
 
@@ -99,9 +109,12 @@ def test_a_common_folder_that_everybody_may_write_is_not_used(
     monkeypatch.setattr(folder, "GROUP_FOLDER", common)
     common.chmod(0o777)
     assert folder.own_folder() == folder.user_folder(os.geteuid())
-    common.chmod(0o755)
+    common.chmod(0o2770)  # not sticky: its group could replace the files of others
+    assert folder.own_folder() == folder.user_folder(os.geteuid())
     if os.geteuid() == 0:  # else it is not root's
-        assert folder.own_folder() == common
+        for mode in (0o755, 0o3771):
+            common.chmod(mode)
+            assert folder.own_folder() == common
 
 
 def test_what_is_not_there(user_folders: Path) -> None:

@@ -1,4 +1,4 @@
-"""The mode says who may read and command: tried as another user. (Hostile ones: tests/attack.)"""
+"""The mode of a share, tried as another user. (Hostile users: tests/attack.)"""
 
 from __future__ import annotations
 

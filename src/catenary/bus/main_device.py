@@ -65,7 +65,7 @@ class MainDevice:
     Leaving the block brings all devices to INIT, whatever happened in it.
 
     It is the only one on its network interfaces: opening is refused while another master is live.
-    `force=True` opens all the same. A forked child cannot use it, and leaves its devices alone.
+    `force=True` opens it anyway. A forked child cannot use it, and leaves its devices alone.
     """
 
     def __init__(self, source: LinkSource, *, force: bool = False) -> None:
@@ -106,7 +106,7 @@ class MainDevice:
         """Open the link. Nothing is sent. A network interface is listened to for 0.1 s.
 
         Raises:
-            LinkError: it cannot be used, or another master is live on it, and not `force`.
+            LinkError: it cannot be used; or another master is live on it, unless `force`.
         """
         self.forget()
         if self._link is not None:
@@ -124,8 +124,8 @@ class MainDevice:
         forget_in_child(self)
 
     def forget(self) -> None:
-        """In a forked child: let go of the parent's link and devices. Sends nothing. In the process
-        that opened it: no effect."""
+        """Let go of the parent's link and devices in a forked child. Sends nothing. No effect in
+        the process that opened it."""
         if not self._is_inherited:
             return
         self._link = self._blocking = self._attached = self._leave_loop = None
@@ -154,8 +154,10 @@ class MainDevice:
         return self._ownership.others or other_sockets(self._link)
 
     def close(self) -> None:
-        """Brings all devices to INIT, best effort, and closes the link. In a forked child: no
-        effect."""
+        """Bring all devices to INIT, best effort, and close the link.
+
+        No effect in a forked child.
+        """
         self.forget()
         if self._link is None:
             return
@@ -199,7 +201,7 @@ class MainDevice:
         expected: Sequence[Identity | tuple[int, int] | None] | None = None,
         strict: bool = True,
     ) -> SubDevices:
-        """Finds all devices and brings them to PRE-OP. The handles of devices that are still
+        """Find all devices and bring them to PRE-OP. The handles of devices that are still
         there stay the same objects.
 
         `expected`: by position, an identity or (vendor, product); None: whatever it is.
@@ -207,8 +209,8 @@ class MainDevice:
         its error is raised then, with those of further ones as notes, and `subs` has all handles;
         else it is in `SubDevice.error`, and raised when the device is used.
 
-        LinkError: another master refreshes the outputs of a device, and not `force`. Devices that
-        a killed program left in SAFE-OP or OP are reset; `notes` names them.
+        Raises LinkError if another master refreshes the outputs of a device, unless `force`.
+        Devices that a killed program left in SAFE-OP or OP are reset; `notes` names them.
         """
         runner = self._runner
         runner.flush()
@@ -253,7 +255,7 @@ class MainDevice:
         if not running:
             return ()
         left = ", ".join(map(str, running))
-        return (f"{left}: left so by another program, which was perhaps killed; now reset",)
+        return (f"{left}: left by another program, which was perhaps killed; now reset",)
 
     def _refuse_refreshed(self, runner: BlockingRunner, running: Sequence[Running]) -> None:
         refreshed = runner.run(find_refreshed(running))
@@ -262,7 +264,7 @@ class MainDevice:
                 f"another EtherCAT master is live on {self.link.name}: it refreshes the outputs of "
                 f"{', '.join(f'device {position}' for position in refreshed)} (0x0440)",
                 hint="a scan would reset devices that may be in motion. End that master, perhaps "
-                "one at the other end of the line; to scan all the same, pass force=True (--force)",
+                "one at the other end of the line; pass force=True (--force) to scan anyway",
             )
 
     def _addressed(

@@ -57,7 +57,7 @@ def add_force(parser: argparse.ArgumentParser) -> None:
 
 
 def note_other_masters(main: MainDevice) -> None:
-    """Tell on stderr that a command reads a line which another master drives."""
+    """Print a note on stderr if another master drives the line that this command reads."""
     for other in main.other_masters:
         print(f"note: {other}; this command only reads", file=sys.stderr)
 

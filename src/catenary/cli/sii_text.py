@@ -1,7 +1,7 @@
 """The image of an EEPROM in words, one fact a line: to be read, and to be compared.
 
-Every field of ETG.2010 has its line. What has no name is shown as bytes, so that two images whose
-text is the same differ in filling at most.
+Every field of ETG.2010 has its line. Data without a name is shown as bytes. Two images with the
+same text therefore differ in filling at most.
 """
 
 from __future__ import annotations
@@ -74,8 +74,10 @@ def text_lines(sii: Sii) -> list[str]:
 
 
 def differences(old: bytes, new: bytes) -> list[str]:
-    """The lines that differ, - the old ones, + the new ones. Where only filling differs, the words.
-    DecodeError if an image cannot be read as one."""
+    """Return the lines that differ, - the old ones, + the new ones.
+
+    If only filling differs, return its words. Raises DecodeError if an image is not one.
+    """
     before, after = text_lines(tolerant(old)), text_lines(tolerant(new))
     lines = unified_diff(before, after, n=0, lineterm="")
     found = [line for line in lines if not line.startswith(("---", "+++", "@@"))]
@@ -83,7 +85,7 @@ def differences(old: bytes, new: bytes) -> list[str]:
 
 
 def word_differences(old: bytes, new: bytes) -> list[str]:
-    """The words that differ, by their address."""
+    """Yield the words that differ, by address."""
     return [
         f"word 0x{start // 2:04X}: {old[start : start + 2].hex(' ') or 'missing'} -> "
         f"{new[start : start + 2].hex(' ') or 'missing'}"
@@ -120,7 +122,7 @@ def _area(area: MailboxArea) -> str:
 
 
 def _flags(flags: IntFlag) -> str:
-    """The names of all bits that are set, those without a name as a number."""
+    """Return the names of all bits that are set; bits without a name as a number."""
     names = [str(each.name) for each in flags]
     rest = int(flags) & ~sum(int(each) for each in type(flags))
     return ", ".join([*names, f"0x{rest:X}"] if rest else names) or "none"
@@ -210,7 +212,7 @@ def _other(category: Category) -> Iterator[str]:
 
 
 def _rows(title: str, data: bytes) -> Iterator[str]:
-    """Bytes without a name; a run of one value is one line."""
+    """Yield bytes without a name; a run of one value is one line."""
     if data and data == data[:1] * len(data):
         yield f"{title}: {len(data)} bytes of {data[:1].hex()}"
         return

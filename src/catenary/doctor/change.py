@@ -1,8 +1,9 @@
 """Changes of `--apply`, and how `--undo` takes them back.
 
 Only what is reversible: a value of /proc or /sys, a setting of the card's driver, or the folder of
-shares, which is read before it is written. What was there is on disk before anything is changed. A
-reboot undoes all too. Nothing outside of `TARGETS` is written, whatever the state file contains.
+shares, which is read before it is written. The old values are on disk before anything is changed.
+A reboot undoes everything, too. Nothing outside of `TARGETS` is written, whatever the state file
+contains.
 """
 
 from __future__ import annotations
@@ -112,7 +113,7 @@ def split(target: str) -> tuple[str, str]:
 
 
 def whole_number(value: str, target: str) -> int:
-    """Raises OSError, as a driver that refuses a value."""
+    """Return the number. Raises OSError, as a driver that refuses a value."""
     if not re.fullmatch(r"\d{1,10}", value, re.ASCII):
         raise OSError(errno.EINVAL, f"{value!r} is not a number", target)
     return int(value)
@@ -155,7 +156,7 @@ class State:
             if status.st_uid != os.geteuid() or status.st_mode & 0o022:
                 raise StateError(
                     f"{self.path} belongs to user {status.st_uid} (mode "
-                    f"{status.st_mode & 0o7777:o}): what it says is not written to this machine",
+                    f"{status.st_mode & 0o7777:o}): its content is not written to this machine",
                     hint="run --undo as the user who ran --apply; a reboot undoes everything, too",
                 )
             return file.read()

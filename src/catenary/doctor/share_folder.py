@@ -39,7 +39,7 @@ def read_folder(path: Path) -> str:
 
 
 def write_folder(path: Path, value: str) -> None:
-    """Raises OSError if the value is invalid, or the system refuses it."""
+    """Create, change or remove the folder. Raises OSError if the value is invalid or refused."""
     if value == ABSENT:
         path.rmdir()  # refused while shares are there
         return

@@ -224,7 +224,7 @@ class KernelCarrier:
             return status_code(code).cause
         return (
             f"sudo dmesg | grep EtherCAT has the AL status code, which neither libethercat nor the "
-            f"device tells; ethercat config -v -p {sub.position} shows what was configured"
+            f"device reports; ethercat config -v -p {sub.position} shows what was configured"
         )
 
     def _cause_of_invalid_sync(self, sub: SubDevice) -> Procedure[str]:
@@ -257,7 +257,7 @@ class KernelCarrier:
         try:
             return int.from_bytes(asked.result(), "little")
         except CatenaryError:
-            return None  # it has no such object, or refuses to tell it: the hint says so
+            return None  # it has no such object, or refuses to report it: see the hint
 
     def _deadline(self) -> int:
         return self._main.link.now() + round(CODE_TIMEOUT * 1e9)

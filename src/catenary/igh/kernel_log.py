@@ -1,4 +1,4 @@
-"""AL status codes in the kernel's log: libethercat does not tell them, and the master clears them
+"""AL status codes in the kernel's log: libethercat does not report them, and the master clears them
 in the device when it acknowledges the error (`ec_fsm_change_state_code` in IgH's
 master/fsm_change.c prints them)."""
 
@@ -14,7 +14,7 @@ LINE = r"EtherCAT ERROR {}-{}: (?:AL status message|Unknown AL status code) 0x([
 
 
 class KernelLog:
-    """Owns a place in the kernel's log: what comes after it was opened is read."""
+    """Owns a position in the kernel's log. Reads the records that come after it was opened."""
 
     def __init__(self, path: str = LOG) -> None:
         self._text = ""

@@ -54,7 +54,7 @@ class MainDevice(bus.MainDevice):
         self._kernel: KernelCarrier | None = None
 
     def forget(self) -> None:
-        """In a forked child: let go of the parent's master."""
+        """Let go of the parent's master in a forked child."""
         if self._is_inherited and self._kernel is not None:
             self._kernel.end()
             self._kernel = self.carrier = None
@@ -170,7 +170,7 @@ class MainDevice(bus.MainDevice):
         The master brings its devices to PRE-OP by itself, within its own times.
 
         Raises:
-            CatenaryError: A device that was told to go by SYNC0 does not reach PRE-OP, or refuses
+            CatenaryError: A device that was synchronised to SYNC0 does not reach PRE-OP, or refuses
                 its former type; further ones as notes.
         """
         kernel, self._kernel, self.carrier = self._kernel, None, None
@@ -201,7 +201,7 @@ class MainDevice(bus.MainDevice):
         return problems
 
     def _restore_sync_types(self, sub: bus.SubDevice) -> None:
-        """Those of a device that is away stay noted: it gets them when it is back."""
+        """Keep the types of a lost device until it returns."""
         if not self.reservation.has(sub.position, sub.identity):
             sub.state = None
             return

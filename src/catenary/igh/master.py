@@ -114,8 +114,8 @@ class Reservation:
             self.library.ecrt_release_master(handle)
 
     def forget(self) -> None:
-        """In a forked child: close its copies of the device file and the process data. The kernel
-        takes the master back when all copies are closed, so the parent's goes on."""
+        """Close the copies of a forked child: device file and process data. The kernel takes the
+        master back when all copies are closed, so the parent's goes on."""
         handle, self.handle = self.handle, 0
         if handle:
             self.library.ecrt_release_master(handle)
@@ -181,7 +181,7 @@ class Reservation:
 
         In INIT nothing answers an SDO, and an application that has just given the master back
         leaves the devices on the way down. One with Ethernet over EtherCAT may stay in OP: it
-        answers there, too. A device may be lost meanwhile: each look asks for those that are there.
+        answers there, too. Devices may be lost meanwhile: only those that are present count.
 
         Args:
             patience: How long no state may change, if none is INIT [s].

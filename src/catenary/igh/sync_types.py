@@ -1,7 +1,7 @@
 """0x1C32:01 and 0x1C33:01 of a device: how it keeps time.
 
-They are read before a loop with clocks and written back after it. Else the device would wait for
-SYNC0 in the next program, too.
+They are read before a loop with clocks and written back after it. Otherwise the device would wait
+for SYNC0 in the next program, too.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def write_types(
 
     Args:
         master: The reserved master.
-        position: Where the device is now.
+        position: The position of the device now.
         types: By index, as `read_types` found them.
         state: Of the device.
 

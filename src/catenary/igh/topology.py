@@ -1,4 +1,4 @@
-"""Delays that a kernel master has measured: whether they can be right.
+"""Plausibility of the delays that a kernel master has measured.
 
 IgH measures them once, in its scan, from the times at which a frame passed each port on its way
 out and back (`ec_master_calc_dc` in its master/master.c). In a closed ring the frame does not come

@@ -1,9 +1,9 @@
 """Pairs in a recording: a frame sent, and the frame as it came back.
 
-A frame was sent or came back by the first of these that says so:
+The first of these that is conclusive shows whether a frame was sent or came back:
 
 1. The file: pcapng can name the direction of a packet.
-2. The source address: the first controller sets bit 1 of its first byte. This says nothing where
+2. The source address: the first controller sets bit 1 of its first byte. It is inconclusive if
    all frames of an address have the bit, because the interface's own address has it (virtual
    interfaces, 02:...), or none has it, because a simulator does not set it.
 3. The content: a frame is sent with all working counters 0 and comes back counted. Where no device
@@ -56,8 +56,10 @@ class _Seen(NamedTuple):
 
 
 def read_exchanges(path: str | os.PathLike[str]) -> list[Exchange]:
-    """The exchanges in a capture, pcapng or pcap, in the order of the answers; DecodeError: no
-    capture. One that was cut off is read up to the cut."""
+    """Return the exchanges in a capture, pcapng or pcap, in the order of the answers.
+
+    A truncated capture is read up to the cut. Raises DecodeError if it is not a capture.
+    """
     return pair(decode_capture(Path(path).read_bytes()).packets)
 
 
@@ -100,7 +102,7 @@ def _ethercat(packets: Iterable[Packet]) -> list[_Seen]:
 
 
 def _conclusive_sources(seen: Iterable[_Seen]) -> frozenset[bytes]:
-    """The source addresses that occur with and without the bit that controllers set."""
+    """Return the source addresses that occur with and without the bit that controllers set."""
     found: dict[bytes, set[bool]] = defaultdict(set)
     for each in seen:
         found[each.frame.sender].add(each.frame.has_passed_controller)

@@ -35,7 +35,7 @@ FRAMES = 256  # read per window: more than a receive ring holds
 
 PACKETS = Path("/proc/thread-self/net/packet")  # of this thread's namespace, see packet(7)
 HINT = (
-    "end it first. force=True (--force) opens the interface all the same: two masters then disturb "
+    "end it first. force=True (--force) opens the interface anyway: two masters then disturb "
     "each other, and a scan stops the devices of both"
 )
 OWN_HINT = (
@@ -47,7 +47,7 @@ OWN_HINT = (
 class Ownership:
     """Owns the locks of the network interfaces that a link uses.
 
-    `others` describes what shows another master, where `force` went on in spite of it.
+    `others` describes the evidence of other masters that `force` has overridden.
     """
 
     def __init__(self, link: Link, *, force: bool = False) -> None:
@@ -72,7 +72,11 @@ class Ownership:
             raise _refused(self.others)
 
     def _lock(self, raws: Sequence[RawLink], force: bool) -> Iterator[str]:
-        """In the order of names, and none after a refusal: else two rings refuse each other."""
+        """Take the locks in the order of names. Yield the holder of one that is taken; stop there
+        unless `force`.
+
+        Without this order, two rings would refuse each other.
+        """
         for raw in sorted(raws, key=lambda each: each.name):
             lock = locked(raw.name)
             if lock is not None:
@@ -83,7 +87,7 @@ class Ownership:
                 return
 
     def forget(self) -> None:
-        """In a forked child: close its copies."""
+        """Close the copies of a forked child."""
         self.release()
 
     def release(self) -> None:
@@ -130,7 +134,7 @@ def holder(name: str) -> str:
             asking.connect(NAME + name)
             credentials = asking.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12)
         except OSError:  # released meanwhile, or too many have asked
-            return "a process that does not tell its number"
+            return "a process that does not report its number"
     return described(struct.unpack("3i", credentials)[0])
 
 

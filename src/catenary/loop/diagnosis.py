@@ -23,9 +23,17 @@ def silence_error(
     mute: Sequence[int] = (),
     tight: str = "",
 ) -> WorkingCounterError:
-    """The error for `lost` bad cycles in a row; `suspects`: devices of the units that failed;
-    `findings`: what silence or error counters say of the place; `mute`: devices whose inputs do not
-    come even when they are asked for alone; `tight`: of a period that is perhaps too short."""
+    """Return the error for `lost` bad cycles in a row.
+
+    Args:
+        answers: of all devices to a read of their AL status.
+        suspects: devices of the units that failed.
+        lost: number of cycles.
+        log: the last cycles.
+        findings: places that silent devices or error counters point to.
+        mute: devices whose inputs are missing even in a frame of their own.
+        tight: hint that the period is perhaps too short; or empty.
+    """
     silent = [answer.station for answer in answers if answer.word is None]
     others = [a for a in answers if a.station.position in suspects and a.word is not None]
     stray = [answer for answer in others if is_astray(answer)]

@@ -335,13 +335,15 @@ class Running:
     # Leaving
 
     def forget(self) -> None:
-        """In a forked child: the cycle, its threads and the devices are the parent's."""
+        """Let go of cycle, threads and devices in a forked child: they are the parent's."""
         self._left = True
         self.engine.forget()
 
     def leave(self, guard: SignalGuard) -> list[Exception]:
-        """Brings everything down, best effort: each step is taken whatever the one before met.
-        What went wrong on the way. A second time, or in a forked child: nothing."""
+        """Stop the loop and return what went wrong. No step depends on the success of another.
+
+        No effect the second time, or in a forked child.
+        """
         if self._process != os.getpid():
             self.forget()
         if self._left:

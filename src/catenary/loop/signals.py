@@ -55,7 +55,7 @@ class SignalGuard:
             signal.signal(number, before)
 
     def forget(self) -> None:
-        """In a forked child: signals end the child as if there were no loop."""
+        """Restore the signals in a forked child: they end it as if there were no loop."""
         self.restore()
 
     def _handle(self, number: int, frame: FrameType | None) -> None:

@@ -80,8 +80,8 @@ class Charge:
 
 
 def required_positions(plan: Plan) -> frozenset[int]:
-    """The devices without which the loop ends: all but the optional ones. None if everything that
-    is exchanged is optional: a coupler before optional devices is then not required either."""
+    """Return the devices without which the loop ends: all but the optional ones. If everything that
+    is exchanged is optional, this is empty: a coupler before optional devices is not required."""
     units = plan.cycle.sync_units
     if units and all(unit.optional for unit in units):
         return frozenset()

@@ -179,7 +179,7 @@ def _is_possible(area: MailboxArea) -> bool:
 
 
 def _sync_managers(sii: Sii, supported: int, notes: list[str]) -> tuple[SyncManager, ...]:
-    """Return those that the controller has (register 0x0005; 0: it does not say)."""
+    """Return those that the controller has (register 0x0005; 0: unknown)."""
     count = min(supported or SYNC_MANAGER_COUNT, SYNC_MANAGER_COUNT)
     if len(sii.sync_managers) > count:
         notes.append(f"its SII has {len(sii.sync_managers)} SyncManagers, its controller {count}")

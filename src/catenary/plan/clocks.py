@@ -121,7 +121,7 @@ def choose_clocks(
 
 
 def make_sync(device: DeviceDescription, wish: DistributedClock, period_ns: int) -> SyncPlan:
-    """Return the SYNC unit of a device: as wished for, else as the OpMode in its SII says."""
+    """Return the SYNC unit of a device: as requested, else from the OpMode in its SII."""
     mode = _op_mode(device, wish)
     cycle_ns = _given(wish.sync0, mode.sync0_ns or _multiple(period_ns, mode.sync0_factor))
     assign = mode.assign_activate if wish.assign_activate is None else wish.assign_activate
@@ -214,7 +214,7 @@ def _no_clock(device: DeviceDescription, why: str) -> ConfigurationError:
 
 
 def _op_mode(device: DeviceDescription, wish: DistributedClock) -> OpMode:
-    """The OpMode of that name; without a name the first one that starts a SYNC signal."""
+    """Return the OpMode of that name; without a name the first one that starts a SYNC signal."""
     if wish.op_mode is not None:
         return _named_mode(device, wish.op_mode)
     for starts in (_starts_sync0, _starts_sync):
@@ -239,8 +239,8 @@ def _named_mode(device: DeviceDescription, name: str) -> OpMode:
 def _check_sync(
     device: DeviceDescription, wish: DistributedClock, plan: SyncPlan, period_ns: int
 ) -> None:
-    """ConfigurationError for what cannot be. A value of the EEPROM is named as such, because
-    nothing in the program shows it."""
+    """Raise ConfigurationError for impossible values. A value of the EEPROM is named as such,
+    because nothing in the program shows it."""
     eeprom = f"{device}: its EEPROM (OpMode {plan.op_mode!r})"
     if not _starts_sync(plan.assign_activate):
         own = wish.assign_activate is None
@@ -283,12 +283,12 @@ def _given(seconds: float | None, else_ns: int) -> int:
 
 
 def _starts_sync0(assign_activate: int) -> bool:
-    """Free running modes have none; their shifts mean nothing (pollen_Orbita2d.bin: 1.9 s)."""
+    """True if SYNC0 runs. Modes without it have meaningless shifts (pollen_Orbita2d.bin: 1.9 s)."""
     return assign_activate & SYNC_BY_ECAT == SYNC_BY_ECAT
 
 
 def _starts_sync(assign_activate: int) -> bool:
-    """SYNC0 or SYNC1. A device may use SYNC1 alone (0x0500): robert-burger/libethercat#21."""
+    """True if SYNC0 or SYNC1 runs. SYNC1 alone (0x0500): robert-burger/libethercat#21."""
     signals = Activation(assign_activate >> 8)
     running = Activation.CYCLIC_OPERATION in signals
     return running and bool(signals & (Activation.SYNC0 | Activation.SYNC1))
@@ -302,10 +302,10 @@ def _multiple(period_ns: int, factor: int) -> int:
 
 
 def _sync1_ns(mode: OpMode, cycle_ns: int, period_ns: int) -> int:
-    """Register 0x09A4: the time from SYNC0 to the SYNC1 that follows it.
+    """Return register 0x09A4: the time from SYNC0 to the SYNC1 that follows it.
 
-    ETG.2000, Dc/OpMode/CycleTimeSync1@Factor: SYNC1 comes every so many SYNC0 cycles; negative:
-    every so many periods. Its cycle is that of SYNC0 plus the register (Beckhoff, ESC data sheet I
+    ETG.2000, Dc/OpMode/CycleTimeSync1@Factor: the cycle of SYNC1 in SYNC0 cycles; if
+    negative, in periods. This cycle is that of SYNC0 plus the register (Beckhoff, ESC data sheet I
     §9.2.3.5; so SOEM's `ecx_dcsync01` and IgH, master/fsm_slave_config.c). An EL3702 with four-fold
     oversampling has the factors -4 and -1: 250 us and 750 us at 1 ms (ecmc's notes on DC clocks).
     """

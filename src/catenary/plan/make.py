@@ -81,14 +81,14 @@ def make_plan(
     burst: int = BURST,
     exact_matching: bool = False,
 ) -> Plan:
-    """Return the plan that fulfils all wishes.
+    """Return the plan that fulfils all requests.
 
     Args:
         period: [s].
         watchdog: of process data [s]; 0: off; None: 0.1 s, for devices in CST the longer of 10 ms
             and five exchanges.
-        optional: positions without which the cycle is good, in addition to devices of wishes that
-            do not require them. Devices that no wish names are required if any other one is.
+        optional: positions without which the cycle is good, in addition to devices of requests that
+            do not require them. Devices without a request are required if any other one is.
         collect_share: threaded, the part of the period in which frames may come back.
         late_limit_position, late_limit_velocity, late_limit_torque: of CSP, CSV and CST [s].
         handover, stop_deadline: [s].
@@ -101,8 +101,8 @@ def make_plan(
         exact_matching: every frame carries the cycle number (plan/frames.py).
 
     Raises:
-        ConfigurationError: an object cannot be mapped, a wish contradicts another, or the frames do
-            not fit into the period.
+        ConfigurationError: an object cannot be mapped, requests contradict each other, or the
+            frames do not fit into the period.
     """
     period_ns = period_in_ns(period)
     asked = _asked(devices, wishes, period_ns)

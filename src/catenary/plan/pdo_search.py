@@ -19,7 +19,7 @@ from catenary.model.device import Pdo
 if TYPE_CHECKING:  # wish.py needs NumPy, a scan does not
     from catenary.plan.wish import ObjectReference
 
-STEPS_MAX = 2000  # combinations looked at: real devices need a few
+STEPS_MAX = 2000  # combinations that are tried: real devices need a few
 
 
 class Combination(NamedTuple):

@@ -110,8 +110,8 @@ class PdoWish:
     """The objects one device must exchange every cycle. What is mapped already stays as it is;
     the mapping is changed only where a wanted object is missing, or as `pdos` says.
 
-    A device that several wishes name is exchanged as often as any of them asks, and is required
-    when any of them requires it.
+    If several requests name a device, the smallest `every` counts, and it is required if any of
+    them requires it.
     """
 
     outputs: tuple[ObjectReference, ...] = ()  # MainDevice → device (RxPDO)

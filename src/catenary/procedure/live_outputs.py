@@ -1,6 +1,6 @@
-"""Devices found in SAFE-OP or OP: left so by a master that was killed, or driven by a live one.
+"""Devices found in SAFE-OP or OP: left by a master that was killed, or driven by a live one.
 
-The process-data watchdog tells which (ETG.1000.4 §6.3; ET1100 datasheet, section II, 0x0420 and
+The process-data watchdog shows which (ETG.1000.4 §6.3; ET1100 datasheet, section II, 0x0420 and
 0x0440): without writes of ours it expires, unless another master goes on refreshing the outputs.
 Devices are addressed by position (APRD): they may not have their station addresses yet.
 """
@@ -69,7 +69,7 @@ def find_refreshed(running: Sequence[Running]) -> Procedure[list[int]]:
     """Return the positions in OP whose outputs another master refreshes, waiting for at most twice
     their watchdog times. Changes nothing.
 
-    Only a device whose watchdog is on and triggered by its outputs can tell. SAFE-OP is left out:
+    Only a device whose watchdog is on and triggered by its outputs shows this. SAFE-OP is left out:
     a watchdog that was never triggered looks like one that is active.
     """
     watched = {}

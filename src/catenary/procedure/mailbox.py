@@ -5,8 +5,8 @@ network loses is recovered by the standard's own means, never by blindly sending
 which jams mailboxes (SOEM#684):
 
 - A lost read: toggle the repeat request of SyncManager 1, wait for the acknowledge, read again.
-- A lost write: nobody knows whether it arrived. An answer within a grace says that it did; else
-  the message is written again with the same counter, by which the device tells the repetition.
+- A lost write: it is unknown whether it arrived. An answer within a grace period shows that it did.
+  Otherwise write the message again with the same counter: the device recognises the repetition.
 
 The counter of what the device sends only identifies repetitions. Devices may start it anywhere,
 leave it 0 (ethercrab#236) or at another value, or copy ours (KickCAT, CoE/mailbox/response.cc). So

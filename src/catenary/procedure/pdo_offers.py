@@ -89,7 +89,7 @@ def _is_read_only(
     channel: MailboxChannel, device: DeviceDescription, index: int
 ) -> Procedure[bool]:
     """Return True if the dictionary says that subindex 0 cannot be written in PRE-OP. An entry
-    without any right to read it tells nothing: some devices leave the access word empty."""
+    without any right to read it is inconclusive: some devices leave the access word empty."""
     if device.mailbox is None or not device.mailbox.sdo_information:
         return False
     entry, _ = yield from describe_entry(channel, index, 0)

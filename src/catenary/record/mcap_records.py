@@ -30,7 +30,7 @@ LARGEST_CHUNK = 1 << 28  # [bytes] what is longer is no chunk of ours, but damag
 
 @contextmanager
 def refusing_damage(name: str) -> Iterator[None]:
-    """Turn whatever a damaged file makes the libraries raise into a RecordingError."""
+    """Raise RecordingError for any error of the libraries that a damaged file causes."""
     damage: tuple[type[Exception], ...] = (
         *(require("mcap.exceptions").McapError, msgspec.MsgspecError, struct.error),
         *(ArithmeticError, LookupError, MemoryError, RecursionError, TypeError, ValueError),

@@ -1,13 +1,13 @@
-"""The desk: where clients leave commands for a loop, and who may command which axis.
+"""The desk: memory for the commands of clients to a loop, and for their leases on axes.
 
-Sealed memory without a name, since clients write in it; they get it over a socket
-(desk_socket.py). Clients trust each other, because they share a mutex, whose robust list holds
-pointers; the loop trusts none of them: it never takes the mutex, and bounds whatever it reads.
-Behind the head lie the mutex, the holders (for every
-axis the serial of the lease it belongs to, 0: nobody's), the places (one for each client) and the
-ring of each place. Clients change it under the mutex alone. The loop never takes the mutex: it
-learns of a lease by the word that publishes it (`_words.pyx`), writes two words of a place only,
-how far it has read and which lease it has ended, and says in the end that it is closed.
+It is sealed memory without a name, because clients write in it. They get it over a socket
+(desk_socket.py). Clients trust each other: they share a mutex, whose robust list holds pointers.
+The loop does not trust them. It never takes the mutex, and bounds whatever it reads.
+
+The head is followed by the mutex, the holders (for each axis the serial of its lease; 0: none), the
+places (one for each client) and the ring of each place. Clients change these under the mutex. The
+loop sees a lease by the word that publishes it (`_words.pyx`). It writes two words of a place: the
+number of commands that it has read, and the lease that it has ended. At its end it sets `closed`.
 """
 
 from __future__ import annotations
@@ -195,7 +195,7 @@ def make_desk(layout: ShareLayout) -> tuple[Desk, int]:
 
 
 def open_desk(layout: ShareLayout, path: Path, owner: int) -> Desk:
-    """Open the desk of a running loop, over its socket. Raises ShareError if it cannot."""
+    """Open the desk of a running loop, over its socket. Raises ShareError if that fails."""
     try:
         descriptor = request_descriptor(path, owner)
     except FileNotFoundError as error:

@@ -1,8 +1,8 @@
 """The socket next to a share: over it, clients get the memory for their commands (SCM_RIGHTS).
 
-The memory itself has no name, because a file of a name can be truncated by whoever may write in it,
-and the loop would get a SIGBUS. unix(7), memfd_create(2). The kernel checks the socket's
-permissions when a client connects; the client checks with SO_PEERCRED who answers.
+The memory has no name, because whoever may write in a file can truncate it: the loop would get a
+SIGBUS. The kernel checks the socket's permissions when a client connects. The client checks with
+SO_PEERCRED which user answers. unix(7), memfd_create(2).
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import os
 import socket
 import struct
 import threading
+import time
 from contextlib import suppress
 from pathlib import Path
 
@@ -21,6 +22,7 @@ ANSWER = b"desk"
 BACKLOG = 16
 PATIENCE = 2.0  # [s]
 RETRY = 0.1  # [s] after an accept that failed: the process has no descriptor left
+PAUSE = 0.002  # [s] after each client; before a client tries again
 CREDENTIALS = struct.Struct("3i")  # pid, uid, gid: struct ucred
 
 
@@ -56,6 +58,8 @@ class DeskSocket:
             self._listening.shutdown(socket.SHUT_RDWR)  # wakes accept
         if self._thread.is_alive():
             self._thread.join(PATIENCE)
+        if self._thread.is_alive():  # starved: it must not send a descriptor of this number
+            return
         self._listening.close()
         os.close(self._descriptor)
 
@@ -72,6 +76,7 @@ class DeskSocket:
             with client, suppress(OSError):
                 client.setblocking(False)  # a client that does not read causes no wait
                 socket.send_fds(client, [ANSWER], [self._descriptor])
+            self._ended.wait(PAUSE)  # clients that connect without end cost the loop little
 
 
 def request_descriptor(path: Path, owner: int) -> int:
@@ -79,13 +84,13 @@ def request_descriptor(path: Path, owner: int) -> int:
 
     Raises:
         FileNotFoundError, PermissionError: from the kernel.
-        ShareError: nobody answers, or not a process of user `owner`.
+        ShareError: no process answers, or one that is not of user `owner`.
     """
     flags = socket.SOCK_SEQPACKET | socket.SOCK_CLOEXEC
     with socket.socket(socket.AF_UNIX, flags) as asking:
         asking.settimeout(PATIENCE)
         try:
-            asking.connect(str(path))
+            _connect(asking, path)
             peer = asking.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, CREDENTIALS.size)
             _, uid, _ = CREDENTIALS.unpack(peer)
             if uid != owner:
@@ -99,3 +104,15 @@ def request_descriptor(path: Path, owner: int) -> int:
     if not descriptors:
         raise ShareError(f"{path} has sent no memory for commands")
     return descriptors[0]
+
+
+def _connect(asking: socket.socket, path: Path) -> None:
+    """Connect. While other clients fill the queue, the kernel refuses with EAGAIN: try again."""
+    deadline = time.monotonic() + PATIENCE
+    while True:
+        try:
+            return asking.connect(str(path))
+        except BlockingIOError:
+            if time.monotonic() >= deadline:
+                raise
+        time.sleep(PAUSE)

@@ -22,11 +22,12 @@ from catenary.share.process import is_running
 
 GROUP_FOLDER = Path("/run/catenary")
 USER_FOLDERS = Path("/dev/shm")
+USER_IDS = Path("/proc/self/uid_map")
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 STATE, SOCKET, MUTEX = "share", "socket", "mutex"  # a file's name begins with its kind
 DRAFT = ".draft-"
 DRAFT_AGE = 60.0  # [s] a draft exists for milliseconds
-LOCK_PATIENCE = 2.0  # [s] so does a lock
+LOCK_PATIENCE = 2.0  # [s] a lock lasts as briefly
 LOCK_PAUSE = 0.005
 
 
@@ -48,7 +49,11 @@ def own_folder() -> Path:
 
 
 def user_folder(uid: int) -> Path:
-    return USER_FOLDERS / f"catenary-{uid}"
+    """Return the folder of a user, named after the id outside of this user namespace.
+
+    An ordinary user is root in the user namespace of a private network.
+    """
+    return USER_FOLDERS / f"catenary-{_outside(uid)}"
 
 
 def prepare(folder: Path, mode: int) -> None:
@@ -61,9 +66,10 @@ def prepare(folder: Path, mode: int) -> None:
     with suppress(FileExistsError):
         folder.mkdir(0o700)
     status = folder.lstat()
-    if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.geteuid():
+    kind = "" if stat.S_ISDIR(status.st_mode) else ", and is not a folder"
+    if kind or status.st_uid != os.geteuid():
         raise ShareError(
-            f"{folder} was made by user {status.st_uid}, not by you (user {os.geteuid()})",
+            f"{folder} belongs to user {status.st_uid} (you are {os.geteuid()}){kind}",
             hint="remove it as root; `sudo catenary doctor --apply` creates /run/catenary instead",
         )
     present = stat.S_IMODE(status.st_mode)
@@ -138,7 +144,7 @@ def deciding(folder: Path) -> Iterator[None]:
 
 
 def draft_path(folder: Path) -> Path:
-    """Return a name that no reader looks for. A socket's path has at most 107 bytes."""
+    """Return a name that readers do not open. A socket's path has at most 107 bytes."""
     return folder / f"{DRAFT}{os.getpid()}-{os.urandom(4).hex()}"
 
 
@@ -153,18 +159,36 @@ def remove_old_drafts(folder: Path) -> None:
                 path.unlink()
 
 
+def _outside(uid: int) -> int:
+    """Return a user's id in the parent of this user namespace: user_namespaces(7)."""
+    with suppress(OSError):
+        for line in USER_IDS.read_text().splitlines():
+            inside, outside, count = map(int, line.split())
+            if inside <= uid < inside + count:
+                return outside + uid - inside
+    return uid
+
+
 def _is_group_folder() -> bool:
-    """True if the folder belongs to root, and not all users can write in it."""
+    """True if the folder belongs to root, not all users can write in it, and it is sticky.
+
+    Without the sticky bit, its group could rename and remove the files of others.
+    """
     try:
         status = GROUP_FOLDER.lstat()
     except OSError:
         return False
-    return stat.S_ISDIR(status.st_mode) and status.st_uid == 0 and not status.st_mode & 0o002
+    mode = status.st_mode
+    closed = not mode & 0o002 and (mode & stat.S_ISVTX or not mode & 0o020)
+    return stat.S_ISDIR(mode) and status.st_uid == 0 and bool(closed)
 
 
 def _passage(mode: int) -> int:
-    """Return the search permissions that files of `mode` need from their folder."""
-    return (0o010 if mode & 0o070 else 0) | (0o001 if mode & 0o007 else 0)
+    """Return the search permissions that files of `mode` need from their folder.
+
+    All users pass: the group of a file can be another one than that of its folder (newgrp(1)).
+    """
+    return 0o011 if mode & 0o077 else 0
 
 
 def _lock(descriptor: int, folder: Path) -> None:

@@ -22,7 +22,7 @@ SEALS = fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL
 
 
 class Segment:
-    """Owns a mapping of a file, whose owner (user id) it knows."""
+    """Owns a mapping of a file, and knows the user who owns the file."""
 
     def __init__(self, path: Path, descriptor: int, *, writable: bool) -> None:
         try:
@@ -52,14 +52,14 @@ class Segment:
 
     def unlink(self) -> None:
         """Remove the name if it still belongs to this file."""
-        # Where another process keeps the lock, the file stays, as after a kill.
+        # If another process keeps the lock, the file stays, as after a kill.
         with suppress(ShareError), deciding(self.path.parent):
             if self.is_published:
                 self.path.unlink()
 
 
 def create(folder: Path, size: int, mode: int) -> Segment:
-    """Create a draft of zeros. Raises ShareError if there is no room."""
+    """Create a draft of zeros. Raises ShareError if the memory is full."""
     prepare(folder, mode)
     remove_old_drafts(folder)
     draft = draft_path(folder)

@@ -13,19 +13,19 @@ FOR_EVER_NS = 1 << 62
 
 
 class Mutex:
-    """One at a time among all threads of all processes that name it.
+    """Owns a lock that all threads of all processes share by its name.
 
         with share.Mutex("tool") as mutex:
-            if mutex.recovered:       # who had it died in its block: what it did may be half done
+            if mutex.recovered:       # the owner died in its block: its work may be half done
                 ...
 
-    A waiter of high priority lends it to the owner (priority inheritance); the lock of an owner
-    that has died goes to the next, who is told. For slow paths: a loop never waits for it. It is
-    made by whoever names it first, and stays until `unlink`.
+    The owner inherits the priority of its waiters. If the owner dies, the next one gets the lock,
+    and `recovered` is True. It is for slow paths: a loop never waits for it. The first process that
+    names it creates it; it stays until `unlink`.
 
-    Who has a mutex can crash the others: it holds pointers of the C library. Share it with users
-    whom you trust. It is refused if another user owns it, or if more users may write in it than
-    `mode` says. `uid`: open the mutex of this user, which exists already.
+    A process that has a mutex can crash the others, because it holds pointers of the C library.
+    Share it only with users whom you trust. It is refused if another user owns it, or if more users
+    may write in it than `mode` grants. `uid`: open the existing mutex of this user.
     """
 
     def __init__(self, name: str, *, mode: int = 0o600, uid: int | None = None) -> None:

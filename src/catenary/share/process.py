@@ -26,7 +26,7 @@ class Process(msgspec.Struct, frozen=True):
         return _start_time(self.pid) == self.start_time and self.boot_id == _boot_id()
 
     def __str__(self) -> str:
-        """The command is the process' own word: control characters are shown as '?'."""
+        """Return number and command. Control characters in the command become '?'."""
         command = "".join(c if c.isprintable() else "?" for c in self.command)
         return f"process {self.pid} ({command})" if command else f"process {self.pid}"
 
@@ -42,9 +42,10 @@ def this_process() -> Process:
 
 
 def _start_time(pid: int) -> int | None:
-    """None: there is no such process, or it waits to be buried."""
+    """Return the start time of a process; None if there is none, or if it is a zombie."""
     try:
-        stat = Path(f"/proc/{pid}/stat").read_text()
+        # A process chooses its name, which need not be UTF-8: prctl(2), PR_SET_NAME.
+        stat = Path(f"/proc/{pid}/stat").read_text(errors="replace")
     except OSError:
         return None
     fields = stat.rpartition(")")[2].split()

@@ -62,8 +62,8 @@ def _attached(name: str, stale: bool, uid: int | None) -> Reader:
         others = ", ".join(map(repr, folder.names(uid))) or "none"
         raise ShareError(
             f"there is no share {name!r}; there are: {others}",
-            hint="it is there while a Loop with sink=cat.Share(...) is open; uid= names another "
-            "user's",
+            hint="it is there while a Loop with sink=cat.Share(...) is open; name the user of "
+            "another user's share: uid= (--uid)",
         ) from error
     except PermissionError as error:
         raise ShareError(

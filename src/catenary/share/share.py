@@ -32,13 +32,13 @@ class Share:
         with cat.Share("arm") as share, cat.Loop(arm, period=1e-3, sink=share) as loop:
             for cycle in loop: ...
 
-    Others `cat.attach("arm")`; nothing they do delays the loop. `history` [s] of cycles are kept.
+    Others call `cat.attach("arm")`. Readers cannot delay the loop. `history`: cycles kept [s].
     `mode`: permissions as of chmod: 0o600, this user alone; 0o640, the group may read; 0o660, and
-    command. Nobody but this user can write into the file of the cycles, whatever `mode` is.
+    command. Only this user can write into the file of the cycles, whatever `mode` is.
 
     One loop at a time. Each loop that is opened with the share begins a segment of its own, whose
-    cycles count from 1: who is attached to the one before sees its end, and attaches again.
-    ShareError: the name belongs to a running process.
+    cycles count from 1. Readers of the segment before see its end, and attach again.
+    Raises ShareError if the name belongs to a running process.
     """
 
     def __init__(self, name: str, *, history: float = HISTORY, mode: int = 0o600) -> None:
@@ -186,7 +186,7 @@ class Share:
         return self._pid != os.getpid()
 
     def _make_files(self, made: ShareLayout) -> tuple[Segment, Desk, DeskSocket]:
-        """Make all of it as drafts. Raises ShareError if there is no room."""
+        """Create files and socket as drafts. Raises ShareError if the memory is full."""
         where = folder.own_folder()
         segment = memory.create(where, made.size, self._mode & ~OTHERS_WRITE)
         try:
@@ -199,7 +199,7 @@ class Share:
             raise
 
     def _publish(self, segment: Segment, listening: DeskSocket) -> None:
-        """Give both their names, the socket first: who finds the segment can connect."""
+        """Rename both, the socket first: a reader that finds the segment can connect."""
         where = segment.path.parent
         try:
             with folder.deciding(where):

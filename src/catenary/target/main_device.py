@@ -21,7 +21,7 @@ class MainDevice(bus.MainDevice):
     Leaving the block brings all devices to INIT, whatever happened in it.
 
     Opening is refused while another master is live on the interface (docs/networks.md).
-    `force=True` opens all the same; on the kernel master it has no effect.
+    `force=True` opens it anyway; on the kernel master it has no effect.
     """
 
     def __new__(

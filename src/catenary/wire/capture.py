@@ -8,7 +8,7 @@ from catenary.wire.pcapng import Capture, decode_pcapng
 
 
 def decode_capture(data: bytes) -> Capture:
-    """The capture in a file's bytes, up to where it was cut off. DecodeError: no capture."""
+    """Return the capture in a file's bytes, up to the cut. Raises DecodeError if it is not one."""
     if is_pcap(data):
         return decode_pcap(data)
     try:

@@ -31,7 +31,7 @@ def is_pcap(data: bytes) -> bool:
 
 
 def decode_pcap(data: bytes) -> Capture:
-    """The capture in a file's bytes. DecodeError if it is not pcap."""
+    """Return the capture in a file's bytes. Raises DecodeError if it is not pcap."""
     form = _format(data)
     if form is None:
         raise DecodeError(f"pcap: its magic number is {data[:4].hex() or 'missing'}")

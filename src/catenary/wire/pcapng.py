@@ -115,7 +115,7 @@ def encode_statistics(time_ns: int, *, received: int, dropped: int) -> bytes:
 
 
 def decode_pcapng(data: bytes) -> Capture:
-    """The capture in a file's bytes, up to where it was cut off. DecodeError: no pcapng."""
+    """Return the capture in a file's bytes, up to the cut. Raises DecodeError if not pcapng."""
     state = _State()
     end = 0
     for block in _blocks(data):
@@ -161,7 +161,7 @@ class _Block(NamedTuple):
 
 
 def _blocks(data: bytes) -> Iterator[_Block]:
-    """Every whole block. The first one must be whole."""
+    """Yield every whole block. The first one must be whole."""
     offset, order = 0, ""
     while offset < len(data):
         if offset + _MINIMUM_BLOCK > len(data):

@@ -1,6 +1,6 @@
 """The cache of compiled laws: Numba's format, in a folder that only this user can write.
 
-Numba unpickles what it finds in its cache: who can write there runs code as the user of the law.
+Numba unpickles the files of its cache: a user who can write there runs code as the user of the law.
 Numba's own choice is `__pycache__` next to the source, which may belong to another user, be
 writable for a group, or be set by $NUMBA_CACHE_DIR. Ours is ~/.cache/catenary/laws (below
 $XDG_CACHE_HOME if that is set), with mode 0700.
@@ -58,21 +58,30 @@ def private_folder(folder: Path) -> Path:
     """Create a folder that only this user can write, mode 0700. Returns it without links.
 
     Raises OSError if that is not possible, or if another user could exchange the folder or a file
-    in it. The folders above count, too, as in OpenSSH's StrictModes (misc.c, safe_path).
+    in it. The folders above count, too, up to the home, as in OpenSSH's StrictModes (misc.c,
+    safe_path). Each is checked before anything below it is created or changed, because root can
+    have the HOME of another user (sudo).
     """
-    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    real = folder.resolve()
+    folder = Path(os.path.abspath(folder))
+    home = Path(os.path.expanduser("~"))
+    # In a user namespace, root is not the owner of these: user_namespaces(7), overflowuid.
+    above_home = {*home.parents, *home.resolve().parents}
+    for place in reversed(folder.parents):
+        if place in above_home:
+            continue
+        _create(place)
+        real = place.resolve(strict=True)
+        for above in {real, *real.parents} - above_home:
+            _refuse_writable(above)
+    _create(folder)
+    real = folder.resolve(strict=True)
     status = real.stat()
     if status.st_uid != os.geteuid():
         raise PermissionError(f"{folder} belongs to user {status.st_uid}")
+    if folder.is_symlink():
+        raise PermissionError(f"{folder} is a link")
     if stat.S_IMODE(status.st_mode) != 0o700:
         real.chmod(0o700)
-    for place in real.parents:
-        above = place.stat()
-        if above.st_uid not in (0, os.geteuid()):
-            raise PermissionError(f"{place} belongs to user {above.st_uid}")
-        if above.st_mode & OTHERS_WRITE and not above.st_mode & stat.S_ISVTX:
-            raise PermissionError(f"others can write in {place}")
     for path in real.glob("*.nb[ci]"):  # from before the folder was private
         found = path.lstat()
         if found.st_uid != os.geteuid() or found.st_mode & OTHERS_WRITE:
@@ -80,8 +89,28 @@ def private_folder(folder: Path) -> Path:
     return real
 
 
+def _create(place: Path) -> None:
+    """Create a folder if it is missing. Refuse a name that another user has put there."""
+    if not os.path.lexists(place):
+        place.mkdir(0o700, exist_ok=True)
+    _refuse_foreign(place, place.lstat())  # of the link itself, if it is one
+
+
+def _refuse_writable(place: Path) -> None:
+    """Refuse a folder whose entries another user could exchange."""
+    status = place.stat()
+    _refuse_foreign(place, status)
+    if status.st_mode & OTHERS_WRITE and not status.st_mode & stat.S_ISVTX:
+        raise PermissionError(f"others can write in {place}")
+
+
+def _refuse_foreign(place: Path, status: os.stat_result) -> None:
+    if status.st_uid not in (0, os.geteuid()):
+        raise PermissionError(f"{place} belongs to user {status.st_uid}")
+
+
 def _cache_class(folder: Path) -> Any:
-    """Return Numba's cache with our place and our key. Its own choice of a place is left out."""
+    """Return Numba's cache with our folder and our key, instead of its own choice of a folder."""
     caching: Any = import_module("numba.core.caching")
 
     class Files(caching.CompileResultCacheImpl):  # type: ignore[misc]
@@ -115,7 +144,7 @@ def _cache_class(folder: Path) -> Any:
                 return None
 
         def save_overload(self, signature: Any, data: Any) -> None:
-            with suppress(OSError):  # no room: the law runs without
+            with suppress(OSError):  # the disk is full: the law runs without
                 super().save_overload(signature, data)
 
     return LawCache

@@ -123,7 +123,7 @@ class Synchronisation:
             self._core.run_model(self._position, self._step_ns)
 
     def awaits_pulses(self) -> bool:
-        """It keeps time by pulses, and none has come."""
+        """True if it keeps time by pulses, and none has arrived."""
         active, seen = self._core.synchronous(self._position)[:2]
         return active and not seen
 
