@@ -5,8 +5,10 @@ from __future__ import annotations
 import pytest
 
 import catenary as cat
-from catenary.errors import SegmentError
+from catenary.bus.sub_devices import SubDevices
+from catenary.errors import SegmentError, StateError
 from catenary.virtual import Coupler, DigitalOutputs, Segment, Servo
+from catenary.wire.al import State
 
 
 def positions(subs: tuple[cat.SubDevice, ...]) -> list[int]:
@@ -21,7 +23,7 @@ def test_a_group_goes_up_to_the_next_alias() -> None:
         assert positions(subs.group(20)) == [4, 5]
         assert subs.group(30) == ()
         assert positions(subs.drives) == [1, 3, 5]
-        with pytest.raises(ValueError, match="0 is none"):
+        with pytest.raises(ValueError, match="0 means that a device has none"):
             subs.group(0)
 
 
@@ -30,3 +32,56 @@ def test_an_alias_that_two_have_is_refused_when_it_is_asked_for() -> None:
         subs = main.scan()
         with pytest.raises(SegmentError, match="devices 0, 1 have the same alias 7"):
             subs.group(7)
+
+
+def test_a_device_is_found_by_its_name_or_order_code() -> None:
+    with cat.MainDevice(Segment([Coupler(), Servo(name="shoulder"), DigitalOutputs()])) as main:
+        subs = main.scan()
+        assert subs["shoulder"].position == 1
+        assert subs["CVK100"].position == 0
+        with pytest.raises(SegmentError, match="no device has the name .* 'sholder'") as caught:
+            subs["sholder"]
+        assert caught.value.hint == "names here: 'shoulder'"
+
+
+def test_a_name_of_several_devices_is_refused_with_their_positions() -> None:
+    with cat.MainDevice(Segment([Servo(), Coupler(), Servo()])) as main:
+        subs = main.scan()
+        with pytest.raises(SegmentError, match=r"2 devices are 'CVS001': positions 0, 2"):
+            subs["CVS001"]
+
+
+def test_a_device_is_found_by_its_alias() -> None:
+    with cat.MainDevice(Segment([Coupler(), Servo(alias=10)])) as main:
+        subs = main.scan()
+        assert subs.by_alias(10).position == 1
+        with pytest.raises(SegmentError, match="no device has the alias 11") as caught:
+            subs.by_alias(11)
+        assert "10 (" in caught.value.hint
+
+
+def test_a_position_that_does_not_exist_names_the_number_of_devices() -> None:
+    with cat.MainDevice(Segment([Coupler(), Servo()])) as main:
+        subs = main.scan()
+        assert subs[-1].position == 1
+        with pytest.raises(IndexError, match=r"no device 99: there are 2, 0 to 1"):
+            subs[99]
+    with pytest.raises(IndexError, match="there are 0$"):
+        SubDevices()[0]
+
+
+@pytest.mark.parametrize("state", ["SAFE_OP", "safeop", State.SAFE_OP])
+def test_a_device_is_brought_to_a_state(state: State | str) -> None:
+    with cat.MainDevice(Segment([Coupler(), Servo()])) as main:
+        servo = main.scan()[1]
+        assert servo.request_state(state).state is State.SAFE_OP
+        assert servo.read_state().state is servo.state is State.SAFE_OP
+        assert servo.request_state("PREOP").state is State.PRE_OP
+        with pytest.raises(ValueError, match="invalid state 'RUN': INIT, PRE-OP"):
+            servo.request_state("RUN")
+
+
+def test_a_refused_state_is_an_error_of_the_device() -> None:
+    with cat.MainDevice(Segment([Coupler(), Servo()])) as main:
+        with pytest.raises(StateError, match="servo"):
+            main.scan()[1].request_state("OP")  # without process data

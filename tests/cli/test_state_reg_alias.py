@@ -147,7 +147,7 @@ def test_mistakes_name_the_thing(
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("state virtual RUN", "'RUN' is no state: INIT, PREOP, SAFEOP, OP, BOOT"),
+        ("state virtual RUN", "invalid state 'RUN': INIT, PRE-OP, BOOT, SAFE-OP, OP"),
         ("reg read virtual 2", "the following arguments are required: ADDRESS"),
         ("reg read virtual two AL_STATUS", "'two' is no number"),
         ("alias virtual 2 100000", "alias 100000 is outside 0 to 65535"),

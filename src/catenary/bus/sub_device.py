@@ -74,10 +74,33 @@ class SubDevice:
         return Station(self.position, self.description.station_address, self.name)
 
     def read_state(self) -> DeviceState:
-        """Asks for its EtherCAT state."""
+        """Read its EtherCAT state."""
         found = self.main.converse(read_state(self.station))
         self.state = found.state
         return found
+
+    def request_state(self, state: State | str) -> DeviceState:
+        """Bring this device to a state, through the states between, and leave it there.
+
+        A device that goes to SAFE-OP gets the mapping that it has. A loop configures its devices
+        itself: do not call this while one runs.
+
+        Args:
+            state: `State.SAFE_OP`, or its name: "SAFE_OP".
+
+        Returns:
+            The state that the device has then.
+
+        Raises:
+            StateError: The device refuses the state; the error names its reason.
+            ValueError: The text is not the name of a state.
+        """
+        target = State.from_name(state) if isinstance(state, str) else State(state)
+        outcome = self.main.request_states(self.main.subs, [self.position], target)[self.position]
+        if isinstance(outcome, CatenaryError):
+            raise outcome
+        self.state = outcome.state
+        return outcome
 
     def __repr__(self) -> str:
         return f"<SubDevice {self.position} {self.name!r} {self.state or 'state unknown'}>"

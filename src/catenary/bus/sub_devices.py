@@ -1,8 +1,9 @@
-"""SubDevices: all devices of a segment, by position, by kind, by alias."""
+"""SubDevices: all devices of a segment, by position, name, kind and alias."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from difflib import get_close_matches
 from itertools import takewhile
 from typing import overload
 
@@ -11,39 +12,97 @@ from catenary.errors import SegmentError
 
 
 class SubDevices(Sequence[SubDevice]):
-    """The devices of a segment, by position."""
+    """The devices of a segment: `subs[2]`, `subs["EL2004"]`, `subs.by_alias(10)`, `subs.drives`."""
 
     def __init__(self, subs: Sequence[SubDevice] = ()) -> None:
         self._subs = tuple(subs)
 
     @property
     def drives(self) -> tuple[SubDevice, ...]:
-        """Those with CiA 402 axes."""
+        """Devices with CiA 402 axes."""
         return tuple(sub for sub in self._subs if sub.is_drive)
 
+    def by_alias(self, alias: int) -> SubDevice:
+        """Return the device with this station alias.
+
+        Raises:
+            SegmentError: No device has it, or several devices have it.
+            ValueError: The alias is not from 1 to 65535; 0 means that a device has none.
+        """
+        found = self._with_alias(alias)
+        if found is None:
+            known = ", ".join(f"{sub.alias} ({sub.station})" for sub in self._subs if sub.alias)
+            raise SegmentError(
+                f"no device has the alias {alias}",
+                hint=f"aliases here: {known or 'none'}; catenary alias TARGET POSITION VALUE",
+            )
+        return found
+
     def group(self, alias: int) -> tuple[SubDevice, ...]:
-        """The device with this station alias and those behind it up to the next one that has an
-        alias of its own: a tool, wherever it is plugged in. Empty where nobody has it. SegmentError
-        where several have; ValueError for 0, which is none."""
+        """Return the device with this alias and those after it, up to the next one with an alias.
+
+        That is a tool with its own devices, wherever it is plugged in. Empty if no device has the
+        alias.
+
+        Raises:
+            SegmentError: Several devices have the alias.
+            ValueError: The alias is not from 1 to 65535; 0 means that a device has none.
+        """
+        head = self._with_alias(alias)
+        if head is None:
+            return ()
+        behind = self._subs[head.position + 1 :]
+        return (head, *takewhile(lambda sub: not sub.alias, behind))
+
+    def _with_alias(self, alias: int) -> SubDevice | None:
         if not 1 <= alias <= 0xFFFF:
-            raise ValueError(f"alias {alias}: from 1 to 65535; 0 is none")
-        heads = [sub.position for sub in self._subs if sub.alias == alias]
+            raise ValueError(f"alias {alias}: from 1 to 65535; 0 means that a device has none")
+        heads = [sub for sub in self._subs if sub.alias == alias]
         if len(heads) > 1:
             raise SegmentError(
-                f"devices {', '.join(map(str, heads))} have the same alias {alias}",
+                f"devices {_positions(heads)} have the same alias {alias}",
                 hint="give each one its own: catenary alias TARGET POSITION VALUE",
             )
-        if not heads:
-            return ()
-        behind = self._subs[heads[0] + 1 :]
-        return (self._subs[heads[0]], *takewhile(lambda sub: not sub.alias, behind))
+        return heads[0] if heads else None
+
+    def _named(self, name: str) -> SubDevice:
+        found = [sub for sub in self._subs if sub.name == name] or [
+            sub for sub in self._subs if sub.order == name
+        ]
+        if len(found) == 1:
+            return found[0]
+        if found:
+            raise SegmentError(
+                f"{len(found)} devices are {name!r}: positions {_positions(found)}",
+                hint="use the position, or give each one an alias and use subs.by_alias(...)",
+            )
+        known = dict.fromkeys(text for sub in self._subs for text in (sub.name, sub.order) if text)
+        near = get_close_matches(name, known, n=3) or list(known)
+        raise SegmentError(
+            f"no device has the name or the order code {name!r}",
+            hint=f"names here: {', '.join(map(repr, near))}" if near else "no device has a name",
+        )
 
     @overload
-    def __getitem__(self, position: int) -> SubDevice: ...
+    def __getitem__(self, key: int | str) -> SubDevice: ...
     @overload
-    def __getitem__(self, position: slice) -> tuple[SubDevice, ...]: ...
-    def __getitem__(self, position: int | slice) -> SubDevice | tuple[SubDevice, ...]:
-        return self._subs[position]
+    def __getitem__(self, key: slice) -> tuple[SubDevice, ...]: ...
+    def __getitem__(self, key: int | str | slice) -> SubDevice | tuple[SubDevice, ...]:
+        """Return a device by position, or by its name or order code; devices by a slice.
+
+        Raises:
+            IndexError: There is no such position.
+            SegmentError: No device has the name, or several devices have it.
+        """
+        if isinstance(key, str):
+            return self._named(key)
+        try:
+            return self._subs[key]
+        except IndexError:
+            count = len(self._subs)
+            raise IndexError(
+                f"no device {key}: there are {count}" + (f", 0 to {count - 1}" if count else "")
+            ) from None
 
     def __len__(self) -> int:
         return len(self._subs)
@@ -53,3 +112,7 @@ class SubDevices(Sequence[SubDevice]):
 
     def __repr__(self) -> str:
         return f"<{len(self._subs)} SubDevices: {', '.join(sub.name for sub in self._subs)}>"
+
+
+def _positions(subs: Sequence[SubDevice]) -> str:
+    return ", ".join(str(sub.position) for sub in subs)

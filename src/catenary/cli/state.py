@@ -49,13 +49,13 @@ def add_parser(commands: Commands) -> None:
 
 
 def state_name(text: str) -> str:
-    """The name of a state in `wire.al.State`, from what people write."""
-    key = "".join(letter for letter in text.upper() if letter.isalpha())
-    names = {"INIT": "INIT", "PREOP": "PRE_OP", "SAFEOP": "SAFE_OP", "OP": "OP", "BOOT": "BOOT"}
-    names |= {"BOOTSTRAP": "BOOT", "OPERATIONAL": "OP"}
-    if key not in names:
-        raise argparse.ArgumentTypeError(f"{text!r} is no state: {STATES}")
-    return names[key]
+    """Return the name of a state in `wire.al.State`."""
+    from catenary.wire.al import State
+
+    try:
+        return State.from_name(text).name
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def run(arguments: argparse.Namespace) -> int:

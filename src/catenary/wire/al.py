@@ -25,6 +25,28 @@ class State(IntEnum):
     def __str__(self) -> str:
         return self.name.replace("_", "-")
 
+    @classmethod
+    def from_name(cls, text: str) -> State:
+        """Return the state of a name: "SAFE_OP", "SAFE-OP", "safeop", "OPERATIONAL".
+
+        Raises:
+            ValueError: The text is not the name of a state; the error lists the names.
+        """
+        key = "".join(letter for letter in text.upper() if letter.isalpha())
+        key = _LONG_NAMES.get(key, key)
+        for state in cls:
+            if state.name.replace("_", "") == key:
+                return state
+        raise ValueError(f"invalid state {text!r}: {', '.join(map(str, cls))}")
+
+
+_LONG_NAMES = {
+    "PREOPERATIONAL": "PREOP",
+    "SAFEOPERATIONAL": "SAFEOP",
+    "OPERATIONAL": "OP",
+    "BOOTSTRAP": "BOOT",
+}
+
 
 @dataclass(frozen=True, slots=True)
 class AlControl:
