@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from catenary.bus import event as events
     from catenary.drive import DistributedClock, Drives, Inputs, Outputs, Phase, Recovery
     from catenary.errors import CatenaryError
+    from catenary.link.interfaces import interfaces
     from catenary.loop import Cycle, Loop, law
     from catenary.share import Share, attach
     from catenary.target import MainDevice
@@ -57,6 +58,7 @@ __all__ = [
     "attach",
     "control",
     "events",
+    "interfaces",
     "law",
     "realtime",
     "share",
@@ -79,6 +81,7 @@ _HOMES = {
     "Share": "catenary.share",
     "SubDevice": "catenary.bus",
     "attach": "catenary.share",
+    "interfaces": "catenary.link.interfaces",
     **dict.fromkeys(_VIRTUAL, "catenary.virtual"),
 }
 

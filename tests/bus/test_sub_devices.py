@@ -39,7 +39,7 @@ def test_a_device_is_found_by_its_name_or_order_code() -> None:
         subs = main.scan()
         assert subs["shoulder"].position == 1
         assert subs["CVK100"].position == 0
-        with pytest.raises(SegmentError, match="no device has the name .* 'sholder'") as caught:
+        with pytest.raises(SegmentError, match=r"no device has the name .* 'sholder'") as caught:
             subs["sholder"]
         assert caught.value.hint == "names here: 'shoulder'"
 
@@ -66,7 +66,7 @@ def test_a_position_that_does_not_exist_names_the_number_of_devices() -> None:
         assert subs[-1].position == 1
         with pytest.raises(IndexError, match=r"no device 99: there are 2, 0 to 1"):
             subs[99]
-    with pytest.raises(IndexError, match="there are 0$"):
+    with pytest.raises(IndexError, match=r"there are 0$"):
         SubDevices()[0]
 
 
@@ -83,5 +83,6 @@ def test_a_device_is_brought_to_a_state(state: State | str) -> None:
 
 def test_a_refused_state_is_an_error_of_the_device() -> None:
     with cat.MainDevice(Segment([Coupler(), Servo()])) as main:
+        servo = main.scan()[1]
         with pytest.raises(StateError, match="servo"):
-            main.scan()[1].request_state("OP")  # without process data
+            servo.request_state("OP")  # without process data
