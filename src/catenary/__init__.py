@@ -16,11 +16,20 @@ would keep a process from entering a network namespace.
 TYPE_CHECKING = False  # of `typing`, which takes longer to import than all of this
 
 if TYPE_CHECKING:
-    from catenary import control, realtime, share, types
+    from catenary import control, errors, realtime, share, types
     from catenary.bus import SubDevice
     from catenary.bus import event as events
     from catenary.drive import DistributedClock, Drives, Inputs, Outputs, Phase, Recovery
-    from catenary.errors import CatenaryError
+    from catenary.errors import (
+        CatenaryError,
+        ClockError,
+        DriveError,
+        LawError,
+        LinkError,
+        LoopError,
+        StateError,
+        WorkingCounterError,
+    )
     from catenary.link.interfaces import interfaces
     from catenary.loop import Cycle, Loop, law
     from catenary.share import Share, attach
@@ -39,14 +48,19 @@ __version__ = "0.1.0"
 __all__ = [
     "AnalogInputs",
     "CatenaryError",
+    "ClockError",
     "Coupler",
     "Cycle",
     "DigitalInputs",
     "DigitalOutputs",
     "DistributedClock",
+    "DriveError",
     "Drives",
     "Inputs",
+    "LawError",
+    "LinkError",
     "Loop",
+    "LoopError",
     "MainDevice",
     "Outputs",
     "Phase",
@@ -54,9 +68,12 @@ __all__ = [
     "Segment",
     "Servo",
     "Share",
+    "StateError",
     "SubDevice",
+    "WorkingCounterError",
     "attach",
     "control",
+    "errors",
     "events",
     "interfaces",
     "law",
@@ -66,8 +83,18 @@ __all__ = [
 ]
 
 _VIRTUAL = ("AnalogInputs", "Coupler", "DigitalInputs", "DigitalOutputs", "Segment", "Servo")
+_ERRORS = (  # that a loop raises; the others are in catenary.errors
+    "CatenaryError",
+    "ClockError",
+    "DriveError",
+    "LawError",
+    "LinkError",
+    "LoopError",
+    "StateError",
+    "WorkingCounterError",
+)
 _HOMES = {
-    "CatenaryError": "catenary.errors",
+    **dict.fromkeys(_ERRORS, "catenary.errors"),
     "Cycle": "catenary.loop",
     "DistributedClock": "catenary.drive",
     "Drives": "catenary.drive",

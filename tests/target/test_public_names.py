@@ -31,3 +31,9 @@ def test_an_unknown_name_is_an_attribute_error() -> None:
 def test_numpy_is_not_imported_before_it_is_needed(use: str) -> None:
     code = f"{use}\nimport sys\nassert 'numpy' not in sys.modules, 'numpy'"
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_errors_of_a_loop_are_at_the_top() -> None:
+    assert cat.DriveError is cat.errors.DriveError
+    assert issubclass(cat.WorkingCounterError, cat.LoopError)
+    assert issubclass(cat.LoopError, cat.CatenaryError)

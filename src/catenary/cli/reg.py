@@ -110,7 +110,7 @@ def run_write(arguments: argparse.Namespace) -> int:
 
 def place(text: str, size: int | None) -> tuple[int, int | None, AnyRegister | None]:
     """Address, size (None: unknown) and the register that is meant, where one is known."""
-    from catenary.wire.register_names import at_address, by_name
+    from catenary.wire.register_names import at_address, by_name, names
 
     if text[:1].isdigit():
         try:
@@ -122,7 +122,7 @@ def place(text: str, size: int | None) -> tuple[int, int | None, AnyRegister | N
     try:
         register = by_name(text)
     except ValueError as error:
-        raise UsageError(str(error), hint="docs/commands.md lists the names") from error
+        raise UsageError(str(error), hint=f"names: {', '.join(names())}") from error
     if size not in (None, register.size):
         raise UsageError(f"{register} has {register.size} bytes, not {size}", hint="leave SIZE out")
     return register.address, register.size, register

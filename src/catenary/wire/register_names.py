@@ -26,9 +26,18 @@ _INDEXED = (
 )
 
 
+def names() -> tuple[str, ...]:
+    """Return the names of all registers, by address."""
+    known = sorted(_by_key().values(), key=lambda each: (each.address, each.size))
+    return tuple(dict.fromkeys(each.name for each in known))
+
+
 def by_name(name: str) -> AnyRegister:
-    """The register of that name, whatever its capitals, spaces and underscores. ValueError for a
-    name that is none, with the nearest ones."""
+    """Return the register of a name; capitals, spaces and underscores do not count.
+
+    Raises:
+        ValueError: No register has the name. The error lists the nearest names.
+    """
     known = _by_key()
     found = known.get(_key(name))
     if found is not None:
