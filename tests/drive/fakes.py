@@ -102,7 +102,12 @@ def fake_sub(
         values = {(0x6076, 0): 640, (0x605A, 0): 2, (0x60C2, 1): 2, (0x60C2, 2): -3}
     sdo = FakeSdo(values, position)
     return SimpleNamespace(
-        position=position, name="Servo", sdo=sdo, slots=slots, main=FakeMain(sdo)
+        position=position,
+        name="Servo",
+        sdo=sdo,
+        slots=slots,
+        is_drive=True,
+        main=FakeMain(sdo),
     )
 
 

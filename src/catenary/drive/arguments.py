@@ -10,12 +10,14 @@ from catenary.bus import SubDevice
 from catenary.drive.axis import MEASURED, Axis
 from catenary.drive.limits import DEFAULT_VELOCITY
 from catenary.drive.objects import NAMED_COLUMNS, AxisObject
+from catenary.model.device import mapped_entries
 from catenary.plan.wish import DistributedClock, ObjectReference, WrittenPdo
 from catenary.wire.cia402 import Mode
 
 AxisSource: TypeAlias = SubDevice | tuple[SubDevice, int]
 PdoList: TypeAlias = Sequence[int] | Mapping[int, Sequence[tuple[int, int, int]]]
 
+STATUSWORD = 0x6041
 EVERY_MAX = 10_000  # cycles: beyond, ask by SDO
 MODES: dict[str, Mode] = {
     **{"csp": Mode.CSP, "csv": Mode.CSV, "cst": Mode.CST},
@@ -31,6 +33,7 @@ def axis_sources(subs: Iterable[AxisSource]) -> list[tuple[SubDevice, int]]:
             sources.append(source)
         else:
             sources.extend((source, slot) for slot in source.slots or (0,))
+        check_drive(sources[-1][0])
     if not sources:
         raise ValueError("no axes: the list of SubDevices is empty")
     places = [(sub.position, slot) for sub, slot in sources]
@@ -38,6 +41,21 @@ def axis_sources(subs: Iterable[AxisSource]) -> list[tuple[SubDevice, int]]:
         if places.count(place) > 1:
             raise ValueError(f"device {place[0]}, slot {place[1]} is given twice")
     return sources
+
+
+def check_drive(sub: SubDevice) -> None:
+    """Raise ValueError if a device cannot be a drive: it has no dictionary and no statusword.
+
+    A drive that does not show its profile in 0x1000 is accepted.
+    """
+    if sub.is_drive or sub.description.coe:
+        return
+    assignments = (*sub.description.inputs, *sub.description.outputs)
+    if not any(entry.index == STATUSWORD for entry in mapped_entries(assignments)):
+        raise ValueError(
+            f"device {sub.position} ({sub.name}) is not a drive: it has no CiA 402 objects; use "
+            "Inputs or Outputs for its process data, and main.subs.drives for the drives"
+        )
 
 
 def axis_name(sub: SubDevice, slot: int) -> str:

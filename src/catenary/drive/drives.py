@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TypeAlias, TypeVar
+from typing import NoReturn, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
+from catenary.bus import SubDevice
 from catenary.drive import start_up
 from catenary.drive.arguments import (
     AxisSource,
@@ -24,6 +25,7 @@ from catenary.drive.arguments import (
     warn_of_default_velocity,
     written_pdos,
 )
+from catenary.drive.attributes import check_writable, unknown_attribute
 from catenary.drive.axis import MEASURED, Axis, column_bank
 from catenary.drive.homing import HomingMethod, Timed, run_homing
 from catenary.drive.limits import LimitOptions
@@ -156,7 +158,7 @@ class Drives:
         )
         written = written_pdos(pdos)
         first_modes = (mode,) * n if isinstance(mode, str) else one_each("mode", mode, n)
-        self.subs = tuple(sub for sub, _ in sources)
+        self._subs = tuple(sub for sub, _ in sources)
         self._columns = named_columns(columns)
         self._clock = clock_wish(dc)
         self._axes = tuple(
@@ -189,8 +191,8 @@ class Drives:
         warn_of_default_velocity(self._axes)
         self._period_ns = 0
         self._is_read = False  # settings of the drives, since the last plan
-        self.actual = AxisValues("actual")
-        self.target = AxisValues("target")
+        self._actual = AxisValues("actual")
+        self._target = AxisValues("target")
         self._views: Views | None = None
         self._units: npt.NDArray[np.intp] = np.zeros(0, np.intp)
 
@@ -199,6 +201,28 @@ class Drives:
 
     def __repr__(self) -> str:
         return f"Drives({', '.join(self.names)})"
+
+    def __getattr__(self, name: str) -> NoReturn:
+        raise unknown_attribute(self, name)  # reached only if there is none of this name
+
+    def __setattr__(self, name: str, value: object) -> None:
+        check_writable(self, name)
+        object.__setattr__(self, name, value)
+
+    @property
+    def subs(self) -> tuple[SubDevice, ...]:
+        """Device of each axis."""
+        return self._subs
+
+    @property
+    def actual(self) -> AxisValues:
+        """Actual values of the axes, as of the last `next(loop)`."""
+        return self._actual
+
+    @property
+    def target(self) -> AxisValues:
+        """Targets of the axes: write into the arrays, `arm.target.position[:] = ...`."""
+        return self._target
 
     @property
     def names(self) -> tuple[str, ...]:

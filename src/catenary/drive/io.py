@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
+
+import numpy.typing as npt
 
 from catenary.bus import SubDevice
 from catenary.drive.arguments import PdoList, clock_wish, cycles_between, written_pdos
+from catenary.drive.attributes import check_writable, unknown_attribute
 from catenary.errors import MappingError
 from catenary.model.device import Assignment, DeviceDescription, Direction, Entry, Pdo
 from catenary.plan.cycle import Bank, Column, NumberKind
@@ -69,16 +72,66 @@ class _Channels:
         dc: DistributedClock | bool = False,
         pdos: PdoList = (),
     ) -> None:
-        self.subs = subs
+        self._subs = subs
         self._pdos = tuple(p for p in written_pdos(pdos) if p.direction is self.direction)
         self._required = required
         self._every = cycles_between("every", every)
         self._clock = clock_wish(dc)
         self._units: list[int] = []
+        self._arrays: tuple[Reals, Integers, Bytes] | None = None
         self._unit_valid: Bytes | None = None
         devices = [with_written(sub.description, self.direction, self._pdos) for sub in subs]
         self._channels = channels(devices, self.direction, scale or {})
         self._places: dict[str, tuple[Reals | Integers | Bytes, int]] = {}
+
+    def __getattr__(self, name: str) -> NoReturn:
+        raise unknown_attribute(self, name)  # reached only if there is none of this name
+
+    def __setattr__(self, name: str, value: object) -> None:
+        check_writable(self, name)
+        object.__setattr__(self, name, value)
+
+    @property
+    def subs(self) -> tuple[SubDevice, ...]:
+        """Devices of these channels."""
+        return self._subs
+
+    @property
+    def bits(self) -> Bytes:
+        """(k,) channels of one bit, 0 or 1, in the order of the process data."""
+        return self._bound()[2]
+
+    @bits.setter
+    def bits(self, values: npt.ArrayLike) -> None:
+        self._write(self.bits, values)
+
+    @property
+    def integers(self) -> Integers:
+        """(k,) raw integers, in the order of the process data."""
+        return self._bound()[1]
+
+    @integers.setter
+    def integers(self, values: npt.ArrayLike) -> None:
+        self._write(self.integers, values)
+
+    @property
+    def reals(self) -> Reals:
+        """(k,) channels with a scale and REAL numbers, in the order of the process data."""
+        return self._bound()[0]
+
+    @reals.setter
+    def reals(self, values: npt.ArrayLike) -> None:
+        self._write(self.reals, values)
+
+    def _bound(self) -> tuple[Reals, Integers, Bytes]:
+        if self._arrays is None:
+            raise RuntimeError(f"{type(self).__name__} have no values before a Loop is open")
+        return self._arrays
+
+    def _write(self, array: Reals | Integers | Bytes, values: npt.ArrayLike) -> None:
+        if self.direction is Direction.INPUT:
+            raise AttributeError("inputs are read-only")
+        array[:] = values
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -124,12 +177,9 @@ class _Channels:
 
     def _bind(self, reals: Reals, integers: Integers, bits: Bytes, unit_valid: Bytes) -> None:
         self._unit_valid = unit_valid
-        self.reals, self.integers, self.bits = reals, integers, bits
-        arrays: dict[Bank, Reals | Integers | Bytes] = {
-            Bank.REAL: reals,
-            Bank.INTEGER: integers,
-            Bank.BIT: bits,
-        }
+        self._arrays = reals, integers, bits
+        arrays: dict[Bank, Reals | Integers | Bytes]
+        arrays = {Bank.REAL: reals, Bank.INTEGER: integers, Bank.BIT: bits}
         used = dict.fromkeys(Bank, 0)
         for channel in self._channels:
             self._places[channel.name] = (arrays[channel.bank], used[channel.bank])

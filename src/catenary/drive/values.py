@@ -7,8 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
+from catenary.drive.attributes import unknown_attribute
 from catenary.plan.wish import Modes, Reals
 
+QUANTITIES = ("position", "velocity", "torque", "mode")
 Array = npt.NDArray[np.float64] | npt.NDArray[np.int64]
 
 
@@ -55,8 +57,12 @@ class AxisValues:
             ) from None
 
     def __getattr__(self, name: str) -> object:
-        # Reached only where a slot is still empty.
+        # Reached only if a slot is still empty, or there is none of this name.
+        if name not in QUANTITIES:
+            raise unknown_attribute(self, name, self._owner)
         raise AttributeError(f"{self._owner}.{name} has no values before a Loop is open")
 
     def __setattr__(self, name: str, value: object) -> None:
+        if name not in QUANTITIES:
+            raise unknown_attribute(self, name, self._owner)
         raise AttributeError(f"write into the array: {self._owner}.{name}[:] = ...")

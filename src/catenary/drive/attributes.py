@@ -1,0 +1,38 @@
+"""Errors for attributes that do not exist: a misspelt name must not pass in silence."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+
+
+def unknown_attribute(owner: object, name: str, label: str = "") -> AttributeError:
+    """Return the error for an attribute that does not exist, with the nearest public name.
+
+    Args:
+        owner: The object.
+        name: The attribute.
+        label: What users call the object; its class by default.
+    """
+    kind = type(owner)
+    known = [each for each in dir(kind) if not each.startswith("_")]
+    near = get_close_matches(name, known, n=1)
+    guess = f"; did you mean {near[0]!r}?" if near else ""
+    return AttributeError(
+        f"{label or kind.__name__} has no attribute {name!r}{guess}", name=name, obj=owner
+    )
+
+
+def check_writable(owner: object, name: str) -> None:
+    """Raise AttributeError unless the attribute is private, or a property with a setter."""
+    if name.startswith("_"):
+        return
+    found = getattr(type(owner), name, None)
+    if isinstance(found, property):
+        if found.fset is None:
+            raise AttributeError(f"{type(owner).__name__}.{name} is read-only", name=name)
+        return
+    if callable(found):
+        raise AttributeError(
+            f"{type(owner).__name__}.{name} is a method: call it, {name}(...)", name=name
+        )
+    raise unknown_attribute(owner, name)
