@@ -159,6 +159,7 @@ class Minute:
         self.figures.ended[kind] += 1
         self._note(kind, error.message)
         since = self._began if running is None else running
+        self.witness.injected.update()  # a scan can fail before the witness looks again
         faults = list(self.witness.injected.between(since - 0.1, self.segment.time))
         excused = faults if running is None else may_end(faults, ring=self.segment.ring)
         if not excused:
