@@ -1,0 +1,12 @@
+import math
+
+import catenary as cat
+
+with cat.MainDevice("eth0") as main:
+    arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=1.0)
+    with cat.Loop(arm, period=1e-3) as loop:
+        home = arm.actual.position.copy()
+        for cycle in loop:
+            arm.target.position[:] = home + 0.1 * math.sin(cycle.time)
+            if cycle.time > 2.0:
+                break
