@@ -10,10 +10,12 @@ from typing import NoReturn
 from catenary.cli import (
     alias,
     bench,
+    check,
     demo,
     diag,
     doctor,
     graph,
+    init,
     plot,
     realtime,
     record,
@@ -30,6 +32,7 @@ from catenary.cli.failure import USAGE, report, silence_stdout
 DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
     *(scan, state, graph, diag, sdo, reg, alias, sii),
+    *(init, check),
     *(demo, doctor, bench, virtual, realtime, record, plot),
 )
 EPILOG = """\
@@ -38,6 +41,7 @@ TARGET is one of
   eth0,eth1          two of them, where the segment is a ring between both
   virtual            a virtual segment: coupler, outputs, three servos, outputs
   virtual:FILE.toml  another one (docs/virtual.md)
+  machine.toml       the target that a machine file names (docs/machine.md)
   igh:0              the IgH kernel master of that number (docs/igh.md): scan and sdo
 
 example:

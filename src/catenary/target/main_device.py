@@ -7,6 +7,7 @@ from typing import Self
 from catenary import bus
 from catenary.link import LinkSource, Ring
 from catenary.target.parse import IGH, parse
+from catenary.target.toml_file import is_machine_file
 
 
 class MainDevice(bus.MainDevice):
@@ -32,7 +33,9 @@ class MainDevice(bus.MainDevice):
         force: bool = False,
     ) -> Self:
         """A source may bring a MainDevice of its own: the IgH kernel master does."""
-        named = isinstance(target, str) and target.strip().startswith(f"{IGH}:")
+        named = isinstance(target, str) and (
+            target.strip().startswith(f"{IGH}:") or is_machine_file(target)
+        )
         make = getattr(source_of(target) if named else target, "main_device", None)
         if make is not None:
             own: Self = make()

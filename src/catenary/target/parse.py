@@ -1,9 +1,16 @@
-"""Names of segments: "eth0", "eth0,eth1" (a ring), "virtual", "virtual:FILE.toml", "igh:0"."""
+"""Names of segments: "eth0", "eth0,eth1" (a ring), "virtual", "virtual:FILE.toml", "igh:0", or a
+machine file, "machine.toml", which names one of these."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from catenary.errors import ConfigurationError
 from catenary.link import Interface, LinkSource, Ring
+from catenary.target.toml_file import is_machine_file, read_toml, target_of
+
+if TYPE_CHECKING:
+    from catenary.virtual import Segment
 
 VIRTUAL = "virtual"
 IGH = "igh"
@@ -12,6 +19,8 @@ IGH = "igh"
 def parse(target: str) -> LinkSource:
     """The link source a name stands for; nothing is opened yet. A virtual segment is a new one
     each time. ConfigurationError for a name that cannot be."""
+    if is_machine_file(target):
+        target = target_of(read_toml(target.strip()))
     kind, colon, rest = target.strip().partition(":")
     if kind == VIRTUAL and (rest or not colon):
         return _virtual(rest)
@@ -23,7 +32,7 @@ def parse(target: str) -> LinkSource:
         raise ConfigurationError(
             f"{target!r} is no target",
             hint="give a network interface (eth0), two (eth0,eth1), virtual, virtual:FILE.toml, "
-            "or igh:0",
+            "igh:0, or a machine file (machine.toml)",
         )
     return Interface(kind)
 
@@ -58,3 +67,13 @@ def _virtual(path: str) -> LinkSource:
 
     segment = Segment.from_toml(path) if path else demo_segment()
     return Ring(segment.first, segment.second) if segment.ring else segment
+
+
+def segment_of(source: LinkSource) -> Segment | None:
+    """Return the virtual segment that a source leads into; None if it is not virtual."""
+    from catenary.virtual.segment import Segment, SegmentEnd
+
+    end = source.first if isinstance(source, Ring) else source
+    if isinstance(end, SegmentEnd):
+        return end.segment
+    return end if isinstance(end, Segment) else None
