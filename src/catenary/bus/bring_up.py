@@ -132,10 +132,8 @@ def _with_objects(
 def _unmapped(
     device: DeviceDescription, direction: Direction, references: Sequence[ObjectReference]
 ) -> list[ObjectReference]:
-    mapped = {
-        (e.index, e.subindex, e.bit_length) for e in mapped_entries(device.assignments(direction))
-    }
-    return [r for r in references if (r.index, r.subindex, r.bit_length) not in mapped]
+    mapped = {entry.place for entry in mapped_entries(device.assignments(direction))}
+    return [each for each in references if each.place not in mapped]
 
 
 def _prepare(sub: SubDevice, plan: DevicePlan) -> Procedure[None]:

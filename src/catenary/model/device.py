@@ -92,6 +92,11 @@ class Entry:
     name: str = ""
     data_type: int = 0  # ETG.1000.6 table 64, 0: unknown
 
+    @property
+    def place(self) -> tuple[int, int, int]:
+        """Index, subindex and length, by which entries are compared."""
+        return self.index, self.subindex, self.bit_length
+
     def __str__(self) -> str:
         place = f"0x{self.index:04X}:{self.subindex:02X} ({self.bit_length} bits)"
         return f"{place} {self.name}".rstrip()

@@ -76,4 +76,4 @@ def with_pdos(device: DeviceDescription, direction: Direction, pdos: Sequence[Pd
 
 def shape(pdo: Pdo) -> tuple[tuple[int, int, int], ...]:
     """Return the entries without their names: index, subindex, length."""
-    return tuple((entry.index, entry.subindex, entry.bit_length) for entry in pdo.entries)
+    return tuple(entry.place for entry in pdo.entries)

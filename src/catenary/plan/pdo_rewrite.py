@@ -138,12 +138,11 @@ def _other_length(
 
 def _entry(device: DeviceDescription, reference: ObjectReference) -> Entry:
     """Return the entry, with the name and type of the dictionary or of the device's PDOs."""
-    place = (reference.index, reference.subindex, reference.bit_length)
     known = device.known_object(reference.index, reference.subindex)
     if known is not None:
-        return Entry(*place, known.name, known.data_type)
+        return Entry(*reference.place, known.name, known.data_type)
     for pdo in (*device.output_pdos, *device.input_pdos):
         for entry in pdo.entries:
-            if (entry.index, entry.subindex, entry.bit_length) == place:
+            if entry.place == reference.place:
                 return entry
-    return Entry(*place)
+    return Entry(*reference.place)

@@ -57,7 +57,7 @@ def find_combination(
         wanted: Objects with their lengths.
     """
     known = {pdo.index: _offer(pdo) for pdo in (*offered, *assigned)}
-    places = [(each.index, each.subindex, each.bit_length) for each in wanted]
+    places = [each.place for each in wanted]
     start = frozenset(pdo.index for pdo in assigned)
     order = count()
     queue = [(0, 0, next(order), _State(start, frozenset()))]
@@ -94,8 +94,7 @@ def explain_failure(
 
 def carries(pdo: Pdo, reference: ObjectReference) -> bool:
     """Return True if the PDO has the object in the wanted length."""
-    wanted = (reference.index, reference.subindex, reference.bit_length)
-    return any((e.index, e.subindex, e.bit_length) == wanted for e in pdo.entries)
+    return any(entry.place == reference.place for entry in pdo.entries)
 
 
 def any_carries(pdos: Sequence[Pdo], reference: ObjectReference) -> bool:
@@ -142,7 +141,7 @@ def _combination(assigned: Sequence[Pdo], known: dict[int, _Offer], state: _Stat
 
 
 def _offer(pdo: Pdo) -> _Offer:
-    entries = frozenset((e.index, e.subindex, e.bit_length) for e in pdo.entries if e.index)
+    entries = frozenset(entry.place for entry in pdo.entries if entry.index)
     return _Offer(pdo, entries, frozenset(entry[:2] for entry in entries))
 
 

@@ -126,7 +126,7 @@ _Shape = tuple[tuple[int, int, int], ...]
 
 def _shape(assignments: tuple[Assignment, ...]) -> _Shape:
     return tuple(
-        (entry.index, entry.subindex, entry.bit_length)
+        entry.place
         for assignment in assignments
         for pdo in assignment.pdos
         for entry in pdo.entries
