@@ -10,7 +10,7 @@ PDOs that the device has assigned together now stay together: the EL3632 maps on
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import count
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -112,9 +112,14 @@ def object_names(references: Sequence[ObjectReference]) -> str:
     return ", ".join(f"0x{r.index:04X}:{r.subindex:02X} ({r.bit_length} bits)" for r in references)
 
 
-def pdo_names(pdos: Sequence[Pdo]) -> str:
-    """Return `0x1A00, 0x1A01`, or `no PDO`."""
-    return ", ".join(f"0x{pdo.index:04X}" for pdo in pdos) or "no PDO"
+def pdo_names(pdos: Iterable[Pdo], *, empty: str = "no PDO") -> str:
+    """Return `0x1A00, 0x1A01`, or `empty`."""
+    return ", ".join(f"0x{pdo.index:04X}" for pdo in pdos) or empty
+
+
+def place_names(places: Iterable[tuple[int, int, int]], *, empty: str) -> str:
+    """Return `0x6064:00/32, ...`, or `empty`. For entries without their names (`Entry.place`)."""
+    return ", ".join(f"0x{index:04X}:{sub:02X}/{bits}" for index, sub, bits in places) or empty
 
 
 def _steps(

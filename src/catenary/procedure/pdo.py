@@ -15,6 +15,7 @@ from catenary.model.device import (
     Pdo,
 )
 from catenary.plan.pdo_mapping import ASSIGNMENT_BASE
+from catenary.plan.pdo_search import place_names
 from catenary.plan.start_up import DevicePlan, Download, restoring_downloads
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
@@ -114,27 +115,21 @@ def verify_mapping(
         if found is None or _shape(found) == wanted:
             continue
         yield from restore_mapping(channel, device, plan)
+        taken = place_names(_shape(found), empty="nothing")
         raise MappingError(
             f"{channel.station}: took a mapping of {direction.noun} that is not the one "
-            f"written: {_text(_shape(found))} instead of {_text(wanted)}",
+            f"written: {taken} instead of {place_names(wanted, empty='nothing')}",
             hint="its firmware corrects mappings; map what it accepts",
         )
 
 
-_Shape = tuple[tuple[int, int, int], ...]
-
-
-def _shape(assignments: tuple[Assignment, ...]) -> _Shape:
+def _shape(assignments: tuple[Assignment, ...]) -> tuple[tuple[int, int, int], ...]:
     return tuple(
         entry.place
         for assignment in assignments
         for pdo in assignment.pdos
         for entry in pdo.entries
     )
-
-
-def _text(shape: _Shape) -> str:
-    return ", ".join(f"0x{index:04X}:{sub:02X}/{bits}" for index, sub, bits in shape) or "nothing"
 
 
 def _read_direction(

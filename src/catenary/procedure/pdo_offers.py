@@ -10,6 +10,7 @@ from dataclasses import replace
 from catenary.errors import MailboxError, MappingError, ResponseTimeout, SdoAbort
 from catenary.model.device import Assignment, DeviceDescription, Direction, ObjectValue, Pdo
 from catenary.plan.pdo_mapping import ASSIGNMENT_BASE, shape
+from catenary.plan.pdo_search import pdo_names, place_names
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.pdo import read_entries, read_list, read_mapping
@@ -118,19 +119,13 @@ def _differences(
     before = {each.sync_manager: each.pdos for each in described.assignments(direction)}
     known = {pdo.index: pdo for pdo in described.pdos(direction)}
     for each in found.assignments(direction):
-        now, then = _indices(each.pdos), _indices(before.get(each.sync_manager, ()))
+        now = pdo_names(each.pdos, empty="none")
+        then = pdo_names(before.get(each.sync_manager, ()), empty="none")
         if now != then:
             yield f"SyncManager {each.sync_manager} carries PDOs {now}, its SII says {then}"
         for pdo in each.pdos:
             other = known.get(pdo.index)
             if other is not None and shape(other) != shape(pdo):
-                yield f"PDO 0x{pdo.index:04X} has {_contents(pdo)}, its SII says {_contents(other)}"
-
-
-def _indices(pdos: Sequence[Pdo]) -> str:
-    return ", ".join(f"0x{pdo.index:04X}" for pdo in pdos) or "none"
-
-
-def _contents(pdo: Pdo) -> str:
-    texts = (f"0x{i:04X}:{sub:02X}/{bits}" for i, sub, bits in shape(pdo))
-    return ", ".join(texts) or "no entries"
+                has = place_names(shape(pdo), empty="no entries")
+                said = place_names(shape(other), empty="no entries")
+                yield f"PDO 0x{pdo.index:04X} has {has}, its SII says {said}"
