@@ -253,12 +253,11 @@ class DeviceDescription:
         return f"device {self.position} ({self.name})"
 
 
+def mapped_pdos(assignments: Iterable[Assignment]) -> tuple[Pdo, ...]:
+    """Return all PDOs of the assignments, in their order."""
+    return tuple(pdo for assignment in assignments for pdo in assignment.pdos)
+
+
 def mapped_entries(assignments: Iterable[Assignment]) -> tuple[Entry, ...]:
-    """All entries of the assignments, gaps left out."""
-    return tuple(
-        entry
-        for assignment in assignments
-        for pdo in assignment.pdos
-        for entry in pdo.entries
-        if entry.index
-    )
+    """Return all entries of the assignments, gaps left out."""
+    return tuple(entry for pdo in mapped_pdos(assignments) for entry in pdo.entries if entry.index)

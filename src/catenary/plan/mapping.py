@@ -95,8 +95,7 @@ def _search(
 
 
 def _missing(mapping: Mapping, wanted: Sequence[ObjectReference]) -> list[ObjectReference]:
-    pdos = [pdo for assignment in mapping.assignments for pdo in assignment.pdos]
-    return [each for each in wanted if not any_carries(pdos, each)]
+    return [each for each in wanted if not any_carries(mapping.pdos, each)]
 
 
 def _assign(
@@ -160,14 +159,13 @@ def _assignment_refusal(device: DeviceDescription, direction: Direction) -> str:
 
 
 def _as_now(current: Mapping, wanted: Sequence[ObjectReference]) -> str:
-    pdos = [pdo for assignment in current.assignments for pdo in assignment.pdos]
     lengths = {(e.index, e.subindex): e.bit_length for e in mapped_entries(current.assignments)}
     reasons = []
     for each in _missing(current, wanted):
         bits = lengths.get((each.index, each.subindex))
         other = f"is mapped with {bits} bits, {each.bit_length} were asked for"
         reasons.append(f"{object_names([each])} {'is not mapped' if bits is None else other}")
-    return f"as assigned now ({pdo_names(pdos)}): {'; '.join(reasons)}"
+    return f"as assigned now ({pdo_names(current.pdos)}): {'; '.join(reasons)}"
 
 
 def _no_combination(
@@ -189,8 +187,8 @@ def _check_written(
 ) -> None:
     missing = [each for each in _missing(mapping, wanted) if each.required]
     if missing:
-        pdos = [pdo for assignment in mapping.assignments for pdo in assignment.pdos]
-        reason = f"as written down ({pdo_names(pdos)}): {object_names(missing)} is not in them"
+        carried = pdo_names(mapping.pdos)
+        reason = f"as written down ({carried}): {object_names(missing)} is not in them"
         _refuse(device, direction, missing, (reason,))
 
 

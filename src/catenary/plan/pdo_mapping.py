@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from catenary.errors import MappingError
-from catenary.model.device import Assignment, DeviceDescription, Direction, Pdo
+from catenary.model.device import Assignment, DeviceDescription, Direction, Pdo, mapped_pdos
 
 if TYPE_CHECKING:  # wish.py needs NumPy, a scan does not
     from catenary.plan.wish import ObjectReference
@@ -29,6 +29,11 @@ class Mapping:
     @property
     def changed(self) -> bool:
         return bool(self.rewritten or self.reassigned)
+
+    @property
+    def pdos(self) -> tuple[Pdo, ...]:
+        """PDOs of all its assignments, in their order."""
+        return mapped_pdos(self.assignments)
 
 
 def process_data_channel(device: DeviceDescription, direction: Direction) -> int | None:

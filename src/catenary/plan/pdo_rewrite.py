@@ -7,7 +7,14 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from catenary.errors import MappingError
-from catenary.model.device import DeviceDescription, Direction, Entry, Pdo, mapped_entries
+from catenary.model.device import (
+    DeviceDescription,
+    Direction,
+    Entry,
+    Pdo,
+    mapped_entries,
+    mapped_pdos,
+)
 from catenary.plan.pdo_mapping import Mapping, process_data_channel, with_pdos
 from catenary.plan.pdo_search import carries, pdo_names
 
@@ -94,7 +101,7 @@ def _changeable(device: DeviceDescription, direction: Direction) -> Pdo | None:
     channel = process_data_channel(device, direction)
     locked = device.mailbox is None or not device.mailbox.pdo_assign
     locked |= any(a.fixed for a in device.assignments(direction) if a.sync_manager == channel)
-    taken = {pdo.index for a in device.assignments(direction) for pdo in a.pdos}
+    taken = {pdo.index for pdo in mapped_pdos(device.assignments(direction))}
     unassigned = [p for p in device.pdos(direction) if p.index not in taken and not locked]
     return next((pdo for pdo in (*assigned, *unassigned) if not pdo.fixed), None)
 

@@ -13,8 +13,9 @@ from catenary.model.device import (
     Direction,
     Entry,
     Pdo,
+    mapped_pdos,
 )
-from catenary.plan.pdo_mapping import ASSIGNMENT_BASE
+from catenary.plan.pdo_mapping import ASSIGNMENT_BASE, shape
 from catenary.plan.pdo_search import place_names
 from catenary.plan.start_up import DevicePlan, Download, restoring_downloads
 from catenary.procedure.exchange import Procedure
@@ -124,12 +125,7 @@ def verify_mapping(
 
 
 def _shape(assignments: tuple[Assignment, ...]) -> tuple[tuple[int, int, int], ...]:
-    return tuple(
-        entry.place
-        for assignment in assignments
-        for pdo in assignment.pdos
-        for entry in pdo.entries
-    )
+    return tuple(place for pdo in mapped_pdos(assignments) for place in shape(pdo))
 
 
 def _read_direction(
@@ -209,7 +205,7 @@ def _joined(
     """All PDOs of a device: those of the SII, corrected and completed by what was read."""
     if assignments is None:
         return offered
-    read = {pdo.index: pdo for assignment in assignments for pdo in assignment.pdos}
+    read = {pdo.index: pdo for pdo in mapped_pdos(assignments)}
     kept = tuple(
         read.pop(pdo.index) if pdo.index in read else replace(pdo, sync_manager=None)
         for pdo in offered

@@ -8,7 +8,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from catenary.errors import MailboxError, MappingError, ResponseTimeout, SdoAbort
-from catenary.model.device import Assignment, DeviceDescription, Direction, ObjectValue, Pdo
+from catenary.model.device import (
+    Assignment,
+    DeviceDescription,
+    Direction,
+    ObjectValue,
+    Pdo,
+    mapped_pdos,
+)
 from catenary.plan.pdo_mapping import ASSIGNMENT_BASE, shape
 from catenary.plan.pdo_search import pdo_names, place_names
 from catenary.procedure.exchange import Procedure
@@ -47,7 +54,7 @@ def read_offers(
 
     After a reply that is missing or malformed, the entries of the other PDOs are those of the SII.
     """
-    taken = {pdo.index for each in device.assignments(direction) for pdo in each.pdos}
+    taken = {pdo.index for pdo in mapped_pdos(device.assignments(direction))}
     known = {pdo.index: pdo for pdo in device.pdos(direction)}
     for index in [index for index in known if index not in taken][:OFFERS_MAX]:
         try:
