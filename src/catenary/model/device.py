@@ -7,7 +7,7 @@ one, its object dictionary (ETG.1000.6 §5.6.7.4). Nothing here asks the network
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -236,6 +236,24 @@ class DeviceDescription:
 
     def pdos(self, direction: Direction) -> tuple[Pdo, ...]:
         return self.output_pdos if direction is Direction.OUTPUT else self.input_pdos
+
+    def with_process_data(
+        self,
+        direction: Direction,
+        assignments: tuple[Assignment, ...],
+        pdos: tuple[Pdo, ...] | None = None,
+    ) -> DeviceDescription:
+        """Return the description with other process data in one direction.
+
+        Args:
+            direction: Outputs or inputs.
+            assignments: What is assigned now, by SyncManager.
+            pdos: All PDOs of the direction; None: as before.
+        """
+        pdos = self.pdos(direction) if pdos is None else pdos
+        if direction is Direction.OUTPUT:
+            return replace(self, outputs=assignments, output_pdos=pdos)
+        return replace(self, inputs=assignments, input_pdos=pdos)
 
     def known_object(self, index: int, subindex: int) -> ObjectInformation | None:
         for known in self.objects:

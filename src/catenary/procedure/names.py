@@ -115,6 +115,4 @@ def _with_pdo(device: DeviceDescription, direction: Direction, named: Pdo) -> De
     assigned = tuple(
         replace(each, pdos=renamed(each.pdos)) for each in device.assignments(direction)
     )
-    if direction is Direction.OUTPUT:
-        return replace(device, outputs=assigned, output_pdos=renamed(device.output_pdos))
-    return replace(device, inputs=assigned, input_pdos=renamed(device.input_pdos))
+    return device.with_process_data(direction, assigned, renamed(device.pdos(direction)))

@@ -8,14 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from catenary.errors import MailboxError, MappingError, ResponseTimeout, SdoAbort
-from catenary.model.device import (
-    Assignment,
-    DeviceDescription,
-    Direction,
-    ObjectValue,
-    Pdo,
-    mapped_pdos,
-)
+from catenary.model.device import Assignment, DeviceDescription, Direction, ObjectValue, mapped_pdos
 from catenary.plan.pdo_mapping import ASSIGNMENT_BASE, shape
 from catenary.plan.pdo_search import pdo_names, place_names
 from catenary.procedure.exchange import Procedure
@@ -72,7 +65,7 @@ def read_offers(
         locked = yield from _is_read_only(channel, device, ASSIGNMENT_BASE + each.sync_manager)
         pdos = tuple(known.get(pdo.index, pdo) for pdo in each.pdos)
         assignments.append(Assignment(each.sync_manager, pdos, each.fixed or locked))
-    return _with(device, direction, tuple(assignments), tuple(known.values()))
+    return device.with_process_data(direction, tuple(assignments), tuple(known.values()))
 
 
 def read_values(
@@ -104,17 +97,6 @@ def _is_read_only(
     if entry is None:
         return False
     return bool(entry.access & READABLE) and Access.WRITE_PRE_OP not in entry.access
-
-
-def _with(
-    device: DeviceDescription,
-    direction: Direction,
-    assignments: tuple[Assignment, ...],
-    pdos: tuple[Pdo, ...],
-) -> DeviceDescription:
-    if direction is Direction.OUTPUT:
-        return replace(device, outputs=assignments, output_pdos=pdos)
-    return replace(device, inputs=assignments, input_pdos=pdos)
 
 
 def _differences(
