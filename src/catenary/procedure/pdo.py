@@ -20,11 +20,9 @@ from catenary.plan.pdo_search import place_names
 from catenary.plan.start_up import DevicePlan, Download, restoring_downloads
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
-from catenary.procedure.profile import SMALL_LIMIT, SMALL_TIMEOUT
-from catenary.procedure.sdo import download, upload
+from catenary.procedure.sdo import NOT_THERE, download, upload_small
 
-NOT_THERE = frozenset((0x0602_0000, 0x0609_0011))  # no such object, no such subindex
-# ... or it cannot be written at all, or not now, or not with this value: it says what holds
+# An optional object that is absent, read-only, or refuses the value or the state
 LEFT_ALONE = NOT_THERE | {0x0601_0000, 0x0601_0002, 0x0609_0030, 0x0800_0020, 0x0800_0022}
 
 
@@ -186,17 +184,13 @@ def _entry(data: bytes, names: dict[tuple[int, int], Entry]) -> Entry:
 def read_list(channel: MailboxChannel, index: int) -> Procedure[list[bytes] | None]:
     """Return subindices 1 to n of a list object; None if the device does not let it be read."""
     try:
-        count = (yield from _upload(channel, index, 0))[:1]
+        count = (yield from upload_small(channel, index, 0))[:1]
         items = []
         for subindex in range(1, int.from_bytes(count, "little") + 1):
-            items.append((yield from _upload(channel, index, subindex)))
+            items.append((yield from upload_small(channel, index, subindex)))
     except SdoAbort:
         return None
     return items
-
-
-def _upload(channel: MailboxChannel, index: int, subindex: int) -> Procedure[bytes]:
-    return upload(channel, index, subindex, limit=SMALL_LIMIT, timeout=SMALL_TIMEOUT)
 
 
 def _joined(
