@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -17,13 +16,6 @@ from catenary.igh import Master
 from tests.igh.double import Double
 
 TURN = 2 * math.pi
-
-
-@pytest.fixture
-def main(double: Double) -> Iterator[cat.MainDevice]:
-    with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
-        main.scan()
-        yield main
 
 
 def arm_of(main: cat.MainDevice, **options: object) -> cat.Drives:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -14,13 +13,6 @@ from catenary.igh import MainDevice, Master, SubDevice
 from catenary.types import UDINT, UINT
 from tests.igh.double import Double
 from tests.loop_options import grouped
-
-
-@pytest.fixture
-def main(double: Double) -> Iterator[cat.MainDevice]:
-    with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
-        main.scan()
-        yield main
 
 
 def loop_of(main: cat.MainDevice, **options: object) -> cat.Loop:

@@ -275,10 +275,7 @@ def with_written(
     """Return the device as if it had these PDOs; unchanged without PDOs."""
     if not pdos:
         return device
-    assignments = write_down(device, direction, pdos).assignments
-    if direction is Direction.OUTPUT:
-        return replace(device, outputs=assignments)
-    return replace(device, inputs=assignments)
+    return device.with_process_data(direction, write_down(device, direction, pdos).assignments)
 
 
 def number_entries(assignment: Assignment) -> list[tuple[Pdo, Entry]]:

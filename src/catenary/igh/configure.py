@@ -184,7 +184,7 @@ def _tell_process_data(master: Reservation, plan: DevicePlan, config: int, who: 
 
 def _pdo_info(pdo: Pdo) -> abi.PdoInfo:
     entries = (abi.PdoEntryInfo * len(pdo.entries))(
-        *(abi.PdoEntryInfo(e.index, e.subindex, e.bit_length) for e in pdo.entries)
+        *(abi.PdoEntryInfo(*entry.place) for entry in pdo.entries)
     )
     return abi.PdoInfo(index=pdo.index, n_entries=len(entries), entries=entries)
 

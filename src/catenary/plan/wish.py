@@ -40,6 +40,11 @@ class ObjectReference:
     bit_length: int
     required: bool = True
 
+    @property
+    def place(self) -> tuple[int, int, int]:
+        """Index, subindex and length, as `Entry.place`."""
+        return self.index, self.subindex, self.bit_length
+
 
 @dataclass(frozen=True, slots=True)
 class WrittenPdo:
