@@ -15,7 +15,7 @@ from catenary.drive.arguments import (
     AxisSource,
     PdoList,
     axis_modes,
-    axis_name,
+    axis_names,
     axis_sources,
     clock_wish,
     cycles_between,
@@ -53,6 +53,7 @@ class Drives:
 
     Options for all axes:
 
+    - `names`: one per axis, for errors, events and logs. None: position, device and slot.
     - `other_modes`: modes that the axes may change to while the loop runs ("hm": see `home`).
     - `measured`: position, velocity, torque that the drives must supply. None: all three; a
       velocity that the drive lacks is estimated, a torque reads NaN.
@@ -107,6 +108,7 @@ class Drives:
         subs: Iterable[AxisSource],
         *,
         counts_per_turn: PerAxis[float],
+        names: Sequence[str] | None = None,
         mode: PerAxis[str] = "csp",
         other_modes: Sequence[str] = (),
         gear_ratio: PerAxis[float] = 1.0,
@@ -163,7 +165,7 @@ class Drives:
         self._clock = clock_wish(dc)
         self._axes = tuple(
             Axis(
-                name=axis_name(sub, slot),
+                name=name,
                 device=sub.position,
                 slot=slot,
                 modes=axis_modes(first, other_modes),
@@ -177,8 +179,9 @@ class Drives:
                 homing=home,
                 pdos=written,
             )
-            for (sub, slot), first, unit, limits, home in zip(
+            for (sub, slot), name, first, unit, limits, home in zip(
                 sources,
+                axis_names(sources, names),
                 first_modes,
                 units,
                 options,

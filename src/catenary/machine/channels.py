@@ -14,6 +14,7 @@ from catenary.machine.references import data_type, nearest, object_of
 from catenary.machine.schema import ChannelTable
 from catenary.model.device import DeviceDescription, Direction, Entry
 
+UNTYPED = Entry(1, 0, 1)  # in place of an entry that is not needed
 Given = Mapping[str, str | ChannelTable]
 
 
@@ -24,7 +25,7 @@ def check_channels(file: MachineFile, path: KeyPath, given: Given) -> None:
         MachineFileError: One is wrong.
     """
     for name, spec in given.items():
-        _channel(file, (*path, name), spec, Entry(0, 0, 1))
+        _channel(file, (*path, name), spec, UNTYPED)
 
 
 def make_channels(
@@ -63,7 +64,7 @@ def _entry(
 ) -> Entry:
     """Return the entry of the device that has the object; any one if the file has the type."""
     if isinstance(spec, ChannelTable) and spec.type is not UNSET:
-        return Entry(0, 0, 1)
+        return UNTYPED
     text = spec if isinstance(spec, str) else spec.object
     wanted = object_of(file, path, text)
     entries = [entry for pdo in device.pdos(direction) for entry in pdo.entries if entry.index]

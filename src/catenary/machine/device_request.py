@@ -8,7 +8,7 @@ from typing import Any
 from msgspec import UNSET
 
 from catenary.bus import SubDevice
-from catenary.drive import StartUp
+from catenary.plan.start_up_object import StartUp
 from catenary.machine.file import MachineFile
 from catenary.machine.lines import KeyPath
 from catenary.machine.references import data_type, object_of

@@ -126,10 +126,8 @@ def _explain_choice(path: KeyPath, found: object) -> Explanation:
         if get_origin(kind) is Literal
         for value in get_args(kind)
     ]
-    near = get_close_matches(str(found), map(str, choices), n=1)
-    guess = f"; did you mean {_shown(near[0])}?" if near else ""
     expected = ", ".join(map(_shown, choices))
-    return Explanation(path, f"{_shown(found)} is not one of {expected}{guess}{_described(path)}")
+    return Explanation(path, f"{_shown(found)} is not one of {expected}{_described(path)}")
 
 
 def _in_words(kinds: str) -> str:

@@ -43,7 +43,7 @@ class MachineFile:
             message,
             path=str(self.path),
             line=line_of(self._lines, path),
-            key=dotted(path),
+            key=dotted(path) or None,
             hint=hint,
         )
 

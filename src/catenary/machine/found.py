@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from catenary.bus import SubDevice
-from catenary.drive import Drives, ProcessData
+from catenary.drive import Drives
+from catenary.drive.process_data import ProcessData
 from catenary.errors import CatenaryError, IdentityError, SegmentError
 from catenary.loop.devices import DeviceWish
 from catenary.machine.by_name import ByName

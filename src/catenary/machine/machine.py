@@ -9,12 +9,12 @@ from typing import Self
 from msgspec import UNSET
 
 from catenary.bus import SubDevice
-from catenary.drive import Drives, ProcessData
+from catenary.drive import Drives
+from catenary.drive.process_data import ProcessData
 from catenary.link import LinkSource
 from catenary.loop import ClockOptions, Loop, Scheduling, StopPolicy
 from catenary.loop.devices import DeviceWish
 from catenary.loop.laws.law import Law, LawFunction
-from catenary.machine.comparison import compare
 from catenary.machine.by_name import ByName
 from catenary.machine.comparison import compare
 from catenary.machine.found import Found, make_found, raise_differences

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from msgspec import UNSET
 
 from catenary.bus import SubDevice
-from catenary.drive import Drives, ProcessData
+from catenary.drive import Drives
+from catenary.drive.process_data import ProcessData
 from catenary.machine.channels import make_channels
 from catenary.machine.device_request import DeviceRequest, start_up_objects
 from catenary.machine.file import MachineFile

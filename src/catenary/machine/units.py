@@ -98,7 +98,7 @@ def _factor(value: str, unit: str, wanted: str) -> float:
     for quantity, units in UNITS.items():
         if _usual(unit) in units:
             raise ValueError(f"{value!r} is {_article(quantity)}; expected {described(wanted)}")
-    near = get_close_matches(_usual(unit), UNITS[wanted], n=1, cutoff=0.5)
+    near = get_close_matches(_usual(unit), UNITS[wanted], n=1)
     guess = f"did you mean {near[0]!r}? Expected" if near else "expected"
     raise ValueError(f"{value!r}: unknown unit {unit!r}; {guess} {described(wanted)}")
 
