@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pytest
@@ -260,11 +260,11 @@ def test_a_statusword_that_codes_no_state_is_none() -> None:
 
 
 def test_names_are_those_given() -> None:
-    arm = Drives(DEVICES, counts_per_turn=1000, velocity_limit=1.0, names=["base", "elbow"])
+    arm = Drives([fake_sub(3), fake_sub(4)], counts_per_turn=1000, velocity_limit=1.0, names=["base", "elbow"])
     assert arm.names == ("base", "elbow")
 
 
 @pytest.mark.parametrize("names", [["base"], ["base", "base"], "ab"])
 def test_every_axis_has_its_own_name(names: Sequence[str]) -> None:
     with pytest.raises(ValueError, match="name"):
-        Drives(DEVICES, counts_per_turn=1000, velocity_limit=1.0, names=names)
+        Drives([fake_sub(3), fake_sub(4)], counts_per_turn=1000, velocity_limit=1.0, names=names)

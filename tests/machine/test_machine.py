@@ -44,7 +44,7 @@ def test_a_loop_runs_with_the_options_of_the_file(tmp_path: Path) -> None:
                     break
             assert start == pytest.approx([0, math.pi / 2, 0], abs=1e-3)
             assert arm.actual.position - start == pytest.approx(0.1 * math.sin(0.5), abs=5e-3)
-            assert loop.plan.period_ns == 1_000_000
+            assert loop.plan.cycle.period_ns == 1_000_000
 
 
 def test_outputs_and_inputs_have_names_and_units(tmp_path: Path) -> None:
@@ -82,7 +82,7 @@ def test_options_of_a_loop_override_those_of_the_file(tmp_path: Path) -> None:
             scheduling=Scheduling(receive="poll"),
         ) as loop,
     ):
-        assert loop.plan.period_ns == 2_000_000
+        assert loop.plan.cycle.period_ns == 2_000_000
         for cycle in loop:
             if cycle.number == 30:
                 break
@@ -215,14 +215,15 @@ def test_two_devices_with_one_alias_are_refused(tmp_path: Path) -> None:
 def test_an_axis_that_is_not_there_is_refused_with_its_line(
     axes: str, message: str, tmp_path: Path
 ) -> None:
-    text = SMALL.replace('"j1", "wrist/0", "wrist/1"', axes).replace('["hand"]', '["wrist/0"]')
-    if '"wrist/0"' in axes:
-        text = text.replace('axes = ["wrist/0"]', 'axes = ["hand"]')
-    path = write_small(tmp_path, text)
-    with pytest.raises(MachineFileError, match=message) as caught, Machine(path):
+    roles = SMALL[SMALL.index("[drives.gripper]") : SMALL.index("[process_data.valves]")]
+    text = SMALL.replace('"j1", "wrist/0", "wrist/1"', axes).replace(roles, "")
+    with pytest.raises(MachineFileError, match=message) as caught, Machine(
+        write_small(tmp_path, text)
+    ):
         pass
-    assert caught.value.line is not None
-    assert "arm" in text.splitlines()[caught.value.line - 2] + text.splitlines()[caught.value.line - 1]
+    assert caught.value.key is not None
+    assert caught.value.key.startswith("drives.arm")
+    assert caught.value.line in (45, 46)
 
 
 def test_an_object_that_no_pdo_has_is_refused(tmp_path: Path) -> None:
@@ -248,7 +249,15 @@ def test_a_machine_without_roles_has_no_loop(tmp_path: Path) -> None:
 
 
 def test_the_mode_of_a_device_is_used_where_the_role_has_no_clock(tmp_path: Path) -> None:
-    text = SMALL.replace("position = 2", 'position = 2\nop_mode = "DC Sync0"')
-    with Machine(write_small(tmp_path, text)) as machine, machine.loop() as loop:
-        assert {sync.op_mode for d in loop.plan.devices if (sync := d.sync)} == {"DC Sync0"}
-        assert sum(d.sync is not None for d in loop.plan.devices) == 3  # j1, wrist, gauge
+    clock = 'clock = { op_mode = "DC Sync0", shift = "250 us" }\n'
+    mode = '\nop_mode = "DC Sync0"'
+    text = SMALL.replace(clock, "").replace("alias = 11", "alias = 11" + mode)
+    with pytest.raises(MachineFileError, match="different values of op_mode"):
+        Machine(write_small(tmp_path, text))
+    text = text.replace("alias = 12", "alias = 12" + mode)
+    with Machine(write_small(tmp_path, text)) as machine:
+        plan = machine.main.plan(*machine.requests)
+    assert {each.position: each.sync.op_mode for each in plan.devices if each.sync} == {
+        3: "DC Sync0",
+        4: "DC Sync0",
+    }

@@ -159,19 +159,19 @@ def _cause_of_another(
 
 
 def _shift(expected: Sequence[DeviceTable], subs: Sequence[SubDevice]) -> int:
-    """Return by how much all devices from the first wrong one on are shifted; 0: they are not."""
+    """Return how many devices more (fewer: negative) there are before the first wrong one; 0: the
+    order does not say."""
     wrong = [
         device
         for device in expected
         if device.position is not UNSET and not _fits(device, subs, 0)
     ]
-    last = [device for device in expected if device.position is not UNSET][-1]
-    if len(wrong) < 2 or last is not wrong[-1]:
-        return 0
-    for shift in (1, -1, 2, -2):
-        inside = [d for d in wrong if 0 <= _position(d) + shift < len(subs)]
-        if inside and all(_fits(device, subs, shift) for device in inside):
-            return shift
+    for count in (1, 2):
+        moved = wrong[count:]  # without those that were taken out
+        if len(wrong) > 1 and all(_fits(device, subs, count) for device in wrong):
+            return count
+        if moved and _position(moved[-1]) >= len(subs) and all(_fits(d, subs, -count) for d in moved):
+            return -count
     return 0
 
 

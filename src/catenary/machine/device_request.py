@@ -47,7 +47,7 @@ class DeviceRequest:
         self, sub: SubDevice, objects: Sequence[StartUp], *, required: bool, divider: int
     ) -> None:
         self.subs = (sub,)
-        self._wish = PdoWish(objects=tuple(objects), required=required, every=divider)
+        self._wish = PdoWish(objects=tuple(objects), required=required, divider=divider)
 
     def pdos(self, period_ns: int) -> Mapping[int, PdoWish]:
         """Return the request, by position."""
