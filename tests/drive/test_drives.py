@@ -260,7 +260,12 @@ def test_a_statusword_that_codes_no_state_is_none() -> None:
 
 
 def test_names_are_those_given() -> None:
-    arm = Drives([fake_sub(3), fake_sub(4)], counts_per_turn=1000, velocity_limit=1.0, names=["base", "elbow"])
+    arm = Drives(
+        [fake_sub(3), fake_sub(4)],
+        counts_per_turn=1000,
+        velocity_limit=1.0,
+        names=["base", "elbow"],
+    )
     assert arm.names == ("base", "elbow")
 
 

@@ -82,9 +82,7 @@ def test_a_device_of_a_kind_that_nobody_expects() -> None:
     [({"revision": 2}, "another revision"), ({"serial": 8}, "another serial")],
 )
 def test_the_same_product_with_another_number(more: dict[str, int], text: str) -> None:
-    device = DeviceTable(
-        name="j1", position=0, identity=IdentityTable(vendor=1, product=A, **more)
-    )
+    device = DeviceTable(name="j1", position=0, identity=IdentityTable(vendor=1, product=A, **more))
     [found] = compare([device], subs(A))
     assert found.verdict == "different"
     assert f"the same product with {text}" in found.cause

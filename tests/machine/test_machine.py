@@ -10,8 +10,8 @@ import pytest
 from catenary.errors import IdentityError, MachineFileError, SegmentError
 from catenary.loop import Scheduling, StopPolicy
 from catenary.machine import Machine
-from catenary.types import USINT, INT
-from catenary.virtual import Coupler, DigitalOutputs, Segment, Servo
+from catenary.types import INT, USINT
+from catenary.virtual import Coupler, DigitalOutputs, Segment
 from tests.machine.files import SMALL, small_segment, write_small
 
 AL_STATUS = 0x0130
@@ -132,7 +132,9 @@ def test_a_machine_that_is_not_open_says_so(tmp_path: Path) -> None:
 def test_an_optional_device_may_be_absent(tmp_path: Path) -> None:
     with Machine(write_small(tmp_path), target=small_segment(hand=False)) as machine:
         assert list(machine.drives) == ["arm"]
-        with pytest.raises(KeyError, match='"gripper" is absent: device "hand": no device has alias 20'):
+        with pytest.raises(
+            KeyError, match='"gripper" is absent: device "hand": no device has alias 20'
+        ):
             _ = machine.drives["gripper"]
         with machine.loop() as loop:
             next(loop)
@@ -217,8 +219,9 @@ def test_an_axis_that_is_not_there_is_refused_with_its_line(
 ) -> None:
     roles = SMALL[SMALL.index("[drives.gripper]") : SMALL.index("[process_data.valves]")]
     text = SMALL.replace('"j1", "wrist/0", "wrist/1"', axes).replace(roles, "")
-    with pytest.raises(MachineFileError, match=message) as caught, Machine(
-        write_small(tmp_path, text)
+    with (
+        pytest.raises(MachineFileError, match=message) as caught,
+        Machine(write_small(tmp_path, text)),
     ):
         pass
     assert caught.value.key is not None
@@ -228,9 +231,9 @@ def test_an_axis_that_is_not_there_is_refused_with_its_line(
 
 def test_an_object_that_no_pdo_has_is_refused(tmp_path: Path) -> None:
     path = write_small(tmp_path, SMALL.replace("0x7010:01", "0x7090:01"))
-    with pytest.raises(MachineFileError, match="0x7090:01 is not in a PDO of device 1") as caught:
-        with Machine(path):
-            pass
+    message = "0x7090:01 is not in a PDO of device 1"
+    with pytest.raises(MachineFileError, match=message) as caught, Machine(path):
+        pass
     assert caught.value.key == "process_data.valves.outputs.vacuum"
 
 
@@ -243,9 +246,11 @@ def test_esi_files_are_refused(tmp_path: Path) -> None:
 
 def test_a_machine_without_roles_has_no_loop(tmp_path: Path) -> None:
     text = SMALL[: SMALL.index("[drives.arm]")]
-    with Machine(write_small(tmp_path, text)) as machine:
-        with pytest.raises(MachineFileError, match="no drives and no process data"):
-            machine.loop()
+    with (
+        Machine(write_small(tmp_path, text)) as machine,
+        pytest.raises(MachineFileError, match="no drives and no process data"),
+    ):
+        machine.loop()
 
 
 def test_the_mode_of_a_device_is_used_where_the_role_has_no_clock(tmp_path: Path) -> None:

@@ -19,7 +19,6 @@ from catenary.virtual import (
     DigitalOutputs,
     Segment,
     Servo,
-    SiiQuirks,
 )
 from catenary.virtual.devices import Device
 
@@ -34,8 +33,10 @@ def written(devices: list[Device]) -> str:
 
 def filled_in(text: str) -> str:
     """Return the text with the marked lines completed, as a user does it."""
-    lines = [line.removeprefix("# ") if FILL_IN in line else line for line in text.splitlines()]
-    return "\n".join(lines[:3] + lines[3:])
+    marked = f"# {FILL_IN}"
+    return "\n".join(
+        line.removeprefix("# ") if marked in line else line for line in text.splitlines()
+    )
 
 
 def everything() -> list[Device]:
@@ -104,16 +105,19 @@ def test_devices_have_alias_or_position_and_their_own_names(tmp_path: Path) -> N
 
 def test_text_of_a_device_stays_in_its_comment() -> None:
     """A device may send any characters; a line break would make its name a line of the file."""
-    text = written([DigitalOutputs(name='evil\n[loop]\nperiod = "', sii_quirks=SiiQuirks())])
+    text = written([DigitalOutputs(name='evil\n[loop]\nperiod = "')])
     assert tomllib.loads(text)["loop"] == {"period": "1 ms"}
 
 
-def test_an_empty_name_becomes_a_key() -> None:
+def test_devices_without_a_name_are_named_by_their_numbers() -> None:
     class Nameless(Coupler):
         def sii_image(self) -> bytes:
             return super().sii_image()[:0x80] + b"\xff\xff" + bytes(0x7E)
 
-    assert tomllib.loads(written([Nameless()]))["device"][0]["name"] == "device"
+    names = [
+        device["name"] for device in tomllib.loads(written([Nameless(), Nameless()]))["device"]
+    ]
+    assert names == ["0x43544e59_0x00010001_1", "0x43544e59_0x00010001_2"]
 
 
 def test_a_target_with_quotes_is_escaped() -> None:

@@ -42,9 +42,7 @@ def test_text_with_a_unit_is_converted(text: str, dimension: Dimension, value: f
         ("0.06 kN", "torque", 60.0),
     ],
 )
-def test_linear_axes_have_lengths_and_forces(
-    text: str, dimension: Dimension, value: float
-) -> None:
+def test_linear_axes_have_lengths_and_forces(text: str, dimension: Dimension, value: float) -> None:
     assert to_si(text, dimension, linear=True) == pytest.approx(value)
 
 

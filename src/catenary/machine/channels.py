@@ -38,7 +38,9 @@ def make_channels(
     """
     direction = Direction.INPUT if path[-1] == "inputs" else Direction.OUTPUT
     return {
-        name: _channel(file, (*path, name), spec, _entry(file, (*path, name), spec, device, direction))
+        name: _channel(
+            file, (*path, name), spec, _entry(file, (*path, name), spec, device, direction)
+        )
         for name, spec in given.items()
     }
 

@@ -109,7 +109,9 @@ def _compare(
         f"at {_place(sub)} ({address(device)}): expected {expected_identity(device)}, "
         f"found {sub.identity}"
     )
-    return Comparison("different", device, sub, fault, _cause_of_another(device, sub, expected, subs))
+    return Comparison(
+        "different", device, sub, fault, _cause_of_another(device, sub, expected, subs)
+    )
 
 
 def _cause_of_absence(device: DeviceTable, subs: Sequence[SubDevice], taken: set[int]) -> str:
@@ -162,15 +164,17 @@ def _shift(expected: Sequence[DeviceTable], subs: Sequence[SubDevice]) -> int:
     """Return how many devices more (fewer: negative) there are before the first wrong one; 0: the
     order does not say."""
     wrong = [
-        device
-        for device in expected
-        if device.position is not UNSET and not _fits(device, subs, 0)
+        device for device in expected if device.position is not UNSET and not _fits(device, subs, 0)
     ]
     for count in (1, 2):
         moved = wrong[count:]  # without those that were taken out
         if len(wrong) > 1 and all(_fits(device, subs, count) for device in wrong):
             return count
-        if moved and _position(moved[-1]) >= len(subs) and all(_fits(d, subs, -count) for d in moved):
+        if (
+            moved
+            and _position(moved[-1]) >= len(subs)
+            and all(_fits(d, subs, -count) for d in moved)
+        ):
             return -count
     return 0
 

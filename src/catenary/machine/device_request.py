@@ -8,11 +8,11 @@ from typing import Any
 from msgspec import UNSET
 
 from catenary.bus import SubDevice
-from catenary.plan.start_up_object import StartUp
 from catenary.machine.file import MachineFile
 from catenary.machine.lines import KeyPath
 from catenary.machine.references import data_type, object_of
 from catenary.machine.schema import StartUpTable
+from catenary.plan.start_up_object import StartUp
 from catenary.plan.wish import ImageLayout, PdoWish, Views, WishTables
 
 
@@ -41,7 +41,7 @@ def _start_up(file: MachineFile, table: StartUpTable, path: KeyPath) -> StartUp:
 
 
 class DeviceRequest:
-    """Request for one device without process data: its start-up objects, whether it may be absent."""
+    """Request for a device without process data: start-up objects, whether it may be absent."""
 
     def __init__(
         self, sub: SubDevice, objects: Sequence[StartUp], *, required: bool, divider: int

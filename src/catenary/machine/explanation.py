@@ -50,7 +50,9 @@ def explain(error: msgspec.ValidationError, content: Mapping[str, object]) -> Ex
     found = _at(content, path)
     if message.startswith("Invalid enum value"):
         return _explain_choice(path, found)
-    expected = re.sub(r"`([^`]*)`", lambda kinds: _in_words(kinds[1]), message.partition(", got")[0])
+    expected = re.sub(
+        r"`([^`]*)`", lambda kinds: _in_words(kinds[1]), message.partition(", got")[0]
+    )
     text = f"{expected[0].lower()}{expected[1:]}, found {_shown(found)}{_described(path)}"
     return Explanation(path, text)
 
@@ -80,7 +82,7 @@ def _failing_key(content: Mapping[str, object], path: KeyPath, text: str) -> str
         except msgspec.ValidationError as error:
             if str(error) == text:
                 return str(key)
-    return next(iter(table))
+    return str(next(iter(table)))
 
 
 def _with(content: Any, path: KeyPath, value: object) -> Any:

@@ -38,9 +38,7 @@ def raise_differences(file: MachineFile, found: Sequence[Comparison]) -> None:
         IdentityError: A device is not the one in the file.
         SegmentError: A required device is missing, or an alias is there twice.
     """
-    errors = [
-        _error(file, each) for each in found if each.verdict in ("different", "missing")
-    ]
+    errors = [_error(file, each) for each in found if each.verdict in ("different", "missing")]
     if errors:
         for other in errors[1:]:
             errors[0].add_note(f"also: {other}")

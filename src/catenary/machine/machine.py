@@ -146,7 +146,9 @@ class Machine:
         found = self._opened
         if not found.drives and not found.process_data:
             raise self._file.error(
-                (), "no drives and no process data", hint="add a [drives.NAME] table: docs/machine.md"
+                (),
+                "no drives and no process data",
+                hint="add a [drives.NAME] table: docs/machine.md",
             )
         reference = self._file.tables.clocks.reference
         options = loop_options(self._file, None if reference is UNSET else self.subs[reference])

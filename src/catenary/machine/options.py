@@ -79,7 +79,7 @@ def process_data_options(file: MachineFile, role: str) -> dict[str, Any]:
     """
     path: KeyPath = ("process_data", role)
     table = file.tables.process_data[role]
-    options = {"dc": _clock(file, table.clock, table.device, (*path, "clock"))}
+    options: dict[str, Any] = {"dc": _clock(file, table.clock, table.device, (*path, "clock"))}
     for name in ("required", "divider"):
         if getattr(table, name) is not UNSET:
             options[name] = getattr(table, name)
@@ -95,7 +95,7 @@ def process_data_options(file: MachineFile, role: str) -> dict[str, Any]:
 def _clock(
     file: MachineFile, given: Optional[bool | ClockTable], device: str, path: KeyPath
 ) -> DistributedClock | bool:
-    """Return what `dc=` of a request receives: `clock` of the role, else `op_mode` of the device."""
+    """Return `dc=` of a request: `clock` of the role, else `op_mode` of the device."""
     if isinstance(given, bool):
         return given
     if isinstance(given, ClockTable):

@@ -11,7 +11,7 @@ from msgspec import UNSET
 
 from catenary.machine.file import MachineFile
 from catenary.machine.lines import KeyPath
-from catenary.machine.schema import ChannelTable, DrivesTable, ProcessDataTable
+from catenary.machine.schema import DrivesTable, ProcessDataTable
 from catenary.types import ALL, DataType, Value, by_name
 
 SLOTS_END = 8  # ETG.6010 §5.1: 0x6000 + 0x800 · slot, up to 0x9FFF
@@ -71,7 +71,7 @@ def _check_devices(file: MachineFile) -> None:
             raise file.error(
                 path,
                 f'device "{device.name}" has neither alias nor position',
-                hint="write alias = 10, or position = 3; catenary scan and catenary alias show them",
+                hint="write alias = 10, or position = 3; catenary scan shows positions",
             )
         if device.alias is not UNSET and device.position is not UNSET:
             raise file.error(
@@ -173,7 +173,8 @@ def object_of(file: MachineFile, path: KeyPath, text: str) -> tuple[int, int]:
     found = _OBJECT.fullmatch(text)
     if found is None:
         raise file.error(
-            path, f'"{text}" is not an object; expected "0xINDEX:SUBINDEX", both hexadecimal',
+            path,
+            f'"{text}" is not an object; expected "0xINDEX:SUBINDEX", both hexadecimal',
             hint='four digits and one or two: "0x6000:11"',
         )
     return int(found[1], 16), int(found[2], 16)

@@ -56,7 +56,9 @@ def _axis(
     known = ", ".join(f'"{address.device}/{slot}"' for slot in slots)
     if address.slot is None:
         raise file.error(path, f'"{address}" has {len(slots)} axes: write {known}')
-    raise file.error(path, f'"{address}": {sub.station} has no axis in slot {address.slot}; {known}')
+    raise file.error(
+        path, f'"{address}": {sub.station} has no axis in slot {address.slot}; {known}'
+    )
 
 
 def make_process_data(file: MachineFile, role: str, subs: Subs) -> ProcessData:

@@ -50,7 +50,7 @@ class Table(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tru
     """A table of the file."""
 
 
-class StopTable(Table):
+class StopTable(Table, frozen=True, kw_only=True):
     """[loop.stop]: what stops the axes, and what becomes of lost devices; as cat.StopPolicy."""
 
     late_limit: Optional[Time] = UNSET
@@ -63,7 +63,7 @@ class StopTable(Table):
     on_replacement: Optional[Literal["restore", "hold"]] = UNSET
 
 
-class SchedulingTable(Table):
+class SchedulingTable(Table, frozen=True, kw_only=True):
     """[loop.scheduling]: how the cycle waits and receives; as cat.Scheduling."""
 
     receive: Optional[Literal["poll", "wait", "busy"]] = UNSET
@@ -74,7 +74,7 @@ class SchedulingTable(Table):
     quorum: Optional[int] = UNSET
 
 
-class ClocksTable(Table):
+class ClocksTable(Table, frozen=True, kw_only=True):
     """[clocks]: distributed clocks of the loop; as cat.ClockOptions."""
 
     lead: Optional[Literal["reference", "main"]] = UNSET
@@ -83,7 +83,7 @@ class ClocksTable(Table):
     burst: Optional[int] = UNSET
 
 
-class LoopTable(Table):
+class LoopTable(Table, frozen=True, kw_only=True):
     """[loop]: as cat.Loop."""
 
     period: Optional[Time] = UNSET
@@ -97,7 +97,7 @@ class LoopTable(Table):
     scheduling: SchedulingTable = SchedulingTable()
 
 
-class IdentityTable(Table):
+class IdentityTable(Table, frozen=True, kw_only=True):
     """Identity of a device, checked when the machine is opened (object 0x1018)."""
 
     vendor: DoubleWord
@@ -106,7 +106,7 @@ class IdentityTable(Table):
     serial: Optional[DoubleWord] = UNSET
 
 
-class StartUpTable(Table):
+class StartUpTable(Table, frozen=True, kw_only=True):
     """An object that is written when the device goes from PRE-OP to SAFE-OP; as cat.StartUp."""
 
     object: Object
@@ -117,7 +117,7 @@ class StartUpTable(Table):
     comment: str = ""
 
 
-class DeviceTable(Table):
+class DeviceTable(Table, frozen=True, kw_only=True):
     """[[device]]: a device with its address (alias or position) and its identity."""
 
     name: Annotated[str, Meta(description="name in this file", min_length=1)]
@@ -131,7 +131,7 @@ class DeviceTable(Table):
     comment: str = ""
 
 
-class ClockTable(Table):
+class ClockTable(Table, frozen=True, kw_only=True):
     """Distributed clock of the devices of a role; as cat.DistributedClock."""
 
     op_mode: Optional[str] = UNSET
@@ -141,7 +141,7 @@ class ClockTable(Table):
     assign_activate: Optional[Word] = UNSET
 
 
-class HomingTable(Table):
+class HomingTable(Table, frozen=True, kw_only=True):
     """Homing by the drive; as cat.drive.HomingMethod."""
 
     method: Optional[int] = UNSET
@@ -151,7 +151,7 @@ class HomingTable(Table):
     offset: Optional[Position] = UNSET
 
 
-class DrivesTable(Table):
+class DrivesTable(Table, frozen=True, kw_only=True):
     """[drives.NAME]: axes as one set; as cat.Drives. A list has one value per axis."""
 
     axes: Annotated[
@@ -186,7 +186,7 @@ class DrivesTable(Table):
     pdos: Optional[list[Word] | dict[str, list[tuple[Word, int, int]]]] = UNSET
 
 
-class ChannelTable(Table):
+class ChannelTable(Table, frozen=True, kw_only=True):
     """One object of a device's process data."""
 
     object: Object
@@ -195,7 +195,7 @@ class ChannelTable(Table):
     unit: Annotated[str, Meta(description="for people; the value is raw · scale")] = ""
 
 
-class ProcessDataTable(Table):
+class ProcessDataTable(Table, frozen=True, kw_only=True):
     """[process_data.NAME]: values of one device by name; as cat.ProcessData. Without inputs or
     outputs: as the device maps them, with its own names."""
 
@@ -209,7 +209,7 @@ class ProcessDataTable(Table):
     clock: Optional[bool | ClockTable] = UNSET
 
 
-class MachineTables(Table):
+class MachineTables(Table, frozen=True, kw_only=True):
     """A machine: devices by name, what the program gets by name, and the loop."""
 
     format: Literal["catenary-machine/1"]

@@ -104,7 +104,9 @@ def _counts(counts: Sequence[float | None]) -> str:
     same = len(set(known)) == 1
     texts = [str(int(count)) if count == int(count) else str(count) for count in known]
     value = texts[0] if same else f"[{', '.join(texts)}]"
-    return f"# counts_per_turn = {value}          # {FILL_IN}: 0x608F of the drives gives this value"
+    return (
+        f"# counts_per_turn = {value}          # {FILL_IN}: 0x608F of the drives gives this value"
+    )
 
 
 def _process_data(name: str, device: DeviceDescription) -> str:
