@@ -58,7 +58,6 @@ AXIS_REFUSED = REFUSED
 AXIS_FALLBACK = FALLBACK
 AXIS_MODE_REFUSED = MODE_REFUSED
 
-cdef double STANDSTILL = 0.05          # [rad/s]
 STILL_NS = 5_000_000                   # at rest for this long: stopped
 BEYOND_NS = 20_000_000                 # CSV: outside a limit and leaving for this long: stop
 CLIMBING_NS = 10_000_000_000           # a request to enable lapses
@@ -483,7 +482,8 @@ cdef class Axes:
         a.acceleration = finite_or(plan.acceleration, INFINITY, f"{name} acceleration")
         a.deceleration = finite_or(plan.deceleration, INFINITY, f"{name} deceleration")
         a.torque_slope = finite_or(plan.torque_slope, INFINITY, f"{name} torque_slope")
-        a.standstill = STANDSTILL
+        a.step_floor = finite_or(plan.step_floor, 0.0, f"{name} step_floor")
+        a.standstill = finite_or(plan.standstill, 0.0, f"{name} standstill")
         if plan.on_loss not in ON_LOSS:
             raise ValueError(f"{name} on_loss: {plan.on_loss!r}, must be one of {', '.join(ON_LOSS)}")
         a.on_loss = ON_LOSS[plan.on_loss]

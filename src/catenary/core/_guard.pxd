@@ -31,7 +31,7 @@ cdef inline uint8_t quantity_of(int8_t mode) noexcept nogil:
     return NO_QUANTITY
 
 cdef enum:
-    MODE_BITS = 0x0270         # controlword bits 4, 5, 6, 9: defined by the mode
+    MODE_BITS = 0x0370         # controlword bits 4, 5, 6, 9: defined by the mode; 8: halt
     FREE_BITS = 0xF800         # controlword bits 11 to 15: the manufacturer's
     OPERATE = 0x000F           # enable operation
 

@@ -46,7 +46,8 @@ cdef enum:
 cdef inline void begin_stop(axis_t *a) noexcept nogil:
     """Start the sequence of a stop. A repeated request or a second reason does not restart it."""
     a.stop_cycles = 0
-    a.followed_at_stop = a.tells and a.status & FOLLOWS_COMMAND != 0
+    a.followed_at_stop = (a.tells and a.status & FOLLOWS_COMMAND != 0
+                          and a.mode in (CSP, CSV, CST))  # elsewhere the bit is another one
 
 
 cdef void stop_axis(axes_t *x, axis_t *a, uint8_t reason) noexcept nogil:

@@ -14,5 +14,7 @@ cdef class Iteration:
     cdef Cycle cycle
     cdef object judge
     cdef object beside
+    cdef list movers
     cdef uint32_t trouble
     cdef int al_status
+    cdef int step_movers(self) except -1

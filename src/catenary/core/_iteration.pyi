@@ -1,7 +1,7 @@
 """Iteration of a loop, and the cycle that it yields."""
 
-from collections.abc import Callable
-from typing import Self
+from collections.abc import Callable, Sequence
+from typing import Protocol, Self
 
 from catenary.core._engine import Engine
 
@@ -52,12 +52,19 @@ class Cycle:
     def spend(self, seconds: float) -> None:
         """Let virtual time pass as if the body took this long [s]. On a NIC, compute that long."""
 
+class Mover(Protocol):
+    """Source of targets that the loop steps before each commit."""
+
+    def step(self, now: float, /) -> None: ...
+
 class Iteration:
     """Iterator that steps the engine once per `next` and yields its one Cycle.
 
     It calls `judge(flags)` if one of the CYCLE_* flags of `trouble` is set, or if the devices' AL
     states together differ from `al_status`; an exception of `judge` ends the iteration. The first
-    step commits nothing. `beside` is called before every step.
+    step commits nothing. `beside` is called before every step. Each
+    of the list `movers` computes targets before every step that commits, with the time of the
+    cycle [s].
     """
 
     def __init__(
@@ -68,6 +75,7 @@ class Iteration:
         trouble: int,
         al_status: int,
         beside: Callable[[], object] | None = None,
+        movers: Sequence[Mover] | None = None,
     ) -> None: ...
     def __iter__(self) -> Self: ...
     def __next__(self) -> Cycle: ...

@@ -12,6 +12,9 @@ decide what is sent instead:
 - underrun: no set-point was committed, or the one of this axis was refused (`late_cycles`);
 - stopping: another state was requested, or the core stopped the axis.
 
+In the profile modes the drive makes the trajectory. In PP the command stays until another one is
+committed, and no underrun counts: the drive ends its motion by itself. In PV the velocity stays in
+an underrun, and the late limit of CSV counts; in all other situations the target is 0.
 In all of them CSP and CSV decelerate and hold, and CST keeps its torque; each is bounded in time
 (`judge_lateness`, _guard.pyx). In an underrun CSP first keeps the velocity of the last two set-points:
 `ghost` is the set-point of this cycle, which the core continues in a fallback (`fallback_cycles`).
@@ -29,8 +32,11 @@ from catenary.core._axes cimport DROPPED, FALLBACK, LIMITED, MODE_REFUSED, REFUS
 from catenary.core._cia402 cimport ENABLED, OPERATION_ENABLED, QUICK_STOP_ACTIVE, SWITCHED_ON
 from catenary.core._guard cimport (
     CSP,
+    CSV,
     DISABLE_VOLTAGE,
     POSITION,
+    PROFILE_POSITION,
+    PROFILE_VELOCITY,
     STOP_HANDOVER,
     STOP_MODE_CHANGE,
     STOP_NOT_FOLLOWING,
@@ -48,7 +54,6 @@ from catenary.core._guard cimport (
     stop_command,
 )
 
-cdef double STEP_FLOOR = 0.1           # [rad] smallest default of the step limit
 cdef double STEP_TOLERANCE = 1.000001  # a step of exactly the limit is accepted
 
 
@@ -134,9 +139,14 @@ cdef void fall_back_position(axes_t *x, axis_t *a, bint keep) noexcept nogil:
 cdef void fall_back(axes_t *x, axis_t *a, bint keep) noexcept nogil:
     """Compute one cycle without a set-point that counts. `keep`: CSP may keep its velocity."""
     cdef uint8_t quantity = quantity_of(a.mode)
+    if a.mode == PROFILE_POSITION:
+        return
     a.flags |= FALLBACK
     a.fallback_cycles += 1
-    if quantity == POSITION:
+    if a.mode == PROFILE_VELOCITY:
+        if not keep:
+            a.commanded_velocity = 0.0
+    elif quantity == POSITION:
         fall_back_position(x, a, keep and a.fallback_cycles <= x.keep_limit)
     elif quantity == VELOCITY:
         if a.fallback_cycles == 1 and a.velocity_offset.present:
@@ -158,7 +168,7 @@ cdef bint is_accepted(axes_t *x, axis_t *a, double target, uint64_t between) noe
     """Refuse a CSP set-point too far from the last accepted one."""
     cdef double limit = a.step_limit
     if limit == 0.0:
-        limit = fmax(STEP_FLOOR, 2 * a.velocity_limit * x.period
+        limit = fmax(a.step_floor, 2 * a.velocity_limit * x.period
                      * <double>max(between, <uint64_t>a.divider))
     if fabs(target - a.setpoint) <= limit * STEP_TOLERANCE:
         return True
@@ -178,9 +188,7 @@ cdef void follow_position(axes_t *x, axis_t *a, const target_t *t, double target
         age = x.number - stamp if x.number > stamp else 0
     if a.mode != CSP:
         a.commanded_position = clamp(a, target, fmin(a.position_min, held), fmax(a.position_max, held))
-        a.ghost = a.commanded_position
         a.refused_cycles = 0
-        a.fallback_cycles = 0
         return
     if not is_accepted(x, a, target, between):
         fall_back(x, a, False)
@@ -227,7 +235,7 @@ cdef void limit_velocity(axes_t *x, axis_t *a) noexcept nogil:
 cdef void follow_velocity(axes_t *x, axis_t *a, double target) noexcept nogil:
     cdef double rate
     if a.fallback_cycles:
-        a.returning = a.accepted > 0
+        a.returning = a.accepted > 0 and a.mode == CSV
     a.accepted = 2
     a.refused_cycles = 0
     a.fallback_cycles = 0

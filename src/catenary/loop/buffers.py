@@ -8,7 +8,7 @@ from dataclasses import fields
 import numpy as np
 
 from catenary.plan.cycle import Bank, Column
-from catenary.plan.wish import Views, Wish, WishTables
+from catenary.plan.wish import Mover, Views, Wish, WishTables
 
 COLUMN_BUFFERS: dict[tuple[bool, Bank], str] = {
     (False, Bank.REAL): "input_reals",
@@ -19,7 +19,9 @@ COLUMN_BUFFERS: dict[tuple[bool, Bank], str] = {
     (True, Bank.BIT): "output_bits",
 }
 AXIS_BUFFERS = tuple(
-    each.name for each in fields(Views) if each.name not in (*COLUMN_BUFFERS.values(), "unit_valid")
+    each.name
+    for each in fields(Views)
+    if each.name not in (*COLUMN_BUFFERS.values(), "unit_valid", "movers")
 )
 
 
@@ -29,16 +31,17 @@ def bind_wishes(
     """Binds every wish to its part of the buffers, in the order of the plan. Returns the whole."""
     arrays = {name: np.asarray(buffers[name]) for name in (*AXIS_BUFFERS, *COLUMN_BUFFERS.values())}
     unit_valid = np.asarray(buffers["unit_valid"])
+    movers: list[Mover] = []
     used = dict.fromkeys(("axes", *COLUMN_BUFFERS.values()), 0)
     for wish, table in zip(wishes, tables, strict=True):
         sizes = dict.fromkeys(AXIS_BUFFERS, len(table.axes)) | column_sizes(table)
         starts = {name: used.get(name, used["axes"]) for name in sizes}
         parts = {name: arrays[name][starts[name] :][: sizes[name]] for name in sizes}
-        wish.bind(Views(**parts, unit_valid=unit_valid))
+        wish.bind(Views(**parts, unit_valid=unit_valid, movers=movers))
         used["axes"] += len(table.axes)
         for name in COLUMN_BUFFERS.values():
             used[name] += sizes[name]
-    return Views(**arrays, unit_valid=unit_valid)
+    return Views(**arrays, unit_valid=unit_valid, movers=movers)
 
 
 def column_sizes(table: WishTables) -> dict[str, int]:

@@ -20,6 +20,7 @@ from catenary.loop.devices import DeviceWish, by_network
 from catenary.loop.laws.law import Law, LawFunction
 from catenary.loop.laws.law import law as made_law
 from catenary.loop.laws.run import LawRun, Numbers
+from catenary.loop.moves import Awaited, wait_for_move
 from catenary.loop.network import ENDING, TROUBLE, Network, Settings, leave_method
 from catenary.loop.networks import (
     NetworksIteration,
@@ -183,6 +184,22 @@ class Loop:
     def __next__(self) -> Cycle:
         return next(iter(self))
 
+    def wait(self, move: Awaited, timeout: float | None = None) -> None:
+        """Iterate until a move is done: `loop.wait(arm.move_to(0.5), timeout=10.0)`.
+
+        It returns when the axes have reached their goals, or after `move.stop()` are at rest.
+
+        Args:
+            move: what `arm.move_to`, `arm.move_by` or `arm.home` returned.
+            timeout: [s]; the move is stopped then. None: twice the expected duration plus 10 s, in
+                homing 60 s.
+
+        Raises:
+            MoveError: The move took too long, was replaced, or its axis was stopped.
+            DriveError: A drive is in fault or was stopped; other errors of the iteration likewise.
+        """
+        wait_for_move(iter(self), move, timeout)
+
     def _make_iteration(self) -> Iteration | NetworksIteration:
         first = self._opened
         if len(self._networks) > 1:
@@ -193,6 +210,7 @@ class Loop:
             trouble=TROUBLE,
             al_status=State.OP,
             beside=first.service.beside,
+            movers=first.views.movers,
         )
 
     def start(

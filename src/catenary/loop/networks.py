@@ -86,7 +86,9 @@ class NetworksIteration:
             flags = [one.engine.run(1) for one in self._runnings]
             self._cycle = NetworksCycle(self._runnings, self._quorum)
         else:
-            for one in self._runnings:
+            for one, cycle in zip(self._runnings, self._cycle.networks, strict=True):
+                for mover in list(one.views.movers):
+                    mover.step(cycle.time)
                 one.engine.commit_targets()
             flags = [one.engine.next() for one in self._runnings]
         self._judge(self._cycle, flags)
