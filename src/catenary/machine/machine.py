@@ -9,6 +9,7 @@ from typing import Self
 from msgspec import UNSET
 
 from catenary.bus import SubDevice
+from catenary.bus.master import MasterSource
 from catenary.drive import Drives
 from catenary.drive.process_data import ProcessData
 from catenary.link import LinkSource
@@ -56,7 +57,7 @@ class Machine:
         source = source_of(str(path) if target is None else target)
         self._segment = segment_of(source)
         self._main = MainDevice(source, force=force)
-        self._is_kernel_master = hasattr(source, "main_device")
+        self._has_own_master = isinstance(source, MasterSource)
         self._found = Found()
 
     def __enter__(self) -> Self:
@@ -176,7 +177,7 @@ class Machine:
     def _find(self) -> Found:
         """Check the identities without changing a device, then scan and make the requests."""
         file = self._file
-        if not self._is_kernel_master:  # it reads the identities itself, and refuses a passive scan
+        if not self._has_own_master:  # that of IgH refuses a passive scan
             raise_differences(file, compare(file.tables.device, self._main.passive_scan()))
         found = compare(file.tables.device, self._main.scan(strict=False))
         raise_differences(file, found)

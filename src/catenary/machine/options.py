@@ -10,13 +10,13 @@ from msgspec import UNSET
 
 from catenary.bus import SubDevice
 from catenary.drive import DistributedClock, HomingMethod
-from catenary.drive.arguments import axis_modes, named_columns
+from catenary.drive.arguments import axis_modes, force_and_torque, named_columns
 from catenary.drive.limits import LimitOptions
 from catenary.drive.units import AxisUnits
 from catenary.loop.options import ClockOptions, Scheduling, StopPolicy
 from catenary.machine.file import MachineFile
 from catenary.machine.lines import KeyPath
-from catenary.machine.references import axis_addresses, pdo_index
+from catenary.machine.references import WHOLE_LISTS, axis_addresses, pdo_index
 from catenary.machine.schema import ClockTable, DrivesTable, HomingTable, Optional
 from catenary.plan.make import period_in_ns
 
@@ -139,18 +139,23 @@ def _check_ranges(
     file: MachineFile, table: DrivesTable, options: dict[str, Any], path: KeyPath
 ) -> None:
     """Check each axis as `Drives` will, before the segment is opened."""
-    units = {field.name for field in fields(AxisUnits)}
-    limits = {field.name for field in fields(LimitOptions)}
     for number, name in enumerate(table.axes):
         own = {
-            key: value[number] if isinstance(value, list) else value
+            key: value[number] if isinstance(value, list) and key not in WHOLE_LISTS else value
             for key, value in options.items()
-            if key in units | limits | {"mode"}
         }
         with file.located(path, options):
-            modes = axis_modes(own.get("mode", "csp"), options.get("other_modes", ()))
-            AxisUnits(**{key: value for key, value in own.items() if key in units})
-            wanted = LimitOptions(**{key: value for key, value in own.items() if key in limits})
-            wanted.check(name, modes)
+            modes = axis_modes(own.get("mode", "csp"), own.get("other_modes", ()))
+            units = AxisUnits(**_of(AxisUnits, own))
+            [own["torque_limit"]] = force_and_torque(
+                (own.get("force_limit"),), (own.get("torque_limit"),), (units.metres_per_turn,)
+            )
+            LimitOptions(**_of(LimitOptions, own)).check(name, modes, units.names)
     with file.located((*path, "columns")):
         named_columns(options.get("columns", ()))
+
+
+def _of(kind: type[AxisUnits] | type[LimitOptions], options: dict[str, Any]) -> dict[str, Any]:
+    """Return the options that are fields of a class."""
+    names = {field.name for field in fields(kind)}
+    return {name: value for name, value in options.items() if name in names}

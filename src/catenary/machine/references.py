@@ -16,7 +16,7 @@ from catenary.types import ALL, DataType, Value, by_name
 
 SLOTS_END = 8  # ETG.6010 §5.1: 0x6000 + 0x800 · slot, up to 0x9FFF
 _OBJECT = re.compile(r"0x([0-9A-Fa-f]{4}):([0-9A-Fa-f]{1,2})")
-_LISTS = ("other_modes", "measured", "columns", "pdos", "axes")  # that are not one per axis
+WHOLE_LISTS = ("other_modes", "measured", "columns", "pdos", "axes")  # that are not one per axis
 
 
 class AxisAddress(NamedTuple):
@@ -128,7 +128,7 @@ def _check_lists(file: MachineFile, role: str, table: DrivesTable) -> None:
     path: KeyPath = ("drives", role)
     for key in table.__struct_fields__:
         value = getattr(table, key)
-        if key not in _LISTS and isinstance(value, list) and len(value) != len(table.axes):
+        if key not in WHOLE_LISTS and isinstance(value, list) and len(value) != len(table.axes):
             raise file.error(
                 (*path, key),
                 f"{len(value)} values for {len(table.axes)} axes",
