@@ -26,6 +26,8 @@ SLOT_STRIDE = 0x800
 SLOTS_MAX = 16  # 0x6000 to 0xDFFF
 SMALL_LIMIT = 4096  # bytes: these objects have up to 4, one wished for may be a string
 SMALL_TIMEOUT = 5.0  # [s] for one of them
+READABLE = Access.READ_PRE_OP | Access.READ_SAFE_OP | Access.READ_OP
+WRITABLE = Access.WRITE_PRE_OP | Access.WRITE_SAFE_OP | Access.WRITE_OP
 
 
 def read_profile(
@@ -71,6 +73,7 @@ def _information(entry: EntryDescription) -> ObjectInformation:
         Access.RXPDO_MAPPABLE in entry.access,
         Access.TXPDO_MAPPABLE in entry.access,
         printable(entry.name),
+        readable=bool(entry.access & READABLE) or not entry.access & WRITABLE,
     )
 
 
