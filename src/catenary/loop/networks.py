@@ -271,6 +271,8 @@ class NetworksLoop(Loop):
 
     def _brake(self) -> None:
         """All axes of all networks at once, in slices, until they stand or the deadline."""
+        for one in self._all:
+            one.make_outputs_safe()
         moving = [one for one in self._all if one.is_open and one.plan.cycle.axes]
         for one in moving:
             one.stop_axes_at_once()
