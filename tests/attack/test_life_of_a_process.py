@@ -18,11 +18,11 @@ atexit.register(lambda: print("at the end", state()))  # after the handlers regi
 import os, signal
 import catenary as cat
 
-segment = cat.Segment([cat.Servo()])
+segment = cat.Segment([cat.virtual.Servo()])
 main = cat.MainDevice(segment)
 main.open()
 arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=1.0)
-loop = cat.Loop(arm, late_limit=0.0).__enter__()
+loop = cat.Loop(arm, stop=cat.StopPolicy(late_limit=0.0)).__enter__()
 next(loop)
 
 def state():
@@ -165,5 +165,5 @@ import sys
 import catenary as cat
 
 with cat.MainDevice(sys.argv[1]) as main:
-    print({str(sub.read_state().state) for sub in main.look()})
+    print({str(sub.read_state().state) for sub in main.passive_scan()})
 """

@@ -27,7 +27,9 @@ from catenary.wire.sii_categories import (
 
 @pytest.fixture
 def segment(monkeypatch: pytest.MonkeyPatch) -> cat.Segment:
-    segment = cat.Segment([cat.Coupler(), cat.Servo(), cat.Servo(name="wrist", serial=7)])
+    segment = cat.Segment(
+        [cat.virtual.Coupler(), cat.virtual.Servo(), cat.virtual.Servo(name="wrist", serial=7)]
+    )
     monkeypatch.setattr("catenary.target.main_device.parse", lambda _: segment)
     return segment
 
@@ -42,7 +44,7 @@ def spoil(segment: cat.Segment, position: int, *words: tuple[int, int]) -> None:
     from catenary.procedure.sii_write import Change, write_words
 
     with cat.MainDevice(segment) as opened:
-        station = opened.look(names=False)[position].station
+        station = opened.passive_scan(names=False)[position].station
         opened.converse(write_words(station, [Change(*each) for each in words]))
 
 

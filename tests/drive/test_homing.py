@@ -20,7 +20,7 @@ COUNTS = 2**20
 def opened(
     *servos: Servo, run: str = "threaded", at: float = 0.0, **options: Any
 ) -> Iterator[tuple[cat.Drives, cat.Loop]]:
-    segment = cat.Segment([cat.Coupler(), *servos])
+    segment = cat.Segment([cat.virtual.Coupler(), *servos])
     with cat.MainDevice(segment) as main:
         main.scan()
         for servo in servos:
@@ -34,7 +34,7 @@ def opened(
                 **options,
             },
         )
-        with cat.Loop(arm, period=1e-3, run=run) as loop:
+        with cat.Loop(arm, period=1e-3, execution=run) as loop:
             yield arm, loop
 
 

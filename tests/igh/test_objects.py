@@ -3,28 +3,22 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 import catenary as cat
 from catenary.errors import ConfigurationError, MailboxError, SdoAbort
-from catenary.igh import MainDevice, Master, SubDevice
+from catenary.igh import Master, SubDevice
 from catenary.types import UDINT, UINT
 from tests.igh.double import Double
-
-
-@pytest.fixture
-def main(double: Double) -> Iterator[cat.MainDevice]:
-    with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
-        main.scan()
-        yield main
+from tests.igh.loops import kernel_of
+from tests.loop_options import grouped
 
 
 def loop_of(main: cat.MainDevice, **options: object) -> cat.Loop:
     return cat.Loop(
-        cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0), **options
+        cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0), **grouped(options)
     )
 
 
@@ -102,7 +96,7 @@ def test_what_the_library_cannot_do_says_so(main: cat.MainDevice) -> None:
     for ask, command in (
         (sub.sdo.list, "ethercat sdos -p 0"),
         (lambda: sub.sdo.describe(0x6040), "ethercat sdos -p 0"),
-        (main.look, "ethercat slaves"),
+        (main.passive_scan, "ethercat slaves"),
         (main.diagnose, "ethercat crc"),
         (lambda: sub.sdo.read(0x1018, complete=True), "one by one"),
     ):
@@ -184,8 +178,7 @@ def test_a_device_that_does_not_answer_holds_nobody_else_up(doubles: dict[str, P
     double = Double(doubles["1.6.1"])
     with cat.MainDevice(Master(library=double.path)) as main:
         main.scan()
-        assert isinstance(main, MainDevice)
-        main.reservation.beside.timeout = 0.2
+        kernel_of(main).reservation.beside.timeout = 0.2
         with loop_of(main, late_limit=0, priority=None) as loop:
             double.block(0)
             stuck = main.subs[0].sdo.request_write(0x605A, 0, 6, type=UINT)

@@ -148,7 +148,7 @@ def test_in_both_modes(cell: Cell, execution: str) -> None:
     with cell.main as main:
         main.scan()
         data = ProcessData(main.subs[SENSOR], safe={"Lamp": 7})
-        with cat.Loop(data, run=execution) as loop:  # type: ignore[arg-type]
+        with cat.Loop(data, execution=execution) as loop:  # type: ignore[arg-type]
             data["Lamp"] = 50
             next(loop)
             next(loop)

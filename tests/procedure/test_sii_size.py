@@ -36,12 +36,12 @@ def header(size_kbit: int) -> bytes:
 
 @pytest.fixture
 def main() -> Iterator[cat.MainDevice]:
-    with cat.MainDevice(cat.Segment([cat.Coupler(), cat.Servo()])) as main:
+    with cat.MainDevice(cat.Segment([cat.virtual.Coupler(), cat.virtual.Servo()])) as main:
         yield main
 
 
 def test_the_header_says_it(main: cat.MainDevice) -> None:
-    assert main.converse(read_extent(main.look()[1].station)) == Extent(2048, MAXIMUM_SIZE)
+    assert main.converse(read_extent(main.passive_scan()[1].station)) == Extent(2048, MAXIMUM_SIZE)
 
 
 def test_a_header_that_claims_more_than_its_controller_addresses() -> None:

@@ -37,10 +37,12 @@ def live(path: Path, run: Run) -> tuple[str, list[float], int, object]:
                 for name, period, execution, priority in TASKS
             ),
             clock=clock,
-            run=run,
+            workers=run,
             best_effort=True,
         )
-        segment = cat.Segment([cat.Coupler(), *(cat.Servo() for _ in range(3))], clock=clock)
+        segment = cat.Segment(
+            [cat.virtual.Coupler(), *(cat.virtual.Servo() for _ in range(3))], clock=clock
+        )
         with tasks, Recorder(segment, path) as link, cat.MainDevice(link) as main:
             arm = cat.Drives(
                 main.scan().drives, mode="csp", counts_per_turn=2**20, velocity_limit=100.0
@@ -76,11 +78,11 @@ def test_two_runs_are_the_same_to_the_last_bit(tmp_path: Path, run: Run) -> None
 def looping(clock: VirtualClock, place: Participant, took: list[float]) -> None:
     """A loop in a thread of its own, whose body computes 9 ms in each of three cycles."""
     try:
-        with cat.MainDevice(cat.Segment([cat.Servo()], clock=place)) as main:
+        with cat.MainDevice(cat.Segment([cat.virtual.Servo()], clock=place)) as main:
             arm = cat.Drives(
                 main.scan().drives, mode="csp", counts_per_turn=2**20, velocity_limit=100.0
             )
-            with cat.Loop(arm, period=20e-3, late_limit=0) as loop:
+            with cat.Loop(arm, period=20e-3, stop=cat.StopPolicy(late_limit=0)) as loop:
                 for cycle in loop:
                     if cycle.number == 3:
                         break
@@ -100,7 +102,7 @@ def test_the_body_of_a_loop_is_preempted_like_a_task() -> None:
         place = clock.participate(priority=10, cpu=0)
         thread = threading.Thread(target=looping, args=(clock, place, took))
         thread.start()
-        with Tasks(task, clock=clock, run="threads", best_effort=True) as tasks:
+        with Tasks(task, clock=clock, workers="threads", best_effort=True) as tasks:
             tasks.join(1.0)
         thread.join()
     assert len(took) == 3
@@ -109,6 +111,6 @@ def test_the_body_of_a_loop_is_preempted_like_a_task() -> None:
 
 def test_a_clock_that_is_none_is_refused() -> None:
     with pytest.raises(ValueError, match="VirtualClock"):
-        cat.Segment([cat.Servo()], clock=3)
+        cat.Segment([cat.virtual.Servo()], clock=3)
     with pytest.raises(ValueError, match="VirtualClock"):
-        cat.Segment([cat.Servo()], clock="real")
+        cat.Segment([cat.virtual.Servo()], clock="real")

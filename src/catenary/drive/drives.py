@@ -62,7 +62,7 @@ class Drives(Request):
       read; to write one, give `Channel(index, subindex, type, output=True)`.
     - `required`: False: the loop continues without a lost drive. Its axes hold their last values;
       enable them again when it is `present`.
-    - `every`: cycles of the loop between two exchanges.
+    - `divider`: cycles of the loop between two exchanges.
     - `dc`: distributed clocks. True: as each device's SII states; or a `DistributedClock` for all
       of them.
     - `pdos`: PDOs of each device, instead of a search: `[0x1701, 0x1B01]`, or with their entries
@@ -130,7 +130,7 @@ class Drives(Request):
         measured: Sequence[str] | None = None,
         columns: Columns = (),
         required: bool = True,
-        every: int = 1,
+        divider: int = 1,
         dc: DistributedClock | bool = False,
         pdos: PdoList = (),
         start_up: Sequence[StartUp] = (),
@@ -176,7 +176,7 @@ class Drives(Request):
                 measured=known(tuple(MEASURED) if measured is None else measured),
                 measured_required=measured is not None,
                 columns=self._columns,
-                every=cycles_between("every", every),
+                divider=cycles_between("divider", divider),
                 required=required,
                 homing=home,
                 pdos=written,
@@ -313,7 +313,7 @@ class Drives(Request):
         self._read_drives()
         wishes: dict[int, PdoWish] = {}
         for axis, sub in zip(self._axes, self.subs, strict=True):
-            wish = axis.pdo_wish(own_objects.downloads(axis, sub, period_ns * axis.every))
+            wish = axis.pdo_wish(own_objects.downloads(axis, sub, period_ns * axis.divider))
             wishes[axis.device] = (
                 joined(wishes[axis.device], wish) if axis.device in wishes else wish
             )

@@ -84,7 +84,7 @@ class Channels(Request):
         channels: Mapping[str, ChannelSpec] | None = None,
         scale: Mapping[str, float] | None = None,
         required: bool = True,
-        every: int = 1,
+        divider: int = 1,
         dc: DistributedClock | bool = False,
         pdos: PdoList = (),
         start_up: Sequence[StartUp] = (),
@@ -94,7 +94,7 @@ class Channels(Request):
         written = written_pdos(pdos, named)
         self._pdos = tuple(pdo for pdo in written if pdo.direction is self.direction)
         self._required = required
-        self._every = cycles_between("every", every)
+        self._divider = cycles_between("divider", divider)
         self._clock = clock_wish(dc)
         self._start_up = tuple(start_up)
         self._units: list[int] = []
@@ -134,7 +134,7 @@ class Channels(Request):
                 outputs=mine if output else (),
                 inputs=() if output else mine,
                 clock=self._clock,
-                every=self._every,
+                divider=self._divider,
                 required=self._required,
                 pdos=self._pdos,
                 objects=self._start_up,
@@ -185,7 +185,7 @@ class Inputs(Channels):
     a `Channel` or (index, subindex, type[, scale]); they are mapped if they are not yet.
     `scale` turns raw numbers into floats: `Inputs(sub, scale={"Value": 10 / 0x7FFF})`.
     `required=False`: the loop goes on without a device that vanishes; its channels keep their last
-    values, `present` tells. `every`: exchanged every so many cycles of the loop.
+    values, `present` tells. `divider`: exchanged every so many cycles of the loop.
     `dc`: distributed clocks, as for `Drives`. `pdos`: these PDOs instead of those assigned now.
     `start_up`: objects that are written to each device before SAFE-OP.
     """
@@ -284,10 +284,7 @@ def with_written(
     """Return the device as if it had these PDOs; unchanged without PDOs."""
     if not pdos:
         return device
-    assignments = write_down(device, direction, pdos).assignments
-    if direction is Direction.OUTPUT:
-        return replace(device, outputs=assignments)
-    return replace(device, inputs=assignments)
+    return device.with_process_data(direction, write_down(device, direction, pdos).assignments)
 
 
 def number_entries(assignment: Assignment) -> list[tuple[Pdo, Entry]]:

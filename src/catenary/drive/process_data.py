@@ -186,7 +186,7 @@ class ProcessData(Request):
             outputs=references[Direction.OUTPUT],
             inputs=references[Direction.INPUT],
             clock=self._clock,
-            every=self._divider,
+            divider=self._divider,
             required=self._required,
             pdos=self._pdos,
             objects=self._start_up,
