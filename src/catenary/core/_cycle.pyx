@@ -444,13 +444,15 @@ cdef void take_law(cycle_t *c, const target_t *orders) noexcept nogil:
 
 
 cdef void take_orders(cycle_t *c, const target_t *committed) noexcept nogil:
-    """Copy what the application may request while a law computes: states, modes, control bits."""
+    """Copy what the application may request while a law computes: states, modes, control bits, and
+    bytes of areas, which a law does not have."""
     cdef target_t *target = &c.handover.target[OF_LAW]
     cdef uint32_t axes = c.handover.counts.axes
     memcpy(target.request, committed.request, axes * sizeof(uint32_t))
     memcpy(target.controlword_bits, committed.controlword_bits, axes * sizeof(uint16_t))
     memcpy(target.mode, committed.mode, axes)
     memcpy(target.goal, committed.goal, axes)
+    memcpy(target.output_bytes, committed.output_bytes, c.handover.counts.output_bytes)
 
 
 cdef bint step_law(cycle_t *c, actual_t *actual, target_t *target) noexcept nogil:

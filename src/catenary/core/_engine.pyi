@@ -26,9 +26,9 @@ class Engine:
         """The private buffers, one per name of plan.wish.Views, typed ("d", "q", "I", "H", "b",
         "B"), for `numpy.asarray`. Read-only: actual_position, actual_velocity, actual_torque,
         statusword, mode_actual, axis_state, axis_flags, input_reals, input_integers, input_bits,
-        and unit_valid ("B"), unit_counter ("H") per sync unit. Writable: target_position,
+        input_bytes, and unit_valid ("B"), unit_counter ("H") per sync unit. Writable: target_position,
         target_velocity, target_torque, mode_target, goal, request, controlword_bits,
-        output_reals, output_integers, output_bits.
+        output_reals, output_integers, output_bits, output_bytes.
 
         A quantity no object is mapped for reads NaN (velocity: estimated from the position).
         A goal is taken over when `request` of its axis has changed: goal[i] = 1; request[i] += 1.

@@ -116,9 +116,10 @@ cdef void thread_loop(void *argument) noexcept nogil:
     cat_futex_wake(&e.cycle.handover.published)
 
 
-def columns_by_bank(columns):
-    """Return the number of columns in each bank."""
-    return [sum(column.bank == bank for column in columns) for bank in range(3)]
+def counts_of(columns, areas):
+    """Return the number of columns in each bank, and the bytes of the areas."""
+    banks = [sum(column.bank == bank for column in columns) for bank in range(3)]
+    return [*banks, sum(area.size for area in areas)]
 
 
 def check_plan(plan):
@@ -164,8 +165,8 @@ cdef class Engine:
         self.handover = Handover(
             len(plan.axes),
             len(plan.sync_units),
-            columns_by_bank(plan.input_columns),
-            columns_by_bank(plan.output_columns),
+            counts_of(plan.input_columns, plan.input_areas),
+            counts_of(plan.output_columns, plan.output_areas),
         )
         self.figures = Figures()
         self.connect(plan)

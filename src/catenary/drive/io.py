@@ -5,25 +5,26 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple, NoReturn
+from typing import Generic, NamedTuple, TypeVar, overload
 
 import numpy.typing as npt
 
 from catenary.bus import SubDevice
 from catenary.drive.arguments import PdoList, clock_wish, cycles_between, written_pdos
-from catenary.drive.attributes import check_writable, unknown_attribute
+from catenary.drive.channel import Channel, ChannelSpec, channel_of, make_channels
+from catenary.drive.request import Request
 from catenary.errors import MappingError
 from catenary.model.device import Assignment, DeviceDescription, Direction, Entry, Pdo
-from catenary.plan.cycle import Bank, Column, NumberKind
+from catenary.plan.cycle import Bank, Column
 from catenary.plan.numbers import ANY, Which
 from catenary.plan.pdo_rewrite import write_down
 from catenary.plan.pdo_search import pdo_names
+from catenary.plan.start_up_object import StartUp
 from catenary.plan.wish import (
     Bytes,
     DistributedClock,
     ImageLayout,
     Integers,
-    ObjectReference,
     PdoWish,
     Reals,
     Views,
@@ -31,107 +32,86 @@ from catenary.plan.wish import (
     WrittenPdo,
 )
 
-# Data types of ETG.1000.6 table 64 that are not unsigned integers.
-SIGNED_TYPES = frozenset((0x02, 0x03, 0x04, 0x10, 0x12, 0x13, 0x14, 0x15))
-REAL_TYPES = frozenset((0x08, 0x11))
+A = TypeVar("A", Reals, Integers, Bytes)
 
 
-class Channel(NamedTuple):
-    """One entry of a device's process data and the name it goes by."""
+class NamedChannel(NamedTuple):
+    """A channel of one device and the name it goes by."""
 
     name: str
     device: int
-    entry: Entry
-    scale: float | None  # SI value = raw · scale; None: the raw number
+    channel: Channel
     which: Which = ANY  # where the device maps the object more than once
 
-    @property
-    def kind(self) -> NumberKind:
-        if self.entry.data_type in REAL_TYPES:
-            return NumberKind.REAL
-        return NumberKind.SIGNED if self.entry.data_type in SIGNED_TYPES else NumberKind.UNSIGNED
 
-    @property
-    def bank(self) -> Bank:
-        if self.scale is not None or self.kind is NumberKind.REAL:
-            return Bank.REAL
-        return Bank.BIT if self.entry.bit_length == 1 else Bank.INTEGER
+class BankArray(Generic[A]):
+    """The array of a bank, as an attribute of Inputs and Outputs. Assigning writes its elements."""
+
+    def __init__(self, bank: Bank) -> None:
+        self._bank = bank
+
+    @overload
+    def __get__(self, owner: None, kind: type[Channels]) -> BankArray[A]: ...
+    @overload
+    def __get__(self, owner: Channels, kind: type[Channels]) -> A: ...
+    def __get__(self, owner: Channels | None, kind: type[Channels]) -> BankArray[A] | A:
+        if owner is None:
+            return self
+        array: A = owner.array(self._bank)  # type: ignore[assignment]
+        return array
+
+    def __set__(self, owner: Channels, values: npt.ArrayLike) -> None:
+        if owner.direction is Direction.INPUT:
+            raise AttributeError("inputs are read-only")
+        owner.array(self._bank)[:] = values
 
 
-class _Channels:
-    """The process data of some devices in one direction, as a wish."""
+class Channels(Request):
+    """The process data of some devices in one direction, as a request."""
 
     direction: Direction
+
+    bits: BankArray[Bytes] = BankArray(Bank.BIT)
+    """(k,) channels of one bit, 0 or 1, in the order of the process data."""
+    integers: BankArray[Integers] = BankArray(Bank.INTEGER)
+    """(k,) raw integers, in the order of the process data."""
+    reals: BankArray[Reals] = BankArray(Bank.REAL)
+    """(k,) channels with a scale and REAL numbers, in the order of the process data."""
 
     def __init__(
         self,
         *subs: SubDevice,
+        channels: Mapping[str, ChannelSpec] | None = None,
         scale: Mapping[str, float] | None = None,
         required: bool = True,
         divider: int = 1,
         dc: DistributedClock | bool = False,
         pdos: PdoList = (),
+        start_up: Sequence[StartUp] = (),
     ) -> None:
-        self._subs = subs
-        self._pdos = tuple(p for p in written_pdos(pdos) if p.direction is self.direction)
+        super().__init__(subs)
+        named = make_channels("channels", channels or {})
+        written = written_pdos(pdos, named)
+        self._pdos = tuple(pdo for pdo in written if pdo.direction is self.direction)
         self._required = required
         self._divider = cycles_between("divider", divider)
         self._clock = clock_wish(dc)
+        self._start_up = tuple(start_up)
         self._units: list[int] = []
-        self._arrays: tuple[Reals, Integers, Bytes] | None = None
+        self._arrays: dict[Bank, Reals | Integers | Bytes] | None = None
         self._unit_valid: Bytes | None = None
-        devices = [with_written(sub.description, self.direction, self._pdos) for sub in subs]
-        self._channels = channels(devices, self.direction, scale or {})
+        if named:
+            self._channels = chosen_channels(subs, named, scale)
+        else:
+            devices = [with_written(sub.description, self.direction, self._pdos) for sub in subs]
+            self._channels = mapped_channels(devices, self.direction, scale or {})
         self._places: dict[str, tuple[Reals | Integers | Bytes, int]] = {}
 
-    def __getattr__(self, name: str) -> NoReturn:
-        raise unknown_attribute(self, name)  # reached only if there is none of this name
-
-    def __setattr__(self, name: str, value: object) -> None:
-        check_writable(self, name)
-        object.__setattr__(self, name, value)
-
-    @property
-    def subs(self) -> tuple[SubDevice, ...]:
-        """Devices of these channels."""
-        return self._subs
-
-    @property
-    def bits(self) -> Bytes:
-        """(k,) channels of one bit, 0 or 1, in the order of the process data."""
-        return self._bound()[2]
-
-    @bits.setter
-    def bits(self, values: npt.ArrayLike) -> None:
-        self._write(self.bits, values)
-
-    @property
-    def integers(self) -> Integers:
-        """(k,) raw integers, in the order of the process data."""
-        return self._bound()[1]
-
-    @integers.setter
-    def integers(self, values: npt.ArrayLike) -> None:
-        self._write(self.integers, values)
-
-    @property
-    def reals(self) -> Reals:
-        """(k,) channels with a scale and REAL numbers, in the order of the process data."""
-        return self._bound()[0]
-
-    @reals.setter
-    def reals(self, values: npt.ArrayLike) -> None:
-        self._write(self.reals, values)
-
-    def _bound(self) -> tuple[Reals, Integers, Bytes]:
+    def array(self, bank: Bank) -> Reals | Integers | Bytes:
+        """Return the array of a bank. RuntimeError before a loop is open."""
         if self._arrays is None:
             raise RuntimeError(f"{type(self).__name__} have no values before a Loop is open")
-        return self._arrays
-
-    def _write(self, array: Reals | Integers | Bytes, values: npt.ArrayLike) -> None:
-        if self.direction is Direction.INPUT:
-            raise AttributeError("inputs are read-only")
-        array[:] = values
+        return self._arrays[bank]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -145,10 +125,10 @@ class _Channels:
         return value
 
     def pdos(self, period_ns: int) -> Mapping[int, PdoWish]:
-        """Request what is mapped already, or `pdos`: without them nothing changes on the device."""
+        """Request the channels, or `pdos`: without either nothing changes on the device."""
         wishes: dict[int, PdoWish] = {}
         for sub in self.subs:
-            mine = tuple(reference(c.entry) for c in self._channels if c.device == sub.position)
+            mine = tuple(c.channel.reference() for c in self._channels if c.device == sub.position)
             output = self.direction is Direction.OUTPUT
             wishes[sub.position] = PdoWish(
                 outputs=mine if output else (),
@@ -157,6 +137,7 @@ class _Channels:
                 divider=self._divider,
                 required=self._required,
                 pdos=self._pdos,
+                objects=self._start_up,
             )
         return wishes
 
@@ -177,13 +158,14 @@ class _Channels:
 
     def _bind(self, reals: Reals, integers: Integers, bits: Bytes, unit_valid: Bytes) -> None:
         self._unit_valid = unit_valid
-        self._arrays = reals, integers, bits
         arrays: dict[Bank, Reals | Integers | Bytes]
         arrays = {Bank.REAL: reals, Bank.INTEGER: integers, Bank.BIT: bits}
+        self._arrays = arrays
         used = dict.fromkeys(Bank, 0)
-        for channel in self._channels:
-            self._places[channel.name] = (arrays[channel.bank], used[channel.bank])
-            used[channel.bank] += 1
+        for each in self._channels:
+            bank = each.channel.bank
+            self._places[each.name] = (arrays[bank], used[bank])
+            used[bank] += 1
 
     def _place(self, name: str) -> tuple[Reals | Integers | Bytes, int]:
         try:
@@ -194,14 +176,18 @@ class _Channels:
             raise KeyError(f"no channel {name!r}; there are: {', '.join(self.names)}") from None
 
 
-class Inputs(_Channels):
+class Inputs(Channels):
     """The inputs of SubDevices: `.bits` (uint8), `.integers` (int64) and `.reals` (float64), each
     in the order of the process data, or one by name: `buttons["Input 1"]`.
 
+    Without `channels`, those that are mapped, by the names of the SII or the dictionary. With it,
+    chosen objects of one device: `Inputs(sub, channels={"force": (0x6000, 1, types.REAL)})`, each
+    a `Channel` or (index, subindex, type[, scale]); they are mapped if they are not yet.
     `scale` turns raw numbers into floats: `Inputs(sub, scale={"Value": 10 / 0x7FFF})`.
     `required=False`: the loop goes on without a device that vanishes; its channels keep their last
     values, `present` tells. `divider`: exchanged every so many cycles of the loop.
     `dc`: distributed clocks, as for `Drives`. `pdos`: these PDOs instead of those assigned now.
+    `start_up`: objects that are written to each device before SAFE-OP.
     """
 
     direction = Direction.INPUT
@@ -211,10 +197,9 @@ class Inputs(_Channels):
         self._bind(views.input_reals, views.input_integers, views.input_bits, views.unit_valid)
 
 
-class Outputs(_Channels):
+class Outputs(Channels):
     """The outputs of SubDevices, all 0 at the start: write `.bits[:]`, `.integers[:]`, `.reals[:]`,
-    or one by name: `lamps["Output 1"] = 1`. `scale`, `required`, `divider`, `dc`, `pdos` as for
-    `Inputs`.
+    or one by name: `lamps["Output 1"] = 1`. The options are those of `Inputs`.
     What is out of its range is cut, and `cycle.limited` says so."""
 
     direction = Direction.OUTPUT
@@ -228,9 +213,23 @@ class Outputs(_Channels):
         self._bind(views.output_reals, views.output_integers, views.output_bits, views.unit_valid)
 
 
-def channels(
+def chosen_channels(
+    subs: Sequence[SubDevice], named: Mapping[str, Channel], scale: Mapping[str, float] | None
+) -> tuple[NamedChannel, ...]:
+    """Return the channels that the application chose. ValueError unless there is one device."""
+    if len(subs) != 1:
+        raise ValueError(f"channels= needs one device, not {len(subs)}: make one request for each")
+    if scale is not None:
+        raise ValueError("scale= belongs to mapped channels: give channels= (..., type, scale)")
+    return tuple(
+        NamedChannel(name, subs[0].position, channel, Which(bit_length=channel.bit_length))
+        for name, channel in named.items()
+    )
+
+
+def mapped_channels(
     devices: Iterable[DeviceDescription], direction: Direction, scale: Mapping[str, float]
-) -> tuple[Channel, ...]:
+) -> tuple[NamedChannel, ...]:
     """All channels of the devices, each with a name of its own. ValueError: there are none."""
     devices = list(devices)
     if not devices:
@@ -253,13 +252,23 @@ def channels(
     for name in scale:
         if name not in names:
             raise ValueError(f"scale: no channel {name!r}; there are: {', '.join(names)}")
+    return place_entries(names, found, scale)
+
+
+def place_entries(
+    names: Sequence[str],
+    found: Sequence[tuple[DeviceDescription, Pdo, Entry]],
+    scale: Mapping[str, float],
+) -> tuple[NamedChannel, ...]:
+    """Return mapped entries as channels. One that is mapped twice keeps its own place."""
     alike: Counter[tuple[int, int, int, int, int]] = Counter()
     made = []
     for name, (device, pdo, entry) in zip(names, found, strict=True):
         place = (device.position, pdo.index, entry.index, entry.subindex, entry.bit_length)
         which = Which(pdo.index, entry.bit_length, alike[place])
         alike[place] += 1
-        made.append(Channel(name, device.position, entry, scale.get(name), which))
+        channel = channel_of(entry, scale.get(name))
+        made.append(NamedChannel(name, device.position, channel, which))
     return tuple(made)
 
 
@@ -312,21 +321,17 @@ def full_name(entry: str, pdo: str, position: str) -> str:
     return f"{position} {pdo_name(entry, pdo, position)}"
 
 
-def reference(entry: Entry) -> ObjectReference:
-    return ObjectReference(entry.index, entry.subindex, entry.bit_length)
-
-
-def column(channel: Channel, layout: ImageLayout, direction: Direction) -> Column:
-    """The channel with its place."""
-    entry = channel.entry
+def column(named: NamedChannel, layout: ImageLayout, direction: Direction) -> Column:
+    """Return the channel with its place."""
+    channel = named.channel
     find = layout.output if direction is Direction.OUTPUT else layout.input
-    number = find(channel.device, entry.index, entry.subindex, channel.which)
+    number = find(named.device, channel.index, channel.subindex, named.which)
     if number is None:
-        raise MappingError(f"device {channel.device}: {entry} is not in its process data")
+        raise MappingError(f"device {named.device}: {channel.place} is not in its process data")
     return Column(
-        name=channel.name,
+        name=named.name,
         number=replace(number, kind=channel.kind, scale=channel.scale or 1.0, offset=0.0),
         bank=channel.bank,
-        device=channel.device,
-        sync_unit=layout.sync_unit(channel.device),
+        device=named.device,
+        sync_unit=layout.sync_unit(named.device),
     )

@@ -144,6 +144,8 @@ def share_time(runnings: Sequence[Running]) -> None:
 
 def brake(runnings: Sequence[Running], guard: SignalGuard) -> None:
     """Stop all axes of all networks at once, in slices, until they stand or the deadline."""
+    for one in runnings:
+        one.make_outputs_safe()
     moving = [one for one in runnings if one.is_open and one.plan.cycle.axes]
     for one in moving:
         one.stop_axes_at_once()
