@@ -67,5 +67,5 @@ def test_it_runs(tmp_path: Path) -> None:
                 if cycle.time > 0.2:
                     break
             assert machine.process_data["imu"]["rate_z"] == 0.0
-            assert machine.subs["imu_terminal"].sdo.read(0x8000, 6) == b"\xc8\x00"
             assert machine.segment[1].outputs == 0b001
+        assert machine.subs["imu_terminal"].sdo.read(0x8000, 6) == b"\xc8\x00"

@@ -59,8 +59,6 @@ def test_outputs_and_inputs_have_names_and_units(tmp_path: Path) -> None:
                     break
             assert segment[1].outputs == 0b01
             assert gauge["force"] == pytest.approx(16.383, abs=0.01)
-            sub = machine.subs["gauge"]
-            assert sub.sdo.read(0x6000, 0x11, type=INT) == pytest.approx(16383, abs=2)
         assert segment[1].outputs == 0
 
 
@@ -68,8 +66,9 @@ def test_start_up_objects_are_written(tmp_path: Path) -> None:
     with Machine(write_small(tmp_path)) as machine:
         assert "0x8000:01" in str(machine.main.plan(*machine.requests))
         with machine.loop():
-            assert machine.subs["gauge"].sdo.read(0x8000, 1, type=USINT) == 3
-            assert machine.subs["wrist"].sdo.read(0x605A, 0, type=INT) == 6
+            pass
+        assert machine.subs["gauge"].sdo.read(0x8000, 1, type=USINT) == 3
+        assert machine.subs["wrist"].sdo.read(0x605A, 0, type=INT) == 6
 
 
 def test_options_of_a_loop_override_those_of_the_file(tmp_path: Path) -> None:
