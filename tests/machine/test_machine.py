@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from pathlib import Path
 
 import pytest
 
 from catenary.errors import IdentityError, MachineFileError, SegmentError
-from catenary.loop import Scheduling, StopPolicy
+from catenary.loop import Loop, Scheduling, StopPolicy
 from catenary.machine import Machine
 from catenary.types import INT, USINT
 from catenary.virtual import Coupler, DigitalOutputs, Segment
@@ -265,3 +266,31 @@ def test_the_mode_of_a_device_is_used_where_the_role_has_no_clock(tmp_path: Path
         3: "DC Sync0",
         4: "DC Sync0",
     }
+
+
+def test_the_options_of_a_loop_are_those_of_the_api() -> None:
+    def options(function: object) -> set[str]:
+        found = inspect.signature(function).parameters.values()  # type: ignore[arg-type]
+        return {each.name for each in found if each.kind is each.KEYWORD_ONLY}
+
+    assert options(Machine.loop) == options(Loop)
+
+
+def test_columns_may_be_objects_of_the_manufacturer(tmp_path: Path) -> None:
+    table = '{ name = "torque_now", object = "0x6077:00", type = "INT", scale = 0.001 }'
+    text = SMALL.replace('["following_error"]', f'["following_error", {table}]')
+    with Machine(write_small(tmp_path, text)) as machine, machine.loop() as loop:
+        next(loop)
+        assert machine.drives["arm"].actual["torque_now"].shape == (3,)
+        assert machine.drives["arm"].actual["following_error"].shape == (3,)
+
+
+def test_safe_outputs_are_sent_when_the_loop_ends(tmp_path: Path) -> None:
+    segment = small_segment()
+    with Machine(write_small(tmp_path), target=segment) as machine:
+        with machine.loop() as loop:
+            for cycle in loop:
+                machine.process_data["valves"]["clamp"] = True
+                if cycle.number == 20:
+                    break
+        assert segment[1].core.output_image(1, 0)[0] & 0b11 == 0b10  # what the frames left behind

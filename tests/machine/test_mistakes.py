@@ -271,7 +271,7 @@ MISTAKES: dict[str, tuple[str, ...]] = {
     "unknown column": (
         '["following_error"]',
         '["folowing_error"]',
-        "drives.arm.columns",
+        "drives.arm.columns[0]",
         "'folowing_error'; known",
     ),
     "unknown on_loss": (

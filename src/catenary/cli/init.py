@@ -105,11 +105,11 @@ def read_encoders(devices: Sequence[SubDevice]) -> Mapping[tuple[int, int], floa
 
 def seen_from(target: str, output: Path) -> str:
     """Return the target as the file names it: a path counts from the folder of the file."""
-    from catenary.target import is_machine_file, read_toml, target_of
+    from catenary.target.toml_file import VIRTUAL, is_machine_file, read_toml, target_of
 
     if is_machine_file(target):
         target = target_of(read_toml(target))
     kind, colon, name = target.partition(":")
-    if kind != "virtual" or not colon:
+    if kind not in VIRTUAL or not colon:
         return target
     return f"{kind}:{os.path.relpath(name, output.parent)}"

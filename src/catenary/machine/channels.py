@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import cast
 
 from msgspec import UNSET
 
+from catenary.drive.arguments import named_columns
 from catenary.drive.channel import Channel, NumberType, channel_of
 from catenary.machine.file import MachineFile
 from catenary.machine.lines import KeyPath
 from catenary.machine.references import data_type, nearest, object_of
-from catenary.machine.schema import ChannelTable
+from catenary.machine.schema import ChannelTable, ColumnTable
 from catenary.model.device import DeviceDescription, Direction, Entry
 
 UNTYPED = Entry(1, 0, 1)  # in place of an entry that is not needed
@@ -43,6 +45,29 @@ def make_channels(
         )
         for name, spec in given.items()
     }
+
+
+def make_columns(
+    file: MachineFile, path: KeyPath, given: Sequence[str | ColumnTable]
+) -> list[str | tuple[str, Channel]]:
+    """Return `columns=` of `Drives`.
+
+    Raises:
+        MachineFileError: A name is unknown, or an object or a type is wrong.
+    """
+    columns: list[str | tuple[str, Channel]] = []
+    for number, spec in enumerate(given):
+        place = (*path, number)
+        with file.located(place):
+            column = spec if isinstance(spec, str) else _column(file, place, spec)
+            named_columns([column])
+        columns.append(column)
+    return columns
+
+
+def _column(file: MachineFile, path: KeyPath, table: ColumnTable) -> tuple[str, Channel]:
+    channel = ChannelTable(object=table.object, type=table.type, scale=table.scale, unit=table.unit)
+    return table.name, replace(_channel(file, path, channel, UNTYPED), output=table.output)
 
 
 def _channel(file: MachineFile, path: KeyPath, spec: str | ChannelTable, entry: Entry) -> Channel:

@@ -14,6 +14,7 @@ from catenary.machine.references import data_type, object_of
 from catenary.machine.schema import StartUpTable
 from catenary.plan.start_up_object import StartUp
 from catenary.plan.wish import ImageLayout, PdoWish, Views, WishTables
+from catenary.types import Octets
 
 
 def start_up_objects(file: MachineFile, number: int) -> list[StartUp]:
@@ -34,10 +35,14 @@ def _start_up(file: MachineFile, table: StartUpTable, path: KeyPath) -> StartUp:
         for name in ("before_mapping", "verify")
         if getattr(table, name) is not UNSET
     }
+    value: bool | int | float | str | bytes = table.value
     if table.type is not UNSET:
-        options["type"] = data_type(file, (*path, "type"), table.type)
+        options["type"] = kind = data_type(file, (*path, "type"), table.type)
+        if isinstance(kind, Octets) and isinstance(value, str):
+            with file.located((*path, "value")):
+                value = kind.parse(value)
     with file.located((*path, "value")):
-        return StartUp(index, subindex, table.value, **options)
+        return StartUp(index, subindex, value, **options)
 
 
 class DeviceRequest:

@@ -10,10 +10,11 @@ from msgspec import UNSET
 
 from catenary.bus import SubDevice
 from catenary.drive import DistributedClock, HomingMethod
-from catenary.drive.arguments import axis_modes, force_and_torque, named_columns
+from catenary.drive.arguments import axis_modes, force_and_torque
 from catenary.drive.limits import LimitOptions
 from catenary.drive.units import AxisUnits
 from catenary.loop.options import ClockOptions, Scheduling, StopPolicy
+from catenary.machine.channels import make_columns
 from catenary.machine.file import MachineFile
 from catenary.machine.lines import KeyPath
 from catenary.machine.references import WHOLE_LISTS, axis_addresses, pdo_index
@@ -58,6 +59,8 @@ def drives_options(file: MachineFile, role: str) -> dict[str, Any]:
     linear = table.metres_per_turn is not UNSET
     options = file.values(table, path, linear=linear)
     del options["axes"]
+    if "columns" in options:
+        options["columns"] = make_columns(file, (*path, "columns"), options["columns"])
     if "homing" in options:
         options["homing"] = _homing(file, options["homing"], (*path, "homing"), linear)
     if "pdos" in options and isinstance(options["pdos"], dict):
@@ -151,8 +154,6 @@ def _check_ranges(
                 (own.get("force_limit"),), (own.get("torque_limit"),), (units.metres_per_turn,)
             )
             LimitOptions(**_of(LimitOptions, own)).check(name, modes, units.names)
-    with file.located((*path, "columns")):
-        named_columns(options.get("columns", ()))
 
 
 def _of(kind: type[AxisUnits] | type[LimitOptions], options: dict[str, Any]) -> dict[str, Any]:

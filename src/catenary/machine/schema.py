@@ -131,6 +131,17 @@ class DeviceTable(Table, frozen=True, kw_only=True):
     comment: str = ""
 
 
+class ColumnTable(Table, frozen=True, kw_only=True):
+    """A further object of every axis of a role, of slot 0."""
+
+    name: str
+    object: Object
+    type: TypeName
+    scale: Optional[Annotated[float, Meta(description="value in SI units of one count")]] = UNSET
+    unit: str = ""
+    output: Annotated[bool, Meta(description="true: the column is written")] = False
+
+
 class ClockTable(Table, frozen=True, kw_only=True):
     """Distributed clock of the devices of a role; as cat.DistributedClock."""
 
@@ -179,7 +190,7 @@ class DrivesTable(Table, frozen=True, kw_only=True):
     on_loss: Optional[PerAxis[Literal["quick_stop", "disable", "csp_hold"]]] = UNSET
     homing: Optional[PerAxis[HomingTable]] = UNSET
     measured: Optional[list[Literal["position", "velocity", "torque"]]] = UNSET
-    columns: Optional[list[str]] = UNSET
+    columns: Optional[list[str | ColumnTable]] = UNSET
     required: Optional[bool] = UNSET
     divider: Optional[Divider] = UNSET
     clock: Optional[bool | ClockTable] = UNSET

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from catenary.errors import MachineFileError
 
+VIRTUAL = ("virtual", "virtual-realtime")  # targets whose file is a segment
 _PLACE = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)")
 
 
@@ -60,7 +61,7 @@ def target_of(file: TomlFile) -> str:
         fault = 'key "target" is missing' if target is None else f"target = {target!r} is not text"
         raise _unreadable(file.path, fault, hint='write target = "eth0" at the top of the file')
     kind, colon, name = target.strip().partition(":")
-    if kind == "virtual" and colon:
+    if kind in VIRTUAL and colon:
         return f"{kind}:{file.path.parent / name}"
     if is_machine_file(target):
         raise _unreadable(
@@ -74,7 +75,8 @@ def target_of(file: TomlFile) -> str:
 def is_machine_file(target: str) -> bool:
     """True if a target is a machine file: it ends in .toml and is not `virtual:FILE.toml`."""
     name = target.strip()
-    return name.endswith(".toml") and not name.startswith("virtual:")
+    kind, colon, _ = name.partition(":")
+    return name.endswith(".toml") and not (colon and kind in VIRTUAL)
 
 
 def _unreadable(
