@@ -44,14 +44,22 @@ def edited(draw: st.DrawFn) -> str:
     return "\n".join(lines)
 
 
+def refusal(path: Path) -> MachineFileError | None:
+    """Return the error of reading a file; None if it is read."""
+    try:
+        read_machine(path)
+    except MachineFileError as error:
+        return error
+    return None
+
+
 @REUSED
 @given(edited())
 def test_an_edited_file_is_read_or_refused_with_a_line(tmp_path: Path, text: str) -> None:
     path = tmp_path / "machine.toml"
     path.write_text(text)
-    try:
-        read_machine(path)
-    except MachineFileError as error:
+    error = refusal(path)
+    if error is not None:
         assert error.line is not None
         assert 1 <= error.line <= text.count("\n") + 1
 
@@ -74,7 +82,5 @@ def test_every_path_of_toml_has_a_line(text: str) -> None:
 def test_any_bytes_are_read_or_refused(tmp_path: Path, data: bytes) -> None:
     path = tmp_path / "machine.toml"
     path.write_bytes(b'format = "catenary-machine/1"\n' + data)
-    try:
-        read_machine(path)
-    except MachineFileError as error:
-        assert str(path) in error.message
+    error = refusal(path)
+    assert error is None or str(path) in error.message

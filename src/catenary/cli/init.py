@@ -25,7 +25,7 @@ def add_parser(commands: Commands) -> None:
         description="Brings all devices to PRE-OP and writes machine.toml: devices with their "
         "identities, drives, process data by name. Lines marked FILL IN need your values. With "
         "--schema: prints the JSON schema of such files, for editors.",
-        example="catenary init eth0 -o machine.toml\ncatenary init --schema > machine.schema.json",
+        example="catenary init eth0 -o machine.toml\ncatenary init --schema",
     )
     parser.add_argument(
         "target", metavar="TARGET", nargs="?", help="eth0, virtual, virtual:FILE.toml ..."

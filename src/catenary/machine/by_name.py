@@ -1,4 +1,4 @@
-"""What a program gets by name: drives, process data, devices."""
+"""Mapping of names to drives, process data and devices."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ _HINTS: Mapping[str, str] = {
 
 
 class Explanation(msgspec.Struct, frozen=True):
-    """Where a file is wrong, what is wrong, and what to do next."""
+    """Place of a mistake in a file, what is wrong, and what to do next."""
 
     path: KeyPath
     message: str
@@ -73,7 +73,7 @@ def _path(text: str, content: Mapping[str, object]) -> KeyPath:
 
 
 def _failing_key(content: Mapping[str, object], path: KeyPath, text: str) -> str:
-    """Return the key of the table at `path` whose value alone gives the same error."""
+    """Return the key of the table at `path` with the value that causes the error."""
     table = _at(content, path)
     assert isinstance(table, dict)
     for key, value in table.items():

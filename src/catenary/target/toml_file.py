@@ -9,7 +9,7 @@ from pathlib import Path
 
 from catenary.errors import MachineFileError
 
-VIRTUAL = ("virtual", "virtual-realtime")  # targets whose file is a segment
+VIRTUAL = ("virtual", "virtual-realtime")  # targets with the file of a segment
 _PLACE = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)")
 
 
