@@ -105,10 +105,8 @@ def _compare(
     [sub] = mine
     if agrees(device.identity, sub.identity):
         return Comparison("same", device, sub)
-    fault = (
-        f"at {_place(sub)} ({address(device)}): expected {expected_identity(device)}, "
-        f"found {sub.identity}"
-    )
+    alias = "" if device.alias is UNSET else f", {address(device)}"
+    fault = f"{_place(sub)}{alias}: expected {expected_identity(device)}, found {sub.identity}"
     return Comparison(
         "different", device, sub, fault, _cause_of_another(device, sub, expected, subs)
     )

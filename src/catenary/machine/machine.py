@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from msgspec import UNSET
 
@@ -24,7 +24,8 @@ from catenary.machine.read import read_machine, refuse_unsupported
 from catenary.plan.cycle import ExecutionMode
 from catenary.plan.sink import Sink
 from catenary.target import MainDevice, segment_of, source_of
-from catenary.virtual import Segment
+if TYPE_CHECKING:
+    from catenary.virtual import Segment
 
 
 class Machine:
