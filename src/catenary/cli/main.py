@@ -38,6 +38,7 @@ TARGET is one of
   eth0,eth1          two of them, where the segment is a ring between both
   virtual            a virtual segment: coupler, outputs, three servos, outputs
   virtual:FILE.toml  another one (docs/virtual.md)
+  virtual-realtime[:FILE.toml]  the same, on this machine's clock
   igh:0              the IgH kernel master of that number (docs/igh.md): scan and sdo
 
 example:
@@ -94,11 +95,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return report(error)
 
 
+def note_virtual_time(target: str) -> None:
+    """Print a note on stderr if times of this command are not those of this machine."""
+    if not target.startswith("virtual"):
+        return  # spares the import
+    from catenary.target.parse import in_virtual_time
+
+    if in_virtual_time(target):
+        print("virtual time: the segment's own clock, not this machine's", file=sys.stderr)
+
+
 def run(arguments: Sequence[str]) -> int:
     try:
         parsed, unknown = make_parser().parse_known_args(arguments)
         if unknown:
             parsed.parser.error(f"unrecognized arguments: {' '.join(unknown)}")
+        note_virtual_time(getattr(parsed, "target", ""))
         return int(parsed.run(parsed))
     finally:
         sys.stdout.flush()  # here, where a reader that went away can still be handled

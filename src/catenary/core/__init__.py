@@ -17,6 +17,7 @@ from catenary.core._cia402 import (
     controlword_towards,
     state_of,
 )
+from catenary.core._axis_log import AXIS_FIELDS
 from catenary.core._clocks import Clock, PhaseController
 from catenary.core._cycle import (
     CYCLE_CLOCKS,
@@ -52,6 +53,7 @@ from catenary.core._stream import Stream
 __all__ = [
     "AXIS_DROPPED",
     "AXIS_FALLBACK",
+    "AXIS_FIELDS",
     "AXIS_FOLLOWED",
     "AXIS_LIMITED",
     "AXIS_MODE_REFUSED",

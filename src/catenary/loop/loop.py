@@ -26,6 +26,7 @@ from catenary.core import (
     Iteration,
 )
 from catenary.errors import LawError
+from catenary.log import Log
 from catenary.loop.axis_watch import StopPolicy
 from catenary.loop.carried import CarriedRunning, carried
 from catenary.loop.clocks import Clocks
@@ -34,7 +35,7 @@ from catenary.loop.laws.law import Law
 from catenary.loop.laws.law import law as made_law
 from catenary.loop.laws.run import LawRun, Numbers
 from catenary.loop.publishing import one_sink_each
-from catenary.loop.running import LogArray, Running, take_down
+from catenary.loop.running import Running, take_down
 from catenary.loop.signals import SignalGuard
 from catenary.loop.stream import Stream
 from catenary.loop.timing import Timing
@@ -72,7 +73,8 @@ class Loop:
     time. `switch_interval` [s] of the interpreter while an inline loop is open in real time; None:
     as it is (see `interpreter` in `loop.timing`). `collect_deadline`: threaded, the share of the
     period in which frames may come back; a law's budget shortens it.
-    `log`: how many cycles the log, and that of an error, reaches back. `raise_faults`: a drive in
+    `log`: how many cycles the log, and that of an error, reaches back. `log_axes`: the log has
+    the values of every axis, too (docs/recording.md). `raise_faults`: a drive in
     fault, or one that left OPERATION_ENABLED by itself (STO), raises DriveError; else see
     `Drives.faults` and `Drives.stopped`. `on_return`: what becomes of a device that no
     wish requires and that comes back: "restore", its start-up list is replayed and it goes to OP;
@@ -134,6 +136,7 @@ class Loop:
         cpu: int | Sequence[int] | None = None,
         quorum: int | None = None,
         priority: int | None = 80,
+        log_axes: bool = False,
     ) -> None:
         if run not in ("threaded", "inline"):
             raise ValueError(f'run={run!r}: "threaded" or "inline"')
@@ -187,6 +190,7 @@ class Loop:
             raise ValueError(f"cpu={cpu}: one network has one thread, on one CPU")
         self._cpu = cpu
         self._priority = priority
+        self._log_axes = log_axes
         self._guard = SignalGuard(
             (Loop.__exit__.__code__, Loop._leave.__code__, leave_open_loop.__code__)
         )
@@ -203,9 +207,7 @@ class Loop:
             self._running.open()
             if self._enable:
                 self._running.enable()
-            self._running.engine.reset_histograms()
-            if self._running.clocks is not None:
-                self._running.clocks.reset()
+            self._running.begin_figures()
             return self  # inside: a signal may come at this line too
         except BaseException as error:
             self._tell_end(error)
@@ -358,9 +360,8 @@ class Loop:
 
     @property
     def timing(self) -> Timing:
-        """The phases of the cycles since the loop was entered; stays readable after it."""
-        engine = self._opened.engine
-        return Timing(engine.histograms(), engine.counters)
+        """Timing of the cycles since the loop was entered; stays readable after it."""
+        return self._opened.timing()
 
     @property
     def clocks(self) -> Clocks:
@@ -390,12 +391,13 @@ class Loop:
         return self._opened.engine.scheduling
 
     @property
-    def log(self) -> LogArray:
-        """The last cycles (1000, or `log`), oldest first, as a structured array."""
+    def log(self) -> Log:
+        """The last cycles (1000, or `log`), oldest first: an array, `to_pandas()`, `to_csv(path)`."""
         return self._opened.log()
 
     def histogram(self, phase: str) -> list[tuple[float, float, int]]:
-        """(lower, upper, count) in us of every bucket of a phase of `timing` that is not empty."""
+        """Return (lower [s], upper [s], count) of every bucket of a phase of `timing` that is not
+        empty."""
         return self._opened.engine.histogram_counts(phase)
 
     @property
@@ -436,6 +438,7 @@ class Loop:
             exact_matching=self._exact_matching,
             cpu=self._cpu,
             priority=self._priority,
+            log_axes=self._log_axes,
         )
 
     def _abandoned(self) -> Callable[[], object]:

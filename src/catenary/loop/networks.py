@@ -138,9 +138,7 @@ class NetworksLoop(Loop):
                 for running in self._all:
                     running.enable()
             for running in self._all:
-                running.engine.reset_histograms()
-                if running.clocks is not None:
-                    running.clocks.reset()
+                running.begin_figures()
             return self
         except BaseException as error:
             self._tell_end(error)

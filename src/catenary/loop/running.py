@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 
 import numpy as np
@@ -22,7 +22,6 @@ from catenary.core import (
     GOAL_ENABLED,
     GOAL_QUICK_STOP,
     GOAL_RESET,
-    RECORD_FIELDS,
     Engine,
 )
 from catenary.errors import CatenaryError, DriveError, LinkError, LoopError
@@ -41,11 +40,14 @@ from catenary.loop.diagnosis import (
 from catenary.loop.error_watch import ErrorWatch
 from catenary.loop.frame_watch import FrameWatch
 from catenary.loop.interpreter import switch_interval
+from catenary.log import Log
 from catenary.loop.laws.runner import LawRunner
+from catenary.loop.log_rows import read_log
 from catenary.loop.publishing import Publisher
 from catenary.loop.service import Service
 from catenary.loop.signals import SignalGuard
 from catenary.loop.stop_error import stopped_error
+from catenary.loop.timing import Timing
 from catenary.loop.watch import Attendance, Policy, Watch
 from catenary.model.device import Direction
 from catenary.model.silence import judge_silence
@@ -61,8 +63,6 @@ from catenary.types import UINT
 from catenary.wire.al import State
 from catenary.wire.cia402 import IN_FAULT, SLOT_OFFSET, Mode, Object, state_of
 from catenary.wire.cia402 import State as DriveState
-
-LogArray = npt.NDArray[np.void]
 
 FATAL = CYCLE_WORKING_COUNTER | CYCLE_STOPPED | CYCLE_NONE
 ENABLE_TIMEOUT_NS = 5_000_000_000  # mains contactors and brakes are slow, but not this slow
@@ -110,6 +110,7 @@ class Running:
         self._companions: Sequence[Running] = ()
         self._watches: list[Pending[None]] = []
         self._publisher: Publisher | None = None
+        self._counted: Mapping[str, int] = {}  # by the engine, until the loop was entered
         self.service.cycle = self.cycle
 
     def _make_engine(self) -> Engine:
@@ -259,6 +260,20 @@ class Running:
 
     # Running
 
+    def begin_figures(self) -> None:
+        """Forget the timing so far: that of the start-up."""
+        self.engine.reset_histograms()
+        if self.clocks is not None:
+            self.clocks.reset()
+        self._counted = self.engine.counters
+
+    def timing(self) -> Timing:
+        """Return the timing since `begin_figures`."""
+        engine = self.engine
+        since = {name: n - self._counted.get(name, 0) for name, n in engine.counters.items()}
+        period = self.plan.cycle.period_ns * 1e-9
+        return Timing(engine.histograms(), since, period=period, scheduling=engine.scheduling)
+
     def judge(self, flags: int, *, faults: bool) -> None:
         """Announce what happened in a cycle in trouble, and raise its error, if it is one."""
         self._raise_ended(flags)
@@ -328,9 +343,9 @@ class Running:
                 hint="the native thread does not get the CPU: see loop.scheduling",
             )
 
-    def log(self) -> LogArray:
+    def log(self) -> Log:
         """The last cycles, oldest first."""
-        return np.frombuffer(self.engine.log(), dtype=np.dtype(RECORD_FIELDS))
+        return read_log(self.engine, self.plan.cycle)
 
     # Leaving
 

@@ -80,6 +80,7 @@ def make_plan(
     margin: float | None = None,
     burst: int = BURST,
     exact_matching: bool = False,
+    log_axes: bool = False,
 ) -> Plan:
     """Return the plan that fulfils all requests.
 
@@ -99,6 +100,7 @@ def make_plan(
         margin: [s] between the cycle start and the frames; None: by the execution mode.
         burst: frames that bring the clocks together before the cycle.
         exact_matching: every frame carries the cycle number (plan/frames.py).
+        log_axes: the log keeps the values of the axes, too.
 
     Raises:
         ConfigurationError: an object cannot be mapped, requests contradict each other, or the
@@ -157,6 +159,7 @@ def make_plan(
         acyclic_ns=acyclic_ns,
         busy_wait_ns=round(busy_wait * 1e9),
         log_cycles=log,
+        log_axes=log_axes,
         cpu=cpu,
         priority=priority,
         clock=None
