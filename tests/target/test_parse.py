@@ -34,7 +34,9 @@ def test_virtual_with_a_file(tmp_path: Path) -> None:
     assert len(segment) == 1
 
 
-@pytest.mark.parametrize(("target", "clock"), [("virtual", "virtual"), ("virtual-realtime", "monotonic")])
+@pytest.mark.parametrize(
+    ("target", "clock"), [("virtual", "virtual"), ("virtual-realtime", "monotonic")]
+)
 def test_a_virtual_segment_on_the_clock_of_the_machine(
     target: str, clock: str, tmp_path: Path
 ) -> None:

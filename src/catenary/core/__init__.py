@@ -9,6 +9,7 @@ from catenary.core._axes import (
     AXIS_MODE_REFUSED,
     AXIS_REFUSED,
 )
+from catenary.core._axis_log import AXIS_FIELDS
 from catenary.core._cia402 import (
     GOAL_DISABLED,
     GOAL_ENABLED,
@@ -17,7 +18,6 @@ from catenary.core._cia402 import (
     controlword_towards,
     state_of,
 )
-from catenary.core._axis_log import AXIS_FIELDS
 from catenary.core._clocks import Clock, PhaseController
 from catenary.core._cycle import (
     CYCLE_CLOCKS,

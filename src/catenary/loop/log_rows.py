@@ -54,6 +54,4 @@ def axis_names(axes: Sequence[AxisPlan]) -> list[str]:
     """Return the name of each axis; with its position if several have the same one."""
     short = [axis.name.removeprefix(f"{axis.device} ") for axis in axes]
     often = Counter(short)
-    return [
-        axis.name if often[name] > 1 else name for axis, name in zip(axes, short, strict=True)
-    ]
+    return [axis.name if often[name] > 1 else name for axis, name in zip(axes, short, strict=True)]

@@ -392,7 +392,7 @@ class Loop:
 
     @property
     def log(self) -> Log:
-        """The last cycles (1000, or `log`), oldest first: an array, `to_pandas()`, `to_csv(path)`."""
+        """The last cycles (1000, or `log`), oldest first: an array, a pandas table, a CSV file."""
         return self._opened.log()
 
     def histogram(self, phase: str) -> list[tuple[float, float, int]]:

@@ -26,6 +26,7 @@ from catenary.core import (
 )
 from catenary.errors import CatenaryError, DriveError, LinkError, LoopError
 from catenary.link import forget_in_child, ring_of
+from catenary.log import Log
 from catenary.loop.axis_watch import AxisWatch, RefusedMode, StoppedAxis, StopPolicy
 from catenary.loop.buffers import bind_wishes
 from catenary.loop.clocks import Clocks
@@ -40,7 +41,6 @@ from catenary.loop.diagnosis import (
 from catenary.loop.error_watch import ErrorWatch
 from catenary.loop.frame_watch import FrameWatch
 from catenary.loop.interpreter import switch_interval
-from catenary.log import Log
 from catenary.loop.laws.runner import LawRunner
 from catenary.loop.log_rows import read_log
 from catenary.loop.publishing import Publisher

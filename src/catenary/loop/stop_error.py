@@ -44,9 +44,7 @@ GO_ON = (
 )
 
 
-def stopped_error(
-    stops: Sequence[StoppedAxis], cycle: CyclePlan, log: Log
-) -> DriveError:
+def stopped_error(stops: Sequence[StoppedAxis], cycle: CyclePlan, log: Log) -> DriveError:
     """Return the error for axes that were stopped without a request.
 
     Args:

@@ -42,7 +42,7 @@ def _late(timing: Timing) -> Iterator[str]:
     elif _worst(timing, "process") > timing.period:
         yield f"{text}: {_long_body(timing)}"
     elif timing.scheduling.startswith("SCHED_OTHER"):
-        yield f"{text}: the cycle has no real-time priority; `catenary doctor` shows how to allow it"
+        yield f"{text}: the cycle has no real-time priority; see `catenary doctor`"
     else:
         yield f"{text}: another process or an interrupt uses this CPU; see `catenary doctor`"
 
@@ -62,8 +62,8 @@ def _underrun(timing: Timing) -> Iterator[str]:
     """Cycles for which the stream was empty."""
     if timing.counters.get("underrun"):
         yield (
-            f"{_of_all(timing, 'underrun')} underrun: the stream was empty; keep more rows in it, "
-            "or close it when the motion is complete"
+            f"{_of_all(timing, 'underrun')} underrun: the stream was empty; keep more rows in it, or "
+            "close it when the motion is complete"
         )
 
 
@@ -71,8 +71,8 @@ def _lost(timing: Timing) -> Iterator[str]:
     """Cycles without all answers."""
     if timing.counters.get("lost"):
         yield (
-            f"{_of_all(timing, 'lost')} lost: frames did not come back, or a device did not answer; "
-            "`catenary diag TARGET` names the cable or the device"
+            f"{_of_all(timing, 'lost')} lost: frames did not come back, or a device did not answer;"
+            " `catenary diag TARGET` names the cable or the device"
         )
 
 
@@ -80,8 +80,8 @@ def _interpreter(timing: Timing) -> Iterator[str]:
     waits = timing.get("interpreter", {}).get("p99", 0.0)
     if waits >= BUSY_SHARE * sys.getswitchinterval():
         yield (
-            f"Another Python thread keeps the interpreter for up to {waits * 1e6:.0f} us (p99): end "
-            "it, run it in a process, or shorten its turns with Loop(switch_interval=20e-6)."
+            f"Another Python thread keeps the interpreter for up to {waits * 1e6:.0f} us (p99): "
+            "end it, run it in a process, or shorten its turns: Scheduling(switch_interval=20e-6)."
         )
 
 
@@ -91,15 +91,15 @@ def _nothing(timing: Timing) -> str:
     if timing.is_virtual or worst < LATE_SHARE * timing.period:
         return text
     return (
-        f"{text} The latest wake-up was {worst * 1e6:.0f} us after its cycle start: `catenary doctor` "
-        "shows what delays it."
+        f"{text} The latest wake-up was {worst * 1e6:.0f} us after its cycle start: "
+        "`catenary doctor` shows what delays it."
     )
 
 
 def _long_body(timing: Timing) -> str:
     return (
-        f"the body took up to {_most(timing, 'process')} of a period of {timing.period * 1e6:.0f} us"
-        "; move slow work into another thread or a law"
+        f"the body took up to {_most(timing, 'process')} of a period of "
+        f"{timing.period * 1e6:.0f} us; move slow work into another thread or a law"
     )
 
 
