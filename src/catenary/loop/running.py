@@ -186,6 +186,8 @@ class Running:
         inline = self.plan.cycle.order == "inline" and self.engine.scheduling != "virtual time"
         if inline and self.switch_interval is not None:
             self._attached.enter_context(switch_interval(self.switch_interval))
+        engine = self.engine
+        self.main.events.begin_loop(lambda: engine.zero_ns)
         self.engine.start(origin_ns)
         self._opened = True
         self.service.start()
@@ -376,6 +378,7 @@ class Running:
                 step(guard)
             except Exception as problem:  # the next step matters more; all are told at the end
                 problems.append(problem)
+        self.main.events.end_loop()
         return problems
 
     def _stop_axes(self, guard: SignalGuard) -> None:

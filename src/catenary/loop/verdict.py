@@ -62,8 +62,8 @@ def _underrun(timing: Timing) -> Iterator[str]:
     """Cycles for which the stream was empty."""
     if timing.counters.get("underrun"):
         yield (
-            f"{_of_all(timing, 'underrun')} underrun: the stream was empty; keep more rows in it, or "
-            "close it when the motion is complete"
+            f"{_of_all(timing, 'underrun')} underrun: the stream was empty; keep more rows in it, "
+            "or close it when the motion is complete"
         )
 
 

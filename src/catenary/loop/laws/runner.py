@@ -98,7 +98,7 @@ class LawRunner:
             judge(self._engine.run_law(SLICE_NS, trouble))
         self.raise_failure(None)
 
-    def raise_failure(self, log: Log) -> None:
+    def raise_failure(self, log: Log | None) -> None:
         """The error of the law that has failed, if one has."""
         run = self._run
         error = run.error(self._axes, log, lambda: self._replay(run)) if run else None
