@@ -55,7 +55,10 @@ def _uncommitted(timing: Timing) -> Iterator[str]:
     if _worst(timing, "process") > timing.period:
         yield f"{text}; {_long_body(timing)}"
     else:
-        yield f"{text}; look for waits between two iterations, or write ahead with loop.stream()"
+        yield (
+            f"{text}; look for waits between two iterations, and for other processes "
+            "(`catenary doctor`); loop.stream() writes ahead"
+        )
 
 
 def _underrun(timing: Timing) -> Iterator[str]:
