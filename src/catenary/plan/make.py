@@ -6,6 +6,7 @@ import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
+from catenary import notebook
 from catenary.errors import ConfigurationError
 from catenary.model.device import DeviceDescription, Direction
 from catenary.plan.clocks import BURST, SyncPlan, choose_clocks, make_clock_plan, make_sync
@@ -53,6 +54,9 @@ class Plan:
     def __str__(self) -> str:
         axes = [axis for table in self.tables for axis in table.axis_reports]
         return report(self.cycle, self.devices, self.layout, axes)
+
+    def _repr_html_(self) -> str:
+        return notebook.preformatted(str(self))
 
 
 def make_plan(
