@@ -9,13 +9,13 @@ from catenary.bus.event import Event
 from catenary.virtual import Segment, Servo
 
 
-@pytest.mark.parametrize("run", ["threaded", "inline"])
-def test_events_and_cycles_have_one_clock(run: str) -> None:
+@pytest.mark.parametrize("execution", ["threaded", "inline"])
+def test_events_and_cycles_have_one_clock(execution: str) -> None:
     told: list[Event] = []
     with cat.MainDevice(Segment([Servo(name="arm")])) as main:
         main.on_event(told.append)
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=2.0)
-        with cat.Loop(arm, run=run) as loop:
+        with cat.Loop(arm, execution=execution) as loop:
             for cycle in loop:
                 if cycle.number == 100:
                     main.mark("now")

@@ -23,10 +23,10 @@ def fail(loop: cat.Loop, servo: Servo) -> None:
                 servo.inject_fault(0x8611)
 
 
-@pytest.mark.parametrize("run", ["threaded", "inline"])
-def test_time_is_that_of_the_cycle(run: str) -> None:
+@pytest.mark.parametrize("execution", ["threaded", "inline"])
+def test_time_is_that_of_the_cycle(execution: str) -> None:
     with cat.MainDevice(Segment([Servo()])) as main:
-        with cat.Loop(drives(main), run=run) as loop:
+        with cat.Loop(drives(main), execution=execution) as loop:
             assert loop.log["time"][0] == 0.0  # from the first cycle, before the first iteration
             for cycle in loop:
                 assert loop.log["time"][-1] == pytest.approx(cycle.time)
@@ -37,12 +37,12 @@ def test_time_is_that_of_the_cycle(run: str) -> None:
         assert np.diff(time) == pytest.approx(1e-3)
 
 
-@pytest.mark.parametrize("run", ["threaded", "inline"])
-def test_axes_have_fields_of_their_own(run: str) -> None:
+@pytest.mark.parametrize("execution", ["threaded", "inline"])
+def test_axes_have_fields_of_their_own(execution: str) -> None:
     segment = Segment([Servo(name="shoulder"), Servo(name="elbow")])
     with cat.MainDevice(segment) as main:
         arm = drives(main)
-        with cat.Loop(arm, run=run, log_axes=True) as loop:
+        with cat.Loop(arm, execution=execution, log_axes=True) as loop:
             home = arm.actual.position.copy()
             for cycle in loop:
                 arm.target.position[:] = home + np.array([0.01, -0.01]) * cycle.time

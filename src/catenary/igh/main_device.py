@@ -268,7 +268,7 @@ class MainDevice(bus.MainDevice):
 
     # What the master keeps to itself
 
-    def look(self, *, names: bool = True) -> SubDevices:
+    def passive_scan(self, *, names: bool = True) -> SubDevices:
         """ConfigurationError: the state of a segment that is not ours is the master's to tell."""
         self._cannot(
             "look at devices without taking them over",

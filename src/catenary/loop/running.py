@@ -27,7 +27,7 @@ from catenary.core import (
 from catenary.errors import CatenaryError, DriveError, LinkError, LoopError
 from catenary.link import forget_in_child, ring_of
 from catenary.log import Log
-from catenary.loop.axis_watch import AxisWatch, RefusedMode, StoppedAxis, StopPolicy
+from catenary.loop.axis_watch import AxisWatch, RefusedMode, StoppedAxis
 from catenary.loop.buffers import bind_wishes
 from catenary.loop.clocks import Clocks
 from catenary.loop.diagnosis import (
@@ -43,12 +43,13 @@ from catenary.loop.frame_watch import FrameWatch
 from catenary.loop.interpreter import switch_interval
 from catenary.loop.laws.runner import LawRunner
 from catenary.loop.log_rows import read_log
+from catenary.loop.options import StopPolicy
 from catenary.loop.publishing import Publisher
 from catenary.loop.service import Service
 from catenary.loop.signals import SignalGuard
 from catenary.loop.stop_error import stopped_error
 from catenary.loop.timing import Timing
-from catenary.loop.watch import Attendance, Policy, Watch
+from catenary.loop.watch import Attendance, Watch
 from catenary.model.device import Direction
 from catenary.model.silence import judge_silence
 from catenary.plan.make import Plan
@@ -81,24 +82,20 @@ class Running:
         wishes: Sequence[Wish],
         *,
         abandon: Callable[[], object],
-        on_axis_stopped: StopPolicy = "raise",
-        on_return: Policy = "restore",
-        on_replacement: Policy = "hold",
+        stop: StopPolicy,
     ) -> None:
         self.main = main
         self.plan = plan
         self.engine = self._make_engine()
         self.views = bind_wishes(wishes, plan.tables, self.engine.buffers)
         self._axis_watch = AxisWatch(self.views, plan.cycle.axes)
-        self._on_axis_stopped: StopPolicy = on_axis_stopped
+        self._stop = stop
         self.laws = LawRunner(self.engine, plan)
         clock = plan.cycle.clock
         self.clocks: Clocks | None = None
         if clock is not None:
             self.clocks = Clocks(main, self.engine, self._clock(), clock, self.cycle)
         self.service = Service(main, self.engine, plan)
-        self._on_return: Policy = on_return
-        self._on_replacement: Policy = on_replacement
         self._attend()
         self.switch_interval: float | None = None  # [s] of the interpreter, inline
         self._attached = ExitStack()
@@ -133,8 +130,8 @@ class Running:
             now=lambda: self.engine.now() * 1e-9,
             rejoin=None if self.clocks is None else self.clocks.rejoin,
             cables_seen=self._announce_clocks,
-            on_return=self._on_return,
-            on_replacement=self._on_replacement,
+            on_return=self._stop.on_return,
+            on_replacement=self._stop.on_replacement,
         )
         self.errors = ErrorWatch(self.main, now=lambda: self.engine.now() * 1e-9)
         self.frames = FrameWatch(
@@ -183,7 +180,7 @@ class Running:
         """From SAFE-OP to OP: the cycle starts, and valid outputs flow while the states change.
         `origin_ns`: an instant of the grid to keep to."""
         self._attached.enter_context(self.main.attached(self.service.runner, self._abandon))
-        inline = self.plan.cycle.order == "inline" and self.engine.scheduling != "virtual time"
+        inline = self.plan.cycle.execution == "inline" and self.engine.scheduling != "virtual time"
         if inline and self.switch_interval is not None:
             self._attached.enter_context(switch_interval(self.switch_interval))
         engine = self.engine
@@ -262,15 +259,15 @@ class Running:
 
     # Running
 
-    def begin_figures(self) -> None:
-        """Forget the timing so far: that of the start-up."""
+    def reset_figures(self) -> None:
+        """Begin the timing and the figures of the clocks anew."""
         self.engine.reset_histograms()
         if self.clocks is not None:
             self.clocks.reset()
         self._counted = self.engine.counters
 
     def timing(self) -> Timing:
-        """Return the timing since `begin_figures`."""
+        """Return the timing since `reset_figures`."""
         engine = self.engine
         since = {name: n - self._counted.get(name, 0) for name, n in engine.counters.items()}
         period = self.plan.cycle.period_ns * 1e-9
@@ -326,7 +323,7 @@ class Running:
         if faults and left:
             raise self._drive_error(left, "left OPERATION_ENABLED by itself")
         unasked = [s for s in stops if s.reason in UNASKED]
-        if unasked and self._on_axis_stopped == "raise":
+        if unasked and self._stop.on_axis_stopped == "raise":
             log = self.log()
             self.stop_axes_at_once()
             raise stopped_error(unasked, self.plan.cycle, log)

@@ -18,7 +18,7 @@ from catenary.wire.cia402 import Mode
 ADVICE: dict[StopReason, str] = {
     StopReason.UNDERRUN: (
         "move slow work out of the loop body, keep more rows in the stream, "
-        "or give Loop(late_limit=...) a longer time [s]"
+        "or give StopPolicy(late_limit=...) a longer time [s]"
     ),
     StopReason.HANDOVER: (
         "start the next law or write torques in time, change to CSP before the law ends, "
@@ -40,7 +40,8 @@ ADVICE: dict[StopReason, str] = {
     StopReason.NOT_ENABLED: "check its main supply, safe torque off and the enable input",
 }
 GO_ON = (
-    'Loop(on_axis_stopped="event") keeps the loop running; Drives.enable() starts the axis again'
+    'StopPolicy(on_axis_stopped="event") keeps the loop running; '
+    "Drives.enable() starts the axis again"
 )
 
 
