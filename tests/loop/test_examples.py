@@ -1,4 +1,4 @@
-"""Every example runs without arguments; those of coming devices and two networks do what they say."""
+"""Every example runs without arguments; two of them are seen to do what they say."""
 
 from __future__ import annotations
 

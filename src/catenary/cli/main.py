@@ -27,6 +27,7 @@ from catenary.cli import (
 from catenary.cli.console import INTERRUPTED
 from catenary.cli.failure import USAGE, report, silence_stdout
 
+VIRTUAL_TIME = "virtual time: the segment's own clock, not this machine's"
 DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
     *(scan, state, graph, diag, sdo, reg, alias, sii),
@@ -96,13 +97,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def note_virtual_time(target: str) -> None:
-    """Print a note on stderr if times of this command are not those of this machine."""
+    """Print a note on stderr if the times of a command were not those of this machine."""
     if not target.startswith("virtual"):
         return  # spares the import
     from catenary.target.parse import in_virtual_time
 
     if in_virtual_time(target):
-        print("virtual time: the segment's own clock, not this machine's", file=sys.stderr)
+        print(f"note: {VIRTUAL_TIME}", file=sys.stderr)
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -110,7 +111,8 @@ def run(arguments: Sequence[str]) -> int:
         parsed, unknown = make_parser().parse_known_args(arguments)
         if unknown:
             parsed.parser.error(f"unrecognized arguments: {' '.join(unknown)}")
+        status = int(parsed.run(parsed))
         note_virtual_time(getattr(parsed, "target", ""))
-        return int(parsed.run(parsed))
+        return status
     finally:
         sys.stdout.flush()  # here, where a reader that went away can still be handled

@@ -1,4 +1,4 @@
-"""What the demo prints: devices, a progress bar, the results."""
+"""Text of the demo: devices, a progress bar, the results."""
 
 from __future__ import annotations
 
