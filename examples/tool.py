@@ -1,6 +1,6 @@
 """A tool that may be unplugged and plugged in while the arm moves: `python tool.py eth0`.
 
-Without an argument it runs on the virtual segment of tool.toml, whose tool loses power for a moment.
+Without an argument it runs on the virtual segment of tool.toml, where the tool loses power once.
 On yours, the first device of the tool needs the alias 20: `catenary alias eth0 POSITION 20`, then
 switch it off and on.
 """
