@@ -9,8 +9,8 @@ logged. Budget: 10 ns for each axis.
 
 from libc.stdint cimport uint8_t, uint32_t, uint64_t
 
-from catenary.core._native cimport cat_fence
 from catenary.core._handover cimport actual_t, target_t
+from catenary.core._native cimport cat_fence, cat_load_acquire64, cat_store_release64
 
 AXIS_FIELDS = [
     ("actual.position", "<f8"),
@@ -46,8 +46,8 @@ cdef void axis_log_put(axis_log_t *log, uint64_t number, const actual_t *actual,
     cdef uint64_t *stamp = <uint64_t *>row
     cdef axis_record_t *r = <axis_record_t *>(row + sizeof(uint64_t))
     cdef uint32_t i
-    stamp[0] = 0
-    cat_fence()
+    cat_store_release64(stamp, 0)
+    cat_fence()  # before the records
     for i in range(log.axes):
         r[i].actual_position = actual.position[i]
         r[i].actual_velocity = actual.velocity[i]
@@ -62,8 +62,7 @@ cdef void axis_log_put(axis_log_t *log, uint64_t number, const actual_t *actual,
         r[i].controlword = actual.controlword[i]
         r[i].mode = actual.mode[i]
         r[i].state = actual.state[i]
-    cat_fence()
-    stamp[0] = number
+    cat_store_release64(stamp, number)
 
 
 cdef bytes axis_log_row(const axis_log_t *log, uint64_t number):
@@ -74,9 +73,8 @@ cdef bytes axis_log_row(const axis_log_t *log, uint64_t number):
         return b""
     row = row_of(log, number)
     stamp = <uint64_t *>row
-    if stamp[0] != number:
+    if cat_load_acquire64(stamp) != number:
         return None
-    cat_fence()
     copy = (<char *>row)[sizeof(uint64_t):log.row_size]
-    cat_fence()
-    return copy if stamp[0] == number else None
+    cat_fence()  # before the number is read again
+    return copy if cat_load_acquire64(stamp) == number else None
