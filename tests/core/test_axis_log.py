@@ -22,9 +22,9 @@ def test_an_axis_takes_80_bytes() -> None:
     assert AXIS.itemsize == 80
 
 
-@pytest.mark.parametrize("order", ["threaded", "inline"])
-def test_each_record_is_followed_by_its_axes(order: str) -> None:
-    b = bench(axis(0), axis(1), order=order, log_axes=True)
+@pytest.mark.parametrize("execution", ["threaded", "inline"])
+def test_each_record_is_followed_by_its_axes(execution: str) -> None:
+    b = bench(axis(0), axis(1), execution=execution, log_axes=True)
     b.steps(3)
     record, axes = rows(b, 2)
     assert record["number"].tolist() == list(range(1, b.engine.number + 1))
@@ -33,9 +33,9 @@ def test_each_record_is_followed_by_its_axes(order: str) -> None:
     assert axes["state"][-1].tolist() == b.engine.buffers["axis_state"].tolist()
 
 
-@pytest.mark.parametrize("order", ["threaded", "inline"])
-def test_targets_are_those_of_the_frames_that_brought_the_values(order: str) -> None:
-    b = bench(axis(0), order=order, log_axes=True)
+@pytest.mark.parametrize("execution", ["threaded", "inline"])
+def test_targets_are_those_of_the_frames_that_brought_the_values(execution: str) -> None:
+    b = bench(axis(0), execution=execution, log_axes=True)
     b.enable()
     sent = []
     for step in range(1, 6):
@@ -48,7 +48,7 @@ def test_targets_are_those_of_the_frames_that_brought_the_values(order: str) -> 
 
 
 def test_old_rows_are_overwritten_with_their_records() -> None:
-    b = bench(axis(0), order="inline", log_axes=True, log_cycles=50)
+    b = bench(axis(0), execution="inline", log_axes=True, log_cycles=50)
     b.engine.run(500)
     record, axes = rows(b, 1)
     assert record["number"].tolist() == list(range(451, 501))
@@ -56,12 +56,12 @@ def test_old_rows_are_overwritten_with_their_records() -> None:
 
 
 def test_without_it_the_log_has_records_only() -> None:
-    b = bench(axis(0), order="inline")
+    b = bench(axis(0), execution="inline")
     b.engine.run(10)
     assert len(b.engine.log()) == 10 * RECORD.itemsize
 
 
 def test_a_plan_without_axes_logs_records_only() -> None:
-    b = bench(order="inline", units=1, log_axes=True)
+    b = bench(execution="inline", units=1, log_axes=True)
     b.engine.run(10)
     assert len(b.engine.log()) == 10 * RECORD.itemsize

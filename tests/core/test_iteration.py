@@ -41,7 +41,7 @@ def test_the_first_step_commits_nothing_and_time_counts_from_it() -> None:
 
 
 def test_the_first_iteration_is_the_zero_of_times() -> None:
-    b = bench(axis(0), order="inline")
+    b = bench(axis(0), execution="inline")
     b.steps(3)
     assert b.engine.zero_ns == 0
     next(Iteration(b.engine, lambda flags: None, trouble=0, al_status=b.engine.al_status))
