@@ -57,7 +57,7 @@ def as_json(
             {
                 "name": run.name,
                 "cycles": run.cycles,
-                "late": run.late,
+                "uncommitted": run.uncommitted,
                 "lost": run.lost,
                 "cpu_us_per_cycle": round(run.cpu_us_per_cycle, 3),
                 **({"answers": run.answers} if run.answers else {}),
@@ -106,9 +106,9 @@ def _phases(runs: Sequence[Run], figure: str) -> str:
 
 
 def _counters(runs: Sequence[Run]) -> str:
-    lines = [f"{'':{NAME}}{'rounds':>8}{'cycles':>9}{'late':>7}{'lost':>7}"]
+    lines = [f"{'':{NAME}}{'rounds':>8}{'cycles':>9}{'uncommitted':>13}{'lost':>7}"]
     lines += [
-        f"{run.name:{NAME}}{len(run.rounds.cycles):8d}{run.cycles:9d}{run.late:7d}{run.lost:7d}"
+        f"{run.name:{NAME}}{len(run.rounds.cycles):8d}{run.cycles:9d}{run.uncommitted:13d}{run.lost:7d}"
         for run in runs
     ]
     return "\n".join(lines)

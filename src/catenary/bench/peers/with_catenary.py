@@ -128,7 +128,7 @@ def measure(
         samples_of(loop.log[-job.cycles - 1 : -1]),  # the last cycle is incomplete
         lost=after["lost"] - before["lost"],
         cpu_per_cycle_ns=cpu,
-        late=after["uncommitted"] - before["uncommitted"],
+        uncommitted=after["uncommitted"] - before["uncommitted"],
         answers=sum(answers) - answered,
     )
 
