@@ -97,7 +97,10 @@ class Engine:
     @property
     def zero_ns(self) -> int:
         """Cycle start of the first iteration [ns], on the link's clock: the zero of `Cycle.time`.
-        0 before the first iteration."""
+        0 before the first iteration. Engines of one loop share that of the first one."""
+
+    @zero_ns.setter
+    def zero_ns(self, zero: int) -> None: ...
 
     # The cycle that `actual` belongs to.
     @property

@@ -226,6 +226,10 @@ cdef class Engine:
     def zero_ns(self):
         return self.zero
 
+    @zero_ns.setter
+    def zero_ns(self, int64_t zero):
+        self.zero = zero
+
     cdef int64_t now_ns(self) noexcept:
         return self.e.cycle.link.now(self.e.cycle.link.self)
 
