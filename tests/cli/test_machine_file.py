@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from catenary.cli.main import main
+from catenary.cli.main import VIRTUAL_TIME, main
 from tests.machine.files import SMALL, write_small
 
 
@@ -143,7 +143,8 @@ def test_a_machine_file_is_a_target(
     path = write_small(tmp_path)
     first = 2 if words[0] in ("reg", "sii", "sdo") else 1
     status, out, err = call(capsys, *words[:first], path, *words[first:])
-    assert (status, err) == (0, "")
+    assert status == 0
+    assert err == f"note: {VIRTUAL_TIME}\n"
     assert out
 
 

@@ -105,10 +105,10 @@ def read_encoders(devices: Sequence[SubDevice]) -> Mapping[tuple[int, int], floa
 
 def seen_from(target: str, output: Path) -> str:
     """Return the target as the file names it: a path counts from the folder of the file."""
-    from catenary.target.toml_file import VIRTUAL, is_machine_file, read_toml, target_of
+    from catenary.target import named_target
+    from catenary.target.toml_file import VIRTUAL
 
-    if is_machine_file(target):
-        target = target_of(read_toml(target))
+    target = named_target(target)
     kind, colon, name = target.partition(":")
     if kind not in VIRTUAL or not colon:
         return target

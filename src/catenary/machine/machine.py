@@ -24,6 +24,7 @@ from catenary.machine.read import read_machine, refuse_unsupported
 from catenary.plan.cycle import ExecutionMode
 from catenary.plan.sink import Sink
 from catenary.target import MainDevice, segment_of, source_of
+
 if TYPE_CHECKING:
     from catenary.virtual import Segment
 

@@ -1,9 +1,12 @@
-"""Names of segments: "eth0", "eth0,eth1" (a ring), "virtual", "virtual:FILE.toml", "igh:0", or a
-machine file, "machine.toml", which names one of these."""
+"""Names of segments: "eth0", "eth0,eth1" (a ring), "virtual", "virtual:FILE.toml", "igh:0".
+
+"virtual-realtime[:FILE.toml]" is a virtual segment on this machine's clock. "machine.toml" is a
+machine file, which names one of these.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from catenary.errors import ConfigurationError
 from catenary.link import Interface, LinkSource, Ring
@@ -13,17 +16,17 @@ if TYPE_CHECKING:
     from catenary.virtual import Segment
 
 VIRTUAL = "virtual"
+VIRTUAL_REALTIME = "virtual-realtime"
 IGH = "igh"
 
 
 def parse(target: str) -> LinkSource:
     """The link source a name stands for; nothing is opened yet. A virtual segment is a new one
     each time. ConfigurationError for a name that cannot be."""
-    if is_machine_file(target):
-        target = target_of(read_toml(target.strip()))
-    kind, colon, rest = target.strip().partition(":")
-    if kind == VIRTUAL and (rest or not colon):
-        return _virtual(rest)
+    target = named_target(target)
+    kind, colon, rest = target.partition(":")
+    if kind in (VIRTUAL, VIRTUAL_REALTIME) and (rest or not colon):
+        return _virtual(rest, realtime=kind == VIRTUAL_REALTIME)
     if "," in target:
         return _ring(target)
     if kind == IGH:
@@ -32,7 +35,7 @@ def parse(target: str) -> LinkSource:
         raise ConfigurationError(
             f"{target!r} is no target",
             hint="give a network interface (eth0), two (eth0,eth1), virtual, virtual:FILE.toml, "
-            "igh:0, or a machine file (machine.toml)",
+            "virtual-realtime, igh:0, or a machine file (machine.toml)",
         )
     return Interface(kind)
 
@@ -62,10 +65,26 @@ def _ring(target: str) -> LinkSource:
     return Ring(first, second)
 
 
-def _virtual(path: str) -> LinkSource:
+def in_virtual_time(target: str) -> bool:
+    """Return True if the target is a virtual segment with its own clock."""
+    return named_target(target).partition(":")[0] == VIRTUAL
+
+
+def named_target(target: str) -> str:
+    """Return the target that a machine file names, or the target itself.
+
+    Raises:
+        MachineFileError: The machine file cannot be read, or names no target.
+    """
+    name = target.strip()
+    return target_of(read_toml(name)).strip() if is_machine_file(name) else name
+
+
+def _virtual(path: str, *, realtime: bool) -> LinkSource:
     from catenary.virtual import Segment, demo_segment  # a NIC needs none of it
 
-    segment = Segment.from_toml(path) if path else demo_segment()
+    clock: Literal["virtual", "monotonic"] = "monotonic" if realtime else "virtual"
+    segment = Segment.from_toml(path, clock=clock) if path else demo_segment(clock=clock)
     return Ring(segment.first, segment.second) if segment.ring else segment
 
 
