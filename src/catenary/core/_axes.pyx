@@ -70,6 +70,7 @@ STOP_NS = 50_000_000                   # a quick stop shows an effect
 STOP_TORQUE_NS = 20_000_000            # the same in CST
 CUT_NS = 20_000_000                    # disable operation shows an effect
 LATE_CYCLES = 3                        # least number of cycles of a late limit
+cdef uint64_t NEVER = <uint64_t>-1     # age of an update that was not made
 ON_LOSS = {"quick_stop": 0, "disable": 1, "csp_hold": 2}
 
 
@@ -279,7 +280,13 @@ cdef void axes_write(axes_t *x, const target_t *target, bint fresh, uint64_t num
     cdef axis_t *a
     cdef uint32_t i
     x.number = number
+    x.background = target.header.background and not target.header.streamed
+    x.command_age = number - target.header.updated
+    if target.header.updated == 0 or target.header.updated > number:
+        x.command_age = NEVER
     if target.header.hold:
+        if x.handed_over == 0:
+            x.handed_over_at = number
         x.handed_over += 1
         fresh = False
     elif fresh:
@@ -422,6 +429,14 @@ cdef class Axes:
         self.c.late_limit_velocity = limit("late_limit_velocity_ns")
         self.c.late_limit_torque = limit("late_limit_torque_ns")
         self.c.handover_limit = max(cycles_of(plan.handover_ns, plan.period_ns, "handover_ns"), 1)
+        self.c.command_timeout_velocity = max(
+            cycles_of(plan.command_timeout_velocity_ns, plan.period_ns, "command_timeout_velocity_ns"),
+            LATE_CYCLES,
+        )
+        self.c.command_timeout_torque = max(
+            cycles_of(plan.command_timeout_torque_ns, plan.period_ns, "command_timeout_torque_ns"),
+            LATE_CYCLES,
+        )
         self.c.keep_limit = max(cycles_of(KEEP_NS, plan.period_ns, ""), LATE_CYCLES)
         self.c.mode_limit = max(cycles_of(MODE_NS, plan.period_ns, ""), 4)
         self.c.gap_limit = cycles_of(GAP_NS, plan.period_ns, "")

@@ -57,6 +57,18 @@ class Engine:
         """Commits the target buffers for the next `next`, where that has a thread of its own to
         wait for: with several engines all commit before the first one is waited for."""
 
+    def keep_targets(self) -> None:
+        """Let the next `next` commit nothing."""
+
+    background: bool
+    """True if a thread repeats the targets of a program: CSP then has no late limit, and set-points
+    of CSV and CST count until the command timeout after `update_targets`. Not for inline cycles:
+    ValueError."""
+
+    def update_targets(self) -> None:
+        """Commit the target buffers as new ones of the program in the background. Callable from any
+        thread, but only one at a time."""
+
     @property
     def origin(self) -> int:
         """First cycle start [ns]; 0 before `start`. `start(origin_ns)` keeps to the grid of another

@@ -343,9 +343,28 @@ cdef class Engine:
         return self.step(timeout_ns)
 
     def commit_targets(self):
-        if self.native:
+        if self.e.cycle.order != INLINE:
             self.commit(self.is_led())
             self.committed = True
+
+    def keep_targets(self):
+        self.committed = self.e.cycle.order != INLINE
+
+    @property
+    def background(self):
+        return self.h.target[PRIVATE].header.background != 0
+
+    @background.setter
+    def background(self, bint value):
+        if self.e.cycle.order == INLINE:
+            raise ValueError("an inline cycle cannot repeat targets in the background")
+        self.h.target[PRIVATE].header.background = value
+        self.h.target[PRIVATE].header.updated = 0
+
+    def update_targets(self):
+        if not self.is_led():
+            self.h.target[PRIVATE].header.updated = max(self.e.cycle.number, <uint64_t>1)
+        self.commit_targets()
 
     @property
     def origin(self):
@@ -363,7 +382,9 @@ cdef class Engine:
         if self.native:
             return self.step_native(timeout_ns)
         if self.is_native_cycle(True):
-            self.commit(self.is_led())
+            if not self.committed:
+                self.commit(self.is_led())
+            self.committed = False
             self.lockstep()
         else:
             self.inline_outputs(True)
@@ -720,6 +741,7 @@ cdef class Engine:
         self.laws = [*self.laws, law]  # before it is offered: the cycle must not outlive it
         self.law = law
         law.c.threaded = self.native
+        self.h.target[PRIVATE].header.updated = 0  # it does not count after the law
         cat_pointer_offer(&self.e.cycle.law_request, &law.c)
         self.laws = [known for known in self.laws if self.is_law_used(known)]
 
@@ -786,6 +808,7 @@ cdef class Engine:
                 cat_memory_settle(&stream.memory)
             self.streams = [*self.streams, stream]  # before it is offered, as with laws
         self.stream = stream
+        self.h.target[PRIVATE].header.updated = 0  # it does not count after the stream
         cat_pointer_offer(&self.e.cycle.stream, NULL if stream is None else &stream.c)
         self.streams = [known for known in self.streams if self.is_stream_used(known)]
         handover_swap(self.h)
