@@ -27,6 +27,7 @@ from catenary.core._cia402 cimport (
 from catenary.core._guard cimport (
     CSP,
     CST,
+    CSV,
     NO_MODE,
     guard_controlword,
     guard_observe,
@@ -70,7 +71,6 @@ STOP_NS = 50_000_000                   # a quick stop shows an effect
 STOP_TORQUE_NS = 20_000_000            # the same in CST
 CUT_NS = 20_000_000                    # disable operation shows an effect
 LATE_CYCLES = 3                        # least number of cycles of a late limit
-cdef uint64_t NEVER = <uint64_t>-1     # age of an update that was not made
 ON_LOSS = {"quick_stop": 0, "disable": 1, "csp_hold": 2}
 
 
@@ -274,6 +274,11 @@ cdef void write_velocity_offsets(axes_t *x) noexcept nogil:
                          a.command_velocity if a.mode == CSP else 0.0)
 
 
+cdef inline bint update_counts(const target_t *t, uint64_t number, uint32_t timeout) noexcept nogil:
+    """Return True if the last update of a program in the background counts in cycle `number`."""
+    return t.header.updated > 0 and number <= t.header.updated + timeout
+
+
 cdef void axes_write(axes_t *x, const target_t *target, bint fresh, uint64_t number) noexcept nogil:
     """Write the committed targets, as far as they count, into the output image of cycle `number`.
     `fresh`: they were committed since the last cycle."""
@@ -281,9 +286,8 @@ cdef void axes_write(axes_t *x, const target_t *target, bint fresh, uint64_t num
     cdef uint32_t i
     x.number = number
     x.background = target.header.background and not target.header.streamed
-    x.command_age = number - target.header.updated
-    if target.header.updated == 0 or target.header.updated > number:
-        x.command_age = NEVER
+    x.velocity_counts = update_counts(target, number, x.command_timeout_velocity)
+    x.torque_counts = update_counts(target, number, x.command_timeout_torque)
     if target.header.hold:
         if x.handed_over == 0:
             x.handed_over_at = number
@@ -356,16 +360,36 @@ cdef inline void follow(target_t *target, uint32_t i, bint followed, uint64_t si
         target.velocity[i] = commanded_velocity
 
 
+cdef inline void follow_update(const axes_t *x, const actual_t *actual, target_t *target, uint32_t i,
+                               double velocity, double torque) noexcept nogil:
+    """The same, in the background: velocity and torque stay while the last update counts, which may
+    enable the axis. Afterwards they are what is commanded, so that a later update of another axis
+    does not revive them."""
+    cdef uint64_t number = actual.header.number
+    if target.mode[i] == CSV:
+        if update_counts(target, number, x.command_timeout_velocity):
+            target.velocity[i] = velocity
+        else:
+            target.velocity[i] = actual.commanded_velocity[i]
+    elif target.mode[i] == CST:
+        if update_counts(target, number, x.command_timeout_torque):
+            target.torque[i] = torque
+        else:
+            target.torque[i] = actual.commanded_torque[i]
+
+
 cdef void axes_follow(const axes_t *x, const actual_t *actual, target_t *target) noexcept nogil:
     """Adapt the application's targets to the cycle that it sees."""
     cdef uint32_t i
-    cdef double position
+    cdef double position, velocity, torque
     for i in range(x.axis_count):
-        position = actual.position[i]
+        position, velocity, torque = actual.position[i], target.velocity[i], target.torque[i]
         if actual.state[i] == OPERATION_ENABLED:
             position = actual.commanded_position[i]
         follow(target, i, actual.flags[i] & FOLLOWED, actual.followed_since[i], position,
                actual.commanded_velocity[i], actual.commanded_torque[i])
+        if target.header.background:
+            follow_update(x, actual, target, i, velocity, torque)
 
 
 cdef void axes_follow_now(const axes_t *x, target_t *target) noexcept nogil:

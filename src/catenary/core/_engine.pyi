@@ -62,12 +62,15 @@ class Engine:
 
     background: bool
     """True if a thread repeats the targets of a program: CSP then has no late limit, and set-points
-    of CSV and CST count until the command timeout after `update_targets`. Not for inline cycles:
-    ValueError."""
+    of CSV and CST count until the command timeout after an update; then their targets are what is
+    commanded. Not for inline cycles: ValueError."""
 
-    def update_targets(self) -> None:
-        """Commit the target buffers as new ones of the program in the background. Callable from any
-        thread, but only one at a time."""
+    def begin_update(self) -> None:
+        """Let another thread than the one that iterates write the target buffers: until `end_update`
+        `next` does not change them. One thread at a time, which keeps the other from committing."""
+
+    def end_update(self, commit: bool) -> None:
+        """End an update; commit the target buffers as new ones of the program in the background."""
 
     @property
     def origin(self) -> int:

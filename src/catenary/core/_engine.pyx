@@ -55,6 +55,7 @@ from catenary.core._handover cimport (
     actual_t,
     handover_commit,
     handover_swap,
+    target_header_t,
     target_t,
 )
 from catenary.core._histogram cimport histogram_add
@@ -335,6 +336,8 @@ cdef class Engine:
         """Return the error for a call that needs cycles."""
         if self.forgotten:
             return RuntimeError("the loop runs in the parent process: a forked child cannot use it")
+        if self.e.cycle.origin != 0:
+            return RuntimeError("the loop is closed, its cycle has ended: open it again")
         return RuntimeError("the engine is not running: start it first")
 
     # ---- steps
@@ -361,10 +364,17 @@ cdef class Engine:
         self.h.target[PRIVATE].header.background = value
         self.h.target[PRIVATE].header.updated = 0
 
-    def update_targets(self):
-        if not self.is_led():
-            self.h.target[PRIVATE].header.updated = max(self.e.cycle.number, <uint64_t>1)
-        self.commit_targets()
+    def begin_update(self):
+        self.writing = True
+        self.writing_since = self.h.actual[PRIVATE].header.number
+
+    def end_update(self, bint commit):
+        cdef target_header_t *header = self.h.target[PRIVATE].header
+        if commit:
+            if not self.is_led():
+                header.updated = max(self.e.cycle.number, <uint64_t>1)
+            self.commit_targets()
+        self.writing = False
 
     @property
     def origin(self):
@@ -420,9 +430,11 @@ cdef class Engine:
         runs that is all of them, and until the cycle of its end has been seen."""
         cdef actual_t *actual = &self.h.actual[PRIVATE]
         if self.law is None and self.stream is None:
-            axes_follow(&self.axes.c, actual, &self.h.target[PRIVATE])
+            if not self.writing:
+                axes_follow(&self.axes.c, actual, &self.h.target[PRIVATE])
             return
-        self.take_commanded()
+        if not self.writing:
+            self.take_commanded()
         if self.law is not None and self.law.ended_before(actual.header.number):
             # Python may have missed the cycle that said so.
             actual.header.flags |= LAW_FAILED if self.law.failed() else LAW_DONE
@@ -516,6 +528,8 @@ cdef class Engine:
         target.header.hold = hold
         target.header.seen = self.h.actual[PRIVATE].header.number
         target.header.stamp = target.header.seen + 1
+        if self.writing:  # an axis that became followed since does not follow this
+            target.header.seen = self.writing_since
         target.header.process_ns = -1
         target.header.input_age_ns = -1
         if self.left >= 0 and not hold:

@@ -76,9 +76,9 @@ cdef inline bint is_commanded(const axes_t *x, int8_t mode) noexcept nogil:
     if not x.background:
         return True
     if mode == CSV:
-        return x.command_age <= x.command_timeout_velocity
+        return x.velocity_counts
     if mode == CST:
-        return x.command_age <= x.command_timeout_torque
+        return x.torque_counts
     return True
 
 cdef inline bint shows_mode(const axis_t *a) noexcept nogil:

@@ -16,3 +16,5 @@ cdef class Iteration:
     cdef object beside
     cdef uint32_t trouble
     cdef int al_status
+    cdef public object commit_lock
+    cdef int commit_if_free(self) except -1

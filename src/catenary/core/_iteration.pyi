@@ -1,6 +1,7 @@
 """Iteration of a loop, and the cycle that it yields."""
 
 from collections.abc import Callable
+from threading import Lock
 from typing import Self
 
 from catenary.core._engine import Engine
@@ -53,7 +54,8 @@ class Iteration:
 
     It calls `judge(flags)` if one of the CYCLE_* flags of `trouble` is set, or if the devices' AL
     states together differ from `al_status`; an exception of `judge` ends the iteration. The first
-    step commits nothing. `beside` is called before every step.
+    step commits nothing. `beside` is called before every step. With a `commit_lock`, a step that
+    finds it taken commits nothing: another thread is writing the targets.
     """
 
     def __init__(
@@ -65,5 +67,6 @@ class Iteration:
         al_status: int,
         beside: Callable[[], object] | None = None,
     ) -> None: ...
+    commit_lock: Lock | None
     def __iter__(self) -> Self: ...
     def __next__(self) -> Cycle: ...

@@ -76,7 +76,20 @@ cdef class Iteration:
             flags = self.engine.run(1)
             self.cycle = Cycle(self.engine)
         else:
+            if self.commit_lock is not None:
+                self.commit_if_free()
             flags = self.engine.step()
         if flags & self.trouble or self.cycle.header.al_status != self.al_status:
             self.judge(flags)
         return self.cycle
+
+    cdef int commit_if_free(self) except -1:
+        """Commit, unless another thread is writing the targets; never wait for it."""
+        if not self.commit_lock.acquire(False):
+            self.engine.keep_targets()
+            return 0
+        try:
+            self.engine.commit_targets()
+        finally:
+            self.commit_lock.release()
+        return 0

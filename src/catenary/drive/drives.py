@@ -269,20 +269,20 @@ class Drives:
 
     def enable(self, axes: Axes = ALL) -> None:
         """Request that axes be enabled. Each starts from its actual position."""
-        self._ask(Goal.ENABLED, axes)
+        self._request("enable", Goal.ENABLED, axes)
 
     def disable(self, axes: Axes = ALL) -> None:
         """Request that axes be disabled."""
-        self._ask(Goal.DISABLED, axes)
+        self._request("disable", Goal.DISABLED, axes)
 
     def quick_stop(self, axes: Axes = ALL) -> None:
         """Request a quick stop. The ramp and the final state are the drive's (0x605A)."""
-        self._ask(Goal.QUICK_STOP, axes)
+        self._request("quick_stop", Goal.QUICK_STOP, axes)
 
     def reset_faults(self, axes: Axes = ALL) -> None:
         """Request a fault reset of those axes that are in fault. Nothing moves before `enable`."""
         chosen = set(np.atleast_1d(np.arange(len(self))[axes]).tolist())
-        self._ask(Goal.RESET, sorted(chosen & set(self.faults)))
+        self._request("reset_faults", Goal.RESET, sorted(chosen & set(self.faults)))
 
     def switch(self, mode: str, axes: Axes = ALL) -> None:
         """Request a change to `mode`, one of those that the Drives were made with.
@@ -293,7 +293,7 @@ class Drives:
         for axis in np.atleast_1d(np.arange(len(self))[axes]).tolist():
             if wanted not in self._axes[axis].modes:
                 raise ValueError(f"{self.names[axis]}: make Drives with other_modes=[{mode!r}]")
-        self._bound().mode_target[axes] = wanted
+        self._of_open_loop("switch").mode_target[axes] = wanted
 
     def home(self, loop: Iterable[Timed], axes: Axes = ALL, *, timeout: float = 30.0) -> None:
         """Lets enabled axes find their homes themselves (mode 6, "hm" in `other_modes`), and waits,
@@ -306,7 +306,7 @@ class Drives:
         for axis in chosen.tolist():
             if Mode.HM not in self._axes[axis].modes:
                 raise ValueError(f"{self.names[axis]}: make Drives with other_modes=['hm']")
-        run_homing(self._bound(), self.names, loop, chosen, timeout)
+        run_homing(self._of_open_loop("home"), self.names, loop, chosen, timeout)
 
     # plan.wish.Wish
 
@@ -390,10 +390,19 @@ class Drives:
             used[bank] += len(self)
         return slices
 
-    def _ask(self, goal: Goal, axes: Axes) -> None:
-        views = self._bound()
+    def _request(self, call: str, goal: Goal, axes: Axes) -> None:
+        views = self._of_open_loop(call)
         views.goal[axes] = goal
         views.request[axes] += 1  # a goal that dropped comes back only by a new request
+
+    def _of_open_loop(self, call: str) -> Views:
+        """Return the views for a request; RuntimeError if no cycle would send it."""
+        views = self._bound()
+        if not views.is_open():
+            raise RuntimeError(
+                f"{call}(): the loop is closed, and its drives were stopped; open a loop first"
+            )
+        return views
 
     def _bound(self) -> Views:
         if self._views is None:

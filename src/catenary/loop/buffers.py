@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 
 import numpy as np
@@ -18,15 +18,20 @@ COLUMN_BUFFERS: dict[tuple[bool, Bank], str] = {
     (True, Bank.INTEGER): "output_integers",
     (True, Bank.BIT): "output_bits",
 }
-AXIS_BUFFERS = tuple(
-    each.name for each in fields(Views) if each.name not in (*COLUMN_BUFFERS.values(), "unit_valid")
-)
+OTHERS = (*COLUMN_BUFFERS.values(), "unit_valid", "is_open")
+AXIS_BUFFERS = tuple(each.name for each in fields(Views) if each.name not in OTHERS)
 
 
 def bind_wishes(
-    wishes: Sequence[Wish], tables: Sequence[WishTables], buffers: Mapping[str, memoryview]
+    wishes: Sequence[Wish],
+    tables: Sequence[WishTables],
+    buffers: Mapping[str, memoryview],
+    is_open: Callable[[], bool],
 ) -> Views:
-    """Binds every wish to its part of the buffers, in the order of the plan. Returns the whole."""
+    """Bind every wish to its part of the buffers, in the order of the plan. Return the whole.
+
+    `is_open` returns True while the loop runs.
+    """
     arrays = {name: np.asarray(buffers[name]) for name in (*AXIS_BUFFERS, *COLUMN_BUFFERS.values())}
     unit_valid = np.asarray(buffers["unit_valid"])
     used = dict.fromkeys(("axes", *COLUMN_BUFFERS.values()), 0)
@@ -34,11 +39,11 @@ def bind_wishes(
         sizes = dict.fromkeys(AXIS_BUFFERS, len(table.axes)) | column_sizes(table)
         starts = {name: used.get(name, used["axes"]) for name in sizes}
         parts = {name: arrays[name][starts[name] :][: sizes[name]] for name in sizes}
-        wish.bind(Views(**parts, unit_valid=unit_valid))
+        wish.bind(Views(**parts, unit_valid=unit_valid, is_open=is_open))
         used["axes"] += len(table.axes)
         for name in COLUMN_BUFFERS.values():
             used[name] += sizes[name]
-    return Views(**arrays, unit_valid=unit_valid)
+    return Views(**arrays, unit_valid=unit_valid, is_open=is_open)
 
 
 def column_sizes(table: WishTables) -> dict[str, int]:

@@ -7,12 +7,14 @@ Leaving, for whatever reason, stops the drives natively before the states go dow
 from __future__ import annotations
 
 import math
+import threading
 import warnings
 import weakref
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from functools import partial
 from types import TracebackType
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 from catenary.bus import SubDevice
 from catenary.core import (
@@ -27,6 +29,7 @@ from catenary.core import (
 )
 from catenary.errors import LawError
 from catenary.loop.axis_watch import StopPolicy
+from catenary.loop.background import Awaited, Background
 from catenary.loop.carried import CarriedRunning, carried
 from catenary.loop.clocks import Clocks
 from catenary.loop.devices import DeviceWish, by_network, main_device_of
@@ -187,17 +190,19 @@ class Loop:
             raise ValueError(f"cpu={cpu}: one network has one thread, on one CPU")
         self._cpu = cpu
         self._priority = priority
-        self._guard = SignalGuard(
-            (Loop.__exit__.__code__, Loop._leave.__code__, leave_open_loop.__code__)
-        )
+        leaving = (Loop.close, Loop.__exit__, Loop._leave, leave_open_loop)
+        self._guard = SignalGuard(tuple(each.__code__ for each in leaving))
         self._running: Running | None = None
         self._iteration: Iteration | None = None
+        self._background: Background | None = None
         self._finalizer: weakref.finalize[..., Loop] | None = None
 
     def __enter__(self) -> Loop:
+        if self._running is not None and self._running.is_open:
+            raise RuntimeError("the loop is open: `with` and open() open it; use one of them, once")
         try:
             self._guard.install()
-            self._running = self._iteration = None
+            self._running = self._iteration = self._background = None
             self._running = self._prepared(self._abandoned())
             self._leave_at_the_latest([self._running])
             self._running.open()
@@ -243,15 +248,97 @@ class Loop:
         if error is not None:
             self._tell_end(error)
         problems = self._leave()
+        if self._background is not None and (untold := self._background.untold_error()) is not None:
+            problems.insert(0, untold)
         if error is not None:
             for problem in problems:
                 error.add_note(f"on the way down: {problem}")
         elif problems:
             raise problems[0]
 
+    def open(self) -> Self:
+        """Enter without a `with` block, for a notebook or a server. Returns the loop.
+
+        `close` leaves it; so do the end of the program and the MainDevice's `close`.
+        """
+        self.__enter__()
+        return self
+
+    def close(self) -> None:
+        """Leave the loop: stop the axes, then the cycle. A no-op if it is closed.
+
+        Raises an error that ended the loop in the background, unless another call has raised it.
+        """
+        if self._running is None:
+            return
+        if self._running.is_open:
+            self._guard.install()  # again: a notebook sets its own handlers in each cell
+        self.__exit__(None, None, None)
+
+    def run_in_background(self) -> None:
+        """Let a Python thread iterate the loop from now on, and return at once.
+
+        The thread commits the targets in every cycle. Write them in `with loop.update():`. An
+        error of the loop stops the axes and closes the loop; the next `update`, `wait` or `close`
+        raises it. Interrupting the program (Ctrl-C) does not stop the loop; `close` and the end of
+        the program do. In virtual time the thread keeps to the wall clock. A no-op if it runs.
+
+        Raises:
+            ValueError: the loop is inline.
+            LoopError: an axis is powered in CST.
+        """
+        if self._background is not None:
+            self._background.raise_error()
+        running = self._open_running
+        if self._background is None:
+            background = Background(running, iter(self), self._guard)
+            background.start()
+            self._background = background
+
+    def update(self) -> AbstractContextManager[None]:
+        """Return a context in which a program writes one consistent set of targets and requests.
+
+        While the loop runs in the background, all of the set is committed when the block ends; none
+        of it if the block raises. In CSV and CST it counts for `command_timeout`: then CSV
+        decelerates, and CST is stopped.
+
+        Raises:
+            RuntimeError: the loop does not run in the background: `next(loop)` commits.
+            CatenaryError: what ended the loop in the background.
+        """
+        if self._background is None:
+            raise RuntimeError(
+                "update() needs run_in_background(): a program that iterates the loop itself "
+                "commits all it has written by `next(loop)`"
+            )
+        return self._background.update()
+
+    def wait(self, awaited: Awaited, *, timeout: float | None = None) -> None:
+        """Iterate until `awaited` is done; while the loop runs in the background, only wait.
+
+        Args:
+            awaited: a move, or anything else with `done` and `error`.
+            timeout: [s]; None: none.
+
+        Raises:
+            TimeoutError: it is not done within `timeout`.
+            CatenaryError: what ended the loop or the move.
+        """
+        if self._background is not None:
+            return self._background.wait(awaited, timeout)
+        for cycle in self:
+            if awaited.done:
+                break
+        return None
+
+    @property
+    def error(self) -> Exception | None:
+        """Error that ended the loop in the background; None if there is none."""
+        return None if self._background is None else self._background.error
+
     def __iter__(self) -> Iteration:
         """Iterating again goes on where the last iteration ended."""
-        running = self._opened
+        running = self._foreground
         if self._iteration is None:
             self._iteration = Iteration(
                 running.engine,
@@ -307,7 +394,7 @@ class Loop:
         `compiled=False` runs it as Python, in the loop's own thread: slow, with Python's errors, to
         find mistakes.
         """
-        running = self._opened
+        running = self._foreground
         if not compiled:
             return self._run_as_python(made_law(law), memory, parameters)
         run = running.laws.start(made_law(law), memory, parameters, budget, overruns)
@@ -333,7 +420,7 @@ class Loop:
     def stream(self, capacity: int = 1000) -> Stream:
         """A ring of at most `capacity` rows of set-points, one row a cycle, that a slower thread
         fills ahead: see `Stream`."""
-        return Stream(self._opened.engine, self._opened.views, capacity)
+        return Stream(self._open_running.engine, self._opened.views, capacity)
 
     def restore(self, sub: SubDevice) -> None:
         """Lets a device that is held (event DeviceHeld or DeviceReplaced) go to OP: from now on,
@@ -379,7 +466,7 @@ class Loop:
             ClockError: after `timeout` [s].
             LoopError: an axis is powered in CST, whose torque would become stale meanwhile.
         """
-        running = self._opened
+        running = self._foreground
         running.refuse_powered_torque("wait_locked")
         self.clocks.wait(within, timeout, self._judge)
         running.judge(CYCLE_CLOCKS, faults=self._raise_faults)
@@ -402,6 +489,22 @@ class Loop:
     def _runnings(self) -> Sequence[Running]:
         """What runs of each network."""
         return [self._opened]
+
+    @property
+    def _open_running(self) -> Running:
+        running = self._opened
+        running.require_open()
+        return running
+
+    @property
+    def _foreground(self) -> Running:
+        """What runs, for a call that iterates."""
+        if self._background is not None and self._background.is_alive:
+            raise RuntimeError(
+                "the loop runs in the background, where a thread iterates it: write targets in "
+                "`with loop.update():`, wait with loop.wait(move), start laws with loop.start()"
+            )
+        return self._open_running
 
     @property
     def _opened(self) -> Running:
@@ -474,7 +577,7 @@ class Loop:
 
 def leave_open_loop(runnings: Sequence[Running], guard: SignalGuard) -> None:
     """Stop the axes of a loop that nothing refers to any more, then warn: a warning may be an
-    error."""
+    error. A loop in the background may stay open until the program ends."""
     if not any(running.is_open for running in runnings):
         return
     for running in runnings:
@@ -482,6 +585,13 @@ def leave_open_loop(runnings: Sequence[Running], guard: SignalGuard) -> None:
             running.stop_axes_at_once()
     problems = [problem for running in runnings for problem in running.leave(guard)]
     guard.restore()
-    text = "a Loop was not left: its axes have been stopped. Use it in a with block"
+    if _program_ends() and not problems and all(one.in_background for one in runnings):
+        return
+    text = "a Loop was not left: its axes have been stopped. Use it in a with block, or close() it"
     text += "".join(f"; {problem}" for problem in problems)
     warnings.warn(text, RuntimeWarning, stacklevel=2)
+
+
+def _program_ends() -> bool:
+    """Return True in the functions of `atexit`: Python marks its main thread as ended before."""
+    return not threading.main_thread().is_alive()

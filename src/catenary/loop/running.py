@@ -88,7 +88,7 @@ class Running:
         self.main = main
         self.plan = plan
         self.engine = self._make_engine()
-        self.views = bind_wishes(wishes, plan.tables, self.engine.buffers)
+        self.views = bind_wishes(wishes, plan.tables, self.engine.buffers, lambda: self.is_open)
         self._axis_watch = AxisWatch(self.views, plan.cycle.axes)
         self._on_axis_stopped: StopPolicy = on_axis_stopped
         self.laws = LawRunner(self.engine, plan)
@@ -110,6 +110,7 @@ class Running:
         self._companions: Sequence[Running] = ()
         self._watches: list[Pending[None]] = []
         self._publisher: Publisher | None = None
+        self.end_background: Callable[[], None] = _no_background  # the thread that iterates
         self.service.cycle = self.cycle
 
     def _make_engine(self) -> Engine:
@@ -177,6 +178,20 @@ class Running:
     def is_open(self) -> bool:
         """True if its cycle runs, in this process."""
         return self._opened and not self._left and self._process == os.getpid()
+
+    @property
+    def in_background(self) -> bool:
+        """True if a thread of ours iterates, or did until the loop was left."""
+        return self.end_background is not _no_background
+
+    def require_open(self) -> None:
+        """Raise RuntimeError for a call that needs cycles, unless the loop is open."""
+        if self._process != os.getpid():
+            raise RuntimeError(
+                "the loop runs in the parent process: a forked child cannot use it"
+            )
+        if not self.is_open:
+            raise RuntimeError("the loop is closed: open it again, or use it in a with block")
 
     def open(self, origin_ns: int = 0) -> None:
         """From SAFE-OP to OP: the cycle starts, and valid outputs flow while the states change.
@@ -347,9 +362,11 @@ class Running:
         if self._process != os.getpid():
             self.forget()
         if self._left:
+            self.end_background()  # it may be leaving
             return []
         self._left = True
         steps: tuple[Callable[[SignalGuard], None], ...] = (
+            self._end_background,
             self._stop_axes,
             self._stop_cycle,
             self._tell_of_watches,
@@ -362,6 +379,9 @@ class Running:
             except Exception as problem:  # the next step matters more; all are told at the end
                 problems.append(problem)
         return problems
+
+    def _end_background(self, guard: SignalGuard) -> None:
+        self.end_background()
 
     def _stop_axes(self, guard: SignalGuard) -> None:
         """Quick stop as each drive's 0x605A says, exchanged until all stand."""
@@ -474,6 +494,10 @@ class Running:
             return UINT.decode(data)
         except CatenaryError:
             return None  # a drive in trouble may not talk; the error says that the code is unknown
+
+
+def _no_background() -> None:
+    """The program iterates the loop itself."""
 
 
 def take_down(main: MainDevice) -> list[Exception]:

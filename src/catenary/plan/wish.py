@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -186,6 +186,7 @@ class Views:
     output_integers: Integers
     output_bits: Bytes
     unit_valid: Bytes  # (units of the whole plan,) whether each one's last exchange was valid
+    is_open: Callable[[], bool]  # True while the loop runs: afterwards requests reach nothing
 
 
 class Wish(Protocol):

@@ -1,0 +1,213 @@
+"""A Python thread that iterates an open loop while the program does something else.
+
+Theory of operation. The thread commits the targets in every cycle, under a lock that `update` takes,
+too: while a program writes its targets, nothing is committed. The thread never waits for that lock.
+The native core judges how long the targets of the last update count (core/_setpoints.pyx), so a
+program that keeps the interpreter cannot keep an axis moving. An error of the loop ends the thread,
+which leaves the loop first; the next call of the program raises the error. In virtual time the
+thread keeps to the wall clock: nobody else would.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Protocol
+
+from catenary.core import Iteration
+from catenary.errors import LoopError
+from catenary.loop.running import Running
+from catenary.loop.signals import SignalGuard
+
+VIRTUAL = "virtual time"
+END_TIMEOUT = 30.0  # [s] and some periods: to leave a loop after an error takes some seconds
+UPDATE_TIMEOUT = 5.0  # [s] for which another thread may be inside `update`
+BEHIND = 0.1  # [s] of virtual time that is not made up for
+LOOK = 1.0  # [s] between two looks of a waiting call, at most
+
+
+class Awaited(Protocol):
+    """What a program can wait for: a move."""
+
+    @property
+    def done(self) -> bool: ...
+    @property
+    def error(self) -> Exception | None: ...
+
+
+class Background:
+    """Owns the thread that iterates an open loop, and the lock under which targets are committed.
+
+    `error`: what ended the loop; None: nothing yet, or it was closed.
+    """
+
+    def __init__(self, running: Running, iteration: Iteration, guard: SignalGuard) -> None:
+        self.error: Exception | None = None
+        self._running = running
+        self._iteration = iteration
+        self._guard = guard
+        self._commit = threading.Lock()
+        self._updating = 0  # the thread that is inside `update`
+        self._cycled = threading.Condition()
+        self._ended = threading.Event()
+        self._told = False  # the error was raised
+        self._pace = _Pace(running)
+        self._process = os.getpid()
+        self._thread = threading.Thread(target=self._iterate, name="catenary loop", daemon=True)
+
+    def start(self) -> None:
+        """Start the thread.
+
+        Raises:
+            ValueError: an inline loop exchanges its frames in the thread of the program.
+            LoopError: an axis is powered in CST, and nothing updates its torque.
+        """
+        if self._running.plan.cycle.order == "inline":
+            raise ValueError(
+                'run_in_background needs a threaded loop: in an inline one, frames would wait for '
+                "whatever else Python computes"
+            )
+        self._running.refuse_powered_torque("run_in_background")
+        self._running.engine.background = True
+        self._iteration.commit_lock = self._commit
+        self._running.end_background = self.end
+        self._thread.start()
+
+    def end(self) -> None:
+        """End the thread and wait for it. No effect in the thread itself, or in a forked child."""
+        self._ended.set()
+        if threading.current_thread() is self._thread or self._process != os.getpid():
+            return
+        self._thread.join(END_TIMEOUT + 8e-9 * self._running.plan.cycle.period_ns)
+        if self._thread.is_alive():
+            raise LoopError("the thread that iterates the loop does not end: is a callback stuck?")
+
+    @property
+    def is_alive(self) -> bool:
+        """True while the thread iterates."""
+        return self._thread.is_alive() and not self._ended.is_set()
+
+    def raise_error(self) -> None:
+        """Raise what ended the loop."""
+        if self.error is not None:
+            self._told = True
+            raise self.error
+
+    def untold_error(self) -> Exception | None:
+        """Return what ended the loop, unless a call has raised it."""
+        error = None if self._told else self.error
+        self._told = True
+        return error
+
+    @contextmanager
+    def update(self) -> Iterator[None]:
+        """See `Loop.update`."""
+        self._take_commit()
+        try:
+            self._require_alive()
+            with self._written_targets():
+                yield
+                self._require_alive()  # else it would seem that they are sent
+        finally:
+            self._updating = 0
+            self._commit.release()
+
+    @contextmanager
+    def _written_targets(self) -> Iterator[None]:
+        """Commit what the block writes; nothing of it if the block raises."""
+        engine = self._running.engine
+        _, targets = engine.blocks()
+        before = bytes(targets)
+        engine.begin_update()
+        complete = False
+        try:
+            yield
+            complete = True
+        finally:
+            if not complete:
+                targets[:] = before
+            engine.end_update(complete)
+
+    def wait(self, awaited: Awaited, timeout: float | None = None) -> None:
+        """Wait until it is done, while the thread iterates; raise its error.
+
+        Raises:
+            TimeoutError: after `timeout` [s].
+        """
+        self._refuse_inside_update("wait")
+        end = None if timeout is None else time.monotonic() + timeout
+        with self._cycled:
+            while not awaited.done:
+                self._require_alive()
+                left = LOOK if end is None else end - time.monotonic()
+                if left <= 0:
+                    raise TimeoutError(f"not done within {timeout:g} s")
+                self._cycled.wait(min(left, LOOK))
+        if awaited.error is not None:
+            raise awaited.error
+
+    def _take_commit(self) -> None:
+        self._refuse_inside_update("update")
+        self._require_alive()
+        if not self._commit.acquire(timeout=UPDATE_TIMEOUT):
+            raise LoopError(
+                f"another thread has been inside loop.update() for {UPDATE_TIMEOUT:g} s",
+                hint="compute and wait before `with loop.update():`, and only write targets in it",
+            )
+        self._updating = threading.get_ident()
+
+    def _refuse_inside_update(self, call: str) -> None:
+        if self._updating == threading.get_ident():
+            raise RuntimeError(
+                f"loop.{call}() inside `with loop.update():`, which commits when it ends: leave it"
+            )
+
+    def _require_alive(self) -> None:
+        self.raise_error()
+        self._running.require_open()
+
+    def _iterate(self) -> None:
+        self._running.service.runner.adopt()
+        try:
+            while not self._ended.is_set():
+                next(self._iteration)
+                self._tell_cycle()
+                self._pace.keep(self._ended)
+        except Exception as error:  # a thread has no caller: the next call raises it
+            self._fail(error)
+        finally:
+            self._ended.set()
+            self._tell_cycle()
+
+    def _tell_cycle(self) -> None:
+        with self._cycled:
+            self._cycled.notify_all()
+
+    def _fail(self, error: Exception) -> None:
+        """Leave the loop as a `with` block would."""
+        self._running.tell_end(error)
+        self.error = error
+        for problem in self._running.leave(self._guard):
+            error.add_note(f"on the way down: {problem}")
+
+
+class _Pace:
+    """Keeps virtual time to the wall clock."""
+
+    def __init__(self, running: Running) -> None:
+        self._engine = running.engine
+        self._is_virtual = running.engine.scheduling == VIRTUAL
+        self._offset: float | None = None  # [s] virtual time minus the wall clock's, at the start
+
+    def keep(self, ended: threading.Event) -> None:
+        """Wait until the wall clock is as late as virtual time; in real time no wait at all."""
+        if not self._is_virtual:
+            return
+        offset = self._engine.now() * 1e-9 - time.monotonic()
+        if self._offset is None or offset < self._offset - BEHIND:
+            self._offset = offset
+        if offset > self._offset:
+            ended.wait(offset - self._offset)
