@@ -12,7 +12,7 @@ with cat.MainDevice(sys.argv[1]) as main:
     others = [drive for drive in subs.drives if drive not in tool]
     arm = cat.Drives(others, counts_per_turn=2**20, velocity_limit=2.0)
     grip = cat.Outputs(*tool, required=False)
-    with cat.Loop(arm, grip, period=1e-3, on_return="restore") as loop:
+    with cat.Loop(arm, grip, period=1e-3, stop=cat.StopPolicy(on_return="restore")) as loop:
         for cycle in loop:
             grip.bits[:] = cycle.number // 500 % 2
             for event in main.events:

@@ -116,11 +116,12 @@ def main_control(place, cost, period, target, share, state, torque, phase, rows,
     wanted = speed = nothing = np.zeros(JOINTS)
     handled = lost = 0
     silences = realtime.Silence(torque), realtime.Silence(done)
-    options = {"run": "inline", "period": period, "priority": 90, "raise_faults": False}
+    options = {"execution": "inline", "period": period, "priority": 90}
+    stop = cat.StopPolicy(raise_faults=False)
     with cat.MainDevice(read_segment(target, clock=place) if place else target) as main:
         arm = cat.Drives(main.scan().drives, mode="cst", required=False, **AXES)
         recovery, measured = cat.Recovery(arm), Measured(virtual=bool(place))
-        with cat.Loop(arm, sink=share, watchdog=0.02, **options) as loop:
+        with cat.Loop(arm, sink=share, watchdog=0.02, stop=stop, **options) as loop:
             for cycle in loop:
                 q, v = arm.actual.position, arm.actual.velocity
                 row = rows.take()

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
         WorkingCounterError,
     )
     from catenary.link.interfaces import interfaces
-    from catenary.loop import Cycle, Loop, law
+    from catenary.loop import ClockOptions, Cycle, Loop, Scheduling, StopPolicy, law
     from catenary.share import Share, attach
     from catenary.target import MainDevice
     from catenary.virtual import (
@@ -49,6 +49,7 @@ __all__ = [
     "AnalogInputs",
     "CatenaryError",
     "ClockError",
+    "ClockOptions",
     "Coupler",
     "Cycle",
     "DigitalInputs",
@@ -65,10 +66,12 @@ __all__ = [
     "Outputs",
     "Phase",
     "Recovery",
+    "Scheduling",
     "Segment",
     "Servo",
     "Share",
     "StateError",
+    "StopPolicy",
     "SubDevice",
     "WorkingCounterError",
     "attach",
@@ -95,6 +98,7 @@ _ERRORS = (  # that a loop raises; the others are in catenary.errors
 )
 _HOMES = {
     **dict.fromkeys(_ERRORS, "catenary.errors"),
+    "ClockOptions": "catenary.loop",
     "Cycle": "catenary.loop",
     "DistributedClock": "catenary.drive",
     "Drives": "catenary.drive",
@@ -106,6 +110,8 @@ _HOMES = {
     "Phase": "catenary.drive",
     "Recovery": "catenary.drive",
     "Share": "catenary.share",
+    "Scheduling": "catenary.loop",
+    "StopPolicy": "catenary.loop",
     "SubDevice": "catenary.bus",
     "attach": "catenary.share",
     "interfaces": "catenary.link.interfaces",

@@ -27,7 +27,13 @@ import catenary as cat
 def main(interface, run):
     with cat.MainDevice(interface) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=1.0)
-        options = dict(run=run, period=4e-3, lost_limit=1000, watchdog=0.5, priority=None)
+        options = dict(
+            execution=run,
+            period=4e-3,
+            stop=cat.StopPolicy(lost_limit=1000),
+            watchdog=0.5,
+            priority=None,
+        )
         with cat.Loop(arm, **options) as loop:
             print("running", flush=True)
             for cycle in loop:

@@ -72,7 +72,8 @@ def good(count):
 main = cat.MainDevice(sys.argv[1])
 main.open()
 arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=1.0)
-loop = cat.Loop(arm, run=sys.argv[2], period=4e-3, lost_limit=1000, late_limit=10.0, priority=None,
+loop = cat.Loop(arm, execution=sys.argv[2], period=4e-3, priority=None,
+                stop=cat.StopPolicy(lost_limit=1000, late_limit=10.0),
                 watchdog=6.0)
 loop.__enter__()
 iteration = iter(loop)

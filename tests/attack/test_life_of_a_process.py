@@ -22,7 +22,7 @@ segment = cat.Segment([cat.Servo()])
 main = cat.MainDevice(segment)
 main.open()
 arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=1.0)
-loop = cat.Loop(arm, late_limit=0.0).__enter__()
+loop = cat.Loop(arm, stop=cat.StopPolicy(late_limit=0.0)).__enter__()
 next(loop)
 
 def state():
@@ -165,5 +165,5 @@ import sys
 import catenary as cat
 
 with cat.MainDevice(sys.argv[1]) as main:
-    print({str(sub.read_state().state) for sub in main.look()})
+    print({str(sub.read_state().state) for sub in main.passive_scan()})
 """

@@ -108,7 +108,7 @@ def test_outputs_that_stay_on_are_found(monkeypatch: pytest.MonkeyPatch) -> None
 def test_a_device_that_is_left_in_op_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cat.MainDevice, "leave", lambda self: None)
     minute = soaked(monkeypatch, f.Drift(device=TOOL, ppm=10.0, at=0.3, for_=0.1))
-    assert "nobody left in OP" in invariants(minute)
+    assert "no device left in OP" in invariants(minute)
 
 
 def test_a_device_that_is_not_led_back_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -144,7 +144,7 @@ def test_the_command_tells_by_its_exit_status(
     assert main(arguments) == 1
     printed = capsys.readouterr().out
     assert "minute 1, seed 1 (line, no clocks, CSV), at" in printed
-    assert "nobody left in OP" in printed
+    assert "no device left in OP" in printed
     again = "catenary bench soak --minutes 0.02 --seed 1 --wiring line --no-clocks --mode csv"
     assert again in printed
 

@@ -62,7 +62,7 @@ def test_silence_names_the_cable(segment: cat.Segment, main: cat.MainDevice) -> 
 
 def after(segment: cat.Segment, main: cat.MainDevice, *injected: faults.Fault) -> Diagnosis:
     """What is found after half a second of traffic with faults."""
-    subs = main.look()
+    subs = main.passive_scan()
     before = main.diagnose(subs=subs)
     for fault in injected:
         segment.inject(fault)
@@ -104,7 +104,7 @@ def test_a_device_that_came_back_by_itself_had_no_power(
     segment: cat.Segment, main: cat.MainDevice
 ) -> None:
     """With its address given again its counters can be read, and show that they began anew."""
-    subs = main.look()
+    subs = main.passive_scan()
     before = main.diagnose(subs=subs)
     segment.inject(faults.power_cycle(2, for_=0.1))
     main.converse(exercise(0.5))
@@ -132,7 +132,7 @@ def test_a_device_with_an_error_says_so(segment: cat.Segment, main: cat.MainDevi
 
 def test_on_devices_that_were_only_looked_at(segment: cat.Segment, main: cat.MainDevice) -> None:
     segment.core.poke(2, 0x0300, b"\x09")
-    assert main.diagnose(subs=main.look())
+    assert main.diagnose(subs=main.passive_scan())
     assert len(main.subs) == 0
 
 
@@ -143,7 +143,7 @@ def test_beside_a_running_loop_from_another_thread(segment: cat.Segment) -> None
         arm = cat.Drives(
             main.scan().drives, mode="csp", counts_per_turn=2**20, velocity_limit=100.0
         )
-        with cat.Loop(arm, period=1e-3, late_limit=0) as loop:
+        with cat.Loop(arm, period=1e-3, stop=cat.StopPolicy(late_limit=0)) as loop:
             asking = threading.Thread(target=lambda: results.append(main.diagnose()))
             asking.start()
             for cycle in loop:

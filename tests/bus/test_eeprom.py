@@ -25,14 +25,14 @@ def main(segment: cat.Segment) -> Iterator[cat.MainDevice]:
 
 def test_all_bytes_are_read(segment: cat.Segment, main: cat.MainDevice) -> None:
     seen: list[tuple[int, int]] = []
-    station = main.look(names=False)[1].station
+    station = main.passive_scan(names=False)[1].station
     image = read_eeprom(main, station, 2048, progress=lambda *far: seen.append(far))
     assert image == segment.core.sii_image(1)
     assert seen == [(256, 1024), (512, 1024), (768, 1024), (1024, 1024)]
 
 
 def test_another_image_is_written(segment: cat.Segment, main: cat.MainDevice) -> None:
-    station = main.look(names=False)[1].station
+    station = main.passive_scan(names=False)[1].station
     old, new = segment.core.sii_image(1), segment.core.sii_image(2)
     write_eeprom(main, station, changes(old, new))
     assert segment.core.sii_image(1) == new
@@ -41,7 +41,7 @@ def test_another_image_is_written(segment: cat.Segment, main: cat.MainDevice) ->
 def test_a_write_that_breaks_off_says_what_the_device_is_now(
     segment: cat.Segment, main: cat.MainDevice
 ) -> None:
-    station = main.look(names=False)[1].station
+    station = main.passive_scan(names=False)[1].station
     wanted = changes(segment.core.sii_image(1), segment.core.sii_image(2))
 
     def pull_the_cable(done: int, total: int) -> None:

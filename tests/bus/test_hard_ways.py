@@ -187,7 +187,11 @@ def test_sdo_from_another_thread_while_the_loop_runs_and_never_from_its_own(run:
             found.append(servo.sdo.read(0x6065, 0, type=UDINT))
 
         with cat.Loop(
-            arm, period=2e-3, run=run, lost_limit=1000, late_limit=0, watchdog=5.0
+            arm,
+            period=2e-3,
+            execution=run,
+            stop=cat.StopPolicy(lost_limit=1000, late_limit=0),
+            watchdog=5.0,
         ) as loop:
             asking = threading.Thread(target=ask)
             asking.start()

@@ -40,7 +40,7 @@ def test_the_eeprom_belongs_to_the_device_once_it_is_asked_for_pre_op() -> None:
         for _ in range(2):
             for sub in main.scan():
                 assert segment.core.peek(sub.position, 0x0500, 1) == b"\x01"
-        main.look()
+        main.passive_scan()
         assert segment.core.peek(2, 0x0500, 1) == b"\x01"
 
 

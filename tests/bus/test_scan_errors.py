@@ -87,7 +87,7 @@ def test_a_slow_eeprom_does_not_hold_a_scan(slow_segment: cat.Segment) -> None:
 
 def test_a_slow_eeprom_does_not_hold_a_look(slow_segment: cat.Segment) -> None:
     with cat.MainDevice(slow_segment) as main:
-        found = main.look()
+        found = main.passive_scan()
         assert slow_segment.now_ns < 40e9
         assert any("within 30 s" in note for note in found[1].description.notes)
         assert found[2].identity.serial == 2

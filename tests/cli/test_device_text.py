@@ -26,13 +26,18 @@ sii_quirks = { text_prefix = "\\u001b[2J\\r\\n\\u0007\\u009b", mailbox_size = %d
 
 @pytest.fixture
 def target(tmp_path: Path) -> str:
-    return made(tmp_path, 128)
+    return made(tmp_path, SEGMENT % 128)
 
 
-def made(folder: Path, mailbox_size: int) -> str:
-    path = folder / "evil.toml"
-    path.write_text(SEGMENT % mailbox_size)
+def made(folder: Path, *devices: str) -> str:
+    """Return the target of a virtual segment with these devices."""
+    path = folder / "segment.toml"
+    path.write_text("".join(devices))
     return f"virtual:{path}"
+
+
+def servo(settings: str) -> str:
+    return f'[[device]]\nkind = "servo"\n{settings}\n'
 
 
 def call(line: str, capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
@@ -75,7 +80,7 @@ def test_no_command_prints_control_characters(
 def test_an_error_of_the_scan_is_escaped_too(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    status, out, err = call(f"scan {made(tmp_path, 65535)}", capsys)
+    status, out, err = call(f"scan {made(tmp_path, SEGMENT % 65535)}", capsys)
     assert status == 1
     assert "failed" in out
     assert "error: device 0" in err
@@ -110,10 +115,9 @@ def test_a_list_that_was_cut_short_is_printed_with_a_note(
 def test_sdo_list_prints_what_the_device_describes(
     quirks: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = tmp_path / "quirk.toml"
-    path.write_text(f'[[device]]\nkind = "servo"\nmailbox_quirks = {{ {quirks} }}\n')
+    target = made(tmp_path, servo(f"mailbox_quirks = {{ {quirks} }}"))
     for option in ("", " --values --json"):
-        status, out, _ = call(f"sdo list virtual:{path} 0{option}", capsys)
+        status, out, _ = call(f"sdo list {target} 0{option}", capsys)
         assert status == 0
         assert "Statusword" in out or quirks.startswith("object_list")
         assert "Device type" in out
@@ -122,14 +126,11 @@ def test_sdo_list_prints_what_the_device_describes(
 def test_an_object_without_a_description_has_a_row_and_a_note(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = tmp_path / "quirk.toml"
-    path.write_text(
-        '[[device]]\nkind = "servo"\nmailbox_quirks = { malformed_descriptions = [0x1008] }\n'
-    )
-    _, out, err = call(f"sdo list virtual:{path} 0", capsys)
+    target = made(tmp_path, servo("mailbox_quirks = { malformed_descriptions = [0x1008] }"))
+    _, out, err = call(f"sdo list {target} 0", capsys)
     assert re.search(r"^0x1008 +\(not described\)$", out, re.MULTILINE)
     assert err.startswith("note: 0x1008 cannot be described: an answer of SDO information")
-    _, out, _ = call(f"sdo list virtual:{path} 0 --json", capsys)
+    _, out, _ = call(f"sdo list {target} 0 --json", capsys)
     [row] = [row for row in json.loads(out) if row["index"] == 0x1008]
     assert (row["subindex"], row["problem"]) == (None, "not described")
 
@@ -137,14 +138,10 @@ def test_an_object_without_a_description_has_a_row_and_a_note(
 def test_another_devices_error_does_not_keep_one_from_being_read(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = tmp_path / "broken.toml"
-    path.write_text(
-        '[[device]]\nkind = "servo"\nsii_quirks = { mailbox_size = 8 }\n'
-        '[[device]]\nkind = "servo"\nserial = 2\n'
-    )
-    status, out, _ = call(f"sdo read virtual:{path} 1 0x1018:4 --type UDINT", capsys)
+    target = made(tmp_path, servo("sii_quirks = { mailbox_size = 8 }"), servo("serial = 2"))
+    status, out, _ = call(f"sdo read {target} 1 0x1018:4 --type UDINT", capsys)
     assert (status, out) == (0, "2\n")
-    status, out, err = call(f"sdo read virtual:{path} 0 0x1018:4 --type UDINT", capsys)
+    status, out, err = call(f"sdo read {target} 0 0x1018:4 --type UDINT", capsys)
     assert (status, out) == (1, "")
     assert "device 0" in err
 

@@ -42,7 +42,7 @@ def spoil(segment: cat.Segment, position: int, *words: tuple[int, int]) -> None:
     from catenary.procedure.sii_write import Change, write_words
 
     with cat.MainDevice(segment) as opened:
-        station = opened.look(names=False)[position].station
+        station = opened.passive_scan(names=False)[position].station
         opened.converse(write_words(station, [Change(*each) for each in words]))
 
 

@@ -14,6 +14,7 @@ import catenary as cat
 from catenary import control
 from catenary.errors import LawError
 from tests.control.arm import THREE
+from tests.loop_options import grouped
 
 pytest.importorskip("numba", reason="laws are compiled by Numba: pip install 'catenary[law]'")
 JOINTS = ["turn", "shoulder", "elbow"]
@@ -26,7 +27,7 @@ def opened(
     servo = cat.Servo(axes=axes, inertia=0.01, rated_torque=20.0)
     with cat.MainDevice(cat.Segment([servo])) as main:
         arm = cat.Drives(main.scan().drives, mode=mode, counts_per_turn=2**20, velocity_limit=100.0)
-        with cat.Loop(arm, period=1e-3, **more) as loop, warnings.catch_warnings():
+        with cat.Loop(arm, period=1e-3, **grouped(more)) as loop, warnings.catch_warnings():
             warnings.simplefilter("error")  # a law that allocates is warned of
             yield arm, loop
 

@@ -307,7 +307,7 @@ def make_plan(
     count = len(axes) if units is None else units
     plan = CyclePlan(
         period_ns=PERIOD,
-        order="threaded",
+        execution="threaded",
         receive_mode="wait",
         collect_deadline_ns=PERIOD // 2,
         output_size=count * DRIVE_SIZE,

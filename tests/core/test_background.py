@@ -198,7 +198,6 @@ def test_kept_targets_are_not_committed() -> None:
 
 
 def test_an_inline_cycle_has_no_background() -> None:
-    b = bench(axis(0), drives=[ScriptedDrive()], order="inline")
+    b = bench(axis(0), drives=[ScriptedDrive()], execution="inline")
     with pytest.raises(ValueError, match="inline"):
         b.engine.background = True
-

@@ -26,7 +26,7 @@ from tests.core.rig import (
     make_plan,
 )
 
-ORDERS = ("threaded", "inline")
+EXECUTION_MODES = ("threaded", "inline")
 
 
 class Trace(Bench):
@@ -52,8 +52,8 @@ class Trace(Bench):
         self.engine.start()
 
 
-def traced(order: str) -> Trace:
-    return Trace(make_plan([axis(0)], order=order))
+def traced(execution: str) -> Trace:
+    return Trace(make_plan([axis(0)], execution=execution))
 
 
 def test_threaded_waits_sends_and_collects_by_the_deadline() -> None:
@@ -69,9 +69,9 @@ def test_threaded_waits_sends_and_collects_by_the_deadline() -> None:
     ]
 
 
-@pytest.mark.parametrize("order", ["inline"])
-def test_inline_and_law_never_wait_for_frames(order: str) -> None:
-    b = traced(order)
+@pytest.mark.parametrize("execution", ["inline"])
+def test_inline_and_law_never_wait_for_frames(execution: str) -> None:
+    b = traced(execution)
     b.steps(3)
     kinds = [kind for kind, _ in b.events]
     assert "collect" not in kinds
@@ -88,9 +88,9 @@ def test_inline_sends_when_the_body_ends_and_sees_the_frame_of_the_cycle_before(
     assert b.events[2:] == [("send", PERIOD), ("wait", 2 * PERIOD)]
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_number_time_and_instants(order: str) -> None:
-    b = bench(axis(0), order=order)
+@pytest.mark.parametrize("execution", EXECUTION_MODES)
+def test_number_time_and_instants(execution: str) -> None:
+    b = bench(axis(0), execution=execution)
     seen = []
     for _ in range(5):
         b.engine.next()
@@ -101,7 +101,7 @@ def test_number_time_and_instants(order: str) -> None:
 
 @pytest.mark.parametrize(("spent", "skipped"), [(2.5, 2), (3.0, 3)])
 def test_inline_skips_missed_instants_and_never_bursts(spent: float, skipped: int) -> None:
-    b = bench(axis(0), order="inline")
+    b = bench(axis(0), execution="inline")
     b.steps(2)
     sent = len(b.link.sent)
     b.engine.spend(int(spent * PERIOD))
@@ -115,9 +115,9 @@ def test_inline_skips_missed_instants_and_never_bursts(spent: float, skipped: in
     assert b.engine.time_ns == (3 + skipped) * PERIOD
 
 
-@pytest.mark.parametrize("order", ["threaded"])
-def test_a_late_python_does_not_hold_the_bus_up(order: str) -> None:
-    b = bench(axis(0), order=order)
+@pytest.mark.parametrize("execution", ["threaded"])
+def test_a_late_python_does_not_hold_the_bus_up(execution: str) -> None:
+    b = bench(axis(0), execution=execution)
     b.steps(2)
     before = len(b.link.sent)
     b.engine.spend(7 * PERIOD)
@@ -128,7 +128,7 @@ def test_a_late_python_does_not_hold_the_bus_up(order: str) -> None:
 
 
 def test_a_wait_that_ends_late_keeps_to_the_grid() -> None:
-    b = bench(axis(0), order="inline")
+    b = bench(axis(0), execution="inline")
     b.steps(1)
     wait = b.link.table_wait_until
 
@@ -150,9 +150,9 @@ def records(b: Bench) -> np.ndarray:
     return np.frombuffer(b.engine.log(), np.dtype(RECORD_FIELDS))
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_the_log_holds_the_last_thousand_cycles(order: str) -> None:
-    b = bench(axis(0), order=order)
+@pytest.mark.parametrize("execution", EXECUTION_MODES)
+def test_the_log_holds_the_last_thousand_cycles(execution: str) -> None:
+    b = bench(axis(0), execution=execution)
     b.engine.run(1)
     assert len(records(b)) == 1
     b.engine.run(1499)
@@ -167,7 +167,7 @@ def test_the_log_holds_the_last_thousand_cycles(order: str) -> None:
 
 @pytest.mark.parametrize("reach", [1, 1000, 1001, 1100])
 def test_the_log_reaches_back_as_far_as_planned(reach: int) -> None:
-    b = bench(axis(0), order="inline", log_cycles=reach)
+    b = bench(axis(0), execution="inline", log_cycles=reach)
     b.engine.run(1200)
     assert records(b)["number"].tolist() == list(range(1201 - reach, 1201))
 
@@ -175,7 +175,7 @@ def test_the_log_reaches_back_as_far_as_planned(reach: int) -> None:
 @pytest.mark.parametrize("reach", [0, 1 << 25])
 def test_a_log_of_nothing_or_of_gigabytes_is_refused(reach: int) -> None:
     with pytest.raises(ValueError, match="log_cycles"):
-        bench(axis(0), order="inline", log_cycles=reach)
+        bench(axis(0), execution="inline", log_cycles=reach)
 
 
 def test_the_log_shows_a_lost_cycle() -> None:
@@ -189,7 +189,7 @@ def test_the_log_shows_a_lost_cycle() -> None:
 
 
 def test_phases_of_the_inline_order() -> None:
-    b = bench(axis(0), order="inline")
+    b = bench(axis(0), execution="inline")
     b.steps(2)
     b.engine.reset_histograms()
     for _ in range(10):
@@ -223,8 +223,8 @@ def test_phases_of_the_threaded_order() -> None:
 
 
 def test_start_up_without_an_application_has_no_process_phase() -> None:
-    for order in ORDERS:
-        b = bench(axis(0), order=order)
+    for execution in EXECUTION_MODES:
+        b = bench(axis(0), execution=execution)
         b.engine.run(20)
         assert b.engine.histograms()["process"] == {"count": 0}
 
@@ -237,9 +237,9 @@ def test_an_unknown_phase_is_refused() -> None:
 # ---- interruptions and errors of the link
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_an_interrupted_wait_goes_on_and_sends_once(order: str) -> None:
-    b = bench(axis(0), order=order)
+@pytest.mark.parametrize("execution", EXECUTION_MODES)
+def test_an_interrupted_wait_goes_on_and_sends_once(execution: str) -> None:
+    b = bench(axis(0), execution=execution)
     b.steps(1)
     sent = len(b.link.sent)
     b.link.wait_results = [-4, -4]  # -EINTR
@@ -249,10 +249,10 @@ def test_an_interrupted_wait_goes_on_and_sends_once(order: str) -> None:
     assert b.engine.number == 2
 
 
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("execution", EXECUTION_MODES)
 @pytest.mark.parametrize("method", ["next", "run"])
-def test_a_wait_that_fails_is_an_os_error(order: str, method: str) -> None:
-    b = bench(axis(0), order=order)
+def test_a_wait_that_fails_is_an_os_error(execution: str, method: str) -> None:
+    b = bench(axis(0), execution=execution)
     b.steps(1)
     b.link.wait_results = [-100]  # -ENETDOWN
     with pytest.raises(OSError, match="link") as caught:
@@ -350,7 +350,7 @@ def test_a_late_cycle_whose_frames_would_be_late_is_skipped_and_counted(late: in
 def test_inline_a_body_into_the_next_period_skips_the_cycle_start_and_loses_no_frame(
     body: int, skipped: int
 ) -> None:
-    b = bench(axis(0), order="inline")
+    b = bench(axis(0), execution="inline")
     b.steps(3)
     sent = len(b.link.sent)
     b.engine.spend(body)
@@ -399,16 +399,18 @@ class DriftingReference(Trace):
         self.segment.process = with_time  # type: ignore[method-assign]
 
 
-def clocked(order: str) -> DriftingReference:
+def clocked(execution: str) -> DriftingReference:
     time = Datagram(Command.FRMW, 0x1001 | 0x0910 << 16, bytes(4))
     frame = frame_plan([al_status(1), lrw(0), (DatagramKind.CLOCK, time, 1, -1)])
-    return DriftingReference(make_plan([axis(0)], order=order, frames=(frame,), clock=CLOCK))
+    return DriftingReference(
+        make_plan([axis(0)], execution=execution, frames=(frame,), clock=CLOCK)
+    )
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_cycle_time_is_the_true_time_of_the_cycle_start(order: str) -> None:
+@pytest.mark.parametrize("execution", EXECUTION_MODES)
+def test_cycle_time_is_the_true_time_of_the_cycle_start(execution: str) -> None:
     """Cycle starts follow the reference clock: they are no multiples of the period."""
-    b = clocked(order)
+    b = clocked(execution)
     b.engine.run(50)
     cycle = Cycle(b.engine)
     first = [deadline for kind, deadline in b.events if kind == "wait"][-1]

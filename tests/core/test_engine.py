@@ -16,13 +16,13 @@ from catenary.wire.datagram import Command, Datagram
 from catenary.wire.frame import decode_frame, encode_frame
 from tests.core.rig import Bench, al_status, axis, frame_plan, make_plan
 
-ORDERS = ("threaded", "inline")
+EXECUTION_MODES = ("threaded", "inline")
 
 
-def plan(order: str, **more: object) -> CyclePlan:
+def plan(execution: str, **more: object) -> CyclePlan:
     """A BRD of the AL status alone: two couplers answer it."""
     frames = (frame_plan([al_status(2)]),)
-    made = make_plan([], units=0, order=order, frames=frames, priority=None)
+    made = make_plan([], units=0, execution=execution, frames=frames, priority=None)
     return replace(made, **more)
 
 
@@ -32,7 +32,7 @@ def link() -> Iterator[object]:
         yield link
 
 
-@pytest.fixture(params=ORDERS)
+@pytest.fixture(params=EXECUTION_MODES)
 def engine(request: pytest.FixtureRequest, link) -> Iterator[Engine]:
     engine = Engine(plan(request.param), link.capsule)
     engine.start()
@@ -123,10 +123,10 @@ def test_stop_and_start_again(engine: Engine) -> None:
         assert engine.number > done
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_scheduling_that_was_not_to_be_had_is_said(order: str, link) -> None:
+@pytest.mark.parametrize("execution", EXECUTION_MODES)
+def test_scheduling_that_was_not_to_be_had_is_said(execution: str, link) -> None:
     policy, cpus = os.sched_getscheduler(0), os.sched_getaffinity(0)
-    engine = Engine(plan(order, cpu=1023, priority=1), link.capsule)
+    engine = Engine(plan(execution, cpu=1023, priority=1), link.capsule)
     engine.start()
     engine.run(2)
     text = engine.scheduling

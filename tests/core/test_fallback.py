@@ -648,18 +648,18 @@ class OneExchangeLater(ScriptedDrive):
         return super().exchange(outputs)
 
 
-@pytest.mark.parametrize(("first", "then", "every"), [(CSP, CSV, 60), (CST, CSP, 12)])
+@pytest.mark.parametrize(("first", "then", "divider"), [(CSP, CSV, 60), (CST, CSP, 12)])
 def test_a_change_of_mode_has_time_for_some_exchanges_of_the_device(
-    first: int, then: int, every: int
+    first: int, then: int, divider: int
 ) -> None:
-    frames = (frame_plan([al_status(1)]), replace(frame_plan([lrw(0)]), every=every))
-    units = (SyncUnit("slow", (0,), every=every),)
+    frames = (frame_plan([al_status(1)]), replace(frame_plan([lrw(0)]), divider=divider))
+    units = (SyncUnit("slow", (0,), divider=divider),)
     b = bench(axis(0, mode=first), drives=[OneExchangeLater()], frames=frames, sync_units=units)
     b.ask(GOAL_ENABLED)
-    b.steps(8 * every)
+    b.steps(8 * divider)
     assert b.axis_flags[0] & 1
     b.mode_target[0] = then
-    b.steps(5 * every)
+    b.steps(5 * divider)
     assert b.axis_flags[0] & 1
     assert not b.axis_flags[0] & AXIS_MODE_REFUSED
     assert b.drives[0].mode == then

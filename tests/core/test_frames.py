@@ -114,11 +114,11 @@ def test_a_late_frame_is_not_repeated() -> None:
     assert b.engine.counters["repeated"] == 0
 
 
-def numbered(*, every: int = 1) -> Bench:
+def numbered(*, divider: int = 1) -> Bench:
     """Two drives in two frames with cycle numbers, the second one with a divider."""
     plan = make_plan([axis(0), axis(1)])
-    units = (plan.sync_units[0], SyncUnit("second", (1,), every=every))
-    slow = replace(frame_plan([lrw(1), cycle_number()]), every=every)
+    units = (plan.sync_units[0], SyncUnit("second", (1,), divider=divider))
+    slow = replace(frame_plan([lrw(1), cycle_number()]), divider=divider)
     first = frame_plan([al_status(2), lrw(0), cycle_number()])
     return Bench(replace(plan, frames=(first, slow), sync_units=units))
 
@@ -148,9 +148,9 @@ def test_frames_repeated_128_frames_later_pass_as_current_and_are_counted() -> N
     assert b.engine.counters["stale"] == b.engine.counters["repeated"] == 271  # the true ones
 
 
-@pytest.mark.parametrize("every", [1, 3])
-def test_with_cycle_numbers_no_repeated_frame_passes(every: int) -> None:
-    b = numbered(every=every)
+@pytest.mark.parametrize("divider", [1, 3])
+def test_with_cycle_numbers_no_repeated_frame_passes(divider: int) -> None:
+    b = numbered(divider=divider)
     assert false_positions(b) == 0
     assert b.ok
     assert b.engine.counters["lost"] == 0
@@ -158,7 +158,7 @@ def test_with_cycle_numbers_no_repeated_frame_passes(every: int) -> None:
 
 
 def test_cycle_numbers_count_the_cycles() -> None:
-    b = numbered(every=2)
+    b = numbered(divider=2)
     b.engine.run(4)
     numbers = [
         int.from_bytes(datagram.data, "little")
@@ -170,7 +170,7 @@ def test_cycle_numbers_count_the_cycles() -> None:
 
 
 @pytest.mark.parametrize(
-    ("frames", "every", "exact", "refused"),
+    ("frames", "divider", "exact", "refused"),
     [
         (32, 1, False, None),
         (33, 1, False, "33 in one cycle, at most 32"),
@@ -182,13 +182,13 @@ def test_cycle_numbers_count_the_cycles() -> None:
     ],
 )
 def test_how_many_frames_a_cycle_may_have(
-    frames: int, every: int, exact: bool, refused: str | None
+    frames: int, divider: int, exact: bool, refused: str | None
 ) -> None:
     parts = [al_status(1), *([cycle_number()] if exact else [])]
     one = frame_plan(parts)
     plan = make_plan(
         frames=tuple(
-            replace(one, every=every, phase=k % every) if k else one for k in range(frames)
+            replace(one, divider=divider, phase=k % divider) if k else one for k in range(frames)
         ),
         device_count=1,
     )
@@ -333,16 +333,16 @@ def test_a_lost_second_frame(optional: bool) -> None:
 # ---- units that are exchanged every few cycles
 
 
-def slow_second(every: int, phase: int = 0, **options: object) -> Bench:
+def slow_second(divider: int, phase: int = 0, **options: object) -> Bench:
     """The second of two drives rides in a frame of its own, every so many cycles."""
     plan = make_plan([axis(0), axis(1)], **options)
-    units = (plan.sync_units[0], SyncUnit("second", (1,), every=every))
-    slow = replace(frame_plan([lrw(1)]), every=every, phase=phase)
+    units = (plan.sync_units[0], SyncUnit("second", (1,), divider=divider))
+    slow = replace(frame_plan([lrw(1)]), divider=divider, phase=phase)
     return Bench(replace(plan, frames=(frame_plan([al_status(2), lrw(0)]), slow), sync_units=units))
 
 
 def test_a_slow_unit_goes_out_in_its_own_cycles_only() -> None:
-    b = slow_second(every=4, phase=1)
+    b = slow_second(divider=4, phase=1)
     b.engine.run(12)
     assert [len(decode_frame(f).datagrams) for f in b.link.sent] == [2, 1, 2, 2, 2] * 3
     assert b.ok
@@ -350,7 +350,7 @@ def test_a_slow_unit_goes_out_in_its_own_cycles_only() -> None:
 
 
 def test_between_its_exchanges_a_slow_unit_keeps_its_inputs() -> None:
-    b = slow_second(every=3)
+    b = slow_second(divider=3)
     b.engine.run(3)
     b.drives[1].position = 1000
     b.engine.run(2)
@@ -361,7 +361,7 @@ def test_between_its_exchanges_a_slow_unit_keeps_its_inputs() -> None:
 
 def test_a_silent_slow_unit_counts_its_own_exchanges_in_a_row() -> None:
     """Good cycles between them do not make it forgotten, nor are they counted as lost."""
-    b = slow_second(every=3, lost_limit=3)
+    b = slow_second(divider=3, lost_limit=3)
     b.engine.run(3)
     b.segment.silent = {1}
     b.engine.run(3)
@@ -375,15 +375,15 @@ def test_a_silent_slow_unit_counts_its_own_exchanges_in_a_row() -> None:
     assert (b.engine.lost_in_row, b.unit_valid.tolist()) == (0, [1, 1])
 
 
-@pytest.mark.parametrize(("every", "phase"), [(0, 0), (3, 3), (3, -1), (20_000, 0)])
-def test_a_divisor_that_makes_no_sense_is_refused(every: int, phase: int) -> None:
-    with pytest.raises((ValueError, OverflowError), match=r"every|negative"):
-        slow_second(every, phase)
+@pytest.mark.parametrize(("divider", "phase"), [(0, 0), (3, 3), (3, -1), (20_000, 0)])
+def test_a_divisor_that_makes_no_sense_is_refused(divider: int, phase: int) -> None:
+    with pytest.raises((ValueError, OverflowError), match=r"divider|negative"):
+        slow_second(divider, phase)
 
 
 def test_a_unit_in_frames_of_different_cycles_is_refused() -> None:
     plan = make_plan([axis(0)])
-    again = replace(frame_plan([lrw(0)]), every=2)
+    again = replace(frame_plan([lrw(0)]), divider=2)
     with pytest.raises(ValueError, match="other cycles"):
         Bench(replace(plan, frames=(frame_plan([al_status(1), lrw(0)]), again)))
 
@@ -433,7 +433,7 @@ def test_a_link_that_does_not_send_is_counted_and_the_cycle_is_lost() -> None:
 
 
 def test_look_waits_for_the_deadline_and_looks_once() -> None:
-    b = bench(axis(0), receive_mode="look")
+    b = bench(axis(0), receive_mode="poll")
     b.engine.run(2)
     assert b.ok
     assert b.link.waits == [1_000_000, 1_500_000, 2_000_000, 2_500_000]
@@ -485,7 +485,7 @@ def with_datagram(frame, **changes) -> dict[str, object]:
         (lambda p, f, d: with_datagram(f, outputs=(Copy(40, -1, 2),)), "leaves the image"),
         (lambda p, f, d: {"output_size": -1}, "output_size"),
         (lambda p, f, d: {"receive_mode": "listen"}, "listen"),
-        (lambda p, f, d: {"order": "sideways"}, "sideways"),
+        (lambda p, f, d: {"execution": "sideways"}, "sideways"),
         (lambda p, f, d: {"period_ns": 0}, "period_ns"),
         (lambda p, f, d: {"collect_deadline_ns": 2_000_000}, "collect_deadline_ns"),
         (lambda p, f, d: {"priority": 100}, "priority"),

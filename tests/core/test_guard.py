@@ -25,7 +25,7 @@ from catenary.plan.cycle import AxisLimits, SyncUnit
 from catenary.plan.stop_reason import StopReason
 from tests.core.rig import CSP, CST, CSV, MS, Bench, ScriptedDrive, axis, bench
 
-ORDERS = ("threaded", "inline")
+EXECUTION_MODES = ("threaded", "inline")
 OE, QUICK_STOPPED, FAULT = 4, 5, 7
 
 
@@ -41,9 +41,9 @@ def dropped(b: Bench) -> bool:
     return bool(b.axis_flags[0] & AXIS_DROPPED)
 
 
-def driving(mode: int, *, order: str = "threaded", **more: object) -> Bench:
+def driving(mode: int, *, execution: str = "threaded", **more: object) -> Bench:
     """One axis, enabled and followed by an application that has committed once."""
-    b = bench(axis(0, mode=mode, **more), order=order)
+    b = bench(axis(0, mode=mode, **more), execution=execution)
     b.ask(GOAL_ENABLED)
     b.steps(12)
     assert followed(b)
@@ -53,9 +53,9 @@ def driving(mode: int, *, order: str = "threaded", **more: object) -> Bench:
 # ---- enabling
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_until_it_is_followed_the_target_is_the_actual_position(order: str) -> None:
-    b = bench(axis(0), drives=[ScriptedDrive(position=1234, moves=False)], order=order)
+@pytest.mark.parametrize("execution", EXECUTION_MODES)
+def test_until_it_is_followed_the_target_is_the_actual_position(execution: str) -> None:
+    b = bench(axis(0), drives=[ScriptedDrive(position=1234, moves=False)], execution=execution)
     b.ask(GOAL_ENABLED)
     for _ in range(10):
         b.target_position[0] = 99.0  # committed before anyone could see that it is followed
@@ -82,9 +82,9 @@ def test_a_target_counts_only_when_its_writer_had_seen_that_it_is_followed() -> 
     assert b.drives[0].target_position == 500
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_run_holds_and_hands_the_held_position_over(order: str) -> None:
-    b = bench(axis(0), drives=[ScriptedDrive(position=700)], order=order)
+@pytest.mark.parametrize("execution", EXECUTION_MODES)
+def test_run_holds_and_hands_the_held_position_over(execution: str) -> None:
+    b = bench(axis(0), drives=[ScriptedDrive(position=700)], execution=execution)
     b.enable()
     b.target_position[0] = 5.0
     b.engine.run(3)
@@ -212,9 +212,9 @@ def test_a_mode_may_change_while_running() -> None:
     assert b.drives[0].target_velocity == 800
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_a_change_of_mode_does_not_send_the_position_written_long_ago(order: str) -> None:
-    b = driving(CSV, order=order)
+@pytest.mark.parametrize("execution", EXECUTION_MODES)
+def test_a_change_of_mode_does_not_send_the_position_written_long_ago(execution: str) -> None:
+    b = driving(CSV, execution=execution)
     b.target_position[0] = 5.0  # nobody follows it
     b.steps(2)
     sent = []
@@ -387,9 +387,9 @@ def test_disabling_goes_by_disable_operation() -> None:
     assert b.drives[0].state == 2
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_quick_stop_all_and_the_native_end(order: str) -> None:
-    b = bench(axis(0), axis(1), order=order)
+@pytest.mark.parametrize("execution", EXECUTION_MODES)
+def test_quick_stop_all_and_the_native_end(execution: str) -> None:
+    b = bench(axis(0), axis(1), execution=execution)
     b.enable()
     b.steps(3)
     for drive in b.drives:
@@ -520,10 +520,10 @@ def test_nobody_is_late_before_and_between_applications() -> None:
 # ---- targets that are no numbers
 
 
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("execution", EXECUTION_MODES)
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_a_position_that_is_no_number_is_refused(order: str, value: float) -> None:
-    b = driving(CSP, order=order)
+def test_a_position_that_is_no_number_is_refused(execution: str, value: float) -> None:
+    b = driving(CSP, execution=execution)
     b.target_position[0] = 0.25
     b.steps(2)
     b.target_position[0] = value
@@ -553,11 +553,11 @@ def test_refused_for_too_long_is_a_quick_stop() -> None:
 # ---- limits
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_a_position_is_clamped_and_so_is_its_step(order: str) -> None:
+@pytest.mark.parametrize("execution", EXECUTION_MODES)
+def test_a_position_is_clamped_and_so_is_its_step(execution: str) -> None:
     # 0.1 rad a cycle
     limits = AxisLimits(position_min=-0.5, position_max=0.5, velocity=100.0, step=20.0)
-    b = driving(CSP, order=order, limits=limits)
+    b = driving(CSP, execution=execution, limits=limits)
     b.target_position[0] = 3.0
     steps = []
     for _ in range(8):

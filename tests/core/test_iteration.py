@@ -19,7 +19,7 @@ BUSY_WAIT = 60_000  # [ns]
 
 
 def started(link: TickingLink, **more: object) -> Engine:
-    engine = Engine(make_plan([axis(0)], order="inline", priority=None, **more), link.capsule)
+    engine = Engine(make_plan([axis(0)], execution="inline", priority=None, **more), link.capsule)
     engine.start()
     return engine
 
@@ -29,7 +29,7 @@ def ticking() -> TickingLink:
 
 
 def test_the_first_step_commits_nothing_and_time_counts_from_it() -> None:
-    b = bench(axis(0), order="inline")
+    b = bench(axis(0), execution="inline")
     b.steps(3)
     iteration = Iteration(b.engine, lambda flags: None, trouble=0, al_status=b.engine.al_status)
     cycle = next(iteration)
@@ -41,7 +41,7 @@ def test_the_first_step_commits_nothing_and_time_counts_from_it() -> None:
 
 
 def test_trouble_and_a_wrong_al_state_are_judged() -> None:
-    b = bench(axis(0), order="inline")
+    b = bench(axis(0), execution="inline")
     b.steps(1)
     judged: list[int] = []
     right = b.engine.al_status
@@ -53,7 +53,7 @@ def test_trouble_and_a_wrong_al_state_are_judged() -> None:
 
 
 def test_what_the_judge_raises_ends_the_iteration() -> None:
-    b = bench(axis(0), order="inline")
+    b = bench(axis(0), execution="inline")
 
     def judge(flags: int) -> None:
         raise LookupError("judged")
@@ -75,7 +75,7 @@ def test_a_busy_wait_begins_before_the_cycle_start_and_ends_at_it() -> None:
 
 
 def test_virtual_time_has_no_busy_wait() -> None:
-    b = bench(axis(0), order="inline", busy_wait_ns=BUSY_WAIT)
+    b = bench(axis(0), execution="inline", busy_wait_ns=BUSY_WAIT)
     b.steps(2)
     assert b.link.waits == [PERIOD, 2 * PERIOD]
 

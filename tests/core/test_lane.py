@@ -15,9 +15,9 @@ def lane_frames(b: Bench) -> list[bytes]:
     return [f for f in b.link.sent if decode_frame(f).datagrams[0].index >= 0x80]
 
 
-@pytest.mark.parametrize("order", ["threaded", "inline"])
-def test_a_frame_goes_out_after_the_cyclic_one_and_comes_back(order: str) -> None:
-    b = bench(axis(0), order=order)
+@pytest.mark.parametrize("execution", ["threaded", "inline"])
+def test_a_frame_goes_out_after_the_cyclic_one_and_comes_back(execution: str) -> None:
+    b = bench(axis(0), execution=execution)
     b.engine.run(1)
     sent = len(b.link.sent)
     assert b.engine.lane_push(request(7))
@@ -61,7 +61,7 @@ def test_only_what_fits_into_the_wire_time_left_and_one_frame_in_any_case(
 
 
 def test_a_late_body_leaves_less_of_the_wire() -> None:
-    b = bench(axis(0), order="inline", acyclic_ns=900_000)
+    b = bench(axis(0), execution="inline", acyclic_ns=900_000)
     b.steps(2)
     for k in range(8):
         assert b.engine.lane_push(request(k, size=1400))

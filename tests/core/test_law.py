@@ -1,4 +1,4 @@
-"""Laws in the cycle: in every order, handed over, ended, got out of. Virtual time throughout."""
+"""Laws in the cycle, in every execution mode: handed over, ended, left. Virtual time throughout."""
 
 import ctypes
 import gc
@@ -44,7 +44,7 @@ from tests.core.rig import (
     number,
 )
 
-ORDERS = ("threaded", "inline")
+EXECUTION_MODES = ("threaded", "inline")
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 STEP = ctypes.CFUNCTYPE(
     ctypes.c_int,
@@ -118,9 +118,9 @@ def spring(frame: Frame) -> int:
     return 0
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_a_law_acts_on_the_inputs_of_its_own_cycle_and_no_cycle_is_lost(order: str) -> None:
-    b = bench(axis(0, mode=CST), order=order)
+@pytest.mark.parametrize("execution", EXECUTION_MODES)
+def test_a_law_acts_on_the_inputs_of_its_own_cycle_and_no_cycle_is_lost(execution: str) -> None:
+    b = bench(axis(0, mode=CST), execution=execution)
     b.ask(GOAL_ENABLED)
     b.engine.run(10)
     assert b.drives[0].state == 1  # a brake does not open before somebody holds the load
@@ -135,9 +135,9 @@ def test_a_law_acts_on_the_inputs_of_its_own_cycle_and_no_cycle_is_lost(order: s
     assert b.engine.counters["lost"] == 0
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_a_law_sees_what_it_was_promised(order: str) -> None:
-    b = bench(axis(0), axis(1), order=order)
+@pytest.mark.parametrize("execution", EXECUTION_MODES)
+def test_a_law_sees_what_it_was_promised(execution: str) -> None:
+    b = bench(axis(0), axis(1), execution=execution)
     b.enable()
     seen: list[tuple] = []
 
@@ -154,27 +154,27 @@ def test_a_law_sees_what_it_was_promised(order: str) -> None:
     assert all(entry[3] == [1, 1] for entry in seen)
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_the_limits_hold_for_laws_too(order: str) -> None:
+@pytest.mark.parametrize("execution", EXECUTION_MODES)
+def test_the_limits_hold_for_laws_too(execution: str) -> None:
     def wild(frame: Frame) -> int:
         frame.target["torque"][0] = 99.0
         return 0
 
     limits = AxisLimits(torque=2.0)
-    b = bench(axis(0, mode=CST, limits=limits, torque_slope=100.0), order=order)
+    b = bench(axis(0, mode=CST, limits=limits, torque_slope=100.0), execution=execution)
     b.ask(GOAL_ENABLED)
     b.engine.start_law(make_law(b, wild))
     assert b.steps(20) & CYCLE_LIMITED
     assert b.drives[0].target_torque == 2000
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_a_finished_law_leaves_the_axes_holding_and_python_where_it_ended(order: str) -> None:
+@pytest.mark.parametrize("execution", EXECUTION_MODES)
+def test_a_finished_law_leaves_the_axes_holding_and_python_where_it_ended(execution: str) -> None:
     def until_soon(frame: Frame) -> int:
         frame.target["position"][0] += 0.001
         return frame.time > 0.03
 
-    b = bench(axis(0), order=order)
+    b = bench(axis(0), execution=execution)
     b.enable()
     b.target_position[0] = -0.5  # committed before: must not come back
     b.engine.next()
@@ -198,9 +198,9 @@ def test_a_finished_law_leaves_the_axes_holding_and_python_where_it_ended(order:
     assert b.drives[0].state == 4
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_run_law_goes_on_until_its_end(order: str) -> None:
-    b = bench(axis(0), order=order)
+@pytest.mark.parametrize("execution", EXECUTION_MODES)
+def test_run_law_goes_on_until_its_end(execution: str) -> None:
+    b = bench(axis(0), execution=execution)
     b.enable()
     law = make_law(b, lambda frame: frame.time > 0.02)
     b.engine.start_law(law)
@@ -223,14 +223,14 @@ def failing(b: Bench, body: Callable[[Frame], int], **more: int) -> tuple[Law, i
     raise AssertionError("the law did not fail")
 
 
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("execution", EXECUTION_MODES)
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
-def test_a_target_that_is_no_number_stops_the_drives(order: str, value: float) -> None:
+def test_a_target_that_is_no_number_stops_the_drives(execution: str, value: float) -> None:
     def breaks(frame: Frame) -> int:
         frame.target["position"][1] = value if frame.time > 0.01 else frame.target["position"][1]
         return 0
 
-    b = bench(axis(0), axis(1), order=order)
+    b = bench(axis(0), axis(1), execution=execution)
     law, flags = failing(b, breaks)
     assert flags & CYCLE_LAW_FAILED
     assert (law.status, law.axis) == (LAW_NOT_FINITE, 1)
@@ -239,11 +239,11 @@ def test_a_target_that_is_no_number_stops_the_drives(order: str, value: float) -
     assert all(np.isfinite(b.target_position))
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_what_a_failed_step_has_half_written_is_not_sent(order: str) -> None:
+@pytest.mark.parametrize("execution", EXECUTION_MODES)
+def test_what_a_failed_step_has_half_written_is_not_sent(execution: str) -> None:
     valve = Column("valve", number(DRIVE_SIZE, 8), Bank.INTEGER, 1, 0)
     drives = [ScriptedDrive(), ScriptedDrive()]
-    plan = replace(make_plan([axis(0)], units=2, order=order), output_columns=(valve,))
+    plan = replace(make_plan([axis(0)], units=2, execution=execution), output_columns=(valve,))
     b = Bench(plan, drives)
 
     def breaks(frame: Frame) -> int:
@@ -257,9 +257,9 @@ def test_what_a_failed_step_has_half_written_is_not_sent(order: str) -> None:
     assert drives[0].state != 4
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_one_long_step_is_counted_several_in_a_row_stop(order: str) -> None:
-    b = bench(axis(0), order=order)
+@pytest.mark.parametrize("execution", EXECUTION_MODES)
+def test_one_long_step_is_counted_several_in_a_row_stop(execution: str) -> None:
+    b = bench(axis(0), execution=execution)
 
     def slow(frame: Frame) -> int:
         if frame.time in (0.0, PERIOD * 1e-9) or frame.time > 0.01:
@@ -274,7 +274,7 @@ def test_one_long_step_is_counted_several_in_a_row_stop(order: str) -> None:
 
 
 def test_memory_and_parameters_change_all_at_once_and_can_be_read_back() -> None:
-    b = bench(axis(0), order="threaded")
+    b = bench(axis(0), execution="threaded")
     b.enable()
 
     def count(frame: Frame) -> int:
@@ -299,7 +299,7 @@ def test_memory_and_parameters_change_all_at_once_and_can_be_read_back() -> None
 
 
 def test_numbers_given_while_others_are_converted_come_whole() -> None:
-    b = bench(axis(0), order="threaded")
+    b = bench(axis(0), execution="threaded")
     b.enable()
     law = make_law(b, lambda frame: 0, memory=[1.0])
 
@@ -315,7 +315,7 @@ def test_numbers_given_while_others_are_converted_come_whole() -> None:
 
 
 def test_a_law_can_be_stopped_and_another_started() -> None:
-    b = bench(axis(0), order="threaded")
+    b = bench(axis(0), execution="threaded")
     b.enable()
     first, second = make_law(b, lambda frame: 0), make_law(b, lambda frame: 0)
     b.engine.start_law(first)
@@ -332,9 +332,9 @@ def test_a_law_can_be_stopped_and_another_started() -> None:
     assert b.drives[0].target_position == 2
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_of_two_requests_in_one_cycle_the_last_one_is_served(order: str) -> None:
-    b = bench(axis(0), order=order)
+@pytest.mark.parametrize("execution", EXECUTION_MODES)
+def test_of_two_requests_in_one_cycle_the_last_one_is_served(execution: str) -> None:
+    b = bench(axis(0), execution=execution)
     b.enable()
     first, second, third = (make_law(b, lambda frame: 0) for _ in range(3))
     b.engine.start_law(first)
@@ -365,11 +365,11 @@ def endless(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
     return ctypes.CDLL(str(library))
 
 
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("execution", EXECUTION_MODES)
 def test_a_law_that_never_returns_is_given_up_and_the_bus_goes_on(
-    order: str, endless: ctypes.CDLL
+    execution: str, endless: ctypes.CDLL
 ) -> None:
-    b = bench(axis(0), order=order)
+    b = bench(axis(0), execution=execution)
     b.enable()
     address = ctypes.cast(endless.endless, ctypes.c_void_p).value
     law = Law(address, [], [], budget_ns=0, overrun_limit=3, priority=0)
@@ -415,9 +415,11 @@ def is_asleep(thread: str) -> bool:
     return False
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_the_laws_of_an_engine_share_one_monitor_that_sleeps_while_none_runs(order: str) -> None:
-    b = bench(axis(0), order=order)
+@pytest.mark.parametrize("execution", EXECUTION_MODES)
+def test_the_laws_of_an_engine_share_one_monitor_that_sleeps_while_none_runs(
+    execution: str,
+) -> None:
+    b = bench(axis(0), execution=execution)
     b.enable()
     before = threads()
     laws = [make_law(b, lambda frame: 0) for _ in range(3)]
@@ -478,15 +480,15 @@ def test_a_late_cycle_that_leaves_the_law_no_time_is_skipped_instead_of_lost() -
     assert b.engine.counters["late"] == 1
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_the_last_targets_of_a_law_are_sent_as_they_are(order: str) -> None:
+@pytest.mark.parametrize("execution", EXECUTION_MODES)
+def test_the_last_targets_of_a_law_are_sent_as_they_are(execution: str) -> None:
     """The torque slope shapes the return to the application's set-points only."""
 
     def body(frame: Frame) -> int:
         frame.target["torque"][0] = 0.8 if frame.time > 0.015 else 0.5
         return frame.time > 0.015
 
-    b = bench(axis(0, mode=CST, torque_slope=10.0), order=order)
+    b = bench(axis(0, mode=CST, torque_slope=10.0), execution=execution)
     b.ask(GOAL_ENABLED)
     b.engine.start_law(make_law(b, body))
     b.steps(25)
@@ -496,7 +498,7 @@ def test_the_last_targets_of_a_law_are_sent_as_they_are(order: str) -> None:
 @pytest.mark.parametrize("starts", [True, False])
 def test_a_waiting_call_of_an_inline_loop_keeps_the_axes_enabled(starts: bool) -> None:
     """Its native cycles must not take the requests of an older commit over."""
-    b = bench(axis(0), order="inline")
+    b = bench(axis(0), execution="inline")
     b.enable()
     b.steps(3)
     if starts:
@@ -516,7 +518,7 @@ def test_the_first_step_in_an_inline_loop_sees_an_estimated_velocity() -> None:
         frame.target["position"][0] += 0.002
         return 0
 
-    b = bench(axis(0, actual_velocity=None), order="inline")
+    b = bench(axis(0, actual_velocity=None), execution="inline")
     b.enable()
     for _ in range(10):
         b.target_position[0] += 0.002

@@ -98,6 +98,6 @@ def test_no_right_to_lock_is_no_error() -> None:
     assert "(EPERM, RLIMIT_MEMLOCK 0 kB: raise `ulimit -l`, or grant CAP_IPC_LOCK)" in text
 
 
-@pytest.mark.parametrize("order", ["threaded", "inline"])
-def test_nothing_is_locked_in_virtual_time(order: str) -> None:
-    assert bench(order=order, units=1).engine.scheduling == "virtual time"
+@pytest.mark.parametrize("execution", ["threaded", "inline"])
+def test_nothing_is_locked_in_virtual_time(execution: str) -> None:
+    assert bench(execution=execution, units=1).engine.scheduling == "virtual time"

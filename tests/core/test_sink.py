@@ -62,8 +62,10 @@ class Sink:
         return np.array([each[2 + block][offset : offset + size].view(code) for each in self.given])
 
 
-def opened(order: str, **options: object) -> tuple[Bench, Sink]:
-    b = Bench(make_plan([axis(0), axis(1)], order=order), [ScriptedDrive(), ScriptedDrive()])
+def opened(execution: str, **options: object) -> tuple[Bench, Sink]:
+    b = Bench(
+        make_plan([axis(0), axis(1)], execution=execution), [ScriptedDrive(), ScriptedDrive()]
+    )
     b.engine.stop()
     sink = Sink(b, **options)  # type: ignore[arg-type]
     b.engine.set_sink(sink.capsule)
@@ -71,9 +73,9 @@ def opened(order: str, **options: object) -> tuple[Bench, Sink]:
     return b, sink
 
 
-@pytest.mark.parametrize("order", ["threaded", "inline"])
-def test_every_cycle_once_with_what_was_known_and_sent(order: str) -> None:
-    b, sink = opened(order)
+@pytest.mark.parametrize("execution", ["threaded", "inline"])
+def test_every_cycle_once_with_what_was_known_and_sent(execution: str) -> None:
+    b, sink = opened(execution)
     b.enable()
     for k in range(10):
         b.target_position[:] = b.actual_position + 0.001 * k
@@ -82,18 +84,18 @@ def test_every_cycle_once_with_what_was_known_and_sent(order: str) -> None:
     assert numbers == list(range(1, len(numbers) + 1))
     assert numbers == [told["number"] for _, told, *_ in sink.given]
     assert (np.diff([told["scheduled_ns"] for _, told, *_ in sink.given]) == 1_000_000).all()
-    if order != "inline":  # there the tail of the newest cycle comes behind the next body
+    if execution != "inline":  # there the tail of the newest cycle comes behind the next body
         assert sink.field("position", 0)[-1] == pytest.approx(b.actual_position)
-    assert len(sink.given) == b.engine.number - (order == "inline")
+    assert len(sink.given) == b.engine.number - (execution == "inline")
     commanded = sink.field("commanded_position", 0)
     assert commanded[-1] == pytest.approx([d.target_position / 1000 for d in b.drives], abs=1e-3)
     assert (sink.field("target_mode", 1) == CSP).all()
 
 
-@pytest.mark.parametrize("order", ["threaded", "inline"])
-def test_it_comes_behind_the_frames_of_its_cycle(order: str) -> None:
+@pytest.mark.parametrize("execution", ["threaded", "inline"])
+def test_it_comes_behind_the_frames_of_its_cycle(execution: str) -> None:
     sent: list[int] = []
-    b, sink = opened(order, look=lambda: len(sent))
+    b, sink = opened(execution, look=lambda: len(sent))
     b.link.sent = sent
     b.steps(5)
     frames = [each[4] for each in sink.given]
@@ -101,15 +103,15 @@ def test_it_comes_behind_the_frames_of_its_cycle(order: str) -> None:
     assert frames[-1] == len(sent)
 
 
-@pytest.mark.parametrize("order", ["threaded", "inline"])
-def test_the_controlword_is_that_of_the_frames_of_its_cycle(order: str) -> None:
+@pytest.mark.parametrize("execution", ["threaded", "inline"])
+def test_the_controlword_is_that_of_the_frames_of_its_cycle(execution: str) -> None:
     on_the_wire: list[list[int]] = []
 
     def look() -> int:
         on_the_wire.append([drive.controlword for drive in b.drives])
         return 0
 
-    b, sink = opened(order, look=look)
+    b, sink = opened(execution, look=look)
     b.enable()
     b.steps(3)
     b.controlword_bits[0] = 0x0010  # of the mode, in OPERATION_ENABLED

@@ -10,7 +10,7 @@ from catenary.plan.stop_reason import StopReason
 from tests.core.rig import CSV, Bench, axis, bench
 from tests.core.test_law import Frame, make_law
 
-ORDERS = ("threaded", "inline")
+EXECUTION_MODES = ("threaded", "inline")
 
 
 def rows(*positions: float) -> bytes:
@@ -18,17 +18,17 @@ def rows(*positions: float) -> bytes:
     return np.array([[p, 0.0, 0.0] for p in positions]).tobytes()
 
 
-def streaming(order: str, **more: object) -> tuple[Bench, Stream]:
-    b = bench(axis(0, **more), order=order)
+def streaming(execution: str, **more: object) -> tuple[Bench, Stream]:
+    b = bench(axis(0, **more), execution=execution)
     b.enable()
     stream = Stream(1, 8)
     b.engine.set_stream(stream)
     return b, stream
 
 
-@pytest.mark.parametrize("order", ["threaded", "inline"])
-def test_one_row_a_cycle_whatever_python_writes(order: str) -> None:
-    b, stream = streaming(order)
+@pytest.mark.parametrize("execution", ["threaded", "inline"])
+def test_one_row_a_cycle_whatever_python_writes(execution: str) -> None:
+    b, stream = streaming(execution)
     assert stream.write(rows(0.001, 0.002, 0.003), b.engine.number) == 3
     seen = []
     for _ in range(3):
@@ -40,9 +40,9 @@ def test_one_row_a_cycle_whatever_python_writes(order: str) -> None:
     assert stream.dry == 0
 
 
-@pytest.mark.parametrize("order", ["threaded", "inline"])
-def test_an_empty_stream_is_an_underrun_that_is_reported_and_ends(order: str) -> None:
-    b, stream = streaming(order)
+@pytest.mark.parametrize("execution", ["threaded", "inline"])
+def test_an_empty_stream_is_an_underrun_that_is_reported_and_ends(execution: str) -> None:
+    b, stream = streaming(execution)
     b.steps(3)
     assert stream.dry == 0  # not begun: nothing was promised yet
     stream.write(rows(0.001), b.engine.number)
@@ -74,9 +74,9 @@ def test_the_velocity_of_an_empty_stream_goes_to_zero() -> None:
     assert b.drives[0].target_velocity == 0
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_a_law_finds_the_row_in_its_targets(order: str) -> None:
-    b, stream = streaming(order)
+@pytest.mark.parametrize("execution", EXECUTION_MODES)
+def test_a_law_finds_the_row_in_its_targets(execution: str) -> None:
+    b, stream = streaming(execution)
 
     def mirror(frame: Frame) -> int:
         frame.target["position"][0] *= -1
@@ -141,10 +141,10 @@ def test_no_row_is_torn_lost_or_doubled_between_two_threads() -> None:
     assert len(seen) == count
 
 
-@pytest.mark.parametrize("order", ["threaded", "inline"])
-def test_rows_written_before_an_axis_was_enabled_again_do_not_move_it(order: str) -> None:
+@pytest.mark.parametrize("execution", ["threaded", "inline"])
+def test_rows_written_before_an_axis_was_enabled_again_do_not_move_it(execution: str) -> None:
     """It would jump to the row of the moment. It follows what is written from then on."""
-    b, stream = streaming(order)
+    b, stream = streaming(execution)
     stream.write(rows(*np.linspace(0.001, 0.008, 8)), b.engine.number)
     b.steps(2)
     b.drives[0].state = 1

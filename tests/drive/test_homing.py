@@ -34,7 +34,7 @@ def opened(
                 **options,
             },
         )
-        with cat.Loop(arm, period=1e-3, run=run) as loop:
+        with cat.Loop(arm, period=1e-3, execution=run) as loop:
             yield arm, loop
 
 

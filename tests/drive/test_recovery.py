@@ -47,7 +47,9 @@ def rig(*faults: object, **options: float) -> Iterator[Rig]:
         arm = cat.Drives(
             main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0, required=False
         )
-        with cat.Loop(arm, period=MS, raise_faults=False, lost_limit=1000) as loop:
+        with cat.Loop(
+            arm, period=MS, stop=cat.StopPolicy(raise_faults=False, lost_limit=1000)
+        ) as loop:
             yield Rig(segment, arm, loop, **options)
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+import catenary as cat
+from catenary.igh import Master
 from tests.igh.double import Double, build
 
 
@@ -20,3 +23,11 @@ def doubles(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 def double(doubles: dict[str, Path], request: pytest.FixtureRequest) -> Double:
     """Two drives, behind the oldest and a newer interface."""
     return Double(doubles[request.param])
+
+
+@pytest.fixture
+def main(double: Double) -> Iterator[cat.MainDevice]:
+    """A scanned MainDevice over the double."""
+    with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
+        main.scan()
+        yield main

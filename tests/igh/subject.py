@@ -15,6 +15,7 @@ from pathlib import Path
 import catenary as cat
 from catenary.igh import Master
 from tests.igh.double import Double
+from tests.loop_options import grouped
 
 REAL = os.environ.get("CATENARY_IGH")
 PERIOD = 2e-3
@@ -37,7 +38,7 @@ class Subject:
         """One that no stalled machine stops."""
         calm = {"watchdog": max(0.1, 50 * self.period), "late_limit": 0, "lost_limit": 100}
         settings = {"period": self.period, "enable": False, **calm, **options}
-        return cat.Loop(*wishes, **settings)  # type: ignore[arg-type]
+        return cat.Loop(*wishes, **grouped(settings))  # type: ignore[arg-type]
 
     def inputs(self, main: cat.MainDevice) -> list[cat.Inputs]:
         """All inputs of all devices."""

@@ -50,7 +50,7 @@ def test_a_device_is_followed_where_it_is_plugged_in(main: cat.MainDevice, doubl
     """The two drives of the tool and the one in front of it change their places."""
     double.set(1, 0x6076, 0, 5000)
     tool = cat.Drives([main.subs.group(7)[0]], counts_per_turn=1000, velocity_limit=100.0)
-    with cat.Loop(tool, raise_faults=False) as loop:
+    with cat.Loop(tool, stop=cat.StopPolicy(raise_faults=False)) as loop:
         double.swap(0, 1)
         for _ in range(50):
             next(loop)

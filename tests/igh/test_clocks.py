@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -13,21 +12,9 @@ from catenary import igh
 from catenary.igh import Master
 from catenary.plan.make import make_plan
 from tests.igh.double import Double
+from tests.igh.loops import clocked_loop
 
 PERIOD_NS = 1_000_000
-
-
-@pytest.fixture
-def main(double: Double) -> Iterator[cat.MainDevice]:
-    with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
-        main.scan()
-        yield main
-
-
-def loop_of(main: cat.MainDevice, **options: object) -> cat.Loop:
-    return cat.Loop(
-        cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0, dc=True), **options
-    )
 
 
 def times_of(calls: list[str], name: str) -> list[int]:
@@ -35,7 +22,7 @@ def times_of(calls: list[str], name: str) -> list[int]:
 
 
 def test_sync0_fires_behind_the_frames(main: cat.MainDevice, double: Double) -> None:
-    with loop_of(main, margin=100e-6):
+    with clocked_loop(main, margin=100e-6):
         pass
     [first, second] = [call for call in double.calls() if call.startswith("dc ")]
     position, assign, cycle, shift, *_ = first.split()[1:]
@@ -45,7 +32,7 @@ def test_sync0_fires_behind_the_frames(main: cat.MainDevice, double: Double) -> 
 
 
 def test_application_time_keeps_to_the_grid(main: cat.MainDevice, double: Double) -> None:
-    with loop_of(main, clock="main") as loop:
+    with clocked_loop(main, lead="main") as loop:
         double.forget()
         for _ in range(5):
             next(loop)
@@ -55,7 +42,7 @@ def test_application_time_keeps_to_the_grid(main: cat.MainDevice, double: Double
 
 def test_the_reference_follows_the_machine(main: cat.MainDevice, double: Double) -> None:
     """1.5.2 has no call that takes the time: the application time is taken."""
-    with loop_of(main, clock="main") as loop:
+    with clocked_loop(main, lead="main") as loop:
         double.forget()
         next(loop)
         calls = double.calls()
@@ -71,7 +58,7 @@ def test_the_machine_follows_the_reference(doubles: dict[str, Path], ppm: int) -
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         main.scan()
         assert isinstance(main, igh.MainDevice)
-        with loop_of(main, run="inline") as loop:
+        with clocked_loop(main, execution="inline") as loop:
             exchange = main.configuration.exchange
             begin = main.link.now()
             for _ in range(4000):
@@ -119,7 +106,7 @@ def test_whole_periods_are_no_phase_error(
     a real master: -998115 ns, which were chased until the drives left OP with 0x001A)."""
     reference.ahead_ns = periods * PERIOD_NS + 1885
     double.reference(main.link.now() + reference.ahead_ns)
-    with loop_of(main, run="inline", clock="reference") as loop:
+    with clocked_loop(main, execution="inline", lead="reference") as loop:
         reference.follow(loop, 100)
         before = reference.figures["offset_ns"]
         reference.follow(loop, 1000)
@@ -155,7 +142,7 @@ def test_late_frames_are_no_jumps(
     main: cat.MainDevice, double: Double, reference: Reference
 ) -> None:
     """A frame that the segment, or this thread, delays says nothing about clocks."""
-    with loop_of(main, run="inline", clock="reference") as loop:
+    with clocked_loop(main, execution="inline", lead="reference") as loop:
         reference.follow(loop, 200)
         loop.clocks.reset()
         assert loop.clocks.locked
@@ -172,7 +159,7 @@ def test_a_clock_that_jumps_in_operation_is_followed_slowly(
     main: cat.MainDevice, double: Double, reference: Reference
 ) -> None:
     """By 0.1 % of the period in a cycle, and no drift is learnt from it."""
-    with loop_of(main, run="inline", clock="reference") as loop:
+    with clocked_loop(main, execution="inline", lead="reference") as loop:
         reference.follow(loop, 100)
         before = int(reference.figures["offset_ns"])
         reference.ahead_ns += 300_000
@@ -187,7 +174,7 @@ def test_a_clock_that_jumps_in_operation_is_followed_slowly(
 
 def test_a_reference_clock_can_be_chosen(main: cat.MainDevice, double: Double) -> None:
     arm = cat.Drives([main.subs[1]], counts_per_turn=1000, velocity_limit=100.0, dc=True)
-    with cat.Loop(arm, reference=main.subs[1]):
+    with cat.Loop(arm, clocks=cat.ClockOptions(reference=main.subs[1])):
         pass
     assert "select_reference_clock 1" in double.calls()
 
@@ -197,7 +184,7 @@ def test_the_watch_of_the_clocks(main: cat.MainDevice, double: Double, clock: st
     """Phase and the largest difference of every cycle, single differences one after the other."""
     double.spread(300)
     double.register(1, 0x092C, 0x00FA)
-    with loop_of(main, clock=clock) as loop:
+    with clocked_loop(main, lead=clock) as loop:
         loop.wait_locked(within=1e-6)
         assert loop.clocks.locked
         for _ in range(60):
@@ -217,7 +204,7 @@ def test_the_watch_of_the_clocks(main: cat.MainDevice, double: Double, clock: st
 def test_clocks_that_do_not_come_together_are_told(main: cat.MainDevice, double: Double) -> None:
     double.spread(50_000)
     with (
-        loop_of(main) as loop,
+        clocked_loop(main) as loop,
         pytest.raises(cat.errors.ClockError, match=r"not within 1 us after 0\.2 s"),
     ):
         loop.wait_locked(within=1e-6, timeout=0.2)
@@ -225,7 +212,7 @@ def test_clocks_that_do_not_come_together_are_told(main: cat.MainDevice, double:
 
 def test_a_silent_reference_is_asked_seldom(main: cat.MainDevice, double: Double) -> None:
     """libethercat writes a line on stderr for each question without an answer."""
-    with loop_of(main) as loop:
+    with clocked_loop(main) as loop:
         double.fail(b"reference_clock_time", -6)
         double.forget()
         for _ in range(200):

@@ -15,6 +15,7 @@ from catenary.igh.library import Library
 from catenary.igh.master import Master
 from catenary.loop.carried import carried
 from tests.igh.double import Double
+from tests.loop_options import grouped
 
 
 @pytest.fixture
@@ -102,7 +103,7 @@ def test_no_domain_is_processed_before_its_frame_is_back(doubles: dict[str, Path
     with cat.MainDevice(Master(library=double.path)) as main:
         main.scan()
         arm = cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0)
-        with cat.Loop(arm, period=4e-3, late_limit=0, priority=None) as loop:
+        with cat.Loop(arm, period=4e-3, stop=cat.StopPolicy(late_limit=0), priority=None) as loop:
             double.early()  # bring-up: nothing is known of the answers before the first cycle
             for _ in range(60):
                 assert next(loop).ok
@@ -114,7 +115,7 @@ def test_the_monitor_leaves_last_where_answers_are_waited_for(doubles: dict[str,
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         main.scan()
         arm = cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0)
-        with cat.Loop(arm, run="threaded") as loop:
+        with cat.Loop(arm, execution="threaded") as loop:
             double.forget()
             next(loop)
             calls = double.calls()
@@ -131,7 +132,7 @@ def test_a_ring_without_its_main_interface_is_not_waited_for(doubles: dict[str, 
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         main.scan()
         arm = cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0)
-        with cat.Loop(arm, run="threaded") as loop:
+        with cat.Loop(arm, execution="threaded") as loop:
             double.mainless(1)
             assert all(next(loop).ok for _ in range(50))
             double.forget()
@@ -151,7 +152,7 @@ def test_slow_answers_of_devices_that_need_not_be_there_are_found(doubles: dict[
             main.subs.drives, counts_per_turn=1000, velocity_limit=100.0, required=False
         )
         calm = {"late_limit": 0, "priority": None, "watchdog": 2.0, "enable": False}
-        with cat.Loop(arm, period=50e-3, **calm) as loop:  # type: ignore[arg-type]
+        with cat.Loop(arm, period=50e-3, **grouped(calm)) as loop:  # type: ignore[arg-type]
             for cycle in loop:
                 if arm.present.all() or cycle.number > 100:
                     break

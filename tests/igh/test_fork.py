@@ -40,7 +40,7 @@ def test_a_child_closes_its_copies_and_commands_nothing(double: Double, run: str
 
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=1000, velocity_limit=100.0)
-        with cat.Loop(arm, run=run) as loop:
+        with cat.Loop(arm, execution=run) as loop:
             next(loop)
             double.forget()
             assert in_child(released)

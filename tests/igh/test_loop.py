@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -17,13 +16,6 @@ from catenary.igh import Master
 from tests.igh.double import Double
 
 TURN = 2 * math.pi
-
-
-@pytest.fixture
-def main(double: Double) -> Iterator[cat.MainDevice]:
-    with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
-        main.scan()
-        yield main
 
 
 def arm_of(main: cat.MainDevice, **options: object) -> cat.Drives:
@@ -45,7 +37,7 @@ def test_a_scan_finds_drives(main: cat.MainDevice) -> None:
 @pytest.mark.parametrize("run", ["threaded", "inline"])
 def test_drives_follow(main: cat.MainDevice, double: Double, run: str) -> None:
     arm = arm_of(main)
-    with cat.Loop(arm, run=run) as loop:
+    with cat.Loop(arm, execution=run) as loop:
         assert arm.enabled.all()
         home = arm.actual.position.copy()
         np.testing.assert_allclose(home, [0.0, TURN])
@@ -78,7 +70,7 @@ def test_a_law_runs_natively(main: cat.MainDevice) -> None:
 
 
 def test_the_calls_of_a_cycle_and_their_order(main: cat.MainDevice, double: Double) -> None:
-    with cat.Loop(arm_of(main), run="inline") as loop:
+    with cat.Loop(arm_of(main), execution="inline") as loop:
         next(loop)
         double.forget()
         for _ in range(3):
@@ -133,8 +125,8 @@ def test_the_mapping_is_changed_where_something_is_missing(
 def test_sync_units_are_domains(main: cat.MainDevice, double: Double) -> None:
     left, right = main.subs.drives
     one = cat.Drives([left], counts_per_turn=1000, velocity_limit=100.0)
-    two = cat.Drives([right], counts_per_turn=1000, velocity_limit=100.0, required=False, every=2)
-    with cat.Loop(one, two, run="inline") as loop:
+    two = cat.Drives([right], counts_per_turn=1000, velocity_limit=100.0, required=False, divider=2)
+    with cat.Loop(one, two, execution="inline") as loop:
         next(loop)
         double.forget()
         for _ in range(4):
@@ -225,7 +217,7 @@ def test_the_real_clock(doubles: dict[str, Path]) -> None:
     with cat.MainDevice(Master(library=double.path)) as main:
         main.scan()
         arm = arm_of(main)
-        with cat.Loop(arm, period=2e-3, late_limit=0, priority=None) as loop:
+        with cat.Loop(arm, period=2e-3, stop=cat.StopPolicy(late_limit=0), priority=None) as loop:
             for cycle in loop:
                 arm.target.position[:] = arm.actual.position
                 if cycle.number > 20:
@@ -325,7 +317,7 @@ def test_two_masters_in_one_loop(doubles: dict[str, Path], tmp_path: Path) -> No
             cat.Drives(main.scan().drives, counts_per_turn=1000, velocity_limit=100.0)
             for main in (first, second)
         ]
-        with cat.Loop(*arms, period=5e-3, late_limit=0, priority=None) as loop:
+        with cat.Loop(*arms, period=5e-3, stop=cat.StopPolicy(late_limit=0), priority=None) as loop:
             for cycle in loop:
                 assert cycle.ok
                 for arm in arms:

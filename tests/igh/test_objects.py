@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -13,18 +12,12 @@ from catenary.errors import ConfigurationError, MailboxError, SdoAbort
 from catenary.igh import MainDevice, Master, SubDevice
 from catenary.types import UDINT, UINT
 from tests.igh.double import Double
-
-
-@pytest.fixture
-def main(double: Double) -> Iterator[cat.MainDevice]:
-    with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
-        main.scan()
-        yield main
+from tests.loop_options import grouped
 
 
 def loop_of(main: cat.MainDevice, **options: object) -> cat.Loop:
     return cat.Loop(
-        cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0), **options
+        cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0), **grouped(options)
     )
 
 
@@ -102,7 +95,7 @@ def test_what_the_library_cannot_do_says_so(main: cat.MainDevice) -> None:
     for ask, command in (
         (sub.sdo.list, "ethercat sdos -p 0"),
         (lambda: sub.sdo.describe(0x6040), "ethercat sdos -p 0"),
-        (main.look, "ethercat slaves"),
+        (main.passive_scan, "ethercat slaves"),
         (main.diagnose, "ethercat crc"),
         (lambda: sub.sdo.read(0x1018, complete=True), "one by one"),
     ):

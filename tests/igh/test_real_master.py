@@ -71,7 +71,7 @@ def test_a_loop_reaches_op_and_leaves_nothing(subject: Subject, run: str) -> Non
     for _ in range(2):  # the second time shows that nothing was left of the first
         with subject.open() as main:
             main.scan()
-            with subject.loop(*subject.inputs(main), run=run) as loop:
+            with subject.loop(*subject.inputs(main), execution=run) as loop:
                 good = sum(next(loop).ok for _ in range(200))
                 assert good > 100
                 assert all(sub.state == 8 for sub in main.subs)
@@ -149,7 +149,7 @@ def test_clocks_are_watched(subject: Subject, main: cat.MainDevice, clock: str) 
     if not clocked:
         pytest.skip("no drive with distributed clocks")
     arm = cat.Drives(clocked, counts_per_turn=2**20, velocity_limit=100.0, dc=True)
-    with subject.loop(arm, clock=clock) as loop:
+    with subject.loop(arm, lead=clock) as loop:
         clocks = loop.clocks
         until(loop, lambda: not any(math.isnan(d) for d in clocks.differences.values()))
         assert clocks.reference in main.subs
@@ -163,7 +163,7 @@ def test_drives_follow(subject: Subject, main: cat.MainDevice, run: str) -> None
     if not subject.may_move:
         pytest.skip("nothing moves without CATENARY_IGH_MOVE=1")
     arm = cat.Drives(drives(main), counts_per_turn=2**20, velocity_limit=100.0)
-    with subject.loop(arm, run=run, enable=True) as loop:
+    with subject.loop(arm, execution=run, enable=True) as loop:
         assert arm.enabled.all()
         home = arm.actual.position.copy()
         for cycle in loop:

@@ -2,28 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 import catenary as cat
-from catenary.igh import Master, carrier
+from catenary.igh import carrier
 from catenary.igh.kernel_log import KernelLog
 from tests.igh.double import Double
-
-
-@pytest.fixture
-def main(double: Double) -> Iterator[cat.MainDevice]:
-    with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
-        main.scan()
-        yield main
-
-
-def loop_of(main: cat.MainDevice) -> cat.Loop:
-    return cat.Loop(
-        cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0, dc=True)
-    )
+from tests.igh.loops import clocked_loop
 
 
 def test_devices_keep_time_as_before_when_a_loop_with_clocks_ends(
@@ -31,7 +18,7 @@ def test_devices_keep_time_as_before_when_a_loop_with_clocks_ends(
 ) -> None:
     """Else the next program, without clocks, would find them waiting for SYNC0 (seen on a real
     master: AL status 0x0030)."""
-    with loop_of(main):
+    with clocked_loop(main):
         assert double.value(0, 0x1C32, 1) == 2
     assert double.value(0, 0x1C32, 1) == 1
     with cat.Loop(cat.Drives(main.subs.drives, counts_per_turn=1000, velocity_limit=100.0)) as loop:
@@ -43,7 +30,7 @@ def test_types_are_restored_once_devices_are_in_pre_op(
 ) -> None:
     """The master leads them down after it was deactivated; in OP they refuse 0x1C32."""
     double.linger(20)
-    with loop_of(main):
+    with clocked_loop(main):
         assert double.value(1, 0x1C32, 1) == 2
     assert [double.value(p, 0x1C32, 1) for p in (0, 1)] == [1, 1]
     assert all(str(sub.state) == "PRE-OP" for sub in main.subs)
@@ -52,14 +39,14 @@ def test_types_are_restored_once_devices_are_in_pre_op(
 def test_a_device_may_take_seconds_to_reach_pre_op(main: cat.MainDevice, double: Double) -> None:
     """The master repeats a lost INIT request after 5 s (seen on a real master)."""
     double.linger(500)  # a look takes 10 ms
-    with loop_of(main):
+    with clocked_loop(main):
         pass
     assert [double.value(p, 0x1C32, 1) for p in (0, 1)] == [1, 1]
 
 
 def test_a_type_that_cannot_be_restored_is_told(main: cat.MainDevice, double: Double) -> None:
     def run() -> None:
-        with loop_of(main):
+        with clocked_loop(main):
             double.refuse(0x06090030)
 
     with pytest.raises(cat.errors.SdoAbort, match="0x06090030") as caught:
@@ -70,7 +57,7 @@ def test_a_type_that_cannot_be_restored_is_told(main: cat.MainDevice, double: Do
 
 def test_a_device_that_stays_up_is_told(main: cat.MainDevice, double: Double) -> None:
     def run() -> None:
-        with loop_of(main):
+        with clocked_loop(main):
             double.linger(1_000_000)
 
     with pytest.raises(cat.errors.StateError, match=r"device 0 is not in PRE-OP but in OP.*0x1C32"):
@@ -85,7 +72,7 @@ def test_a_device_that_stays_up_is_told(main: cat.MainDevice, double: Double) ->
 
 def test_a_configuration_that_fails_leaves_no_type(main: cat.MainDevice, double: Double) -> None:
     double.fail(b"activate", -5)
-    with pytest.raises(cat.CatenaryError, match="activat"), loop_of(main):
+    with pytest.raises(cat.CatenaryError, match="activat"), clocked_loop(main):
         pass
     assert [double.value(p, 0x1C32, 1) for p in (0, 1)] == [1, 1]
 
@@ -99,7 +86,7 @@ def test_the_kernels_log_tells_a_code_that_the_device_has_forgotten(
     monkeypatch.setattr(carrier, "KernelLog", lambda: KernelLog(str(log)))
 
     def run() -> None:
-        with loop_of(main) as loop:
+        with clocked_loop(main) as loop:
             double.state(1, 4, 1)
             text = '3,1,1,-;EtherCAT ERROR 0-1: AL status message 0x0032: "DC PLL Sync Error".'
             log.write_text(text)

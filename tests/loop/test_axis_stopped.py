@@ -20,6 +20,7 @@ from catenary.plan.cycle import AxisPlan, CyclePlan, Number, NumberKind
 from catenary.plan.stop_reason import UNASKED, StopReason
 from catenary.plan.wish import Views, WishTables
 from tests.drive.fakes import views_of
+from tests.loop_options import grouped
 
 WORD = Number(0, 16, NumberKind.UNSIGNED)
 
@@ -98,7 +99,7 @@ def test_the_error_names_axis_reason_and_cycle_and_what_to_do(reason: StopReason
     error = error_of(reason)
     assert error.message.startswith("0 Servo was stopped in cycle 0: ")
     assert reason.text in error.message
-    assert 'Loop(on_axis_stopped="event")' in error.hint
+    assert 'StopPolicy(on_axis_stopped="event")' in error.hint
     assert not error.hint.startswith(";")
 
 
@@ -165,7 +166,10 @@ def test_what_the_application_asks_for_is_no_event() -> None:
 @pytest.mark.parametrize(
     ("options", "match"),
     [
-        ({"on_axis_stopped": "ignore"}, 'on_axis_stopped=\'ignore\': "raise" or "event"'),
+        (
+            {"on_axis_stopped": "ignore"},
+            "on_axis_stopped='ignore': must be one of \"raise\"",
+        ),
         ({"late_limit": -1.0}, "late_limit=-1"),
         ({"late_limit": float("nan")}, "late_limit=nan"),
     ],
@@ -174,7 +178,7 @@ def test_options_that_cannot_be(options: dict[str, object], match: str) -> None:
     with cat.MainDevice(cat.Segment([cat.Servo()])) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=1, velocity_limit=10.0)
         with pytest.raises(ValueError, match=match):
-            cat.Loop(arm, **options)  # type: ignore[arg-type]
+            cat.Loop(arm, **grouped(options))  # type: ignore[arg-type]
 
 
 def test_the_times_reach_the_plan() -> None:
@@ -183,7 +187,7 @@ def test_the_times_reach_the_plan() -> None:
         csp = cat.Drives(subs.drives, counts_per_turn=1000, velocity_limit=10.0)
         cst = cat.Drives(subs.drives, mode="cst", counts_per_turn=1000, velocity_limit=10.0)
         for late, expected in ((None, (50, 50, 10)), (0.03, (30, 30, 30)), (0, (0, 0, 0))):
-            with cat.Loop(csp, late_limit=late, handover=0.007) as loop:
+            with cat.Loop(csp, stop=cat.StopPolicy(late_limit=late, handover=0.007)) as loop:
                 cycle = loop.plan.cycle
             found = (
                 cycle.late_limit_position_ns,
@@ -194,8 +198,8 @@ def test_the_times_reach_the_plan() -> None:
             assert cycle.handover_ns == 7_000_000
         with (
             pytest.raises(ValueError, match="late_limit=0 is refused"),
-            cat.Loop(cst, late_limit=0),
+            cat.Loop(cst, stop=cat.StopPolicy(late_limit=0)),
         ):
             pass
-        with cat.Loop(cst, late_limit=0.02) as loop:
+        with cat.Loop(cst, stop=cat.StopPolicy(late_limit=0.02)) as loop:
             assert "CST 20 ms" in str(loop.plan)

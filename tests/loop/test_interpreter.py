@@ -52,7 +52,11 @@ def test_an_inline_loop_sets_it_where_time_is_real(
             main.scan().drives, mode="csp", counts_per_turn=1 << 20, velocity_limit=6.0
         )
         with cat.Loop(
-            arm, period=5e-3, run=run, lost_limit=1000, late_limit=0, switch_interval=option
+            arm,
+            period=5e-3,
+            execution=run,
+            stop=cat.StopPolicy(lost_limit=1000, late_limit=0),
+            scheduling=cat.Scheduling(switch_interval=option),
         ) as loop:
             next(iter(loop))
             assert interval() == during
@@ -64,4 +68,4 @@ def test_an_interval_that_cannot_be_is_refused(option: float) -> None:
     with cat.MainDevice(Segment([Servo()])) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=1 << 20, velocity_limit=6.0)
         with pytest.raises(ValueError, match="switch_interval"):
-            cat.Loop(arm, switch_interval=option)
+            cat.Loop(arm, scheduling=cat.Scheduling(switch_interval=option))

@@ -10,6 +10,7 @@ import pytest
 
 import catenary as cat
 from catenary.errors import LawError
+from tests.loop_options import grouped
 
 pytest.importorskip("numba", reason="laws are compiled by Numba: pip install 'catenary[law]'")
 COUNTS = 2**20
@@ -21,7 +22,7 @@ def opened(mode: str = "csp", **more: Any) -> Iterator[tuple[cat.Drives, cat.Loo
         arm = cat.Drives(
             main.scan().drives, mode=mode, counts_per_turn=COUNTS, velocity_limit=100.0
         )
-        with cat.Loop(arm, period=1e-3, **more) as loop:
+        with cat.Loop(arm, period=1e-3, **grouped(more)) as loop:
             yield arm, loop
 
 
@@ -52,7 +53,7 @@ def count(actual, target, memory, time, parameters, enabled, dt, ok, n):
 
 @pytest.mark.parametrize("run", ["threaded", "inline"])
 def test_the_law_of_the_documentation_moves_the_arm(run: str) -> None:
-    with opened("cst", run=run, laws=[pd]) as (arm, loop):
+    with opened("cst", execution=run, laws=[pd]) as (arm, loop):
         memory = loop.run(pd, memory=[0.5, 4.0, 0.4])
         assert arm.actual.position == pytest.approx(0.5, abs=0.05)
         assert memory.tolist() == [0.5, 4.0, 0.4]
@@ -251,7 +252,7 @@ def endless(actual, target, memory, time):
     ],
 )
 def test_a_failing_law_stops_the_drives_and_says_why(law: Callable, said: str, run: str) -> None:
-    with opened(run=run) as (arm, loop):
+    with opened(execution=run) as (arm, loop):
         with pytest.raises(LawError, match=said) as caught:
             loop.run(law, memory=[7.0])
         assert caught.value.log is not None

@@ -28,10 +28,8 @@ def test_an_emergency_arrives_over_the_wire(
         with cat.Loop(
             arm,
             period=2e-3,
-            run=run,
-            raise_faults=False,
-            lost_limit=PATIENCE,
-            late_limit=0,
+            execution=run,
+            stop=cat.StopPolicy(raise_faults=False, lost_limit=PATIENCE, late_limit=0),
             watchdog=0,
         ) as loop:
             found: list[Event] = []

@@ -23,17 +23,15 @@ def test_both_run_on_threads_of_their_own() -> None:
             upper,
             lower,
             period=2e-3,
-            lost_limit=1_000_000,
-            late_limit=0,
+            stop=cat.StopPolicy(lost_limit=1_000_000, late_limit=0, raise_faults=False),
             watchdog=0,
-            raise_faults=False,
         ) as loop:
             for cycle in loop:
                 upper.target.position[:] = 0.05
                 lower.target.position[:] = -0.05
                 if cycle.number >= CYCLES:
                     break
-            origins = {network._opened.engine.origin % 2_000_000 for network in loop.networks}
+            origins = {network.session.engine.origin % 2_000_000 for network in loop.networks}
             assert len(origins) == 1  # one grid of instants
             assert all(network.timing.counters["cycles"] >= CYCLES for network in loop.networks)
             assert (upper.target.position > 0).all()

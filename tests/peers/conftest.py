@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
-from catenary.realtime.child import start_python
+from catenary.realtime.child import Child, start_python
 
 # Whole bytes: SOEM's expected counter forgets a device whose bits fill no byte up (the difference
 # of logical addresses is 0 there), so that with 4-bit terminals it is too low.
@@ -56,6 +57,14 @@ def serve_command(interface: str, file: Path, *, max_age: float = 1e6) -> list[s
     return [*command, "--priority", "50"]
 
 
+@contextmanager
+def serving(interface: str, file: Path, *, max_age: float = 1e6) -> Iterator[Child]:
+    """Serve the devices of a file on an interface. Yields the process that serves them."""
+    with start_python(serve_command(interface, file, max_age=max_age)) as server:
+        assert server.read_line(20.0), "the virtual segment did not start"
+        yield server
+
+
 @pytest.fixture
 def line(tmp_path: Path) -> Path:
     """The devices behind `served`."""
@@ -68,6 +77,5 @@ def line(tmp_path: Path) -> Path:
 def served(veth: tuple[str, str], line: Path) -> Iterator[str]:
     """An interface at the other end of which virtual devices answer, as a user starts them."""
     ours, theirs = veth
-    with start_python(serve_command(theirs, line)) as server:
-        assert server.read_line(20.0), "the virtual segment did not start"
+    with serving(theirs, line):
         yield ours

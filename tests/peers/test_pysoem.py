@@ -21,7 +21,7 @@ from catenary.realtime.child import Child, start_python
 from catenary.virtual import Segment
 from catenary.virtual.description import VENDOR_ID, Description
 from catenary.virtual.devices.application import BLOB_BYTES
-from tests.peers.conftest import serve_command
+from tests.peers.conftest import serving
 from tests.peers.soem import MAX_BUF
 
 pysoem = pytest.importorskip("pysoem", reason="PySOEM is not installed (extra `peers`)")
@@ -79,15 +79,8 @@ def devices(line: Path) -> list[Description]:
 
 @pytest.fixture
 def master(served: str) -> Iterator[Any]:
-    master = pysoem.Master()
-    master.open(served)
-    try:
-        find(master, 6)
+    with opened(6, served) as master:
         yield master
-    finally:
-        master.state = pysoem.INIT_STATE
-        master.write_state()
-        master.close()
 
 
 @pytest.fixture
@@ -96,17 +89,8 @@ def clocked(veth: tuple[str, str], tmp_path: Path) -> Iterator[Any]:
     ours, theirs = veth
     file = tmp_path / "clocked.toml"
     file.write_text(CLOCKED)
-    with start_python(serve_command(theirs, file)) as server:
-        assert server.read_line(20.0), "the virtual segment did not start"
-        master = pysoem.Master()
-        master.open(ours)
-        try:
-            find(master, 4)
-            yield master
-        finally:
-            master.state = pysoem.INIT_STATE
-            master.write_state()
-            master.close()
+    with serving(theirs, file), opened(4, ours) as master:
+        yield master
 
 
 @again(devices=6)
@@ -201,12 +185,8 @@ def test_a_servo_goes_through_its_states_to_a_position(master: Any) -> None:
 def test_a_pause_of_the_segment_leaves_no_old_answers(veth: tuple[str, str], line: Path) -> None:
     """SOEM finds answers by index modulo 16, in a socket that it does not empty."""
     ours, theirs = veth
-    with start_python(serve_command(theirs, line, max_age=0.002)) as server:
-        assert server.read_line(20.0), "the virtual segment did not start"
-        master = pysoem.Master()
-        master.open(ours)
+    with serving(theirs, line, max_age=0.002) as server, opened(6, ours) as master:
         try:
-            find(master, 6)
             to_operational(master)
             server.process.send_signal(signal.SIGSTOP)
             for _ in range(100):
@@ -218,7 +198,6 @@ def test_a_pause_of_the_segment_leaves_no_old_answers(veth: tuple[str, str], lin
             assert statistics.median_high(lags) < MAX_BUF // 2
         finally:
             server.process.send_signal(signal.SIGCONT)
-            master.close()
 
 
 WITHOUT_LRW = """
@@ -244,17 +223,8 @@ def without_lrw(veth: tuple[str, str], tmp_path: Path) -> Iterator[Any]:
     ours, theirs = veth
     file = tmp_path / "without_lrw.toml"
     file.write_text(WITHOUT_LRW)
-    with start_python(serve_command(theirs, file)) as server:
-        assert server.read_line(20.0), "the virtual segment did not start"
-        master = pysoem.Master()
-        master.open(ours)
-        try:
-            find(master, 4)
-            yield master
-        finally:
-            master.state = pysoem.INIT_STATE
-            master.write_state()
-            master.close()
+    with serving(theirs, file), opened(4, ours) as master:
+        yield master
 
 
 @again(devices=4)
@@ -279,10 +249,7 @@ def ring(line: Path, veth: tuple[str, str]) -> Iterator[tuple[str, str, Child]]:
 def test_a_ring_over_both_interfaces_survives_a_cut(ring: tuple[str, str, Child]) -> None:
     """Cable redundancy of SOEM: a cut in the middle of cyclic operation, and joined again."""
     first, second, server = ring
-    master = pysoem.Master()
-    master.open(first, second)
-    try:
-        find(master, 6)
+    with opened(6, first, second) as master:
         to_operational(master)
         expected = master.expected_wkc
         for number, word in ((None, "whole"), (signal.SIGUSR1, "cut"), (signal.SIGUSR2, "join")):
@@ -292,6 +259,16 @@ def test_a_ring_over_both_interfaces_survives_a_cut(ring: tuple[str, str, Child]
                 cycle_until(master, lambda: exchange(master) == expected)
             counters = [exchange(master, 5_000_000) for _ in range(100)]
             assert counters == [expected] * 100, word
+
+
+@contextlib.contextmanager
+def opened(devices: int, *interfaces: str) -> Iterator[Any]:
+    """Yield a master that has found its devices. Afterwards they are in INIT again."""
+    master = pysoem.Master()
+    master.open(*interfaces)
+    try:
+        find(master, devices)
+        yield master
     finally:
         master.state = pysoem.INIT_STATE
         master.write_state()

@@ -95,7 +95,7 @@ def test_frames_are_through_before_the_beat() -> None:
     assert clock.wire_ns == (size + 24) * 80 + 4 * 1000  # 100 Mbit/s; a microsecond a device
     assert clock.allowance_ns == 0.2 * PERIOD_NS
     assert clock.phase_ns == PERIOD_NS - clock.wire_ns - clock.allowance_ns
-    inline = planned(cell(), 2, 3, order="inline").cycle.clock
+    inline = planned(cell(), 2, 3, execution="inline").cycle.clock
     assert inline is not None
     assert inline.allowance_ns == 0.5 * PERIOD_NS
     given = planned(cell(), 2, 3, margin=10e-6).cycle.clock

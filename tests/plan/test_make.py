@@ -190,8 +190,8 @@ def test_an_optional_device_is_a_unit_of_its_own() -> None:
 class Slow:
     """A wish that only says how often."""
 
-    def __init__(self, every: int, *positions: int, required: bool = True) -> None:
-        self.wish = PdoWish(every=every, required=required)
+    def __init__(self, divider: int, *positions: int, required: bool = True) -> None:
+        self.wish = PdoWish(divider=divider, required=required)
         self.positions = positions
 
     def pdos(self, period_ns: int) -> dict[int, PdoWish]:
@@ -206,20 +206,20 @@ class Slow:
 
 def test_devices_of_a_divisor_ride_in_frames_of_their_own() -> None:
     cycle = make_plan(demo(), [Slow(4, 2, 3)]).cycle
-    assert [(u.devices, u.every) for u in cycle.sync_units] == [((1, 4, 5), 1), ((2, 3), 4)]
-    assert [(f.every, f.phase) for f in cycle.frames] == [(1, 0), (4, 0)]
+    assert [(u.devices, u.divider) for u in cycle.sync_units] == [((1, 4, 5), 1), ((2, 3), 4)]
+    assert [(f.divider, f.phase) for f in cycle.frames] == [(1, 0), (4, 0)]
     assert "every 4 cycles" in str(make_plan(demo(), [Slow(4, 2, 3)]))
 
 
 def test_units_of_a_divisor_take_turns() -> None:
     """Three that are optional, so units of their own: never two of them in one cycle."""
     cycle = make_plan(demo(), [Slow(4, 2, 3, 4, required=False)]).cycle
-    assert [(f.every, f.phase) for f in cycle.frames] == [(1, 0), (4, 0), (4, 1), (4, 2)]
+    assert [(f.divider, f.phase) for f in cycle.frames] == [(1, 0), (4, 0), (4, 1), (4, 2)]
 
 
 def test_wishes_for_one_device_meet_in_the_greatest_common_divisor() -> None:
     units = make_plan(demo(), [Slow(4, 2), Slow(6, 2, 3)]).cycle.sync_units
-    assert [(u.devices, u.every) for u in units] == [((1, 4, 5), 1), ((2,), 2), ((3,), 6)]
+    assert [(u.devices, u.divider) for u in units] == [((1, 4, 5), 1), ((2,), 2), ((3,), 6)]
 
 
 def test_one_wish_that_requires_a_device_is_enough() -> None:
@@ -286,7 +286,7 @@ def test_cyclic_frames_that_exceed_the_period_are_refused() -> None:
     assert str(caught.value).startswith(
         "the cyclic frames take 1011.04 us at 100 Mbit/s, the period is 1000 us"
     )
-    assert "every=" in str(caught.value)
+    assert "divider=" in str(caught.value)
     turns = make_plan(devices, [Slow(2, *range(12))], period=1e-3).cycle
     assert turns.wire_ns < 600_000  # of the busiest cycle, not of all frames
 
@@ -299,7 +299,7 @@ def test_frames_that_cannot_be_back_in_time_are_refused() -> None:
         "period=0.001 s is too short: the cyclic frames take 842.72 us at 100 Mbit/s, and must be "
         "back 800 us after the cycle start"
     )
-    make_plan(devices, period=1e-3, order="inline")
+    make_plan(devices, period=1e-3, execution="inline")
 
 
 def test_acyclic_frames_get_what_the_cyclic_ones_and_the_guard_leave() -> None:

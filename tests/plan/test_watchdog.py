@@ -26,9 +26,9 @@ def with_control(device: DeviceDescription, control: int) -> DeviceDescription:
 
 
 def watchdog_ns(
-    *outputs: ObjectReference, every: int = 1, period: float = 1e-3, watchdog: float | None = None
+    *outputs: ObjectReference, divider: int = 1, period: float = 1e-3, watchdog: float | None = None
 ) -> int:
-    wish = Asking({0: PdoWish(outputs=outputs, every=every)})
+    wish = Asking({0: PdoWish(outputs=outputs, divider=divider)})
     return make_plan([servo(0)], [wish], period=period, watchdog=watchdog).devices[0].watchdog_ns
 
 
@@ -37,11 +37,11 @@ def test_100_ms_unless_torques_are_commanded() -> None:
 
 
 @pytest.mark.parametrize(
-    ("period", "every", "expected"),
+    ("period", "divider", "expected"),
     [(1e-3, 1, 10), (0.25e-3, 1, 10), (4e-3, 1, 20), (1e-3, 3, 15), (50e-3, 1, 250)],
 )
-def test_in_cst_10_ms_or_five_exchanges(period: float, every: int, expected: int) -> None:
-    assert watchdog_ns(TORQUE, period=period, every=every) == expected * MILLISECOND
+def test_in_cst_10_ms_or_five_exchanges(period: float, divider: int, expected: int) -> None:
+    assert watchdog_ns(TORQUE, period=period, divider=divider) == expected * MILLISECOND
 
 
 def test_five_exchanges_are_rounded_up_to_the_registers_unit() -> None:

@@ -28,7 +28,7 @@ def main(segment: cat.Segment) -> Iterator[cat.MainDevice]:
 
 
 def test_forty_devices_share_a_frame(segment: cat.Segment, main: cat.MainDevice) -> None:
-    stations = [sub.station for sub in main.look(names=False)]
+    stations = [sub.station for sub in main.passive_scan(names=False)]
     segment.core.poke(3, 0x0302, b"\x05\x06")
     segment.core.poke(3, 0x0311, b"\x07")
     before = main.counts.sent
@@ -39,7 +39,7 @@ def test_forty_devices_share_a_frame(segment: cat.Segment, main: cat.MainDevice)
 
 
 def test_a_silent_device_is_none(segment: cat.Segment, main: cat.MainDevice) -> None:
-    stations = [sub.station for sub in main.look(names=False)]
+    stations = [sub.station for sub in main.passive_scan(names=False)]
     segment.plug(devices=2)
     found = main.converse(read_error_counters(stations))
     assert found[1] is not None
@@ -50,7 +50,7 @@ def test_a_silent_device_is_none(segment: cat.Segment, main: cat.MainDevice) -> 
 def test_where_no_frame_comes_back_nobody_has_said_anything(
     segment: cat.Segment, main: cat.MainDevice
 ) -> None:
-    stations = [sub.station for sub in main.look(names=False)]
+    stations = [sub.station for sub in main.passive_scan(names=False)]
     segment.unplug()
     assert set(main.converse(read_error_counters(stations))) == {None}
 
@@ -69,7 +69,7 @@ def test_nobody_to_ask(main: cat.MainDevice) -> None:
 
 
 def test_all_counters_are_cleared(segment: cat.Segment, main: cat.MainDevice) -> None:
-    stations = [sub.station for sub in main.look(names=False)]
+    stations = [sub.station for sub in main.passive_scan(names=False)]
     segment.core.poke(1, 0x0300, bytes(range(1, 15)))
     segment.core.poke(1, 0x0310, b"\x01\x02\x03\x04")
     main.converse(clear_error_counters(stations))
@@ -77,7 +77,7 @@ def test_all_counters_are_cleared(segment: cat.Segment, main: cat.MainDevice) ->
 
 
 def test_exercise_lasts_as_long_as_asked(segment: cat.Segment, main: cat.MainDevice) -> None:
-    main.look(names=False)
+    main.passive_scan(names=False)
     start = segment.now_ns
     sent, lost = main.converse(exercise(0.5))
     assert 0.5 <= (segment.now_ns - start) * 1e-9 < 0.51
@@ -88,7 +88,7 @@ def test_exercise_lasts_as_long_as_asked(segment: cat.Segment, main: cat.MainDev
 def test_exercise_ends_where_the_segment_is_gone(
     segment: cat.Segment, main: cat.MainDevice
 ) -> None:
-    main.look(names=False)
+    main.passive_scan(names=False)
     segment.unplug()
     with pytest.raises(NoDeviceError, match="no frame comes back any more"):
         main.converse(exercise(1e6))

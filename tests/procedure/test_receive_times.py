@@ -12,7 +12,7 @@ from catenary.virtual import Junction
 def test_the_cables_of_a_tree_are_measured() -> None:
     devices = [cat.Coupler(), Junction(), cat.Servo(), cat.Servo(), cat.DigitalOutputs()]
     with cat.MainDevice(cat.Segment(devices, behind={3: (1, 2)})) as main:
-        descriptions = [sub.description for sub in main.look()]
+        descriptions = [sub.description for sub in main.passive_scan()]
         times = main.converse(read_receive_times(descriptions))
     assert times[4] is None  # no clock
     delays = cable_delays_ns(make_topology([d.open_ports for d in descriptions]), times)
@@ -23,7 +23,7 @@ def test_the_cables_of_a_tree_are_measured() -> None:
 
 def test_a_segment_without_clocks() -> None:
     with cat.MainDevice(cat.Segment([cat.DigitalOutputs()])) as main:
-        descriptions = [sub.description for sub in main.look()]
+        descriptions = [sub.description for sub in main.passive_scan()]
         sent = main.counts.sent
         assert main.converse(read_receive_times(descriptions)) == (None,)
         assert main.counts.sent == sent

@@ -23,7 +23,7 @@ def main(segment: cat.Segment) -> Iterator[cat.MainDevice]:
 
 
 def test_what_is_written_is_read(main: cat.MainDevice) -> None:
-    station = main.look(names=False)[1].station
+    station = main.passive_scan(names=False)[1].station
     main.converse(write_register(station, 0x0400, b"\x34\x12"))
     assert main.converse(read_register(station, 0x0400, 2)) == b"\x34\x12"
 
@@ -31,7 +31,7 @@ def test_what_is_written_is_read(main: cat.MainDevice) -> None:
 def test_a_read_only_register_is_told_from_a_silent_device(
     segment: cat.Segment, main: cat.MainDevice
 ) -> None:
-    station = main.look(names=False)[1].station
+    station = main.passive_scan(names=False)[1].station
     with pytest.raises(RegisterError, match="does not let 0x0130 to 0x0131 be written"):
         main.converse(write_register(station, 0x0130, b"\x08\x00"))
     segment.plug(devices=1)
@@ -40,6 +40,6 @@ def test_a_read_only_register_is_told_from_a_silent_device(
 
 
 def test_past_the_end_of_memory(main: cat.MainDevice) -> None:
-    station = main.look(names=False)[1].station
+    station = main.passive_scan(names=False)[1].station
     with pytest.raises(RegisterError, match="does not let 0xFFFF be read"):
         main.converse(read_register(station, 0xFFFF, 1))

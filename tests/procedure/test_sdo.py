@@ -114,31 +114,28 @@ def test_an_object_beyond_the_limit_is_broken_off_at_once() -> None:
     assert play(upload(channel(), 0x2000, 0, limit=5000), device) == bytes(5000)
 
 
-def test_an_upload_that_never_ends_is_bounded_by_its_own_size() -> None:
+def dripping(segment: bytes) -> MailboxDevice:
+    """Return a device that announces 1000 bytes of 0x2000:00 and repeats one segment for ever."""
     dictionary = Dictionary({(0x2000, 0): bytes(1000)})
 
-    def drip(message: Mailbox) -> list[Mailbox]:
+    def answer(message: Mailbox) -> list[Mailbox]:
         request = decode_coe(message.data)
         if isinstance(request, UploadSegmentRequest):
-            return [coe(UploadSegment(request.toggle, False, b"x"))]
+            return [coe(UploadSegment(request.toggle, False, segment))]
         return dictionary(message)
 
-    device = MailboxDevice(drip)
+    return MailboxDevice(answer)
+
+
+def test_an_upload_that_never_ends_is_bounded_by_its_own_size() -> None:
+    device = dripping(b"x")
     with pytest.raises(MailboxError, match="against the protocol"):
         play(upload(channel(), 0x2000, 0), device)
     assert len(device.received) <= 1000
 
 
 def test_an_upload_has_an_overall_deadline() -> None:
-    dictionary = Dictionary({(0x2000, 0): bytes(1000)})
-
-    def drip(message: Mailbox) -> list[Mailbox]:
-        request = decode_coe(message.data)
-        if isinstance(request, UploadSegmentRequest):
-            return [coe(UploadSegment(request.toggle, False, b"x"))]
-        return dictionary(message)
-
-    device = MailboxDevice(drip)
+    device = dripping(b"x")
     with pytest.raises(MailboxError, match=r"Probe.*0x2000:00: \d+ of 1000 bytes within 0.05 s"):
         play(upload(channel(), 0x2000, 0, timeout=0.05), device)
     assert decode_coe(device.received[-1].data) == Abort(0x2000, 0, 0x0504_0000)
@@ -146,16 +143,8 @@ def test_an_upload_has_an_overall_deadline() -> None:
 
 
 def test_segments_of_nothing_are_no_transfer() -> None:
-    dictionary = Dictionary({(0x2000, 0): bytes(1000)})
-
-    def nothing(message: Mailbox) -> list[Mailbox]:
-        request = decode_coe(message.data)
-        if isinstance(request, UploadSegmentRequest):
-            return [coe(UploadSegment(request.toggle, False, b""))]
-        return dictionary(message)
-
     with pytest.raises(MailboxError, match="against the protocol"):
-        play(upload(channel(), 0x2000, 0), MailboxDevice(nothing))
+        play(upload(channel(), 0x2000, 0), dripping(b""))
 
 
 def test_complete_access_both_ways() -> None:

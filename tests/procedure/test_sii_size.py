@@ -41,7 +41,7 @@ def main() -> Iterator[cat.MainDevice]:
 
 
 def test_the_header_says_it(main: cat.MainDevice) -> None:
-    assert main.converse(read_extent(main.look()[1].station)) == Extent(2048, MAXIMUM_SIZE)
+    assert main.converse(read_extent(main.passive_scan()[1].station)) == Extent(2048, MAXIMUM_SIZE)
 
 
 def test_a_header_that_claims_more_than_its_controller_addresses() -> None:

@@ -42,27 +42,27 @@ def test_images_of_different_lengths_are_not_compared() -> None:
 
 
 def test_words_arrive_in_the_eeprom(segment: cat.Segment, main: cat.MainDevice) -> None:
-    station = main.look(names=False)[1].station
+    station = main.passive_scan(names=False)[1].station
     main.converse(write_words(station, [Change(0x20, 0xBEEF), Change(0x21, 0x0001)]))
     assert segment.core.sii_image(1)[0x40:0x44] == b"\xef\xbe\x01\x00"
 
 
 def test_a_slow_eeprom_is_waited_for(segment: cat.Segment, main: cat.MainDevice) -> None:
     segment.core.time_sii(1, 2 * MS, 100 * MS, False)
-    station = main.look(names=False)[1].station
+    station = main.passive_scan(names=False)[1].station
     main.converse(write_word(station, Change(0x20, 0x1234)))
     assert segment.core.sii_image(1)[0x40:0x42] == b"\x34\x12"
 
 
 def test_an_eeprom_that_stays_busy_has_an_end(segment: cat.Segment, main: cat.MainDevice) -> None:
     segment.core.time_sii(1, 2 * MS, 2000 * MS, False)
-    station = main.look(names=False)[1].station
+    station = main.passive_scan(names=False)[1].station
     with pytest.raises(EepromError, match=r"busy with word 0x0020 for 0\.5 s"):
         main.converse(write_word(station, Change(0x20, 0x1234)))
 
 
 def test_past_the_end_it_does_not_acknowledge(main: cat.MainDevice) -> None:
-    station = main.look(names=False)[1].station
+    station = main.passive_scan(names=False)[1].station
     with pytest.raises(EepromError, match="does not acknowledge"):
         main.converse(write_word(station, Change(0x8000, 1)))
 
@@ -79,7 +79,7 @@ def test_a_write_protected_eeprom_reads_back_the_old_word() -> None:
 
 
 def test_an_alias_comes_with_its_checksum(segment: cat.Segment, main: cat.MainDevice) -> None:
-    station = main.look(names=False)[1].station
+    station = main.passive_scan(names=False)[1].station
     assert main.converse(read_alias(station)) == 3
     main.converse(write_alias(station, 0x1234))
     assert main.converse(read_alias(station)) == 0x1234
@@ -89,7 +89,7 @@ def test_an_alias_comes_with_its_checksum(segment: cat.Segment, main: cat.MainDe
 def test_an_alias_does_not_bless_an_eeprom_with_a_wrong_checksum(
     segment: cat.Segment, main: cat.MainDevice
 ) -> None:
-    station = main.look(names=False)[1].station
+    station = main.passive_scan(names=False)[1].station
     main.converse(write_word(station, Change(CHECKSUM_WORD, 0)))
     with pytest.raises(EepromError, match="not to be trusted"):
         main.converse(write_alias(station, 5))
@@ -98,20 +98,20 @@ def test_an_alias_does_not_bless_an_eeprom_with_a_wrong_checksum(
 def test_the_eeprom_goes_back_to_the_processor_it_was_taken_from(
     segment: cat.Segment, main: cat.MainDevice
 ) -> None:
-    station = main.look(names=False)[1].station
+    station = main.passive_scan(names=False)[1].station
     segment.core.poke(1, 0x0500, b"\x01")
     main.converse(with_eeprom(station, write_alias(station, 9)))
     assert segment.core.peek(1, 0x0500, 1) == b"\x01"
-    assert main.look()[1].name == "Catenary virtual servo"
+    assert main.passive_scan()[1].name == "Catenary virtual servo"
     assert segment.core.peek(1, 0x0500, 1) == b"\x01"
 
 
 def test_an_eeprom_in_use_by_the_processor_is_left_to_it(
     segment: cat.Segment, main: cat.MainDevice
 ) -> None:
-    station = main.look(names=False)[1].station
+    station = main.passive_scan(names=False)[1].station
     segment.core.poke(1, 0x0500, b"\x01\x01")
     with pytest.raises(EepromError, match="its processor is using the EEPROM"):
         main.converse(with_eeprom(station, read_alias(station)))
-    found = main.look()[1]
+    found = main.passive_scan()[1]
     assert found.description.notes[0].endswith("is using the EEPROM (register 0x0501)")

@@ -189,7 +189,7 @@ def simulate(demands: list[Demand], seconds: float) -> dict[str, float]:
         )
         for one in demands
     ]
-    with VirtualClock() as clock, Tasks(*tasks, run="threads", clock=clock) as running:
+    with VirtualClock() as clock, Tasks(*tasks, workers="threads", clock=clock) as running:
         running.join(seconds)
         return {handle.name: handle.statistics.response.max for handle in running}
 

@@ -220,7 +220,7 @@ def test_two_runs_are_alike_to_the_bit(run):
             Task(spend_and_note, (5e-3, queues[1]), name="b", period=17e-3, priority=2),
             Task(spend_and_note, (10e-3, queues[2]), name="c", period=41e-3, priority=1),
         ]
-        with VirtualClock() as clock, Tasks(*tasks, run=run, clock=clock) as running:
+        with VirtualClock() as clock, Tasks(*tasks, workers=run, clock=clock) as running:
             running.join(0.7)
             running.stop()
         return [records(queue) for queue in queues]
@@ -237,7 +237,7 @@ def test_threads_and_processes_give_the_same_schedule():
             Task(spend, (3e-3,), name="b", period=11e-3, priority=3),
             Task(spend, (5e-3,), name="c", period=31e-3, priority=1),
         ]
-        with VirtualClock() as clock, Tasks(*tasks, run=run, clock=clock) as running:
+        with VirtualClock() as clock, Tasks(*tasks, workers=run, clock=clock) as running:
             running.join(1.0)
             running.stop()
             return [handle.statistics.response for handle in running]
@@ -252,6 +252,6 @@ def test_a_signal_releases_at_the_instant_it_is_set():
         Task(set_then_spend, (alarm, 4e-3), name="low", period=10e-3, priority=1),
         Task(note, (notes,), name="high", period=1e-3, priority=2, trigger=alarm),
     ]
-    with VirtualClock() as clock, Tasks(*tasks, run="threads", clock=clock) as running:
+    with VirtualClock() as clock, Tasks(*tasks, workers="threads", clock=clock) as running:
         running.join(15e-3)
     assert records(notes) == [[0, 2 * MS, 2 * MS], [1, 12 * MS, 12 * MS]]

@@ -143,7 +143,7 @@ def test_read_while_written_by_another_process_and_after_its_death():
     """Every array that is read holds one number: none is torn, also not by SIGKILL in mid-write."""
     value = Value("f8", 512)
     task = Task(write_forever, (value,), period=1e-3, on_failure="continue")
-    with Tasks(task, run="processes") as tasks:
+    with Tasks(task, workers="processes") as tasks:
         newest = 0.0
         while newest < 3000:
             array = value.read()
@@ -163,7 +163,7 @@ def test_taken_while_put_by_another_process_and_after_its_death(full):
     queue = Queue("f8", 64, length=8, full=full)
     task = Task(put_forever, (queue,), period=1e-3, on_failure="continue")
     taken, last = 0, 0.0
-    with Tasks(task, run="processes") as tasks:
+    with Tasks(task, workers="processes") as tasks:
         while taken < 3000:
             record = queue.take()
             if record is None:

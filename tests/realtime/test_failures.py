@@ -46,7 +46,7 @@ def test_a_task_that_raises_stops_all_and_is_named(run):
         pytest.raises(
             TaskError, match=r"'bad' in job 2.*ArithmeticError: the sum.*bodies\.py:"
         ) as e,
-        Tasks(*tasks, run=run) as running,
+        Tasks(*tasks, workers=run) as running,
     ):
         running.join(30.0)
     assert e.value.task == "bad"
@@ -60,7 +60,7 @@ def test_continue_goes_on_without_it(run):
         Task(bodies.fail_at, (0,), name="bad", period=2e-3, on_failure="continue"),
         Task(bodies.count_to, (20,), name="good", period=2e-3),
     ]
-    with Tasks(*tasks, run=run) as running:
+    with Tasks(*tasks, workers=run) as running:
         assert running.join(30.0)
         assert [failure.task for failure in running.failures] == ["bad"]
         assert running["good"].statistics.jobs == 21
@@ -69,7 +69,7 @@ def test_continue_goes_on_without_it(run):
 @BOTH
 def test_restarted_too_often_it_stops_all(run):
     task = Task(bodies.fail_always, name="bad", period=1e-3, on_failure="restart")
-    with pytest.raises(TaskError, match="the sum"), Tasks(task, run=run) as running:
+    with pytest.raises(TaskError, match="the sum"), Tasks(task, workers=run) as running:
         running.join(30.0)
     assert len(running.failures) == 4  # the first, and three restarts
 
@@ -133,7 +133,7 @@ def test_killed_on_a_virtual_clock_time_goes_on_without_it():
 def test_a_process_that_does_not_end_is_ended_by_force_and_named():
     there = Value("i8")
     task = Task(bodies.ignore_the_end, (there,), name="deaf", period=1e-3)
-    running = Tasks(task, run="processes")
+    running = Tasks(task, workers="processes")
     running.start()
     wait_for(there, running)
     with pytest.raises(TaskError, match=r"'deaf' did not end within 0\.05 s"):
@@ -144,7 +144,7 @@ def test_a_process_that_does_not_end_is_ended_by_force_and_named():
 def test_a_process_that_never_waits_can_clean_up_when_it_is_ended(tmp_path):
     there, trace = Value("i8"), tmp_path / "trace"
     task = Task(bodies.leave_a_trace, (str(trace), there), name="deaf", period=1e-3)
-    running = Tasks(task, run="processes")
+    running = Tasks(task, workers="processes")
     running.start()
     wait_for(there, running)
     with pytest.raises(TaskError, match="did not end"):
@@ -158,7 +158,8 @@ from catenary.realtime import Task, Tasks, Value
 from tests.realtime.bodies import leave_a_trace
 if __name__ == "__main__":
     there = Value("i8")
-    with Tasks(Task(leave_a_trace, (sys.argv[1], there), period=1e-3), run="processes") as tasks:
+    leaving = Task(leave_a_trace, (sys.argv[1], there), period=1e-3)
+    with Tasks(leaving, workers="processes") as tasks:
         while there.number == 0:
             tasks.join(0.01)
         print(int(there.read()), flush=True)
@@ -186,7 +187,7 @@ def test_tasks_end_with_their_parent_however_that_ends(tmp_path):
 def test_arguments_that_cannot_be_handed_over_are_an_error():
     task = Task(bodies.spend, (lambda: 1,), name="a", period=1e-3)
     with pytest.raises(TaskError, match=r"task 'a'.*could not be started"):
-        Tasks(task, run="processes").start()
+        Tasks(task, workers="processes").start()
 
 
 def test_priorities_that_are_refused_are_an_error_that_says_how_to_get_them(monkeypatch):
@@ -233,7 +234,7 @@ if __name__ == "__main__":
     clock = VirtualClock() if sys.argv[2] == "virtual" else None
     task = Task(idle, period=20e-6 if clock else 1e-3)
     try:
-        with Tasks(task, run=sys.argv[1], clock=clock) as tasks:
+        with Tasks(task, workers=sys.argv[1], clock=clock) as tasks:
             print("ready", flush=True)
             tasks.join(1e5)
     except KeyboardInterrupt:
@@ -273,7 +274,7 @@ def test_restarted_on_a_virtual_clock_it_takes_its_place_again(run):
         Task(bodies.fail_at, (1,), name="bad", period=10e-3, priority=9, on_failure="restart"),
         Task(bodies.note, (notes,), name="good", period=10e-3),
     ]
-    with VirtualClock() as clock, Tasks(*tasks, run=run, clock=clock) as running:
+    with VirtualClock() as clock, Tasks(*tasks, workers=run, clock=clock) as running:
         running.join(50e-3)
         running.stop()
         assert len(running.failures) == 1
@@ -290,7 +291,7 @@ def test_a_session_that_is_refused_leaves_nothing_started(monkeypatch):
     with VirtualClock() as clock:
         task = Task(bodies.idle, period=1e-3)
         with pytest.raises(RealtimeError, match=r"locked memory refused .*not permitted"):
-            Tasks(task, run="threads", clock=clock, session=session()).start()
+            Tasks(task, workers="threads", clock=clock, session=session()).start()
         assert clock.wait_until(MS)  # nobody is waited for
     assert sys.getswitchinterval() == interval
 
@@ -299,9 +300,9 @@ def test_more_tasks_than_a_virtual_clock_has_places_leave_it_as_it_was():
     tasks = [Task(bodies.idle, name=str(number), period=1e-3) for number in range(64)]
     with VirtualClock() as clock:
         with pytest.raises(ValueError, match="room for 64"):
-            Tasks(*tasks, run="threads", clock=clock).start()
+            Tasks(*tasks, workers="threads", clock=clock).start()
         assert clock.wait_until(MS)
-        with Tasks(*tasks[:63], run="threads", clock=clock) as running:
+        with Tasks(*tasks[:63], workers="threads", clock=clock) as running:
             running.join(2e-3)
         assert sum(handle.statistics.jobs for handle in running) == 126
 
@@ -321,7 +322,7 @@ def test_a_thread_that_does_not_end_is_named():
 WITHOUT_GUARD = """
 from catenary.realtime import Task, Tasks
 from tests.realtime.bodies import idle
-Tasks(Task(idle, period=1e-3), run="processes").start()
+Tasks(Task(idle, period=1e-3), workers="processes").start()
 """
 
 

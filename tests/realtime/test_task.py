@@ -64,8 +64,8 @@ def test_a_set_refuses():
         Tasks(one, other)
     with pytest.raises(TypeError, match="is not a Task"):
         Tasks(idle)
-    with pytest.raises(ValueError, match='run is "processes" or "threads"'):
-        Tasks(one, run="fibers")
+    with pytest.raises(ValueError, match='must be "processes" or "threads"'):
+        Tasks(one, workers="fibers")
     with pytest.raises(ValueError, match="task 'idle': CPU 1000 does not exist or is not ours"):
         Tasks(Task(idle, period=1e-3, cpu=1000))
     with pytest.raises(ValueError, match="the same trigger"):
@@ -87,7 +87,7 @@ def test_a_cpu_that_is_kept_free_may_be_asked_for():
 
 
 def test_a_function_that_a_process_cannot_import_is_refused_before_anything_starts():
-    tasks = Tasks(Task(lambda task: None, name="arm", period=1e-3), run="processes")
+    tasks = Tasks(Task(lambda task: None, name="arm", period=1e-3), workers="processes")
     with pytest.raises(TypeError, match=r"'arm': its process cannot import .*top of a module"):
         tasks.start()
 

@@ -33,7 +33,7 @@ BOTH = pytest.mark.parametrize("run", ["threads", "processes"])
 def test_a_period_changed_by_the_task_itself(run):
     notes = Queue("i8", 3, length=100)
     task = Task(bodies.double_the_period, (notes,), period=10e-3)
-    with VirtualClock() as clock, Tasks(task, run=run, clock=clock) as tasks:
+    with VirtualClock() as clock, Tasks(task, workers=run, clock=clock) as tasks:
         tasks.join(60e-3)
         tasks.stop()
         assert tasks["double_the_period"].period == 20e-3
@@ -129,7 +129,7 @@ def test_a_sporadic_task_keeps_its_distance():
         Task(bodies.set_at_every_job, (alarm, 3), name="cause", period=20e-3, priority=9),
         Task(bodies.note, (notes,), name="effect", period=3e-3, trigger=alarm),
     ]
-    with VirtualClock() as clock, Tasks(*tasks, run="threads", clock=clock) as running:
+    with VirtualClock() as clock, Tasks(*tasks, workers="threads", clock=clock) as running:
         running.join(30e-3)
     assert [now // MS for _, _, now in records(notes)] == [0, 3, 6, 20, 23, 26]
 
@@ -153,7 +153,7 @@ def test_statistics_of_the_published_experiment():
             ("tau3", 40e-3, 10e-3, 1),
         )
     ]
-    with VirtualClock() as clock, Tasks(*tasks, run="threads", clock=clock) as running:
+    with VirtualClock() as clock, Tasks(*tasks, workers="threads", clock=clock) as running:
         running.join(0.4)
     tau3 = running["tau3"].statistics
     assert tau3.jobs == 10
@@ -202,7 +202,7 @@ def test_all_on_a_virtual_clock_share_a_processor_until_the_end():
     before = os.sched_getaffinity(0)
     found = Value("i8", 4)
     task = Task(bodies.report_scheduling, (found,), period=1e-3, cpu=7)  # a simulated one
-    with VirtualClock() as clock, Tasks(task, run="processes", clock=clock) as running:
+    with VirtualClock() as clock, Tasks(task, workers="processes", clock=clock) as running:
         [ours] = os.sched_getaffinity(0)
         running.join(1e-3)
         assert found.read()[3] == ours
@@ -215,7 +215,7 @@ def test_all_on_a_virtual_clock_share_a_processor_until_the_end():
 @BOTH
 def test_tasks_end_by_themselves(run):
     tasks = [Task(bodies.count_to, (n,), name=f"to {n}", period=1e-3) for n in (3, 5)]
-    with Tasks(*tasks, run=run) as running:
+    with Tasks(*tasks, workers=run) as running:
         assert running.join(30.0)
         assert not any(handle.running for handle in running)
         assert [handle.statistics.jobs for handle in running] == [4, 6]
@@ -223,8 +223,8 @@ def test_tasks_end_by_themselves(run):
 
 def test_more_than_one_run_as_processes_one_as_a_thread():
     one, two = (Task(bodies.idle, name=name, period=1e-3) for name in "ab")
-    assert Tasks(one).run == "threads"
-    assert Tasks(one, two).run == "processes"
+    assert Tasks(one).workers == "threads"
+    assert Tasks(one, two).workers == "processes"
 
 
 def test_a_sporadic_task_sleeps_until_it_is_signalled_from_another_process():
@@ -245,7 +245,7 @@ def test_the_place_that_is_asked_for_is_obtained(run):
     found = Value("i8", 4)
     task = Task(bodies.report_scheduling, (found,), period=1e-3, cpu=cpu, priority=7)
     try:
-        with Tasks(task, run=run) as running:
+        with Tasks(task, workers=run) as running:
             assert running.join(30.0)
     except RealtimeError as error:
         pytest.skip(f"needs real-time scheduling: {error.message}")
@@ -259,7 +259,7 @@ def test_a_stack_of_its_own_size(run):
     before = threading.stack_size(), resource.getrlimit(resource.RLIMIT_STACK)
     found = Value("i8", 2)
     task = Task(bodies.stack_deep, (found,), period=1e-3, stack_size=256 * 1024)
-    with Tasks(task, run=run) as running:
+    with Tasks(task, workers=run) as running:
         assert running.join(30.0)
     if run == "processes":
         assert found.read()[1] == 256 * 1024
@@ -283,7 +283,7 @@ def test_a_loop_beside_tasks_has_a_place_on_their_clock(run):
             ends.append(place.now_ns)
         return ends
 
-    with VirtualClock() as clock, Tasks(task, run=run, clock=clock, best_effort=True) as tasks:
+    with VirtualClock() as clock, Tasks(task, workers=run, clock=clock, best_effort=True) as tasks:
         ends = tasks.beside(work, 3, priority=40, cpu=0)
     assert [end % (10 * MS) for end in ends] == [3 * MS] * 3
     assert len(records(notes)) >= 3
@@ -329,7 +329,7 @@ def test_on_the_machines_clock_it_runs_here():
 def test_on_the_machines_clock_it_is_in_the_session_too(run):
     collects = gc.isenabled()
     prepared = session(best_effort=True)
-    with Tasks(Task(bodies.idle, period=10e-3), run=run, session=prepared) as tasks:
+    with Tasks(Task(bodies.idle, period=10e-3), workers=run, session=prepared) as tasks:
         assert tasks.beside(lambda place: gc.isenabled()) is False
         assert gc.isenabled() == (collects and run == "processes")
     assert gc.isenabled() == collects

@@ -23,7 +23,7 @@ def sine(arm: cat.Drives, home: np.ndarray, time: float) -> None:
 def test_two_lost_cycles_are_counted_and_the_motion_goes_on(cell: Cell, run: str) -> None:
     arm = cell.drives()
     seen = []
-    with cat.Loop(arm, run=run) as loop:  # type: ignore[arg-type]
+    with cat.Loop(arm, execution=run) as loop:  # type: ignore[arg-type]
         home = arm.actual.position.copy()
         for cycle in loop:
             if cycle.number == 100:
@@ -46,7 +46,7 @@ def test_three_in_a_row_end_the_loop_with_its_log(cell: Cell, run: str) -> None:
     arm = cell.drives()
     with (
         pytest.raises(WorkingCounterError, match="3 cycles in a row") as caught,
-        cat.Loop(arm, run=run) as loop,  # type: ignore[arg-type]
+        cat.Loop(arm, execution=run) as loop,  # type: ignore[arg-type]
     ):
         home = arm.actual.position.copy()
         for cycle in loop:
@@ -77,7 +77,10 @@ def test_a_frame_too_late_is_a_frame_lost(cell: Cell) -> None:
 
 def test_a_limit_of_one_is_one(cell: Cell) -> None:
     arm = cell.drives()
-    with pytest.raises(WorkingCounterError, match="1 cycles"), cat.Loop(arm, lost_limit=1) as loop:
+    with (
+        pytest.raises(WorkingCounterError, match="1 cycles"),
+        cat.Loop(arm, stop=cat.StopPolicy(lost_limit=1)) as loop,
+    ):
         for cycle in loop:
             if cycle.number == 10:
                 cell.spoil("lose", 1)

@@ -35,7 +35,7 @@ def test_a_position_holds_while_python_is_a_little_late(cell: Cell) -> None:
 
 def test_after_the_late_limit_the_axes_stop_and_stay(cell: Cell) -> None:
     arm = cell.drives()
-    with cat.Loop(arm, on_axis_stopped="event") as loop:
+    with cat.Loop(arm, stop=cat.StopPolicy(on_axis_stopped="event")) as loop:
         home = arm.actual.position.copy()
         for cycle in loop:
             if cycle.number < 100:
@@ -67,7 +67,7 @@ def test_the_iteration_says_which_axes_were_stopped_and_what_was_late(cell: Cell
     assert all(name in str(caught.value) for name in arm.names)
     assert "50 ms in CSP" in caught.value.message
     assert "wrote no targets for" in caught.value.message
-    assert "Loop(late_limit=...)" in caught.value.hint
+    assert "StopPolicy(late_limit=...)" in caught.value.hint
     cell.assert_safe()
 
 
@@ -107,7 +107,7 @@ def test_velocity_and_torque_ramp_to_zero_and_stop(cell: Cell, mode: str) -> Non
 
 def test_the_limit_is_off_only_when_asked(cell: Cell) -> None:
     arm = cell.drives()
-    with cat.Loop(arm, late_limit=0) as loop:
+    with cat.Loop(arm, stop=cat.StopPolicy(late_limit=0)) as loop:
         for cycle in loop:
             if cycle.number == 20:
                 cycle.spend(2.0)
@@ -118,7 +118,10 @@ def test_the_limit_is_off_only_when_asked(cell: Cell) -> None:
 
 def test_inline_a_late_body_stops_the_bus_and_the_watchdog_is_the_guard(cell: Cell) -> None:
     arm = cell.drives()
-    with pytest.raises(cat.CatenaryError, match="SAFE-OP"), cat.Loop(arm, run="inline") as loop:
+    with (
+        pytest.raises(cat.CatenaryError, match="SAFE-OP"),
+        cat.Loop(arm, execution="inline") as loop,
+    ):
         for cycle in loop:
             if cycle.number == 20:
                 cycle.spend(0.5)

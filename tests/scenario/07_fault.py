@@ -52,7 +52,7 @@ def test_a_new_loop_resets_the_fault(mode: str) -> None:
 def test_an_application_may_go_on_and_decide_itself(cell: Cell) -> None:
     arm = cell.drives()
     faulty = cell.servos[1]
-    with cat.Loop(arm, raise_faults=False) as loop:
+    with cat.Loop(arm, stop=cat.StopPolicy(raise_faults=False)) as loop:
         home = arm.actual.position.copy()
         for cycle in loop:
             arm.target.position[:] = home + 0.5 * cycle.time
@@ -80,7 +80,7 @@ def test_an_application_may_go_on_and_decide_itself(cell: Cell) -> None:
 
 def test_reset_alone_moves_nothing(cell: Cell) -> None:
     arm = cell.drives()
-    with cat.Loop(arm, raise_faults=False) as loop:
+    with cat.Loop(arm, stop=cat.StopPolicy(raise_faults=False)) as loop:
         for cycle in loop:
             arm.target.position[:] = 1.0
             if cycle.number == 0:

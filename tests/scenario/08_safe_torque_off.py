@@ -13,7 +13,7 @@ from tests.scenario.cell import OP, Cell
 def test_nothing_moves_after_sto_until_the_application_asks(cell: Cell) -> None:
     arm = cell.drives()
     servo = cell.servos[0]
-    with cat.Loop(arm, raise_faults=False) as loop:
+    with cat.Loop(arm, stop=cat.StopPolicy(raise_faults=False)) as loop:
         home = arm.actual.position.copy()
         for cycle in loop:
             if cycle.number < 100 or cycle.number >= 400:

@@ -60,7 +60,7 @@ def test_a_velocity_stops_at_the_position_limit(cell: Cell) -> None:
 
 def test_a_torque_is_clamped_and_stops_at_the_position_limit(cell: Cell) -> None:
     arm = cell.drives(mode="cst", position_max=0.5, torque_limit=0.05)
-    with cat.Loop(arm, on_axis_stopped="event") as loop:
+    with cat.Loop(arm, stop=cat.StopPolicy(on_axis_stopped="event")) as loop:
         for cycle in loop:
             arm.target.torque[:] = 1.9
             assert all(servo.torque_nm < 0.051 for servo in cell.servos if arm.enabled.all())

@@ -15,7 +15,7 @@ class Stumble(Exception):
 
 
 def spin(cell: Cell, arm: cat.Drives, run: str, end: BaseException | None) -> None:
-    with cat.Loop(arm, run=run) as loop:  # type: ignore[arg-type]
+    with cat.Loop(arm, execution=run) as loop:  # type: ignore[arg-type]
         home = arm.actual.position.copy()
         for cycle in loop:
             arm.target.position[:] = home + FAST * cycle.time
@@ -59,7 +59,7 @@ def test_the_same_in_every_mode(cell: Cell, mode: str, target: str) -> None:
 def test_a_drive_that_cannot_brake_has_a_deadline(cell: Cell) -> None:
     arm = cell.drives()
     start = 0
-    with cat.Loop(arm, stop_deadline=0.2) as loop:
+    with cat.Loop(arm, stop=cat.StopPolicy(stop_deadline=0.2)) as loop:
         home = arm.actual.position.copy()
         for cycle in loop:
             arm.target.position[:] = home + FAST * cycle.time

@@ -30,7 +30,8 @@ segment = demo_segment(clock="monotonic")
 with cat.MainDevice(segment) as main:
     arm = Arm(main.scan().drives, counts_per_turn=2**20)
     try:
-        with cat.Loop(arm, priority=None, watchdog=5.0, lost_limit=1000, late_limit=0) as loop:
+        with cat.Loop(arm, priority=None, watchdog=5.0,
+            stop=cat.StopPolicy(lost_limit=1000, late_limit=0)) as loop:
             print("running", flush=True)
             home = arm.actual.position.copy()
             for cycle in loop:
@@ -135,7 +136,7 @@ def test_a_real_process_comes_down_by_itself(number: signal.Signals, moment: str
 def test_a_second_signal_shortens_the_wait_for_standstill(cell: Cell) -> None:
     arm = cell.drives()
     start = 0
-    with cat.Loop(arm, stop_deadline=60.0) as loop:
+    with cat.Loop(arm, stop=cat.StopPolicy(stop_deadline=60.0)) as loop:
         home = arm.actual.position.copy()
         for cycle in loop:
             arm.target.position[:] = home + 20.0 * cycle.time

@@ -20,7 +20,7 @@ from tests.scenario.vertical import VerticalCell, vertical_cell
 
 WATCHDOG = 0.1  # [s], the default of Loop
 # In real time: the machine may stop for a while without the scenario being over.
-PATIENT = "period=2e-3, watchdog=1.0, lost_limit=1000, late_limit=0"
+PATIENT = "period=2e-3, watchdog=1.0, stop=cat.StopPolicy(lost_limit=1000, late_limit=0)"
 
 SCRIPT = f"""
 import sys
@@ -87,7 +87,7 @@ def kill_in_cst(cell: VerticalCell, watchdog: float) -> tuple[float, float]:
     Returns the way [rad] from then until the arm stands, and the velocity at the kill [rad/s].
     """
     arm = cell.drives(mode="cst", velocity_limit=6.0)
-    with cat.Loop(arm, watchdog=watchdog, raise_faults=False) as loop:
+    with cat.Loop(arm, watchdog=watchdog, stop=cat.StopPolicy(raise_faults=False)) as loop:
         for cycle in loop:
             arm.target.torque[:] = cell.gravity + 10.0
             if cycle.number == 50:
@@ -148,6 +148,8 @@ def test_a_killed_process_leaves_nothing_turning_and_nothing_locked(veth: tuple[
         assert until(lambda: abs(servo.velocity_rad_s) < 0.05, seconds=30)
         with cat.MainDevice(veth[0]) as main:
             arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
-            with cat.Loop(arm, period=2e-3, watchdog=1.0, lost_limit=1000, late_limit=0) as loop:
+            with cat.Loop(
+                arm, period=2e-3, watchdog=1.0, stop=cat.StopPolicy(lost_limit=1000, late_limit=0)
+            ) as loop:
                 next(loop)
                 assert servo.drive_state() == "OPERATION ENABLED"

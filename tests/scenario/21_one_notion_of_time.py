@@ -37,7 +37,7 @@ def live(path: Path, run: Run) -> tuple[str, list[float], int, object]:
                 for name, period, execution, priority in TASKS
             ),
             clock=clock,
-            run=run,
+            workers=run,
             best_effort=True,
         )
         segment = cat.Segment([cat.Coupler(), *(cat.Servo() for _ in range(3))], clock=clock)
@@ -80,7 +80,7 @@ def looping(clock: VirtualClock, place: Participant, took: list[float]) -> None:
             arm = cat.Drives(
                 main.scan().drives, mode="csp", counts_per_turn=2**20, velocity_limit=100.0
             )
-            with cat.Loop(arm, period=20e-3, late_limit=0) as loop:
+            with cat.Loop(arm, period=20e-3, stop=cat.StopPolicy(late_limit=0)) as loop:
                 for cycle in loop:
                     if cycle.number == 3:
                         break
@@ -100,7 +100,7 @@ def test_the_body_of_a_loop_is_preempted_like_a_task() -> None:
         place = clock.participate(priority=10, cpu=0)
         thread = threading.Thread(target=looping, args=(clock, place, took))
         thread.start()
-        with Tasks(task, clock=clock, run="threads", best_effort=True) as tasks:
+        with Tasks(task, clock=clock, workers="threads", best_effort=True) as tasks:
             tasks.join(1.0)
         thread.join()
     assert len(took) == 3

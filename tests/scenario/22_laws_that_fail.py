@@ -40,7 +40,7 @@ def test_the_drives_stop_and_the_bus_goes_on(
     cell: Cell, law: Callable, said: str, run: str
 ) -> None:
     arm = cell.drives(mode="csv")
-    with cat.Loop(arm, run=run) as loop:
+    with cat.Loop(arm, execution=run) as loop:
         turning = loop.start(law, memory=[0.0])
         with pytest.raises(LawError, match=said):
             for cycle in loop:

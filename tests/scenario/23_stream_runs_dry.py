@@ -39,7 +39,7 @@ def test_the_axes_continue_and_follow_the_next_rows(cell: Cell) -> None:
 
 def test_a_moving_axis_comes_to_rest_and_is_stopped(cell: Cell) -> None:
     arm = cell.drives(mode="csv")
-    with cat.Loop(arm, on_axis_stopped="event") as loop:
+    with cat.Loop(arm, stop=cat.StopPolicy(on_axis_stopped="event")) as loop:
         for cycle in loop:
             arm.target.velocity[:] = 0.0  # somebody holds the load
             if cycle.number == 100:

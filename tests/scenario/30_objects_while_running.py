@@ -22,7 +22,7 @@ def test_an_answer_takes_four_cycles(cell: Cell, run: str) -> None:
     arm = cell.drives()
     drive = cell.subs.drives[0]
     answer: Pending[int] | None = None
-    with cat.Loop(arm, run=run) as loop:  # type: ignore[arg-type]
+    with cat.Loop(arm, execution=run) as loop:  # type: ignore[arg-type]
         for cycle in loop:
             if answer is None and cycle.number == 10:
                 answer = drive.sdo.request(0x1018, 1, type=UDINT)
@@ -75,7 +75,7 @@ def test_what_is_written_inside_the_loop_is_there(cell: Cell) -> None:
 def test_a_call_that_would_stop_the_loop_is_refused_at_once(cell: Cell, run: str) -> None:
     arm = cell.drives()
     drive = cell.subs.drives[0]
-    with cat.Loop(arm, run=run) as loop:  # type: ignore[arg-type]
+    with cat.Loop(arm, execution=run) as loop:  # type: ignore[arg-type]
         for cycle in loop:
             with pytest.raises(RuntimeError, match=r"request\(\)"):
                 drive.sdo.read(0x1000)

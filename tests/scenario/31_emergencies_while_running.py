@@ -37,7 +37,7 @@ def emergencies(loop: cat.Loop, cell: Cell, cycles: int) -> Iterator[tuple[int, 
 @pytest.mark.parametrize("run", ["threaded", "inline"])
 def test_the_bit_in_the_cycle_tells_at_once(cell: Cell, run: str) -> None:
     arm = cell.drives()
-    with cat.Loop(arm, run=run, raise_faults=False) as loop:  # type: ignore[arg-type]
+    with cat.Loop(arm, execution=run, stop=cat.StopPolicy(raise_faults=False)) as loop:  # type: ignore[arg-type]
         assert loop.plan.mailboxes.devices == (2, 3)
         sent = loop.timing.counters["lane_sent"]
         [(when, event)] = emergencies(loop, cell, cycles=60)
@@ -54,7 +54,7 @@ def test_without_an_fmmu_to_spare_the_register_is_asked(cell: Cell) -> None:
     for drive in cell.subs.drives:
         with_fmmus(drive, 2)
     arm = cell.drives()
-    with cat.Loop(arm, raise_faults=False) as loop:
+    with cat.Loop(arm, stop=cat.StopPolicy(raise_faults=False)) as loop:
         assert loop.plan.mailboxes.devices == ()
         [(when, event)] = emergencies(loop, cell, cycles=100)
         assert loop.timing.counters["lost"] == 0
@@ -65,7 +65,7 @@ def test_without_an_fmmu_to_spare_the_register_is_asked(cell: Cell) -> None:
 def test_one_with_and_one_without(cell: Cell) -> None:
     with_fmmus(cell.subs[2], 2)
     arm = cell.drives()
-    with cat.Loop(arm, raise_faults=False) as loop:
+    with cat.Loop(arm, stop=cat.StopPolicy(raise_faults=False)) as loop:
         assert loop.plan.mailboxes.devices == (3,)
         [(when, _)] = emergencies(loop, cell, cycles=60)
     assert when <= 28
@@ -77,7 +77,7 @@ def test_a_conversation_with_the_drive_hears_it_too(cell: Cell) -> None:
     answers = []
     told: list[Event] = []
     cell.main.on_event(told.append)
-    with cat.Loop(arm, raise_faults=False) as loop:
+    with cat.Loop(arm, stop=cat.StopPolicy(raise_faults=False)) as loop:
         for cycle in loop:
             if cycle.number == 20:
                 cell.servos[1].inject_fault(0x7305)

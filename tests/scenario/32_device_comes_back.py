@@ -27,6 +27,7 @@ from catenary.virtual.faults import (
     swap,
     unplug,
 )
+from tests.loop_options import grouped
 from tests.scenario.cell import OP, PRE_OP, Cell, cell_of
 
 TOOL, GRIPPER = 3, 4
@@ -65,7 +66,7 @@ def run(
 ) -> list[event.Event]:
     """The arm moves throughout and never misses a cycle; what happened meanwhile."""
     arm, tool, gripper = wishes(cell)
-    with cat.Loop(arm, tool, gripper, **options) as loop:  # type: ignore[arg-type]
+    with cat.Loop(arm, tool, gripper, **grouped(options)) as loop:  # type: ignore[arg-type]
         cell.main.events.get()
         for fault in faults:
             cell.segment.inject(fault)
@@ -371,10 +372,9 @@ def test_two_that_changed_places_are_both_told(cell: Cell) -> None:
 
 
 @pytest.mark.parametrize("name", ["on_return", "on_replacement"])
-def test_a_policy_there_is_not(cell: Cell, name: str) -> None:
-    arm, _, _ = wishes(cell)
+def test_a_policy_there_is_not(name: str) -> None:
     with pytest.raises(ValueError, match=name):
-        cat.Loop(arm, **{name: "maybe"})  # type: ignore[arg-type]
+        cat.StopPolicy(**{name: "maybe"})  # type: ignore[arg-type]
 
 
 def test_an_object_of_a_device_that_came_back_can_be_read(cell: Cell) -> None:

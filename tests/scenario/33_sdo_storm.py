@@ -27,7 +27,7 @@ def positions(run: str, *, storm: bool) -> list[tuple[float, ...]]:
         arm = cell.drives()
         answers: dict[int, Pending[int]] = {}
         answered, found = 0, []
-        with cat.Loop(arm, run=run) as loop:  # type: ignore[arg-type]
+        with cat.Loop(arm, execution=run) as loop:  # type: ignore[arg-type]
             home = arm.actual.position.copy()
             for cycle in loop:
                 arm.target.position[:] = home + 0.2 * math.sin(2 * math.pi * cycle.time)

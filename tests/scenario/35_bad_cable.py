@@ -51,7 +51,7 @@ def test_a_cable_that_spoils_every_frame_is_named_by_the_error(cell: Cell) -> No
 
 
 def test_a_loose_plug_is_named(cell: Cell) -> None:
-    with cat.Loop(cell.drives(), lost_limit=20) as loop:
+    with cat.Loop(cell.drives(), stop=cat.StopPolicy(lost_limit=20)) as loop:
         for cycle in loop:
             if cycle.number == 1500:
                 cell.segment.inject(cut(between=(2, 3), for_=0.005))

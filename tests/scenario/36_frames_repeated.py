@@ -25,6 +25,7 @@ from tests.link_table import (
     capsule_of,
     table_in,
 )
+from tests.loop_options import grouped
 
 INDICES = 128
 
@@ -97,7 +98,7 @@ def false_steps(segment: Segment, links: list[RepeatingLink], **options: bool) -
     false = 0
     with cat.MainDevice(*links) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
-        with cat.Loop(arm, **options) as loop:
+        with cat.Loop(arm, **grouped(options)) as loop:
             home = arm.actual.position.copy()
             for cycle in loop:
                 arm.target.position[:] = home + 0.5 * cycle.time
@@ -151,7 +152,7 @@ def due_of(link: RepeatingLink) -> int:
 def test_the_plan_prints_what_exact_matching_costs() -> None:
     with cat.MainDevice(segment_of()) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
-        with cat.Loop(arm, exact_matching=True) as loop:
+        with cat.Loop(arm, scheduling=cat.Scheduling(exact_matching=True)) as loop:
             text = str(loop.plan)
     assert "exact matching: a cycle number in each frame; 16 bytes and 1.28 us of wire" in text
     assert "NOP  4 bytes" in text

@@ -52,7 +52,7 @@ def test_with_stamps_that_scatter_twice_as_much() -> None:
 def test_whoever_follows_in_whatever_order(run: str, clock: str) -> None:
     with clocked_cell(3) as cell:
         arm = cell.drives(dc=True)
-        with cat.Loop(arm, period=1e-3, run=run, clock=clock) as loop:  # type: ignore[arg-type]
+        with cat.Loop(arm, period=1e-3, execution=run, clocks=cat.ClockOptions(lead=clock)) as loop:  # type: ignore[arg-type]
             loop.wait_locked(within=BOUND, timeout=2.0)
             run_for(loop, 0.5)
             assert all(abs(d) < BOUND for d in true_differences(cell.segment).values())
@@ -88,7 +88,7 @@ def test_the_wake_up_takes_on_the_reference_clocks_rate() -> None:
 def test_the_reference_takes_on_the_machines_rate() -> None:
     with (
         cell_of(Servo(crystal=Crystal(ppm=150.0)), Servo(crystal=Crystal(ppm=-80.0))) as cell,
-        cat.Loop(cell.drives(dc=True), period=1e-3, clock="main") as loop,
+        cat.Loop(cell.drives(dc=True), period=1e-3, clocks=cat.ClockOptions(lead="main")) as loop,
     ):
         loop.wait_locked()
         offset = cell.segment.core.system_time(0) - cell.segment.now_ns

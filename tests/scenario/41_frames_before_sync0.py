@@ -25,7 +25,7 @@ def missed(cell: Cell) -> list[int]:
 def test_no_pulse_is_missed(run: str, clock: str) -> None:
     with clocked_cell(2) as cell:
         arm = cell.drives(dc=True)
-        with cat.Loop(arm, period=1e-3, run=run, clock=clock) as loop:  # type: ignore[arg-type]
+        with cat.Loop(arm, period=1e-3, execution=run, clocks=cat.ClockOptions(lead=clock)) as loop:  # type: ignore[arg-type]
             before = [cell.segment.core.synchronous(p)[2] for p in (2, 3)]
             pulses = cell.segment.core.pulses(2)[0]
             run_for(loop, 1.0)

@@ -66,7 +66,10 @@ def test_the_figures_print() -> None:
 
 def test_late_frames_are_late_and_not_corrupt() -> None:
     """Each cycle asks another device's difference: a frame of the cycle before looks different."""
-    with clocked_cell(2) as cell, cat.Loop(cell.drives(dc=True), lost_limit=5) as loop:
+    with (
+        clocked_cell(2) as cell,
+        cat.Loop(cell.drives(dc=True), stop=cat.StopPolicy(lost_limit=5)) as loop,
+    ):
         loop.wait_locked()
         cell.spoil("delay", 2, delay=1.2e-3)
         run_for(loop, 0.02)

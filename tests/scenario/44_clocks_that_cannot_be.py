@@ -7,11 +7,12 @@ import pytest
 
 import catenary as cat
 from catenary.errors import ConfigurationError
+from tests.loop_options import grouped
 from tests.scenario.cell import PRE_OP, Cell
 
 
 def enter(cell: Cell, *wishes: object, **options: object) -> None:
-    with cat.Loop(*wishes, period=1e-3, **options):  # type: ignore[arg-type]
+    with cat.Loop(*wishes, period=1e-3, **grouped(options)):  # type: ignore[arg-type]
         raise AssertionError("this loop cannot be")
 
 
@@ -50,12 +51,14 @@ def test_two_wishes_that_disagree(cell: Cell) -> None:
 
 
 def test_a_reference_of_the_users_choice(cell: Cell) -> None:
-    with cat.Loop(cell.drives(dc=True), period=1e-3, reference=cell.subs[2]) as loop:
+    with cat.Loop(
+        cell.drives(dc=True), period=1e-3, clocks=cat.ClockOptions(reference=cell.subs[2])
+    ) as loop:
         loop.wait_locked()
         assert loop.clocks.reference is cell.subs[2]
         assert set(loop.clocks.differences) == {3}
 
 
 def test_nobody_but_us_is_followed(cell: Cell) -> None:
-    with pytest.raises(ValueError, match='clock=\'gps\': "reference" or "main"'):
-        cat.Loop(cell.drives(dc=True), clock="gps")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match='lead=\'gps\': must be one of "reference", "main"'):
+        cat.Loop(cell.drives(dc=True), clocks=cat.ClockOptions(lead="gps"))  # type: ignore[arg-type]

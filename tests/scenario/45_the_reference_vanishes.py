@@ -38,7 +38,9 @@ def ride(cell: Cell, vanishing: int, seconds: float = 6.0) -> list[event.Event]:
         [cell.subs[vanishing]], counts_per_turn=2**20, velocity_limit=100.0, dc=True, required=False
     )
     core = cell.segment.core
-    with cat.Loop(arm, tool, period=1e-3, reference=cell.subs[FIRST]) as loop:
+    with cat.Loop(
+        arm, tool, period=1e-3, clocks=cat.ClockOptions(reference=cell.subs[FIRST])
+    ) as loop:
         loop.wait_locked()
         list(cell.main.events)
         missed = {sub.position: core.synchronous(sub.position)[2] for sub in others}

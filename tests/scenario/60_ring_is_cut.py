@@ -151,7 +151,7 @@ def test_a_thousand_cuts_and_joins_cost_no_frame_that_could_have_come(
     segment = segment_of(detection=detection)
     with cat.MainDevice(segment.first, segment.second) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
-        with cat.Loop(arm, lost_limit=20) as loop:
+        with cat.Loop(arm, stop=cat.StopPolicy(lost_limit=20)) as loop:
             changes, cutting, between, longest, lost = 0, True, CABLES[0], 0, 0
             for cycle in loop:
                 declared = segment.take_losses()

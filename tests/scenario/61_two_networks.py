@@ -99,7 +99,7 @@ def run_and_kill(
     body: Body, upper: cat.Drives, lower: cat.Drives, quorum: int | None = None
 ) -> list[tuple[bool, bool, bool]]:
     seen = []
-    with cat.Loop(upper, lower, quorum=quorum) as loop:
+    with cat.Loop(upper, lower, scheduling=cat.Scheduling(quorum=quorum)) as loop:
         home = lower.actual.position.copy()
         for cycle in loop:
             lower.target.position[:] = home + 0.2 * cycle.time
@@ -126,7 +126,7 @@ def test_with_a_quorum_the_other_goes_on(body: Body) -> None:
 def test_one_that_is_plugged_in_again_does_not_stop_the_other(body: Body) -> None:
     """Its devices are out of OP by their watchdogs. They are led back, and stand until asked."""
     upper, lower = body.wishes()
-    with cat.Loop(upper, lower, quorum=1) as loop:
+    with cat.Loop(upper, lower, scheduling=cat.Scheduling(quorum=1)) as loop:
         home = lower.actual.position.copy()
         for cycle in loop:
             assert cycle.ok
@@ -152,7 +152,7 @@ def test_a_network_that_answers_out_of_op_does_not_count(body: Body, quorum: int
     upper, lower = body.wishes()
     with (
         pytest.raises((WorkingCounterError, StateError)),
-        cat.Loop(upper, lower, quorum=quorum) as loop,
+        cat.Loop(upper, lower, scheduling=cat.Scheduling(quorum=quorum)) as loop,
     ):
         for cycle in loop:
             if cycle.number == 100:
@@ -196,8 +196,8 @@ def test_their_clocks_follow_the_main_device() -> None:
                     if cycle.time > 10.0:
                         break
                 assert [network.clocks.locked for network in loop.networks] == [True, True]
-            with pytest.raises(ValueError, match='clock="main"'):
-                cat.Loop(*wishes, clock="reference")
+            with pytest.raises(ValueError, match='lead="main"'):
+                cat.Loop(*wishes, clocks=cat.ClockOptions(lead="reference"))
 
 
 def test_clocks_that_nobody_wished_for_cannot_be_waited_for(body: Body) -> None:
@@ -214,7 +214,7 @@ def test_a_device_is_released_in_its_own_network(body: Body) -> None:
         cat.Drives(main.subs.drives, counts_per_turn=2**20, velocity_limit=100.0, required=False)
         for main in (body.upper_main, body.lower_main)
     ]
-    with cat.Loop(upper, lower, on_return="hold") as loop:
+    with cat.Loop(upper, lower, stop=cat.StopPolicy(on_return="hold")) as loop:
         for cycle in loop:
             if cycle.number == 20:
                 for segment in (body.upper, body.lower):
@@ -235,9 +235,9 @@ def test_a_device_is_released_in_its_own_network(body: Body) -> None:
 def test_what_several_networks_cannot_have(body: Body) -> None:
     upper, lower = body.wishes()
     with pytest.raises(ValueError, match="threaded"):
-        cat.Loop(upper, lower, run="inline")
+        cat.Loop(upper, lower, execution="inline")
     with pytest.raises(ValueError, match="quorum"):
-        cat.Loop(upper, lower, quorum=3)
+        cat.Loop(upper, lower, scheduling=cat.Scheduling(quorum=3))
     with pytest.raises(ValueError, match="one wish with devices of several"):
         both = [body.upper_main.subs[1], body.lower_main.subs[2]]
         cat.Loop(cat.Drives(both, counts_per_turn=2**20, velocity_limit=100.0))

@@ -31,7 +31,8 @@ with cat.MainDevice(segment) as main:
     arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
     with (
         cat.Share(sys.argv[1], history=8.0) as share,
-        cat.Loop(arm, period=1e-3, sink=share, lost_limit=10**6, late_limit=0) as loop,
+        cat.Loop(arm, period=1e-3, sink=share,
+            stop=cat.StopPolicy(lost_limit=10**6, late_limit=0)) as loop,
     ):
         home = arm.actual.position.copy()
         for done, cycle in enumerate(loop):

@@ -41,7 +41,7 @@ def sto_in_motion(**joint: object) -> float:
     """How far the shoulder goes on after safe torque off at some 1 rad/s [rad]."""
     with arm_cell(start=START, **joint) as cell:
         arm = cell.drives()
-        with cat.Loop(arm, raise_faults=False) as loop:
+        with cat.Loop(arm, stop=cat.StopPolicy(raise_faults=False)) as loop:
             home = arm.actual.position.copy()
             for cycle in loop:
                 arm.target.position[SHOULDER] = home[SHOULDER] + 1.0 * min(cycle.time, 0.4)

@@ -16,7 +16,7 @@ from tests.scenario.vertical import LOAD, VerticalCell, vertical_cell
 def hold(cell: VerticalCell, cycles: int = 300) -> float:
     """Hold the arm in CSP, and return its angle [rad] at the moment of a safe torque off."""
     arm = cell.drives()
-    with cat.Loop(arm, raise_faults=False) as loop:
+    with cat.Loop(arm, stop=cat.StopPolicy(raise_faults=False)) as loop:
         for cycle in loop:
             if cycle.number == cycles:
                 cell.servo.switch_sto(True)

@@ -54,7 +54,7 @@ def test_cst_keeps_its_torque_for_20_ms_then_the_brake_closes(torque: float) -> 
     closed."""
     with vertical_cell() as cell:
         arm = cell.drives(mode="cst", velocity_limit=6.0)
-        with cat.Loop(arm, on_axis_stopped="event") as loop:
+        with cat.Loop(arm, stop=cat.StopPolicy(on_axis_stopped="event")) as loop:
             cycle = follow(cell, arm, loop, 100)
             loop.run(carry, parameters=[torque, 0.02])
             before, downwards = cell.joint, -cell.velocity
@@ -72,7 +72,7 @@ def test_the_stream_is_closed_and_cst_is_handed_over(tmp_path: Path) -> None:
     recording = tmp_path / "frames.pcapng"
     with vertical_cell(record=recording) as cell:
         arm = cell.drives(mode="cst", velocity_limit=6.0)
-        with cat.Loop(arm, on_axis_stopped="event") as loop:
+        with cat.Loop(arm, stop=cat.StopPolicy(on_axis_stopped="event")) as loop:
             follow(cell, arm, loop, 100)
             stream = loop.stream()
             stream.write(torque=[[cell.gravity]] * 50)
@@ -158,10 +158,8 @@ def test_on_the_machines_clock_and_real_frames(veth: tuple[str, str]) -> None:
             arm,
             period=2e-3,
             laws=[carry],  # compiled before the axis is powered
-            on_axis_stopped="event",
+            stop=cat.StopPolicy(on_axis_stopped="event", lost_limit=1000, late_limit=0.5),
             watchdog=1.0,
-            lost_limit=1000,
-            late_limit=0.5,
         )
         with loop:
             for cycle in loop:

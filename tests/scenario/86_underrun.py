@@ -33,7 +33,7 @@ def late_in_cst(cell: VerticalCell, torque: float, **options: object) -> tuple[T
     Returns the trace, and angle [rad] and velocity downwards [rad/s] before.
     """
     arm = cell.drives(mode="cst", velocity_limit=6.0)
-    with cat.Loop(arm, on_axis_stopped="event", **options) as loop:  # type: ignore[arg-type]
+    with cat.Loop(arm, stop=cat.StopPolicy(on_axis_stopped="event"), **options) as loop:  # type: ignore[arg-type]
         cycle = follow(cell, arm, loop, 100)
         arm.target.torque[:] = torque
         next(loop)
@@ -59,7 +59,7 @@ def test_a_late_commit_in_cst(torque: float) -> None:
 def test_the_late_limit_is_three_cycles_at_least() -> None:
     with vertical_cell() as cell:
         arm = cell.drives(mode="cst", velocity_limit=6.0)
-        with cat.Loop(arm, on_axis_stopped="event", period=8e-3) as loop:
+        with cat.Loop(arm, stop=cat.StopPolicy(on_axis_stopped="event"), period=8e-3) as loop:
             cycle = follow(cell, arm, loop, 50)
             before = cell.joint
             trace = cell.compute(cycle, 1.0)
@@ -70,7 +70,7 @@ def test_the_late_limit_is_three_cycles_at_least() -> None:
 def test_an_empty_stream_in_cst() -> None:
     with vertical_cell() as cell:
         arm = cell.drives(mode="cst", velocity_limit=6.0)
-        with cat.Loop(arm, on_axis_stopped="event") as loop:
+        with cat.Loop(arm, stop=cat.StopPolicy(on_axis_stopped="event")) as loop:
             follow(cell, arm, loop, 100)
             stream = loop.stream()
             stream.write(torque=[[cell.gravity]] * 50)
@@ -93,7 +93,7 @@ def test_csp_and_csv_decelerate_and_stop(
     brake has closed."""
     with vertical_cell() as cell:
         arm = cell.drives(mode=mode, velocity_limit=2.0, deceleration_limit=DECELERATION)
-        with cat.Loop(arm, on_axis_stopped="event") as loop:
+        with cat.Loop(arm, stop=cat.StopPolicy(on_axis_stopped="event")) as loop:
             cycle = follow(cell, arm, loop, 100)
             if stream:
                 rows = 300 * [[velocity]]
@@ -122,7 +122,7 @@ def test_the_late_limit_cannot_be_switched_off_in_cst() -> None:
         arm = cell.drives(mode="cst", velocity_limit=6.0)
         with (
             pytest.raises(ValueError, match="late_limit=0 is refused"),
-            cat.Loop(arm, late_limit=0),
+            cat.Loop(arm, stop=cat.StopPolicy(late_limit=0)),
         ):
             pass
         assert cell.fall(0.0) < RESOLUTION

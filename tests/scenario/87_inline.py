@@ -29,7 +29,7 @@ def stuck(cell: VerticalCell, mode: str, torque: float = LOAD) -> tuple[Trace, f
     Returns the trace, and angle [rad] and velocity downwards [rad/s] before.
     """
     arm = cell.drives(mode=mode, velocity_limit=6.0)
-    with pytest.raises(CatenaryError, match="SAFE-OP"), cat.Loop(arm, run="inline") as loop:
+    with pytest.raises(CatenaryError, match="SAFE-OP"), cat.Loop(arm, execution="inline") as loop:
         follow(cell, arm, loop, 100)
         arm.target.torque[:] = torque
         cycle = next(loop)

@@ -58,7 +58,7 @@ def test_never_zero_torque_in_the_frame_that_stops(
     with vertical_cell(record=recording) as cell:
         arm = cell.drives(mode=mode, velocity_limit=6.0)
         try:
-            with cat.Loop(arm, on_axis_stopped="event") as loop:
+            with cat.Loop(arm, stop=cat.StopPolicy(on_axis_stopped="event")) as loop:
                 plan = loop.plan.cycle
                 follow(cell, arm, loop, 100)
                 before = cell.joint

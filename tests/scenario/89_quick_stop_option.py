@@ -55,7 +55,7 @@ def late(cell: VerticalCell, on_loss: str) -> tuple[float, float, int, float]:
     OPERATION ENABLED [ms], and the fall since half a second before the end [rad].
     """
     arm = cell.drives(mode="cst", velocity_limit=6.0, on_loss=on_loss)
-    with cat.Loop(arm, on_axis_stopped="event") as loop:
+    with cat.Loop(arm, stop=cat.StopPolicy(on_axis_stopped="event")) as loop:
         follow(cell, arm, loop, 100)
         arm.target.torque[:] = TORQUE
         next(loop)
@@ -97,7 +97,7 @@ def test_each_reaction_is_a_bounded_motion(option: Option, on_loss: str) -> None
 def test_an_axis_that_holds_takes_its_load_over_again() -> None:
     with rig() as cell:
         arm = cell.drives(mode="cst", velocity_limit=6.0, on_loss="csp_hold")
-        with cat.Loop(arm, on_axis_stopped="event") as loop:
+        with cat.Loop(arm, stop=cat.StopPolicy(on_axis_stopped="event")) as loop:
             cell.compute(follow(cell, arm, loop, 100), 1.0)
             before = cell.joint
             arm.enable()

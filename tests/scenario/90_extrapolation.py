@@ -136,7 +136,7 @@ def test_a_step_of_3_rad_is_refused() -> None:
     """Bound: the arm stays; at the late limit it falls until the brake has closed."""
     with vertical_cell() as cell:
         arm = cell.drives(velocity_limit=6.28)
-        with cat.Loop(arm, on_axis_stopped="event") as loop:
+        with cat.Loop(arm, stop=cat.StopPolicy(on_axis_stopped="event")) as loop:
             follow(cell, arm, loop, 100)
             before = cell.joint
             samples = []
@@ -170,7 +170,7 @@ def test_a_position_limit_is_not_passed() -> None:
     """Bound: the limit. The arm is 20 ms before it when the application is late."""
     with vertical_cell() as cell:
         arm = cell.drives(**LIMITS, position_max=0.3)
-        with cat.Loop(arm, late_limit=0.2) as loop:
+        with cat.Loop(arm, stop=cat.StopPolicy(late_limit=0.2)) as loop:
             cycle = follow(cell, arm, loop, 280, 1.0)
             assert 0.25 < cell.joint < 0.28
             trace = cell.compute(cycle, 0.15)
@@ -217,7 +217,7 @@ def test_a_velocity_offset_does_not_push_against_the_held_position() -> None:
     velocity = 0.5
     with vertical_cell() as cell:
         arm = cell.drives(**LIMITS, columns=["velocity_offset"])
-        with cat.Loop(arm, late_limit=1.0) as loop:
+        with cat.Loop(arm, stop=cat.StopPolicy(late_limit=1.0)) as loop:
             for cycle in loop:
                 arm.target.position[:] += velocity * MS
                 arm.target["velocity_offset"][:] = velocity

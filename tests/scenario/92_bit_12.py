@@ -104,7 +104,7 @@ def test_after_10_ms_the_axis_is_given_up(velocity: float) -> None:
     """Bound: v² / 2a of 0x6085 and the lag of the drive, the fall until the brake has closed."""
     with vertical_cell() as cell:
         arm = cell.drives(**LIMITS)
-        with cat.Loop(arm, on_axis_stopped="event") as loop:
+        with cat.Loop(arm, stop=cat.StopPolicy(on_axis_stopped="event")) as loop:
             trace, start = lose_bit_12(cell, arm, loop, float("inf"), velocity)
             assert arm.stopped == (StopReason.NOT_FOLLOWING,)
         assert GIVEN_UP <= trace.powered_ms * MS <= GIVEN_UP + 6 * MS
@@ -116,7 +116,7 @@ def test_in_cst_the_torque_stays_until_the_axis_is_given_up() -> None:
     """Bound: the fall until the brake has closed."""
     with vertical_cell() as cell:
         arm = cell.drives(mode="cst", velocity_limit=6.0)
-        with cat.Loop(arm, on_axis_stopped="event") as loop:
+        with cat.Loop(arm, stop=cat.StopPolicy(on_axis_stopped="event")) as loop:
             before = cell.joint
             trace, _ = lose_bit_12(cell, arm, loop, float("inf"))
             assert arm.stopped == (StopReason.NOT_FOLLOWING,)

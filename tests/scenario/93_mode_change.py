@@ -87,7 +87,7 @@ def test_a_change_that_takes_too_long_in_cst_is_a_quick_stop(tmp_path: Path) -> 
     recording = tmp_path / "frames.pcapng"
     with vertical_cell(quirks=ServoQuirks(mode_delay=0.060), record=recording) as cell:
         arm = cell.drives(mode="cst", other_modes=["csp"], velocity_limit=6.0)
-        with cat.Loop(arm, on_axis_stopped="event") as loop:
+        with cat.Loop(arm, stop=cat.StopPolicy(on_axis_stopped="event")) as loop:
             plan = loop.plan.cycle
             follow(cell, arm, loop, 100)
             arm.switch("csp")
@@ -122,7 +122,7 @@ def test_a_refused_mode_is_reported_and_the_old_one_goes_on(refused: int) -> Non
 def test_a_refused_mode_in_cst_is_a_quick_stop() -> None:
     with vertical_cell(quirks=ServoQuirks(refused_modes=(CSP,))) as cell:
         arm = cell.drives(mode="cst", other_modes=["csp"], velocity_limit=6.0)
-        with cat.Loop(arm, on_axis_stopped="event") as loop:
+        with cat.Loop(arm, stop=cat.StopPolicy(on_axis_stopped="event")) as loop:
             follow(cell, arm, loop, 100)
             arm.switch("csp")
             before = cell.joint

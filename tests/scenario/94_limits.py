@@ -74,7 +74,7 @@ def test_a_position_limit_in_cst_is_a_quick_stop() -> None:
     with vertical_cell() as cell:
         arm = cell.drives(mode="cst", velocity_limit=2.0, position_max=0.2)
         highest, reached = 0.0, 0.0
-        with cat.Loop(arm, on_axis_stopped="event") as loop:
+        with cat.Loop(arm, stop=cat.StopPolicy(on_axis_stopped="event")) as loop:
             for cycle in loop:
                 arm.target.torque[:] = cell.gravity + 5.0
                 reached = max(reached, cell.velocity)

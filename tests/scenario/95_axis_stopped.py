@@ -71,7 +71,7 @@ def test_on_request_there_is_only_the_event_and_the_axis_can_be_enabled_again() 
     """Bound: the fall until the brake has closed; enabling moves nothing."""
     with vertical_cell() as cell:
         arm = cell.drives(mode="cst", velocity_limit=6.0)
-        with cat.Loop(arm, on_axis_stopped="event") as loop:
+        with cat.Loop(arm, stop=cat.StopPolicy(on_axis_stopped="event")) as loop:
             cycle = follow(cell, arm, loop, 100)
             before = cell.joint
             cycle.spend(1.0)
@@ -113,7 +113,7 @@ def test_a_program_that_is_late_ends_with_an_exit_status() -> None:
 def test_the_reason_is_kept_until_the_next_request() -> None:
     with vertical_cell() as cell:
         arm = cell.drives(velocity_limit=6.0)
-        with cat.Loop(arm, on_axis_stopped="event") as loop:
+        with cat.Loop(arm, stop=cat.StopPolicy(on_axis_stopped="event")) as loop:
             follow(cell, arm, loop, 100).spend(60 * MS)
             follow(cell, arm, loop, 500)
             assert arm.stopped == (StopReason.UNDERRUN,)
@@ -123,7 +123,7 @@ def test_a_stop_while_the_states_of_the_devices_are_read_is_announced(cell: Cell
     """A reply is garbled: the AL status in it is not OP, and the loop reads the states of all
     devices. Frames are lost meanwhile, so that the core stops all axes. (Found by the soak.)"""
     arm = cell.drives()
-    with cat.Loop(arm, on_axis_stopped="event") as loop:
+    with cat.Loop(arm, stop=cat.StopPolicy(on_axis_stopped="event")) as loop:
         for cycle in loop:
             arm.target.position[:] = arm.actual.position
             if cycle.number == 100:

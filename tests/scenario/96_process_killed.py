@@ -30,7 +30,7 @@ def kill(cell: VerticalCell, torque: float, **options: object) -> tuple[Trace, f
     Returns the trace of a second, and angle [rad] and velocity downwards [rad/s] before.
     """
     arm = cell.drives(mode="cst", velocity_limit=6.0)
-    with cat.Loop(arm, raise_faults=False, **options) as loop:  # type: ignore[arg-type]
+    with cat.Loop(arm, stop=cat.StopPolicy(raise_faults=False), **options) as loop:  # type: ignore[arg-type]
         follow(cell, arm, loop, 100)
         arm.target.torque[:] = torque
         next(loop)

@@ -34,7 +34,7 @@ def run(name: str, order: str, body: Callable[[cat.Loop, cat.Drives, Reader], No
             columns=["following_error"],
         )
         share = cat.Share(name)
-        with share, cat.Loop(arm, run=order, sink=share) as loop, cat.attach(name) as reader:  # type: ignore[arg-type]
+        with share, cat.Loop(arm, execution=order, sink=share) as loop, cat.attach(name) as reader:  # type: ignore[arg-type]
             body(loop, arm, reader)
 
 
@@ -319,11 +319,9 @@ def test_in_real_time_too(name: str, order: str) -> None:
         loop = cat.Loop(
             arm,
             period=2e-3,
-            run=order,  # type: ignore[arg-type]
-            lost_limit=1_000_000,
-            late_limit=0,
+            execution=order,  # type: ignore[arg-type]
+            stop=cat.StopPolicy(lost_limit=1_000_000, late_limit=0, raise_faults=False),
             watchdog=0,
-            raise_faults=False,
             sink=(share := cat.Share(name)),
         )
         with share, loop, cat.attach(name) as reader:

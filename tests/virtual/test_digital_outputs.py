@@ -26,7 +26,7 @@ def switch(segment: Segment, *, dc: bool, cycles: int = 20) -> list[tuple[int, i
     with cat.MainDevice(segment) as main:
         subs = main.scan()
         lamps = cat.Outputs(subs[1], subs[-1], dc=dc)
-        with cat.Loop(lamps, period=PERIOD, run="inline") as loop:
+        with cat.Loop(lamps, period=PERIOD, execution="inline") as loop:
             if dc:
                 loop.wait_locked()
             for cycle in loop:  # SYNC0 begins some 100 ms after it was switched on

@@ -97,17 +97,18 @@ def run(found: dict[str, Any], way: str, rate: int, clock: str | None) -> None:
             velocity_limit=100.0,
             dc=clock is not None,
         )
-        options: dict[str, Any] = {} if clock is None else {"clock": clock}
+        clocks = cat.ClockOptions(lead=clock)
         with cat.Loop(
             arm,
             period=1 / rate,
-            run="inline" if way == "inline" else "threaded",
-            switch_interval=20e-6 if way == "inline" else None,  # docs/benchmarks.md
+            execution="inline" if way == "inline" else "threaded",
+            scheduling=cat.Scheduling(
+                switch_interval=20e-6 if way == "inline" else None
+            ),  # docs/benchmarks.md
             priority=PRIORITY,
-            lost_limit=1000,
-            late_limit=10.0,
+            stop=cat.StopPolicy(lost_limit=1000, late_limit=10.0),
             laws=[sine] if way == "law" else [],
-            **options,
+            clocks=clocks,
         ) as loop:
             if way == "law":
                 home = arm.actual.position.copy()

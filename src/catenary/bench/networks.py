@@ -26,6 +26,7 @@ from catenary.bench.peers.with_catenary import LATE_LIMIT, LOST_LIMIT
 from catenary.bench.report import machine
 from catenary.bench.rounds import BRING_UP_SECONDS, RoundError, run_round
 from catenary.bench.segment import COUNTS_PER_TURN, make_segment, served
+from catenary.loop import Network
 from catenary.realtime import VirtualClock
 from catenary.realtime.child import start_python
 
@@ -214,8 +215,7 @@ def run_loop(jobs: Sequence[Job]) -> list[NetworkRound]:
                 period=first.period_ns * 1e-9,
                 cpu=None if first.cpu is None else [first.cpu] * len(jobs),
                 priority=first.priority,
-                lost_limit=LOST_LIMIT,
-                late_limit=LATE_LIMIT,
+                stop=cat.StopPolicy(lost_limit=LOST_LIMIT, late_limit=LATE_LIMIT),
                 log=first.log,
             )
         )
@@ -224,7 +224,7 @@ def run_loop(jobs: Sequence[Job]) -> list[NetworkRound]:
 
 def follow_and_count(loop: cat.Loop, bodies: Sequence[cat.Drives], job: Job) -> list[NetworkRound]:
     """Counted from the end of the warm-up; lateness from each network's log."""
-    networks = loop.networks  # type: ignore[attr-defined]
+    networks = loop.networks
     before, counted = [network.timing.counters for network in networks], False
     homes = homes_of(bodies)
     for cycle in loop:
@@ -244,7 +244,7 @@ def follow_and_count(loop: cat.Loop, bodies: Sequence[cat.Drives], job: Job) -> 
     ]
 
 
-def phases_of(network: cat.Loop, cycles: int) -> dict[str, list[int]]:
+def phases_of(network: Network | cat.Loop, cycles: int) -> dict[str, list[int]]:
     """Of the last cycles."""
     last = network.log[-cycles:]
     return {name: last[f"{name}_ns"].tolist() for name in KEPT}

@@ -73,7 +73,7 @@ def run_round(way: str, found: Found) -> None:
     low = Task(compute_much, name="low", period=LOW_PERIOD, priority=LOW_PRIORITY, cpu=cpu)
     tasks = Tasks(
         *([high] if way == "alone" else [high, low]),
-        run="threads" if way.startswith("threads") else "processes",
+        workers="threads" if way.startswith("threads") else "processes",
         session=session(best_effort=True, switch_interval=SWITCH_INTERVALS.get(way, 1e-4)),
         best_effort=True,
     )

@@ -15,10 +15,10 @@ from catenary.bench.report import machine
 from catenary.bench.segment import COUNTS_PER_TURN, make_segment
 from catenary.virtual import Segment, Servo
 
-Order = Literal["inline", "threaded"]
+ExecutionMode = Literal["inline", "threaded"]
 
 PERIOD = 1e-3  # [s]
-ORDERS: tuple[Order, ...] = ("inline", "threaded")
+EXECUTION_MODES: tuple[ExecutionMode, ...] = ("inline", "threaded")
 
 
 def measure(*, drives: int, seconds: float, file: Path | None, config: Path | None = None) -> None:
@@ -29,13 +29,15 @@ def measure(*, drives: int, seconds: float, file: Path | None, config: Path | No
             make_segment(drives, clock="virtual") if config is None else Segment.from_toml(config)
         )
 
-    found: dict[str, float] = {order: run(segment(), seconds, order) for order in ORDERS}
+    found: dict[str, float] = {
+        execution: run(segment(), seconds, execution) for execution in EXECUTION_MODES
+    }
     if find_spec("numba"):
         found["law"] = run_law(segment(), seconds)
     drives = sum(device.axes for device in segment() if isinstance(device, Servo))
     print(f"{machine()}\n{drives} drives, {seconds:g} s of virtual time at {1 / PERIOD:.0f} Hz")
-    for order, took in found.items():
-        print(f"  {order:10} {took:7.3f} s: {seconds / took:6.0f} times real time")
+    for execution, took in found.items():
+        print(f"  {execution:10} {took:7.3f} s: {seconds / took:6.0f} times real time")
     write(
         file,
         {
@@ -43,7 +45,9 @@ def measure(*, drives: int, seconds: float, file: Path | None, config: Path | No
             "drives": drives,
             "config": None if config is None else config.name,
             "virtual_seconds": seconds,
-            "times_real_time": {order: round(seconds / took, 1) for order, took in found.items()},
+            "times_real_time": {
+                execution: round(seconds / took, 1) for execution, took in found.items()
+            },
         },
     )
 
@@ -69,13 +73,13 @@ def run_law(segment: Segment, seconds: float) -> float:
             return time.perf_counter() - start
 
 
-def run(segment: Segment, seconds: float, order: Order) -> float:
+def run(segment: Segment, seconds: float, execution: ExecutionMode) -> float:
     """How long the loop took [s], without bring-up and leaving."""
     with cat.MainDevice(segment) as main:
         arm = cat.Drives(
             main.scan().drives, mode="csp", counts_per_turn=COUNTS_PER_TURN, velocity_limit=100.0
         )
-        with cat.Loop(arm, period=PERIOD, run=order) as loop:
+        with cat.Loop(arm, period=PERIOD, execution=execution) as loop:
             home = arm.actual.position.copy()
             start = time.perf_counter()
             for cycle in loop:

@@ -17,9 +17,10 @@ from catenary.errors import (
     SegmentError,
 )
 from catenary.link import RingLink
-from catenary.model.device import DeviceDescription, Direction, mapped_entries
+from catenary.model.device import DeviceDescription, Direction, mapped_pdos
 from catenary.plan.clocks import SYNC_OBJECTS
 from catenary.plan.make import Plan, gather_wishes
+from catenary.plan.pdo_search import any_carries
 from catenary.plan.start_up import DevicePlan
 from catenary.plan.wish import ObjectReference, PdoWish, Wish
 from catenary.procedure.al_state import request_state
@@ -132,10 +133,8 @@ def _with_objects(
 def _unmapped(
     device: DeviceDescription, direction: Direction, references: Sequence[ObjectReference]
 ) -> list[ObjectReference]:
-    mapped = {
-        (e.index, e.subindex, e.bit_length) for e in mapped_entries(device.assignments(direction))
-    }
-    return [r for r in references if (r.index, r.subindex, r.bit_length) not in mapped]
+    pdos = mapped_pdos(device.assignments(direction))
+    return [each for each in references if not any_carries(pdos, each)]
 
 
 def _prepare(sub: SubDevice, plan: DevicePlan) -> Procedure[None]:

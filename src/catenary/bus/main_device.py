@@ -45,7 +45,7 @@ from catenary.wire.al import STATE_MASK, State
 if TYPE_CHECKING:  # plan needs NumPy, a scan does not
     from catenary.bus.diagnosis import Diagnosis
     from catenary.bus.states import Outcome
-    from catenary.plan.cycle import Order, ReceiveMode
+    from catenary.plan.cycle import ExecutionMode, ReceiveMode
     from catenary.plan.make import Plan
     from catenary.plan.wish import Wish
 
@@ -280,22 +280,25 @@ class MainDevice:
         cuts = find_cuts(ring.state, device_count)
         return registers, (str(cuts),) if cuts is not None and cuts.cables else ()
 
-    def look(self, *, names: bool = True) -> SubDevices:
+    def passive_scan(self, *, names: bool = True) -> SubDevices:
         """The devices as they are: unlike `scan` it changes no state and no mapping, and leaves
         `subs` alone, so that closing brings nobody down. For diagnosis.
 
         `names`: also what their EEPROMs say, without which a device has neither name nor identity.
         """
-        from catenary.bus.look import look
+        from catenary.bus.passive_scan import passive_scan
 
-        descriptions = look(self._runner, ring_of(self.link), names)
+        descriptions = passive_scan(self._runner, ring_of(self.link), names)
         return SubDevices([SubDevice(self, each, None) for each in descriptions])
 
     def request_states(
         self, subs: Sequence[SubDevice], positions: Sequence[int], state: State
     ) -> dict[int, Outcome]:
-        """Brings devices of a `look` to a state and leaves them there: where each is then, or the
-        error that kept it from it. Not while a loop runs."""
+        """Bring devices of a `passive_scan` to a state and leave them there. Not while a loop runs.
+
+        Returns:
+            By position, the state that was reached, or the error.
+        """
         from catenary.bus.states import request_states
 
         return request_states(self._runner, [sub.description for sub in subs], positions, state)
@@ -311,8 +314,8 @@ class MainDevice:
         device, power. Also while a loop runs, from any thread but the loop's: one frame or a few.
 
         `since`: an earlier diagnosis, after which is counted; else since the devices' power-up.
-        `subs`: those of a `look`; else those of the last `scan`. `lost_frames`: that the caller has
-        not got back whole in the same time.
+        `subs`: those of a `passive_scan`; else those of the last `scan`. `lost_frames`: that the
+        caller did not get back whole in the same time.
         """
         from catenary.bus.diagnosis import diagnose
 
@@ -324,7 +327,7 @@ class MainDevice:
         self,
         *wishes: Wish,
         period: float = 1e-3,
-        order: Order = "threaded",
+        execution: ExecutionMode = "threaded",
         receive_mode: ReceiveMode = "wait",
         optional: Collection[int] = (),
         watchdog: float | None = None,
@@ -341,7 +344,7 @@ class MainDevice:
             [sub.description for sub in self.subs],
             wishes,
             period=period,
-            order=order,
+            execution=execution,
             receive_mode=receive_mode,
             optional=optional,
             watchdog=watchdog,
@@ -403,12 +406,19 @@ class MainDevice:
             with contextlib.suppress(LinkLent):
                 return runner.submit(procedure)
 
+    def require_no_loop(self) -> None:
+        """Raise RuntimeError while a loop runs on this MainDevice."""
+        if self._attached is not None:
+            raise RuntimeError(
+                "a loop runs on this MainDevice: leave it first, or close() it (in a notebook, "
+                "before its cell is run again)"
+            )
+
     @contextlib.contextmanager
     def attached(self, runner: Runner, leave: Callable[[], object] | None = None) -> Iterator[None]:
         """While a loop runs: conversations go through its runner, scans are refused. Waits for
         those that other threads have under way: the link is the loop's alone."""
-        if self._attached is not None:
-            raise RuntimeError("a loop runs on this MainDevice already")
+        self.require_no_loop()
         blocking = self._runner
         self._attached, self._leave_loop = runner, leave
         blocking.lend()
@@ -433,8 +443,7 @@ class MainDevice:
     def _runner(self) -> BlockingRunner:
         if self._blocking is None or self._is_inherited:
             raise self._not_open()
-        if self._attached is not None:
-            raise RuntimeError("not possible while a loop runs on this MainDevice")
+        self.require_no_loop()
         return self._blocking
 
     def _handle(self, found: Found) -> SubDevice:

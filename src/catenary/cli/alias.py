@@ -56,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     with MainDevice(arguments.target, force=reads) as main:
         if reads:
             note_other_masters(main)
-        devices = main.look()
+        devices = main.passive_scan()
         device = device_at(devices, arguments.position)
         if arguments.value is not None:
             if arguments.value and not arguments.force:

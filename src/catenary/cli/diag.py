@@ -54,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
     with MainDevice(arguments.target, force=reads or arguments.force) as main:
         if reads:
             note_other_masters(main)
-        subs = main.look()
+        subs = main.passive_scan()
         found = main.diagnose(subs=subs)
         if arguments.seconds is not None:
             sent, lost = main.converse(exercise(arguments.seconds))

@@ -36,7 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     with MainDevice(arguments.target, force=True) as main:  # it only reads
         note_other_masters(main)
-        subs = main.look()
+        subs = main.passive_scan()
         drawing = draw(arguments.target, main, subs)
     print(as_dot(drawing) if arguments.dot else as_text(drawing))
     if arguments.dot:

@@ -86,7 +86,7 @@ def run_read(arguments: argparse.Namespace) -> int:
     _check(address, size)
     with MainDevice(arguments.target, force=True) as main:  # it only reads
         note_other_masters(main)
-        device = device_at(main.look(names=False), arguments.position)
+        device = device_at(main.passive_scan(names=False), arguments.position)
         data = main.converse(read_register(device.station, address, size))
     print(as_json(arguments, address, register, data) if arguments.json else show(register, data))
     return 0
@@ -101,7 +101,7 @@ def run_write(arguments: argparse.Namespace) -> int:
     data = value_bytes(arguments.value, size, address)
     _check(address, len(data))
     with MainDevice(arguments.target, force=arguments.force) as main:
-        device = device_at(main.look(names=False), arguments.position)
+        device = device_at(main.passive_scan(names=False), arguments.position)
         main.converse(write_register(device.station, address, data))
     if arguments.json:
         print(as_json(arguments, address, register, data))

@@ -89,7 +89,7 @@ def run_read(arguments: argparse.Namespace) -> int:
 
     with MainDevice(arguments.target, force=True) as main:  # it only reads
         note_other_masters(main)
-        station = device_at(main.look(names=False), arguments.position).station
+        station = device_at(main.passive_scan(names=False), arguments.position).station
         extent = main.converse(with_eeprom(station, read_extent(station)))
         size = min(arguments.bytes or extent.size, extent.limit) // 2 * 2
         with Progress("read") as progress:
@@ -162,7 +162,7 @@ def run_write(arguments: argparse.Namespace) -> int:
     image = arguments.file.read_bytes()
     refuse_bad(image, arguments)
     with MainDevice(arguments.target) as main:
-        device = device_at(main.look(), arguments.position)
+        device = device_at(main.passive_scan(), arguments.position)
         station = device.station
         extent = main.converse(with_eeprom(station, read_extent(station)))
         refuse_unfit(image, device, extent, arguments.force)

@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
     with MainDevice(arguments.target, force=reads or arguments.force) as main:
         if reads:
             note_other_masters(main)
-        devices = main.look()
+        devices = main.passive_scan()
         if arguments.position is not None:
             device_at(devices, arguments.position)
         chosen = range(len(devices)) if arguments.position is None else [arguments.position]

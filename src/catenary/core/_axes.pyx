@@ -499,7 +499,7 @@ cdef class Axes:
         make_number(&a.velocity_offset, plan.velocity_offset, outputs, f"{name} velocity_offset")
         self.make_limits(plan, name)
         a.unit = plan.sync_unit
-        a.divider = cycle.sync_units[plan.sync_unit].every
+        a.divider = cycle.sync_units[plan.sync_unit].divider
         a.mode = a.mode_wanted = plan.mode
         a.mode_refused = NO_MODE
         a.mode_shown = 0

@@ -63,7 +63,7 @@ cdef struct cycle_t:
     cat_pointer law_request    # of a law_t; CAT_POINTER_NONE: stop the law. Claimed: `law`
     cat_pointer stream         # of a stream_t; none: the application or the law sets the set-points
     const cat_sink *sink       # NULL: none
-    int order
+    int execution
     bint patient               # a cycle may begin at any time within its period: engines in turns
     int64_t period
     int64_t busy_wait          # before each cycle start

@@ -17,7 +17,7 @@ CYCLE_DRY: Final[int]  # the stream of set-points is empty: an underrun
 CYCLE_STOPPED: Final[int]  # the native thread has ended (stop, or an error of the link)
 CYCLE_NONE: Final[int]  # timeout_ns passed without a new cycle: actual is unchanged
 
-ORDERS: Final[dict[str, int]]
+EXECUTION_MODES: Final[dict[str, int]]
 PHASE_NAMES: Final[dict[str, int]]  # in the order of a report
 RECORD_FIELDS: Final[list[tuple[str, str]]]
 """The fields of one record of `log()`, for `numpy.dtype(RECORD_FIELDS)`; no padding.

@@ -104,7 +104,7 @@ CYCLE_CLOCKS = CLOCKS
 CYCLE_STOPPED = STOPPED
 CYCLE_NONE = NONE
 
-ORDERS = {"threaded": THREADED, "inline": INLINE}
+EXECUTION_MODES = {"threaded": THREADED, "inline": INLINE}
 PHASE_NAMES = {
     "period": PERIOD,
     "lateness": LATENESS,
@@ -215,7 +215,7 @@ cdef int cycle_wait(cycle_t *c) noexcept nogil:
 cdef void cycle_await_lane(cycle_t *c, int64_t until) noexcept nogil:
     """threaded: take acyclic frames as they arrive, so that the next request leaves with the next
     cycle. An inline loop collects them at the next cycle start."""
-    if c.order != THREADED:
+    if c.execution != THREADED:
         return
     while c.lane.under_way > 0 and now(c) < until:
         if c.link.wait_until(c.link.self, until, 1) <= 0:

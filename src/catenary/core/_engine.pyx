@@ -39,7 +39,7 @@ from catenary.core._cycle cimport (
     cycle_wants_native,
     record_t,
 )
-from catenary.core._cycle import ORDERS
+from catenary.core._cycle import EXECUTION_MODES
 from catenary.core._figures cimport Figures
 from catenary.core._frames cimport Frames, frames_flush
 from catenary.core._handover cimport (
@@ -124,8 +124,8 @@ def columns_by_bank(columns):
 
 def check_plan(plan):
     """Raise ValueError for numbers of a plan that cannot be."""
-    if plan.order not in ORDERS:
-        raise ValueError(f"order: {plan.order!r}, must be one of {', '.join(ORDERS)}")
+    if plan.execution not in EXECUTION_MODES:
+        raise ValueError(f"execution: {plan.execution!r}, must be one of {', '.join(EXECUTION_MODES)}")
     if not 1000 <= plan.period_ns <= 1 << 40:
         raise ValueError(f"period_ns: {plan.period_ns}")
     if not 0 <= plan.collect_deadline_ns <= plan.period_ns:
@@ -173,7 +173,7 @@ cdef class Engine:
         self._buffers = self.handover.fields()
         self.laws = []
         self.streams = []
-        self.native = self.e.cycle.order != INLINE and not self.virtual
+        self.native = self.e.cycle.execution != INLINE and not self.virtual
         self.left = -1
 
     cdef connect(self, plan):
@@ -196,7 +196,7 @@ cdef class Engine:
         c.handover = &self.handover.c
         self.virtual = c.link.flags & CAT_LINK_VIRTUAL_TIME != 0
         self.alone = self.virtual and not c.link.flags & CAT_LINK_SHARED_TIME
-        c.order = ORDERS[plan.order]
+        c.execution = EXECUTION_MODES[plan.execution]
         c.period = plan.period_ns
         c.busy_wait = 0 if self.virtual else plan.busy_wait_ns
         c.collect_deadline = plan.collect_deadline_ns
@@ -346,12 +346,12 @@ cdef class Engine:
         return self.step(timeout_ns)
 
     def commit_targets(self):
-        if self.e.cycle.order != INLINE:
+        if self.e.cycle.execution != INLINE:
             self.commit(self.is_led())
             self.committed = True
 
     def keep_targets(self):
-        self.committed = self.e.cycle.order != INLINE
+        self.committed = self.e.cycle.execution != INLINE
 
     @property
     def background(self):
@@ -359,7 +359,7 @@ cdef class Engine:
 
     @background.setter
     def background(self, bint value):
-        if self.e.cycle.order == INLINE:
+        if self.e.cycle.execution == INLINE:
             raise ValueError("an inline cycle cannot repeat targets in the background")
         self.h.target[PRIVATE].header.background = value
         self.h.target[PRIVATE].header.updated = 0
@@ -417,7 +417,7 @@ cdef class Engine:
         """Return True if the next cycle of the caller's thread is a threaded one. Inline: only
         while a law runs; it is taken over after Python's last outputs."""
         cdef cycle_t *c = &self.e.cycle
-        if c.order != INLINE:
+        if c.execution != INLINE:
             return True
         if not cycle_wants_native(c):
             return False
@@ -467,7 +467,7 @@ cdef class Engine:
         return 0
 
     cdef int lockstep(self) except -1:
-        """One cycle of an order that has its own thread in real time, in the caller's here."""
+        """One cycle of an execution mode that has its own thread in real time, in the caller's here."""
         cdef actual_header_t *header = self.h.actual[PRIVATE].header
         cdef uint64_t before = header.number
         cdef int rc
@@ -584,7 +584,7 @@ cdef class Engine:
         cdef int64_t batch
         cdef uint32_t flags = actual.header.flags
         self.commit(True)  # an inline loop runs native cycles around a law
-        if self.e.cycle.order != INLINE:
+        if self.e.cycle.execution != INLINE:
             handover_swap(self.h)  # cycles are counted from the commit on
         while cycles > 0:
             batch = 1 if until_stopped else min(cycles, max(SIGNALS_NS // self.e.cycle.period, 1))
@@ -595,7 +595,8 @@ cdef class Engine:
             cycles -= batch
             if until_stopped and (actual.header.moving == 0 or self.now_ns() >= deadline):
                 break
-        self.take_commanded()
+        if not self.writing:
+            self.take_commanded()
         return flags
 
     cdef uint32_t hold_native(self, int64_t cycles) except? 0xFFFFFFFF:
@@ -654,11 +655,11 @@ cdef class Engine:
             return
         while left > 0:
             slice = left
-            if c.order != INLINE:
+            if c.execution != INLINE:
                 slice = min(left, max(c.next - self.now_ns(), <int64_t>0))
             self.pass_time(slice)
             since = self.now_ns()
-            while c.order != INLINE and c.next <= self.now_ns():
+            while c.execution != INLINE and c.next <= self.now_ns():
                 self.spend_cycle()
             left -= slice + self.now_ns() - since  # the cycles take none of the application's time
 

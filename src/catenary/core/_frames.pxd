@@ -11,9 +11,9 @@ cdef enum:
     INDEX_COUNT = 128          # 0x00 to 0x7F belong to the cycle, the others to the acyclic queue
 
 cdef enum:                     # receive modes
-    LOOK = 0                   # sleep until the deadline, then take what is there
+    POLL = 0                   # sleep until the deadline, then take what is there
     WAIT = 1                   # sleep until a frame has come
-    SPIN = 2                   # busy-wait
+    BUSY = 2                   # busy-wait
 
 cdef struct copy_t:            # bytes between a frame and an image
     uint32_t frame_offset
@@ -40,7 +40,7 @@ cdef struct frame_t:
     uint32_t used              # up to the end of the last datagram; padding follows
     uint32_t first_datagram
     uint32_t datagram_count
-    uint32_t every             # due in cycles whose serial is `phase` modulo `every`
+    uint32_t divider           # due in cycles whose serial is `phase` modulo `divider`
     uint32_t phase
     uint32_t number_offset     # of the cycle number, in the frame; 0: the frame has none
     uint8_t needed             # its loss makes the cycle bad

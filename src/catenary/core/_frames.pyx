@@ -79,7 +79,7 @@ cdef enum:                     # kinds of datagrams, as in plan/cycle.py
 ADDRESS_MOVES = frozenset(
     (CAT_APRD, CAT_APWR, CAT_APRW, CAT_BRD, CAT_BWR, CAT_BRW, CAT_ARMW)
 )
-RECEIVE_MODES = {"look": LOOK, "wait": WAIT, "spin": SPIN}
+RECEIVE_MODES = {"poll": POLL, "wait": WAIT, "busy": BUSY}
 
 
 cdef inline uint16_t word_at(const uint8_t *bytes) noexcept nogil:
@@ -159,7 +159,7 @@ cdef int frames_emit(void *self) noexcept nogil:
         frame = &f.frames[i]
         frame.back = 0
         frame.judged = 0
-        frame.due = frame.every == 1 or f.serial % frame.every == frame.phase
+        frame.due = frame.divider == 1 or f.serial % frame.divider == frame.phase
         if not frame.due:
             continue
         f.missing += 1
@@ -313,7 +313,7 @@ cdef int await_frames(frames_t *f, int64_t deadline, int budget) noexcept nogil:
     cdef const cat_link *link = f.link
     cdef int rc
     while f.missing > 0 and budget > 0:
-        if f.receive_mode == SPIN:
+        if f.receive_mode == BUSY:
             if link.now(link.self) >= deadline:
                 return 0
         else:
@@ -324,7 +324,7 @@ cdef int await_frames(frames_t *f, int64_t deadline, int budget) noexcept nogil:
             if rc == 0 or f.frame_stamp >= deadline:
                 drain(f, budget)
                 return 0
-        if f.receive_mode == SPIN:
+        if f.receive_mode == BUSY:
             f.frame_stamp = link.now(link.self)
         budget = drain(f, budget)
     return 0
@@ -461,7 +461,7 @@ def frames_per_cycle(frames):
     phase. The plan refuses by the same number (plan/frames.py)."""
     counts = {}
     for frame in frames:
-        counts.setdefault(frame.every, {}).setdefault(frame.phase, []).append(frame)
+        counts.setdefault(frame.divider, {}).setdefault(frame.phase, []).append(frame)
     return sum(max(map(len, phases.values())) for phases in counts.values())
 
 
@@ -479,7 +479,7 @@ cdef class Frames:
               f"link: table version {self.c.link.version}, expected {CAT_LINK_VERSION}")
         check(plan.receive_mode in RECEIVE_MODES, f"receive_mode: {plan.receive_mode!r}")
         self.c.receive_mode = RECEIVE_MODES[plan.receive_mode]
-        if self.c.link.flags & CAT_LINK_VIRTUAL_TIME and self.c.receive_mode == SPIN:
+        if self.c.link.flags & CAT_LINK_VIRTUAL_TIME and self.c.receive_mode == BUSY:
             self.c.receive_mode = WAIT  # virtual time passes only in a wait
         self.make_images(plan)
         self.make_frames(plan)
@@ -531,9 +531,9 @@ cdef class Frames:
               f"frame {number}: {len(template)} bytes, must be {CAT_FRAME_MIN} to {CAT_FRAME_MAX}")
         check(template[12:14] == b"\x88\xa4", f"frame {number}: EtherType is not 0x88A4")
         check(len(frame.datagrams) > 0, f"frame {number}: no datagrams")
-        check(1 <= frame.every <= EVERY_MAX and 0 <= frame.phase < frame.every,
-              f"frame {number}: every {frame.every} cycles, phase {frame.phase}")
-        check(number > 0 or frame.every == 1, "frame 0 goes out in every cycle")
+        check(1 <= frame.divider <= EVERY_MAX and 0 <= frame.phase < frame.divider,
+              f"frame {number}: divider {frame.divider}, phase {frame.phase}")
+        check(number > 0 or frame.divider == 1, "frame 0 goes out in every cycle")
         payload = int.from_bytes(template[14:16], "little")
         end = DATAGRAMS + sum(HEADER + d.length + CAT_DATAGRAM_COUNTER for d in frame.datagrams)
         check(payload >> 12 == 1 and DATAGRAMS + (payload & 0x7FF) == end and end <= len(template),
@@ -543,7 +543,7 @@ cdef class Frames:
         c.used = end
         c.first_datagram = self.c.datagram_count
         c.datagram_count = len(frame.datagrams)
-        c.every = frame.every
+        c.divider = frame.divider
         c.phase = frame.phase
         memcpy(c.template, <const uint8_t *>template, len(template))
         check(is_ours(self.c.frames[0].template, c.template),
@@ -620,7 +620,7 @@ cdef class Frames:
             self.c.unit_valid[unit] = 1
             self.c.units[unit].frame = number
         first = &self.c.frames[self.c.units[unit].frame]
-        check((first.every, first.phase) == (self.c.frames[number].every, self.c.frames[number].phase),
+        check((first.divider, first.phase) == (self.c.frames[number].divider, self.c.frames[number].phase),
               f"{where}: its sync unit rides in frames of other cycles too")
 
     def make_copy(self, where, plan, copy, uint32_t image_size, uint32_t place):

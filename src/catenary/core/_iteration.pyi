@@ -46,6 +46,10 @@ class Cycle:
     def dry(self) -> bool:
         """True if the stream of set-points was empty: an underrun."""
 
+    @property
+    def networks(self) -> tuple[Cycle, ...]:
+        """The cycle of each network of the loop; with one network, this one."""
+
     def spend(self, seconds: float) -> None:
         """Let virtual time pass as if the body took this long [s]. On a NIC, compute that long."""
 

@@ -48,11 +48,15 @@ cdef class Cycle:
     def dry(self):
         return (self.header.flags & DRY) != 0
 
+    @property
+    def networks(self):
+        return (self,)
+
     def spend(self, double seconds):
         self.engine.spend(round(seconds * 1e9))
 
     def __repr__(self):
-        return f"Cycle(number={self.number}, time={self.time:.6f}, ok={self.ok})"
+        return f"{type(self).__name__}(number={self.number}, time={self.time:.6f}, ok={self.ok})"
 
 
 cdef class Iteration:

@@ -40,7 +40,10 @@ def run(seconds: float, *, refused: str | None) -> Result:
         recording = Recording(seconds, len(arm))
         progress = ProgressBar(seconds)
         with cat.Loop(
-            arm, period=PERIOD, lost_limit=LOST_LIMIT, late_limit=LATE_LIMIT, watchdog=WATCHDOG
+            arm,
+            period=PERIOD,
+            stop=cat.StopPolicy(lost_limit=LOST_LIMIT, late_limit=LATE_LIMIT),
+            watchdog=WATCHDOG,
         ) as loop:
             devices = [device(sub) for sub in main.subs]
             print(device_lines(devices))

@@ -66,7 +66,7 @@ def interrupts(machine: Machine, card: Card) -> Check:
 
 
 def spinning(machine: Machine, card: Card) -> Check:
-    """A loop that spins (`receive="spin"`) on the CPU that is to bring the answer loses every
+    """A loop that spins (`receive="busy"`) on the CPU that is to bring the answer loses every
     frame: the interrupt's work never gets its turn."""
     id, cpu = "spin", machine.loop_cpu
     if len(machine.cpus) < 2:

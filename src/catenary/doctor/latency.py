@@ -45,7 +45,7 @@ def measure(seconds: float, *, period: float, priority: int, cpu: int | None) ->
     task = Task(wake_up, period=period, priority=priority, cpu=cpu, name="latency")
     with (
         session(best_effort=True) as prepared,
-        Tasks(task, run="threads", best_effort=True) as tasks,
+        Tasks(task, workers="threads", best_effort=True) as tasks,
     ):
         tasks.join(seconds)
     statistics = tasks["latency"].statistics

@@ -112,11 +112,11 @@ def mode_of(name: str) -> Mode:
         raise ValueError(f"mode {name!r}; known: {', '.join(MODES)}") from None
 
 
-def cycles_between(name: str, every: int) -> int:
-    """`every` as a number of cycles."""
-    if not isinstance(every, int) or not 1 <= every <= EVERY_MAX:
-        raise ValueError(f"{name}={every!r}: a whole number of cycles, 1 to {EVERY_MAX}")
-    return every
+def cycles_between(name: str, divider: int) -> int:
+    """`divider` as a number of cycles."""
+    if not isinstance(divider, int) or not 1 <= divider <= EVERY_MAX:
+        raise ValueError(f"{name}={divider!r}: a whole number of cycles, 1 to {EVERY_MAX}")
+    return divider
 
 
 def known(measured: Sequence[str]) -> tuple[str, ...]:

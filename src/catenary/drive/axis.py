@@ -44,7 +44,7 @@ class Axis:
     measured: tuple[str, ...] = tuple(MEASURED)
     measured_required: bool = False  # else what the drive cannot map reads NaN
     columns: Mapping[str, AxisObject] = field(default_factory=dict)
-    every: int = 1  # cycles between two exchanges
+    divider: int = 1  # cycles between two exchanges
     required: bool = True  # the cycle is not good without its device
     homing: HomingMethod | None = None
     pdos: tuple[WrittenPdo, ...] = ()  # as the application wrote them down
@@ -79,7 +79,7 @@ class Axis:
     def report(self, period_ns: int) -> AxisReport:
         """Describe the axis for the plan. `period_ns`: of the loop."""
         return axis_report(
-            self.name, self.modes, self.bounds, self.settings, period_ns * self.every
+            self.name, self.modes, self.bounds, self.settings, period_ns * self.divider
         )
 
     def pdo_wish(self, start_up: tuple[tuple[int, int, bytes], ...] = ()) -> PdoWish:
@@ -104,7 +104,7 @@ class Axis:
                 o.reference(self.slot, required=o not in optional) for o in dict.fromkeys(given)
             ),
             start_up=start_up,
-            every=self.every,
+            divider=self.divider,
             required=self.required,
             pdos=self.pdos,
         )

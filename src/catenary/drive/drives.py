@@ -60,7 +60,7 @@ class Drives:
       them as `arm.actual["following_error"]`.
     - `required`: False: the loop continues without a lost drive. Its axes hold their last values;
       enable them again when it is `present`.
-    - `every`: cycles of the loop between two exchanges.
+    - `divider`: cycles of the loop between two exchanges.
     - `dc`: distributed clocks. True: as each device's SII states; or a `DistributedClock` for all
       of them.
     - `pdos`: PDOs of each device, instead of a search: `[0x1701, 0x1B01]`, or with their entries
@@ -127,7 +127,7 @@ class Drives:
         measured: Sequence[str] | None = None,
         columns: Sequence[str | tuple[str, AxisObject]] = (),
         required: bool = True,
-        every: int = 1,
+        divider: int = 1,
         dc: DistributedClock | bool = False,
         pdos: PdoList = (),
     ) -> None:
@@ -172,7 +172,7 @@ class Drives:
                 measured=known(tuple(MEASURED) if measured is None else measured),
                 measured_required=measured is not None,
                 columns=self._columns,
-                every=cycles_between("every", every),
+                divider=cycles_between("divider", divider),
                 required=required,
                 homing=home,
                 pdos=written,
@@ -320,7 +320,7 @@ class Drives:
         self._read_drives()
         wishes: dict[int, PdoWish] = {}
         for axis, sub in zip(self._axes, self.subs, strict=True):
-            wish = axis.pdo_wish(start_up.downloads(axis, sub, period_ns * axis.every))
+            wish = axis.pdo_wish(start_up.downloads(axis, sub, period_ns * axis.divider))
             wishes[axis.device] = (
                 joined(wishes[axis.device], wish) if axis.device in wishes else wish
             )

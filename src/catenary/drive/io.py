@@ -68,14 +68,14 @@ class _Channels:
         *subs: SubDevice,
         scale: Mapping[str, float] | None = None,
         required: bool = True,
-        every: int = 1,
+        divider: int = 1,
         dc: DistributedClock | bool = False,
         pdos: PdoList = (),
     ) -> None:
         self._subs = subs
         self._pdos = tuple(p for p in written_pdos(pdos) if p.direction is self.direction)
         self._required = required
-        self._every = cycles_between("every", every)
+        self._divider = cycles_between("divider", divider)
         self._clock = clock_wish(dc)
         self._units: list[int] = []
         self._arrays: tuple[Reals, Integers, Bytes] | None = None
@@ -154,7 +154,7 @@ class _Channels:
                 outputs=mine if output else (),
                 inputs=() if output else mine,
                 clock=self._clock,
-                every=self._every,
+                divider=self._divider,
                 required=self._required,
                 pdos=self._pdos,
             )
@@ -200,7 +200,7 @@ class Inputs(_Channels):
 
     `scale` turns raw numbers into floats: `Inputs(sub, scale={"Value": 10 / 0x7FFF})`.
     `required=False`: the loop goes on without a device that vanishes; its channels keep their last
-    values, `present` tells. `every`: exchanged every so many cycles of the loop.
+    values, `present` tells. `divider`: exchanged every so many cycles of the loop.
     `dc`: distributed clocks, as for `Drives`. `pdos`: these PDOs instead of those assigned now.
     """
 
@@ -213,7 +213,7 @@ class Inputs(_Channels):
 
 class Outputs(_Channels):
     """The outputs of SubDevices, all 0 at the start: write `.bits[:]`, `.integers[:]`, `.reals[:]`,
-    or one by name: `lamps["Output 1"] = 1`. `scale`, `required`, `every`, `dc`, `pdos` as for
+    or one by name: `lamps["Output 1"] = 1`. `scale`, `required`, `divider`, `dc`, `pdos` as for
     `Inputs`.
     What is out of its range is cut, and `cycle.limited` says so."""
 
@@ -275,10 +275,7 @@ def with_written(
     """Return the device as if it had these PDOs; unchanged without PDOs."""
     if not pdos:
         return device
-    assignments = write_down(device, direction, pdos).assignments
-    if direction is Direction.OUTPUT:
-        return replace(device, outputs=assignments)
-    return replace(device, inputs=assignments)
+    return device.with_process_data(direction, write_down(device, direction, pdos).assignments)
 
 
 def number_entries(assignment: Assignment) -> list[tuple[Pdo, Entry]]:

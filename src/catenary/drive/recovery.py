@@ -43,7 +43,7 @@ class Recovery:
     """Owns the way of some drives from a stop back into motion: one `step` in every cycle.
 
         recovery = cat.Recovery(arm)
-        with cat.Loop(arm, raise_faults=False) as loop:
+        with cat.Loop(arm, stop=cat.StopPolicy(raise_faults=False)) as loop:
             for cycle in loop:
                 if recovery.step(cycle, why_stop(arm)) == cat.Phase.RUNNING:
                     arm.target.position[:] = ...

@@ -57,7 +57,7 @@ class AxisValues:
             ) from None
 
     def __getattr__(self, name: str) -> object:
-        # Reached only if a slot is still empty, or there is none of this name.
+        # Called only for an empty slot, or an attribute that does not exist.
         if name not in QUANTITIES:
             raise unknown_attribute(self, name, self._owner)
         raise AttributeError(f"{self._owner}.{name} has no values before a Loop is open")

@@ -43,7 +43,7 @@ cdef extern from "exchange.h" nogil:
         uint32_t output_count
         uint32_t first_input
         uint32_t input_count
-        uint32_t every
+        uint32_t divider
         uint32_t phase
         uint8_t optional
 
@@ -207,7 +207,7 @@ cdef class Exchange:
         unit.domain = <void *>address
         address = plan.data
         unit.data = <uint8_t *>address
-        unit.every = plan.every
+        unit.divider = plan.divider
         unit.phase = plan.phase
         unit.optional = plan.optional
         unit.first_output = copies

@@ -31,7 +31,7 @@ class Domain:
     """Owns the place of one sync unit in the master's memory."""
 
     domain: int
-    every: int
+    divider: int
     phase: int
     optional: bool
     data: int = 0
@@ -105,7 +105,7 @@ def _domain(master: Reservation, unit: UnitLayout) -> Domain:
     handle = master.library.ecrt_master_create_domain(master.handle)
     if not handle:
         raise _no_handle(f"no domain for {unit.name}")
-    return Domain(handle, unit.every, unit.phase, unit.optional)
+    return Domain(handle, unit.divider, unit.phase, unit.optional)
 
 
 def _device(
@@ -184,7 +184,7 @@ def _tell_process_data(master: Reservation, plan: DevicePlan, config: int, who: 
 
 def _pdo_info(pdo: Pdo) -> abi.PdoInfo:
     entries = (abi.PdoEntryInfo * len(pdo.entries))(
-        *(abi.PdoEntryInfo(e.index, e.subindex, e.bit_length) for e in pdo.entries)
+        *(abi.PdoEntryInfo(*entry.place) for entry in pdo.entries)
     )
     return abi.PdoInfo(index=pdo.index, n_entries=len(entries), entries=entries)
 

@@ -42,7 +42,7 @@ static int igh_emit(void *self)
     for (u = 0; u < x->image.unit_count; u++) {
         igh_unit *unit = &x->units[u];
         unit->back = 0;
-        unit->queued = unit->every == 1 || x->serial % unit->every == unit->phase;
+        unit->queued = unit->divider == 1 || x->serial % unit->divider == unit->phase;
         if (!unit->queued)
             continue;
         for (k = unit->first_output; k < unit->first_output + unit->output_count; k++)

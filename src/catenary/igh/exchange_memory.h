@@ -17,7 +17,7 @@ typedef struct igh_unit {             /* a sync unit: one domain */
     void *domain;
     uint8_t *data;
     uint32_t first_output, output_count, first_input, input_count;   /* in the list of copies */
-    uint32_t every, phase;
+    uint32_t divider, phase;
     uint8_t optional, queued, back;
 } igh_unit;
 

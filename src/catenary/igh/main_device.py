@@ -80,7 +80,7 @@ class MainDevice(bus.MainDevice):
     ) -> SubDevices:
         """The devices that the master has found; it has brought them to PRE-OP. NoDeviceError where
         there are none. Handles of devices that are still there stay the same objects."""
-        self._refuse_beside_loop()
+        self.require_no_loop()
         count = self.reservation.device_count()
         self.reservation.wait_preop()
         found = [describe(self.reservation, position) for position in range(count)]
@@ -127,7 +127,7 @@ class MainDevice(bus.MainDevice):
 
     def configure(self, plan: Plan) -> None:
         """Tells the master the plan and activates it: from here on it waits for cycles."""
-        self._refuse_beside_loop()
+        self.require_no_loop()
         if self._kernel is not None:
             raise ConfigurationError(
                 f"{self.reservation.name} is activated already: nothing can be configured any more",
@@ -268,7 +268,7 @@ class MainDevice(bus.MainDevice):
 
     # What the master keeps to itself
 
-    def look(self, *, names: bool = True) -> SubDevices:
+    def passive_scan(self, *, names: bool = True) -> SubDevices:
         """ConfigurationError: the state of a segment that is not ours is the master's to tell."""
         self._cannot(
             "look at devices without taking them over",
@@ -287,10 +287,6 @@ class MainDevice(bus.MainDevice):
 
     def _cannot(self, what: str, command: str) -> NoReturn:
         raise ConfigurationError(f"libethercat cannot {what}", hint=f"its tool does: {command}")
-
-    def _refuse_beside_loop(self) -> None:
-        if self._attached is not None:
-            raise RuntimeError("not possible while a loop runs on this MainDevice")
 
     def _kernel_handle(self, description: DeviceDescription) -> SubDevice:
         position = description.position

@@ -82,20 +82,22 @@ def check(name: str) -> None:
 
 
 def no_link(name: str, number: int) -> LinkError | None:
-    """Return the error for frames that the kernel refuses because there is no carrier, with ENOBUFS
-    ("No buffer space available"). None: there is another reason."""
+    """Return the error for an interface without a carrier; None: there is another reason.
+
+    Without a carrier, the kernel refuses frames with ENOBUFS ("No buffer space available").
+    """
     if number != errno.ENOBUFS:
         return None
     try:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
             flags = ask(asking, SIOCGIFFLAGS, name)
     except OSError:
-        return None  # it was renamed or removed: the plain error says as much as is known
+        return None  # the interface was renamed or removed: keep the error of the kernel
     if flags & (IFF_UP | IFF_RUNNING) != IFF_UP:
         return None
     return LinkError(
         f"{name} has no link: the cable is unplugged or damaged, or the first device has no power",
-        hint=f"look at the link lights; is {name} the right port? `ip link show {name}` says "
+        hint=f"look at the link lights; is {name} the right port? `ip link show {name}` shows "
         "NO-CARRIER until there is a link. Of a veth pair, set the other end up too",
     )
 

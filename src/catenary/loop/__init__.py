@@ -4,6 +4,19 @@ from catenary.core import Cycle
 from catenary.loop.laws.law import Law, law
 from catenary.loop.laws.run import LawRun
 from catenary.loop.loop import Loop
+from catenary.loop.network import Network
+from catenary.loop.options import ClockOptions, Scheduling, StopPolicy
 from catenary.loop.stream import Stream
 
-__all__ = ["Cycle", "Law", "LawRun", "Loop", "Stream", "law"]
+__all__ = [
+    "ClockOptions",
+    "Cycle",
+    "Law",
+    "LawRun",
+    "Loop",
+    "Network",
+    "Scheduling",
+    "StopPolicy",
+    "Stream",
+    "law",
+]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,8 +14,6 @@ from catenary.plan.cycle import AxisPlan
 from catenary.plan.stop_reason import StopReason
 from catenary.plan.wish import Views
 from catenary.wire.cia402 import Mode
-
-StopPolicy = Literal["raise", "event"]
 
 
 class StoppedAxis(NamedTuple):

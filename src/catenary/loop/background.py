@@ -1,11 +1,11 @@
 """A Python thread that iterates an open loop while the program does something else.
 
-Theory of operation. The thread commits the targets in every cycle, under a lock that `update` takes,
-too: while a program writes its targets, nothing is committed. The thread never waits for that lock.
-The native core judges how long the targets of the last update count (core/_setpoints.pyx), so a
-program that keeps the interpreter cannot keep an axis moving. An error of the loop ends the thread,
-which leaves the loop first; the next call of the program raises the error. In virtual time the
-thread keeps to the wall clock: nobody else would.
+Theory of operation. The thread commits the targets in every cycle, under a lock that `update` also
+takes: while a program writes its targets, nothing is committed. The thread never waits for that
+lock. The native core judges how long the targets of the last update count (core/_setpoints.pyx), so
+a program that keeps the interpreter cannot keep an axis moving. An error of the loop ends the
+thread, which leaves the loop; the next call of the program raises the error. In virtual time the
+thread keeps to the wall clock, which nothing else does.
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Protocol
 
 from catenary.core import Iteration
 from catenary.errors import LoopError
+from catenary.loop.networks import VIRTUAL, NetworksIteration, leave_all
 from catenary.loop.running import Running
 from catenary.loop.signals import SignalGuard
 
-VIRTUAL = "virtual time"
 END_TIMEOUT = 30.0  # [s] and some periods: to leave a loop after an error takes some seconds
 UPDATE_TIMEOUT = 5.0  # [s] for which another thread may be inside `update`
 BEHIND = 0.1  # [s] of virtual time that is not made up for
@@ -44,9 +44,14 @@ class Background:
     `error`: what ended the loop; None: nothing yet, or it was closed.
     """
 
-    def __init__(self, running: Running, iteration: Iteration, guard: SignalGuard) -> None:
+    def __init__(
+        self,
+        runnings: Sequence[Running],
+        iteration: Iteration | NetworksIteration,
+        guard: SignalGuard,
+    ) -> None:
         self.error: Exception | None = None
-        self._running = running
+        self._runnings = runnings
         self._iteration = iteration
         self._guard = guard
         self._commit = threading.Lock()
@@ -54,7 +59,7 @@ class Background:
         self._cycled = threading.Condition()
         self._ended = threading.Event()
         self._told = False  # the error was raised
-        self._pace = _Pace(running)
+        self._pace = _Pace(runnings[0])
         self._process = os.getpid()
         self._thread = threading.Thread(target=self._iterate, name="catenary loop", daemon=True)
 
@@ -65,23 +70,27 @@ class Background:
             ValueError: an inline loop exchanges its frames in the thread of the program.
             LoopError: an axis is powered in CST, and nothing updates its torque.
         """
-        if self._running.plan.cycle.order == "inline":
+        if self._runnings[0].plan.cycle.execution == "inline":
             raise ValueError(
-                'run_in_background needs a threaded loop: in an inline one, frames would wait for '
+                "run_in_background needs a threaded loop: in an inline one, frames would wait for "
                 "whatever else Python computes"
             )
-        self._running.refuse_powered_torque("run_in_background")
-        self._running.engine.background = True
+        for running in self._runnings:
+            running.refuse_powered_torque("run_in_background")
+        for running in self._runnings:
+            running.engine.background = True
+            running.end_background = self.end
         self._iteration.commit_lock = self._commit
-        self._running.end_background = self.end
+        next(self._iteration)  # the first one commits nothing: it must not meet an update
         self._thread.start()
 
     def end(self) -> None:
         """End the thread and wait for it. No effect in the thread itself, or in a forked child."""
         self._ended.set()
-        if threading.current_thread() is self._thread or self._process != os.getpid():
+        is_own = threading.current_thread() is self._thread
+        if is_own or self._thread.ident is None or self._process != os.getpid():
             return
-        self._thread.join(END_TIMEOUT + 8e-9 * self._running.plan.cycle.period_ns)
+        self._thread.join(END_TIMEOUT + 8e-9 * self._runnings[0].plan.cycle.period_ns)
         if self._thread.is_alive():
             raise LoopError("the thread that iterates the loop does not end: is a callback stuck?")
 
@@ -118,18 +127,19 @@ class Background:
     @contextmanager
     def _written_targets(self) -> Iterator[None]:
         """Commit what the block writes; nothing of it if the block raises."""
-        engine = self._running.engine
-        _, targets = engine.blocks()
-        before = bytes(targets)
-        engine.begin_update()
+        engines = [running.engine for running in self._runnings]
+        before = [bytes(engine.blocks()[1]) for engine in engines]
+        for engine in engines:
+            engine.begin_update()
         complete = False
         try:
             yield
             complete = True
         finally:
-            if not complete:
-                targets[:] = before
-            engine.end_update(complete)
+            for engine, targets in zip(engines, before, strict=True):
+                if not complete:
+                    engine.blocks()[1][:] = targets
+                engine.end_update(complete)
 
     def wait(self, awaited: Awaited, timeout: float | None = None) -> None:
         """Wait until it is done, while the thread iterates; raise its error.
@@ -167,10 +177,11 @@ class Background:
 
     def _require_alive(self) -> None:
         self.raise_error()
-        self._running.require_open()
+        self._runnings[0].require_open()
 
     def _iterate(self) -> None:
-        self._running.service.runner.adopt()
+        for running in self._runnings:
+            running.service.runner.adopt()
         try:
             while not self._ended.is_set():
                 next(self._iteration)
@@ -188,10 +199,16 @@ class Background:
 
     def _fail(self, error: Exception) -> None:
         """Leave the loop as a `with` block would."""
-        self._running.tell_end(error)
+        for running in self._runnings:
+            running.tell_end(error)
         self.error = error
-        for problem in self._running.leave(self._guard):
+        for problem in leave_all(self._runnings, self._guard):
             error.add_note(f"on the way down: {problem}")
+
+
+def program_ends() -> bool:
+    """Return True in the functions of `atexit`: Python marks its main thread as ended before."""
+    return not threading.main_thread().is_alive()
 
 
 class _Pace:

@@ -59,7 +59,7 @@ def silence_error(
         hint = tight or (
             "frames are lost, corrupted or late on the way: check cables and other traffic on the "
             "port; where the segment is a program on a busy machine, allow it more cycles with "
-            "Loop(lost_limit=...)"
+            "StopPolicy(lost_limit=...)"
         )
     return WorkingCounterError(
         f"{lost} cycles in a row without all answers; {who}", log=log, hint=hint

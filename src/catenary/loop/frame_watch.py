@@ -52,6 +52,6 @@ class FrameWatch:
         self._reported = now
         message = (
             f"{repeated} frames in {interval:.1f} s came back more than once: suspect a loop in "
-            "the wiring or a second sender; Loop(exact_matching=True) rejects such frames"
+            "the wiring or a second sender; Scheduling(exact_matching=True) rejects such frames"
         )
         self._put(DuplicateFrames(now, None, message, repeated, interval))

@@ -1,4 +1,4 @@
-"""Loop: wishes become a plan, the plan a cycle that runs, the cycle `for cycle in loop`.
+"""Loop: requests become a plan, the plan a cycle that runs, the cycle `for cycle in loop`.
 
 Entering ends with the drives enabled and holding, or with everything safe and a specific error.
 Leaving, for whatever reason, stops the drives natively before the states go down.
@@ -6,238 +6,162 @@ Leaving, for whatever reason, stops the drives natively before the states go dow
 
 from __future__ import annotations
 
-import math
-import threading
 import warnings
 import weakref
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager
 from functools import partial
 from types import TracebackType
-from typing import Any, Literal, Self
 
 from catenary.bus import SubDevice
-from catenary.core import (
-    CYCLE_CLOCKS,
-    CYCLE_DROPPED,
-    CYCLE_LAW_FAILED,
-    CYCLE_NONE,
-    CYCLE_STOPPED,
-    CYCLE_WORKING_COUNTER,
-    Cycle,
-    Iteration,
-)
+from catenary.core import Cycle, Iteration
 from catenary.errors import LawError
-from catenary.loop.axis_watch import StopPolicy
-from catenary.loop.background import Awaited, Background
-from catenary.loop.carried import CarriedRunning, carried
+from catenary.loop.background import Awaited, Background, program_ends
 from catenary.loop.clocks import Clocks
-from catenary.loop.devices import DeviceWish, by_network, main_device_of
-from catenary.loop.laws.law import Law
+from catenary.loop.devices import DeviceWish, by_network
+from catenary.loop.laws.law import Law, LawFunction
 from catenary.loop.laws.law import law as made_law
 from catenary.loop.laws.run import LawRun, Numbers
+from catenary.loop.network import ENDING, TROUBLE, Network, Settings, leave_method
+from catenary.loop.networks import (
+    NetworksIteration,
+    clocks_of_several,
+    cpus_for,
+    leave_all,
+    share_time,
+)
+from catenary.loop.options import ClockOptions, Scheduling, StopPolicy, one_of
 from catenary.loop.publishing import one_sink_each
 from catenary.loop.running import LogArray, Running, take_down
 from catenary.loop.signals import SignalGuard
 from catenary.loop.stream import Stream
 from catenary.loop.timing import Timing
-from catenary.loop.watch import Policy
-from catenary.plan.clocks import BURST
-from catenary.plan.cycle import FollowedClock, ReceiveMode
-from catenary.plan.make import Plan, make_plan, period_in_ns
+from catenary.plan.cycle import ExecutionMode
+from catenary.plan.make import Plan, period_in_ns
 from catenary.plan.sink import Sink
 from catenary.wire.al import State
 
-ENDING = CYCLE_WORKING_COUNTER | CYCLE_DROPPED | CYCLE_STOPPED | CYCLE_NONE | CYCLE_LAW_FAILED
-TROUBLE = ENDING | CYCLE_CLOCKS
-LATE_LIMIT_POSITION = 0.050  # [s], CSP
-LATE_LIMIT_VELOCITY = 0.050  # [s], CSV
-LATE_LIMIT_TORQUE = 0.010  # [s], CST
-HANDOVER = 0.020  # [s], CST
 LOG_LIMIT = 2**24  # cycles: a gigabyte
 
 
 class Loop:
-    """Owns the cyclic exchange of the devices its wishes name, as a context manager and an iterator
-    of one `Cycle`.
+    """Cyclic exchange of the devices that its requests name: a context manager and an iterator.
 
-    `period` [s]. `run`: "threaded", a native thread keeps the instants and Python follows; or
-    "inline", the thread that iterates exchanges the frames itself. `receive`: "look", "wait" or
-    "spin"; None: "wait" when threaded, "look" when inline. `enable`: drives are enabled on entry.
-    `late_limit` [s] without fresh set-points, then quick stop; None: 50 ms in CSP and CSV, 10 ms in
-    CST; 0: never, refused for axes that use CST. `handover` [s]: CST keeps its torque for this time
-    after a law or stream ended, then quick stop. `on_axis_stopped`: the core stopped a required
-    axis without a request: "raise", the iteration raises DriveError; "event", see the event
-    `AxisStopped` and `Drives.stopped`. `lost_limit`: cycles in a row without all answers before
-    WorkingCounterError. `stop_deadline` [s] for standing still when leaving. `watchdog` [s] of the
-    devices' outputs; 0: off; None: 0.1 s, in CST the longer of 10 ms and five exchanges.
-    `busy_wait` [s] before each cycle start instead of a plain sleep; it costs as much processor
-    time. `switch_interval` [s] of the interpreter while an inline loop is open in real time; None:
-    as it is (see `interpreter` in `loop.timing`). `collect_deadline`: threaded, the share of the
-    period in which frames may come back; a law's budget shortens it.
-    `log`: how many cycles the log, and that of an error, reaches back. `raise_faults`: a drive in
-    fault, or one that left OPERATION_ENABLED by itself (STO), raises DriveError; else see
-    `Drives.faults` and `Drives.stopped`. `on_return`: what becomes of a device that no
-    wish requires and that comes back: "restore", its start-up list is replayed and it goes to OP;
-    or "hold", it stays in PRE-OP until `restore`. `on_replacement`: the same for another device of
-    the same product in its place, which is not even led to PRE-OP when held. `laws` are compiled
-    on entry, before the devices go to OP; others when they are started. `sink` is given every
-    cycle (a `cat.Share`: to other processes).
+        with cat.Loop(arm, period=1e-3) as loop:
+            for cycle in loop:
+                ...
 
-    Where a wish has `dc=`: `clock`, whom time is taken from: "reference", the wake-up follows the
-    reference clock; "main", it follows the MainDevice's. `reference`: the device with that clock;
-    None: the first that has one. `margin` [s]: from the instant to the frames, at most; None: 20 %
-    of the period when threaded and for laws, 50 % when inline. `burst`: frames that bring the
-    clocks together before the cycle begins.
+    Requests on several MainDevices run as several networks in one schedule (docs/networks.md):
+    threaded only, with a thread for each. `cycle.networks[i]` and `loop.networks[i]` have what
+    belongs to one network; the properties of the loop itself are those of the first.
 
-    `exact_matching`: every cyclic frame carries the cycle number in a NOP datagram. A frame that a
-    loop in the wiring or a second sender repeats is then never accepted as a current one. Costs 16
-    bytes and 1.3 us of wire time per frame; `print(loop.plan)` shows it.
+    Args:
+        requests: `Drives`, `Inputs`, `Outputs` and other process-data requests.
+        period: of the cycle [s].
+        execution: "threaded": a native thread exchanges the frames and Python follows. "inline":
+            the thread that iterates exchanges the frames itself.
+        enable: drives are enabled on entry.
+        watchdog: of the devices' outputs [s]; 0: off; None: 0.1 s, in CST the longer of 10 ms and
+            five exchanges.
+        cpu: CPU of the native thread; several networks: one for each. None: unchanged; several
+            networks: the last CPUs, where there are more than networks.
+        priority: SCHED_FIFO priority of the native thread; None: unchanged.
+        log: number of cycles that the log, and that of an error, reaches back.
+        laws: compiled on entry, before the devices go to OP. Others are compiled when started.
+        sink: receives every cycle, for example a `Share` for other processes. Several networks:
+            one for each.
+        stop: limits that stop axes or end the loop.
+        scheduling: how the loop waits for time and frames.
+        clocks: how distributed clocks are kept.
 
-    `cpu` and `priority` (SCHED_FIFO) of the native thread; None: as they are. With wishes on
-    several MainDevices (docs/networks.md) `cpu` is a sequence, one for each network, and `quorum`
-    says how many of them must be good for a cycle to be; None: all.
+    Raises:
+        ValueError: an option is impossible, or a request names devices of several MainDevices.
     """
-
-    def __new__(cls, *wishes: DeviceWish, **options: Any) -> Loop:
-        """Wishes on several MainDevices make a `NetworksLoop`."""
-        if cls is Loop and len(by_network(wishes)) > 1:
-            from catenary.loop.networks import NetworksLoop
-
-            return super().__new__(NetworksLoop)
-        return super().__new__(cls)
 
     def __init__(
         self,
-        *wishes: DeviceWish,
+        *requests: DeviceWish,
         period: float = 1e-3,
-        run: Literal["threaded", "inline"] = "threaded",
-        receive: ReceiveMode | None = None,
+        execution: ExecutionMode = "threaded",
         enable: bool = True,
-        late_limit: float | None = None,
-        handover: float = HANDOVER,
-        on_axis_stopped: StopPolicy = "raise",
-        lost_limit: int = 3,
-        stop_deadline: float = 2.0,
         watchdog: float | None = None,
-        busy_wait: float = 0.0,
-        switch_interval: float | None = None,
-        collect_deadline: float = 0.8,
-        log: int = 1000,
-        raise_faults: bool = True,
-        on_return: Policy = "restore",
-        on_replacement: Policy = "hold",
-        laws: Sequence[Law | Callable[..., Any]] = (),
-        sink: Sink | Sequence[Sink] | None = None,
-        clock: Literal["reference", "main"] = "reference",
-        reference: SubDevice | None = None,
-        margin: float | None = None,
-        burst: int = BURST,
-        exact_matching: bool = False,
         cpu: int | Sequence[int] | None = None,
-        quorum: int | None = None,
         priority: int | None = 80,
+        log: int = 1000,
+        laws: Sequence[Law | LawFunction] = (),
+        sink: Sink | Sequence[Sink] | None = None,
+        stop: StopPolicy = StopPolicy(),
+        scheduling: Scheduling = Scheduling(),
+        clocks: ClockOptions = ClockOptions(),
     ) -> None:
-        if run not in ("threaded", "inline"):
-            raise ValueError(f'run={run!r}: "threaded" or "inline"')
-        if clock not in ("reference", "main"):
-            raise ValueError(f'clock={clock!r}: "reference" or "main"')
+        one_of("execution", execution, ("threaded", "inline"))
         period_in_ns(period)
-        if not 0 <= busy_wait < period:
-            raise ValueError(f"busy_wait={busy_wait} s: must be less than the period of {period} s")
-        if switch_interval is not None and not 1e-6 <= switch_interval <= 1.0:
-            raise ValueError(f"switch_interval={switch_interval} s: must be 1 us to 1 s")
-        if not 0 < collect_deadline <= 1:
-            raise ValueError(f"collect_deadline={collect_deadline}: a share of the period, 0 to 1")
-        self._wishes = wishes
-        self._main = main_device_of(wishes)
-        self._period = period
-        self._run: Literal["threaded", "inline"] = run
-        self._receive: ReceiveMode = receive or ("look" if run == "inline" else "wait")
-        self._enable = enable
-        if late_limit is not None and not 0 <= late_limit < math.inf:
-            raise ValueError(f"late_limit={late_limit} s: must be 0 (never) or a positive time")
-        self._late_limit = late_limit
-        self._handover = handover
-        if on_axis_stopped not in ("raise", "event"):
-            raise ValueError(f'on_axis_stopped={on_axis_stopped!r}: "raise" or "event"')
-        self._on_axis_stopped: StopPolicy = on_axis_stopped
-        self._lost_limit = lost_limit
-        self._stop_deadline = stop_deadline
-        self._watchdog = watchdog
-        self._busy_wait = busy_wait
-        self._switch_interval = switch_interval
-        self._collect_deadline = collect_deadline
+        if scheduling.busy_wait >= period:
+            raise ValueError(
+                f"busy_wait={scheduling.busy_wait} s: must be less than the period of {period} s"
+            )
         if not 1 <= log <= LOG_LIMIT:
             raise ValueError(f"log={log} cycles: must be 1 to {LOG_LIMIT}")
-        self._log = log
-        self._raise_faults = raise_faults
-        for name, policy in (("on_return", on_return), ("on_replacement", on_replacement)):
-            if policy not in ("restore", "hold"):
-                raise ValueError(f'{name}={policy!r}: "restore" or "hold"')
-        self._on_return: Policy = on_return
-        self._on_replacement: Policy = on_replacement
-        self._laws = [made_law(law) for law in laws]
-        [self._sink] = one_sink_each(sink, 1)
-        self._clock: FollowedClock = clock
-        self._reference = reference
-        self._margin = margin
-        self._burst = burst
-        self._exact_matching = exact_matching
-        if quorum not in (None, 1):
-            raise ValueError(f"quorum={quorum}: there is one network")
-        if cpu is not None and not isinstance(cpu, int):
+        groups = by_network(requests)
+        count = len(groups)
+        if count > 1:
+            refuse_for_several(execution, laws)
+            clocks = clocks_of_several(clocks)
+        elif cpu is not None and not isinstance(cpu, int):
             raise ValueError(f"cpu={cpu}: one network has one thread, on one CPU")
-        self._cpu = cpu
-        self._priority = priority
+        settings = Settings(
+            period=period,
+            execution=execution,
+            watchdog=watchdog,
+            priority=priority,
+            log=log,
+            laws=[made_law(law) for law in laws],
+            stop=stop,
+            scheduling=scheduling,
+            clocks=clocks,
+        )
+        cpus = cpus_for(count, cpu) if count > 1 else [cpu if isinstance(cpu, int) else None]
+        self._networks = tuple(
+            Network(main, mine, settings, cpu=one, sink=its)
+            for (main, mine), one, its in zip(groups, cpus, one_sink_each(sink, count), strict=True)
+        )
+        self._quorum = checked_quorum(scheduling.quorum, count)
+        self._enable = enable
+        self._faults = stop.raise_faults
         leaving = (Loop.close, Loop.__exit__, Loop._leave, leave_open_loop)
         self._guard = SignalGuard(tuple(each.__code__ for each in leaving))
-        self._running: Running | None = None
-        self._iteration: Iteration | None = None
+        self._iteration: Iteration | NetworksIteration | None = None
         self._background: Background | None = None
         self._finalizer: weakref.finalize[..., Loop] | None = None
 
     def __enter__(self) -> Loop:
-        if self._running is not None and self._running.is_open:
+        if any(running.is_open for running in self._runnings):
             raise RuntimeError("the loop is open: `with` and open() open it; use one of them, once")
+        for network in self._networks:
+            network.main.require_no_loop()
         try:
             self._guard.install()
-            self._running = self._iteration = self._background = None
-            self._running = self._prepared(self._abandoned())
-            self._leave_at_the_latest([self._running])
-            self._running.open()
+            self._iteration = self._background = None
+            for network in self._networks:
+                network.running = None
+            abandon = leave_method(self._abandon)
+            runnings = [network.prepare(abandon) for network in self._networks]
+            self._leave_at_the_latest(runnings)
+            if len(runnings) > 1:
+                share_time(runnings)
+            for running in runnings:
+                running.open(runnings[0].engine.origin)
             if self._enable:
-                self._running.enable()
-            self._running.engine.reset_histograms()
-            if self._running.clocks is not None:
-                self._running.clocks.reset()
+                for running in runnings:
+                    running.enable()
+            for running in runnings:
+                running.reset_figures()
             return self  # inside: a signal may come at this line too
         except BaseException as error:
-            self._tell_end(error)
+            self._report_end(error)
             for problem in self._leave():
                 error.add_note(f"on the way down: {problem}")
             raise
-
-    def _prepared(self, abandon: Callable[[], object]) -> Running:
-        """All devices in SAFE-OP, all laws compiled."""
-        plan = self._make_plan()
-        self._main.configure(plan)
-        is_carried = self._main.carrier is not None
-        running = (CarriedRunning if is_carried else Running)(
-            self._main,
-            carried(plan) if is_carried else plan,
-            self._wishes,
-            abandon=abandon,
-            on_axis_stopped=self._on_axis_stopped,
-            on_return=self._on_return,
-            on_replacement=self._on_replacement,
-        )
-        running.switch_interval = self._switch_interval
-        for law in self._laws:
-            running.laws.compile(law)
-        if self._sink is not None:
-            running.publish(self._sink)
-        return running
 
     def __exit__(
         self,
@@ -246,7 +170,7 @@ class Loop:
         traceback: TracebackType | None,
     ) -> None:
         if error is not None:
-            self._tell_end(error)
+            self._report_end(error)
         problems = self._leave()
         if self._background is not None and (untold := self._background.untold_error()) is not None:
             problems.insert(0, untold)
@@ -256,29 +180,28 @@ class Loop:
         elif problems:
             raise problems[0]
 
-    def open(self) -> Self:
-        """Enter without a `with` block, for a notebook or a server. Returns the loop.
+    def open(self) -> Loop:
+        """Enter without a `with` block, for a notebook or a server. Return the loop.
 
         `close` leaves it; so do the end of the program and the MainDevice's `close`.
         """
-        self.__enter__()
-        return self
+        return self.__enter__()
 
     def close(self) -> None:
         """Leave the loop: stop the axes, then the cycle. A no-op if it is closed.
 
         Raises an error that ended the loop in the background, unless another call has raised it.
         """
-        if self._running is None:
+        if not self._runnings:
             return
-        if self._running.is_open:
+        if any(running.is_open for running in self._runnings):
             self._guard.install()  # again: a notebook sets its own handlers in each cell
         self.__exit__(None, None, None)
 
     def run_in_background(self) -> None:
         """Let a Python thread iterate the loop from now on, and return at once.
 
-        The thread commits the targets in every cycle. Write them in `with loop.update():`. An
+        The thread commits the targets in every cycle: write them in `with loop.update():`. An
         error of the loop stops the axes and closes the loop; the next `update`, `wait` or `close`
         raises it. Interrupting the program (Ctrl-C) does not stop the loop; `close` and the end of
         the program do. In virtual time the thread keeps to the wall clock. A no-op if it runs.
@@ -289,18 +212,19 @@ class Loop:
         """
         if self._background is not None:
             self._background.raise_error()
-        running = self._open_running
-        if self._background is None:
-            background = Background(running, iter(self), self._guard)
-            background.start()
-            self._background = background
+            if self._background.is_alive:
+                return
+        iteration = self._iterating()
+        background = Background(self._runnings, iteration, self._guard)
+        background.start()
+        self._background = background
 
     def update(self) -> AbstractContextManager[None]:
         """Return a context in which a program writes one consistent set of targets and requests.
 
         While the loop runs in the background, all of the set is committed when the block ends; none
-        of it if the block raises. In CSV and CST it counts for `command_timeout`: then CSV
-        decelerates, and CST is stopped.
+        of it if the block raises. In CSV and CST it counts for `StopPolicy.command_timeout`: then
+        CSV decelerates, and CST is stopped.
 
         Raises:
             RuntimeError: the loop does not run in the background: `next(loop)` commits.
@@ -326,7 +250,7 @@ class Loop:
         """
         if self._background is not None:
             return self._background.wait(awaited, timeout)
-        for cycle in self:
+        for _ in self:
             if awaited.done:
                 break
         return None
@@ -336,26 +260,36 @@ class Loop:
         """Error that ended the loop in the background; None if there is none."""
         return None if self._background is None else self._background.error
 
-    def __iter__(self) -> Iteration:
-        """Iterating again goes on where the last iteration ended."""
-        running = self._foreground
+    def __iter__(self) -> Iterator[Cycle]:
+        """Iterating again continues where the last iteration ended."""
+        return self._iterating()
+
+    def _iterating(self) -> Iteration | NetworksIteration:
+        self._require_foreground()
         if self._iteration is None:
-            self._iteration = Iteration(
-                running.engine,
-                partial(running.judge, faults=self._raise_faults),
-                trouble=TROUBLE,
-                al_status=State.OP,
-                beside=running.service.beside,
-            )
-            running.service.runner.adopt()
+            self._iteration = self._make_iteration()
+            for running in self._runnings:
+                running.service.runner.adopt()
         return self._iteration
 
     def __next__(self) -> Cycle:
         return next(iter(self))
 
+    def _make_iteration(self) -> Iteration | NetworksIteration:
+        first = self._opened
+        if len(self._networks) > 1:
+            return NetworksIteration(self._networks, self._quorum, faults=self._faults)
+        return Iteration(
+            first.engine,
+            partial(first.judge, faults=self._faults),
+            trouble=TROUBLE,
+            al_status=State.OP,
+            beside=first.service.beside,
+        )
+
     def start(
         self,
-        law: Law | Callable[..., Any],
+        law: Law | LawFunction,
         memory: Sequence[float] | Numbers = (),
         parameters: Sequence[float] | Numbers = (),
         *,
@@ -377,11 +311,11 @@ class Loop:
                 target that is NaN or infinite, overruns, and a step that never returns.
             ValueError: the budget leaves too little of the period for the frames.
         """
-        return self._opened.laws.start(made_law(law), memory, parameters, budget, overruns)
+        return self._only("a law").laws.start(made_law(law), memory, parameters, budget, overruns)
 
     def run(
         self,
-        law: Law | Callable[..., Any],
+        law: Law | LawFunction,
         memory: Sequence[float] | Numbers = (),
         parameters: Sequence[float] | Numbers = (),
         *,
@@ -389,16 +323,18 @@ class Loop:
         overruns: int = 3,
         compiled: bool = True,
     ) -> Numbers:
-        """Runs a law to its end, as `start` says; the axes hold then. Returns its memory.
+        """Run a law to its end and return its memory; the axes hold then. Arguments: see `start`.
 
-        `compiled=False` runs it as Python, in the loop's own thread: slow, with Python's errors, to
-        find mistakes.
+        Args:
+            compiled: False: run it as Python, in the thread of the caller. This is slow and gives
+                Python's errors: use it to find mistakes.
         """
-        running = self._foreground
+        self._require_foreground()
+        running = self._only("a law")
         if not compiled:
             return self._run_as_python(made_law(law), memory, parameters)
         run = running.laws.start(made_law(law), memory, parameters, budget, overruns)
-        running.laws.run(run, ENDING, self._judge)
+        running.laws.run(run, ENDING, self._advance)
         return run.memory
 
     def _run_as_python(
@@ -418,138 +354,113 @@ class Loop:
         return kept
 
     def stream(self, capacity: int = 1000) -> Stream:
-        """A ring of at most `capacity` rows of set-points, one row a cycle, that a slower thread
-        fills ahead: see `Stream`."""
-        return Stream(self._open_running.engine, self._opened.views, capacity)
+        """Return a `Stream`: up to `capacity` rows of set-points, one per cycle, that a slower
+        thread fills in advance."""
+        self._only("a stream").require_open()
+        return self._networks[0].stream(capacity)
 
     def restore(self, sub: SubDevice) -> None:
-        """Lets a device that is held (event DeviceHeld or DeviceReplaced) go to OP: from now on,
-        beside the cycle. Returns at once; `sub.state` and the events tell. ValueError for a device
-        of another loop."""
+        """Let a held device (event DeviceHeld or DeviceReplaced) go to OP while the cycle runs.
+
+        Returns at once: see `sub.state` and the events.
+
+        Raises:
+            ValueError: a device of another loop.
+        """
         for running in self._runnings:
             if running.main is sub.main:
                 return running.watch.release(sub)
         raise ValueError(f"{sub.station} is no device of this loop: it is on another MainDevice")
 
-    def _judge(self, flags: int) -> None:
-        running = self._opened
-        if running.service.beside is not None:
-            running.service.step()
-        if flags & TROUBLE or running.engine.al_status != State.OP:
-            running.judge(flags, faults=self._raise_faults)
+    @property
+    def networks(self) -> tuple[Network, ...]:
+        """Plan, timing, clocks and log of each network: one per MainDevice."""
+        return self._networks
 
     @property
     def plan(self) -> Plan:
-        """What runs: print it."""
-        return self._opened.plan
+        """The plan that runs: print it."""
+        return self._networks[0].plan
 
     @property
     def timing(self) -> Timing:
-        """The phases of the cycles since the loop was entered; stays readable after it."""
-        engine = self._opened.engine
-        return Timing(engine.histograms(), engine.counters)
+        """Phases of the cycles since the loop was opened; it stays readable afterwards."""
+        return self._networks[0].timing
 
     @property
     def clocks(self) -> Clocks:
-        """The distributed clocks: print it. RuntimeError where no wish has `dc=`."""
-        clocks = self._opened.clocks
-        if clocks is None:
-            raise RuntimeError("no distributed clocks in this loop: Drives(..., dc=True)")
-        return clocks
-
-    def wait_locked(self, within: float = 1e-6, timeout: float = 5.0) -> None:
-        """Cycles, axes holding, until every clock differs by at most `within` [s] from the
-        reference clock and the instants are in phase with it. That bound holds from now on: leaving
-        it is a `ClockUnlocked` event, coming back `ClockLocked`.
-
-        Raises:
-            ClockError: after `timeout` [s].
-            LoopError: an axis is powered in CST, whose torque would become stale meanwhile.
-        """
-        running = self._foreground
-        running.refuse_powered_torque("wait_locked")
-        self.clocks.wait(within, timeout, self._judge)
-        running.judge(CYCLE_CLOCKS, faults=self._raise_faults)
+        """The distributed clocks: print it. RuntimeError if no request has `dc=`."""
+        return self._networks[0].clocks
 
     @property
     def scheduling(self) -> str:
         """Scheduling and locked memory that the cycle thread obtained, as text."""
-        return self._opened.engine.scheduling
+        return self._networks[0].scheduling
 
     @property
     def log(self) -> LogArray:
         """The last cycles (1000, or `log`), oldest first, as a structured array."""
-        return self._opened.log()
+        return self._networks[0].log
 
     def histogram(self, phase: str) -> list[tuple[float, float, int]]:
         """(lower, upper, count) in us of every bucket of a phase of `timing` that is not empty."""
-        return self._opened.engine.histogram_counts(phase)
+        return self._networks[0].histogram(phase)
 
-    @property
-    def _runnings(self) -> Sequence[Running]:
-        """What runs of each network."""
-        return [self._opened]
+    def wait_locked(self, within: float = 1e-6, timeout: float = 5.0) -> None:
+        """Run cycles, axes holding, until the clocks are locked.
 
-    @property
-    def _open_running(self) -> Running:
-        running = self._opened
-        running.require_open()
-        return running
+        They are locked when every clock differs by at most `within` [s] from the reference clock
+        and the cycle starts are in phase with it. The bound stays in force: leaving it is a
+        `ClockUnlocked` event, returning a `ClockLocked` event. Several networks are awaited one
+        after the other.
 
-    @property
-    def _foreground(self) -> Running:
-        """What runs, for a call that iterates."""
+        Raises:
+            ClockError: after `timeout` [s], for each network.
+            LoopError: an axis is powered in CST, whose torque would become stale meanwhile.
+        """
+        self._require_foreground()
+        with_clocks = [n for n in self._networks if n.running and n.running.clocks is not None]
+        if not with_clocks:
+            raise RuntimeError("no distributed clocks in this loop: Drives(..., dc=True)")
+        for running in self._runnings:
+            running.refuse_powered_torque("wait_locked")
+        for network in with_clocks:
+            network.wait_locked(within, timeout)
+
+    def _require_foreground(self) -> None:
+        """Raise RuntimeError for a call that iterates if a thread does, or the loop is closed."""
         if self._background is not None and self._background.is_alive:
             raise RuntimeError(
                 "the loop runs in the background, where a thread iterates it: write targets in "
                 "`with loop.update():`, wait with loop.wait(move), start laws with loop.start()"
             )
-        return self._open_running
+        self._opened.require_open()
+
+    def _advance(self, flags: int) -> None:
+        """Do what belongs to each cycle that no iteration runs, and raise its error, if any."""
+        running = self._opened
+        if running.service.beside is not None:
+            running.service.step()
+        self._networks[0].check(flags)
+
+    def _only(self, what: str) -> Running:
+        """Return what runs of the one network.
+
+        Raises:
+            ValueError: there are several.
+        """
+        if len(self._networks) > 1:
+            raise ValueError(f"{what} belongs to one network: make a Loop for it")
+        return self._opened
+
+    @property
+    def _runnings(self) -> list[Running]:
+        """What runs of each network."""
+        return [network.running for network in self._networks if network.running is not None]
 
     @property
     def _opened(self) -> Running:
-        if self._running is None:
-            raise RuntimeError("the loop is not open: with Loop(...) as loop:")
-        return self._running
-
-    def _make_plan(self) -> Plan:
-        """What the wishes come to; nothing is written to the devices yet."""
-        late = self._late_limit
-        self._main.read_mappings(*self._wishes, period=self._period)
-        return make_plan(
-            [sub.description for sub in self._main.subs],
-            self._wishes,
-            period=self._period,
-            order=self._run,
-            receive_mode=self._receive,
-            watchdog=self._watchdog,
-            lost_limit=self._lost_limit,
-            late_limit_position=LATE_LIMIT_POSITION if late is None else late,
-            late_limit_velocity=LATE_LIMIT_VELOCITY if late is None else late,
-            late_limit_torque=LATE_LIMIT_TORQUE if late is None else late,
-            handover=self._handover,
-            stop_deadline=self._stop_deadline,
-            busy_wait=self._busy_wait,
-            collect_share=self._collect_deadline,
-            log=self._log,
-            clock=self._clock,
-            reference=None if self._reference is None else self._reference.position,
-            margin=self._margin,
-            burst=self._burst,
-            exact_matching=self._exact_matching,
-            cpu=self._cpu,
-            priority=self._priority,
-        )
-
-    def _abandoned(self) -> Callable[[], object]:
-        """Return what leaves the loop when its MainDevice is closed. It does not keep the loop."""
-        method = weakref.WeakMethod(self._abandon)
-
-        def abandon() -> None:
-            if (leave := method()) is not None:
-                leave()
-
-        return abandon
+        return self._networks[0].session
 
     def _abandon(self) -> None:
         """The MainDevice is being closed while the loop is open."""
@@ -560,19 +471,41 @@ class Loop:
         """Leave the loop when it is deleted, or when the program ends, if it is open then."""
         self._finalizer = weakref.finalize(self, leave_open_loop, runnings, self._guard)
 
-    def _tell_end(self, error: BaseException) -> None:
-        if self._running is not None:
-            self._running.tell_end(error)
+    def _report_end(self, error: BaseException) -> None:
+        """Tell those that read along why the loop ends."""
+        for running in self._runnings:
+            running.tell_end(error)
 
     def _leave(self) -> list[Exception]:
+        """Stop every network that answers, whatever happens to the others. Return the problems."""
         try:
-            if self._running is not None:
-                return self._running.leave(self._guard)
-            return take_down(self._main)
+            problems = leave_all(self._runnings, self._guard)
+            for network in self._networks:
+                if network.running is None:
+                    problems += take_down(network.main)
         finally:
             self._guard.restore()
             if self._finalizer is not None:
                 self._finalizer.detach()
+        return problems
+
+
+def refuse_for_several(execution: ExecutionMode, laws: Sequence[Law | LawFunction]) -> None:
+    """Raise ValueError for what only one network can have."""
+    if execution != "threaded":
+        raise ValueError(
+            'several networks need execution="threaded": a thread that iterates cannot keep the '
+            "cycle starts of more than one"
+        )
+    if laws:
+        raise ValueError("laws belong to one network: make a Loop for it")
+
+
+def checked_quorum(quorum: int | None, count: int) -> int:
+    """Return how many networks must be good. ValueError if there are not as many."""
+    if quorum is not None and not 1 <= quorum <= count:
+        raise ValueError(f"quorum={quorum}: must be 1 to the number of networks, {count}")
+    return count if quorum is None else quorum
 
 
 def leave_open_loop(runnings: Sequence[Running], guard: SignalGuard) -> None:
@@ -583,15 +516,10 @@ def leave_open_loop(runnings: Sequence[Running], guard: SignalGuard) -> None:
     for running in runnings:
         if running.is_open:
             running.stop_axes_at_once()
-    problems = [problem for running in runnings for problem in running.leave(guard)]
+    problems = leave_all(runnings, guard)
     guard.restore()
-    if _program_ends() and not problems and all(one.in_background for one in runnings):
+    if program_ends() and not problems and all(one.in_background for one in runnings):
         return
     text = "a Loop was not left: its axes have been stopped. Use it in a with block, or close() it"
     text += "".join(f"; {problem}" for problem in problems)
     warnings.warn(text, RuntimeWarning, stacklevel=2)
-
-
-def _program_ends() -> bool:
-    """Return True in the functions of `atexit`: Python marks its main thread as ended before."""
-    return not threading.main_thread().is_alive()

@@ -27,7 +27,7 @@ from catenary.core import (
 )
 from catenary.errors import CatenaryError, DriveError, LinkError, LoopError
 from catenary.link import forget_in_child, ring_of
-from catenary.loop.axis_watch import AxisWatch, RefusedMode, StoppedAxis, StopPolicy
+from catenary.loop.axis_watch import AxisWatch, RefusedMode, StoppedAxis
 from catenary.loop.buffers import bind_wishes
 from catenary.loop.clocks import Clocks
 from catenary.loop.diagnosis import (
@@ -42,11 +42,12 @@ from catenary.loop.error_watch import ErrorWatch
 from catenary.loop.frame_watch import FrameWatch
 from catenary.loop.interpreter import switch_interval
 from catenary.loop.laws.runner import LawRunner
+from catenary.loop.options import StopPolicy
 from catenary.loop.publishing import Publisher
 from catenary.loop.service import Service
 from catenary.loop.signals import SignalGuard
 from catenary.loop.stop_error import stopped_error
-from catenary.loop.watch import Attendance, Policy, Watch
+from catenary.loop.watch import Attendance, Watch
 from catenary.model.device import Direction
 from catenary.model.silence import judge_silence
 from catenary.plan.make import Plan
@@ -81,24 +82,20 @@ class Running:
         wishes: Sequence[Wish],
         *,
         abandon: Callable[[], object],
-        on_axis_stopped: StopPolicy = "raise",
-        on_return: Policy = "restore",
-        on_replacement: Policy = "hold",
+        stop: StopPolicy,
     ) -> None:
         self.main = main
         self.plan = plan
         self.engine = self._make_engine()
         self.views = bind_wishes(wishes, plan.tables, self.engine.buffers, lambda: self.is_open)
         self._axis_watch = AxisWatch(self.views, plan.cycle.axes)
-        self._on_axis_stopped: StopPolicy = on_axis_stopped
+        self._stop = stop
         self.laws = LawRunner(self.engine, plan)
         clock = plan.cycle.clock
         self.clocks: Clocks | None = None
         if clock is not None:
             self.clocks = Clocks(main, self.engine, self._clock(), clock, self.cycle)
         self.service = Service(main, self.engine, plan)
-        self._on_return: Policy = on_return
-        self._on_replacement: Policy = on_replacement
         self._attend()
         self.switch_interval: float | None = None  # [s] of the interpreter, inline
         self._attached = ExitStack()
@@ -133,8 +130,8 @@ class Running:
             now=lambda: self.engine.now() * 1e-9,
             rejoin=None if self.clocks is None else self.clocks.rejoin,
             cables_seen=self._announce_clocks,
-            on_return=self._on_return,
-            on_replacement=self._on_replacement,
+            on_return=self._stop.on_return,
+            on_replacement=self._stop.on_replacement,
         )
         self.errors = ErrorWatch(self.main, now=lambda: self.engine.now() * 1e-9)
         self.frames = FrameWatch(
@@ -187,9 +184,7 @@ class Running:
     def require_open(self) -> None:
         """Raise RuntimeError for a call that needs cycles, unless the loop is open."""
         if self._process != os.getpid():
-            raise RuntimeError(
-                "the loop runs in the parent process: a forked child cannot use it"
-            )
+            raise RuntimeError("the loop runs in the parent process: a forked child cannot use it")
         if not self.is_open:
             raise RuntimeError("the loop is closed: open it again, or use it in a with block")
 
@@ -197,7 +192,7 @@ class Running:
         """From SAFE-OP to OP: the cycle starts, and valid outputs flow while the states change.
         `origin_ns`: an instant of the grid to keep to."""
         self._attached.enter_context(self.main.attached(self.service.runner, self._abandon))
-        inline = self.plan.cycle.order == "inline" and self.engine.scheduling != "virtual time"
+        inline = self.plan.cycle.execution == "inline" and self.engine.scheduling != "virtual time"
         if inline and self.switch_interval is not None:
             self._attached.enter_context(switch_interval(self.switch_interval))
         self.engine.start(origin_ns)
@@ -214,6 +209,12 @@ class Running:
             sub.state = State.OP
         watches = (self.watch, self.errors, self.frames)
         self._watches = [self.service.runner.submit(watch.run()) for watch in watches]
+
+    def reset_figures(self) -> None:
+        """Begin the histograms and the figures of the clocks anew."""
+        self.engine.reset_histograms()
+        if self.clocks is not None:
+            self.clocks.reset()
 
     def enable(self) -> None:
         """Reset faults and enable all axes. Position axes hold when this returns; velocity and
@@ -324,7 +325,7 @@ class Running:
         if faults and left:
             raise self._drive_error(left, "left OPERATION_ENABLED by itself")
         unasked = [s for s in stops if s.reason in UNASKED]
-        if unasked and self._on_axis_stopped == "raise":
+        if unasked and self._stop.on_axis_stopped == "raise":
             log = self.log()
             self.stop_axes_at_once()
             raise stopped_error(unasked, self.plan.cycle, log)
@@ -362,11 +363,9 @@ class Running:
         if self._process != os.getpid():
             self.forget()
         if self._left:
-            self.end_background()  # it may be leaving
             return []
         self._left = True
         steps: tuple[Callable[[SignalGuard], None], ...] = (
-            self._end_background,
             self._stop_axes,
             self._stop_cycle,
             self._tell_of_watches,
@@ -379,9 +378,6 @@ class Running:
             except Exception as problem:  # the next step matters more; all are told at the end
                 problems.append(problem)
         return problems
-
-    def _end_background(self, guard: SignalGuard) -> None:
-        self.end_background()
 
     def _stop_axes(self, guard: SignalGuard) -> None:
         """Quick stop as each drive's 0x605A says, exchanged until all stand."""

@@ -17,7 +17,7 @@ from catenary.wire.cia402 import Mode
 ADVICE: dict[StopReason, str] = {
     StopReason.UNDERRUN: (
         "move slow work out of the loop body, keep more rows in the stream, "
-        "or give Loop(late_limit=...) a longer time [s]"
+        "or give StopPolicy(late_limit=...) a longer time [s]"
     ),
     StopReason.HANDOVER: (
         "start the next law or write torques in time, change to CSP before the law ends, "
@@ -37,12 +37,14 @@ ADVICE: dict[StopReason, str] = {
     ),
     StopReason.MODE_CHANGE: "check that the drive supports the mode (0x6502, its manual)",
     StopReason.COMMAND_TIMEOUT: (
-        "update torques more often than that from a thread, use a law (loop.start), or change to CSP"
+        "update torques more often than that from a thread, use a law (loop.start), change to "
+        "CSP, or give StopPolicy(command_timeout=...) a longer time [s]"
     ),
     StopReason.NOT_ENABLED: "check its main supply, safe torque off and the enable input",
 }
 GO_ON = (
-    'Loop(on_axis_stopped="event") keeps the loop running; Drives.enable() starts the axis again'
+    'StopPolicy(on_axis_stopped="event") keeps the loop running; '
+    "Drives.enable() starts the axis again"
 )
 
 

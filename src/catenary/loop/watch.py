@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Literal, Protocol
+from typing import Any, Protocol
 
 from catenary.bus import MainDevice, SubDevice
 from catenary.bus.event import (
@@ -25,6 +25,7 @@ from catenary.bus.pending import Pending
 from catenary.errors import CatenaryError
 from catenary.link import ring_of
 from catenary.loop.diagnosis import described
+from catenary.loop.options import ReturnPolicy
 from catenary.loop.ring_watch import RingWatch
 from catenary.model.device import Identity
 from catenary.model.returning import vacancies
@@ -36,7 +37,6 @@ from catenary.procedure.exchange import Procedure, after
 from catenary.procedure.survey import Answer, survey
 from catenary.wire.al import ERROR_FLAG, STATE_MASK, State
 
-Policy = Literal["restore", "hold"]
 Submit = Callable[[Procedure[None]], Pending[None]]
 
 LOOK = 0.010  # [s] between two looks at the core's flag, and between two surveys
@@ -102,8 +102,8 @@ class Watch:
         now: Callable[[], float],
         rejoin: Callable[[int, DevicePlan], Procedure[None]] | None = None,
         cables_seen: Callable[[], None] = lambda: None,
-        on_return: Policy = "restore",
-        on_replacement: Policy = "hold",
+        on_return: ReturnPolicy = "restore",
+        on_replacement: ReturnPolicy = "hold",
     ) -> None:
         required = required_positions(plan)
         self._charges = [

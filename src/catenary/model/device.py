@@ -7,7 +7,7 @@ one, its object dictionary (ETG.1000.6 §5.6.7.4). Nothing here asks the network
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -91,6 +91,11 @@ class Entry:
     bit_length: int
     name: str = ""
     data_type: int = 0  # ETG.1000.6 table 64, 0: unknown
+
+    @property
+    def place(self) -> tuple[int, int, int]:
+        """Index, subindex and length, by which entries are compared."""
+        return self.index, self.subindex, self.bit_length
 
     def __str__(self) -> str:
         place = f"0x{self.index:04X}:{self.subindex:02X} ({self.bit_length} bits)"
@@ -232,6 +237,24 @@ class DeviceDescription:
     def pdos(self, direction: Direction) -> tuple[Pdo, ...]:
         return self.output_pdos if direction is Direction.OUTPUT else self.input_pdos
 
+    def with_process_data(
+        self,
+        direction: Direction,
+        assignments: tuple[Assignment, ...],
+        pdos: tuple[Pdo, ...] | None = None,
+    ) -> DeviceDescription:
+        """Return the description with other process data in one direction.
+
+        Args:
+            direction: Outputs or inputs.
+            assignments: What is assigned now, by SyncManager.
+            pdos: All PDOs of the direction; None: as before.
+        """
+        pdos = self.pdos(direction) if pdos is None else pdos
+        if direction is Direction.OUTPUT:
+            return replace(self, outputs=assignments, output_pdos=pdos)
+        return replace(self, inputs=assignments, input_pdos=pdos)
+
     def known_object(self, index: int, subindex: int) -> ObjectInformation | None:
         for known in self.objects:
             if (known.index, known.subindex) == (index, subindex):
@@ -248,12 +271,11 @@ class DeviceDescription:
         return f"device {self.position} ({self.name})"
 
 
+def mapped_pdos(assignments: Iterable[Assignment]) -> tuple[Pdo, ...]:
+    """Return all PDOs of the assignments, in their order."""
+    return tuple(pdo for assignment in assignments for pdo in assignment.pdos)
+
+
 def mapped_entries(assignments: Iterable[Assignment]) -> tuple[Entry, ...]:
-    """All entries of the assignments, gaps left out."""
-    return tuple(
-        entry
-        for assignment in assignments
-        for pdo in assignment.pdos
-        for entry in pdo.entries
-        if entry.index
-    )
+    """Return all entries of the assignments, gaps left out."""
+    return tuple(entry for pdo in mapped_pdos(assignments) for entry in pdo.entries if entry.index)

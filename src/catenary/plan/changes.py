@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from catenary.model.device import DeviceDescription, Direction, Pdo
-from catenary.plan.pdo_mapping import ASSIGNMENT_BASE, Mapping
+from catenary.model.device import DeviceDescription, Direction
+from catenary.plan.pdo_mapping import ASSIGNMENT_BASE, Mapping, shape
+from catenary.plan.pdo_search import pdo_names, place_names
 
 
 class Change(NamedTuple):
@@ -26,15 +27,15 @@ def mapping_changes(
     changes = [
         Change(
             f"0x{ASSIGNMENT_BASE + each.sync_manager:04X}",
-            _pdo_list(before.get(each.sync_manager, ())),
-            _pdo_list(each.pdos),
+            pdo_names(before.get(each.sync_manager, ()), empty="none"),
+            pdo_names(each.pdos, empty="none"),
         )
         for each in mapping.assignments
         if each.sync_manager in mapping.reassigned
     ]
     for pdo in mapping.rewritten:
-        old = _entry_list(known[pdo.index]) if pdo.index in known else ""
-        changes.append(Change(f"0x{pdo.index:04X}", old, _entry_list(pdo)))
+        old = place_names(shape(known[pdo.index]), empty="none") if pdo.index in known else ""
+        changes.append(Change(f"0x{pdo.index:04X}", old, place_names(shape(pdo), empty="none")))
     return changes
 
 
@@ -49,12 +50,3 @@ def value_changes(
             text = "" if old is None else old.hex(" ")
             changes.append(Change(f"0x{index:04X}:{subindex:02X}", text, data.hex(" ")))
     return changes
-
-
-def _pdo_list(pdos: Sequence[Pdo]) -> str:
-    return ", ".join(f"0x{pdo.index:04X}" for pdo in pdos) or "none"
-
-
-def _entry_list(pdo: Pdo) -> str:
-    texts = (f"0x{e.index:04X}:{e.subindex:02X}/{e.bit_length}" for e in pdo.entries)
-    return ", ".join(texts) or "none"

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 from catenary.errors import ConfigurationError
 from catenary.model.device import DeviceDescription, OpMode
-from catenary.plan.cycle import ClockPlan, FollowedClock, FramePlan, Order
+from catenary.plan.cycle import ClockPlan, ExecutionMode, FollowedClock, FramePlan
 from catenary.wire.clock import Activation
 from catenary.wire.frame import wire_time_ns
 
@@ -32,7 +32,7 @@ START_DELAY_NS = 100_000_000  # to the first SYNC pulse: as SOEM (`SyncDelay`) a
 HOP_NS = 1000  # through a device and its cable: 0.3 µs by E-bus, up to 1 µs by Ethernet PHYs
 # What of the period is left between the instant and the frames: threaded, the wake-up's lateness;
 # inline and with a law, the calculation too, which comes before the frames.
-ALLOWANCE: dict[Order, float] = {"threaded": 0.2, "inline": 0.5}
+ALLOWANCE: dict[ExecutionMode, float] = {"threaded": 0.2, "inline": 0.5}
 
 # The phase controller (docs/clocks.md): a critically damped loop of this time constant, which
 # begins quick and slows down, and what it may do to the period.
@@ -143,17 +143,17 @@ def make_clock_plan(
     frames: Sequence[FramePlan],
     device_count: int,
     period_ns: int,
-    order: Order,
+    execution: ExecutionMode,
     margin: float | None = None,
     burst: int = BURST,
 ) -> ClockPlan:
     """Everything the cycle needs to know of clocks. `margin` [s]: between the instant and the
-    frames; None: by the order. `burst`: frames of static drift compensation. ConfigurationError
-    where the frames do not fit into the period."""
+    frames; None: by the execution mode. `burst`: frames of static drift compensation.
+    ConfigurationError where the frames do not fit into the period."""
     if burst < 0:
         raise ConfigurationError(f"a burst of {burst} frames", hint="0 or more")
     wire_ns = sum(wire_time_ns(len(frame.template)) for frame in frames) + HOP_NS * device_count
-    allowance_ns = round(ALLOWANCE[order] * period_ns if margin is None else margin * 1e9)
+    allowance_ns = round(ALLOWANCE[execution] * period_ns if margin is None else margin * 1e9)
     if allowance_ns < 0 or wire_ns + allowance_ns > period_ns:
         raise ConfigurationError(
             f"{wire_ns / 1e3:g} us of frames and {allowance_ns / 1e3:g} us before them do not fit "

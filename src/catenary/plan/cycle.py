@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Literal
 
-Order = Literal["threaded", "inline"]
-ReceiveMode = Literal["look", "wait", "spin"]
+ExecutionMode = Literal["threaded", "inline"]
+ReceiveMode = Literal["poll", "wait", "busy"]
 FollowedClock = Literal["reference", "main"]
 OnLoss = Literal["quick_stop", "disable", "csp_hold"]
 
@@ -94,8 +94,8 @@ class FramePlan:
 
     template: bytes
     datagrams: tuple[DatagramPlan, ...]
-    every: int = 1  # goes out every so many cycles
-    phase: int = 0  # in those whose number is this, modulo `every`
+    divider: int = 1  # goes out every so many cycles
+    phase: int = 0  # in those whose number is this, modulo `divider`
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +105,7 @@ class SyncUnit:
     name: str
     devices: tuple[int, ...]  # positions
     optional: bool = False  # its loss does not make the cycle bad
-    every: int = 1  # exchanged every so many cycles
+    divider: int = 1  # exchanged every so many cycles
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +177,7 @@ class ClockPlan:
 @dataclass(frozen=True, slots=True)
 class CyclePlan:
     period_ns: int
-    order: Order
+    execution: ExecutionMode
     receive_mode: ReceiveMode
     collect_deadline_ns: int  # threaded: how long after the wake-up the frames may come back
     output_size: int

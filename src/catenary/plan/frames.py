@@ -48,13 +48,13 @@ class _Piece:
     sync_unit: int
     outputs: tuple[Copy, ...] = ()
     inputs: tuple[Copy, ...] = ()
-    every: int = 1
+    divider: int = 1
     phase: int = 0
 
     @property
     def turn(self) -> tuple[int, int]:
         """The cycles in which it is sent."""
-        return self.every, self.phase
+        return self.divider, self.phase
 
     @property
     def size(self) -> int:
@@ -87,7 +87,7 @@ def make_frames(
     pieces = [_al_status(device_count), *_of_clocks(clocks)]
     for number, unit in enumerate(units):
         for piece in _of_unit(unit, number):
-            pieces.append(replace(piece, every=unit.every, phase=unit.phase))
+            pieces.append(replace(piece, divider=unit.divider, phase=unit.phase))
     pieces.extend(_of_mailboxes(mailboxes))
     room = MAXIMUM_PAYLOAD - (CYCLE_NUMBER_SIZE if exact_matching else 0)
     batches = _batches(pieces, room)
@@ -122,7 +122,7 @@ def acyclic_wire_time_ns(cyclic_ns: int, period_ns: int) -> int:
         raise ConfigurationError(
             f"the cyclic frames take {cyclic_ns / 1e3:g} us at 100 Mbit/s, the period is "
             f"{period_ns / 1e3:g} us",
-            hint="a longer period, fewer objects, or some devices less often (every=...)",
+            hint="a longer period, fewer objects, or some devices less often (divider=...)",
         )
     return max(period_ns - cyclic_ns - round(ACYCLIC_GUARD * period_ns), 0)
 
@@ -134,18 +134,19 @@ def check_return(cyclic_ns: int, period_ns: int, deadline_ns: int) -> None:
             f"period={period_ns * 1e-9:g} s is too short: the cyclic frames take "
             f"{cyclic_ns / 1e3:g} us at 100 Mbit/s, and must be back {deadline_ns / 1e3:g} us "
             "after the cycle start",
-            hint="a longer period, fewer objects, some devices less often (every=...), or a later "
-            "collect_deadline=... of the Loop",
+            hint="a longer period, fewer objects, "
+            "some devices less often (divider=...), or a later "
+            "deadline, Scheduling(collect_deadline=...)",
         )
 
 
 def _per_cycle(frames: Sequence[FramePlan], weight: Callable[[FramePlan], int]) -> int:
     sums: Counter[tuple[int, int]] = Counter()
     for frame in frames:
-        sums[frame.every, frame.phase] += weight(frame)
+        sums[frame.divider, frame.phase] += weight(frame)
     fullest: dict[int, int] = {}
-    for (every, _), total in sums.items():
-        fullest[every] = max(fullest.get(every, 0), total)
+    for (divider, _), total in sums.items():
+        fullest[divider] = max(fullest.get(divider, 0), total)
     return sum(fullest.values())
 
 
@@ -157,12 +158,12 @@ def _check_count(frames: Sequence[FramePlan], exact_matching: bool) -> None:
     if busiest <= limit:
         raise ConfigurationError(
             f"{len(frames)} frames for all dividers and phases, at most {FRAMES_MAX}",
-            hint="exchange fewer devices with dividers (every=...)",
+            hint="exchange fewer devices with dividers (divider=...)",
         )
-    more = "" if exact_matching else f", Loop(exact_matching=True) allows {EXACT_FRAMES_MAX}"
+    more = "" if exact_matching else f", Scheduling(exact_matching=True) allows {EXACT_FRAMES_MAX}"
     raise ConfigurationError(
         f"{busiest} frames in one cycle, at most {limit}: an index of 7 bits identifies them{more}",
-        hint="map fewer objects, or exchange some devices less often (every=...)",
+        hint="map fewer objects, or exchange some devices less often (divider=...)",
     )
 
 
@@ -175,7 +176,7 @@ def _cycle_number(first: _Piece) -> _Piece:
         CYCLE_NUMBER_SIZE - OVERHEAD,
         expected_counter=0,
         sync_unit=-1,
-        every=first.every,
+        divider=first.divider,
         phase=first.phase,
     )
 
@@ -300,7 +301,7 @@ def _frame(batch: Sequence[_Piece]) -> FramePlan:
         plans.append(_placed(piece, offset))
         offset += piece.size
     datagrams = [Datagram(piece.command, piece.address, bytes(piece.length)) for piece in batch]
-    return FramePlan(encode_frame(datagrams), tuple(plans), batch[0].every, batch[0].phase)
+    return FramePlan(encode_frame(datagrams), tuple(plans), batch[0].divider, batch[0].phase)
 
 
 def _placed(piece: _Piece, offset: int) -> DatagramPlan:

@@ -90,7 +90,7 @@ class UnitLayout:
     name: str
     devices: tuple[int, ...]
     optional: bool
-    every: int  # exchanged every so many cycles
+    divider: int  # exchanged every so many cycles
     phase: int
     logical_read_write: bool
     logical_start: int
@@ -109,7 +109,7 @@ class DeviceData:
     description: DeviceDescription
     outputs: tuple[Assignment, ...]
     inputs: tuple[Assignment, ...]
-    every: int = 1  # cycles between two exchanges
+    divider: int = 1  # cycles between two exchanges
     optional: bool = False
     watchdog_ns: int = 0  # of process data; 0: off
 
@@ -168,9 +168,9 @@ def make_layout(devices: Sequence[DeviceData], unit_max: int = UNIT_MAX) -> Layo
     turns: dict[int, int] = {}  # divisor → units that have it
     for members in _grouped(devices, unit_max):
         number = len(units)
-        every = members[0].every
-        turn = turns[every] = turns.get(every, -1) + 1
-        unit = _unit(members, turn % every, logical_start, output_offset, input_offset)
+        divider = members[0].divider
+        turn = turns[divider] = turns.get(divider, -1) + 1
+        unit = _unit(members, turn % divider, logical_start, output_offset, input_offset)
         units.append(unit)
         places.update(_places(members, unit, number))
         output_offset += unit.output_size
@@ -208,7 +208,7 @@ def _grouped(devices: Sequence[DeviceData], unit_max: int) -> list[list[DeviceDa
         if data.optional:
             groups.append([data])
             continue
-        kind = (data.description.supports_lrw, data.every)
+        kind = (data.description.supports_lrw, data.divider)
         rank = room.get(kind)
         if rank is not None and _fits(groups[rank], data, unit_max):
             groups[rank].append(data)
@@ -236,7 +236,7 @@ def _unit(
         name=name,
         devices=positions,
         optional=members[0].optional,
-        every=members[0].every,
+        divider=members[0].divider,
         phase=phase,
         logical_read_write=members[0].description.supports_lrw,
         logical_start=logical_start,

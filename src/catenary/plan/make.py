@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from catenary.errors import ConfigurationError
 from catenary.model.device import DeviceDescription, Direction
 from catenary.plan.clocks import BURST, SyncPlan, choose_clocks, make_clock_plan, make_sync
-from catenary.plan.cycle import CyclePlan, FollowedClock, Order, ReceiveMode, SyncUnit
+from catenary.plan.cycle import CyclePlan, ExecutionMode, FollowedClock, ReceiveMode, SyncUnit
 from catenary.plan.frames import (
     acyclic_wire_time_ns,
     check_return,
@@ -60,7 +60,7 @@ def make_plan(
     wishes: Sequence[Wish] = (),
     *,
     period: float = 1e-3,
-    order: Order = "threaded",
+    execution: ExecutionMode = "threaded",
     receive_mode: ReceiveMode = "wait",
     optional: Collection[int] = (),
     watchdog: float | None = None,
@@ -130,19 +130,19 @@ def make_plan(
     wire_ns = cyclic_wire_time_ns(frames)
     acyclic_ns = acyclic_wire_time_ns(wire_ns, period_ns)
     collect_ns = round(period_ns * collect_share)
-    if order == "threaded":
+    if execution == "threaded":
         check_return(wire_ns, period_ns, collect_ns)
     tables = tuple(wish.tables(layout) for wish in wishes)
     _check_times(tables, late_limit_torque, handover)
     cycle = CyclePlan(
         period_ns=period_ns,
-        order=order,
+        execution=execution,
         receive_mode=receive_mode,
         collect_deadline_ns=collect_ns,
         output_size=layout.output_size,
         input_size=layout.input_size,
         frames=frames,
-        sync_units=tuple(SyncUnit(u.name, u.devices, u.optional, u.every) for u in layout.units),
+        sync_units=tuple(SyncUnit(u.name, u.devices, u.optional, u.divider) for u in layout.units),
         device_count=len(devices),
         axes=tuple(axis for table in tables for axis in table.axes),
         output_columns=tuple(c for table in tables for c in table.output_columns),
@@ -166,7 +166,7 @@ def make_plan(
         priority=priority,
         clock=None
         if choice is None
-        else make_clock_plan(choice, frames, len(devices), period_ns, order, margin, burst),
+        else make_clock_plan(choice, frames, len(devices), period_ns, execution, margin, burst),
     )
     plans = tuple(
         make_device_plan(
@@ -197,13 +197,13 @@ def gather_wishes(wishes: Sequence[Wish], period_ns: int) -> dict[int, PdoWish]:
     gathered: dict[int, PdoWish] = {}
     for wish in wishes:
         for position, pdos in wish.pdos(period_ns).items():
-            before = gathered.get(position, PdoWish(every=pdos.every, required=False))
+            before = gathered.get(position, PdoWish(divider=pdos.divider, required=False))
             gathered[position] = PdoWish(
                 _merged(before.outputs, pdos.outputs),
                 _merged(before.inputs, pdos.inputs),
                 before.start_up + tuple(d for d in pdos.start_up if d not in before.start_up),
                 _one_clock(position, before.clock, pdos.clock),
-                math.gcd(before.every, pdos.every),
+                math.gcd(before.divider, pdos.divider),
                 before.required or pdos.required,
                 _one_mapping(position, before.pdos, pdos.pdos),
             )
@@ -261,7 +261,7 @@ def _syncs(
     devices: Sequence[DeviceDescription], asked: dict[int, PdoWish], period_ns: int
 ) -> dict[int, SyncPlan]:
     return {
-        position: make_sync(devices[position], wish, period_ns * asked[position].every)
+        position: make_sync(devices[position], wish, period_ns * asked[position].divider)
         for position, wish in _clock_wishes(asked).items()
     }
 
@@ -302,7 +302,7 @@ def _device_data(
         device,
         outputs,
         inputs,
-        wish.every,
+        wish.divider,
         optional=not wish.required,
         watchdog_ns=watchdog_ns,
     )

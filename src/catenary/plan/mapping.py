@@ -21,12 +21,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, NoReturn
 
 from catenary.errors import MappingError
-from catenary.model.device import DeviceDescription, Direction, Pdo, mapped_entries
+from catenary.model.device import DeviceDescription, Direction, mapped_entries
 from catenary.plan.pdo_mapping import (
-    ASSIGNMENT_BASE,
     Mapping,
+    assignment_refusal,
+    available_pdos,
     check_channel,
-    process_data_channel,
     with_pdos,
 )
 from catenary.plan.pdo_rewrite import rewrite, rewrite_refusal, write_down
@@ -95,17 +95,16 @@ def _search(
 
 
 def _missing(mapping: Mapping, wanted: Sequence[ObjectReference]) -> list[ObjectReference]:
-    pdos = [pdo for assignment in mapping.assignments for pdo in assignment.pdos]
-    return [each for each in wanted if not any_carries(pdos, each)]
+    return [each for each in wanted if not any_carries(mapping.pdos, each)]
 
 
 def _assign(
     device: DeviceDescription, direction: Direction, wanted: Sequence[ObjectReference]
 ) -> Mapping | None:
     """Return a combination of the PDOs that the device offers; None: it has or allows none."""
-    if _assignment_refusal(device, direction):
+    if assignment_refusal(device, direction):
         return None
-    assigned, offered, elsewhere = _pdos(device, direction)
+    assigned, offered, elsewhere = available_pdos(device, direction)
     here = [each for each in wanted if not any_carries(elsewhere, each)]
     found = find_combination(assigned, offered, here)
     return None if found is None else with_pdos(device, direction, found.pdos)
@@ -128,54 +127,22 @@ def _assign_most(
     return found
 
 
-def _pdos(
-    device: DeviceDescription, direction: Direction
-) -> tuple[tuple[Pdo, ...], list[Pdo], list[Pdo]]:
-    """Return the PDOs assigned to the SyncManager of process data, those that can be, and those
-    that other SyncManagers carry."""
-    channel = process_data_channel(device, direction)
-    assigned: tuple[Pdo, ...] = ()
-    elsewhere: list[Pdo] = []
-    for assignment in device.assignments(direction):
-        if assignment.sync_manager == channel:
-            assigned = assignment.pdos
-        else:
-            elsewhere.extend(assignment.pdos)
-    taken = {pdo.index for pdo in elsewhere}
-    offered = [pdo for pdo in device.pdos(direction) if pdo.index not in taken]
-    return assigned, offered, elsewhere
-
-
-def _assignment_refusal(device: DeviceDescription, direction: Direction) -> str:
-    """Return why the assignment cannot be changed; empty if it can."""
-    if device.mailbox is None or not device.coe:
-        return "it has no CoE mailbox to change its assignment"
-    channel = check_channel(device, direction)
-    index = ASSIGNMENT_BASE + channel
-    if not device.mailbox.pdo_assign:
-        return f"its SII says that 0x{index:04X} cannot be changed"
-    if any(a.fixed for a in device.assignments(direction) if a.sync_manager == channel):
-        return f"its dictionary says that 0x{index:04X} is read-only"
-    return ""
-
-
 def _as_now(current: Mapping, wanted: Sequence[ObjectReference]) -> str:
-    pdos = [pdo for assignment in current.assignments for pdo in assignment.pdos]
     lengths = {(e.index, e.subindex): e.bit_length for e in mapped_entries(current.assignments)}
     reasons = []
     for each in _missing(current, wanted):
         bits = lengths.get((each.index, each.subindex))
         other = f"is mapped with {bits} bits, {each.bit_length} were asked for"
         reasons.append(f"{object_names([each])} {'is not mapped' if bits is None else other}")
-    return f"as assigned now ({pdo_names(pdos)}): {'; '.join(reasons)}"
+    return f"as assigned now ({pdo_names(current.pdos)}): {'; '.join(reasons)}"
 
 
 def _no_combination(
     device: DeviceDescription, direction: Direction, required: Sequence[ObjectReference]
 ) -> str:
-    reason = _assignment_refusal(device, direction)
+    reason = assignment_refusal(device, direction)
     if not reason:
-        assigned, offered, elsewhere = _pdos(device, direction)
+        assigned, offered, elsewhere = available_pdos(device, direction)
         here = [each for each in required if not any_carries(elsewhere, each)]
         reason = explain_failure(assigned, offered, here)
     return f"another combination of its PDOs: {reason}"
@@ -189,8 +156,8 @@ def _check_written(
 ) -> None:
     missing = [each for each in _missing(mapping, wanted) if each.required]
     if missing:
-        pdos = [pdo for assignment in mapping.assignments for pdo in assignment.pdos]
-        reason = f"as written down ({pdo_names(pdos)}): {object_names(missing)} is not in them"
+        carried = pdo_names(mapping.pdos)
+        reason = f"as written down ({carried}): {object_names(missing)} is not in them"
         _refuse(device, direction, missing, (reason,))
 
 

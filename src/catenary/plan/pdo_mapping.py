@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from catenary.errors import MappingError
-from catenary.model.device import Assignment, DeviceDescription, Direction, Pdo
+from catenary.model.device import Assignment, DeviceDescription, Direction, Pdo, mapped_pdos
 
 if TYPE_CHECKING:  # wish.py needs NumPy, a scan does not
     from catenary.plan.wish import ObjectReference
@@ -29,6 +29,19 @@ class Mapping:
     @property
     def changed(self) -> bool:
         return bool(self.rewritten or self.reassigned)
+
+    @property
+    def pdos(self) -> tuple[Pdo, ...]:
+        """PDOs of all its assignments, in their order."""
+        return mapped_pdos(self.assignments)
+
+
+class AvailablePdos(NamedTuple):
+    """The PDOs of a device in one direction, by their assignment."""
+
+    assigned: tuple[Pdo, ...]  # to the SyncManager of process data
+    offered: tuple[Pdo, ...]  # all that can be assigned to it, `assigned` included
+    elsewhere: tuple[Pdo, ...]  # assigned to other SyncManagers
 
 
 def process_data_channel(device: DeviceDescription, direction: Direction) -> int | None:
@@ -56,6 +69,36 @@ def check_channel(device: DeviceDescription, direction: Direction) -> int:
     return channel
 
 
+def available_pdos(device: DeviceDescription, direction: Direction) -> AvailablePdos:
+    """Return the PDOs of a direction, by their assignment."""
+    channel = process_data_channel(device, direction)
+    assignments = device.assignments(direction)
+    elsewhere = mapped_pdos(each for each in assignments if each.sync_manager != channel)
+    taken = {pdo.index for pdo in elsewhere}
+    return AvailablePdos(
+        assigned=mapped_pdos(each for each in assignments if each.sync_manager == channel),
+        offered=tuple(pdo for pdo in device.pdos(direction) if pdo.index not in taken),
+        elsewhere=elsewhere,
+    )
+
+
+def assignment_refusal(device: DeviceDescription, direction: Direction) -> str:
+    """Return why the assignment cannot be changed; empty if it can.
+
+    Raises:
+        MappingError: The device has a CoE mailbox, but no SyncManager for the direction.
+    """
+    if device.mailbox is None or not device.coe:
+        return "it has no CoE mailbox to change its assignment"
+    channel = check_channel(device, direction)
+    index = ASSIGNMENT_BASE + channel
+    if not device.mailbox.pdo_assign:
+        return f"its SII says that 0x{index:04X} cannot be changed"
+    if any(a.fixed for a in device.assignments(direction) if a.sync_manager == channel):
+        return f"its dictionary says that 0x{index:04X} is read-only"
+    return ""
+
+
 def with_pdos(device: DeviceDescription, direction: Direction, pdos: Sequence[Pdo]) -> Mapping:
     """Return the mapping with these PDOs on the SyncManager of process data.
 
@@ -76,4 +119,4 @@ def with_pdos(device: DeviceDescription, direction: Direction, pdos: Sequence[Pd
 
 def shape(pdo: Pdo) -> tuple[tuple[int, int, int], ...]:
     """Return the entries without their names: index, subindex, length."""
-    return tuple((entry.index, entry.subindex, entry.bit_length) for entry in pdo.entries)
+    return tuple(entry.place for entry in pdo.entries)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from catenary.errors import MappingError
 from catenary.model.device import DeviceDescription, Direction, Entry, Pdo, mapped_entries
-from catenary.plan.pdo_mapping import Mapping, process_data_channel, with_pdos
+from catenary.plan.pdo_mapping import Mapping, assignment_refusal, available_pdos, with_pdos
 from catenary.plan.pdo_search import carries, pdo_names
 
 if TYPE_CHECKING:  # wish.py needs NumPy, a scan does not
@@ -51,7 +51,7 @@ def rewrite(
     """
     pdo = _changeable(device, direction)
     assert pdo is not None
-    assigned = _assigned(device, direction)
+    assigned = available_pdos(device, direction).assigned
     others = [other for other in assigned if other.index != pdo.index]
     new = tuple(dict.fromkeys(_entry(device, each) for each in missing))
     grown = replace(pdo, entries=pdo.entries + new)
@@ -90,21 +90,12 @@ def write_down(
 
 def _changeable(device: DeviceDescription, direction: Direction) -> Pdo | None:
     """Return the first assigned PDO that is not fixed; else one that can be assigned."""
-    assigned = _assigned(device, direction)
-    channel = process_data_channel(device, direction)
-    locked = device.mailbox is None or not device.mailbox.pdo_assign
-    locked |= any(a.fixed for a in device.assignments(direction) if a.sync_manager == channel)
-    taken = {pdo.index for a in device.assignments(direction) for pdo in a.pdos}
-    unassigned = [p for p in device.pdos(direction) if p.index not in taken and not locked]
+    assigned, offered, _ = available_pdos(device, direction)
+    if assignment_refusal(device, direction):
+        offered = ()
+    taken = {pdo.index for pdo in assigned}
+    unassigned = [pdo for pdo in offered if pdo.index not in taken]
     return next((pdo for pdo in (*assigned, *unassigned) if not pdo.fixed), None)
-
-
-def _assigned(device: DeviceDescription, direction: Direction) -> tuple[Pdo, ...]:
-    channel = process_data_channel(device, direction)
-    for assignment in device.assignments(direction):
-        if assignment.sync_manager == channel:
-            return assignment.pdos
-    return ()
 
 
 def _not_mappable(
@@ -138,12 +129,11 @@ def _other_length(
 
 def _entry(device: DeviceDescription, reference: ObjectReference) -> Entry:
     """Return the entry, with the name and type of the dictionary or of the device's PDOs."""
-    place = (reference.index, reference.subindex, reference.bit_length)
     known = device.known_object(reference.index, reference.subindex)
     if known is not None:
-        return Entry(*place, known.name, known.data_type)
+        return Entry(*reference.place, known.name, known.data_type)
     for pdo in (*device.output_pdos, *device.input_pdos):
         for entry in pdo.entries:
-            if (entry.index, entry.subindex, entry.bit_length) == place:
+            if entry.place == reference.place:
                 return entry
-    return Entry(*place)
+    return Entry(*reference.place)

@@ -10,7 +10,7 @@ PDOs that the device has assigned together now stay together: the EL3632 maps on
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import count
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -57,7 +57,7 @@ def find_combination(
         wanted: Objects with their lengths.
     """
     known = {pdo.index: _offer(pdo) for pdo in (*offered, *assigned)}
-    places = [(each.index, each.subindex, each.bit_length) for each in wanted]
+    places = [each.place for each in wanted]
     start = frozenset(pdo.index for pdo in assigned)
     order = count()
     queue = [(0, 0, next(order), _State(start, frozenset()))]
@@ -94,8 +94,7 @@ def explain_failure(
 
 def carries(pdo: Pdo, reference: ObjectReference) -> bool:
     """Return True if the PDO has the object in the wanted length."""
-    wanted = (reference.index, reference.subindex, reference.bit_length)
-    return any((e.index, e.subindex, e.bit_length) == wanted for e in pdo.entries)
+    return any(entry.place == reference.place for entry in pdo.entries)
 
 
 def any_carries(pdos: Sequence[Pdo], reference: ObjectReference) -> bool:
@@ -113,9 +112,14 @@ def object_names(references: Sequence[ObjectReference]) -> str:
     return ", ".join(f"0x{r.index:04X}:{r.subindex:02X} ({r.bit_length} bits)" for r in references)
 
 
-def pdo_names(pdos: Sequence[Pdo]) -> str:
-    """Return `0x1A00, 0x1A01`, or `no PDO`."""
-    return ", ".join(f"0x{pdo.index:04X}" for pdo in pdos) or "no PDO"
+def pdo_names(pdos: Iterable[Pdo], *, empty: str = "no PDO") -> str:
+    """Return `0x1A00, 0x1A01`, or `empty`."""
+    return ", ".join(f"0x{pdo.index:04X}" for pdo in pdos) or empty
+
+
+def place_names(places: Iterable[tuple[int, int, int]], *, empty: str) -> str:
+    """Return `0x6064:00/32, ...`, or `empty`. For entries without their names (`Entry.place`)."""
+    return ", ".join(f"0x{index:04X}:{sub:02X}/{bits}" for index, sub, bits in places) or empty
 
 
 def _steps(
@@ -142,7 +146,7 @@ def _combination(assigned: Sequence[Pdo], known: dict[int, _Offer], state: _Stat
 
 
 def _offer(pdo: Pdo) -> _Offer:
-    entries = frozenset((e.index, e.subindex, e.bit_length) for e in pdo.entries if e.index)
+    entries = frozenset(entry.place for entry in pdo.entries if entry.index)
     return _Offer(pdo, entries, frozenset(entry[:2] for entry in entries))
 
 

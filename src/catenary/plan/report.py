@@ -44,7 +44,7 @@ def report(
 def _heading(cycle: CyclePlan) -> Iterator[str]:
     yield (
         f"Plan: {cycle.device_count} devices, period {cycle.period_ns / 1e6:g} ms, "
-        f"{cycle.order}, receive {cycle.receive_mode}, "
+        f"{cycle.execution}, receive {cycle.receive_mode}, "
         f"{cycle.output_size} bytes out, {cycle.input_size} bytes in, {len(cycle.axes)} axes"
     )
 
@@ -144,7 +144,7 @@ def _frames(cycle: CyclePlan) -> Iterator[str]:
     yield _wire_time(cycle)
     yield from _exact_matching(cycle.frames)
     for number, frame in enumerate(cycle.frames):
-        when = f", every {frame.every} cycles" if frame.every > 1 else ""
+        when = f", every {frame.divider} cycles" if frame.divider > 1 else ""
         yield f"frame {number}: {len(frame.template)} bytes{when}"
         for datagram in frame.datagrams:
             yield f"    {_datagram(datagram)}"
@@ -188,6 +188,6 @@ def _datagram(datagram: DatagramPlan) -> str:
 def _units(layout: Layout) -> Iterator[str]:
     for number, unit in enumerate(layout.units):
         optional = ", optional" if unit.optional else ""
-        every = f", every {unit.every} cycles" if unit.every > 1 else ""
+        every = f", every {unit.divider} cycles" if unit.divider > 1 else ""
         how = "LRW" if unit.logical_read_write else "LRD + LWR"
         yield f"sync unit {number}: {unit.name}, {how}{optional}{every}"

@@ -16,9 +16,10 @@ from catenary.plan.changes import Change, mapping_changes, value_changes
 from catenary.plan.clocks import SyncPlan
 from catenary.plan.layout import DeviceLayout
 from catenary.plan.pdo_mapping import ASSIGNMENT_BASE, Mapping, shape
+from catenary.wire.register import watchdog_unit_ns
 
-WATCHDOG_DIVIDER = 2498  # (2498 + 2) · 40 ns = 100 µs, the controller's reset value
-WATCHDOG_UNIT_NS = (WATCHDOG_DIVIDER + 2) * 40
+WATCHDOG_DIVIDER = 2498  # the controller's reset value
+WATCHDOG_UNIT_NS = watchdog_unit_ns(WATCHDOG_DIVIDER)  # 100 µs
 
 
 @dataclass(frozen=True, slots=True)

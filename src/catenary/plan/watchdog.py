@@ -34,7 +34,7 @@ def choose_watchdog(
     Raises:
         ValueError: The register cannot hold the time, or it is shorter than three exchanges.
     """
-    exchange_ns = period_ns * wish.every
+    exchange_ns = period_ns * wish.divider
     if seconds is not None:
         watchdog_ns = _rounded(seconds)
     elif _is_torque_controlled(wish):
@@ -66,7 +66,7 @@ def _is_torque_controlled(wish: PdoWish) -> bool:
 def _check(device: DeviceDescription, wish: PdoWish, watchdog_ns: int, period_ns: int) -> None:
     if watchdog_ns > COUNT_MAX * WATCHDOG_UNIT_NS:
         raise ValueError(_range(watchdog_ns * 1e-9))
-    if watchdog_ns == 0 or watchdog_ns >= LEAST_EXCHANGES * period_ns * wish.every:
+    if watchdog_ns == 0 or watchdog_ns >= LEAST_EXCHANGES * period_ns * wish.divider:
         return
     seconds, period = watchdog_ns * 1e-9, period_ns * 1e-9
     if watchdog_ns < LEAST_EXCHANGES * period_ns:
@@ -75,7 +75,7 @@ def _check(device: DeviceDescription, wish: PdoWish, watchdog_ns: int, period_ns
             f"of {period} s; use a longer watchdog=... of the Loop"
         )
     raise ValueError(
-        f"{device}: exchanged every {wish.every} cycles of {period} s, less than "
+        f"{device}: exchanged every {wish.divider} cycles of {period} s, less than "
         f"{LEAST_EXCHANGES} times within the watchdog of {seconds:.4f} s; use a smaller divisor, "
         "or a longer watchdog=... of the Loop"
     )

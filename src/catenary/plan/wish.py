@@ -40,6 +40,11 @@ class ObjectReference:
     bit_length: int
     required: bool = True
 
+    @property
+    def place(self) -> tuple[int, int, int]:
+        """Index, subindex and length, as `Entry.place`."""
+        return self.index, self.subindex, self.bit_length
+
 
 @dataclass(frozen=True, slots=True)
 class WrittenPdo:
@@ -110,7 +115,7 @@ class PdoWish:
     """The objects one device must exchange every cycle. What is mapped already stays as it is;
     the mapping is changed only where a wanted object is missing, or as `pdos` says.
 
-    If several requests name a device, the smallest `every` counts, and it is required if any of
+    If several requests name a device, the smallest `divider` counts, and it is required if any of
     them requires it.
     """
 
@@ -120,7 +125,7 @@ class PdoWish:
         tuple[int, int, bytes], ...
     ] = ()  # SDO downloads in PRE-OP: index, subindex, data
     clock: DistributedClock | None = None
-    every: int = 1  # exchanged every so many cycles
+    divider: int = 1  # exchanged every so many cycles
     required: bool = True  # the cycle is not good without it
     pdos: tuple[WrittenPdo, ...] = ()  # exactly these, in directions that have any; else a search
 

@@ -16,11 +16,13 @@ from catenary.wire.al import ERROR_FLAG, STATE_MASK, State
 from catenary.wire.datagram import Command
 from catenary.wire.register import (
     AL_STATUS,
+    SYNC_MANAGER_COUNT,
     SYNC_MANAGERS_SUPPORTED,
     WATCHDOG_DIVIDER,
     WATCHDOG_STATUS_PROCESS_DATA,
     WATCHDOG_TIME_PROCESS_DATA,
     sync_manager,
+    watchdog_unit_ns,
 )
 from catenary.wire.sync_manager import SIZE, Activation, Direction, decode_sync_manager
 
@@ -28,7 +30,6 @@ RUNNING = (State.SAFE_OP, State.OP)
 ACTIVE = 0x01  # 0x0440: the watchdog has not expired, or is off
 POLL = 0.010  # [s]
 LONGEST_NS = 5_000_000_000  # twice a longer watchdog time is too long to wait
-DIVIDER_OFFSET, DIVIDER_NS = 2, 40  # the unit of 0x0420 is (0x0400 + 2) · 40 ns
 
 
 class Running(NamedTuple):
@@ -97,7 +98,7 @@ def find_refreshed(running: Sequence[Running]) -> Procedure[list[int]]:
 
 def _watchdog_time(device: Running) -> Procedure[int]:
     """Return the watchdog time of a device [ns]; 0 if its outputs do not trigger a watchdog."""
-    count = min(device.sync_managers, 16)
+    count = min(device.sync_managers, SYNC_MANAGER_COUNT)
     replies = yield [
         read(Command.APRD, -device.position, WATCHDOG_DIVIDER),
         read(Command.APRD, -device.position, WATCHDOG_TIME_PROCESS_DATA),
@@ -111,8 +112,7 @@ def _watchdog_time(device: Running) -> Procedure[int]:
     if not all(map(_answers, replies)) or not _triggers(replies[2].data):
         return 0
     divider = WATCHDOG_DIVIDER.unpack(replies[0].data)
-    time_ns = (divider + DIVIDER_OFFSET) * DIVIDER_NS
-    time_ns *= WATCHDOG_TIME_PROCESS_DATA.unpack(replies[1].data)
+    time_ns = watchdog_unit_ns(divider) * WATCHDOG_TIME_PROCESS_DATA.unpack(replies[1].data)
     return time_ns if 2 * time_ns <= LONGEST_NS else 0
 
 

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from catenary.errors import MailboxError, ResponseTimeout, SdoAbort
-from catenary.model.device import DeviceDescription, Direction, Entry, Pdo
+from catenary.model.device import DeviceDescription, Direction, Entry, Pdo, mapped_pdos
 from catenary.model.text import printable
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
@@ -35,8 +35,7 @@ def name_entries(
         return device
     dictionary = _Names(channel)
     for direction in Direction:
-        assignments = device.assignments(direction)
-        for pdo in (pdo for assignment in assignments for pdo in assignment.pdos):
+        for pdo in mapped_pdos(device.assignments(direction)):
             named = yield from dictionary.name(pdo)
             if named != pdo:
                 device = _with_pdo(device, direction, named)
@@ -116,6 +115,4 @@ def _with_pdo(device: DeviceDescription, direction: Direction, named: Pdo) -> De
     assigned = tuple(
         replace(each, pdos=renamed(each.pdos)) for each in device.assignments(direction)
     )
-    if direction is Direction.OUTPUT:
-        return replace(device, outputs=assigned, output_pdos=renamed(device.output_pdos))
-    return replace(device, inputs=assigned, input_pdos=renamed(device.input_pdos))
+    return device.with_process_data(direction, assigned, renamed(device.pdos(direction)))

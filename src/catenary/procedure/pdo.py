@@ -13,16 +13,16 @@ from catenary.model.device import (
     Direction,
     Entry,
     Pdo,
+    mapped_pdos,
 )
-from catenary.plan.pdo_mapping import ASSIGNMENT_BASE
+from catenary.plan.pdo_mapping import ASSIGNMENT_BASE, shape
+from catenary.plan.pdo_search import place_names
 from catenary.plan.start_up import DevicePlan, Download, restoring_downloads
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
-from catenary.procedure.profile import SMALL_LIMIT, SMALL_TIMEOUT
-from catenary.procedure.sdo import download, upload
+from catenary.procedure.sdo import NOT_THERE, download, upload_small
 
-NOT_THERE = frozenset((0x0602_0000, 0x0609_0011))  # no such object, no such subindex
-# ... or it cannot be written at all, or not now, or not with this value: it says what holds
+# An optional object that is absent, read-only, or refuses the value or the state
 LEFT_ALONE = NOT_THERE | {0x0601_0000, 0x0601_0002, 0x0609_0030, 0x0800_0020, 0x0800_0022}
 
 
@@ -114,27 +114,16 @@ def verify_mapping(
         if found is None or _shape(found) == wanted:
             continue
         yield from restore_mapping(channel, device, plan)
+        taken = place_names(_shape(found), empty="nothing")
         raise MappingError(
             f"{channel.station}: took a mapping of {direction.noun} that is not the one "
-            f"written: {_text(_shape(found))} instead of {_text(wanted)}",
+            f"written: {taken} instead of {place_names(wanted, empty='nothing')}",
             hint="its firmware corrects mappings; map what it accepts",
         )
 
 
-_Shape = tuple[tuple[int, int, int], ...]
-
-
-def _shape(assignments: tuple[Assignment, ...]) -> _Shape:
-    return tuple(
-        (entry.index, entry.subindex, entry.bit_length)
-        for assignment in assignments
-        for pdo in assignment.pdos
-        for entry in pdo.entries
-    )
-
-
-def _text(shape: _Shape) -> str:
-    return ", ".join(f"0x{index:04X}:{sub:02X}/{bits}" for index, sub, bits in shape) or "nothing"
+def _shape(assignments: tuple[Assignment, ...]) -> tuple[tuple[int, int, int], ...]:
+    return tuple(place for pdo in mapped_pdos(assignments) for place in shape(pdo))
 
 
 def _read_direction(
@@ -195,17 +184,13 @@ def _entry(data: bytes, names: dict[tuple[int, int], Entry]) -> Entry:
 def read_list(channel: MailboxChannel, index: int) -> Procedure[list[bytes] | None]:
     """Return subindices 1 to n of a list object; None if the device does not let it be read."""
     try:
-        count = (yield from _upload(channel, index, 0))[:1]
+        count = (yield from upload_small(channel, index, 0))[:1]
         items = []
         for subindex in range(1, int.from_bytes(count, "little") + 1):
-            items.append((yield from _upload(channel, index, subindex)))
+            items.append((yield from upload_small(channel, index, subindex)))
     except SdoAbort:
         return None
     return items
-
-
-def _upload(channel: MailboxChannel, index: int, subindex: int) -> Procedure[bytes]:
-    return upload(channel, index, subindex, limit=SMALL_LIMIT, timeout=SMALL_TIMEOUT)
 
 
 def _joined(
@@ -214,7 +199,7 @@ def _joined(
     """All PDOs of a device: those of the SII, corrected and completed by what was read."""
     if assignments is None:
         return offered
-    read = {pdo.index: pdo for assignment in assignments for pdo in assignment.pdos}
+    read = {pdo.index: pdo for pdo in mapped_pdos(assignments)}
     kept = tuple(
         read.pop(pdo.index) if pdo.index in read else replace(pdo, sync_manager=None)
         for pdo in offered

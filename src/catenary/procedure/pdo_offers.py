@@ -8,8 +8,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from catenary.errors import MailboxError, MappingError, ResponseTimeout, SdoAbort
-from catenary.model.device import Assignment, DeviceDescription, Direction, ObjectValue, Pdo
+from catenary.model.device import Assignment, DeviceDescription, Direction, ObjectValue, mapped_pdos
 from catenary.plan.pdo_mapping import ASSIGNMENT_BASE, shape
+from catenary.plan.pdo_search import pdo_names, place_names
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.pdo import read_entries, read_list, read_mapping
@@ -46,7 +47,7 @@ def read_offers(
 
     After a reply that is missing or malformed, the entries of the other PDOs are those of the SII.
     """
-    taken = {pdo.index for each in device.assignments(direction) for pdo in each.pdos}
+    taken = {pdo.index for pdo in mapped_pdos(device.assignments(direction))}
     known = {pdo.index: pdo for pdo in device.pdos(direction)}
     for index in [index for index in known if index not in taken][:OFFERS_MAX]:
         try:
@@ -64,7 +65,7 @@ def read_offers(
         locked = yield from _is_read_only(channel, device, ASSIGNMENT_BASE + each.sync_manager)
         pdos = tuple(known.get(pdo.index, pdo) for pdo in each.pdos)
         assignments.append(Assignment(each.sync_manager, pdos, each.fixed or locked))
-    return _with(device, direction, tuple(assignments), tuple(known.values()))
+    return device.with_process_data(direction, tuple(assignments), tuple(known.values()))
 
 
 def read_values(
@@ -98,17 +99,6 @@ def _is_read_only(
     return bool(entry.access & READABLE) and Access.WRITE_PRE_OP not in entry.access
 
 
-def _with(
-    device: DeviceDescription,
-    direction: Direction,
-    assignments: tuple[Assignment, ...],
-    pdos: tuple[Pdo, ...],
-) -> DeviceDescription:
-    if direction is Direction.OUTPUT:
-        return replace(device, outputs=assignments, output_pdos=pdos)
-    return replace(device, inputs=assignments, input_pdos=pdos)
-
-
 def _differences(
     described: DeviceDescription, found: DeviceDescription, direction: Direction
 ) -> Iterator[str]:
@@ -118,19 +108,13 @@ def _differences(
     before = {each.sync_manager: each.pdos for each in described.assignments(direction)}
     known = {pdo.index: pdo for pdo in described.pdos(direction)}
     for each in found.assignments(direction):
-        now, then = _indices(each.pdos), _indices(before.get(each.sync_manager, ()))
+        now = pdo_names(each.pdos, empty="none")
+        then = pdo_names(before.get(each.sync_manager, ()), empty="none")
         if now != then:
             yield f"SyncManager {each.sync_manager} carries PDOs {now}, its SII says {then}"
         for pdo in each.pdos:
             other = known.get(pdo.index)
             if other is not None and shape(other) != shape(pdo):
-                yield f"PDO 0x{pdo.index:04X} has {_contents(pdo)}, its SII says {_contents(other)}"
-
-
-def _indices(pdos: Sequence[Pdo]) -> str:
-    return ", ".join(f"0x{pdo.index:04X}" for pdo in pdos) or "none"
-
-
-def _contents(pdo: Pdo) -> str:
-    texts = (f"0x{i:04X}:{sub:02X}/{bits}" for i, sub, bits in shape(pdo))
-    return ", ".join(texts) or "no entries"
+                has = place_names(shape(pdo), empty="no entries")
+                said = place_names(shape(other), empty="no entries")
+                yield f"PDO 0x{pdo.index:04X} has {has}, its SII says {said}"

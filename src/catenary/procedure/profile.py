@@ -13,7 +13,7 @@ from catenary.model.device import DeviceDescription, ObjectInformation
 from catenary.model.text import printable
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
-from catenary.procedure.sdo import upload
+from catenary.procedure.sdo import upload_small
 from catenary.procedure.sdo_information import describe_entry
 from catenary.wire.sdo_information import Access, EntryDescription
 
@@ -24,8 +24,6 @@ PROFILE_DRIVE = 402
 PROFILE_MODULAR = 5001
 SLOT_STRIDE = 0x800
 SLOTS_MAX = 16  # 0x6000 to 0xDFFF
-SMALL_LIMIT = 4096  # bytes: these objects have up to 4, one wished for may be a string
-SMALL_TIMEOUT = 5.0  # [s] for one of them
 
 
 def read_profile(
@@ -97,8 +95,6 @@ def _listed_axes(channel: MailboxChannel) -> Procedure[tuple[int, ...]]:
 def _upload_if_there(channel: MailboxChannel, index: int, subindex: int) -> Procedure[bytes | None]:
     """Return None if the device refuses: whatever the reason, the object is of no use."""
     try:
-        return (
-            yield from upload(channel, index, subindex, limit=SMALL_LIMIT, timeout=SMALL_TIMEOUT)
-        )
+        return (yield from upload_small(channel, index, subindex))
     except SdoAbort:
         return None

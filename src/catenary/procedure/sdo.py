@@ -38,6 +38,9 @@ ABORT_LENGTH = 0x0607_0012  # data type does not match, length too high
 ABORT_MEMORY = 0x0504_0005  # out of memory
 UPLOAD_LIMIT = 1 << 20  # bytes: more than any object of a device we know
 UPLOAD_TIMEOUT = 60.0  # [s] for all segments: 1 MiB in mailboxes of 128 bytes, 7 ms each
+SMALL_LIMIT = 4096  # bytes: most of these objects have up to 4, but a requested one may be a string
+SMALL_TIMEOUT = 5.0  # [s] for one of them
+NOT_THERE = frozenset((0x0602_0000, 0x0609_0011))  # no such object, no such subindex
 
 
 def upload(
@@ -62,6 +65,16 @@ def upload(
             announced, or needs longer than `timeout`.
     """
     return exclusively(channel, _upload(channel, index, subindex, complete_access, limit, timeout))
+
+
+def upload_small(channel: MailboxChannel, index: int, subindex: int) -> Procedure[bytes]:
+    """Read one object of a scan or a plan: with a limit and a deadline for small objects.
+
+    Raises:
+        SdoAbort: The device refuses.
+        MailboxError: More than `SMALL_LIMIT` bytes, or longer than `SMALL_TIMEOUT`.
+    """
+    return upload(channel, index, subindex, limit=SMALL_LIMIT, timeout=SMALL_TIMEOUT)
 
 
 def _upload(

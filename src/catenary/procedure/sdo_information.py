@@ -12,7 +12,7 @@ from typing import NamedTuple, TypeVar
 from catenary.errors import CatenaryError, DecodeError, MailboxError, ResponseTimeout, SdoAbort
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel, converse, exclusively, further
-from catenary.procedure.sdo import decoded, refused
+from catenary.procedure.sdo import NOT_THERE, decoded, refused
 from catenary.procedure.station import Deadline
 from catenary.wire.mailbox import Mailbox, Type
 from catenary.wire.sdo_information import (
@@ -38,7 +38,6 @@ ABOUT = {Opcode.LIST_RESPONSE: 2, Opcode.OBJECT_RESPONSE: 2, Opcode.ENTRY_RESPON
 ANSWER_MAX = 2 + 2 * 0x1_0000  # bytes: the list of all indices there can be
 ANSWER_TIMEOUT = 20.0  # [s] for all fragments of one answer
 FAILURES_MAX = 3  # answers in a row that are missing or malformed; then nothing more is asked
-NOT_THERE = frozenset((0x0602_0000, 0x0609_0011))  # no such object, no such subindex
 PLACES_SHOWN = 8  # of each reason
 FAILURES = (SdoAbort, MailboxError, ResponseTimeout)
 

@@ -33,7 +33,7 @@ class OwnSteps:
 
     def __init__(self, wish: Wish, slaves: list[SlaveBase], period: float) -> None:
         self._wish = wish
-        self._loop = Loop(wish, period=period, run="inline", enable=False)
+        self._loop = Loop(wish, period=period, execution="inline", enable=False)
         self._loop.__enter__()
         self._cycle = next(self._loop)
         for slave in slaves:

@@ -26,7 +26,7 @@ from catenary.realtime.runner import START_SECONDS, Work
 from catenary.realtime.statistics import as_table, measured_demand
 from catenary.realtime.supervisor import Supervisor
 from catenary.realtime.task import Task
-from catenary.realtime.worker import ProcessWorker, Run, ThreadWorker, Worker, check_importable
+from catenary.realtime.worker import ProcessWorker, ThreadWorker, Worker, Workers, check_importable
 
 LEAD_SECONDS = 0.01  # from the last task's start to the first release of all
 STOP_SECONDS = 5.0
@@ -39,7 +39,7 @@ class Tasks:
     """Owns running tasks: `with Tasks(a, b) as tasks:` starts them together, the end of the block
     ends them. `tasks["a"]` is one of them; `print(tasks)` shows what their jobs took.
 
-    run: "processes" or "threads"; None: processes for more than one.
+    workers: "processes" or "threads"; None: processes for more than one.
     clock: a VirtualClock simulates them, by priority and processor (`cpu`; None counts as 0).
     session: `realtime.session()`, entered in each process, or in this one for threads.
     best_effort: priorities and processors that are refused are done without.
@@ -48,15 +48,15 @@ class Tasks:
     def __init__(
         self,
         *tasks: Task,
-        run: Run | None = None,
+        workers: Workers | None = None,
         clock: VirtualClock | None = None,
         session: Session | None = None,
         best_effort: bool = False,
     ) -> None:
-        check_set(tasks, run)
+        check_set(tasks, workers)
         if clock is None:
             check_cpus(tasks)
-        self.run: Run = run or ("processes" if len(tasks) > 1 else "threads")
+        self.workers: Workers = workers or ("processes" if len(tasks) > 1 else "threads")
         self._tasks = tasks
         self._clock = clock
         self._session = session
@@ -86,7 +86,7 @@ class Tasks:
         """Starts all tasks; their first release is at one instant, once all have started."""
         if self._supervisor is not None:
             raise RuntimeError("these tasks have been started already")
-        if self.run == "processes":
+        if self.workers == "processes":
             for task in self._tasks:
                 check_importable(task)
         self._handles = make_handles(self._tasks, self._clock)
@@ -95,7 +95,7 @@ class Tasks:
                 handle.task.trigger.bind(handle.place)
         self._supervisor = Supervisor(self._handles, self._make_worker, self._wake_clock)
         try:
-            if self.run == "threads" and self._session is not None:
+            if self.workers == "threads" and self._session is not None:
                 self._undo.enter_context(self._session)
             if self._clock is not None:
                 share_one_cpu(self._undo)
@@ -188,7 +188,7 @@ class Tasks:
 
     def _own_session(self) -> contextlib.AbstractContextManager[object]:
         """What prepares this process, where the tasks have theirs elsewhere; threads have it."""
-        if self._session is None or self.run == "threads":
+        if self._session is None or self.workers == "threads":
             return contextlib.nullcontext()
         return self._session
 
@@ -199,7 +199,7 @@ class Tasks:
 
     def _make_worker(self, handle: Handle, supervisor: Supervisor) -> Worker:
         work = Work(handle.task, handle.place, self._best_effort)
-        if self.run == "threads":
+        if self.workers == "threads":
             return ThreadWorker(work, supervisor.thread_ended)
         return ProcessWorker(work, self._session)
 
@@ -262,7 +262,7 @@ def share_one_cpu(undo: contextlib.ExitStack) -> None:
     os.sched_setaffinity(thread, {libc.call("sched_getcpu")})
 
 
-def check_set(tasks: tuple[Task, ...], run: Run | None) -> None:
+def check_set(tasks: tuple[Task, ...], workers: Workers | None) -> None:
     if not tasks:
         raise ValueError("no tasks: Tasks(task, ...)")
     for task in tasks:
@@ -275,8 +275,8 @@ def check_set(tasks: tuple[Task, ...], run: Run | None) -> None:
     triggers = [task.trigger for task in tasks if task.trigger is not None]
     if len(set(map(id, triggers))) < len(triggers):
         raise ValueError("two tasks have the same trigger: a Signal releases one task")
-    if run not in (None, "processes", "threads"):
-        raise ValueError(f'run is "processes" or "threads", not {run!r}')
+    if workers not in (None, "processes", "threads"):
+        raise ValueError(f'workers={workers!r}: must be "processes" or "threads"')
 
 
 def make_handles(tasks: tuple[Task, ...], clock: VirtualClock | None) -> dict[str, Handle]:

@@ -15,7 +15,7 @@ from catenary.realtime.preparation import Session
 from catenary.realtime.runner import Work, run_in_process, start_thread
 from catenary.realtime.task import Task
 
-Run: TypeAlias = Literal["processes", "threads"]
+Workers: TypeAlias = Literal["processes", "threads"]
 
 
 class Worker(Protocol):
@@ -87,5 +87,5 @@ def check_importable(task: Task) -> None:
         except (pickle.PicklingError, AttributeError, TypeError) as error:
             raise TypeError(
                 f"{task}: its process cannot import {function!r}: {error}. Define it at the top of "
-                'a module, or take run="threads"'
+                'a module, or take workers="threads"'
             ) from error

@@ -15,7 +15,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from catenary.errors import ShareError
-from catenary.share.folder import deciding, draft_path, not_trusted, prepare, remove_old_drafts
+from catenary.share.folder import deciding, draft_path, not_trusted, remove_old_drafts
 
 MFD_NOEXEC_SEAL = 0x0008  # linux/memfd.h, from Linux 6.3: asked for where vm.memfd_noexec is 2
 SEALS = fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL
@@ -59,8 +59,7 @@ class Segment:
 
 
 def create(folder: Path, size: int, mode: int) -> Segment:
-    """Create a draft of zeros. Raises ShareError if the memory is full."""
-    prepare(folder, mode)
+    """Create a draft of zeros in a prepared folder. Raises ShareError if the memory is full."""
     remove_old_drafts(folder)
     draft = draft_path(folder)
     descriptor = os.open(draft, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)

@@ -188,7 +188,9 @@ class Share:
     def _make_files(self, made: ShareLayout) -> tuple[Segment, Desk, DeskSocket]:
         """Create files and socket as drafts. Raises ShareError if the memory is full."""
         where = folder.own_folder()
-        segment = memory.create(where, made.size, self._mode & ~OTHERS_WRITE)
+        mode = self._mode & ~OTHERS_WRITE
+        folder.prepare(where, mode)
+        segment = memory.create(where, made.size, mode)
         try:
             head = encode_head(made)
             segment.memory[: len(head)] = head

@@ -189,6 +189,11 @@ GENERAL_PURPOSE_OUTPUTS = Register[int](0x0F10, "<Q", "general purpose outputs")
 GENERAL_PURPOSE_INPUTS = Register[int](0x0F18, "<Q", "general purpose inputs")
 
 
+def watchdog_unit_ns(divider: int) -> int:
+    """Return the unit of the watchdog times (0x0410, 0x0420) for a value of the divider."""
+    return (divider + 2) * 40
+
+
 def rx_error_counter(port: int) -> Register[int]:
     """Low byte: invalid frames; high byte: RX errors of the PHY."""
     return Register(0x0300 + 2 * _checked(port, PORT_COUNT), "<H", f"RX error counter port {port}")

@@ -142,7 +142,9 @@ class Minute:
         list(self._main.events)  # of the last loop
         for positions in wishes.parts:
             self.witness.ask(positions)
-        with cat.Loop(*wishes.all, period=PERIOD, on_axis_stopped="event") as loop:
+        with cat.Loop(
+            *wishes.all, period=PERIOD, stop=cat.StopPolicy(on_axis_stopped="event")
+        ) as loop:
             self.figures.loops += 1
             self.witness.enter(Phase.RUNNING)
             try:

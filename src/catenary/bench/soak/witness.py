@@ -316,4 +316,4 @@ class Witness:
         out_of_reach = disturbed(self.injected.between(since, now), ring=self.segment.ring)
         for position, device in enumerate(self.segment):
             if device.state & AL_STATE == OP and position not in out_of_reach:
-                self.tell("nobody left in OP", f"device {position} is", about=str(position))
+                self.tell("no device left in OP", f"device {position} is", about=str(position))

@@ -210,11 +210,10 @@ def exchange(interface: str, order: str, rate: int, cycles: int, cpu: int | None
         with cat.Loop(
             terminal,
             period=1 / rate,
-            run="inline" if order == "inline" else "threaded",
+            execution="inline" if order == "inline" else "threaded",
             cpu=cpu,
             priority=PRIORITY,
-            lost_limit=LOST_LIMIT,
-            late_limit=LATE_LIMIT,
+            stop=cat.StopPolicy(lost_limit=LOST_LIMIT, late_limit=LATE_LIMIT),
         ) as loop:
             before, start, last = loop.timing.counters, 0, 0
             for cycle in loop:

@@ -92,7 +92,7 @@ def run(segment: Segment, seconds: float, *, dc: bool) -> Found:
     with cat.MainDevice(segment) as main:
         subs = main.scan()
         outputs = cat.Outputs(subs[first.position], subs[last.position], dc=dc)
-        with cat.Loop(outputs, period=PERIOD, run="inline") as loop:
+        with cat.Loop(outputs, period=PERIOD, execution="inline") as loop:
             if dc:
                 loop.wait_locked(timeout=LOCK_TIMEOUT)
             for cycle in loop:

@@ -176,7 +176,7 @@ def run_python(way: Literal["processes", "threads"], seconds: float) -> list[Fou
                 NAMES, PERIODS, EXECUTIONS, PRIORITIES, most, strict=True
             )
         ),
-        run=way,
+        workers=way,
         session=session(best_effort=True),
         best_effort=True,
     )

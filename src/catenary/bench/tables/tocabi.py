@@ -250,7 +250,7 @@ def beside() -> Tasks:
             priority=TASK_PRIORITY,
             cpu=processors().masters,
         ),
-        run="processes",
+        workers="processes",
         session=session(best_effort=True),
         best_effort=True,
     )

@@ -5,9 +5,11 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable
-from typing import Any
+from typing import TypeAlias
 
 from catenary.errors import LawError
+
+LawFunction: TypeAlias = Callable[..., object]  # of the arguments that it names
 
 ARGUMENTS = ("actual", "target", "memory", "time", "parameters", "enabled", "dt", "ok", "n")
 """What a law may ask for, by name."""
@@ -27,7 +29,7 @@ class Law:
     Calling it is calling the function: as Python, with all of Python's errors.
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: LawFunction) -> None:
         self.function = function
         functools.update_wrapper(self, function)
         self.arguments = arguments_of(function)
@@ -42,12 +44,12 @@ class Law:
         return getattr(self.function, "__name__", "law")
 
 
-def law(function: Callable[..., Any]) -> Law:
+def law(function: LawFunction) -> Law:
     """Makes a control law of a function: see `Law`. `loop.run(pd, memory=[...])` runs it."""
     return function if isinstance(function, Law) else Law(function)
 
 
-def arguments_of(function: Callable[..., Any]) -> tuple[str, ...]:
+def arguments_of(function: LawFunction) -> tuple[str, ...]:
     """The names the function asks for. TypeError: no function; LawError: a name no law has."""
     if not inspect.isfunction(function):
         raise TypeError(f"a law is made of a plain function, not of {function!r}")

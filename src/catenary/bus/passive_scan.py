@@ -19,7 +19,7 @@ from catenary.procedure.stations import StationRegisters, count, read_registers
 from catenary.procedure.visit import distinct, give_addresses, read_addresses, visit
 
 
-def look(
+def passive_scan(
     runner: BlockingRunner, ring: RingLink | None, names: bool
 ) -> tuple[DeviceDescription, ...]:
     """All devices in the order of their positions, with their parents."""

@@ -31,28 +31,28 @@ def states(segment: cat.Segment) -> list[State]:
 
 
 def test_a_look_finds_what_a_scan_finds(main: cat.MainDevice) -> None:
-    looked = [(sub.name, sub.identity, sub.alias) for sub in main.look()]
+    looked = [(sub.name, sub.identity, sub.alias) for sub in main.passive_scan()]
     assert looked == [(sub.name, sub.identity, sub.alias) for sub in main.scan()]
 
 
 def test_a_look_changes_no_state_and_closing_brings_nobody_down(segment: cat.Segment) -> None:
     with cat.MainDevice(segment) as main:
-        main.request_states(main.look(), range(3), State.PRE_OP)
+        main.request_states(main.passive_scan(), range(3), State.PRE_OP)
     assert states(segment) == [State.PRE_OP] * 3
     with cat.MainDevice(segment) as main:
-        main.look()
+        main.passive_scan()
     assert states(segment) == [State.PRE_OP] * 3
 
 
 def test_without_names_nothing_is_read_from_the_eeproms(main: cat.MainDevice) -> None:
-    main.look(names=False)
+    main.passive_scan(names=False)
     few = main.counts.datagrams
-    main.look()
+    main.passive_scan()
     assert main.counts.datagrams > 10 * few
 
 
 def test_safe_op_is_reached_from_every_state(segment: cat.Segment, main: cat.MainDevice) -> None:
-    subs = main.look()
+    subs = main.passive_scan()
     for before in (State.INIT, State.PRE_OP, State.SAFE_OP):
         main.request_states(subs, range(3), before)
         found = main.request_states(subs, range(3), State.SAFE_OP)
@@ -63,14 +63,14 @@ def test_safe_op_is_reached_from_every_state(segment: cat.Segment, main: cat.Mai
 
 
 def test_one_device_alone(segment: cat.Segment, main: cat.MainDevice) -> None:
-    main.request_states(main.look(), [SERVO], State.PRE_OP)
+    main.request_states(main.passive_scan(), [SERVO], State.PRE_OP)
     assert states(segment) == [State.INIT, State.PRE_OP, State.INIT]
 
 
 def test_who_refuses_says_why_and_the_others_go_on(
     segment: cat.Segment, main: cat.MainDevice
 ) -> None:
-    found = main.request_states(main.look(), range(3), State.OP)
+    found = main.request_states(main.passive_scan(), range(3), State.OP)
     error = found[SERVO]
     assert isinstance(error, StateError)
     assert error.code == 0x0019
@@ -78,7 +78,7 @@ def test_who_refuses_says_why_and_the_others_go_on(
 
 
 def test_boot_needs_a_bootstrap_mailbox(main: cat.MainDevice) -> None:
-    error = main.request_states(main.look(), [SERVO], State.BOOT)[SERVO]
+    error = main.request_states(main.passive_scan(), [SERVO], State.BOOT)[SERVO]
     assert isinstance(error, EepromError)
     assert "no bootstrap mailbox" in error.message
 
@@ -90,7 +90,7 @@ def test_a_ring_is_looked_at_from_both_ends(cut: tuple[int | str, int | str] | N
     if cut is not None:
         segment.inject(faults.cut(between=cut))
     with cat.MainDevice(segment.first, segment.second) as main:
-        subs = main.look()
+        subs = main.passive_scan()
         assert [sub.name for sub in subs] == ["Catenary virtual coupler", "a", "b"]
         texts = [each.evidence for each in main.diagnose(subs=subs).findings]
     wanted = [] if cut is None else [f"the ring is cut between device {cut[0]} and device {cut[1]}"]

@@ -1,0 +1,202 @@
+"""Network: the part of a loop that runs on one MainDevice."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from catenary.bus import MainDevice
+from catenary.core import (
+    CYCLE_CLOCKS,
+    CYCLE_DROPPED,
+    CYCLE_LAW_FAILED,
+    CYCLE_NONE,
+    CYCLE_STOPPED,
+    CYCLE_WORKING_COUNTER,
+)
+from catenary.loop.carried import CarriedRunning, carried
+from catenary.loop.clocks import Clocks
+from catenary.loop.devices import DeviceWish
+from catenary.loop.laws.law import Law
+from catenary.loop.options import ClockOptions, Scheduling, StopPolicy
+from catenary.loop.running import LogArray, Running
+from catenary.loop.stream import Stream
+from catenary.loop.timing import Timing
+from catenary.plan.cycle import ExecutionMode
+from catenary.plan.make import Plan, make_plan
+from catenary.plan.sink import Sink
+from catenary.wire.al import State
+
+ENDING = CYCLE_WORKING_COUNTER | CYCLE_DROPPED | CYCLE_STOPPED | CYCLE_NONE | CYCLE_LAW_FAILED
+TROUBLE = ENDING | CYCLE_CLOCKS
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """Options of a loop that are the same for all of its networks."""
+
+    period: float
+    execution: ExecutionMode
+    watchdog: float | None
+    priority: int | None
+    log: int
+    laws: Sequence[Law]
+    stop: StopPolicy
+    scheduling: Scheduling
+    clocks: ClockOptions
+
+
+class Network:
+    """Owns the session of one MainDevice in a loop: its plan, timing, clocks and log."""
+
+    def __init__(
+        self,
+        main: MainDevice,
+        requests: Sequence[DeviceWish],
+        settings: Settings,
+        *,
+        cpu: int | None,
+        sink: Sink | None,
+    ) -> None:
+        self.main = main
+        self.running: Running | None = None
+        self._requests = requests
+        self._settings = settings
+        self._cpu = cpu
+        self._sink = sink
+
+    @property
+    def plan(self) -> Plan:
+        """The plan that runs: print it."""
+        return self.session.plan
+
+    @property
+    def timing(self) -> Timing:
+        """Phases of the cycles since the loop was opened; it stays readable afterwards."""
+        engine = self.session.engine
+        return Timing(engine.histograms(), engine.counters)
+
+    @property
+    def clocks(self) -> Clocks:
+        """The distributed clocks: print it. RuntimeError if no request has `dc=`."""
+        clocks = self.session.clocks
+        if clocks is None:
+            raise RuntimeError("no distributed clocks in this loop: Drives(..., dc=True)")
+        return clocks
+
+    @property
+    def scheduling(self) -> str:
+        """Scheduling and locked memory that the cycle thread obtained, as text."""
+        return self.session.engine.scheduling
+
+    @property
+    def log(self) -> LogArray:
+        """The last cycles, oldest first, as a structured array."""
+        return self.session.log()
+
+    def histogram(self, phase: str) -> list[tuple[float, float, int]]:
+        """(lower, upper, count) in us of every bucket of a phase of `timing` that is not empty."""
+        return self.session.engine.histogram_counts(phase)
+
+    def stream(self, capacity: int = 1000) -> Stream:
+        """Return a `Stream` of set-points for the axes of this network."""
+        return Stream(self.session.engine, self.session.views, capacity)
+
+    @property
+    def session(self) -> Running:
+        """Its engine and what belongs to it. RuntimeError before the loop is open."""
+        if self.running is None:
+            raise RuntimeError("the loop is not open: with Loop(...) as loop:")
+        return self.running
+
+    def prepare(self, abandon: Callable[[], object]) -> Running:
+        """Bring all devices to SAFE-OP and compile all laws.
+
+        Args:
+            abandon: leaves the loop when the MainDevice is closed.
+        """
+        self.running = None
+        plan = self._make_plan()
+        self.main.configure(plan)
+        is_carried = self.main.carrier is not None
+        running = (CarriedRunning if is_carried else Running)(
+            self.main,
+            carried(plan) if is_carried else plan,
+            self._requests,
+            abandon=abandon,
+            stop=self._settings.stop,
+        )
+        running.switch_interval = self._settings.scheduling.switch_interval
+        for law in self._settings.laws:
+            running.laws.compile(law)
+        if self._sink is not None:
+            running.publish(self._sink)
+        self.running = running
+        return running
+
+    def _make_plan(self) -> Plan:
+        """Plan the requests. Nothing is written to the devices yet."""
+        its = self._settings
+        self.main.read_mappings(*self._requests, period=its.period)
+        late_position, late_velocity, late_torque = its.stop.late_limits
+        command_velocity, command_torque = its.stop.command_timeouts
+        reference = its.clocks.reference
+        if reference is not None and reference.main is not self.main:
+            reference = None  # a device of another network of the loop
+        receive = its.scheduling.receive
+        return make_plan(
+            [sub.description for sub in self.main.subs],
+            self._requests,
+            period=its.period,
+            execution=its.execution,
+            receive_mode=receive or ("poll" if its.execution == "inline" else "wait"),
+            watchdog=its.watchdog,
+            lost_limit=its.stop.lost_limit,
+            late_limit_position=late_position,
+            late_limit_velocity=late_velocity,
+            late_limit_torque=late_torque,
+            handover=its.stop.handover,
+            command_timeout_velocity=command_velocity,
+            command_timeout_torque=command_torque,
+            stop_deadline=its.stop.stop_deadline,
+            busy_wait=its.scheduling.busy_wait,
+            collect_share=its.scheduling.collect_deadline,
+            log=its.log,
+            clock=its.clocks.lead or "reference",
+            reference=None if reference is None else reference.position,
+            margin=its.clocks.margin,
+            burst=its.clocks.burst,
+            exact_matching=its.scheduling.exact_matching,
+            cpu=self._cpu,
+            priority=its.priority,
+        )
+
+    def check(self, flags: int) -> None:
+        """Raise the error of a cycle in trouble, if it is one."""
+        running = self.session
+        if flags & TROUBLE or running.engine.al_status != State.OP:
+            running.judge(flags, faults=self._settings.stop.raise_faults)
+
+    def wait_locked(self, within: float, timeout: float) -> None:
+        """See `Loop.wait_locked`."""
+        running = self.session
+
+        def advance(flags: int) -> None:
+            if running.service.beside is not None:
+                running.service.step()
+            self.check(flags)
+
+        self.clocks.wait(within, timeout, advance)
+        running.judge(CYCLE_CLOCKS, faults=self._settings.stop.raise_faults)
+
+
+def leave_method(loop_leave: Callable[[], None]) -> Callable[[], object]:
+    """Return a call of a bound method that does not keep its object alive."""
+    method = weakref.WeakMethod(loop_leave)
+
+    def call() -> None:
+        if (leave := method()) is not None:
+            leave()
+
+    return call

@@ -1,0 +1,160 @@
+"""Options of a Loop, grouped: what stops it, how its thread is scheduled, how clocks are kept."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from catenary.bus import SubDevice
+from catenary.plan.clocks import BURST
+from catenary.plan.cycle import FollowedClock, ReceiveMode
+
+AxisStopReaction = Literal["raise", "event"]
+ReturnPolicy = Literal["restore", "hold"]
+
+HANDOVER = 0.020  # [s], CST
+LATE_LIMIT_POSITION = 0.050  # [s], CSP
+LATE_LIMIT_VELOCITY = 0.050  # [s], CSV
+LATE_LIMIT_TORQUE = 0.010  # [s], CST
+COMMAND_TIMEOUT_VELOCITY = 0.200  # [s], CSV
+COMMAND_TIMEOUT_TORQUE = 0.020  # [s], CST
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StopPolicy:
+    """What stops axes or ends a loop, and what happens to devices that return.
+
+    Args:
+        late_limit: time without fresh set-points, then quick stop [s]. None: 50 ms in CSP and CSV,
+            10 ms in CST. 0: never; refused for axes that use CST.
+        handover: time for which CST keeps its torque after a law or stream ended, then quick stop
+            [s].
+        command_timeout: in the background, time for which the targets of an update count [s]; then
+            CSV decelerates and CST stops quickly. None: 0.2 s in CSV, 20 ms in CST. CSP holds
+            without limit.
+        stop_deadline: time for the axes to reach standstill when the loop is left [s].
+        lost_limit: cycles in a row without all answers, then WorkingCounterError.
+        raise_faults: a drive in fault, or one that left OPERATION_ENABLED by itself (STO), raises
+            DriveError; else see `Drives.faults` and `Drives.stopped`.
+        on_axis_stopped: the core stopped a required axis without a request: "raise" DriveError, or
+            only the "event" `AxisStopped`; see `Drives.stopped`.
+        on_return: a device that no request requires comes back: "restore" replays its start-up
+            objects and brings it to OP; "hold" keeps it in PRE-OP until `Loop.restore`.
+        on_replacement: the same for another device of the same product in its place. A held one is
+            not even brought to PRE-OP.
+
+    Raises:
+        ValueError: an option is impossible.
+    """
+
+    late_limit: float | None = None
+    handover: float = HANDOVER
+    command_timeout: float | None = None
+    stop_deadline: float = 2.0
+    lost_limit: int = 3
+    raise_faults: bool = True
+    on_axis_stopped: AxisStopReaction = "raise"
+    on_return: ReturnPolicy = "restore"
+    on_replacement: ReturnPolicy = "hold"
+
+    def __post_init__(self) -> None:
+        if self.late_limit is not None and not 0 <= self.late_limit < math.inf:
+            raise ValueError(
+                f"late_limit={self.late_limit} s: must be 0 (never) or a positive time"
+            )
+        if self.command_timeout is not None and not 0 < self.command_timeout < math.inf:
+            raise ValueError(
+                f"command_timeout={self.command_timeout} s: must be positive and finite"
+            )
+        one_of("on_axis_stopped", self.on_axis_stopped, ("raise", "event"))
+        one_of("on_return", self.on_return, ("restore", "hold"))
+        one_of("on_replacement", self.on_replacement, ("restore", "hold"))
+
+    @property
+    def late_limits(self) -> tuple[float, float, float]:
+        """Late limits in CSP, CSV and CST [s]."""
+        if self.late_limit is None:
+            return LATE_LIMIT_POSITION, LATE_LIMIT_VELOCITY, LATE_LIMIT_TORQUE
+        return (self.late_limit,) * 3
+
+    @property
+    def command_timeouts(self) -> tuple[float, float]:
+        """Command timeouts in CSV and CST [s]."""
+        if self.command_timeout is None:
+            return COMMAND_TIMEOUT_VELOCITY, COMMAND_TIMEOUT_TORQUE
+        return (self.command_timeout,) * 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scheduling:
+    """How a loop waits for time and frames.
+
+    Args:
+        receive: how the cycle waits for its frames: "poll", "wait" or "busy". None: "wait" when
+            threaded, "poll" when inline.
+        busy_wait: busy-wait before each cycle start instead of a plain sleep [s]. It costs as much
+            processor time.
+        switch_interval: of the interpreter while an inline loop is open in real time [s]. None:
+            unchanged; see `interpreter` in `Loop.timing`.
+        collect_deadline: threaded: share of the period in which frames may return. The budget of a
+            law shortens it.
+        exact_matching: every cyclic frame carries the cycle number in a NOP datagram. A frame that
+            a loop in the wiring or a second sender repeats is then never accepted as a current
+            one. Costs 16 bytes and 1.3 us of wire time per frame.
+        quorum: of several networks, how many must be good for a cycle to be good. None: all.
+
+    Raises:
+        ValueError: an option is impossible.
+    """
+
+    receive: ReceiveMode | None = None
+    busy_wait: float = 0.0
+    switch_interval: float | None = None
+    collect_deadline: float = 0.8
+    exact_matching: bool = False
+    quorum: int | None = None
+
+    def __post_init__(self) -> None:
+        one_of("receive", self.receive, (None, "poll", "wait", "busy"))
+        if not 0 <= self.busy_wait < math.inf:
+            raise ValueError(f"busy_wait={self.busy_wait} s: must be 0 or a positive time")
+        if self.switch_interval is not None and not 1e-6 <= self.switch_interval <= 1.0:
+            raise ValueError(f"switch_interval={self.switch_interval} s: must be 1 us to 1 s")
+        if not 0 < self.collect_deadline <= 1:
+            raise ValueError(
+                f"collect_deadline={self.collect_deadline}: must be a share of the period, 0 to 1"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClockOptions:
+    """How distributed clocks are kept, for requests with `dc=`.
+
+    Args:
+        lead: the clock that gives the time. "reference": the cycle start follows the reference
+            clock. "main": the reference clock follows the MainDevice. None: "reference"; with
+            several networks "main", the only possible one.
+        reference: device with the reference clock. None: the first that has a clock.
+        margin: latest time of the frames after the cycle start [s]. None: 20 % of the period when
+            threaded and for laws, 50 % when inline.
+        burst: frames that bring the clocks together before the cycle begins.
+
+    Raises:
+        ValueError: an option is impossible.
+    """
+
+    lead: FollowedClock | None = None
+    reference: SubDevice | None = None
+    margin: float | None = None
+    burst: int = BURST
+
+    def __post_init__(self) -> None:
+        one_of("lead", self.lead, (None, "reference", "main"))
+
+
+def one_of(name: str, value: object, allowed: tuple[object, ...]) -> None:
+    """Raise ValueError for a value that is not one of those allowed."""
+    if value not in allowed:
+        names = ", ".join(f'"{each}"' for each in allowed if each is not None)
+        raise ValueError(f"{name}={value!r}: must be one of {names}")
