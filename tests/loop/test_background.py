@@ -5,6 +5,7 @@ as soon as its condition holds.
 """
 
 import asyncio
+import ctypes
 import gc
 import os
 import signal
@@ -21,6 +22,7 @@ import pytest
 
 import catenary as cat
 from catenary.errors import CatenaryError, DriveError, LoopError
+from catenary.realtime import VirtualClock
 from catenary.types import SINT
 from catenary.virtual import Segment, Servo
 
@@ -387,6 +389,7 @@ def test_a_loop_that_is_forgotten_is_stopped_with_a_warning() -> None:
 EXIT = """
 import atexit
 import catenary as cat
+from catenary.realtime import VirtualClock
 from catenary.types import SINT
 from catenary.virtual import Segment, Servo
 
@@ -465,3 +468,46 @@ def test_a_callback_that_never_returns_is_named() -> None:
     assert cell.segment[0].state & 0x0F == 2
     release.set()
     cell.main.close()
+
+
+# ---- several networks, and real time
+
+
+def test_several_networks_in_the_background() -> None:
+    clock = VirtualClock()
+    mains = [cat.MainDevice(Segment([Servo()], clock=clock)) for _ in range(2)]
+    for main in mains:
+        main.open()
+    arms = [
+        cat.Drives(main.scan().drives, counts_per_turn=COUNTS, velocity_limit=10.0)
+        for main in mains
+    ]
+    loop = cat.Loop(*arms).open()
+    loop.run_in_background()
+    with loop.update():
+        for arm in arms:
+            arm.target.position[:] = 0.05
+    for arm in arms:
+        loop.wait(Condition(lambda arm=arm: arm.actual.position[0] > 0.04), timeout=PATIENCE)
+    loop.close()
+    for main in mains:
+        main.close()
+
+
+def test_csp_holds_while_the_program_keeps_the_interpreter() -> None:
+    """In real time the native core judges: no Python thread can run meanwhile."""
+    segment = Segment([Servo()], clock="monotonic")
+    main = cat.MainDevice(segment)
+    main.open()
+    arm = cat.Drives(main.scan().drives, counts_per_turn=COUNTS, velocity_limit=10.0)
+    stop = cat.StopPolicy(lost_limit=1_000_000)
+    loop = cat.Loop(arm, period=2e-3, stop=stop, watchdog=0).open()
+    loop.run_in_background()
+    ctypes.PyDLL(None).usleep(300_000)  # does not release the interpreter
+    with loop.update():
+        arm.target.position[:] = arm.actual.position + 0.05
+    goal = arm.target.position[0]
+    loop.wait(Condition(lambda: arm.actual.position[0] > goal - 0.01), timeout=PATIENCE)
+    assert arm.stopped == (None,)
+    loop.close()
+    main.close()
