@@ -12,7 +12,7 @@ import catenary as cat
 
 def move(name, started):
     """The loop: two axes in virtual time; other processes may command them."""
-    with cat.MainDevice(cat.Segment([cat.Servo(), cat.Servo()])) as main:
+    with cat.MainDevice(cat.Segment([cat.virtual.Servo(), cat.virtual.Servo()])) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=2.0)
         with cat.Share(name) as share, cat.Loop(arm, period=1e-3, sink=share) as loop:
             started.set()

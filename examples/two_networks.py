@@ -6,7 +6,7 @@ import catenary as cat
 from catenary.realtime import VirtualClock
 
 with VirtualClock() as clock:  # on the robot: MainDevice("eth0"), MainDevice("eth1")
-    bodies = [cat.Segment([cat.Servo() for _ in range(n)], clock=clock) for n in (18, 15)]
+    bodies = [cat.Segment([cat.virtual.Servo() for _ in range(n)], clock=clock) for n in (18, 15)]
     with cat.MainDevice(bodies[0]) as first, cat.MainDevice(bodies[1]) as second:
         upper = cat.Drives(first.scan().drives, counts_per_turn=2**20, velocity_limit=2.0)
         lower = cat.Drives(second.scan().drives, counts_per_turn=2**20, velocity_limit=2.0)

@@ -58,7 +58,7 @@ def trajectory(task, cost, state, phase, rows, done, goals):
     motion, number = None, int(done.read())
     for _ in task:
         task.spend(cost)
-        if phase.read() != cat.Phase.RUNNING or number == len(goals):
+        if phase.read() != cat.drive.Phase.RUNNING or number == len(goals):
             motion = None
         elif motion is None and not len(rows):  # begins as the reference moves; mostly it stands
             begin = control.MotionState(*state.read()[:3])
@@ -120,13 +120,13 @@ def main_control(place, cost, period, target, share, state, torque, phase, rows,
     stop = cat.StopPolicy(raise_faults=False)
     with cat.MainDevice(read_segment(target, clock=place) if place else target) as main:
         arm = cat.Drives(main.scan().drives, mode="cst", required=False, **AXES)
-        recovery, measured = cat.Recovery(arm), Measured(virtual=bool(place))
+        recovery, measured = cat.drive.Recovery(arm), Measured(virtual=bool(place))
         with cat.Loop(arm, sink=share, watchdog=0.02, stop=stop, **options) as loop:
             for cycle in loop:
                 q, v = arm.actual.position, arm.actual.velocity
                 row = rows.take()
-                dry = row is None and recovery.phase == cat.Phase.RUNNING and speed.any()
-                if recovery.phase != cat.Phase.RUNNING:  # follows the arm
+                dry = row is None and recovery.phase == cat.drive.Phase.RUNNING and speed.any()
+                if recovery.phase != cat.drive.Phase.RUNNING:  # follows the arm
                     row, memory = (q.copy(), nothing, nothing), GAINS.memory.tolist()
                 wanted, speed, acceleration = (wanted, nothing, nothing) if row is None else row
                 state.write([wanted, speed, acceleration, q, v])

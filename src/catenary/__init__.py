@@ -16,10 +16,10 @@ would keep a process from entering a network namespace.
 TYPE_CHECKING = False  # of `typing`, which takes longer to import than all of this
 
 if TYPE_CHECKING:
-    from catenary import control, errors, realtime, share, types
+    from catenary import control, drive, errors, realtime, record, share, types, virtual
     from catenary.bus import SubDevice
     from catenary.bus import event as events
-    from catenary.drive import DistributedClock, Drives, Inputs, Outputs, Phase, Recovery
+    from catenary.drive import DistributedClock, Drives, Inputs, Outputs
     from catenary.errors import (
         CatenaryError,
         ClockError,
@@ -34,26 +34,15 @@ if TYPE_CHECKING:
     from catenary.loop import ClockOptions, Cycle, Loop, Scheduling, StopPolicy, law
     from catenary.share import Share, attach
     from catenary.target import MainDevice
-    from catenary.virtual import (
-        AnalogInputs,
-        Coupler,
-        DigitalInputs,
-        DigitalOutputs,
-        Segment,
-        Servo,
-    )
+    from catenary.virtual import Segment
 
 __version__ = "0.1.0"
 
 __all__ = [
-    "AnalogInputs",
     "CatenaryError",
     "ClockError",
     "ClockOptions",
-    "Coupler",
     "Cycle",
-    "DigitalInputs",
-    "DigitalOutputs",
     "DistributedClock",
     "DriveError",
     "Drives",
@@ -64,11 +53,8 @@ __all__ = [
     "LoopError",
     "MainDevice",
     "Outputs",
-    "Phase",
-    "Recovery",
     "Scheduling",
     "Segment",
-    "Servo",
     "Share",
     "StateError",
     "StopPolicy",
@@ -76,16 +62,19 @@ __all__ = [
     "WorkingCounterError",
     "attach",
     "control",
+    "drive",
     "errors",
     "events",
     "interfaces",
     "law",
     "realtime",
+    "record",
     "share",
     "types",
+    "virtual",
 ]
 
-_VIRTUAL = ("AnalogInputs", "Coupler", "DigitalInputs", "DigitalOutputs", "Segment", "Servo")
+_MODULES = ("control", "drive", "errors", "realtime", "record", "share", "types", "virtual")
 _ERRORS = (  # that a loop raises; the others are in catenary.errors
     "CatenaryError",
     "ClockError",
@@ -98,31 +87,23 @@ _ERRORS = (  # that a loop raises; the others are in catenary.errors
 )
 _HOMES = {
     **dict.fromkeys(_ERRORS, "catenary.errors"),
-    "ClockOptions": "catenary.loop",
-    "Cycle": "catenary.loop",
-    "DistributedClock": "catenary.drive",
-    "Drives": "catenary.drive",
-    "Inputs": "catenary.drive",
-    "Loop": "catenary.loop",
-    "law": "catenary.loop",
+    **dict.fromkeys(("DistributedClock", "Drives", "Inputs", "Outputs"), "catenary.drive"),
+    **dict.fromkeys(
+        ("ClockOptions", "Cycle", "Loop", "Scheduling", "StopPolicy", "law"), "catenary.loop"
+    ),
     "MainDevice": "catenary.target",
-    "Outputs": "catenary.drive",
-    "Phase": "catenary.drive",
-    "Recovery": "catenary.drive",
+    "Segment": "catenary.virtual",
     "Share": "catenary.share",
-    "Scheduling": "catenary.loop",
-    "StopPolicy": "catenary.loop",
     "SubDevice": "catenary.bus",
     "attach": "catenary.share",
     "interfaces": "catenary.link.interfaces",
-    **dict.fromkeys(_VIRTUAL, "catenary.virtual"),
 }
 
 
 def __getattr__(name: str) -> object:
     from importlib import import_module
 
-    if name in ("control", "errors", "realtime", "share", "types"):
+    if name in _MODULES:
         return import_module(f"catenary.{name}")
     if name == "events":
         return import_module("catenary.bus.event")

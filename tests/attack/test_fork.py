@@ -37,7 +37,7 @@ def use():
     expect(RuntimeError, lambda: main.scan())
     expect(RuntimeError, lambda: arm.subs[0].sdo.read(0x1018, 1))
     # The views are there. In real time, the pages of the cycle are wiped instead of copied.
-    assert loop._running.views.statusword.any() == sys.argv[1].startswith("virtual")
+    assert loop.networks[0].session.views.statusword.any() == sys.argv[1].startswith("virtual")
     arm.target.position[:] = 1.0
     loop.log, loop.timing, loop.plan
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL

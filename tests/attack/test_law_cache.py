@@ -23,7 +23,7 @@ def follow(actual, target, memory, time):
     return True
 
 if __name__ == "__main__":
-    with cat.MainDevice(cat.Segment([cat.Servo()])) as main:
+    with cat.MainDevice(cat.Segment([cat.virtual.Servo()])) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=1.0)
         with cat.Loop(arm) as loop:
             print(loop.run(follow, memory=[0.0])[0])

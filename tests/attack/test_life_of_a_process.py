@@ -18,7 +18,7 @@ atexit.register(lambda: print("at the end", state()))  # after the handlers regi
 import os, signal
 import catenary as cat
 
-segment = cat.Segment([cat.Servo()])
+segment = cat.Segment([cat.virtual.Servo()])
 main = cat.MainDevice(segment)
 main.open()
 arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=1.0)

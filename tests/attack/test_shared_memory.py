@@ -13,7 +13,7 @@ from tests.attack.users import ALICE, BOB, MALLORY, Machine, operators
 LOOP = """
 import sys
 import catenary as cat
-with cat.MainDevice(cat.Segment([cat.Servo()])) as main:
+with cat.MainDevice(cat.Segment([cat.virtual.Servo()])) as main:
     arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
     with cat.Share("arm", mode=int(sys.argv[1], 8)) as share, cat.Loop(arm, sink=share) as loop:
         next(loop)

@@ -17,7 +17,14 @@ from catenary.virtual import Junction, faults
 
 @pytest.fixture
 def segment() -> cat.Segment:
-    return cat.Segment([cat.Coupler(), cat.Servo(), cat.Servo(), cat.DigitalOutputs()])
+    return cat.Segment(
+        [
+            cat.virtual.Coupler(),
+            cat.virtual.Servo(),
+            cat.virtual.Servo(),
+            cat.virtual.DigitalOutputs(),
+        ]
+    )
 
 
 @pytest.fixture
@@ -81,7 +88,7 @@ def test_corrupt_frames_name_their_cable(
 
 
 def test_a_branch_with_a_bad_cable() -> None:
-    devices = [Junction(), cat.Servo(), cat.Servo(), cat.DigitalOutputs()]
+    devices = [Junction(), cat.virtual.Servo(), cat.virtual.Servo(), cat.virtual.DigitalOutputs()]
     segment = cat.Segment(devices, behind={2: (0, 2)})
     with cat.MainDevice(segment) as main:
         [found] = after(segment, main, faults.corrupt(20, every=4, between=(0, 2))).findings

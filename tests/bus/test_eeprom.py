@@ -14,7 +14,7 @@ from catenary.procedure.sii_write import Change, changes
 
 @pytest.fixture
 def segment() -> cat.Segment:
-    return cat.Segment([cat.Coupler(), cat.Servo(), cat.DigitalOutputs()])
+    return cat.Segment([cat.virtual.Coupler(), cat.virtual.Servo(), cat.virtual.DigitalOutputs()])
 
 
 @pytest.fixture

@@ -29,7 +29,7 @@ MAILBOX_WRITTEN = 2  # event of the controller
 
 
 def segment() -> cat.Segment:
-    return cat.Segment([cat.Coupler(), cat.Servo(), cat.DigitalOutputs()])
+    return cat.Segment([cat.virtual.Coupler(), cat.virtual.Servo(), cat.virtual.DigitalOutputs()])
 
 
 # ---- EEPROM
@@ -56,7 +56,7 @@ def test_one_that_stays_busy_is_named() -> None:
 # ---- mailbox
 
 
-def answering_late(device: cat.Servo, segment: cat.Segment, delay_ns: int) -> None:
+def answering_late(device: cat.virtual.Servo, segment: cat.Segment, delay_ns: int) -> None:
     handle = device.handle
 
     def later(events: int) -> None:
@@ -176,7 +176,7 @@ def test_every_answer_comes_twice() -> None:
 
 @pytest.mark.parametrize("run", ["threaded", "inline"])
 def test_sdo_from_another_thread_while_the_loop_runs_and_never_from_its_own(run: str) -> None:
-    devices = [cat.Coupler(), cat.Servo()]
+    devices = [cat.virtual.Coupler(), cat.virtual.Servo()]
     found: list[int] = []
     with cat.MainDevice(cat.Segment(devices, clock="monotonic")) as main:
         servo = main.scan()[1]

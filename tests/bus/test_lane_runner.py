@@ -267,7 +267,7 @@ def test_a_loop_that_begins_waits_for_who_talks_and_others_go_beside_it() -> Non
 def test_without_the_lane_nobody_sends_while_a_loop_has_the_link() -> None:
     with MainDevice(demo_segment()) as main:
         main.scan()
-        blocking = main._runner
+        blocking = main.runner
         with (
             main.attached(LaneRunner(Lane(main.link))),
             pytest.raises(RuntimeError, match="a loop has the link"),

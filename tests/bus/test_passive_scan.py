@@ -17,7 +17,9 @@ OUTPUTS, SERVO = 2, 1
 
 @pytest.fixture
 def segment() -> cat.Segment:
-    return cat.Segment([cat.Coupler(), cat.Servo(alias=10), cat.DigitalOutputs()])
+    return cat.Segment(
+        [cat.virtual.Coupler(), cat.virtual.Servo(alias=10), cat.virtual.DigitalOutputs()]
+    )
 
 
 @pytest.fixture
@@ -85,7 +87,7 @@ def test_boot_needs_a_bootstrap_mailbox(main: cat.MainDevice) -> None:
 
 @pytest.mark.parametrize("cut", [None, ("main", 0), (0, 1), (1, 2), (2, "main")])
 def test_a_ring_is_looked_at_from_both_ends(cut: tuple[int | str, int | str] | None) -> None:
-    devices = [cat.Coupler(), cat.Servo(name="a"), cat.Servo(name="b")]
+    devices = [cat.virtual.Coupler(), cat.virtual.Servo(name="a"), cat.virtual.Servo(name="b")]
     segment = cat.Segment(devices, ring=True)
     if cut is not None:
         segment.inject(faults.cut(between=cut))

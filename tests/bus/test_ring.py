@@ -12,7 +12,7 @@ from catenary.link import Interface
 from catenary.virtual import Coupler, Segment, Servo
 
 
-@pytest.mark.parametrize("ask", [cat.MainDevice.scan, cat.MainDevice.look])
+@pytest.mark.parametrize("ask", [cat.MainDevice.scan, cat.MainDevice.passive_scan])
 def test_two_ports_that_are_swapped_are_told(ask: Callable[[cat.MainDevice], object]) -> None:
     """Frames then pass all devices unprocessed from the first port, and positions mean nobody."""
     segment = Segment([Coupler(), Servo()], ring=True)

@@ -13,7 +13,14 @@ REFUSED = 0x0016  # invalid mailbox configuration, PRE-OP
 
 @pytest.fixture
 def segment() -> cat.Segment:
-    segment = cat.Segment([cat.Coupler(), cat.Servo(), cat.Servo(), cat.DigitalOutputs()])
+    segment = cat.Segment(
+        [
+            cat.virtual.Coupler(),
+            cat.virtual.Servo(),
+            cat.virtual.Servo(),
+            cat.virtual.DigitalOutputs(),
+        ]
+    )
     segment[1].refuse_state(State.PRE_OP, REFUSED)
     return segment
 
@@ -70,7 +77,7 @@ SLOW_READ, WRITE = 400_000_000, 3_000_000  # [ns] of the EEPROM
 @pytest.fixture
 def slow_segment() -> cat.Segment:
     """The EEPROM of device 1 would take minutes."""
-    segment = cat.Segment([cat.Coupler(), cat.Servo(), cat.Servo(serial=2)])
+    segment = cat.Segment([cat.virtual.Coupler(), cat.virtual.Servo(), cat.virtual.Servo(serial=2)])
     segment.core.time_sii(1, SLOW_READ, WRITE, False)
     return segment
 
@@ -95,8 +102,8 @@ def test_a_slow_eeprom_does_not_hold_a_look(slow_segment: cat.Segment) -> None:
 
 def test_an_object_that_drips_does_not_hold_a_scan() -> None:
     """0x1000 is announced with 4000 bytes; one of them comes in each segment, after 50 ms."""
-    device = cat.Servo(mailbox_delay=0.05)
-    segment = cat.Segment([cat.Coupler(), device, cat.Servo(serial=2)])
+    device = cat.virtual.Servo(mailbox_delay=0.05)
+    segment = cat.Segment([cat.virtual.Coupler(), device, cat.virtual.Servo(serial=2)])
     announced = struct.pack("<HBHBI", 0x3000, 0x41, 0x1000, 0, 4000)
 
     def drip(payload: bytes) -> list[bytes]:

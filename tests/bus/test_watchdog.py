@@ -32,7 +32,7 @@ def test_the_trigger_follows_the_time(
     trigger: bool, checks: bool, watchdog: float | None, expected: tuple[int, int]
 ) -> None:
     quirks = ServoQuirks(watchdog_trigger=trigger, checks_watchdog=checks)
-    segment = cat.Segment([cat.Servo(quirks=quirks)])
+    segment = cat.Segment([cat.virtual.Servo(quirks=quirks)])
     with cat.MainDevice(segment) as main:
         main.scan()
         main.configure(main.plan(watchdog=watchdog))
@@ -41,7 +41,7 @@ def test_the_trigger_follows_the_time(
 
 
 def test_a_drive_in_cst_has_10_ms() -> None:
-    segment = cat.Segment([cat.Servo(), cat.Servo()])
+    segment = cat.Segment([cat.virtual.Servo(), cat.virtual.Servo()])
     with cat.MainDevice(segment) as main:
         main.scan()
         main.configure(main.plan(Asking({1: PdoWish(outputs=(TORQUE,))})))
@@ -50,7 +50,7 @@ def test_a_drive_in_cst_has_10_ms() -> None:
 
 def test_terminals_show_their_outputs_without_a_watchdog() -> None:
     lamps = DigitalOutputs()
-    segment = cat.Segment([cat.Coupler(), lamps])
+    segment = cat.Segment([cat.virtual.Coupler(), lamps])
     with cat.MainDevice(segment) as main:
         outputs = cat.Outputs(main.scan()[1])
         with cat.Loop(outputs, watchdog=0) as loop:

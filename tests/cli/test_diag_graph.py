@@ -13,7 +13,9 @@ from catenary.cli.main import main
 
 @pytest.fixture
 def segment(monkeypatch: pytest.MonkeyPatch) -> cat.Segment:
-    segment = cat.Segment([cat.Coupler(), cat.Servo(name="elbow"), cat.Servo(name="wrist")])
+    segment = cat.Segment(
+        [cat.virtual.Coupler(), cat.virtual.Servo(name="elbow"), cat.virtual.Servo(name="wrist")]
+    )
     monkeypatch.setattr("catenary.target.main_device.parse", lambda _: segment)
     return segment
 

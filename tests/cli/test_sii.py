@@ -27,7 +27,9 @@ from catenary.wire.sii_categories import (
 
 @pytest.fixture
 def segment(monkeypatch: pytest.MonkeyPatch) -> cat.Segment:
-    segment = cat.Segment([cat.Coupler(), cat.Servo(), cat.Servo(name="wrist", serial=7)])
+    segment = cat.Segment(
+        [cat.virtual.Coupler(), cat.virtual.Servo(), cat.virtual.Servo(name="wrist", serial=7)]
+    )
     monkeypatch.setattr("catenary.target.main_device.parse", lambda _: segment)
     return segment
 

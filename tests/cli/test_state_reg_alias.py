@@ -107,7 +107,7 @@ def test_an_alias_that_another_device_has_is_refused(
 def test_an_alias_that_another_device_will_have_is_refused_too(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    segment = cat.Segment([cat.Servo(), cat.Servo()])
+    segment = cat.Segment([cat.virtual.Servo(), cat.virtual.Servo()])
     monkeypatch.setattr("catenary.target.main_device.parse", lambda _: segment)
     assert call("alias eth9 0 7", capsys)[0] == 0
     status, _, err = call("alias eth9 1 7", capsys)

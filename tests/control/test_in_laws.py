@@ -24,7 +24,7 @@ JOINTS = ["turn", "shoulder", "elbow"]
 def opened(
     mode: str = "cst", axes: int = 3, **more: float
 ) -> Iterator[tuple[cat.Drives, cat.Loop]]:
-    servo = cat.Servo(axes=axes, inertia=0.01, rated_torque=20.0)
+    servo = cat.virtual.Servo(axes=axes, inertia=0.01, rated_torque=20.0)
     with cat.MainDevice(cat.Segment([servo])) as main:
         arm = cat.Drives(main.scan().drives, mode=mode, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Loop(arm, period=1e-3, **grouped(more)) as loop, warnings.catch_warnings():

@@ -11,7 +11,7 @@ LIMITS = control.MotionLimits(velocity=[2.0, 1.0], acceleration=[8.0, 5.0], jerk
 
 
 def test_what_is_commanded_keeps_every_limit_and_arrives() -> None:
-    with cat.MainDevice(cat.Segment([cat.Servo(), cat.Servo()])) as main:
+    with cat.MainDevice(cat.Segment([cat.virtual.Servo(), cat.virtual.Servo()])) as main:
         arm = cat.Drives(
             main.scan().drives, mode="csp", counts_per_turn=2**20, velocity_limit=100.0
         )

@@ -20,7 +20,7 @@ COUNTS = 2**20
 def opened(
     *servos: Servo, run: str = "threaded", at: float = 0.0, **options: Any
 ) -> Iterator[tuple[cat.Drives, cat.Loop]]:
-    segment = cat.Segment([cat.Coupler(), *servos])
+    segment = cat.Segment([cat.virtual.Coupler(), *servos])
     with cat.MainDevice(segment) as main:
         main.scan()
         for servo in servos:

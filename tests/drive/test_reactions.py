@@ -71,7 +71,7 @@ def test_an_object_of_another_size_is_unreadable(monkeypatch: pytest.MonkeyPatch
 
 def test_real_frames_bring_the_same() -> None:
     """Two axes of a virtual servo: all objects of all devices in one conversation each."""
-    with cat.MainDevice(cat.Segment([cat.Servo(axes=2), cat.Servo()])) as main:
+    with cat.MainDevice(cat.Segment([cat.virtual.Servo(axes=2), cat.virtual.Servo()])) as main:
         first, second = main.scan()
         first.sdo.write(0x685A, 0, 6, type=INT)
         found = read_settings([(first, 0), (first, 1), (second, 0)])

@@ -20,8 +20,8 @@ class Rig:
 
     def __init__(self, segment: cat.Segment, arm: cat.Drives, loop: cat.Loop, **options: float):
         self.segment, self.arm, self.loop = segment, arm, loop
-        self.recovery = cat.Recovery(arm, **options)
-        self.phases: list[cat.Phase] = []
+        self.recovery = cat.drive.Recovery(arm, **options)
+        self.phases: list[cat.drive.Phase] = []
 
     def run(self, cycles: int, reason: Callable[[float], str | None], **options: bool) -> None:
         for cycle in self.loop:
@@ -53,7 +53,7 @@ def rig(*faults: object, **options: float) -> Iterator[Rig]:
             yield Rig(segment, arm, loop, **options)
 
 
-STARTING, RUNNING, STOPPED = cat.Phase
+STARTING, RUNNING, STOPPED = cat.drive.Phase
 
 
 def test_a_reason_is_a_quick_stop_and_its_end_an_enabling() -> None:

@@ -8,11 +8,10 @@ from pathlib import Path
 import pytest
 
 import catenary as cat
-from catenary import igh
 from catenary.igh import Master
 from catenary.plan.make import make_plan
 from tests.igh.double import Double
-from tests.igh.loops import clocked_loop
+from tests.igh.loops import clocked_loop, kernel_of
 
 PERIOD_NS = 1_000_000
 
@@ -57,9 +56,8 @@ def test_the_machine_follows_the_reference(doubles: dict[str, Path], ppm: int) -
     double = Double(doubles["1.6.1"])
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         main.scan()
-        assert isinstance(main, igh.MainDevice)
         with clocked_loop(main, execution="inline") as loop:
-            exchange = main.configuration.exchange
+            exchange = kernel_of(main).configuration.exchange
             begin = main.link.now()
             for _ in range(4000):
                 machine = main.link.now() - int(exchange.figures["offset_ns"]) - begin
@@ -75,14 +73,12 @@ class Reference:
     """A reference clock that is some time ahead of the machine's clock."""
 
     def __init__(self, main: cat.MainDevice, double: Double) -> None:
-        assert isinstance(main, igh.MainDevice)
         self.main, self.double = main, double
         self.ahead_ns = 0
 
     @property
     def figures(self) -> dict[str, float]:
-        assert isinstance(self.main, igh.MainDevice)
-        return dict(self.main.configuration.exchange.figures)
+        return dict(kernel_of(self.main).configuration.exchange.figures)
 
     def follow(self, loop: cat.Loop, cycles: int, late_every: int = 0, late_ns: int = 0) -> None:
         """Run cycles. Every so many frames one is late at the reference."""
@@ -127,8 +123,7 @@ def test_the_phase_is_sought_before_operation(
     main.read_mappings(arm)
     devices = [sub.description for sub in main.subs]
     main.configure(make_plan(devices, [arm], clock="reference"))
-    assert isinstance(main, igh.MainDevice)
-    exchange, start = main.configuration.exchange, main.link.now()
+    exchange, start = kernel_of(main).configuration.exchange, main.link.now()
     for cycle in range(100):  # SAFE-OP
         main.link.wait_until(start + cycle * PERIOD_NS, False)
         machine = main.link.now() - int(reference.figures["offset_ns"])

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import catenary as cat
-from catenary import igh
 from catenary.igh import Master
 from tests.igh.double import Double
+from tests.igh.loops import kernel_of
 
 TURN = 2 * math.pi
 
@@ -230,10 +230,9 @@ def test_the_real_clock(doubles: dict[str, Path]) -> None:
 
 
 def test_a_ring_of_the_masters(main: cat.MainDevice, double: Double) -> None:
-    assert isinstance(main, igh.MainDevice)
     with cat.Loop(arm_of(main)) as loop:
         next(loop)
-        exchange = main.configuration.exchange
+        exchange = kernel_of(main).configuration.exchange
         assert exchange.figures["redundancy"] is False
         double.redundancy(1)
         next(loop)
@@ -280,14 +279,13 @@ def test_send_errors_of_new_libraries_are_counted(doubles: dict[str, Path]) -> N
     double = Double(doubles["1.6.1"])
     with cat.MainDevice(Master(library=double.path, virtual_time=True)) as main:
         main.scan()
-        assert isinstance(main, igh.MainDevice)
         with cat.Loop(arm_of(main)) as loop:
             next(loop)
             double.fail(b"send", -5)
             next(loop)
             next(loop)
             double.fail(b"", 0)
-            assert main.configuration.exchange.figures["send_errors"] >= 1
+            assert kernel_of(main).configuration.exchange.figures["send_errors"] >= 1
 
 
 def test_others_read_along_and_set_points_are_streamed(main: cat.MainDevice) -> None:

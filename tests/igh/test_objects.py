@@ -9,9 +9,10 @@ import pytest
 
 import catenary as cat
 from catenary.errors import ConfigurationError, MailboxError, SdoAbort
-from catenary.igh import MainDevice, Master, SubDevice
+from catenary.igh import Master, SubDevice
 from catenary.types import UDINT, UINT
 from tests.igh.double import Double
+from tests.igh.loops import kernel_of
 from tests.loop_options import grouped
 
 
@@ -177,8 +178,7 @@ def test_a_device_that_does_not_answer_holds_nobody_else_up(doubles: dict[str, P
     double = Double(doubles["1.6.1"])
     with cat.MainDevice(Master(library=double.path)) as main:
         main.scan()
-        assert isinstance(main, MainDevice)
-        main.reservation.beside.timeout = 0.2
+        kernel_of(main).reservation.beside.timeout = 0.2
         with loop_of(main, late_limit=0, priority=None) as loop:
             double.block(0)
             stuck = main.subs[0].sdo.request_write(0x605A, 0, 6, type=UINT)

@@ -122,7 +122,7 @@ def two_arms(main: cat.MainDevice, **options: object) -> tuple[cat.Drives, cat.D
 
 
 def test_only_a_required_axis_raises() -> None:
-    with cat.MainDevice(cat.Segment([cat.Servo(), cat.Servo()])) as main:
+    with cat.MainDevice(cat.Segment([cat.virtual.Servo(), cat.virtual.Servo()])) as main:
         arm, tool = two_arms(main)
         with cat.Loop(arm, tool) as loop:
             for cycle in loop:
@@ -150,7 +150,7 @@ def test_only_a_required_axis_raises() -> None:
 
 
 def test_what_the_application_asks_for_is_no_event() -> None:
-    with cat.MainDevice(cat.Segment([cat.Servo(), cat.Servo()])) as main:
+    with cat.MainDevice(cat.Segment([cat.virtual.Servo(), cat.virtual.Servo()])) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=10.0)
         with cat.Loop(arm) as loop:
             for cycle in loop:
@@ -175,14 +175,14 @@ def test_what_the_application_asks_for_is_no_event() -> None:
     ],
 )
 def test_options_that_cannot_be(options: dict[str, object], match: str) -> None:
-    with cat.MainDevice(cat.Segment([cat.Servo()])) as main:
+    with cat.MainDevice(cat.Segment([cat.virtual.Servo()])) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=1, velocity_limit=10.0)
         with pytest.raises(ValueError, match=match):
             cat.Loop(arm, **grouped(options))  # type: ignore[arg-type]
 
 
 def test_the_times_reach_the_plan() -> None:
-    with cat.MainDevice(cat.Segment([cat.Servo()])) as main:
+    with cat.MainDevice(cat.Segment([cat.virtual.Servo()])) as main:
         subs = main.scan()
         csp = cat.Drives(subs.drives, counts_per_turn=1000, velocity_limit=10.0)
         cst = cat.Drives(subs.drives, mode="cst", counts_per_turn=1000, velocity_limit=10.0)

@@ -29,7 +29,7 @@ def follow(actual, target, memory, time):
     memory[0] = gains.gain(1.0) + OFFSET
     return True
 
-with cat.MainDevice(cat.Segment([cat.Servo()])) as main:
+with cat.MainDevice(cat.Segment([cat.virtual.Servo()])) as main:
     arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
     with cat.Loop(arm) as loop:
         print(loop.run(follow, memory=[0.0])[0])

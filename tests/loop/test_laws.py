@@ -18,7 +18,9 @@ COUNTS = 2**20
 
 @contextmanager
 def opened(mode: str = "csp", **more: Any) -> Iterator[tuple[cat.Drives, cat.Loop]]:
-    with cat.MainDevice(cat.Segment([cat.Coupler(), cat.Servo(), cat.Servo()])) as main:
+    with cat.MainDevice(
+        cat.Segment([cat.virtual.Coupler(), cat.virtual.Servo(), cat.virtual.Servo()])
+    ) as main:
         arm = cat.Drives(
             main.scan().drives, mode=mode, counts_per_turn=COUNTS, velocity_limit=100.0
         )
@@ -114,7 +116,9 @@ def test_stopped_it_leaves_the_axes_to_python() -> None:
 
 
 def test_columns_by_name_and_by_bank() -> None:
-    segment = cat.Segment([cat.DigitalOutputs(), cat.DigitalInputs(), cat.Servo()])
+    segment = cat.Segment(
+        [cat.virtual.DigitalOutputs(), cat.virtual.DigitalInputs(), cat.virtual.Servo()]
+    )
 
     @cat.law
     def follow(actual, target, memory, time):
@@ -299,7 +303,7 @@ def test_a_law_without_axes() -> None:
         memory[0] += 1.0
         return time > 0.02
 
-    segment = cat.Segment([cat.DigitalOutputs()])
+    segment = cat.Segment([cat.virtual.DigitalOutputs()])
     with cat.MainDevice(segment) as main:
         lamps = cat.Outputs(main.scan()[0])
         with cat.Loop(lamps) as loop:

@@ -10,7 +10,7 @@ import catenary as cat
 
 @pytest.fixture
 def opened():
-    with cat.MainDevice(cat.Segment([cat.Servo(), cat.Servo()])) as main:
+    with cat.MainDevice(cat.Segment([cat.virtual.Servo(), cat.virtual.Servo()])) as main:
         arm = cat.Drives(
             main.scan().drives, mode="csp", counts_per_turn=2**20, velocity_limit=100.0
         )

@@ -18,7 +18,7 @@ from tests.procedure.by_hand import play
 
 @pytest.fixture
 def segment() -> cat.Segment:
-    return cat.Segment([cat.Coupler(), *[cat.DigitalOutputs() for _ in range(39)]])
+    return cat.Segment([cat.virtual.Coupler(), *[cat.virtual.DigitalOutputs() for _ in range(39)]])
 
 
 @pytest.fixture

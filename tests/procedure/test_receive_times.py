@@ -10,7 +10,13 @@ from catenary.virtual import Junction
 
 
 def test_the_cables_of_a_tree_are_measured() -> None:
-    devices = [cat.Coupler(), Junction(), cat.Servo(), cat.Servo(), cat.DigitalOutputs()]
+    devices = [
+        cat.virtual.Coupler(),
+        Junction(),
+        cat.virtual.Servo(),
+        cat.virtual.Servo(),
+        cat.virtual.DigitalOutputs(),
+    ]
     with cat.MainDevice(cat.Segment(devices, behind={3: (1, 2)})) as main:
         descriptions = [sub.description for sub in main.passive_scan()]
         times = main.converse(read_receive_times(descriptions))
@@ -22,7 +28,7 @@ def test_the_cables_of_a_tree_are_measured() -> None:
 
 
 def test_a_segment_without_clocks() -> None:
-    with cat.MainDevice(cat.Segment([cat.DigitalOutputs()])) as main:
+    with cat.MainDevice(cat.Segment([cat.virtual.DigitalOutputs()])) as main:
         descriptions = [sub.description for sub in main.passive_scan()]
         sent = main.counts.sent
         assert main.converse(read_receive_times(descriptions)) == (None,)

@@ -13,7 +13,7 @@ from catenary.procedure.registers import read_register, write_register
 
 @pytest.fixture
 def segment() -> cat.Segment:
-    return cat.Segment([cat.Coupler(), cat.Servo()])
+    return cat.Segment([cat.virtual.Coupler(), cat.virtual.Servo()])
 
 
 @pytest.fixture

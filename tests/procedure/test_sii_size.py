@@ -36,7 +36,7 @@ def header(size_kbit: int) -> bytes:
 
 @pytest.fixture
 def main() -> Iterator[cat.MainDevice]:
-    with cat.MainDevice(cat.Segment([cat.Coupler(), cat.Servo()])) as main:
+    with cat.MainDevice(cat.Segment([cat.virtual.Coupler(), cat.virtual.Servo()])) as main:
         yield main
 
 

@@ -20,7 +20,9 @@ MS = 1_000_000
 
 @pytest.fixture
 def segment() -> cat.Segment:
-    return cat.Segment([cat.Coupler(), cat.Servo(alias=3), cat.DigitalOutputs()])
+    return cat.Segment(
+        [cat.virtual.Coupler(), cat.virtual.Servo(alias=3), cat.virtual.DigitalOutputs()]
+    )
 
 
 @pytest.fixture

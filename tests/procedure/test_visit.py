@@ -30,7 +30,7 @@ def test_addresses_are_kept_where_they_are_one_devices_own(
 
 @pytest.fixture
 def segment() -> cat.Segment:
-    return cat.Segment([cat.Coupler(), cat.Servo(), cat.DigitalOutputs()])
+    return cat.Segment([cat.virtual.Coupler(), cat.virtual.Servo(), cat.virtual.DigitalOutputs()])
 
 
 @pytest.fixture

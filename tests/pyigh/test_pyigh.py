@@ -27,7 +27,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(params=["kernel", "own"])
 def master(library: Path, request: pytest.FixtureRequest) -> MasterBase:
     if request.param == "own":
-        return MasterBase(cat.Segment([cat.Servo(), cat.Servo()]))
+        return MasterBase(cat.Segment([cat.virtual.Servo(), cat.virtual.Servo()]))
     Double(library)
     return MasterBase(Master(library=library, virtual_time=True))
 
@@ -103,7 +103,7 @@ def test_torque(library: Path) -> None:
 
 
 def test_inputs_and_outputs() -> None:
-    inputs, outputs = cat.DigitalInputs(), cat.DigitalOutputs()
+    inputs, outputs = cat.virtual.DigitalInputs(), cat.virtual.DigitalOutputs()
     buttons, lamps = SlaveIO(0), SlaveIO(1)
     with MasterBase(cat.Segment([inputs, outputs])) as master:
         activated(master, buttons, lamps)
@@ -117,7 +117,7 @@ def test_inputs_and_outputs() -> None:
 
 
 def test_an_object_that_is_mapped_twice_is_one_channel() -> None:
-    gauges = cat.AnalogInputs(channels=1, second_pdo="twice")
+    gauges = cat.virtual.AnalogInputs(channels=1, second_pdo="twice")
     terminal = SlaveIO(0)
     with MasterBase(cat.Segment([gauges])) as master:
         activated(master, terminal)

@@ -36,7 +36,7 @@ class SharedLoop:
 @contextmanager
 def shared_loop(name: str, *, axes: int = 3, history: float = 30.0) -> Iterator[SharedLoop]:
     """Remembers so much that a recorder that starts late, or is slow, loses nothing."""
-    segment = cat.Segment([cat.Coupler(), *(cat.Servo() for _ in range(axes))])
+    segment = cat.Segment([cat.virtual.Coupler(), *(cat.virtual.Servo() for _ in range(axes))])
     with cat.MainDevice(segment) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with (

@@ -49,7 +49,9 @@ def test_what_is_recorded_is_what_the_loop_saw(name: str, tmp_path: Path) -> Non
 
 
 def test_inputs_and_outputs_are_recorded_by_name(name: str, tmp_path: Path) -> None:
-    segment = cat.Segment([cat.Coupler(), cat.DigitalOutputs(), cat.AnalogInputs()])
+    segment = cat.Segment(
+        [cat.virtual.Coupler(), cat.virtual.DigitalOutputs(), cat.virtual.AnalogInputs()]
+    )
     with cat.MainDevice(segment) as main:
         subs = main.scan()
         lamps, gauges = cat.Outputs(subs[1]), cat.Inputs(subs[2])
@@ -70,7 +72,7 @@ def test_inputs_and_outputs_are_recorded_by_name(name: str, tmp_path: Path) -> N
 
 
 def test_events_are_recorded(name: str, tmp_path: Path) -> None:
-    segment = cat.Segment([cat.Coupler(), cat.Servo(), cat.Servo()])
+    segment = cat.Segment([cat.virtual.Coupler(), cat.virtual.Servo(), cat.virtual.Servo()])
     with cat.MainDevice(segment) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Share(name) as share:
@@ -252,7 +254,7 @@ def test_it_ends_after_so_many_seconds(name: str, tmp_path: Path) -> None:
 
 def test_a_loop_that_is_opened_again_is_another_recording(name: str, tmp_path: Path) -> None:
     """It may have other axes and other fields; its cycles begin with 1 again."""
-    segment = cat.Segment([cat.Coupler(), cat.Servo(), cat.Servo()])
+    segment = cat.Segment([cat.virtual.Coupler(), cat.virtual.Servo(), cat.virtual.Servo()])
     with cat.MainDevice(segment) as main, cat.Share(name) as share:
         drives = main.scan().drives
         for axes in (1, 2):

@@ -40,7 +40,9 @@ def live(path: Path, run: Run) -> tuple[str, list[float], int, object]:
             workers=run,
             best_effort=True,
         )
-        segment = cat.Segment([cat.Coupler(), *(cat.Servo() for _ in range(3))], clock=clock)
+        segment = cat.Segment(
+            [cat.virtual.Coupler(), *(cat.virtual.Servo() for _ in range(3))], clock=clock
+        )
         with tasks, Recorder(segment, path) as link, cat.MainDevice(link) as main:
             arm = cat.Drives(
                 main.scan().drives, mode="csp", counts_per_turn=2**20, velocity_limit=100.0
@@ -76,7 +78,7 @@ def test_two_runs_are_the_same_to_the_last_bit(tmp_path: Path, run: Run) -> None
 def looping(clock: VirtualClock, place: Participant, took: list[float]) -> None:
     """A loop in a thread of its own, whose body computes 9 ms in each of three cycles."""
     try:
-        with cat.MainDevice(cat.Segment([cat.Servo()], clock=place)) as main:
+        with cat.MainDevice(cat.Segment([cat.virtual.Servo()], clock=place)) as main:
             arm = cat.Drives(
                 main.scan().drives, mode="csp", counts_per_turn=2**20, velocity_limit=100.0
             )
@@ -109,6 +111,6 @@ def test_the_body_of_a_loop_is_preempted_like_a_task() -> None:
 
 def test_a_clock_that_is_none_is_refused() -> None:
     with pytest.raises(ValueError, match="VirtualClock"):
-        cat.Segment([cat.Servo()], clock=3)
+        cat.Segment([cat.virtual.Servo()], clock=3)
     with pytest.raises(ValueError, match="VirtualClock"):
-        cat.Segment([cat.Servo()], clock="real")
+        cat.Segment([cat.virtual.Servo()], clock="real")

@@ -26,7 +26,7 @@ import sys
 import numpy as np
 import catenary as cat
 
-segment = cat.Segment([cat.Servo() for _ in range({AXES})], clock="monotonic")
+segment = cat.Segment([cat.virtual.Servo() for _ in range({AXES})], clock="monotonic")
 with cat.MainDevice(segment) as main:
     arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
     with (
@@ -99,7 +99,7 @@ def test_in_virtual_time_a_task_takes_what_came(name: str, tmp_path: Path) -> No
     """A hundred times faster than life nobody in another process keeps up: the program's own task
     takes the cycles, as often as its logging would."""
     with VirtualClock() as clock:
-        segment = cat.Segment([cat.Servo() for _ in range(6)], clock=clock)
+        segment = cat.Segment([cat.virtual.Servo() for _ in range(6)], clock=clock)
         with cat.MainDevice(segment) as main, cat.Share(name) as share:
             arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
             with cat.Loop(arm, period=1e-3, sink=share) as loop:

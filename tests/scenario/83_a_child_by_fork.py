@@ -13,7 +13,7 @@ import os, sys
 import catenary as cat
 
 name = sys.argv[1]
-with cat.MainDevice(cat.Segment([cat.Servo()])) as main:
+with cat.MainDevice(cat.Segment([cat.virtual.Servo()])) as main:
     arm = cat.Drives(main.scan().drives, counts_per_turn=2**20)
     loop = cat.Loop(arm, sink=(share := cat.Share(name)))
     share.__enter__()

@@ -262,7 +262,10 @@ def test_a_share_that_was_not_entered_leaves_nothing_open(name: str) -> None:
     segment = Segment([Servo()])
     with cat.MainDevice(segment) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=TURN, velocity_limit=100.0)
-        with pytest.raises(RuntimeError, match="with block"), cat.Loop(arm, sink=cat.Share(name)):
+        with (
+            pytest.raises(RuntimeError, match="with block"),
+            cat.Loop(arm, sink=cat.Share(name)),
+        ):
             pass
         assert segment[0].state & 0x0F == 2
 

@@ -21,6 +21,7 @@ from catenary.bench.report import machine
 from catenary.errors import ConfigurationError
 from catenary.igh.configure import Domain
 from catenary.pyigh import MasterBase, SlaveServo
+from catenary.target import MainDevice
 
 CYCLES = 2000
 ROUNDS = 51
@@ -59,7 +60,7 @@ def cycle_times(library: str | os.PathLike[str] | None) -> dict[str, list[float]
     """[ns] a cycle of every way, in every round."""
     with (
         tempfile.TemporaryDirectory() as folder,
-        igh.MainDevice(igh.Master(library=library)) as main,
+        MainDevice(igh.Master(library=library)) as main,
         MasterBase(main) as master,
     ):
         servos = [SlaveServo(sub.position) for sub in main.subs.drives]
@@ -67,9 +68,11 @@ def cycle_times(library: str | os.PathLike[str] | None) -> dict[str, list[float]
             master.ecat_init_slave(servo)
         master.ecat_activate_domain()
         master.ecat_activate_master()
-        exchange = main.configuration.exchange
-        [domain] = main.configuration.domains
-        peer, kept = _peer(main, domain)
+        kernel = main.master
+        assert isinstance(kernel, igh.KernelMaster)
+        exchange = kernel.configuration.exchange
+        [domain] = kernel.configuration.domains
+        peer, kept = _peer(kernel, domain)
         native = ctypes.CDLL(str(compile_library("igh_peer", Path(folder)))).igh_peer_cycles
         native.argtypes = [ctypes.c_void_p, ctypes.c_uint64]
         ways: dict[str, Callable[[], object]] = {
@@ -110,9 +113,9 @@ def _published(master: MasterBase, servos: list[SlaveServo]) -> None:
         master.ecat_master_send()
 
 
-def _peer(main: igh.MainDevice, domain: Domain) -> tuple[Peer, list[object]]:
+def _peer(kernel: igh.KernelMaster, domain: Domain) -> tuple[Peer, list[object]]:
     """The C program's own numbers, and what keeps them alive."""
-    library = main.reservation.library
+    library = kernel.reservation.library
     sides = [
         (ctypes.c_uint32 * (3 * len(copies)))(*(number for copy in copies for number in copy))
         for copies in (domain.outputs, domain.inputs)
@@ -120,7 +123,7 @@ def _peer(main: igh.MainDevice, domain: Domain) -> tuple[Peer, list[object]]:
     images = [ctypes.create_string_buffer(domain.size + 16) for _ in sides]
     peer = Peer(
         *(library.addresses[name] for name in CALLS),
-        *(main.reservation.handle, domain.domain, domain.data),
+        *(kernel.reservation.handle, domain.domain, domain.data),
         *(ctypes.addressof(image) for image in images),
         *(len(domain.outputs), len(domain.inputs)),
         *(ctypes.addressof(side) for side in sides),

@@ -6,19 +6,20 @@ import contextlib
 import os
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from functools import partial
 from typing import TYPE_CHECKING, Self, TypeVar
 
 from catenary.bus import event
 from catenary.bus.carrier import Carrier
 from catenary.bus.events import Callback, Callbacks, Events
+from catenary.bus.frame_master import FrameMaster
+from catenary.bus.master import Master, MasterSource
 from catenary.bus.pending import Pending
 from catenary.bus.runner import BlockingRunner, FrameCounts, LinkLent, Runner
-from catenary.bus.sdo import Objects, read_each
-from catenary.bus.segment_scan import Found, check_identity, find, oddities, with_places
+from catenary.bus.sdo import Objects
+from catenary.bus.segment_scan import check_identity
 from catenary.bus.sub_device import SubDevice
 from catenary.bus.sub_devices import SubDevices
-from catenary.errors import CatenaryError, LinkError, SegmentError
+from catenary.errors import CatenaryError, SegmentError
 from catenary.link import (
     Link,
     LinkSource,
@@ -26,21 +27,10 @@ from catenary.link import (
     forget_in_child,
     lives_in_virtual_time,
     other_sockets,
-    ring_of,
 )
 from catenary.model.device import Identity
 from catenary.procedure.exchange import Procedure
-from catenary.procedure.live_outputs import Running, find_refreshed, find_running
-from catenary.procedure.mailbox import Heard
-from catenary.procedure.stations import (
-    StationRegisters,
-    assign,
-    bring_all_down,
-    count,
-    duplicate_aliases,
-    reset,
-)
-from catenary.wire.al import STATE_MASK, State
+from catenary.wire.al import State
 
 if TYPE_CHECKING:  # plan needs NumPy, a scan does not
     from catenary.bus.diagnosis import Diagnosis
@@ -85,6 +75,11 @@ class MainDevice:
         self._blocking: BlockingRunner | None = None
         self._attached: Runner | None = None
         self._leave_loop: Callable[[], object] | None = None  # ends the loop that runs
+        self.master: Master = (
+            source.make_master(self)
+            if isinstance(source, MasterSource)
+            else FrameMaster(self, force=force)
+        )
 
     @property
     def link(self) -> Link:
@@ -98,9 +93,14 @@ class MainDevice:
         return self._link is not None
 
     @property
+    def has_loop(self) -> bool:
+        """True while a loop runs on it."""
+        return self._attached is not None
+
+    @property
     def counts(self) -> FrameCounts:
         """Frames sent and lost outside the loop."""
-        return self._runner.counts
+        return self.runner.counts
 
     def open(self) -> None:
         """Open the link. Nothing is sent. A network interface is listened to for 0.1 s.
@@ -128,6 +128,7 @@ class MainDevice:
         the process that opened it."""
         if not self._is_inherited:
             return
+        self.master.forget()
         self._link = self._blocking = self._attached = self._leave_loop = None
         if self._ownership is not None:
             self._ownership.release()
@@ -166,7 +167,8 @@ class MainDevice:
                 self._leave_loop()  # a loop that was left open must not go on without its link
             if self.subs:
                 with contextlib.suppress(CatenaryError):  # the segment may be gone, so we go too
-                    self._bring_down(State.INIT)
+                    self._detach()
+                    self.master.close(LEAVE_TIMEOUT)
         finally:
             self._release()
 
@@ -212,29 +214,8 @@ class MainDevice:
         Raises LinkError if another master refreshes the outputs of a device, unless `force`.
         Devices that a killed program left in SAFE-OP or OP are reset; `notes` names them.
         """
-        runner = self._runner
-        runner.flush()
-        device_count, states = runner.run(count())
-        running_notes = self._judge_running(runner, device_count, states)
-        runner.run(reset(device_count))
-        registers, ring_notes = self._addressed(runner, device_count)
-        found = runner.run_all([find(each) for each in registers])
-        descriptions = with_places([each.description for each in found])
-        self.subs = SubDevices(
-            [
-                self._handle(each._replace(description=description))
-                for each, description in zip(found, descriptions, strict=True)
-            ]
-        )
-        self.notes = (
-            *running_notes,
-            *ring_notes,
-            *(
-                f"devices {positions} have the same alias {alias}"
-                for alias, positions in duplicate_aliases(registers).items()
-            ),
-            *oddities(descriptions, ring=ring_of(self.link) is not None),
-        )
+        subs, self.notes = self.master.scan()
+        self.subs = SubDevices(subs)
         self._note_further_errors()
         self.deliver_events()
         if strict:
@@ -243,53 +224,16 @@ class MainDevice:
             self._check_expected(expected)
         return self.subs
 
-    def _judge_running(
-        self, runner: BlockingRunner, device_count: int, states: int
-    ) -> tuple[str, ...]:
-        """Return a note on devices that another program has left in SAFE-OP or OP."""
-        if states & STATE_MASK <= State.BOOT:
-            return ()
-        running = runner.run(find_running(device_count))
-        if not self._force:
-            self._refuse_refreshed(runner, running)
-        if not running:
-            return ()
-        left = ", ".join(map(str, running))
-        return (f"{left}: left by another program, which was perhaps killed; now reset",)
-
-    def _refuse_refreshed(self, runner: BlockingRunner, running: Sequence[Running]) -> None:
-        refreshed = runner.run(find_refreshed(running))
-        if refreshed:
-            raise LinkError(
-                f"another EtherCAT master is live on {self.link.name}: it refreshes the outputs of "
-                f"{', '.join(f'device {position}' for position in refreshed)} (0x0440)",
-                hint="a scan would reset devices that may be in motion. End that master, perhaps "
-                "one at the other end of the line; pass force=True (--force) to scan anyway",
-            )
-
-    def _addressed(
-        self, runner: BlockingRunner, device_count: int
-    ) -> tuple[Sequence[StationRegisters], tuple[str, ...]]:
-        """Every device's registers, once it has its station address; what is odd about a ring."""
-        ring = ring_of(self.link)
-        if ring is None:
-            return runner.run(assign(range(device_count))), ()
-        from catenary.bus.ring import assign_from_both_ends, find_cuts
-
-        registers = assign_from_both_ends(runner, ring, device_count)
-        cuts = find_cuts(ring.state, device_count)
-        return registers, (str(cuts),) if cuts is not None and cuts.cables else ()
-
     def passive_scan(self, *, names: bool = True) -> SubDevices:
-        """The devices as they are: unlike `scan` it changes no state and no mapping, and leaves
-        `subs` alone, so that closing brings nobody down. For diagnosis.
+        """Read the devices without changing a state or mapping, for diagnosis.
 
-        `names`: also what their EEPROMs say, without which a device has neither name nor identity.
+        `subs` stays as it is, and `close` leaves these devices in their states.
+
+        Args:
+            names: also read the EEPROMs. Without them a device has neither name nor identity.
         """
-        from catenary.bus.passive_scan import passive_scan
-
-        descriptions = passive_scan(self._runner, ring_of(self.link), names)
-        return SubDevices([SubDevice(self, each, None) for each in descriptions])
+        found = self.master.passive_scan(names=names)
+        return SubDevices([SubDevice(self, each, None) for each in found])
 
     def request_states(
         self, subs: Sequence[SubDevice], positions: Sequence[int], state: State
@@ -299,9 +243,7 @@ class MainDevice:
         Returns:
             By position, the state that was reached, or the error.
         """
-        from catenary.bus.states import request_states
-
-        return request_states(self._runner, [sub.description for sub in subs], positions, state)
+        return self.master.request_states([sub.description for sub in subs], positions, state)
 
     def diagnose(
         self,
@@ -310,18 +252,16 @@ class MainDevice:
         subs: Sequence[SubDevice] | None = None,
         lost_frames: int = 0,
     ) -> Diagnosis:
-        """Reads the error counters and states of all devices and judges where a fault is: cable,
-        device, power. Also while a loop runs, from any thread but the loop's: one frame or a few.
+        """Read the error counters and states of all devices and judge where a fault is: cable,
+        device or power. Takes one frame or a few; also while a loop runs, from any other thread.
 
-        `since`: an earlier diagnosis, after which is counted; else since the devices' power-up.
-        `subs`: those of a `passive_scan`; else those of the last `scan`. `lost_frames`: that the
-        caller did not get back whole in the same time.
+        Args:
+            since: count from this earlier diagnosis; None: from the power-up of the devices.
+            subs: those of a `passive_scan`; None: those of the last `scan`.
+            lost_frames: number that the caller did not get back whole in the same time.
         """
-        from catenary.bus.diagnosis import diagnose
-
         chosen = self.subs if subs is None else subs
-        ring = ring_of(self.link) is not None
-        return self.converse(diagnose(chosen, since=since, lost_frames=lost_frames, ring=ring))
+        return self.master.diagnose(chosen, since=since, lost_frames=lost_frames)
 
     def plan(
         self,
@@ -351,30 +291,29 @@ class MainDevice:
         )
 
     def read_mappings(self, *wishes: Wish, period: float = 1e-3) -> None:
-        """Brings the descriptions up to date: what is mapped, and what the dictionaries say of
-        objects wished for that are not. Raises the error of a device that is not in PRE-OP."""
+        """Update the descriptions: what is mapped, and what the dictionaries say of wanted objects
+        that are not. Raises the error of a device that is not in PRE-OP."""
         self._raise_errors()
-        from catenary.bus.bring_up import describe_mappings
         from catenary.plan.make import period_in_ns
 
-        describe_mappings(self._runner, self.subs, wishes, period_in_ns(period))
+        self.master.read_mappings(wishes, period_in_ns(period))
 
     def configure(self, plan: Plan) -> None:
-        """Tells every device its part of the plan and brings all to SAFE-OP."""
-        from catenary.bus.bring_up import bring_to_safe_op
-
+        """Configure every device as planned and bring all to SAFE-OP."""
         self.clock_epoch_ns = self._epoch_ns()
-        ring = ring_of(self.link)
-        measured = bring_to_safe_op(self._runner, self.subs, plan, self.clock_epoch_ns, ring)
-        self.clock_delays_ns = measured.delays_ns if measured is not None else ()
+        self.master.configure(plan)
 
     def leave(self, *, timeout: float = LEAVE_TIMEOUT) -> None:
-        """Brings all devices to SAFE-OP, then PRE-OP. StateError names one that stays up."""
-        self._bring_down(State.SAFE_OP, timeout)
-        self._bring_down(State.PRE_OP, timeout)
+        """End operation: bring all devices to PRE-OP. StateError names one that stays up.
+
+        Args:
+            timeout: for each state on the way down [s]. The kernel master uses its own.
+        """
+        self._detach()
+        self.master.leave(timeout)
 
     def read_objects(self, wanted: Mapping[int, Sequence[tuple[int, int]]]) -> dict[int, Objects]:
-        """Read objects of several devices before a loop, all devices at the same time.
+        """Read objects of several devices before a loop.
 
         Args:
             wanted: (index, subindex) by position.
@@ -382,9 +321,7 @@ class MainDevice:
         Returns:
             By position, the bytes of each object that the device did not refuse.
         """
-        positions = list(wanted)
-        found = self._runner.run_all([read_each(self.subs[k], wanted[k]) for k in positions])
-        return dict(zip(positions, found, strict=True))
+        return self.master.read_objects(wanted)
 
     def converse(self, procedure: Procedure[T]) -> T:
         """Runs a procedure, alone or beside the running loop."""
@@ -419,7 +356,7 @@ class MainDevice:
         """While a loop runs: conversations go through its runner, scans are refused. Waits for
         those that other threads have under way: the link is the loop's alone."""
         self.require_no_loop()
-        blocking = self._runner
+        blocking = self.runner
         self._attached, self._leave_loop = runner, leave
         blocking.lend()
         try:
@@ -437,30 +374,15 @@ class MainDevice:
         """That of the running loop, or our own."""
         if self._is_inherited:
             raise self._not_open()
-        return self._attached or self._runner
+        return self._attached or self.runner
 
     @property
-    def _runner(self) -> BlockingRunner:
+    def runner(self) -> BlockingRunner:
+        """What runs conversations while no loop does. RuntimeError while a loop runs."""
         if self._blocking is None or self._is_inherited:
             raise self._not_open()
         self.require_no_loop()
         return self._blocking
-
-    def _handle(self, found: Found) -> SubDevice:
-        """The handle there was at this place, if it is the same device; else a new one."""
-        position = found.description.position
-        known = self.subs[position] if position < len(self.subs) else None
-        if known is None or known.identity != found.description.identity:
-            known = SubDevice(self, found.description, found.channel)
-        known.description, known.channel = found.description, found.channel
-        if known.channel is not None:
-            known.channel.listen(partial(self._hear, known))
-        known.error = found.error
-        known.state = State.PRE_OP if found.error is None else None
-        return known
-
-    def _hear(self, sub: SubDevice, heard: Heard) -> None:
-        self.events.put(event.emergency(heard.time_ns * 1e-9, sub, heard.emergency))
 
     def _raise_errors(self) -> None:
         """The first error that the scan has met."""
@@ -489,13 +411,6 @@ class MainDevice:
         for sub, wanted in zip(self.subs, expected, strict=True):
             if wanted is not None:
                 check_identity(sub.description, Identity(*(*wanted, 0, 0)[:4]))
-
-    def _bring_down(self, state: State, timeout: float = LEAVE_TIMEOUT) -> None:
-        self._detach()
-        stations = [sub.station for sub in self.subs]
-        self._runner.run(bring_all_down(stations, state, timeout))
-        for sub in self.subs:
-            sub.state = state
 
     def __enter__(self) -> Self:
         self.open()

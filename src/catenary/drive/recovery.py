@@ -42,10 +42,10 @@ class Stop:
 class Recovery:
     """Owns the way of some drives from a stop back into motion: one `step` in every cycle.
 
-        recovery = cat.Recovery(arm)
+        recovery = cat.drive.Recovery(arm)
         with cat.Loop(arm, stop=cat.StopPolicy(raise_faults=False)) as loop:
             for cycle in loop:
-                if recovery.step(cycle, why_stop(arm)) == cat.Phase.RUNNING:
+                if recovery.step(cycle, why_stop(arm)) == cat.drive.Phase.RUNNING:
                     arm.target.position[:] = ...
 
     A reason is a quick stop of all, in this cycle's frame. Faults are reset as long as the reason

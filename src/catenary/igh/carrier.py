@@ -26,7 +26,7 @@ from catenary.wire.al import State, status_code
 from catenary.wire.register import AL_STATUS_CODE, SYSTEM_TIME_DIFFERENCE
 
 if TYPE_CHECKING:
-    from catenary.igh.main_device import MainDevice
+    from catenary.igh.kernel_master import KernelMaster
 
 OP_TIMEOUT = 20.0  # [s]: the master configures one device after the other
 LOOK = 0.005  # [s] between two looks
@@ -40,10 +40,10 @@ LINKS = 2  # the main one and the backup
 class KernelCarrier:
     """Owns an activated configuration. Fulfils `bus.Carrier`."""
 
-    def __init__(self, main: MainDevice, configuration: Configuration) -> None:
+    def __init__(self, kernel: KernelMaster, configuration: Configuration) -> None:
         self.configuration = configuration
-        self._main = main
-        self._library = main.reservation.library
+        self._kernel = kernel
+        self._library = kernel.reservation.library
         self._links: list[bool | None] = [None] * LINKS
         self._link_count = LINKS
         clock = configuration.clock
@@ -91,12 +91,12 @@ class KernelCarrier:
         """Whether the master has given it up."""
         if not self.state(position).online:
             return False
-        return bool(self._main.reservation.slave(self._main.place_of(position)).error_flag)
+        return bool(self._kernel.reservation.slave(self._kernel.place_of(position)).error_flag)
 
     def survey(self) -> Procedure[list[Answer]]:
         """Who answers, and from which state; the reason of those that are not in OP."""
         answers = []
-        for sub in self._main.subs:
+        for sub in self._kernel.subs:
             state = self.state(sub.position)
             if not state.online:
                 answers.append(Answer(sub.station, None))
@@ -115,7 +115,7 @@ class KernelCarrier:
                 self._library.ecrt_slave_config_emerg_pop(device.config, ctypes.addressof(target))
                 == 0
             ):
-                self._main.hear(device.position, target.raw)
+                self._kernel.hear(device.position, target.raw)
         self._look_at_links()
         yield from self._read_difference()
 
@@ -132,12 +132,12 @@ class KernelCarrier:
             )
 
     def _sub(self, position: int) -> SubDevice:
-        sub = self._main.subs[position]
+        sub = self._kernel.subs[position]
         assert isinstance(sub, SubDevice)  # as every scan of a kernel master makes them
         return sub
 
     def _look_at_links(self) -> None:
-        handle = self._main.reservation.handle
+        handle = self._kernel.reservation.handle
         for number in range(self._link_count):
             state = abi.MasterState()
             found = self._library.ecrt_master_link_state(handle, number, ctypes.byref(state))
@@ -147,12 +147,12 @@ class KernelCarrier:
             before, self._links[number] = self._links[number], bool(state.link_up)
             if before is None or before == bool(state.link_up):
                 continue
-            now, which = self._main.link.now() * 1e-9, ("main", "backup")[number]
-            end = 0 if number == 0 else len(self._main.subs) - 1
+            now, which = self._kernel.main.link.now() * 1e-9, ("main", "backup")[number]
+            end = 0 if number == 0 else len(self._kernel.subs) - 1
             kind = LinkRestored if state.link_up else LinkLost
             what = "carries again" if state.link_up else "does not carry any more"
             message = f"the cable of the {which} interface {what}"
-            self._main.events.put(kind(now, None, message, (None, end)))
+            self._kernel.main.events.put(kind(now, None, message, (None, end)))
 
     def _status_code(self, position: int) -> Procedure[int]:
         """Return the AL status code of a device in error; 0: unknown.
@@ -160,17 +160,16 @@ class KernelCarrier:
         The kernel's log has it. Without the permission to read that, ask the device: the master
         refuses requests until it has acknowledged the error, which may clear the code.
         """
-        main = self._main
         try:
-            place = main.place_of(position)
+            place = self._kernel.place_of(position)
         except SegmentError:
             return 0  # it was unplugged meanwhile, and is nowhere
-        code = self._kernel_log.status_code(main.reservation.index, place)
+        code = self._kernel_log.status_code(self._kernel.reservation.index, place)
         if code:
             return code
         sub = self._sub(position)
         deadline = self._deadline()
-        while self._main.link.now() < deadline:
+        while self._kernel.main.link.now() < deadline:
             try:
                 data = yield from sub.read_register(AL_STATUS_CODE.address, AL_STATUS_CODE.size)
                 return AL_STATUS_CODE.unpack(data)
@@ -182,7 +181,7 @@ class KernelCarrier:
         """Why the first of them is not there."""
         sub = self._sub(waiting[0])
         try:
-            info = self._main.reservation.slave(self._main.place_of(sub.position))
+            info = self._kernel.reservation.slave(self._kernel.place_of(sub.position))
         except CatenaryError as error:
             return StateError(
                 f"{sub.station} did not reach OP: it is not there any more ({error})",
@@ -250,7 +249,7 @@ class KernelCarrier:
         if not sub.description.coe:
             return None
         asked, deadline = sub.sdo.request(*SYNC_TYPE), self._deadline()
-        while not asked.done and self._main.link.now() < deadline:
+        while not asked.done and self._kernel.main.link.now() < deadline:
             yield after(CODE_LOOK)
         if not asked.done:
             return None
@@ -260,4 +259,4 @@ class KernelCarrier:
             return None  # it has no such object, or refuses to report it: see the hint
 
     def _deadline(self) -> int:
-        return self._main.link.now() + round(CODE_TIMEOUT * 1e9)
+        return self._kernel.main.link.now() + round(CODE_TIMEOUT * 1e9)

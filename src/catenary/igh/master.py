@@ -18,7 +18,8 @@ from catenary.model.device import Identity
 from catenary.wire.al import State
 
 if TYPE_CHECKING:
-    from catenary.igh.main_device import MainDevice
+    from catenary.bus import MainDevice
+    from catenary.igh.kernel_master import KernelMaster
 
 SCAN_TIMEOUT = 30.0  # [s]: some devices answer their first SDO after seconds
 EMPTY_TIMEOUT = 3.0  # [s]: a link that has just come up finds its devices within a second
@@ -53,11 +54,11 @@ class Master:
         """Reserves the master. LinkError says what is in the way, and how to mend it."""
         return Reservation(Library(self._library), self.index, KernelTime(self._virtual_time))
 
-    def main_device(self) -> MainDevice:
-        """The MainDevice for it."""
-        from catenary.igh.main_device import MainDevice
+    def make_master(self, main: MainDevice) -> KernelMaster:
+        """Return what brings the devices of a MainDevice up and down."""
+        from catenary.igh.kernel_master import KernelMaster
 
-        return MainDevice(self)
+        return KernelMaster(main)
 
 
 class Reservation:

@@ -22,7 +22,7 @@ from catenary.wire.coe import Emergency
 from catenary.wire.sdo_information import ObjectDescription
 
 if TYPE_CHECKING:
-    from catenary.igh.main_device import MainDevice
+    from catenary.igh.kernel_master import KernelMaster
 
 T = TypeVar("T")
 V = TypeVar("V")
@@ -35,10 +35,12 @@ EMERGENCIES_KEPT = 32
 class SubDevice(bus.SubDevice):
     """Owns what is known of one device of the kernel master."""
 
-    def __init__(self, main: MainDevice, description: DeviceDescription) -> None:
+    def __init__(
+        self, main: bus.MainDevice, kernel: KernelMaster, description: DeviceDescription
+    ) -> None:
         super().__init__(main, description, None)
         self.sdo: Sdo = Sdo(self)
-        self.kernel = main
+        self.kernel = kernel
         self._heard: deque[Emergency] = deque(maxlen=EMERGENCIES_KEPT)
         self._asking = False  # its register request is in use
 

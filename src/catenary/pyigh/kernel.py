@@ -6,7 +6,8 @@ import ctypes
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from catenary.igh import MainDevice, abi
+from catenary.bus import MainDevice
+from catenary.igh import KernelMaster, abi
 from catenary.igh.configure import Domain
 from catenary.model.device import Direction
 from catenary.plan.cycle import Number
@@ -66,16 +67,22 @@ class KernelSteps:
     """Owns an activated master that the program drives itself."""
 
     def __init__(
-        self, main: MainDevice, wish: Wish, slaves: Sequence[SlaveBase], period: float
+        self,
+        main: MainDevice,
+        kernel: KernelMaster,
+        wish: Wish,
+        slaves: Sequence[SlaveBase],
+        period: float,
     ) -> None:
         self._main = main
+        self._kernel = kernel
         plan = main.plan(wish, period=period)
         main.configure(plan)
         self._period_ns = plan.cycle.period_ns
         self._next = main.link.now()
-        self._library = main.reservation.library
-        self._master = main.reservation.handle
-        domains = main.configuration.domains
+        self._library = kernel.reservation.library
+        self._master = kernel.reservation.handle
+        domains = kernel.configuration.domains
         self._domains = [domain.domain for domain in domains]
         self._domain_state = abi.DomainState()
         self._slaves = slaves
@@ -114,7 +121,7 @@ class KernelSteps:
         return int(state.slaves_responding), int(state.al_states), bool(state.link_up)
 
     def state(self, position: int) -> tuple[bool, bool, int]:
-        config = self._main.configuration.devices[position].config
+        config = self._kernel.configuration.devices[position].config
         state = abi.ConfigState()
         self._library.ecrt_slave_config_state(config, ctypes.byref(state))
         return bool(state.online), bool(state.operational), int(state.al_state)

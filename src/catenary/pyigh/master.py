@@ -124,8 +124,9 @@ class MasterBase:
         self._before_operation()
         if not self._planned:
             raise RuntimeError("ecat_activate_domain() comes first")
-        if isinstance(self.main, igh.MainDevice):
-            self._steps = KernelSteps(self.main, self._wish, self.slaves, self.period)
+        master = self.main.master
+        if isinstance(master, igh.KernelMaster):
+            self._steps = KernelSteps(self.main, master, self._wish, self.slaves, self.period)
         else:
             self._steps = OwnSteps(self._wish, self.slaves, self.period)
 

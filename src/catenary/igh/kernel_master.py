@@ -1,4 +1,4 @@
-"""MainDevice on a kernel master: the same handles and loops, the master does the talking."""
+"""KernelMaster: brings devices up and down by the IgH kernel master."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, NoReturn
 
 from catenary import bus
 from catenary.bus import SubDevices, event
-from catenary.bus.main_device import LEAVE_TIMEOUT
 from catenary.errors import (
     CatenaryError,
     ConfigurationError,
@@ -22,15 +21,17 @@ from catenary.igh.address import place
 from catenary.igh.carrier import KernelCarrier
 from catenary.igh.configure import Configuration, DeviceConfiguration, configure
 from catenary.igh.describe import describe, object_information, read_if_there
-from catenary.igh.master import Master, Reservation
+from catenary.igh.master import Reservation
 from catenary.igh.sub_device import SubDevice
 from catenary.igh.sync_types import read_types, write_types
 from catenary.igh.topology import check_delays
-from catenary.model.device import DeviceDescription, Direction, Identity, mapped_entries
+from catenary.model.device import DeviceDescription, Direction, mapped_entries
 from catenary.wire.al import State
 from catenary.wire.coe import Emergency
 
 if TYPE_CHECKING:  # plan needs NumPy, a scan does not
+    from catenary.bus import MainDevice
+    from catenary.bus.diagnosis import Diagnosis
     from catenary.bus.states import Outcome
     from catenary.plan.make import Plan
     from catenary.plan.start_up import DevicePlan
@@ -42,66 +43,65 @@ RESTORE_PATIENCE = 6.0
 _EMERGENCY = struct.Struct("<HB5s")
 
 
-class MainDevice(bus.MainDevice):
-    """Owns a reserved kernel master: `MainDevice("igh:0")`.
+class KernelMaster:
+    """Owns a reserved kernel master while a MainDevice is open on it. Implements `bus.Master`.
 
     The kernel brings devices up, talks to their mailboxes and leads those back that were away; a
-    `Loop` exchanges the process images. Leaving the block gives the master back.
+    `Loop` exchanges the process images. Closing the MainDevice gives the master back.
     """
 
-    def __init__(self, source: Master) -> None:
-        super().__init__(source)
+    def __init__(self, main: MainDevice) -> None:
+        self.main = main
         self._kernel: KernelCarrier | None = None
 
     def forget(self) -> None:
         """Let go of the parent's master in a forked child."""
-        if self._is_inherited and self._kernel is not None:
+        if self._kernel is not None:
             self._kernel.end()
-            self._kernel = self.carrier = None
-        super().forget()
+            self._kernel = self.main.carrier = None
+
+    @property
+    def subs(self) -> SubDevices:
+        """Handles of the devices, by position."""
+        return self.main.subs
 
     @property
     def reservation(self) -> Reservation:
         """The reserved master."""
-        link = self.link
+        link = self.main.link
         assert isinstance(link, Reservation)
         return link
 
     @property
     def cycling(self) -> bool:
-        """Whether a loop runs: requests are answered in operation only."""
-        return self._attached is not None
+        """True while a loop runs: requests are answered in operation only."""
+        return self.main.has_loop
 
-    def scan(
-        self,
-        *,
-        expected: Sequence[Identity | tuple[int, int] | None] | None = None,
-        strict: bool = True,
-    ) -> SubDevices:
-        """The devices that the master has found; it has brought them to PRE-OP. NoDeviceError where
-        there are none. Handles of devices that are still there stay the same objects."""
-        self.require_no_loop()
+    def scan(self) -> tuple[Sequence[SubDevice], tuple[str, ...]]:
+        """Return the devices that the master has found. It has brought them to PRE-OP.
+
+        Raises:
+            NoDeviceError: there are none.
+        """
+        self.main.require_no_loop()
         count = self.reservation.device_count()
         self.reservation.wait_preop()
         found = [describe(self.reservation, position) for position in range(count)]
         if not found:
             raise NoDeviceError(
                 f"{self.reservation.name}: the master finds no device",
-                hint="look at cable and power; ethercat slaves lists what it sees",
+                hint="check cable and power; ethercat slaves lists what it sees",
             )
-        self.subs = SubDevices([self._kernel_handle(description) for description in found])
-        for sub in self.subs:
+        subs = [self._handle(description) for description in found]
+        for sub in subs:
             sub.read_state()
-        if expected is not None:
-            self._check_expected(expected)
-        return self.subs
+        return subs, ()
 
-    def read_mappings(self, *wishes: Wish, period: float = 1e-3) -> None:
-        """Brings the descriptions up to date: what is mapped, and how long objects are that are
-        wished for and not mapped."""
-        from catenary.plan.make import gather_wishes, period_in_ns
+    def read_mappings(self, wishes: Sequence[Wish], period_ns: int) -> None:
+        """Read what is mapped, and how long other wanted objects are."""
+        from catenary.plan.make import gather_wishes
 
-        asked = gather_wishes(wishes, period_in_ns(period))
+        asked = gather_wishes(wishes, period_ns)
         for sub in self.subs:
             renewed = describe(self.reservation, sub.position)
             _check_same(sub.description, renewed)
@@ -115,7 +115,7 @@ class MainDevice(bus.MainDevice):
     def read_objects(
         self, wanted: Mapping[int, Sequence[tuple[int, int]]]
     ) -> dict[int, dict[tuple[int, int], bytes]]:
-        """Read objects before a loop, one after the other; see `bus.MainDevice.read_objects`."""
+        """Read objects before a loop, one after the other."""
         found: dict[int, dict[tuple[int, int], bytes]] = {}
         for position, places in wanted.items():
             read = {
@@ -127,7 +127,7 @@ class MainDevice(bus.MainDevice):
 
     def configure(self, plan: Plan) -> None:
         """Tells the master the plan and activates it: from here on it waits for cycles."""
-        self.require_no_loop()
+        self.main.require_no_loop()
         if self._kernel is not None:
             raise ConfigurationError(
                 f"{self.reservation.name} is activated already: nothing can be configured any more",
@@ -139,14 +139,13 @@ class MainDevice(bus.MainDevice):
         for sub, device in zip(self.subs, plan.devices, strict=True):
             self._keep_sync_types(sub, device)
         found = [sub.description for sub in self.subs]
-        self.clock_epoch_ns = self._epoch_ns()
         try:
-            configuration = configure(self.reservation, plan, found, self.clock_epoch_ns)
+            configuration = configure(self.reservation, plan, found, self.main.clock_epoch_ns)
         except BaseException as error:
             self._undo(error)
             raise
         self._kernel = KernelCarrier(self, configuration)
-        self.carrier = self._kernel
+        self.main.carrier = self._kernel
 
     def _keep_sync_types(self, sub: bus.SubDevice, plan: DevicePlan) -> None:
         """Read how a device keeps time, before SYNC0 is written to it. Without clocks, write back
@@ -164,7 +163,7 @@ class MainDevice(bus.MainDevice):
             for problem in self._settle():
                 error.add_note(f"on the way down: {problem}")
 
-    def leave(self, *, timeout: float = LEAVE_TIMEOUT) -> None:
+    def leave(self, timeout: float) -> None:
         """End the operation of the master, wait for PRE-OP and restore the synchronisation types.
 
         The master brings its devices to PRE-OP by itself, within its own times.
@@ -173,7 +172,7 @@ class MainDevice(bus.MainDevice):
             CatenaryError: A device that was synchronised to SYNC0 does not reach PRE-OP, or refuses
                 its former type; further ones as notes.
         """
-        kernel, self._kernel, self.carrier = self._kernel, None, None
+        kernel, self._kernel, self.main.carrier = self._kernel, None, None
         if kernel is None:
             return
         kernel.end()
@@ -210,13 +209,12 @@ class MainDevice(bus.MainDevice):
             write_types(self.reservation, sub.position, sub.sync_types, state)
             sub.sync_types = {}
 
-    def _bring_down(self, state: State, timeout: float = LEAVE_TIMEOUT) -> None:
-        """INIT is not ours to ask for: giving the master back leaves the devices in PRE-OP."""
-        self._detach()
+    def close(self, timeout: float) -> None:
+        """Deactivate the master. Giving it back leaves the devices in PRE-OP."""
         try:
-            self.leave()
-        except CatenaryError as problem:  # `close` goes on: the master must be given back
-            warnings.warn(str(problem), RuntimeWarning, stacklevel=3)
+            self.leave(timeout)
+        except CatenaryError as problem:  # the master must be given back all the same
+            warnings.warn(str(problem), RuntimeWarning, stacklevel=4)
 
     def configuration_of(self, position: int) -> DeviceConfiguration | None:
         """The master's handles for a device; None: it is not activated."""
@@ -264,35 +262,37 @@ class MainDevice(bus.MainDevice):
         heard = Emergency(*_EMERGENCY.unpack(message))
         if isinstance(sub, SubDevice):
             sub.hear(heard)
-        self.events.put(event.emergency(self.link.now() * 1e-9, sub, heard))
+        self.main.events.put(event.emergency(self.main.link.now() * 1e-9, sub, heard))
 
     # What the master keeps to itself
 
-    def passive_scan(self, *, names: bool = True) -> SubDevices:
-        """ConfigurationError: the state of a segment that is not ours is the master's to tell."""
+    def passive_scan(self, *, names: bool) -> NoReturn:
+        """Raise ConfigurationError: the states of the devices are the master's."""
         self._cannot(
             "look at devices without taking them over",
             "ethercat slaves -v, and states, reg_read, sii_read, alias, graph, crc",
         )
 
-    def diagnose(self, **options: object) -> NoReturn:
-        """ConfigurationError: error counters are read by the master's own tool."""
+    def diagnose(
+        self, subs: Sequence[bus.SubDevice], *, since: Diagnosis | None, lost_frames: int
+    ) -> NoReturn:
+        """Raise ConfigurationError: the master's own tool reads error counters."""
         self._cannot("read the error counters of all devices", "ethercat crc, ethercat graph CRC")
 
     def request_states(
-        self, subs: Sequence[bus.SubDevice], positions: Sequence[int], state: State
+        self, devices: Sequence[DeviceDescription], positions: Sequence[int], state: State
     ) -> dict[int, Outcome]:
-        """ConfigurationError: the master leads the states."""
-        self._cannot("ask single devices for a state", f"ethercat states {state}")
+        """Raise ConfigurationError: the master leads the states."""
+        self._cannot("request a state of single devices", f"ethercat states {state}")
 
     def _cannot(self, what: str, command: str) -> NoReturn:
         raise ConfigurationError(f"libethercat cannot {what}", hint=f"its tool does: {command}")
 
-    def _kernel_handle(self, description: DeviceDescription) -> SubDevice:
+    def _handle(self, description: DeviceDescription) -> SubDevice:
         position = description.position
         known = self.subs[position] if position < len(self.subs) else None
         if not isinstance(known, SubDevice) or known.identity != description.identity:
-            return SubDevice(self, description)
+            return SubDevice(self.main, self, description)
         known.description = description
         return known
 

@@ -1,0 +1,183 @@
+"""FrameMaster: brings the devices of a segment up and down by frames of our own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING
+
+from catenary.bus import event
+from catenary.bus.runner import BlockingRunner
+from catenary.bus.sdo import Objects, read_each
+from catenary.bus.segment_scan import Found, find, oddities, with_places
+from catenary.bus.sub_device import SubDevice
+from catenary.errors import LinkError
+from catenary.link import ring_of
+from catenary.model.device import DeviceDescription
+from catenary.procedure.live_outputs import Running, find_refreshed, find_running
+from catenary.procedure.mailbox import Heard
+from catenary.procedure.stations import (
+    StationRegisters,
+    assign,
+    bring_all_down,
+    count,
+    duplicate_aliases,
+    reset,
+)
+from catenary.wire.al import STATE_MASK, State
+
+if TYPE_CHECKING:  # plan needs NumPy, a scan does not
+    from catenary.bus.diagnosis import Diagnosis
+    from catenary.bus.main_device import MainDevice
+    from catenary.bus.states import Outcome
+    from catenary.plan.make import Plan
+    from catenary.plan.wish import Wish
+
+
+class FrameMaster:
+    """Owns the conversations of one MainDevice with its devices. Implements `bus.Master`."""
+
+    def __init__(self, main: MainDevice, *, force: bool) -> None:
+        self._main = main
+        self._force = force
+
+    def forget(self) -> None:
+        """Do nothing: a forked child keeps no more than the link, which the MainDevice drops."""
+
+    def scan(self) -> tuple[Sequence[SubDevice], tuple[str, ...]]:
+        """Reset all devices, bring them to PRE-OP and read what they are."""
+        main, runner = self._main, self._main.runner
+        runner.flush()
+        device_count, states = runner.run(count())
+        running_notes = self._judge_running(runner, device_count, states)
+        runner.run(reset(device_count))
+        registers, ring_notes = self._addressed(runner, device_count)
+        found = runner.run_all([find(each) for each in registers])
+        descriptions = with_places([each.description for each in found])
+        subs = [
+            self._handle(each._replace(description=description))
+            for each, description in zip(found, descriptions, strict=True)
+        ]
+        notes = (
+            *running_notes,
+            *ring_notes,
+            *(
+                f"devices {positions} have the same alias {alias}"
+                for alias, positions in duplicate_aliases(registers).items()
+            ),
+            *oddities(descriptions, ring=ring_of(main.link) is not None),
+        )
+        return subs, notes
+
+    def _judge_running(
+        self, runner: BlockingRunner, device_count: int, states: int
+    ) -> tuple[str, ...]:
+        """Return a note on devices that another program has left in SAFE-OP or OP."""
+        if states & STATE_MASK <= State.BOOT:
+            return ()
+        running = runner.run(find_running(device_count))
+        if not self._force:
+            self._refuse_refreshed(runner, running)
+        if not running:
+            return ()
+        left = ", ".join(map(str, running))
+        return (f"{left}: left by another program, which was perhaps killed; now reset",)
+
+    def _refuse_refreshed(self, runner: BlockingRunner, running: Sequence[Running]) -> None:
+        refreshed = runner.run(find_refreshed(running))
+        if refreshed:
+            raise LinkError(
+                f"another EtherCAT master is live on {self._main.link.name}: it refreshes the "
+                f"outputs of {', '.join(f'device {position}' for position in refreshed)} (0x0440)",
+                hint="a scan would reset devices that may be in motion. End that master, perhaps "
+                "one at the other end of the line; pass force=True (--force) to scan anyway",
+            )
+
+    def _addressed(
+        self, runner: BlockingRunner, device_count: int
+    ) -> tuple[Sequence[StationRegisters], tuple[str, ...]]:
+        """Every device's registers, once it has its station address; what is odd about a ring."""
+        ring = ring_of(self._main.link)
+        if ring is None:
+            return runner.run(assign(range(device_count))), ()
+        from catenary.bus.ring import assign_from_both_ends, find_cuts
+
+        registers = assign_from_both_ends(runner, ring, device_count)
+        cuts = find_cuts(ring.state, device_count)
+        return registers, (str(cuts),) if cuts is not None and cuts.cables else ()
+
+    def passive_scan(self, *, names: bool) -> Sequence[DeviceDescription]:
+        """Read the devices without changing a state or mapping."""
+        from catenary.bus.passive_scan import passive_scan
+
+        return passive_scan(self._main.runner, ring_of(self._main.link), names)
+
+    def request_states(
+        self, devices: Sequence[DeviceDescription], positions: Sequence[int], state: State
+    ) -> dict[int, Outcome]:
+        """Bring devices of a passive scan to a state and leave them there."""
+        from catenary.bus.states import request_states
+
+        return request_states(self._main.runner, devices, positions, state)
+
+    def diagnose(
+        self, subs: Sequence[SubDevice], *, since: Diagnosis | None, lost_frames: int
+    ) -> Diagnosis:
+        """Read the error counters and states of devices and judge where a fault is."""
+        from catenary.bus.diagnosis import diagnose
+
+        ring = ring_of(self._main.link) is not None
+        return self._main.converse(diagnose(subs, since=since, lost_frames=lost_frames, ring=ring))
+
+    def read_mappings(self, wishes: Sequence[Wish], period_ns: int) -> None:
+        """Read what is mapped, and what the dictionaries say of other objects."""
+        from catenary.bus.bring_up import describe_mappings
+
+        describe_mappings(self._main.runner, self._main.subs, wishes, period_ns)
+
+    def read_objects(self, wanted: Mapping[int, Sequence[tuple[int, int]]]) -> dict[int, Objects]:
+        """Read objects of several devices, all devices at the same time."""
+        positions, subs = list(wanted), self._main.subs
+        found = self._main.runner.run_all([read_each(subs[k], wanted[k]) for k in positions])
+        return dict(zip(positions, found, strict=True))
+
+    def configure(self, plan: Plan) -> None:
+        """Configure every device as planned and bring all to SAFE-OP."""
+        from catenary.bus.bring_up import bring_to_safe_op
+
+        main = self._main
+        epoch_ns, ring = main.clock_epoch_ns, ring_of(main.link)
+        measured = bring_to_safe_op(main.runner, main.subs, plan, epoch_ns, ring)
+        main.clock_delays_ns = measured.delays_ns if measured is not None else ()
+
+    def leave(self, timeout: float) -> None:
+        """Bring all devices to SAFE-OP, then to PRE-OP."""
+        self._bring_down(State.SAFE_OP, timeout)
+        self._bring_down(State.PRE_OP, timeout)
+
+    def close(self, timeout: float) -> None:
+        """Bring all devices to INIT."""
+        self._bring_down(State.INIT, timeout)
+
+    def _bring_down(self, state: State, timeout: float) -> None:
+        subs = self._main.subs
+        self._main.runner.run(bring_all_down([sub.station for sub in subs], state, timeout))
+        for sub in subs:
+            sub.state = state
+
+    def _handle(self, found: Found) -> SubDevice:
+        """Return the known handle of this place, if it is the same device; else a new one."""
+        subs = self._main.subs
+        position = found.description.position
+        known = subs[position] if position < len(subs) else None
+        if known is None or known.identity != found.description.identity:
+            known = SubDevice(self._main, found.description, found.channel)
+        known.description, known.channel = found.description, found.channel
+        if known.channel is not None:
+            known.channel.listen(partial(self._hear, known))
+        known.error = found.error
+        known.state = State.PRE_OP if found.error is None else None
+        return known
+
+    def _hear(self, sub: SubDevice, heard: Heard) -> None:
+        self._main.events.put(event.emergency(heard.time_ns * 1e-9, sub, heard.emergency))
