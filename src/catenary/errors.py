@@ -130,6 +130,18 @@ class DriveError(LoopError):
     """A drive is in fault, cannot be enabled, or was stopped without a request."""
 
 
+class MoveError(DriveError):
+    """A move that ended before its goal. `axis`: its name; `remaining`: goal minus actual position
+    [rad], of a linear axis [m]; NaN in homing."""
+
+    def __init__(
+        self, message: str, *, axis: str, remaining: float, log: object = None, hint: str = ""
+    ) -> None:
+        super().__init__(message, log=log, hint=hint)
+        self.axis = axis
+        self.remaining = remaining
+
+
 class RealtimeError(CatenaryError):
     """The machine does not give what real time needs: says what, and how to get it."""
 

@@ -86,4 +86,4 @@ def test_control_bits_of_the_mode_only_while_enabled_and_never_those_of_the_stat
     b.engine.run(1)
     assert b.drives[0].controlword == 0xF800
     b.enable()
-    assert b.drives[0].controlword == 0x0F | 0xFA70
+    assert b.drives[0].controlword == 0x0F | 0xFB70

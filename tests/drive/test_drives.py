@@ -152,7 +152,7 @@ def test_limits_reach_the_plan() -> None:
         {"position_min": 1.0, "position_max": -1.0},
         {"velocity_limit": 0.0},
         {"torque_limit": math.nan},
-        {"mode": "pp"},
+        {"mode": "ip"},
         {"measured": ["power"]},
         {"columns": ["no_such_thing"]},
         {"gear_ratio": [1.0, 2.0]},

@@ -48,7 +48,7 @@ def test_here_is_home(run: str, mode: str) -> None:
             if cycle.number > 100:
                 break
         assert arm.actual.position == pytest.approx(0.5, abs=0.05)
-        arm.home(loop)
+        loop.wait(arm.home())
         assert arm.actual.position == pytest.approx(0.0, abs=1e-3)
         assert arm.actual.mode.tolist() == [{"csp": 8, "csv": 9, "cst": 10}[mode]] * 2
         assert arm.enabled.all()
@@ -57,7 +57,7 @@ def test_here_is_home(run: str, mode: str) -> None:
 def test_an_offset_in_radians_and_one_axis_alone() -> None:
     homing = [HomingMethod(37, offset=-0.3), None]
     with opened(Servo(), Servo(), homing=homing, gear_ratio=10.0, direction=-1) as (arm, loop):
-        arm.home(loop, 0)
+        loop.wait(arm.home(0))
         assert arm.actual.position == pytest.approx([0.3, 0.0], abs=1e-3)
         for _ in range(20):
             next(loop)
@@ -67,7 +67,7 @@ def test_an_offset_in_radians_and_one_axis_alone() -> None:
 def test_a_method_the_drive_does_not_have() -> None:
     with opened(Servo(name="Left"), homing=HomingMethod(5)) as (arm, loop):
         with pytest.raises(DriveError, match=r"1 Left reports a homing error .*bit 13"):
-            arm.home(loop)
+            loop.wait(arm.home())
         for _ in range(20):
             next(loop)
         assert arm.actual.mode.tolist() == [8]
@@ -103,7 +103,7 @@ def test_against_a_joints_hard_stop(tmp_path: Path, method: int, stop: float) ->
             homing=homing,
         )
         with cat.Loop(arm, period=1e-3) as loop:
-            arm.home(loop)
+            loop.wait(arm.home())
             assert arm.actual.position[0] == pytest.approx(0.0, abs=0.01)
             assert segment.plant.data.qpos[0] == pytest.approx(stop, abs=0.02)
 
@@ -111,10 +111,11 @@ def test_against_a_joints_hard_stop(tmp_path: Path, method: int, stop: float) ->
 def test_a_stop_that_is_nowhere() -> None:
     method = HomingMethod(-3, speed=2.0, acceleration=20.0)
     with opened(Servo(name="Left"), homing=method) as (arm, loop):
-        with pytest.raises(DriveError, match=r"1 Left has not found its home within 0\.5 s"):
-            arm.home(loop, timeout=0.5)
+        with pytest.raises(DriveError, match=r"1 Left was still moving after 0\.5 s"):
+            loop.wait(arm.home(), timeout=0.5)
         for _ in range(400):
             next(loop)
+        assert arm.actual.mode.tolist() == [8]
         assert arm.actual.velocity == pytest.approx(0.0, abs=0.01)
         assert arm.actual.position[0] == pytest.approx(1.0, abs=0.3)
 
@@ -124,12 +125,12 @@ def test_an_axis_that_drops_out() -> None:
     with opened(servo, homing=HomingMethod(-3)) as (arm, loop):
         servo.switch_sto(True)
         with pytest.raises(DriveError, match="left OPERATION_ENABLED by itself: 1 Left"):
-            arm.home(loop)
+            loop.wait(arm.home())
 
 
 def test_drives_made_without_homing() -> None:
-    with opened(Servo(), other_modes=[]) as (arm, loop), pytest.raises(ValueError, match="'hm'"):
-        arm.home(loop)
+    with opened(Servo(), other_modes=[]) as (arm, _), pytest.raises(ValueError, match="'hm'"):
+        arm.home()
 
 
 def test_numbers_of_the_objects() -> None:

@@ -97,7 +97,7 @@ def test_what_shapes_the_fallback_must_be_finite(option: str) -> None:
 
 
 def test_other_impossible_options_are_refused() -> None:
-    with pytest.raises(ValueError, match="position_min must be an angle"):
+    with pytest.raises(ValueError, match="position_min must be a number"):
         axis_of(position_min=math.nan)
     with pytest.raises(ValueError, match=r"3 Servo: position_min 1\.0 is not below"):
         axis_of(position_min=1.0, position_max=1.0)
@@ -181,7 +181,7 @@ def test_the_velocity_of_the_drive() -> None:
 def test_the_torque_of_the_drive() -> None:
     assert own_limits(DriveSettings(max_torque=3000), UNITS).torque == pytest.approx(3.0)
     assert own_limits(DriveSettings(max_torque=0xFFFF), UNITS).torque is None
-    assert own_limits(DriveSettings(max_torque=3000), AxisUnits(1000)).torque is None
+    assert own_limits(DriveSettings(max_torque=3000), AxisUnits(1)).torque is None
 
 
 def test_the_limits_of_the_drive_only_tighten() -> None:
@@ -192,7 +192,7 @@ def test_the_limits_of_the_drive_only_tighten() -> None:
         (tighter, (-1.0, 1.0, 2.0, 0.5), "option"),
         (looser, (-2.0, 2.0, 3.0, 1.0), "0x6080 of the drive"),
     ):
-        bounds = make_bounds("a", options, [Mode.CSV], own)
+        bounds = make_bounds("a", options, [Mode.CSV], own, AxisUnits(1))
         limits = bounds.limits
         found = (limits.position_min, limits.position_max, limits.velocity, limits.torque)
         assert found == expected
@@ -201,13 +201,13 @@ def test_the_limits_of_the_drive_only_tighten() -> None:
 
 def test_position_limits_that_contradict_the_options_do_not_count() -> None:
     own = OwnLimits(position_min=2.0, position_max=3.0)
-    bounds = make_bounds("a", LimitOptions(-1.0, 1.0, 1.0), [Mode.CSP], own)
+    bounds = make_bounds("a", LimitOptions(-1.0, 1.0, 1.0), [Mode.CSP], own, AxisUnits(1))
     assert (bounds.position_min.value, bounds.position_max.value) == (-1.0, 1.0)
     assert "contradicts" in bounds.position_max.source
 
 
 def test_the_default_velocity_is_not_raised_by_the_drive() -> None:
-    fast = make_bounds("a", LimitOptions(), [Mode.CSP], OwnLimits(velocity=300.0))
-    slow = make_bounds("a", LimitOptions(), [Mode.CSP], OwnLimits(velocity=3.0))
+    fast = make_bounds("a", LimitOptions(), [Mode.CSP], OwnLimits(velocity=300.0), AxisUnits(1))
+    slow = make_bounds("a", LimitOptions(), [Mode.CSP], OwnLimits(velocity=3.0), AxisUnits(1))
     assert fast.velocity.value == pytest.approx(2 * math.pi)
     assert slow.velocity.value == 3.0

@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 
 import catenary as cat
-from catenary.errors import CatenaryError, DriveError, LoopError
+from catenary.errors import CatenaryError, DriveError, LoopError, MoveError
 from catenary.realtime import VirtualClock
 from catenary.types import SINT
 from catenary.virtual import Segment, Servo
@@ -42,11 +42,19 @@ class Condition:
     """Something to wait for."""
 
     condition: Callable[[], object]
-    error: Exception | None = None
+    error: CatenaryError | None = None
+    patience: float = PATIENCE
+    stopped: bool = False
 
     @property
     def done(self) -> bool:
         return bool(self.condition())
+
+    def stop(self) -> None:
+        self.stopped = True
+
+    def timeout_error(self, timeout: float) -> MoveError:
+        return MoveError(f"late after {timeout:g} s", axis="", remaining=0.0)
 
 
 class Cell:
@@ -101,7 +109,7 @@ def test_an_update_is_sent_when_the_block_ends(cell: Cell) -> None:
         cell.arm.target.position[:] = cell.start + 0.05
         cell.pass_cycles(20)
         assert not cell.moved(0)
-    cell.loop.wait(Condition(lambda: cell.moved(0) and cell.moved(1)), timeout=PATIENCE)
+    cell.loop.wait(Condition(lambda: cell.moved(0) and cell.moved(1)))
 
 
 def test_an_update_that_raises_sends_nothing(cell: Cell) -> None:
@@ -190,8 +198,10 @@ def test_wait_raises_the_error_of_what_it_waits_for(cell: Cell) -> None:
 
 
 def test_wait_has_a_timeout(cell: Cell) -> None:
-    with pytest.raises(TimeoutError, match=r"not done within 0\.05 s"):
-        cell.loop.wait(Condition(lambda: False), timeout=0.05)
+    never = Condition(lambda: False)
+    with pytest.raises(MoveError, match=r"late after 0\.05 s"):
+        cell.loop.wait(never, timeout=0.05)
+    assert never.stopped
 
 
 def test_wait_ends_when_another_thread_closes_the_loop(cell: Cell) -> None:
@@ -199,7 +209,7 @@ def test_wait_ends_when_another_thread_closes_the_loop(cell: Cell) -> None:
 
     def wait() -> None:
         try:
-            cell.loop.wait(Condition(lambda: False), timeout=PATIENCE)
+            cell.loop.wait(Condition(lambda: False))
         except RuntimeError as error:
             errors.append(error)
 
@@ -220,7 +230,6 @@ def test_asyncio_waits_in_a_thread(cell: Cell) -> None:
                 asyncio.to_thread(
                     cell.loop.wait,
                     Condition(lambda axis=axis: cell.moved(axis)),
-                    timeout=PATIENCE,
                 )
                 for axis in range(2)
             )
@@ -243,7 +252,7 @@ def test_an_error_closes_the_loop_and_the_next_call_raises_it(cell: Cell) -> Non
     until(lambda: cell.loop.error is not None)
     until(lambda: cell.segment[1].state & 0x0F == 2)  # left as by a with block
     with pytest.raises(DriveError, match="0x2310"):
-        cell.loop.wait(Condition(lambda: False), timeout=PATIENCE)
+        cell.loop.wait(Condition(lambda: False))
     with pytest.raises(DriveError, match="0x2310"), cell.loop.update():
         raise AssertionError
     with pytest.raises(DriveError, match="0x2310"):
@@ -458,9 +467,14 @@ def test_a_callback_that_never_returns_is_named() -> None:
     cell.run_in_background()
     background = cell.loop._background
     assert background is not None
-    release = threading.Event()
-    background._pace.keep = lambda ended: release.wait(PATIENCE)  # type: ignore[method-assign]
-    until(lambda: background._thread.is_alive())
+    entered, release = threading.Event(), threading.Event()
+
+    def stuck(ended: threading.Event) -> None:
+        entered.set()
+        release.wait(PATIENCE)
+
+    background._pace.keep = stuck  # type: ignore[method-assign]
+    assert entered.wait(PATIENCE)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("catenary.loop.background.END_TIMEOUT", 0.1)
         with pytest.raises(LoopError, match="does not end"):
@@ -488,7 +502,7 @@ def test_several_networks_in_the_background() -> None:
         for arm in arms:
             arm.target.position[:] = 0.05
     for arm in arms:
-        loop.wait(Condition(lambda arm=arm: arm.actual.position[0] > 0.04), timeout=PATIENCE)
+        loop.wait(Condition(lambda arm=arm: arm.actual.position[0] > 0.04))
     loop.close()
     for main in mains:
         main.close()
@@ -507,7 +521,7 @@ def test_csp_holds_while_the_program_keeps_the_interpreter() -> None:
     with loop.update():
         arm.target.position[:] = arm.actual.position + 0.05
     goal = arm.target.position[0]
-    loop.wait(Condition(lambda: arm.actual.position[0] > goal - 0.01), timeout=PATIENCE)
+    loop.wait(Condition(lambda: arm.actual.position[0] > goal - 0.01))
     assert arm.stopped == (None,)
     loop.close()
     main.close()

@@ -62,7 +62,7 @@ def test_upload_aborts(main: MainDevice, index: int, subindex: int, code: int) -
         (0x1018, 1, bytes(4), 0x06010002),
         (0x6065, 0, bytes(2), 0x06070013),
         (0x6060, 0, bytes(4), 0x06070012),
-        (0x6060, 0, b"\x01", 0x06090030),
+        (0x6060, 0, b"\x04", 0x06090030),
         (0x2101, 0, bytes(2049), 0x06070012),
     ],
 )

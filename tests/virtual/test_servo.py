@@ -172,7 +172,7 @@ def test_positions_wrap_at_32_bits() -> None:
 
 def test_an_unknown_mode_leaves_the_display(drive: Drive) -> None:
     drive.enable(CSP)
-    drive.mode = 3
+    drive.mode = 4
     assert drive.cycle(3).mode == CSP
 
 

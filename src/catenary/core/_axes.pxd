@@ -45,6 +45,7 @@ cdef struct axis_t:
     double velocity_limit
     double torque_limit
     double step_limit          # [rad] of a CSP set-point; 0: by velocity limit and time
+    double step_floor          # [rad] smallest default of it
     double acceleration        # [rad/s²] of return
     double deceleration        # [rad/s²] of fallback
     double torque_slope        # [N·m/s] of return

@@ -27,14 +27,16 @@ from catenary.core._cia402 cimport (
 from catenary.core._guard cimport (
     CSP,
     CST,
-    CSV,
     NO_MODE,
+    TORQUE,
+    VELOCITY,
     guard_controlword,
     guard_observe,
     guard_orders,
     guard_stop,
     guard_take_orders,
     guard_works,
+    quantity_of,
 )
 from catenary.core._handover cimport LIMITED_SOME, REFUSED_SOME
 from catenary.core._memory cimport cat_memory, cat_memory_free, memory_take
@@ -59,7 +61,6 @@ AXIS_REFUSED = REFUSED
 AXIS_FALLBACK = FALLBACK
 AXIS_MODE_REFUSED = MODE_REFUSED
 
-cdef double STANDSTILL = 0.05          # [rad/s]
 STILL_NS = 5_000_000                   # at rest for this long: stopped
 BEYOND_NS = 20_000_000                 # CSV: outside a limit and leaving for this long: stop
 CLIMBING_NS = 10_000_000_000           # a request to enable lapses
@@ -366,12 +367,13 @@ cdef inline void follow_update(const axes_t *x, const actual_t *actual, target_t
     enable the axis. Afterwards they are what is commanded, so that a later update of another axis
     does not revive them."""
     cdef uint64_t number = actual.header.number
-    if target.mode[i] == CSV:
+    cdef uint8_t quantity = quantity_of(target.mode[i])
+    if quantity == VELOCITY:
         if update_counts(target, number, x.command_timeout_velocity):
             target.velocity[i] = velocity
         else:
             target.velocity[i] = actual.commanded_velocity[i]
-    elif target.mode[i] == CST:
+    elif quantity == TORQUE:
         if update_counts(target, number, x.command_timeout_torque):
             target.torque[i] = torque
         else:
@@ -522,7 +524,8 @@ cdef class Axes:
         a.acceleration = finite_or(plan.acceleration, INFINITY, f"{name} acceleration")
         a.deceleration = finite_or(plan.deceleration, INFINITY, f"{name} deceleration")
         a.torque_slope = finite_or(plan.torque_slope, INFINITY, f"{name} torque_slope")
-        a.standstill = STANDSTILL
+        a.step_floor = finite_or(plan.step_floor, 0.0, f"{name} step_floor")
+        a.standstill = finite_or(plan.standstill, 0.0, f"{name} standstill")
         if plan.on_loss not in ON_LOSS:
             raise ValueError(f"{name} on_loss: {plan.on_loss!r}, must be one of {', '.join(ON_LOSS)}")
         a.on_loss = ON_LOSS[plan.on_loss]

@@ -31,7 +31,7 @@ cdef inline uint8_t quantity_of(int8_t mode) noexcept nogil:
     return NO_QUANTITY
 
 cdef enum:
-    MODE_BITS = 0x0270         # controlword bits 4, 5, 6, 9: defined by the mode
+    MODE_BITS = 0x0370         # controlword bits 4, 5, 6, 9: defined by the mode; 8: halt
     FREE_BITS = 0xF800         # controlword bits 11 to 15: the manufacturer's
     OPERATE = 0x000F           # enable operation
 
@@ -72,12 +72,14 @@ cdef void prepare_other_mode(axis_t *a) noexcept nogil
 cdef void refuse_mode(axes_t *x, axis_t *a, int8_t mode) noexcept nogil
 
 cdef inline bint is_commanded(const axes_t *x, int8_t mode) noexcept nogil:
-    """Return True if set-points count. Those of a program in the background time out in CSV and CST."""
+    """Return True if set-points count. Velocities and torques of a program in the background time
+    out."""
+    cdef uint8_t quantity = quantity_of(mode)
     if not x.background:
         return True
-    if mode == CSV:
+    if quantity == VELOCITY:
         return x.velocity_counts
-    if mode == CST:
+    if quantity == TORQUE:
         return x.torque_counts
     return True
 

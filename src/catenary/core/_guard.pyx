@@ -46,7 +46,8 @@ cdef enum:
 cdef inline void begin_stop(axis_t *a) noexcept nogil:
     """Start the sequence of a stop. A repeated request or a second reason does not restart it."""
     a.stop_cycles = 0
-    a.followed_at_stop = a.tells and a.status & FOLLOWS_COMMAND != 0
+    a.followed_at_stop = (a.tells and a.status & FOLLOWS_COMMAND != 0
+                          and a.mode in (CSP, CSV, CST))  # elsewhere the bit is another one
 
 
 cdef void stop_axis(axes_t *x, axis_t *a, uint8_t reason) noexcept nogil:
@@ -130,7 +131,7 @@ cdef void take_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noex
         if not t.header.hold:
             if is_commanded(x, a.mode):
                 a.armed = 1
-            elif a.mode == CST:
+            elif quantity_of(a.mode) == TORQUE:
                 a.armed = 0  # a torque that does not count any more
         if a.armed or quantity_of(a.mode) == POSITION:
             a.climbing_cycles += 1

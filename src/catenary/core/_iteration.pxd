@@ -14,7 +14,9 @@ cdef class Iteration:
     cdef Cycle cycle
     cdef object judge
     cdef object beside
+    cdef list movers
     cdef uint32_t trouble
     cdef int al_status
     cdef public object commit_lock
     cdef int commit_if_free(self) except -1
+    cdef int step_movers(self) except -1

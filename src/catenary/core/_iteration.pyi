@@ -1,8 +1,8 @@
 """Iteration of a loop, and the cycle that it yields."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from threading import Lock
-from typing import Self
+from typing import Protocol, Self
 
 from catenary.core._engine import Engine
 
@@ -53,13 +53,19 @@ class Cycle:
     def spend(self, seconds: float) -> None:
         """Let virtual time pass as if the body took this long [s]. On a NIC, compute that long."""
 
+class Mover(Protocol):
+    """Source of targets that the loop steps before each commit."""
+
+    def step(self, now: float, /) -> None: ...
+
 class Iteration:
     """Iterator that steps the engine once per `next` and yields its one Cycle.
 
     It calls `judge(flags)` if one of the CYCLE_* flags of `trouble` is set, or if the devices' AL
     states together differ from `al_status`; an exception of `judge` ends the iteration. The first
-    step commits nothing. `beside` is called before every step. With a `commit_lock`, a step that
-    finds it taken commits nothing: another thread is writing the targets.
+    step commits nothing. `beside` is called before every step. Each of the list `movers` computes
+    targets before every step that commits, with the time of the cycle [s]. With a `commit_lock`, a
+    step that finds it taken commits nothing: another thread is writing the targets.
     """
 
     def __init__(
@@ -70,6 +76,7 @@ class Iteration:
         trouble: int,
         al_status: int,
         beside: Callable[[], object] | None = None,
+        movers: Sequence[Mover] | None = None,
     ) -> None: ...
     commit_lock: Lock | None
     def __iter__(self) -> Self: ...

@@ -61,12 +61,13 @@ cdef class Cycle:
 
 cdef class Iteration:
     def __init__(self, Engine engine not None, judge, *, uint32_t trouble, int al_status,
-                 beside=None):
+                 beside=None, movers=None):
         self.engine = engine
         self.judge = judge
         self.trouble = trouble
         self.al_status = al_status
         self.beside = beside
+        self.movers = [] if movers is None else movers
 
     def __iter__(self):
         return self
@@ -80,7 +81,9 @@ cdef class Iteration:
             flags = self.engine.run(1)
             self.cycle = Cycle(self.engine)
         else:
-            if self.commit_lock is not None:
+            if self.commit_lock is None:
+                self.step_movers()
+            else:
                 self.commit_if_free()
             flags = self.engine.step()
         if flags & self.trouble or self.cycle.header.al_status != self.al_status:
@@ -93,7 +96,17 @@ cdef class Iteration:
             self.engine.keep_targets()
             return 0
         try:
+            self.step_movers()
             self.engine.commit_targets()
         finally:
             self.commit_lock.release()
+        return 0
+
+    cdef int step_movers(self) except -1:
+        cdef double now
+        if not self.movers:
+            return 0
+        now = self.cycle.time
+        for mover in list(self.movers):  # a mover that has finished leaves the list
+            mover.step(now)
         return 0

@@ -15,6 +15,9 @@ decide what is sent instead:
   older than the command timeout, then CSV decelerates and CST is stopped (`is_timed_out`);
 - stopping: another state was requested, or the core stopped the axis.
 
+In the profile modes the drive makes the trajectory. In PP the command stays until another one is
+committed, and no underrun counts: the drive ends its motion by itself. In PV the velocity stays in
+an underrun, and the late limit of CSV counts; in all other situations the target is 0.
 In all of them CSP and CSV decelerate and hold, and CST keeps its torque; each is bounded in time
 (`judge_lateness`, _guard.pyx). In an underrun CSP first keeps the velocity of the last two set-points:
 `ghost` is the set-point of this cycle, which the core continues in a fallback (`fallback_cycles`).
@@ -32,10 +35,11 @@ from catenary.core._axes cimport DROPPED, FALLBACK, LIMITED, MODE_REFUSED, REFUS
 from catenary.core._cia402 cimport ENABLED, OPERATION_ENABLED, QUICK_STOP_ACTIVE, SWITCHED_ON
 from catenary.core._guard cimport (
     CSP,
-    CST,
     CSV,
     DISABLE_VOLTAGE,
     POSITION,
+    PROFILE_POSITION,
+    PROFILE_VELOCITY,
     STOP_COMMAND_TIMEOUT,
     STOP_HANDOVER,
     STOP_MODE_CHANGE,
@@ -55,7 +59,6 @@ from catenary.core._guard cimport (
     stop_command,
 )
 
-cdef double STEP_FLOOR = 0.1           # [rad] smallest default of the step limit
 cdef double STEP_TOLERANCE = 1.000001  # a step of exactly the limit is accepted
 
 
@@ -141,9 +144,14 @@ cdef void fall_back_position(axes_t *x, axis_t *a, bint keep) noexcept nogil:
 cdef void fall_back(axes_t *x, axis_t *a, bint keep) noexcept nogil:
     """Compute one cycle without a set-point that counts. `keep`: CSP may keep its velocity."""
     cdef uint8_t quantity = quantity_of(a.mode)
+    if a.mode == PROFILE_POSITION:
+        return
     a.flags |= FALLBACK
     a.fallback_cycles += 1
-    if quantity == POSITION:
+    if a.mode == PROFILE_VELOCITY:
+        if not keep:
+            a.commanded_velocity = 0.0
+    elif quantity == POSITION:
         fall_back_position(x, a, keep and a.fallback_cycles <= x.keep_limit)
     elif quantity == VELOCITY:
         if a.fallback_cycles == 1 and a.velocity_offset.present:
@@ -165,7 +173,7 @@ cdef bint is_accepted(axes_t *x, axis_t *a, double target, uint64_t between) noe
     """Refuse a CSP set-point too far from the last accepted one."""
     cdef double limit = a.step_limit
     if limit == 0.0:
-        limit = fmax(STEP_FLOOR, 2 * a.velocity_limit * x.period
+        limit = fmax(a.step_floor, 2 * a.velocity_limit * x.period
                      * <double>max(between, <uint64_t>a.divider))
     if fabs(target - a.setpoint) <= limit * STEP_TOLERANCE:
         return True
@@ -185,9 +193,7 @@ cdef void follow_position(axes_t *x, axis_t *a, const target_t *t, double target
         age = x.number - stamp if x.number > stamp else 0
     if a.mode != CSP:
         a.commanded_position = clamp(a, target, fmin(a.position_min, held), fmax(a.position_max, held))
-        a.ghost = a.commanded_position
         a.refused_cycles = 0
-        a.fallback_cycles = 0
         return
     if not is_accepted(x, a, target, between):
         fall_back(x, a, False)
@@ -234,7 +240,7 @@ cdef void limit_velocity(axes_t *x, axis_t *a) noexcept nogil:
 cdef void follow_velocity(axes_t *x, axis_t *a, double target) noexcept nogil:
     cdef double rate
     if a.fallback_cycles:
-        a.returning = a.accepted > 0
+        a.returning = a.accepted > 0 and a.mode == CSV
     a.accepted = 2
     a.refused_cycles = 0
     a.fallback_cycles = 0
@@ -290,10 +296,10 @@ cdef void follow(axes_t *x, axis_t *a, const target_t *t, uint32_t i, bint fresh
         target = t.velocity[i]
     elif quantity == TORQUE:
         target = t.torque[i]
-    if x.background and not x.handed_over and (a.mode == CSV or a.mode == CST):
+    if x.background and not x.handed_over and quantity != POSITION:
         fresh = is_commanded(x, a.mode)
     if not fresh or not is_number(a, target):
-        fall_back(x, a, not x.handed_over and a.refused_cycles == 0)
+        fall_back(x, a, not x.handed_over and a.refused_cycles == 0 and is_commanded(x, a.mode))
     elif quantity == POSITION:
         follow_position(x, a, t, target)
     elif quantity == VELOCITY:

@@ -8,7 +8,6 @@ from typing import TypeAlias
 
 from catenary.bus import SubDevice
 from catenary.drive.axis import MEASURED, Axis
-from catenary.drive.limits import DEFAULT_VELOCITY
 from catenary.drive.objects import NAMED_COLUMNS, AxisObject
 from catenary.model.device import mapped_entries
 from catenary.plan.wish import DistributedClock, ObjectReference, WrittenPdo
@@ -21,6 +20,7 @@ STATUSWORD = 0x6041
 EVERY_MAX = 10_000  # cycles: beyond, ask by SDO
 MODES: dict[str, Mode] = {
     **{"csp": Mode.CSP, "csv": Mode.CSV, "cst": Mode.CST},
+    **{"pp": Mode.PP, "pv": Mode.PV},  # the drive makes the trajectory
     "hm": Mode.HM,  # homing: no target, `Drives.home` runs it
 }
 
@@ -67,12 +67,15 @@ def axis_modes(first: str, others: Sequence[str]) -> tuple[Mode, ...]:
 
 
 def warn_of_default_velocity(axes: Sequence[Axis]) -> None:
-    """Warn once for all axes in CSP without a velocity limit."""
-    names = [axis.name for axis in axes if axis.options.lacks_velocity(axis.modes)]
-    if names:
+    """Warn once for all axes in CSP or PP without a velocity limit, by kind of axis."""
+    lacking = [axis for axis in axes if axis.options.lacks_velocity(axis.modes)]
+    for units in dict.fromkeys(axis.units.names for axis in lacking):
+        alike = [axis for axis in lacking if axis.units.names == units]
+        names = ", ".join(axis.name for axis in alike)
+        default = alike[0].units.defaults.velocity_limit
         warnings.warn(
-            f"no velocity_limit for {', '.join(names)}: {DEFAULT_VELOCITY:.3g} rad/s at the joint "
-            "is used; write Drives(velocity_limit=...) [rad/s]",
+            f"no velocity_limit for {names}: {default:.3g} {units.velocity} at the joint "
+            f"is used; write Drives(velocity_limit=...) [{units.velocity}]",
             UserWarning,
             stacklevel=3,
         )
@@ -136,3 +139,28 @@ def named_columns(columns: Sequence[str | tuple[str, AxisObject]]) -> dict[str, 
         else:
             raise ValueError(f"columns {column!r}; known: {', '.join(NAMED_COLUMNS)}")
     return named
+
+
+def force_and_torque(
+    forces: Sequence[float | None],
+    torques: Sequence[float | None],
+    metres_per_turn: Sequence[float | None],
+) -> tuple[float | None, ...]:
+    """Return the limit of each axis [N] or [N·m], from the option that fits its kind.
+
+    Raises:
+        ValueError: An option was given to an axis of the other kind.
+    """
+    chosen: list[float | None] = []
+    for axis, (force, torque, metres) in enumerate(
+        zip(forces, torques, metres_per_turn, strict=True)
+    ):
+        if metres is None and force is not None:
+            raise ValueError(
+                f"force_limit for axis {axis}: it is rotary; use torque_limit= [N·m], or give "
+                "metres_per_turn= for a linear axis"
+            )
+        if metres is not None and torque is not None:
+            raise ValueError(f"torque_limit for axis {axis}: it is linear; use force_limit= [N]")
+        chosen.append(torque if metres is None else force)
+    return tuple(chosen)

@@ -23,7 +23,10 @@ TARGETS: dict[int, AxisObject] = {
     Mode.CSP: objects.TARGET_POSITION,
     Mode.CSV: objects.TARGET_VELOCITY,
     Mode.CST: objects.TARGET_TORQUE,
+    Mode.PP: objects.TARGET_POSITION,
+    Mode.PV: objects.TARGET_VELOCITY,
 }
+TORQUES = (Unit.TORQUE, Unit.EFFORT)
 MEASURED: dict[str, AxisObject] = {
     "position": objects.ACTUAL_POSITION,
     "velocity": objects.ACTUAL_VELOCITY,
@@ -66,7 +69,7 @@ class Axis:
             ("torque" in self.measured and self.measured_required)
             or Mode.CST in self.modes
             or self.options.torque_limit is not None
-            or any(column.unit is Unit.TORQUE for column in self.columns.values())
+            or any(column.unit in TORQUES for column in self.columns.values())
         )
 
     @property
@@ -74,12 +77,17 @@ class Axis:
         """Limits and reactions in force. ConfigurationError if a required one is not known."""
         homing_offset = None if self.homing is None else self.homing.offset_counts(self.units)
         own = own_limits(self.settings, self.units, homing_offset)
-        return make_bounds(self.name, self.options, self.modes, own)
+        return make_bounds(self.name, self.options, self.modes, own, self.units)
 
     def report(self, period_ns: int) -> AxisReport:
         """Describe the axis for the plan. `period_ns`: of the loop."""
         return axis_report(
-            self.name, self.modes, self.bounds, self.settings, period_ns * self.divider
+            self.name,
+            self.modes,
+            self.bounds,
+            self.settings,
+            period_ns * self.divider,
+            self.units,
         )
 
     def pdo_wish(self, start_up: tuple[tuple[int, int, bytes], ...] = ()) -> PdoWish:
@@ -93,6 +101,8 @@ class Axis:
         if self.holds_on_loss:
             wanted.append(objects.TARGET_POSITION)
             given.append(objects.ACTUAL_POSITION)
+        if self.uses_profile:
+            wanted += objects.PROFILE_OBJECTS.values()
         for column in self.columns.values():
             (wanted if column.output else given).append(column)
         optional = self._optional()
@@ -110,16 +120,23 @@ class Axis:
         )
 
     @property
+    def uses_profile(self) -> bool:
+        """True if the drive makes trajectories in one of the modes."""
+        return not {Mode.PP, Mode.PV}.isdisjoint(self.modes)
+
+    @property
     def holds_on_loss(self) -> bool:
         """True if the core changes to CSP when it stops the axis."""
         return self.options.on_loss == "csp_hold"
 
     def _optional(self) -> set[AxisObject]:
-        """What a drive may lack: velocity and torque, unless asked for by name; and the mode, which
-        the start-up list sets, where it never changes."""
+        """What a drive may lack: velocity and torque, unless asked for by name; the mode, which
+        the start-up list sets, where it never changes; and the rates of profiles, which are
+        written by SDO then."""
         optional = set() if self.measured_required else {MEASURED["velocity"], MEASURED["torque"]}
         if len(self.modes) == 1 and not self.holds_on_loss:
             optional |= {objects.MODE_TARGET, objects.MODE_ACTUAL}
+        optional |= set(objects.PROFILE_OBJECTS.values())
         return optional - set(self.columns.values())
 
     def plan(self, layout: ImageLayout) -> AxisPlan:
@@ -150,6 +167,8 @@ class Axis:
             acceleration=bounds.acceleration.value,
             deceleration=bounds.deceleration.value,
             torque_slope=bounds.torque_slope.value,
+            standstill=self.units.defaults.standstill,
+            step_floor=self.units.defaults.step_limit,
             on_loss=bounds.on_loss,
         )
 
@@ -168,9 +187,12 @@ class Axis:
             return None
         return self._place(layout, wanted)
 
-    def column(self, name: str, layout: ImageLayout) -> Column:
+    def maps(self, wanted: AxisObject, layout: ImageLayout) -> bool:
+        """True if an object is in the process data."""
+        return self._place(layout, wanted) is not None
+
+    def column(self, name: str, wanted: AxisObject, layout: ImageLayout) -> Column:
         """The named column, with its place."""
-        wanted = self.columns[name]
         return Column(
             name=f"{self.name}.{name}",
             number=self._required(layout, wanted),
@@ -195,7 +217,7 @@ class Axis:
         find = layout.output if wanted.output else layout.input
         which = Which(bit_length=wanted.bit_length)
         place = find(self.device, self.index(wanted.index), wanted.subindex, which)
-        if place is None or (wanted.unit is Unit.TORQUE and self.units.rated_torque is None):
+        if place is None or (wanted.unit in TORQUES and self.units.rated_torque is None):
             return None
         # The layout knows places and widths; signs are the standard's, unless the device says REAL.
         kind = NumberKind.SIGNED if wanted.signed else NumberKind.UNSIGNED

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NoReturn, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from catenary.bus import SubDevice
+from catenary.bus import Pending, SubDevice
 from catenary.drive import start_up
 from catenary.drive.arguments import (
     AxisSource,
@@ -19,6 +21,7 @@ from catenary.drive.arguments import (
     axis_sources,
     clock_wish,
     cycles_between,
+    force_and_torque,
     known,
     mode_of,
     named_columns,
@@ -27,15 +30,27 @@ from catenary.drive.arguments import (
 )
 from catenary.drive.attributes import check_writable, unknown_attribute
 from catenary.drive.axis import MEASURED, Axis, column_bank
-from catenary.drive.homing import HomingMethod, Timed, run_homing
+from catenary.drive.homing import HomingMethod, home_axis, stop_homing
 from catenary.drive.limits import LimitOptions
-from catenary.drive.objects import AxisObject
+from catenary.drive.motions import HALT
+from catenary.drive.move import Move, Moves, Part
+from catenary.drive.move_request import (
+    RateOptions,
+    Values,
+    default_acceleration,
+    make_parts,
+    require_enabled,
+    values_of,
+)
+from catenary.drive.objects import PROFILE_OBJECTS, AxisObject
+from catenary.drive.port import AxisPort
 from catenary.drive.state_machine import Goal
 from catenary.drive.units import AxisUnits, one_each, per_axis
 from catenary.drive.values import Array, AxisValues
 from catenary.plan.cycle import Bank, OnLoss
 from catenary.plan.stop_reason import StopReason
 from catenary.plan.wish import DistributedClock, ImageLayout, PdoWish, Views, WishTables
+from catenary.types import UDINT
 from catenary.wire.cia402 import IN_FAULT, Mode, State
 
 V = TypeVar("V")
@@ -44,6 +59,7 @@ Axes: TypeAlias = int | Sequence[int] | slice
 
 STATES = {int(state): state for state in State}
 ALL = slice(None)
+HOMING_PATIENCE = 60.0  # [s] default timeout of a wait
 
 
 class Drives:
@@ -69,9 +85,11 @@ class Drives:
 
     Options with one value for all axes, or a sequence of one per axis:
 
-    - `mode`: "csp", "csv" or "cst" at the start.
+    - `mode`: "csp", "csv", "cst", "pp" or "pv" at the start.
     - `counts_per_turn`: counts of the motor's encoder per turn.
     - `gear_ratio`: motor turns per joint turn.
+    - `metres_per_turn` [m]: travel of a linear axis per turn of the gear's output side. The axis
+      then has m, m/s and N where rad, rad/s and N·m are stated here. None: a rotary axis.
     - `direction`: 1, or -1 if the joint turns against the motor.
     - `offset` [rad]: position of the joint where the drive reads 0.
     - `velocity_unit` [rad/s of the motor]: one raw velocity count. None: one position count per s.
@@ -81,18 +99,19 @@ class Drives:
     Limits at the joint. The core enforces them; plausible limits of the drive only tighten them:
 
     - `position_min`, `position_max` [rad].
-    - `velocity_limit` [rad/s]: required for CSV and CST. CSP without it: 2π rad/s and a warning.
-      `math.inf`: none.
-    - `torque_limit` [N·m].
+    - `velocity_limit` [rad/s]: required for CSV, CST and PV. CSP and PP without it: 2π rad/s
+      (0.1 m/s) and a warning. `math.inf`: none.
+    - `torque_limit` [N·m]; `force_limit` [N] of a linear axis.
     - `step_limit` [rad]: largest difference between two CSP set-points; a larger one is refused.
-      None: max(0.1 rad, twice the way at `velocity_limit`). Required if `velocity_limit` is
-      infinite.
+      None: max(0.1 rad (5 mm), twice the way at `velocity_limit`). Required if `velocity_limit`
+      is infinite.
 
     Fallback and return after a loss of set-points; they never shape your set-points:
 
     - `deceleration_limit` [rad/s²]. None: a plausible 0x6085 of the drive, else
       `velocity_limit` / 0.25 s.
-    - `acceleration_limit` [rad/s²]. None: the deceleration.
+    - `acceleration_limit` [rad/s²]. None: the deceleration. It limits moves, too; their default is
+      this option, else `velocity_limit` / 0.25 s.
     - `torque_slope` [N·m/s] in CST. None: at once.
     - `on_loss`: reaction when the core stops an axis: "quick_stop" (None), "disable", or
       "csp_hold" (change to CSP and hold). Required in CST if the drive's quick stop (0x605A) does
@@ -114,10 +133,12 @@ class Drives:
         offset: PerAxis[float] = 0.0,
         velocity_unit: PerAxis[float | None] = None,
         rated_torque: PerAxis[float | None] = None,
+        metres_per_turn: PerAxis[float | None] = None,
         position_min: PerAxis[float | None] = None,
         position_max: PerAxis[float | None] = None,
         velocity_limit: PerAxis[float | None] = None,
         torque_limit: PerAxis[float | None] = None,
+        force_limit: PerAxis[float | None] = None,
         step_limit: PerAxis[float | None] = None,
         acceleration_limit: PerAxis[float | None] = None,
         deceleration_limit: PerAxis[float | None] = None,
@@ -133,6 +154,7 @@ class Drives:
     ) -> None:
         sources = axis_sources(subs)
         n = len(sources)
+        metres = per_axis("metres_per_turn", metres_per_turn, n)
         units = map(
             AxisUnits,
             per_axis("counts_per_turn", counts_per_turn, n),
@@ -141,13 +163,18 @@ class Drives:
             per_axis("offset", offset, n),
             per_axis("velocity_unit", velocity_unit, n),
             per_axis("rated_torque", rated_torque, n),
+            metres,
         )
         options = map(
             LimitOptions,
             per_axis("position_min", position_min, n),
             per_axis("position_max", position_max, n),
             per_axis("velocity_limit", velocity_limit, n),
-            per_axis("torque_limit", torque_limit, n),
+            force_and_torque(
+                per_axis("force_limit", force_limit, n),
+                per_axis("torque_limit", torque_limit, n),
+                metres,
+            ),
             per_axis("acceleration_limit", acceleration_limit, n),
             per_axis("deceleration_limit", deceleration_limit, n),
             per_axis("torque_slope", torque_slope, n),
@@ -187,13 +214,16 @@ class Drives:
             )
         )
         for axis in self._axes:
-            axis.options.check(axis.name, axis.modes)
+            axis.options.check(axis.name, axis.modes, axis.units.names)
         warn_of_default_velocity(self._axes)
         self._period_ns = 0
         self._is_read = False  # settings of the drives, since the last plan
         self._actual = AxisValues("actual")
         self._target = AxisValues("target")
         self._views: Views | None = None
+        self._profile_columns: dict[str, AxisObject] = {}  # mapped, and not asked for by name
+        self._ports: tuple[AxisPort, ...] = ()
+        self._moves: Moves | None = None
         self._units: npt.NDArray[np.intp] = np.zeros(0, np.intp)
 
     def __len__(self) -> int:
@@ -281,7 +311,7 @@ class Drives:
 
     def reset_faults(self, axes: Axes = ALL) -> None:
         """Request a fault reset of those axes that are in fault. Nothing moves before `enable`."""
-        chosen = set(np.atleast_1d(np.arange(len(self))[axes]).tolist())
+        chosen = set(self._numbers(axes))
         self._request("reset_faults", Goal.RESET, sorted(chosen & set(self.faults)))
 
     def switch(self, mode: str, axes: Axes = ALL) -> None:
@@ -290,23 +320,117 @@ class Drives:
         Until the drive shows the new mode, the old one continues without fresh set-points.
         """
         wanted = mode_of(mode)
-        for axis in np.atleast_1d(np.arange(len(self))[axes]).tolist():
+        for axis in self._numbers(axes):
             if wanted not in self._axes[axis].modes:
                 raise ValueError(f"{self.names[axis]}: make Drives with other_modes=[{mode!r}]")
-        self._of_open_loop("switch").mode_target[axes] = wanted
+        views = self._of_open_loop("switch()")
+        views.mode_target[axes] = wanted
+        views.controlword_bits[axes] &= ~HALT & 0xFFFF
 
-    def home(self, loop: Iterable[Timed], axes: Axes = ALL, *, timeout: float = 30.0) -> None:
-        """Lets enabled axes find their homes themselves (mode 6, "hm" in `other_modes`), and waits,
-        iterating `loop`; then they hold, in the mode they had, positions counted from the new zero.
+    # Moves: the loop must be iterated meanwhile, by loop.wait(move) or by your own `for`.
 
-        DriveError names an axis that reports an error, drops out, or is not home within `timeout`
-        [s]; the search is over then. ValueError: made without "hm".
+    def move_to(
+        self,
+        position: Values,
+        *,
+        velocity: Values | None = None,
+        acceleration: Values | None = None,
+        jerk: Values | None = None,
+        axes: Axes = ALL,
+    ) -> Move:
+        """Start to move axes to a position, each as fast as the limits allow; they rest there.
+
+        In CSP the loop computes the motion and writes `target.position` of these axes: a trapezoid
+        of the velocity, or with limited jerk. In PP the drive makes it. A move replaces the one
+        that an axis is in, and goes on from its velocity. The axes do not arrive together.
+
+        Args:
+            position: goal, one or one for each of `axes` [rad], [m].
+            velocity: [rad/s], [m/s]; None: `velocity_limit`.
+            acceleration: [rad/s²], [m/s²], to brake, too; None: `acceleration_limit`, else
+                `velocity_limit` / 0.25 s.
+            jerk: [rad/s³], [m/s³]; None: a trapezoid. Needs `pip install 'catenary[traj]'`.
+            axes: numbers of the axes.
+
+        Returns:
+            A handle for `loop.wait`, or to look at `done`.
+
+        Raises:
+            ValueError: A goal or rate is beyond a limit, or the mode is neither CSP nor PP.
+            DriveError: An axis is not enabled.
+            ConfigurationError: `jerk` is given and ruckig is not installed.
         """
-        chosen = np.atleast_1d(np.arange(len(self))[axes])
-        for axis in chosen.tolist():
+        chosen = self._numbers(axes)
+        goals = values_of("position", position, len(chosen))
+        return self._move(chosen, goals, RateOptions(velocity, acceleration, jerk))
+
+    def move_by(
+        self,
+        distance: Values,
+        *,
+        velocity: Values | None = None,
+        acceleration: Values | None = None,
+        jerk: Values | None = None,
+        axes: Axes = ALL,
+    ) -> Move:
+        """Start to move axes by a distance from their goals, or from their targets at rest.
+
+        See `move_to` for the other arguments, the result and the errors.
+        """
+        chosen = self._numbers(axes)
+        moves = self._moving()
+        starts = [moves.goal(axis) for axis in chosen]
+        goals = [
+            step + (self._ports[axis].target if start is None else start)
+            for axis, start, step in zip(
+                chosen, starts, values_of("distance", distance, len(chosen)), strict=True
+            )
+        ]
+        return self._move(chosen, goals, RateOptions(velocity, acceleration, jerk))
+
+    def home(self, axes: Axes = ALL) -> Move:
+        """Let enabled axes find their homes themselves (mode 6, "hm" in `other_modes`).
+
+        Then they hold in the mode that they had, with positions counted from the new zero.
+
+        Returns:
+            A handle, as of `move_to`. Its error names an axis that reports a homing error or drops
+            out.
+
+        Raises:
+            ValueError: The drives were made without "hm", or an axis is homing already.
+            DriveError: An axis is not enabled.
+        """
+        chosen = self._numbers(axes)
+        moves = self._moving()
+        parts: dict[int, Part] = {}
+        for axis in chosen:
+            port = self._ports[axis]
             if Mode.HM not in self._axes[axis].modes:
-                raise ValueError(f"{self.names[axis]}: make Drives with other_modes=['hm']")
-        run_homing(self._of_open_loop("home"), self.names, loop, chosen, timeout)
+                raise ValueError(f"{port.name}: make Drives with other_modes=['hm']")
+            before = port.requested_mode
+            if before == Mode.HM:
+                raise ValueError(f"{port.name}: is homing already; wait, or use move.stop()")
+            require_enabled(port)
+            stop = partial(stop_homing, port, before)
+            parts[axis] = Part(port, math.nan, home_axis(port, before), stop)
+        return moves.begin(parts, HOMING_PATIENCE)
+
+    def _move(self, chosen: Sequence[int], goals: Sequence[float], rates: RateOptions) -> Move:
+        moves = self._moving()
+        axes, ports = [self._axes[i] for i in chosen], [self._ports[i] for i in chosen]
+        parts, patience = make_parts(axes, ports, goals, rates)
+        return moves.begin(dict(zip(chosen, parts, strict=True)), patience)
+
+    def _numbers(self, axes: Axes) -> list[int]:
+        """Return the numbers of chosen axes."""
+        numbers: list[int] = np.atleast_1d(np.arange(len(self))[axes]).tolist()
+        return numbers
+
+    def _moving(self) -> Moves:
+        self._of_open_loop("a move")
+        assert self._moves is not None  # bound together with the views
+        return self._moves
 
     # plan.wish.Wish
 
@@ -342,17 +466,24 @@ class Drives:
         """Return the axes in their order; columns by name, then by axis: a name is one array."""
         self._is_read = False  # the next plan reads again
         self._units = np.array([layout.sync_unit(axis.device) for axis in self._axes], np.intp)
+        self._profile_columns = {
+            name: wanted
+            for name, wanted in PROFILE_OBJECTS.items()
+            if name not in self._columns
+            and all(axis.uses_profile and axis.maps(wanted, layout) for axis in self._axes)
+        }
+        columns = self._all_columns()
         return WishTables(
             axes=tuple(axis.plan(layout) for axis in self._axes),
             output_columns=tuple(
-                axis.column(name, layout)
-                for name, wanted in self._columns.items()
+                axis.column(name, wanted, layout)
+                for name, wanted in columns.items()
                 if wanted.output
                 for axis in self._axes
             ),
             input_columns=tuple(
-                axis.column(name, layout)
-                for name, wanted in self._columns.items()
+                axis.column(name, wanted, layout)
+                for name, wanted in columns.items()
                 if not wanted.output
                 for axis in self._axes
             ),
@@ -376,12 +507,55 @@ class Drives:
             views.mode_target,
             self._slices(views.output_reals, views.output_integers, output=True),
         )
+        self._moves = Moves(views.movers)
+        self._ports = tuple(self._port(views, i, axis) for i, axis in enumerate(self._axes))
+        self._preset_columns()
+
+    def _port(self, views: Views, index: int, axis: Axis) -> AxisPort:
+        """Return what moves read and write of an axis."""
+        sdo, period = self._subs[index].sdo, self._period_ns * 1e-9
+
+        def write(place: int, value: int) -> Pending[None]:
+            return sdo.request_write(axis.index(place), 0, value, type=UDINT)
+
+        return AxisPort(
+            views,
+            index,
+            name=axis.name,
+            units=axis.units,
+            exchange=period * axis.divider,
+            period=period,
+            write=write,
+            set_column=partial(self._set_column, index),
+        )
+
+    def _set_column(self, index: int, name: str, value: float) -> bool:
+        """Write one axis' value of a column. Return False if there is no such column."""
+        if name not in self._all_columns():
+            return False
+        self._target[name][index] = value
+        return True
+
+    def _preset_columns(self) -> None:
+        """Rates and torque limits that are mapped begin with the limits: at 0 no drive moves."""
+        for index, axis in enumerate(self._axes):
+            velocity, torque = axis.bounds.velocity.value, axis.bounds.torque.value
+            acceleration = default_acceleration(axis) or axis.bounds.acceleration.value
+            for name in PROFILE_OBJECTS:
+                value = velocity if name == "profile_velocity" else acceleration
+                self._set_column(index, name, value or 2**31 * abs(axis.units.velocity_scale))
+            if "max_torque" in self._columns:
+                self._set_column(index, "max_torque", torque or 1000 * abs(axis.units.torque_scale))
+
+    def _all_columns(self) -> dict[str, AxisObject]:
+        """Return the columns by name: those asked for, and mapped rates of profiles."""
+        return {**self._columns, **self._profile_columns}
 
     def _slices(self, reals: Array, integers: Array, *, output: bool) -> dict[str, Array]:
         """Each column's part of its bank's array."""
         used = {Bank.REAL: 0, Bank.INTEGER: 0}
         slices: dict[str, Array] = {}
-        for name, wanted in self._columns.items():
+        for name, wanted in self._all_columns().items():
             if wanted.output is not output:
                 continue
             bank = column_bank(wanted)
@@ -391,7 +565,7 @@ class Drives:
         return slices
 
     def _request(self, call: str, goal: Goal, axes: Axes) -> None:
-        views = self._of_open_loop(call)
+        views = self._of_open_loop(f"{call}()")
         views.goal[axes] = goal
         views.request[axes] += 1  # a goal that dropped comes back only by a new request
 
@@ -400,7 +574,7 @@ class Drives:
         views = self._bound()
         if not views.is_open():
             raise RuntimeError(
-                f"{call}(): the loop is closed, and its drives were stopped; open a loop first"
+                f"{call}: the loop is closed, and its drives were stopped; open a loop first"
             )
         return views
 

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
-import numpy as np
-import numpy.typing as npt
-
+from catenary.drive.port import AxisPort, Complaint, Steps, await_condition, mode_is
 from catenary.drive.units import AxisUnits
-from catenary.errors import DriveError
-from catenary.plan.wish import Views
 from catenary.types import DINT, SINT, UDINT
 from catenary.wire.cia402 import Control, Mode, Object, Status
 
@@ -20,13 +15,7 @@ START = int(Control.MODE_4)
 ATTAINED = int(Status.MODE_12 | Status.TARGET_REACHED)
 FAILED = int(Status.MODE_13)
 ANSWER_CYCLES = 10  # until the statusword can be the answer to a controlword
-
-
-class Timed(Protocol):
-    """A cycle of a loop."""
-
-    @property
-    def time(self) -> float: ...
+MODE_TIMEOUT = 5.0  # [s] to change the mode
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,78 +69,47 @@ class HomingMethod:
         return tuple(found)
 
 
-def run_homing(
-    views: Views,
-    names: Sequence[str],
-    loop: Iterable[Timed],
-    axes: npt.NDArray[np.intp],
-    timeout: float,
-) -> None:
-    """Mode 6, start, wait for the answer, back to the modes before. DriveError names the axis."""
-    before = views.mode_target[axes].copy()
-    cycles = iter(loop)
+def home_axis(port: AxisPort, before: int) -> Steps:
+    """Search in mode 6, then return to the mode `before`.
+
+    Raises:
+        MoveError: The drive reports an error, or does not change its mode.
+    """
+    port.request_mode(Mode.HM)
     try:
-        views.mode_target[axes] = Mode.HM
-        for _ in _until(cycles, timeout, views, names, axes, "does not show mode 6"):
-            if (views.mode_actual[axes] == Mode.HM).all() and _followed(views, axes).all():
+        yield from _await_mode(port, Mode.HM)
+        port.set_bits(START)
+        for count in itertools.count():
+            yield
+            if count < ANSWER_CYCLES:
+                continue
+            if port.status & FAILED:
+                what = f"reports a homing error (statusword 0x{port.status:04X}, bit 13)"
+                hint = "the method (0x6098) may be none of the drive's: see its manual"
+                raise port.error(Complaint(what, hint))
+            if port.has_bits(ATTAINED):
                 break
-        views.controlword_bits[axes] |= START
-        _await_answer(cycles, views, names, axes, timeout)
     finally:
-        views.controlword_bits[axes] &= ~START & 0xFFFF
-        views.mode_target[axes] = before
-    for _ in _until(cycles, timeout, views, names, axes, "does not leave mode 6"):
-        if (views.mode_actual[axes] == before).all() and _followed(views, axes).all():
-            return
+        leave_homing(port, before)
+    yield from _await_mode(port, before)
 
 
-def _await_answer(
-    cycles: Iterator[Timed],
-    views: Views,
-    names: Sequence[str],
-    axes: npt.NDArray[np.intp],
-    timeout: float,
-) -> None:
-    waiting = _until(cycles, timeout, views, names, axes, "has not found its home")
-    for count, _ in enumerate(waiting):
-        if count < ANSWER_CYCLES:
-            continue
-        status = views.statusword[axes]
-        for axis in axes[(status & FAILED) != 0].tolist():
-            raise DriveError(
-                f"{names[axis]} reports a homing error (statusword "
-                f"0x{views.statusword.item(axis):04X}, bit 13)",
-                hint="the method (0x6098) may be none of the drive's: see its manual",
-            )
-        if ((status & ATTAINED) == ATTAINED).all():
-            return
+def leave_homing(port: AxisPort, mode: int) -> None:
+    """End a search and request another mode."""
+    port.clear_bits(START)
+    port.request_mode(mode)
 
 
-def _until(
-    cycles: Iterator[Timed],
-    timeout: float,
-    views: Views,
-    names: Sequence[str],
-    axes: npt.NDArray[np.intp],
-    what: str,
-) -> Iterator[Timed]:
-    """Cycles; DriveError when an axis drops out, or after `timeout` [s]."""
-    start: float | None = None
-    for cycle in cycles:
-        start = cycle.time if start is None else start
-        for axis in axes[(views.axis_flags[axes] >> 6) != 1].tolist():
-            raise DriveError(
-                f"{names[axis]} was enabled no longer while it was homing",
-                hint="see Drives.state and its error code (0x603F)",
-            )
-        yield cycle
-        if cycle.time - start > timeout:
-            axis = int(axes[(views.statusword[axes] & ATTAINED) != ATTAINED][:1].sum())
-            raise DriveError(
-                f"{names[axis]} {what} within {timeout:g} s",
-                hint="a longer timeout=, a higher speed (0x6099), or nothing is there to be found",
-            )
+def stop_homing(port: AxisPort, mode: int) -> Steps:
+    """Wait until the drive works in the mode that it had before."""
+    leave_homing(port, mode)
+    yield
+    yield from _await_mode(port, mode)
 
 
-def _followed(views: Views, axes: npt.NDArray[np.intp]) -> npt.NDArray[np.bool_]:
-    return (views.axis_flags[axes] & 1).astype(np.bool_)
+def _await_mode(port: AxisPort, mode: int) -> Steps:
+    complaint = Complaint(
+        f"does not show mode {mode} (0x6061) within {MODE_TIMEOUT:g} s",
+        "check that the drive supports it (0x6502, its manual)",
+    )
+    yield from await_condition(port, mode_is(port, mode), MODE_TIMEOUT, complaint)

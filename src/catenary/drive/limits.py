@@ -7,14 +7,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from catenary.drive.settings import OwnLimits
+from catenary.drive.units import ROTARY, AxisUnits, UnitNames
 from catenary.errors import ConfigurationError
 from catenary.plan.cycle import AxisLimits, OnLoss
 from catenary.wire.cia402 import Mode
 
-DEFAULT_VELOCITY = 2 * math.pi  # [rad/s] in CSP
 BRAKE_TIME = 0.25  # [s] from velocity_limit to standstill, where nothing states a deceleration
 BRAKE_TIMES = (1e-3, 2.5)  # [s]: outside, the unit of 0x6085 is another one
-DEFAULT_DECELERATION = 25.0  # [rad/s²] of an axis that has no velocity limit and no cyclic mode
 REACTIONS: tuple[OnLoss, ...] = ("quick_stop", "disable", "csp_hold")
 POSITIVE = (
     "velocity_limit",
@@ -24,12 +23,16 @@ POSITIVE = (
     "torque_slope",
     "step_limit",
 )
+NEEDS_VELOCITY = (Mode.CSV, Mode.CST, Mode.PV)
 INFINITE = ("velocity_limit", "torque_limit")  # the others must be finite
 
 
 @dataclass(frozen=True, slots=True)
 class LimitOptions:
-    """Options of `Drives` about the limits and reactions of one axis; None: not given."""
+    """Options of `Drives` about the limits and reactions of one axis; None: not given.
+
+    Units are those of a rotary axis; a linear one has m and N.
+    """
 
     position_min: float | None = None  # [rad]
     position_max: float | None = None  # [rad]
@@ -41,42 +44,44 @@ class LimitOptions:
     step_limit: float | None = None  # [rad]
     on_loss: OnLoss | None = None
 
-    def check(self, name: str, modes: Sequence[Mode]) -> None:
+    def check(self, name: str, modes: Sequence[Mode], units: UnitNames = ROTARY) -> None:
         """Raise ValueError for an impossible or missing option of the axis `name`."""
-        self._check_positions(name)
+        self._check_positions(name, units)
         for option in POSITIVE:
             value = getattr(self, option)
             if value is not None and not value > 0:
-                raise ValueError(f"{name}: {option} must be positive, not {value}")
+                raise ValueError(f"{name}: {_shown(option, units)} must be positive, not {value}")
             if value == math.inf and option not in INFINITE:
-                raise ValueError(f"{name}: {option} must be finite, not {value}")
+                raise ValueError(f"{name}: {_shown(option, units)} must be finite, not {value}")
         if self.on_loss is not None and self.on_loss not in REACTIONS:
             known = ", ".join(map(repr, REACTIONS))
             raise ValueError(f"{name}: on_loss={self.on_loss!r}; known: {known}")
-        unlimited = [mode.name for mode in modes if mode in (Mode.CSV, Mode.CST)]
+        unlimited = [mode.name for mode in modes if mode in NEEDS_VELOCITY]
         if self.velocity_limit is None and unlimited:
             raise ValueError(
-                f"{name}: velocity_limit= [rad/s] at the joint is required in "
+                f"{name}: velocity_limit= [{units.velocity}] at the joint is required in "
                 f"{' and '.join(unlimited)}; write Drives(velocity_limit=...), or math.inf for none"
             )
         if self.velocity_limit == math.inf and Mode.CSP in modes and self.step_limit is None:
             raise ValueError(
-                f"{name}: velocity_limit=inf in CSP needs step_limit= [rad], the largest "
-                "difference between two set-points; without it a wrong target is not refused"
+                f"{name}: velocity_limit=inf in CSP needs step_limit= [{units.position}], the "
+                "largest difference between two set-points; without it a wrong target is accepted"
             )
 
-    def _check_positions(self, name: str) -> None:
+    def _check_positions(self, name: str, units: UnitNames) -> None:
         for option in ("position_min", "position_max"):
             value = getattr(self, option)
             if value is not None and math.isnan(value):
-                raise ValueError(f"{name}: {option} must be an angle [rad], not {value}")
+                raise ValueError(
+                    f"{name}: {option} must be a number [{units.position}], not {value}"
+                )
         low, high = self.position_min, self.position_max
         if low is not None and high is not None and low >= high:
             raise ValueError(f"{name}: position_min {low} is not below position_max {high}")
 
     def lacks_velocity(self, modes: Sequence[Mode]) -> bool:
-        """True if the default velocity limit of CSP applies."""
-        return self.velocity_limit is None and Mode.CSP in modes
+        """True if the default velocity limit of CSP and PP applies."""
+        return self.velocity_limit is None and not {Mode.CSP, Mode.PP}.isdisjoint(modes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +119,11 @@ class AxisBounds:
 
 
 def make_bounds(
-    name: str, options: LimitOptions, modes: Sequence[Mode], own: OwnLimits
+    name: str,
+    options: LimitOptions,
+    modes: Sequence[Mode],
+    own: OwnLimits,
+    units: AxisUnits,
 ) -> AxisBounds:
     """Combine options, the drive's own limits and defaults. The drive's limits only tighten.
 
@@ -123,15 +132,17 @@ def make_bounds(
         options: Options of the application.
         modes: Modes that the axis may use.
         own: Plausible limits of the drive.
+        units: Units of the axis, with their defaults.
 
     Raises:
         ConfigurationError: Nothing states a deceleration and velocity_limit is infinite.
     """
     position_min, position_max = _positions(options, own)
     velocity = _tightest(options.velocity_limit, own.velocity, own.velocity_source, min)
-    if options.lacks_velocity(modes) and not (velocity.value or math.inf) < DEFAULT_VELOCITY:
-        velocity = Chosen(DEFAULT_VELOCITY, "default")
-    deceleration = _deceleration(name, options, velocity.value, own)
+    default = units.defaults.velocity_limit
+    if options.lacks_velocity(modes) and not (velocity.value or math.inf) < default:
+        velocity = Chosen(default, "default")
+    deceleration = _deceleration(name, options, velocity.value, own, units)
     return AxisBounds(
         position_min=position_min,
         position_max=position_max,
@@ -145,6 +156,11 @@ def make_bounds(
         torque_slope=_given(options.torque_slope),
         on_loss=options.on_loss or "quick_stop",
     )
+
+
+def _shown(option: str, units: UnitNames) -> str:
+    """Return the name under which the application wrote an option."""
+    return units.torque_limit if option == "torque_limit" else option
 
 
 def _given(value: float | None) -> Chosen:
@@ -173,7 +189,7 @@ def _positions(options: LimitOptions, own: OwnLimits) -> tuple[Chosen, Chosen]:
 
 
 def _deceleration(
-    name: str, options: LimitOptions, velocity: float | None, own: OwnLimits
+    name: str, options: LimitOptions, velocity: float | None, own: OwnLimits, units: AxisUnits
 ) -> Chosen:
     """Return the option, else a plausible 0x6085, else a stop within BRAKE_TIME."""
     if options.deceleration_limit is not None:
@@ -183,10 +199,10 @@ def _deceleration(
     if velocity is not None:
         return Chosen(velocity / BRAKE_TIME, f"default, velocity limit / {BRAKE_TIME:g} s")
     if options.velocity_limit is None:
-        return Chosen(DEFAULT_DECELERATION, "default")
+        return Chosen(units.defaults.deceleration, "default")
     raise ConfigurationError(
         f"{name}: velocity_limit=inf, and the drive states no plausible deceleration (0x6085)",
-        hint="write Drives(deceleration_limit=...) in rad/s² at the joint",
+        hint=f"write Drives(deceleration_limit=...) in {units.names.acceleration} at the joint",
     )
 
 

@@ -18,7 +18,9 @@ class Unit(Enum):
     POSITION = "position"
     DISTANCE = "distance"  # a difference of positions: without the axis' offset
     VELOCITY = "velocity"
+    SPEED = "speed"  # a velocity or its ramp without a direction
     TORQUE = "torque"
+    EFFORT = "effort"  # a torque without a direction
     RAW = "raw"
 
 
@@ -52,12 +54,23 @@ VELOCITY_OFFSET = AxisObject(Object.VELOCITY_OFFSET, 0, 32, True, Unit.VELOCITY,
 TARGET_POSITION = AxisObject(Object.TARGET_POSITION, 0, 32, True, Unit.POSITION, True)
 TARGET_VELOCITY = AxisObject(Object.TARGET_VELOCITY, 0, 32, True, Unit.VELOCITY, True)
 
+MAX_TORQUE = AxisObject(Object.MAX_TORQUE, 0, 16, False, Unit.EFFORT, True)
+
+# Of the profile modes: one count of the ramps is a velocity count per second.
+PROFILE_OBJECTS: dict[str, AxisObject] = {
+    "profile_velocity": AxisObject(Object.PROFILE_VELOCITY, 0, 32, False, Unit.SPEED, True),
+    "profile_acceleration": AxisObject(Object.PROFILE_ACCELERATION, 0, 32, False, Unit.SPEED, True),
+    "profile_deceleration": AxisObject(Object.PROFILE_DECELERATION, 0, 32, False, Unit.SPEED, True),
+}
+
 # Columns that can be asked for by name, in the order of their numbers.
 NAMED_COLUMNS: dict[str, AxisObject] = {
     "error_code": AxisObject(Object.ERROR_CODE, 0, 16, False, Unit.RAW, False),
     "position_demand": POSITION_DEMAND,
     "velocity_demand": AxisObject(0x606B, 0, 32, True, Unit.VELOCITY, False),
     "torque_demand": TORQUE_DEMAND,
+    "max_torque": MAX_TORQUE,
+    **PROFILE_OBJECTS,
     "velocity_offset": VELOCITY_OFFSET,
     "torque_offset": AxisObject(Object.TORQUE_OFFSET, 0, 16, True, Unit.TORQUE, True),
     "touch_probe_function": AxisObject(0x60B8, 0, 16, False, Unit.RAW, True),

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 
 from catenary.drive.limits import AxisBounds, Chosen
 from catenary.drive.settings import DriveSettings
+from catenary.drive.units import AxisUnits, UnitNames
 from catenary.plan.axis_report import AxisReport
 from catenary.wire.cia402 import Mode
 
-STEP_LEAST = 0.1  # [rad]: default step limit, at least (core/_axes.pyx)
 STEP_SHARE = 2.0  # of the velocity limit · time between two set-points
 
 
@@ -19,6 +19,7 @@ def axis_report(
     bounds: AxisBounds,
     settings: DriveSettings,
     exchange_ns: int,
+    units: AxisUnits,
 ) -> AxisReport:
     """Describe one axis.
 
@@ -28,37 +29,46 @@ def axis_report(
         bounds: Limits in force.
         settings: Raw settings of the drive.
         exchange_ns: Time between two exchanges of the device.
+        units: Units of the axis.
     """
-    lines = (*_limits(bounds), *_fallback(modes, bounds, exchange_ns), *settings.reactions())
+    lines = (
+        *_limits(bounds, units.names),
+        *_fallback(modes, bounds, exchange_ns, units),
+        *settings.reactions(),
+    )
     return AxisReport(name, tuple(map(int, modes)), lines)
 
 
-def _limits(bounds: AxisBounds) -> Iterator[str]:
+def _limits(bounds: AxisBounds, names: UnitNames) -> Iterator[str]:
     yield (
-        f"limits: position from {_shown(bounds.position_min, 'rad')} "
-        f"to {_shown(bounds.position_max, 'rad')}"
+        f"limits: position from {_shown(bounds.position_min, names.position)} "
+        f"to {_shown(bounds.position_max, names.position)}"
     )
-    yield f"limits: velocity {_shown(bounds.velocity, 'rad/s')}"
-    yield f"limits: torque {_shown(bounds.torque, 'N·m')}"
+    yield f"limits: velocity {_shown(bounds.velocity, names.velocity)}"
+    quantity = "torque" if names.torque_limit == "torque_limit" else "force"
+    yield f"limits: {quantity} {_shown(bounds.torque, names.torque)}"
 
 
-def _fallback(modes: Sequence[Mode], bounds: AxisBounds, exchange_ns: int) -> Iterator[str]:
+def _fallback(
+    modes: Sequence[Mode], bounds: AxisBounds, exchange_ns: int, units: AxisUnits
+) -> Iterator[str]:
+    names = units.names
     if Mode.CSP in modes:
-        yield f"step limit {_shown(_step(bounds, exchange_ns), 'rad')}"
+        yield f"step limit {_shown(_step(bounds, exchange_ns, units), names.position)}"
     yield (
-        f"fallback: deceleration {_shown(bounds.deceleration, 'rad/s²')}, "
-        f"acceleration {_shown(bounds.acceleration, 'rad/s²')}"
+        f"fallback: deceleration {_shown(bounds.deceleration, names.acceleration)}, "
+        f"acceleration {_shown(bounds.acceleration, names.acceleration)}"
     )
     if Mode.CST in modes:
-        yield f"fallback: torque slope {_shown(bounds.torque_slope, 'N·m/s')}"
+        yield f"fallback: torque slope {_shown(bounds.torque_slope, names.torque_slope)}"
     yield f"on_loss: {bounds.on_loss}"
 
 
-def _step(bounds: AxisBounds, exchange_ns: int) -> Chosen:
+def _step(bounds: AxisBounds, exchange_ns: int, units: AxisUnits) -> Chosen:
     """Return the step limit between two set-points of neighbouring exchanges."""
     if bounds.step.value is not None or bounds.velocity.value is None:
         return bounds.step
-    step = max(STEP_LEAST, STEP_SHARE * bounds.velocity.value * exchange_ns * 1e-9)
+    step = max(units.defaults.step_limit, STEP_SHARE * bounds.velocity.value * exchange_ns * 1e-9)
     return Chosen(step, "default")
 
 

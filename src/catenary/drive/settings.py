@@ -193,7 +193,7 @@ def _velocity_limit(settings: DriveSettings, units: AxisUnits) -> tuple[float | 
     found: list[tuple[float, str]] = []
     speed = settings.max_motor_speed
     if speed is not None and MOTOR_SPEED_RANGE[0] <= speed <= MOTOR_SPEED_RANGE[1]:
-        found.append((speed * 2 * math.pi / 60 / units.gear_ratio, "0x6080 of the drive"))
+        found.append((speed * 2 * math.pi / 60 * units.per_motor_radian, "0x6080 of the drive"))
     profile = settings.max_profile_velocity
     if units.velocity_unit is not None and _is_plausible(profile, 32):
         found.append((profile * abs(units.velocity_scale), "0x607F of the drive"))

@@ -73,7 +73,7 @@ def _check_quick_stop(axis: Axis) -> None:
 def downloads(axis: Axis, sub: SubDevice, period_ns: int) -> tuple[tuple[int, int, bytes], ...]:
     """0x6060 and 0x60C2, for drives that do not map the mode and for the period; what homing
     needs."""
-    found = _mode(axis, sub) + _interpolation(axis, sub, period_ns)
+    found = _mode(axis, sub) + _interpolation(axis, sub, period_ns) + _ramps(axis)
     return found + (axis.homing.downloads(axis.units, axis.index(0)) if axis.homing else ())
 
 
@@ -89,6 +89,22 @@ def _mode(axis: Axis, sub: SubDevice) -> tuple[tuple[int, int, bytes], ...]:
     if found == int(axis.modes[0]):
         return ()
     return ((index, 0, SINT.encode(int(axis.modes[0]))),)
+
+
+def _ramps(axis: Axis) -> tuple[tuple[int, int, bytes], ...]:
+    """0x6083 and 0x6084 of the profile modes, as far as the application limits them."""
+    if not axis.uses_profile:
+        return ()
+    ramps = (
+        (Object.PROFILE_ACCELERATION, axis.options.acceleration_limit),
+        (Object.PROFILE_DECELERATION, axis.options.deceleration_limit),
+    )
+    scale = abs(axis.units.velocity_scale)
+    return tuple(
+        (axis.index(index), 0, UDINT.encode(max(1, round(value / scale))))
+        for index, value in ramps
+        if value is not None
+    )
 
 
 def _interpolation(

@@ -15,10 +15,10 @@ import threading
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Protocol
 
 from catenary.core import Iteration
 from catenary.errors import LoopError
+from catenary.loop.moves import Awaited, stopped_late
 from catenary.loop.networks import VIRTUAL, NetworksIteration, leave_all
 from catenary.loop.running import Running
 from catenary.loop.signals import SignalGuard
@@ -26,16 +26,7 @@ from catenary.loop.signals import SignalGuard
 END_TIMEOUT = 30.0  # [s] and some periods: to leave a loop after an error takes some seconds
 UPDATE_TIMEOUT = 5.0  # [s] for which another thread may be inside `update`
 BEHIND = 0.1  # [s] of virtual time that is not made up for
-LOOK = 1.0  # [s] between two looks of a waiting call, at most
-
-
-class Awaited(Protocol):
-    """What a program can wait for: a move."""
-
-    @property
-    def done(self) -> bool: ...
-    @property
-    def error(self) -> Exception | None: ...
+LOOK = 0.5  # [s] between two looks of a waiting call, at most
 
 
 class Background:
@@ -141,23 +132,22 @@ class Background:
                     engine.blocks()[1][:] = targets
                 engine.end_update(complete)
 
-    def wait(self, awaited: Awaited, timeout: float | None = None) -> None:
-        """Wait until it is done, while the thread iterates; raise its error.
-
-        Raises:
-            TimeoutError: after `timeout` [s].
-        """
+    def wait(self, move: Awaited, timeout: float | None) -> None:
+        """See `Loop.wait`."""
         self._refuse_inside_update("wait")
-        end = None if timeout is None else time.monotonic() + timeout
+        limit = move.patience if timeout is None else timeout
+        end = time.monotonic() + limit
         with self._cycled:
-            while not awaited.done:
+            while not move.done:
                 self._require_alive()
-                left = LOOK if end is None else end - time.monotonic()
-                if left <= 0:
-                    raise TimeoutError(f"not done within {timeout:g} s")
-                self._cycled.wait(min(left, LOOK))
-        if awaited.error is not None:
-            raise awaited.error
+                if time.monotonic() > end:
+                    raise stopped_late(move, limit)
+                self._cycled.wait(LOOK)
+            if move.error is not None and self._thread.is_alive():
+                self._cycled.wait(LOOK)  # it may be a consequence of what ends the loop now
+        if move.error is not None:
+            self.raise_error()
+            raise move.error
 
     def _take_commit(self) -> None:
         self._refuse_inside_update("update")

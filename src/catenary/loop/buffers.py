@@ -8,7 +8,7 @@ from dataclasses import fields
 import numpy as np
 
 from catenary.plan.cycle import Bank, Column
-from catenary.plan.wish import Views, Wish, WishTables
+from catenary.plan.wish import Mover, Views, Wish, WishTables
 
 COLUMN_BUFFERS: dict[tuple[bool, Bank], str] = {
     (False, Bank.REAL): "input_reals",
@@ -18,7 +18,7 @@ COLUMN_BUFFERS: dict[tuple[bool, Bank], str] = {
     (True, Bank.INTEGER): "output_integers",
     (True, Bank.BIT): "output_bits",
 }
-OTHERS = (*COLUMN_BUFFERS.values(), "unit_valid", "is_open")
+OTHERS = (*COLUMN_BUFFERS.values(), "unit_valid", "movers", "is_open")
 AXIS_BUFFERS = tuple(each.name for each in fields(Views) if each.name not in OTHERS)
 
 
@@ -34,16 +34,17 @@ def bind_wishes(
     """
     arrays = {name: np.asarray(buffers[name]) for name in (*AXIS_BUFFERS, *COLUMN_BUFFERS.values())}
     unit_valid = np.asarray(buffers["unit_valid"])
+    movers: list[Mover] = []
     used = dict.fromkeys(("axes", *COLUMN_BUFFERS.values()), 0)
     for wish, table in zip(wishes, tables, strict=True):
         sizes = dict.fromkeys(AXIS_BUFFERS, len(table.axes)) | column_sizes(table)
         starts = {name: used.get(name, used["axes"]) for name in sizes}
         parts = {name: arrays[name][starts[name] :][: sizes[name]] for name in sizes}
-        wish.bind(Views(**parts, unit_valid=unit_valid, is_open=is_open))
+        wish.bind(Views(**parts, unit_valid=unit_valid, movers=movers, is_open=is_open))
         used["axes"] += len(table.axes)
         for name in COLUMN_BUFFERS.values():
             used[name] += sizes[name]
-    return Views(**arrays, unit_valid=unit_valid, is_open=is_open)
+    return Views(**arrays, unit_valid=unit_valid, movers=movers, is_open=is_open)
 
 
 def column_sizes(table: WishTables) -> dict[str, int]:

@@ -16,12 +16,13 @@ from types import TracebackType
 from catenary.bus import SubDevice
 from catenary.core import Cycle, Iteration
 from catenary.errors import LawError
-from catenary.loop.background import Awaited, Background, program_ends
+from catenary.loop.background import Background, program_ends
 from catenary.loop.clocks import Clocks
 from catenary.loop.devices import DeviceWish, by_network
 from catenary.loop.laws.law import Law, LawFunction
 from catenary.loop.laws.law import law as made_law
 from catenary.loop.laws.run import LawRun, Numbers
+from catenary.loop.moves import Awaited, wait_for_move
 from catenary.loop.network import ENDING, TROUBLE, Network, Settings, leave_method
 from catenary.loop.networks import (
     NetworksIteration,
@@ -237,24 +238,6 @@ class Loop:
             )
         return self._background.update()
 
-    def wait(self, awaited: Awaited, *, timeout: float | None = None) -> None:
-        """Iterate until `awaited` is done; while the loop runs in the background, only wait.
-
-        Args:
-            awaited: a move, or anything else with `done` and `error`.
-            timeout: [s]; None: none.
-
-        Raises:
-            TimeoutError: it is not done within `timeout`.
-            CatenaryError: what ended the loop or the move.
-        """
-        if self._background is not None:
-            return self._background.wait(awaited, timeout)
-        for _ in self:
-            if awaited.done:
-                break
-        return None
-
     @property
     def error(self) -> Exception | None:
         """Error that ended the loop in the background; None if there is none."""
@@ -275,6 +258,27 @@ class Loop:
     def __next__(self) -> Cycle:
         return next(iter(self))
 
+    def wait(self, move: Awaited, timeout: float | None = None) -> None:
+        """Iterate until a move is done: `loop.wait(arm.move_to(0.5), timeout=10.0)`.
+
+        While the loop runs in the background, only wait; in any thread.
+
+        It returns when the axes have reached their goals, or after `move.stop()` are at rest.
+
+        Args:
+            move: what `arm.move_to`, `arm.move_by` or `arm.home` returned.
+            timeout: [s]; the move is stopped then. None: twice the expected duration plus 10 s, in
+                homing 60 s.
+
+        Raises:
+            MoveError: The move took too long, was replaced, or its axis was stopped.
+            DriveError: A drive is in fault or was stopped; other errors of the iteration likewise.
+        """
+        if self._background is None:
+            wait_for_move(iter(self), move, timeout)
+        else:
+            self._background.wait(move, timeout)
+
     def _make_iteration(self) -> Iteration | NetworksIteration:
         first = self._opened
         if len(self._networks) > 1:
@@ -285,6 +289,7 @@ class Loop:
             trouble=TROUBLE,
             al_status=State.OP,
             beside=first.service.beside,
+            movers=first.views.movers,
         )
 
     def start(

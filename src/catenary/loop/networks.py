@@ -88,12 +88,12 @@ class NetworksIteration:
             flags = [one.engine.run(1) for one in self._runnings]
             self._cycle = NetworksCycle(self._runnings, self._quorum)
         else:
-            self._commit_if_free()
+            self._commit_if_free(self._cycle)
             flags = [one.engine.next() for one in self._runnings]
         self._judge(self._cycle, flags)
         return self._cycle
 
-    def _commit_if_free(self) -> None:
+    def _commit_if_free(self, cycle: NetworksCycle) -> None:
         """Commit, unless another thread is writing the targets."""
         lock = self.commit_lock
         if lock is not None and not lock.acquire(blocking=False):
@@ -101,7 +101,9 @@ class NetworksIteration:
                 one.engine.keep_targets()
             return
         try:
-            for one in self._runnings:
+            for one, its in zip(self._runnings, cycle.networks, strict=True):
+                for mover in list(one.views.movers):
+                    mover.step(its.time)
                 one.engine.commit_targets()
         finally:
             if lock is not None:

@@ -161,7 +161,7 @@ class Running:
     def enable(self) -> None:
         """Reset faults and enable all axes. Position axes hold when this returns; velocity and
         torque axes wait for their first targets."""
-        in_position = self.views.mode_target == Mode.CSP
+        in_position = np.isin(self.views.mode_target, (Mode.CSP, Mode.PP))
         if (~in_position & self._in_fault()).any():  # their targets would come too late
             self._request(GOAL_RESET, ~in_position & self._in_fault())
             self._await(lambda: ~in_position & self._in_fault())
@@ -219,6 +219,8 @@ class Running:
 
     def judge(self, flags: int, *, faults: bool) -> None:
         """Announce what happened in a cycle in trouble, and raise its error, if it is one."""
+        for mover in list(self.views.movers):
+            mover.check()
         self.raise_ended(flags)
         stops = self._announce_axes() if flags & CYCLE_DROPPED else []
         if flags & CYCLE_CLOCKS:
@@ -307,6 +309,8 @@ class Running:
         if self._left:
             return []
         self._left = True
+        for mover in list(self.views.movers):
+            mover.end()
         steps: tuple[Callable[[SignalGuard], None], ...] = (
             self._stop_axes,
             self._stop_cycle,

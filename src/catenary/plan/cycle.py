@@ -123,13 +123,16 @@ class AxisLimits:
 
 @dataclass(frozen=True, slots=True)
 class AxisPlan:
-    """One CiA 402 axis: slot k of a device (objects + 0x800·k), each quantity's place or None."""
+    """One CiA 402 axis: slot k of a device (objects + 0x800·k), each quantity's place or None.
+
+    A linear axis has m, m/s and N where rad, rad/s and N·m are given here.
+    """
 
     name: str
     device: int
     slot: int
     sync_unit: int
-    mode: int  # modes of operation 0x6060 at the start: 8 CSP, 9 CSV, 10 CST
+    mode: int  # modes of operation 0x6060 at the start: 1 PP, 3 PV, 8 CSP, 9 CSV, 10 CST
     controlword: Number
     statusword: Number
     mode_target: Number | None = None  # 0x6060
@@ -147,6 +150,8 @@ class AxisPlan:
     # Shape of fallback and return, never of the application's set-points (docs/safety.md)
     acceleration: float = 25.0  # [rad/s²] on return to the set-points
     deceleration: float = 25.0  # [rad/s²] to standstill, and before a position limit in CSV
+    standstill: float = 0.05  # [rad/s] at most: at rest
+    step_floor: float = 0.1  # [rad] the default step limit is at least this
     torque_slope: float | None = None  # [N·m/s] on return to the set-points in CST; None: at once
     on_loss: OnLoss = "quick_stop"  # reaction when the core stops the axis
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -156,6 +156,19 @@ class WishTables:
     axis_reports: tuple[AxisReport, ...] = ()
 
 
+class Mover(Protocol):
+    """Source of targets while the loop is iterated, such as the moves of some drives."""
+
+    def step(self, now: float, /) -> None:
+        """Write the targets of the next commit. `now`: time of the cycle [s]."""
+
+    def check(self) -> None:
+        """Look at the axes after a cycle that brought trouble."""
+
+    def end(self) -> None:
+        """The loop ends: nothing moves any more."""
+
+
 @dataclass(frozen=True, slots=True)
 class Views:
     """The part of the loop's private buffers that belongs to one wish: views, not copies.
@@ -191,7 +204,9 @@ class Views:
     output_integers: Integers
     output_bits: Bytes
     unit_valid: Bytes  # (units of the whole plan,) whether each one's last exchange was valid
-    is_open: Callable[[], bool]  # True while the loop runs: afterwards requests reach nothing
+    movers: list[Mover] = field(default_factory=list)  # of the whole loop, while they move
+    # Whether the loop runs: afterwards requests reach nothing
+    is_open: Callable[[], bool] = lambda: True
 
 
 class Wish(Protocol):

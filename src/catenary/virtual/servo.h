@@ -24,7 +24,9 @@ enum servo_slot {
     SLOT_INTERPOLATION_PERIOD, SLOT_INTERPOLATION_EXPONENT, SLOT_VELOCITY_DEMAND,
     SLOT_POLARITY,
     SLOT_HOME_OFFSET, SLOT_HOMING_METHOD, SLOT_HOMING_SPEED, SLOT_HOMING_SLOW,
-    SLOT_HOMING_ACCELERATION, SLOT_HOMING_TORQUE, SLOT_ABORT_CONNECTION_OPTION, AXIS_SLOTS
+    SLOT_HOMING_ACCELERATION, SLOT_HOMING_TORQUE, SLOT_ABORT_CONNECTION_OPTION,
+    SLOT_PROFILE_VELOCITY, SLOT_ACCELERATION, SLOT_HALT_OPTION, SLOT_POSITION_WINDOW, SLOT_POSITION_WINDOW_TIME,
+    SLOT_VELOCITY_WINDOW, SLOT_VELOCITY_WINDOW_TIME, SLOT_VELOCITY_THRESHOLD, AXIS_SLOTS
 };
 
 enum {
@@ -32,7 +34,7 @@ enum {
     QUICK_STOP_ACTIVE, FAULT_REACTION_ACTIVE, FAULT
 };
 
-enum { HM = 6, CSP = 8, CSV = 9, CST = 10 };
+enum { PP = 1, PV = 3, HM = 6, CSP = 8, CSV = 9, CST = 10 };
 
 /* 0x6007, what the drive does when its process data stops. */
 enum { ABORT_NOTHING = 0, ABORT_FAULT = 1, ABORT_DISABLE_VOLTAGE = 2, ABORT_QUICK_STOP = 3 };
@@ -58,6 +60,13 @@ typedef struct servo_quirks {
 typedef struct servo_targets {
     int64_t velocity, velocity_offset, torque, torque_offset;
 } servo_targets;
+
+/* Profile modes, servo_profile.h: counts unwrapped; seconds in the window of bit 10. */
+typedef struct servo_profile {
+    int64_t goal, next;
+    double in_window;
+    uint8_t asked, acknowledged, in_process, buffered, reached;
+} servo_profile;
 
 typedef struct servo_axis {
     /* the machine, SI */
@@ -85,6 +94,7 @@ typedef struct servo_axis {
     double boot;                                      /* seconds until ready for anything */
     servo_quirks quirks;
     servo_targets targets;
+    servo_profile profile;
     double bit_12_hidden;                             /* seconds for which bit 12 is not shown */
     double mode_wait;                                 /* seconds until the requested mode applies */
     int mode_requested;
@@ -125,6 +135,7 @@ static void servo_hold(servo_axis *a) {
     a->interpolated = 0;
     a->following_time = 0;
     a->targets = (servo_targets){0};
+    a->profile = (servo_profile){.goal = a->target, .asked = a->profile.asked};
 }
 
 static void servo_fault(controller *c, servo_axis *a, int64_t *slots, uint16_t code) {
@@ -245,7 +256,7 @@ static void servo_supervise(controller *c, servo_axis *a, int64_t *slots, double
         servo_fault(c, a, slots, a->injected);
     if (fabs(a->velocity) > 1.2 * a->velocity_limit && servo_powered(a))
         servo_fault(c, a, slots, ERROR_OVERSPEED);
-    if (a->state != OPERATION_ENABLED || a->mode != CSP || a->ramping != RAMP_NONE) {
+    if (a->state != OPERATION_ENABLED || (a->mode != CSP && a->mode != PP) || a->ramping != RAMP_NONE) {
         a->following_time = 0;
         return;
     }
@@ -317,10 +328,11 @@ static double servo_ramp(servo_axis *a, const int64_t *slots, double limit, doub
 }
 
 #include "servo_homing.h"
+#include "servo_profile.h"
 
 /* Takes the set-points over, or holds the demand at the last ones followed. */
 static void servo_take_targets(servo_axis *a, const int64_t *slots, int fresh, double dt, double rate) {
-    if (!servo_follows(a)) {
+    if (!is_profile_mode(a->mode) && !servo_follows(a)) {
         a->command_velocity = 0;
         a->interpolated = 0;
         return;
@@ -329,6 +341,8 @@ static void servo_take_targets(servo_axis *a, const int64_t *slots, int fresh, d
                                  slots[SLOT_TARGET_TORQUE], slots[SLOT_TORQUE_OFFSET]};
     if (a->mode == CSP)
         servo_interpolate(a, slots, fresh, dt, rate);
+    else if (is_profile_mode(a->mode))
+        profile_drive(a, slots, dt);
 }
 
 static double servo_drive(servo_axis *a, const int64_t *slots, int fresh, double dt, double rate) {
@@ -340,12 +354,14 @@ static double servo_drive(servo_axis *a, const int64_t *slots, int fresh, double
     double feed_forward = (double)t->torque_offset * 1e-3 * a->rated_torque;
     if (a->ramping != RAMP_NONE)
         torque = servo_ramp(a, slots, limit, dt);
-    else if (a->mode == CSP) {
+    else if (a->mode == CSP || a->mode == PP) {
         double offset = (double)t->velocity_offset * a->radian_per_velocity;
         double error = (a->command - servo_exact(a)) * a->radian_per_count;
         torque = servo_velocity_loop(a, a->position_gain * error + a->command_velocity + offset, feed_forward, limit, dt);
     } else if (a->mode == CSV) {
         a->command_velocity = (double)(t->velocity + t->velocity_offset) * a->radian_per_velocity;
+        torque = servo_velocity_loop(a, a->command_velocity, feed_forward, limit, dt);
+    } else if (a->mode == PV) {
         torque = servo_velocity_loop(a, a->command_velocity, feed_forward, limit, dt);
     } else if (a->mode == CST) {
         torque = (double)t->torque * 1e-3 * a->rated_torque + feed_forward;
@@ -379,6 +395,8 @@ static uint16_t servo_statusword(const servo_axis *a, const int64_t *slots) {
         return word;
     if (a->mode == HM)
         return word | homing_status(a);
+    if (is_profile_mode(a->mode))
+        return word | profile_status(a, slots);
     int cyclic = a->mode == CSP || a->mode == CSV || a->mode == CST;
     if (cyclic && a->ramping == RAMP_NONE && a->fed && !a->quirks.never_bit_12 && a->bit_12_hidden <= 0)
         word |= 0x1000;                                      /* follows the set-point */
@@ -396,7 +414,7 @@ static void servo_show(servo_axis *a, int64_t *slots) {
     slots[SLOT_VELOCITY] = wrap32(llrint(a->velocity * a->velocity_per_radian));
     slots[SLOT_TORQUE] = llrint(1e3 * a->torque * a->per_torque);
     slots[SLOT_TORQUE_DEMAND] = slots[SLOT_TORQUE];
-    int commanded = a->mode == CSP && servo_powered(a) && a->ramping == RAMP_NONE;
+    int commanded = (a->mode == CSP || a->mode == PP) && servo_powered(a) && a->ramping == RAMP_NONE;
     slots[SLOT_POSITION_DEMAND] = wrap32(commanded ? llrint(a->command) : counts);
     slots[SLOT_VELOCITY_DEMAND] = wrap32(llrint(a->command_velocity * a->velocity_per_radian));
     slots[SLOT_FOLLOWING_ERROR] = wrap32(slots[SLOT_POSITION_DEMAND] - slots[SLOT_POSITION]);
@@ -406,7 +424,7 @@ static void servo_show(servo_axis *a, int64_t *slots) {
 }
 
 static inline int servo_knows_mode(const servo_axis *a, int mode) {
-    int known = mode == 0 || mode == HM || mode == CSP || mode == CSV || mode == CST;
+    int known = mode == 0 || is_profile_mode(mode) || mode == HM || mode == CSP || mode == CSV || mode == CST;
     return known && !(a->quirks.refused_modes >> mode & 1);
 }
 
@@ -457,6 +475,7 @@ static void servo_step(controller *c, servo_axis *a, int64_t *slots, int fed, in
     servo_change_mode(a, slots, dt);
     servo_command(c, a, slots);
     homing_command(a, slots);
+    profile_command(a, slots);
     servo_supervise(c, a, slots, dt);
     a->torque = servo_powered(a) ? servo_drive(a, slots, fresh, dt, rate) : 0;
     if (a->joint == NULL)

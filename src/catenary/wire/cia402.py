@@ -61,7 +61,8 @@ class Status(IntFlag):
     REMOTE = 1 << 9  # the controlword is obeyed
     TARGET_REACHED = 1 << 10
     INTERNAL_LIMIT_ACTIVE = 1 << 11
-    MODE_12 = 1 << 12  # CSP, CSV, CST: the drive follows the set-points; HM: homing attained
+    # CSP, CSV, CST: set-points are followed; HM: homing attained; PP: set-point acknowledged
+    MODE_12 = 1 << 12
     MODE_13 = 1 << 13  # CSP: following error; HM: homing error
     MANUFACTURER_14 = 1 << 14
     MANUFACTURER_15 = 1 << 15
@@ -79,7 +80,7 @@ class Control(IntFlag):
     QUICK_STOP = 1 << 2  # 0: stop quickly
     ENABLE_OPERATION = 1 << 3
     MODE_4 = 1 << 4  # PP: new set-point; HM: start homing
-    MODE_5 = 1 << 5
+    MODE_5 = 1 << 5  # PP: change set immediately
     MODE_6 = 1 << 6
     FAULT_RESET = 1 << 7  # at its rising edge
     HALT = 1 << 8
@@ -209,6 +210,9 @@ class Object(IntEnum):
     SOFTWARE_POSITION_LIMIT = 0x607D
     MAX_PROFILE_VELOCITY = 0x607F
     MAX_MOTOR_SPEED = 0x6080  # [rpm]
+    PROFILE_VELOCITY = 0x6081
+    PROFILE_ACCELERATION = 0x6083
+    PROFILE_DECELERATION = 0x6084
     QUICK_STOP_DECELERATION = 0x6085
     POSITION_ENCODER_RESOLUTION = 0x608F
     GEAR_RATIO = 0x6091

@@ -1,4 +1,4 @@
-"""A servo drive, CiA 402 (IEC 61800-7-201): CSP, CSV, CST and homing on 1 to 8 axes, at + 0x800·k.
+"""A servo drive, CiA 402 (IEC 61800-7-201): PP, PV, homing, CSP, CSV, CST; 1 to 8 axes at 0x800·k.
 
 The motor, its loops and the drive's state machine are compiled (`servo.h`) and stepped at the
 device's own cycle. Positions count `counts_per_turn` a turn; velocities are counts a second;
@@ -15,6 +15,7 @@ from catenary.virtual._motors import Motors
 from catenary.virtual.coe.dictionary import (
     ARRAY,
     INTEGER8,
+    INTEGER16,
     OUT_OF_RANGE,
     UNSIGNED8,
     UNSIGNED16,
@@ -37,6 +38,7 @@ from catenary.virtual.devices.servo_objects import (
     OBJECTS,
     RW,
     RX,
+    profile_presets,
 )
 from catenary.virtual.devices.servo_quirks import NO_QUIRKS, ServoQuirks
 from catenary.virtual.devices.synchronisation import DC_SYNC0, DC_SYNC1, Synchronisation
@@ -48,8 +50,8 @@ STEP_NS = 250_000
 MINIMUM_CYCLE_NS = 62_500  # of SYNC0
 COPY_NS = 20_000  # outputs have to be there so long before SYNC0
 BOOT_SECONDS = 0.02
-SUPPORTED_MODES = {0, 6, 8, 9, 10}
-SUPPORTED_MODES_MASK = 1 << 5 | 1 << 7 | 1 << 8 | 1 << 9  # 0x6502: HM, CSP, CSV, CST
+SUPPORTED_MODES = {0, 1, 3, 6, 8, 9, 10}
+SUPPORTED_MODES_MASK = sum(1 << mode - 1 for mode in SUPPORTED_MODES - {0})  # 0x6502
 VELOCITY_BANDWIDTH = 2 * math.pi * 80  # rad/s
 POSITION_BANDWIDTH = 100.0  # rad/s
 AXIS_STRIDE, PDO_STRIDE = 0x800, 0x10
@@ -286,6 +288,7 @@ class Servo(AppliedDevice):
             (_segment.SLOT_DECELERATION, deceleration // 2),
             (_segment.SLOT_INTERPOLATION_PERIOD, 1),
             (_segment.SLOT_INTERPOLATION_EXPONENT, -3),
+            *profile_presets(self.counts_per_turn, self.velocity_counts_per_turn),
             *homing_presets(self.velocity_counts_per_turn / (2 * math.pi)),
         ):
             self.core.put_slot(self.position, _segment.SLOTS_PER_AXIS * axis + slot, value)
@@ -341,6 +344,8 @@ class Servo(AppliedDevice):
         dictionary.add_variable(0x6076 + base, number("Motor rated torque", UNSIGNED32, torque))
         modes = number("Supported drive modes", UNSIGNED32, SUPPORTED_MODES_MASK)
         dictionary.add_variable(0x6502 + base, modes)
+        trapezoid = number("Motion profile type", INTEGER16, 0)
+        dictionary.add_variable(0x6086 + base, trapezoid)
         encoder = [
             number("Encoder increments", UNSIGNED32, self.counts_per_turn),
             number("Motor revolutions", UNSIGNED32, 1),

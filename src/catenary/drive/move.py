@@ -1,0 +1,219 @@
+"""Moves: motions of some axes that were requested, stepped before each commit of the loop."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from catenary.drive.motions import HALT, OWN_BITS
+from catenary.drive.port import AxisPort, Complaint, Steps
+from catenary.errors import CatenaryError, MoveError
+from catenary.plan.wish import Mover
+
+Outcome: TypeAlias = Literal["reached", "stopped", "replaced", "failed"]
+
+WORST: tuple[Outcome, ...] = ("failed", "replaced", "stopped", "reached")
+
+
+@dataclass(slots=True)
+class Part:
+    """Owns the motion of one axis in a move."""
+
+    port: AxisPort
+    goal: float  # NaN in homing
+    steps: Steps
+    stop: Callable[[], Steps]  # what brings the axis to rest
+    mode: int | None = None  # the axis must keep it; None: the motion changes it
+    is_stopping: bool = False
+    outcome: Outcome | None = None
+    error: CatenaryError | None = None
+
+
+class Move:
+    """Handle of a requested motion: `arm.move_to(...)`, `arm.move_by(...)`, `arm.home()`.
+
+    The loop must be iterated while it moves: `loop.wait(move)` does it, or your own `for`.
+    """
+
+    def __init__(self, parts: Sequence[Part], owner: Moves, patience: float) -> None:
+        self._parts = tuple(parts)
+        self._owner = owner
+        self._finished = threading.Event()
+        self.patience = patience  # [s] default of `loop.wait(move)`
+
+    @property
+    def done(self) -> bool:
+        """True once every axis has arrived, or has ended otherwise: see `outcome`."""
+        return self._finished.is_set()
+
+    @property
+    def outcome(self) -> Outcome | None:
+        """How the move ended: "reached" its goal, "stopped" by `stop`, "replaced" by another move
+        of one of its axes, "failed" (see `error`). The worst of its axes counts. None: not done."""
+        if not self.done:
+            return None
+        return next(each for each in WORST if any(part.outcome == each for part in self._parts))
+
+    @property
+    def error(self) -> CatenaryError | None:
+        """Reason why the goal was not reached: of a move that failed or was replaced."""
+        errors = [part.error for part in self._parts if part.error is not None]
+        return errors[0] if self.done and errors else None
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the axes that move."""
+        return tuple(part.port.name for part in self._parts)
+
+    @property
+    def remaining(self) -> npt.NDArray[np.float64]:
+        """(k,) goal minus actual position of the axes that move [rad], [m]; NaN in homing."""
+        return np.array([part.goal - part.port.position for part in self._parts])
+
+    def stop(self) -> None:
+        """Decelerate and hold; the move is done when its axes are at rest.
+
+        In CSP by the acceleration of the move, in PP by the drive's halt (0x605D), in homing the
+        search ends.
+        """
+        self._owner.stop(self._parts)
+
+    def timeout_error(self, timeout: float) -> MoveError:
+        """Return the error of a move that is not done after `timeout` [s]."""
+        part = next((part for part in self._parts if part.outcome is None), self._parts[0])
+        hint = "give loop.wait(timeout=) more time, or look at what keeps the axis: Drives.state"
+        return part.port.error(Complaint(f"was still moving after {timeout:g} s", hint, part.goal))
+
+    def finish_if_over(self) -> None:
+        """Become done if no axis moves any more."""
+        if all(part.outcome is not None for part in self._parts):
+            self._finished.set()
+
+    def __repr__(self) -> str:
+        return f"<Move of {', '.join(self.axes)}: {self.outcome or 'moving'}>"
+
+
+class Moves:
+    """Owns the active moves of some drives: at most one of each axis. A `Mover` of the loop.
+
+    Moves are requested by any thread; the thread that iterates the loop steps them.
+    """
+
+    def __init__(self, movers: list[Mover]) -> None:
+        self._movers = movers
+        self._lock = threading.Lock()
+        self._active: dict[int, tuple[Part, Move]] = {}
+
+    def begin(self, parts: Mapping[int, Part], patience: float) -> Move:
+        """Start a move. It replaces the motion of axes that move already.
+
+        Args:
+            parts: Motion of each axis, by its number.
+            patience: Default timeout of a wait [s].
+        """
+        with self._lock:
+            move = Move(tuple(parts.values()), self, patience)
+            for axis, part in parts.items():
+                if axis in self._active:
+                    self._replace(axis)
+                self._active[axis] = (part, move)
+            if self not in self._movers:
+                self._movers.append(self)
+        return move
+
+    def goal(self, axis: int) -> float | None:
+        """Return the goal of an axis that moves; None if it does not."""
+        with self._lock:
+            part, _ = self._active.get(axis, (None, None))
+            return None if part is None or part.is_stopping else part.goal
+
+    def stop(self, parts: Sequence[Part]) -> None:
+        """Bring the axes of a move to rest."""
+        with self._lock:
+            for part in parts:
+                if part.outcome is None and not part.is_stopping:
+                    part.is_stopping = True
+                    part.steps.close()
+                    part.steps = part.stop()
+
+    # plan.wish.Mover
+
+    def step(self, now: float) -> None:
+        """Compute one step of each axis that moves, at the time of the cycle [s]."""
+        with self._lock:
+            for axis, (part, _) in list(self._active.items()):
+                part.port.now = now
+                if not self._check(axis, part):
+                    self._advance(axis, part)
+            self._leave_if_idle()
+
+    def check(self) -> None:
+        """End the moves of axes that were stopped."""
+        with self._lock:
+            for axis, (part, _) in list(self._active.items()):
+                self._check(axis, part)
+            self._leave_if_idle()
+
+    def end(self) -> None:
+        """End all moves: the loop is left."""
+        with self._lock:
+            for axis, (part, _) in list(self._active.items()):
+                hint = "wait for a move before the loop is left: loop.wait(move)"
+                self._fail(axis, part, Complaint("was moving when the loop ended", hint, part.goal))
+            self._leave_if_idle()
+
+    # One axis
+
+    def _check(self, axis: int, part: Part) -> bool:
+        """End the motion of an axis that cannot go on with it. Return True if so."""
+        cause = part.port.stop_cause()
+        if cause is not None:
+            hint = "see Drives.state and Drives.stopped; reset and enable the axis, then move again"
+        elif part.mode is not None and part.port.requested_mode != part.mode:
+            cause, hint = "its mode was changed", "wait for a move before Drives.switch()"
+        else:
+            return False
+        self._fail(axis, part, Complaint(f"ended its move: {cause}", hint, part.goal))
+        return True
+
+    def _advance(self, axis: int, part: Part) -> None:
+        try:
+            next(part.steps)
+        except StopIteration:
+            self._finish(axis, "stopped" if part.is_stopping else "reached", None)
+        except CatenaryError as error:
+            self._finish(axis, "failed", error)
+
+    def _fail(self, axis: int, part: Part, complaint: Complaint) -> None:
+        error = part.port.error(complaint)
+        part.steps.close()
+        part.port.clear_bits(OWN_BITS)
+        part.port.handshake = False
+        self._finish(axis, "failed", error)
+
+    def _finish(self, axis: int, outcome: Outcome, error: CatenaryError | None) -> None:
+        """The axis ends its move. After an error of a handshake it stays halted."""
+        part, move = self._active.pop(axis)
+        part.outcome, part.error = outcome, error
+        part.port.motion = None
+        part.port.clear_bits(OWN_BITS & ~HALT)
+        move.finish_if_over()
+
+    def _replace(self, axis: int) -> None:
+        """End a motion for the next one, which goes on from it."""
+        part, move = self._active.pop(axis)
+        part.steps.close()
+        part.port.clear_bits(OWN_BITS & ~HALT)
+        part.outcome = "replaced"
+        hint = "wait for a move before the next one, or look at move.outcome"
+        part.error = part.port.error(Complaint("got another move", hint, part.goal))
+        move.finish_if_over()
+
+    def _leave_if_idle(self) -> None:
+        if not self._active and self in self._movers:
+            self._movers.remove(self)

@@ -1,0 +1,164 @@
+"""What `move_to` and `move_by` ask for, checked against the limits before anything moves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from catenary.drive.axis import Axis
+from catenary.drive.limits import BRAKE_TIME
+from catenary.drive.motions import move_cyclic, move_profile, stop_cyclic, stop_profile
+from catenary.drive.move import Part
+from catenary.drive.port import AxisPort
+from catenary.drive.profile import Motion, Rates, load_ruckig, make_profile
+from catenary.errors import DriveError
+from catenary.wire.cia402 import Mode
+
+Values: TypeAlias = float | Sequence[float] | npt.NDArray[np.float64]
+
+SLACK = 1e-9  # of a limit: rounding
+PATIENCE = (2.0, 10.0)  # times the expected duration, and seconds: default timeout of a wait
+
+
+@dataclass(frozen=True, slots=True)
+class RateOptions:
+    """Options of a move, scalars or one value for each axis that moves; None: the axis' own."""
+
+    velocity: Values | None = None
+    acceleration: Values | None = None
+    jerk: Values | None = None
+
+
+def values_of(name: str, value: Values, count: int) -> list[float]:
+    """Return one finite number per axis.
+
+    Raises:
+        ValueError: A wrong number of values, NaN or infinity.
+    """
+    row = np.asarray(value, dtype=np.float64)
+    if row.ndim == 0:
+        row = np.full(count, float(row))
+    if row.shape != (count,):
+        raise ValueError(f"{name}: one number, or {count} for the axes that move, not {value!r}")
+    if not np.isfinite(row).all():
+        raise ValueError(f"{name}: must be finite, not {value!r}")
+    return [float(each) for each in row]
+
+
+def make_parts(
+    axes: Sequence[Axis], ports: Sequence[AxisPort], goals: Sequence[float], options: RateOptions
+) -> tuple[list[Part], float]:
+    """Return the motion of each axis, and the default timeout of a wait [s].
+
+    Raises:
+        ValueError: A goal or rate is outside the limits, or the mode has no positions.
+        DriveError: An axis is not enabled.
+        ConfigurationError: The jerk is limited and ruckig is not installed.
+    """
+    if options.jerk is not None:
+        load_ruckig()
+    rates = _rates(axes, options)
+    parts = [
+        _part(axis, port, goal, rate)
+        for axis, port, goal, rate in zip(axes, ports, goals, rates, strict=True)
+    ]
+    longest = max(
+        make_profile(Motion(port.position), goal, rate._replace(jerk=None)).duration
+        for port, goal, rate in zip(ports, goals, rates, strict=True)
+    )
+    return parts, PATIENCE[0] * longest + PATIENCE[1]
+
+
+def require_enabled(port: AxisPort) -> None:
+    """Raise DriveError if an axis does not follow its targets."""
+    if not port.followed or port.stop_cause() is not None:
+        raise DriveError(
+            f"{port.name} cannot move: it is not enabled ({port.state_text()})",
+            hint="arm.enable(), then iterate the loop until arm.enabled.all()",
+        )
+
+
+def default_acceleration(axis: Axis) -> float | None:
+    """Return `acceleration_limit`, else the velocity limit divided by 0.25 s; None: not known."""
+    if axis.options.acceleration_limit is not None:
+        return axis.options.acceleration_limit
+    velocity = axis.bounds.velocity.value
+    return None if velocity is None else velocity / BRAKE_TIME
+
+
+def _part(axis: Axis, port: AxisPort, goal: float, rates: Rates) -> Part:
+    mode = port.requested_mode
+    if mode not in (Mode.CSP, Mode.PP):
+        raise ValueError(
+            f"{axis.name}: moves to a position need mode csp or pp, its mode is "
+            f'{Mode(mode).name.lower()}: use Drives(mode="csp"), or arm.switch("csp") before'
+        )
+    require_enabled(port)
+    _check_goal(axis, goal)
+    if mode == Mode.PP:
+        if rates.jerk is not None:
+            raise ValueError(
+                f"{axis.name}: jerk= in mode pp: the drive makes the motion (0x6081, 0x6083, "
+                "0x6084); leave jerk= out, or use mode csp"
+            )
+        steps = move_profile(port, goal, rates)
+        return Part(port, goal, steps, lambda: stop_profile(port), mode=mode)
+    steps = move_cyclic(port, goal, rates)
+    return Part(port, goal, steps, lambda: stop_cyclic(port, rates), mode=mode)
+
+
+def _check_goal(axis: Axis, goal: float) -> None:
+    bounds, unit = axis.bounds, axis.units.names.position
+    for name, limit, sign in (
+        ("position_min", bounds.position_min.value, -1.0),
+        ("position_max", bounds.position_max.value, 1.0),
+    ):
+        if limit is not None and sign * (goal - limit) > SLACK * max(1.0, abs(limit)):
+            raise ValueError(
+                f"{axis.name}: goal {goal:.6g} {unit} is beyond {name} {limit:.6g} {unit}"
+            )
+
+
+def _rates(axes: Sequence[Axis], options: RateOptions) -> list[Rates]:
+    columns: dict[str, list[float | None]] = {}
+    for name in ("velocity", "acceleration", "jerk"):
+        value: Values | None = getattr(options, name)
+        count = len(axes)
+        columns[name] = [None] * count if value is None else list(values_of(name, value, count))
+    return [
+        Rates(
+            _rate(axis, "velocity", velocity, axis.bounds.velocity.value),
+            _rate(axis, "acceleration", acceleration, default_acceleration(axis)),
+            None if jerk is None else _positive(axis, "jerk", jerk),
+        )
+        for axis, velocity, acceleration, jerk in zip(axes, *columns.values(), strict=True)
+    ]
+
+
+def _rate(axis: Axis, name: str, value: float | None, known: float | None) -> float:
+    """Return a rate within its limit; the default if it is not given."""
+    unit = getattr(axis.units.names, name)
+    if value is None:
+        if known is None:
+            raise ValueError(
+                f"{axis.name}: no {name} for the move: give {name}= [{unit}], or "
+                f"Drives({name}_limit=...)"
+            )
+        return known
+    limit = axis.bounds.velocity.value if name == "velocity" else axis.options.acceleration_limit
+    if limit is not None and value > limit * (1 + SLACK):
+        raise ValueError(
+            f"{axis.name}: {name} {value:.6g} {unit} is above {name}_limit {limit:.6g} {unit}"
+        )
+    return _positive(axis, name, value)
+
+
+def _positive(axis: Axis, name: str, value: float) -> float:
+    if not 0 < value < math.inf:
+        raise ValueError(f"{axis.name}: {name} must be positive, not {value}")
+    return value

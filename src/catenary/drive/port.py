@@ -1,0 +1,165 @@
+"""One axis as a move sees it: its values of this cycle, and what the next commit sends to it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+
+from catenary.drive.profile import Motion
+from catenary.drive.state_machine import Goal
+from catenary.drive.units import AxisUnits
+from catenary.errors import MoveError
+from catenary.plan.stop_reason import StopReason
+from catenary.plan.wish import Views
+from catenary.wire.cia402 import IN_FAULT, Mode, State
+
+if TYPE_CHECKING:
+    from catenary.bus import Pending
+
+Steps: TypeAlias = Generator[None, None, None]  # one step before each commit
+WriteObject: TypeAlias = "Callable[[int, int], Pending[None]]"  # (object of slot 0, value)
+SetColumn: TypeAlias = Callable[[str, float], bool]  # False: the axis has no such column
+
+FOLLOWED = 1  # axis_flags
+GOAL_SHIFT = 6
+
+
+class AxisPort:
+    """Owns what a move writes to one axis: its target, its mode and its bits of the controlword."""
+
+    def __init__(
+        self,
+        views: Views,
+        index: int,
+        *,
+        name: str,
+        units: AxisUnits,
+        exchange: float,
+        period: float,
+        write: WriteObject,
+        set_column: SetColumn,
+    ) -> None:
+        self._views = views
+        self._index = index
+        self.name = name
+        self.units = units
+        self.exchange = exchange  # [s] between two exchanges of its device
+        self.period = period  # [s] of the loop
+        self.write_object = write
+        self.set_column = set_column
+        self.now = 0.0  # [s] time of the cycle
+        self.motion: Motion | None = None  # commanded last by a profile of ours
+        self.handshake = False  # a set-point of PP is being handed over
+        self.written: dict[str, int] = {}  # profile objects as written by SDO
+
+    @property
+    def status(self) -> int:
+        return self._views.statusword.item(self._index)
+
+    @property
+    def mode(self) -> int:
+        return self._views.mode_actual.item(self._index)
+
+    @property
+    def requested_mode(self) -> int:
+        return self._views.mode_target.item(self._index)
+
+    @property
+    def position(self) -> float:
+        return self._views.actual_position.item(self._index)
+
+    @property
+    def velocity(self) -> float:
+        return self._views.actual_velocity.item(self._index)
+
+    @property
+    def target(self) -> float:
+        return self._views.target_position.item(self._index)
+
+    @property
+    def followed(self) -> bool:
+        """True if the axis follows its targets."""
+        return bool(self._views.axis_flags.item(self._index) & FOLLOWED)
+
+    @property
+    def at_rest(self) -> bool:
+        return abs(self.velocity) <= self.units.defaults.standstill
+
+    def set_target(self, position: float) -> None:
+        self._views.target_position[self._index] = position
+
+    def command(self, motion: Motion) -> None:
+        """Send a motion as the set-point of CSP."""
+        self.motion = motion
+        self.set_target(motion.position)
+
+    def request_mode(self, mode: int) -> None:
+        self._views.mode_target[self._index] = mode
+
+    def set_bits(self, bits: int) -> None:
+        self._views.controlword_bits[self._index] |= bits
+
+    def clear_bits(self, bits: int) -> None:
+        self._views.controlword_bits[self._index] &= ~bits & 0xFFFF
+
+    def has_bits(self, bits: int) -> bool:
+        """True if the drive shows all of these bits in its statusword."""
+        return self.status & bits == bits
+
+    def stop_cause(self) -> str | None:
+        """Return why the axis cannot go on with a move; None if it can."""
+        views, i = self._views, self._index
+        if views.axis_state.item(i) in IN_FAULT:
+            return "the drive is in fault"
+        if views.axis_flags.item(i) >> GOAL_SHIFT == Goal.ENABLED:
+            return None
+        reason = StopReason(views.stop_reason.item(i))
+        return reason.text if reason else "it was disabled or stopped on request"
+
+    def state_text(self) -> str:
+        """Return the CiA 402 state, for messages."""
+        try:
+            return State(self._views.axis_state.item(self._index)).name
+        except ValueError:
+            return "no CiA 402 state"
+
+    def error(self, complaint: Complaint) -> MoveError:
+        """Return the error of a move of this axis that does not reach its goal."""
+        remaining = complaint.goal - self.position
+        unit = self.units.names.position
+        left = "" if math.isnan(remaining) else f", {remaining:.4g} {unit} before its goal"
+        return MoveError(
+            f"{self.name} {complaint.what}{left}",
+            axis=self.name,
+            remaining=remaining,
+            hint=complaint.hint,
+        )
+
+
+class Complaint(NamedTuple):
+    """Text of a MoveError: what the axis did, and what to do."""
+
+    what: str
+    hint: str
+    goal: float = math.nan
+
+
+def await_condition(
+    port: AxisPort, met: Callable[[], bool], timeout: float, complaint: Complaint
+) -> Steps:
+    """Step until a condition is met.
+
+    Raises:
+        MoveError: It is not met after `timeout` [s].
+    """
+    begun = port.now
+    while not met():
+        if port.now - begun > timeout:
+            raise port.error(complaint)
+        yield
+
+
+def mode_is(port: AxisPort, mode: int) -> Callable[[], bool]:
+    """Return the condition that the drive works in a mode."""
+    return lambda: port.mode == Mode(mode) and port.followed

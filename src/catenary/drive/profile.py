@@ -1,0 +1,167 @@
+"""Motion profiles of one axis: trapezoids of its velocity, or with limited jerk by ruckig.
+
+Source of the jerk-limited profile: Berscheid and Kröger, Jerk-limited real-time trajectory
+generation with arbitrary target states, RSS 2021.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any, NamedTuple, Protocol
+
+from catenary.errors import ConfigurationError
+
+
+class Motion(NamedTuple):
+    """Position, velocity and acceleration of an axis, in its units."""
+
+    position: float
+    velocity: float = 0.0
+    acceleration: float = 0.0
+
+
+class Rates(NamedTuple):
+    """Limits of a profile, in the units of the axis. `jerk`: None: a trapezoid."""
+
+    velocity: float
+    acceleration: float
+    jerk: float | None = None
+
+
+class Profile(Protocol):
+    """A motion that ends at rest."""
+
+    @property
+    def duration(self) -> float:
+        """Time until rest [s]."""
+
+    @property
+    def goal(self) -> float:
+        """Position at rest."""
+
+    def at(self, time: float) -> Motion:
+        """Return the motion after `time` [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Trapezoid:
+    """Phases of constant acceleration, one after the other."""
+
+    start: Motion
+    goal: float
+    phases: tuple[tuple[float, float], ...]  # acceleration, duration [s]
+
+    @property
+    def duration(self) -> float:
+        """Time until rest [s]."""
+        return sum(duration for _, duration in self.phases)
+
+    def at(self, time: float) -> Motion:
+        """Return the motion after `time` [s]."""
+        position, velocity, _ = self.start
+        for acceleration, duration in self.phases:
+            t = min(time, duration)
+            position += velocity * t + 0.5 * acceleration * t * t
+            velocity += acceleration * t
+            if time < duration:
+                return Motion(position, velocity, acceleration)
+            time -= duration
+        return Motion(self.goal)
+
+
+def make_profile(start: Motion, goal: float, rates: Rates) -> Profile:
+    """Return the fastest profile from `start` to rest at `goal`.
+
+    A start that is faster than `rates.velocity` slows down to it first.
+
+    Raises:
+        ConfigurationError: The jerk is limited and ruckig is not installed.
+    """
+    if rates.jerk is None:
+        return _trapezoid(start, goal, rates.velocity, rates.acceleration)
+    return _jerk_limited(start, goal, rates)
+
+
+def make_stop(start: Motion, rates: Rates) -> Profile:
+    """Return the profile that decelerates from `start` to rest. The goal follows from it."""
+    if rates.jerk is None:
+        speed, acceleration = abs(start.velocity), rates.acceleration
+        goal = start.position + start.velocity * speed / (2 * acceleration)
+        phases = ((-math.copysign(acceleration, start.velocity), speed / acceleration),)
+        return Trapezoid(start, goal, phases)
+    return _jerk_limited(start, None, rates)
+
+
+def _trapezoid(start: Motion, goal: float, velocity: float, acceleration: float) -> Trapezoid:
+    rest = start.position + start.velocity * abs(start.velocity) / (2 * acceleration)
+    sign = 1.0 if goal >= rest else -1.0
+    way, first = sign * (goal - start.position), sign * start.velocity
+    if first > velocity:
+        begin, peak = -acceleration, velocity
+    else:
+        begin = acceleration
+        peak = min(velocity, math.sqrt(max(acceleration * way + first * first / 2, 0.0)))
+    reach = (peak - first) / begin
+    ramps = (peak + first) / 2 * reach + peak * peak / (2 * acceleration)
+    cruise = max(way - ramps, 0.0) / peak if peak > 0 else 0.0
+    phases = ((sign * begin, reach), (0.0, cruise), (-sign * acceleration, peak / acceleration))
+    return Trapezoid(start, goal, phases)
+
+
+@dataclass(frozen=True, slots=True)
+class JerkLimited:
+    """A profile of ruckig."""
+
+    goal: float
+    duration: float  # [s]
+    trajectory: Any  # ruckig.Trajectory
+
+    def at(self, time: float) -> Motion:
+        """Return the motion after `time` [s]."""
+        if time >= self.duration:
+            return Motion(self.goal)
+        return Motion(*(values[0] for values in self.trajectory.at_time(time)[:3]))
+
+
+def load_ruckig() -> Any:
+    """Return the module.
+
+    Raises:
+        ConfigurationError: It is not installed.
+    """
+    try:
+        return import_module("ruckig")
+    except ImportError as error:
+        raise ConfigurationError(
+            "jerk= needs ruckig, which is not installed",
+            hint="pip install 'catenary[traj]', or leave jerk= out for a trapezoid of the velocity",
+        ) from error
+
+
+def _jerk_limited(start: Motion, goal: float | None, rates: Rates) -> JerkLimited:
+    """Return ruckig's profile to rest at `goal`; None: to rest as soon as possible."""
+    ruckig = load_ruckig()
+    wanted = ruckig.InputParameter(1)
+    wanted.current_position = [start.position]
+    wanted.current_velocity = [start.velocity]
+    wanted.current_acceleration = [start.acceleration]
+    if goal is None:
+        wanted.control_interface = ruckig.ControlInterface.Velocity
+        wanted.target_velocity = [0.0]
+    else:
+        wanted.target_position = [goal]
+        wanted.max_velocity = [rates.velocity]
+    wanted.max_acceleration = [rates.acceleration]
+    wanted.max_jerk = [rates.jerk]
+    trajectory = ruckig.Trajectory(1)
+    result = ruckig.Ruckig(1).calculate(wanted, trajectory)
+    if result not in (ruckig.Result.Working, ruckig.Result.Finished):
+        raise ConfigurationError(
+            f"no jerk-limited motion from {start} to {goal}: ruckig returned {result}",
+            hint="try another velocity, acceleration or jerk",
+        )
+    duration = float(trajectory.duration)
+    end = float(trajectory.at_time(duration)[0][0]) if goal is None else goal
+    return JerkLimited(end, duration, trajectory)

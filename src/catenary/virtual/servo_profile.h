@@ -1,0 +1,145 @@
+/* Profile modes of a servo axis: profile position (1) and profile velocity (3), IEC 61800-7-201 /
+ * CiA 402-2. The drive makes the trajectory: trapezoids (0x6086 = 0) of 0x6081, 0x6083 and 0x6084.
+ *
+ * Profile position. A rising edge of bit 4 of the controlword takes 0x607A as a new set-point: at once
+ * with bit 5, or if no set-point is in process; else into the buffer of one. Bit 6: relative to the
+ * last target. Bit 12 of the statusword acknowledges; it falls when bit 4 is 0 and the buffer is free.
+ * Bit 10: within 0x6067 of the target for 0x6068. Bit 9 (blend into the next set-point) is ignored.
+ * Profile velocity. 0x60FF is the target. Bit 10: within 0x606D of it for 0x606E; bit 12: the speed is
+ * below 0x606F.
+ * Both. Halt (bit 8) slows down by 0x605D and holds; bit 10 then shows standstill. Without the bit the
+ * motion goes on. Included by servo.h. */
+#ifndef CATENARY_VIRTUAL_SERVO_PROFILE_H
+#define CATENARY_VIRTUAL_SERVO_PROFILE_H
+
+enum { NEW_SET_POINT = 0x10, CHANGE_AT_ONCE = 0x20, RELATIVE = 0x40, HALT = 0x100 };
+enum { HALT_QUICK_STOP_RAMP = 2 };
+
+static inline int is_profile_mode(int mode) { return mode == PP || mode == PV; }
+
+static int64_t profile_target(const servo_axis *a, const int64_t *slots) {
+    int64_t last = a->profile.buffered ? a->profile.next : a->profile.goal;
+    int64_t raw = slots[SLOT_TARGET_POSITION];
+    int relative = (slots[SLOT_CONTROLWORD] & RELATIVE) != 0;
+    int64_t goal = last + (relative ? raw : wrap32(raw - last));
+    int64_t least = slots[SLOT_LIMIT_MIN], most = slots[SLOT_LIMIT_MAX];
+    if (least < most)
+        goal = goal < least ? least : goal > most ? most : goal;
+    return goal;
+}
+
+static void profile_begin(servo_axis *a, int64_t goal) {
+    a->profile.goal = goal;
+    a->profile.in_process = 1;
+    a->profile.in_window = 0;
+}
+
+/* The set-point handshake. */
+static void profile_command(servo_axis *a, const int64_t *slots) {
+    uint16_t word = (uint16_t)slots[SLOT_CONTROLWORD];
+    int asked = (word & NEW_SET_POINT) != 0, rises = asked && !a->profile.asked;
+    a->profile.asked = (uint8_t)asked;
+    if (a->mode != PP || a->state != OPERATION_ENABLED || a->ramping != RAMP_NONE)
+        return;
+    if (rises && ((word & CHANGE_AT_ONCE) || !a->profile.in_process)) {
+        int64_t goal = profile_target(a, slots);
+        a->profile.buffered = 0;
+        profile_begin(a, goal);
+        a->profile.acknowledged = 1;
+    } else if (rises && !a->profile.buffered) {
+        a->profile.next = profile_target(a, slots);
+        a->profile.buffered = a->profile.acknowledged = 1;
+    }
+    if (!asked && !a->profile.buffered)
+        a->profile.acknowledged = 0;
+}
+
+static inline double profile_step(const servo_axis *a, int64_t raw, double dt) {
+    return larger(1e-3, (double)raw * a->radian_per_velocity) * dt;
+}
+
+/* The velocity of the next step [rad/s]: towards `wanted` within the ramps. */
+static double profile_ramp(const servo_axis *a, const int64_t *slots, double wanted, double dt) {
+    int halted = (slots[SLOT_CONTROLWORD] & HALT) != 0;
+    int quick = halted && slots[SLOT_HALT_OPTION] == HALT_QUICK_STOP_RAMP;
+    double now = a->command_velocity;
+    int slower = now * wanted < 0 || fabs(wanted) < fabs(now);
+    int64_t raw = slots[!slower ? SLOT_ACCELERATION : quick ? SLOT_QUICK_STOP_DECELERATION : SLOT_DECELERATION];
+    return now + clamp(wanted - now, profile_step(a, raw, dt));
+}
+
+/* The velocity from which the axis still stops at the goal, one step of the ramp ahead. */
+static double profile_approach(const servo_axis *a, const int64_t *slots, double distance, double dt) {
+    double step = profile_step(a, slots[SLOT_DECELERATION], dt);
+    double braking = sqrt(0.25 * step * step + 2 * step / dt * fabs(distance)) - 0.5 * step;
+    double speed = smaller((double)slots[SLOT_PROFILE_VELOCITY] * a->radian_per_velocity, a->velocity_limit);
+    return copysign(smaller(smaller(speed, braking), fabs(distance) / dt), distance);
+}
+
+static void profile_position(servo_axis *a, const int64_t *slots, double dt) {
+    double distance = ((double)a->profile.goal - a->command) * a->radian_per_count;
+    int halted = (slots[SLOT_CONTROLWORD] & HALT) != 0;
+    double wanted = halted ? 0 : profile_approach(a, slots, distance, dt);
+    a->command_velocity = profile_ramp(a, slots, wanted, dt);
+    a->command += a->command_velocity * dt * a->counts_per_radian;
+    if (!halted && fabs((double)a->profile.goal - a->command) < 0.5 && fabs(a->command_velocity) * dt * a->counts_per_radian < 1.0) {
+        a->command = (double)a->profile.goal;
+        a->command_velocity = 0;
+    }
+}
+
+/* Bit 10: the motor has been in the window for long enough. */
+static int profile_in_window(servo_axis *a, int inside, int64_t milliseconds, double dt) {
+    a->profile.in_window = inside ? a->profile.in_window + dt : 0;
+    return inside && a->profile.in_window * 1e3 >= (double)milliseconds;
+}
+
+static void profile_reached(servo_axis *a, const int64_t *slots, double dt) {
+    if (slots[SLOT_CONTROLWORD] & HALT) {
+        a->profile.reached = fabs(a->velocity) < 0.05 && a->command_velocity == 0;
+        return;
+    }
+    if (a->mode == PV) {
+        double error = fabs((double)slots[SLOT_TARGET_VELOCITY] - a->velocity * a->velocity_per_radian);
+        a->profile.reached = (uint8_t)profile_in_window(
+            a, error <= (double)slots[SLOT_VELOCITY_WINDOW], slots[SLOT_VELOCITY_WINDOW_TIME], dt);
+        return;
+    }
+    int64_t off = llabs(servo_counts(a) - a->profile.goal);
+    int inside = a->command_velocity == 0 && off <= slots[SLOT_POSITION_WINDOW];
+    int reached = profile_in_window(a, inside, slots[SLOT_POSITION_WINDOW_TIME], dt);
+    if (reached && a->profile.buffered) {
+        a->profile.buffered = reached = 0;
+        profile_begin(a, a->profile.next);
+    }
+    if (reached)
+        a->profile.in_process = 0;
+    a->profile.reached = (uint8_t)(reached && !a->profile.in_process);
+}
+
+/* The trajectory of one step: command and command_velocity. */
+static void profile_drive(servo_axis *a, const int64_t *slots, double dt) {
+    if (a->mode == PP)
+        profile_position(a, slots, dt);
+    else {
+        int halted = (slots[SLOT_CONTROLWORD] & HALT) != 0;
+        double wanted = (double)slots[SLOT_TARGET_VELOCITY] * a->radian_per_velocity;
+        a->command_velocity = profile_ramp(a, slots, halted ? 0 : clamp(wanted, a->velocity_limit), dt);
+    }
+    profile_reached(a, slots, dt);
+}
+
+/* Bits 10 to 12 of the statusword. */
+static uint16_t profile_status(const servo_axis *a, const int64_t *slots) {
+    uint16_t word = a->profile.reached ? 0x0400 : 0;
+    if (a->mode == PV)
+        return word | (fabs(a->velocity) * a->velocity_per_radian <= (double)slots[SLOT_VELOCITY_THRESHOLD] ? 0x1000 : 0);
+    int64_t least = slots[SLOT_LIMIT_MIN], most = slots[SLOT_LIMIT_MAX];
+    if (least < most && (a->profile.goal == least || a->profile.goal == most))
+        word |= 0x0800;
+    if (a->following_time > 0)
+        word |= 0x2000;
+    return word | (a->profile.acknowledged ? 0x1000 : 0);
+}
+
+#endif
