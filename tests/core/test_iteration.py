@@ -94,3 +94,30 @@ def test_virtual_time_has_no_busy_wait() -> None:
 def test_a_busy_wait_as_long_as_the_period_is_refused(busy_wait: int) -> None:
     with pytest.raises(ValueError, match="busy_wait_ns"):
         started(ticking(), busy_wait_ns=busy_wait)
+
+
+class Mover:
+    """Notes when it is stepped; leaves the list after two steps."""
+
+    def __init__(self, movers: list["Mover"]) -> None:
+        self.movers = movers
+        self.times: list[float] = []
+
+    def step(self, now: float) -> None:
+        self.times.append(now)
+        if len(self.times) == 2:
+            self.movers.remove(self)
+
+
+def test_movers_are_stepped_before_every_commit_with_the_time_of_the_cycle() -> None:
+    b = bench(axis(0))
+    movers: list[Mover] = []
+    iteration = Iteration(
+        b.engine, lambda flags: None, trouble=0, al_status=b.engine.al_status, movers=movers
+    )
+    next(iteration)
+    first, second = Mover(movers), Mover(movers)
+    movers += [first, second]
+    for _ in range(4):
+        next(iteration)
+    assert first.times == second.times == pytest.approx([0.0, PERIOD * 1e-9])

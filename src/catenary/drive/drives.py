@@ -297,19 +297,20 @@ class Drives(Request):
 
     def enable(self, axes: Axes = ALL) -> None:
         """Request that axes be enabled. Each starts from its actual position."""
-        self._ask(Goal.ENABLED, axes)
+        self._request("enable", Goal.ENABLED, axes)
 
     def disable(self, axes: Axes = ALL) -> None:
         """Request that axes be disabled."""
-        self._ask(Goal.DISABLED, axes)
+        self._request("disable", Goal.DISABLED, axes)
 
     def quick_stop(self, axes: Axes = ALL) -> None:
         """Request a quick stop. The ramp and the final state are the drive's (0x605A)."""
-        self._ask(Goal.QUICK_STOP, axes)
+        self._request("quick_stop", Goal.QUICK_STOP, axes)
 
     def reset_faults(self, axes: Axes = ALL) -> None:
         """Request a fault reset of those axes that are in fault. Nothing moves before `enable`."""
-        self._ask(Goal.RESET, sorted(set(self._numbers(axes)) & set(self.faults)))
+        chosen = set(self._numbers(axes))
+        self._request("reset_faults", Goal.RESET, sorted(chosen & set(self.faults)))
 
     def switch(self, mode: str, axes: Axes = ALL) -> None:
         """Request a change to `mode`, one of those that the Drives were made with.
@@ -320,8 +321,9 @@ class Drives(Request):
         for axis in self._numbers(axes):
             if wanted not in self._axes[axis].modes:
                 raise ValueError(f"{self.names[axis]}: make Drives with other_modes=[{mode!r}]")
-        self._bound().mode_target[axes] = wanted
-        self._bound().controlword_bits[axes] &= ~HALT & 0xFFFF
+        views = self._of_open_loop("switch()")
+        views.mode_target[axes] = wanted
+        views.controlword_bits[axes] &= ~HALT & 0xFFFF
 
     # Moves: the loop must be iterated meanwhile, by loop.wait(move) or by your own `for`.
 
@@ -424,7 +426,7 @@ class Drives(Request):
         return numbers
 
     def _moving(self) -> Moves:
-        self._bound()
+        self._of_open_loop("a move")
         assert self._moves is not None  # bound together with the views
         return self._moves
 
@@ -560,10 +562,19 @@ class Drives(Request):
             used[bank] += len(self)
         return slices
 
-    def _ask(self, goal: Goal, axes: Axes) -> None:
-        views = self._bound()
+    def _request(self, call: str, goal: Goal, axes: Axes) -> None:
+        views = self._of_open_loop(f"{call}()")
         views.goal[axes] = goal
         views.request[axes] += 1  # a goal that dropped comes back only by a new request
+
+    def _of_open_loop(self, call: str) -> Views:
+        """Return the views for a request; RuntimeError if no cycle would send it."""
+        views = self._bound()
+        if not views.is_open():
+            raise RuntimeError(
+                f"{call}: the loop is closed, and its drives were stopped; open a loop first"
+            )
+        return views
 
     def _bound(self) -> Views:
         if self._views is None:
