@@ -170,6 +170,7 @@ class Axis:
             acceleration=bounds.acceleration.value,
             deceleration=bounds.deceleration.value,
             torque_slope=bounds.torque_slope.value,
+            linear=self.units.metres_per_turn is not None,
             standstill=self.units.defaults.standstill,
             step_floor=self.units.defaults.step_limit,
             on_loss=bounds.on_loss,

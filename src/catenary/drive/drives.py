@@ -42,7 +42,7 @@ from catenary.drive.move_request import (
     require_enabled,
     values_of,
 )
-from catenary.drive.objects import PROFILE_OBJECTS, AxisObject
+from catenary.drive.objects import ACTUAL_VELOCITY, PROFILE_OBJECTS, AxisObject
 from catenary.drive.port import AxisPort
 from catenary.drive.request import Request
 from catenary.drive.state_machine import Goal
@@ -232,6 +232,7 @@ class Drives(Request):
         self._target = AxisValues("target")
         self._views: Views | None = None
         self._profile_columns: dict[str, AxisObject] = {}  # mapped, and not asked for by name
+        self._measures_velocity: list[bool] = []
         self._ports: tuple[AxisPort, ...] = ()
         self._moves: Moves | None = None
         self._units: npt.NDArray[np.intp] = np.zeros(0, np.intp)
@@ -471,6 +472,7 @@ class Drives(Request):
             and all(axis.uses_profile and axis.maps(wanted, layout) for axis in self._axes)
         }
         columns = self._all_columns()
+        self._measures_velocity = [axis.maps(ACTUAL_VELOCITY, layout) for axis in self._axes]
         return WishTables(
             axes=tuple(axis.plan(layout) for axis in self._axes),
             output_columns=tuple(
@@ -523,6 +525,7 @@ class Drives(Request):
             units=axis.units,
             exchange=period * axis.divider,
             period=period,
+            measures_velocity=self._measures_velocity[index],
             write=write,
             set_column=partial(self._set_column, index),
         )

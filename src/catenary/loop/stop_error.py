@@ -26,7 +26,7 @@ ADVICE: dict[StopReason, str] = {
     ),
     StopReason.REFUSED: (
         "look for NaN or a jump in the targets: begin at the commanded position and move by "
-        "small steps; Drives(step_limit=...) [rad] allows larger ones"
+        "small steps; Drives(step_limit=...) allows larger ones"
     ),
     StopReason.POSITION_LIMIT: (
         "slow down before position_min and position_max; the drive's 0x607D may be tighter: "

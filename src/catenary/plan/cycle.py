@@ -166,6 +166,7 @@ class AxisPlan:
     # Shape of fallback and return, never of the application's set-points (docs/safety.md)
     acceleration: float = 25.0  # [rad/s²] on return to the set-points
     deceleration: float = 25.0  # [rad/s²] to standstill, and before a position limit in CSV
+    linear: bool = False  # m, m/s and N instead
     standstill: float = 0.05  # [rad/s] at most: at rest
     step_floor: float = 0.1  # [rad] the default step limit is at least this
     torque_slope: float | None = None  # [N·m/s] on return to the set-points in CST; None: at once
