@@ -12,7 +12,7 @@ from tests.core.rig import Bench, ScriptedDrive, axis, make_plan
 from tests.core.test_law import Frame, make_law
 from tests.core.test_numbers import Echo
 
-ORDERS = ("threaded", "inline")
+EXECUTIONS = ("threaded", "inline")
 
 
 def area(offset: int, size: int) -> ImageArea:
@@ -59,9 +59,11 @@ def test_an_area_outside_of_the_image_is_refused(place: tuple[int, int]) -> None
         Echo(replace(make_plan([], units=1), output_areas=(wrong,)))
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_while_a_law_runs_the_bytes_are_still_the_applications(order: str) -> None:
-    plan = make_plan([axis(0)], units=2, order=order)
+@pytest.mark.parametrize("execution", EXECUTIONS)
+def test_while_a_law_runs_the_bytes_are_still_the_applications(
+    execution: str,
+) -> None:
+    plan = make_plan([axis(0)], units=2, execution=execution)
     own = ImageArea("x", plan.output_size - 1, 1, 1, 0, b"\0")
     sent: list[int] = []
 

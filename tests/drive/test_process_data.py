@@ -151,7 +151,7 @@ def test_a_divider_and_a_device_that_is_not_required(cell: Cell) -> None:
     terminal = Outputs(cell.main.subs[TERMINAL])
     plan = cell.main.plan(raw, terminal)
     unit = plan.cycle.sync_units[plan.layout.sync_unit(SENSOR)]
-    assert (unit.every, unit.optional) == (4, True)
+    assert (unit.divider, unit.optional) == (4, True)
     with cat.Loop(raw, terminal) as loop:
         steps(loop, 8)
         assert raw.present

@@ -11,6 +11,7 @@ from catenary.bus import MainDevice
 from catenary.drive import Drives, ProcessData
 from catenary.loop.running import Running
 from catenary.loop.signals import SignalGuard
+from catenary.realtime import VirtualClock
 from catenary.virtual import Coupler, Segment, Servo
 from catenary.virtual.faults import power_cycle
 from tests.force_sensor import ForceSensor
@@ -154,3 +155,18 @@ def test_in_both_modes(cell: Cell, execution: str) -> None:
             next(loop)
             next(loop)
     assert cell.sensor.lamp == 7
+
+
+def test_on_each_of_several_networks() -> None:
+    clock = VirtualClock()
+    sensors = [ForceSensor(), ForceSensor()]
+    mains = [MainDevice(Segment([Coupler(), each], clock=clock)) for each in sensors]
+    with mains[0], mains[1]:
+        data = [ProcessData(main.scan()[1], safe={"Lamp": 7}) for main in mains]
+        with cat.Loop(*data) as loop:
+            for each in data:
+                each["Lamp"] = 50
+            for _ in range(4):
+                next(loop)
+            assert [sensor.lamp for sensor in sensors] == [50, 50]
+        assert [sensor.lamp for sensor in sensors] == [7, 7]

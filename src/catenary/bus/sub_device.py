@@ -66,7 +66,7 @@ class SubDevice:
 
     @property
     def pdos(self) -> PdoTable:
-        """The process data that is mapped now: PDO, object, name, type and bit offset."""
+        """The mapping as of the last scan or plan: PDO, object, name, type and bit offset."""
         return PdoTable(self.description)
 
     @property

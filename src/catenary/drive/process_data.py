@@ -262,11 +262,12 @@ class ProcessData(Request):
         return self._images[direction]
 
     def _place(self, name: str) -> tuple[Direction, Place]:
-        if name not in self.names:
-            raise KeyError(f"{self!r}: {_unknown(name, self.names)}")
-        if name not in self._places:
+        found = self._places.get(name)
+        if found is not None:
+            return found
+        if name in self.names:
             raise RuntimeError(f"{name!r} has no value before a Loop is open")
-        return self._places[name]
+        raise KeyError(f"{self!r}: {_unknown(name, self.names)}")
 
 
 def _chosen_channels(sub: SubDevice, named: Mapping[str, Channel]) -> tuple[NamedChannel, ...]:
