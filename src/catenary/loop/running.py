@@ -362,7 +362,7 @@ class Running:
         for done in range(limit):
             if self.cycle() & (CYCLE_STOPPED | CYCLE_NONE):
                 break
-            valid = self._valid_units()
+            valid = self.engine.buffers["unit_valid"].tolist()
             missing = [u for u, unit in units.items() if not (valid[u] or unit.optional)]
             if done + 1 >= round_cycles and (not missing or guard.hurry):
                 return

@@ -56,6 +56,7 @@ class StopTable(Table, frozen=True, kw_only=True):
     late_limit: Optional[Time] = UNSET
     handover: Optional[Time] = UNSET
     on_axis_stopped: Optional[Literal["raise", "event"]] = UNSET
+    command_timeout: Optional[Time] = UNSET
     lost_limit: Optional[int] = UNSET
     stop_deadline: Optional[Time] = UNSET
     raise_faults: Optional[bool] = UNSET
@@ -93,6 +94,7 @@ class LoopTable(Table, frozen=True, kw_only=True):
     cpu: Optional[int] = UNSET
     priority: Optional[Annotated[int, Meta(description="SCHED_FIFO priority", ge=1, le=99)]] = UNSET
     log: Optional[Annotated[int, Meta(description="cycles", ge=1)]] = UNSET
+    log_axes: Optional[bool] = UNSET
     stop: StopTable = StopTable()
     scheduling: SchedulingTable = SchedulingTable()
 
