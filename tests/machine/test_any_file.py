@@ -18,7 +18,7 @@ from tests.machine.test_lines import paths
 LINES = SMALL.splitlines()
 WORDS = ["0", "-1", "1e400", "nan", "inf", "true", '""', '"deg"', "[]", "{}", "[[]]", "1979-05-27"]
 WORDS += ['"1 deg"', '"j1"', '"0x6000:11"', "{ object = 1 }", "[true]", '"virtual"', "65536"]
-REUSED = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+REUSED = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 @st.composite

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from pathlib import Path
 
 import pytest
@@ -13,20 +12,18 @@ from catenary.machine import Machine, compare, read_machine
 from catenary.target import MainDevice
 from tests.machine.example_line import example_segment
 
-ROOT = Path(__file__).resolve().parent.parent.parent
-SHARED = Path(os.environ.get("CATENARY_SHARED", ROOT.parent / "shared"))
-EXAMPLE = SHARED / "examples" / "machine.toml"
 ESI = 'esi = "esi/acme_imu.xml"'
 
-pytestmark = [
-    pytest.mark.shared_data,
-    pytest.mark.skipif(not EXAMPLE.exists(), reason="no shared data folder"),
-]
+
+@pytest.fixture
+def example(shared_data: Path) -> Path:
+    """Return the path of the example."""
+    return shared_data.parent / "examples" / "machine.toml"
 
 
-def without_esi(folder: Path) -> Path:
+def without_esi(example: Path, folder: Path) -> Path:
     """Write the example without the ESI file, which is not supported yet. Return its path."""
-    text = EXAMPLE.read_text(encoding="utf-8")
+    text = example.read_text(encoding="utf-8")
     lines = [line for line in text.splitlines() if not line.startswith(ESI)]
     assert len(lines) == len(text.splitlines()) - 1
     path = folder / "machine.toml"
@@ -34,27 +31,27 @@ def without_esi(folder: Path) -> Path:
     return path
 
 
-def test_it_is_read_as_it_is() -> None:
-    tables = read_machine(EXAMPLE).tables
+def test_it_is_read_as_it_is(example: Path) -> None:
+    tables = read_machine(example).tables
     assert tables.name == "cell 3"
     assert [device.name for device in tables.device][-3:] == ["wrist_a", "wrist_b", "hand"]
 
 
-def test_its_segment_agrees() -> None:
+def test_its_segment_agrees(example: Path) -> None:
     with MainDevice(example_segment()) as main:
-        found = compare(read_machine(EXAMPLE).tables.device, main.passive_scan())
+        found = compare(read_machine(example).tables.device, main.passive_scan())
     assert {each.verdict for each in found} == {"same"}
 
 
-def test_its_esi_file_is_refused_with_its_line() -> None:
+def test_its_esi_file_is_refused_with_its_line(example: Path) -> None:
     with pytest.raises(MachineFileError, match="ESI files are not supported yet") as caught:
-        Machine(EXAMPLE)
-    line = EXAMPLE.read_text(encoding="utf-8").splitlines()[(caught.value.line or 0) - 1]
+        Machine(example)
+    line = example.read_text(encoding="utf-8").splitlines()[(caught.value.line or 0) - 1]
     assert line.startswith(ESI)
 
 
-def test_it_runs(tmp_path: Path) -> None:
-    with Machine(without_esi(tmp_path), target=example_segment()) as machine:
+def test_it_runs(example: Path, tmp_path: Path) -> None:
+    with Machine(without_esi(example, tmp_path), target=example_segment()) as machine:
         arm, valves = machine.drives["arm"], machine.process_data["valves"]
         assert arm.names == ("base", "shoulder", "elbow", "roll", "pitch", "yaw")
         assert machine.drives["gripper"].names == ("jaw",)

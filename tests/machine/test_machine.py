@@ -105,6 +105,20 @@ def test_a_target_of_the_file_counts_from_its_folder(
         assert len(machine.segment) == 6
 
 
+def test_the_suffix_of_a_machine_file_does_not_matter(tmp_path: Path) -> None:
+    path = write_small(tmp_path).rename(tmp_path / "cell.machine")
+    with Machine(path) as machine:
+        assert len(machine.segment) == 6
+
+
+def test_a_file_without_a_target_needs_one(tmp_path: Path) -> None:
+    path = write_small(tmp_path, SMALL.replace('target = "virtual:line.toml"\n', ""))
+    with pytest.raises(MachineFileError, match='key "target" is missing'):
+        Machine(path)
+    with Machine(path, target=small_segment()) as machine:
+        assert machine.drives
+
+
 def test_a_ring_has_its_segment_too(tmp_path: Path) -> None:
     path = write_small(tmp_path)
     line = tmp_path / "line.toml"

@@ -16,7 +16,7 @@ from catenary.machine.explanation import explain, quantities
 from catenary.machine.lines import KeyPath, key_lines, line_of
 from catenary.machine.schema import FORMAT, MachineTables, Table
 from catenary.machine.units import Dimension, to_si
-from catenary.target.toml_file import TomlFile, read_toml
+from catenary.target.toml_file import TomlFile, read_toml, target_of
 
 
 class MachineFile:
@@ -29,6 +29,7 @@ class MachineFile:
             MachineFileError: A key or a value is wrong; it names the line.
         """
         self.path = file.path
+        self._toml = file
         self._lines = key_lines(file.text)
         self._check_format(file.content.get("format"))
         try:
@@ -36,6 +37,15 @@ class MachineFile:
         except msgspec.ValidationError as error:
             found = explain(error, file.content)
             raise self.error(found.path, found.message, hint=found.hint) from None
+
+    @property
+    def target(self) -> str:
+        """Name of the segment.
+
+        Raises:
+            MachineFileError: The file names none.
+        """
+        return target_of(self._toml)
 
     def error(self, path: KeyPath, message: str, *, hint: str = "") -> MachineFileError:
         """Return the error for a key."""
