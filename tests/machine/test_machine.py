@@ -212,6 +212,20 @@ def test_a_device_without_its_alias_is_named(tmp_path: Path) -> None:
     assert "catenary alias TARGET 4 12" in caught.value.hint
 
 
+def test_an_empty_eeprom_is_the_cause(tmp_path: Path) -> None:
+    class Erased(Coupler):
+        def sii_image(self) -> bytes:
+            return b"\xff" * 2048
+
+    segment = Segment([Erased(), DigitalOutputs()])
+    with (
+        pytest.raises(IdentityError) as caught,
+        Machine(write_small(tmp_path), target=segment),
+    ):
+        pass
+    assert caught.value.hint.startswith("its EEPROM has no identity; SII: checksum 0xFFFF")
+
+
 def test_two_devices_with_one_alias_are_refused(tmp_path: Path) -> None:
     path = write_small(tmp_path)
     line = tmp_path / "line.toml"

@@ -133,6 +133,9 @@ def _cause_of_another(
     subs: Sequence[SubDevice],
 ) -> str:
     """Return the likely cause of a wrong identity at an address, and the next step."""
+    if not any(sub.identity):
+        notes = "".join(f"; {note}" for note in sub.description.notes)
+        return f"its EEPROM has no identity{notes}; catenary sii read TARGET {sub.position}"
     differing = differences(device.identity, sub.identity)
     if "vendor" not in differing and "product" not in differing:
         text = " and ".join(differing)

@@ -59,7 +59,12 @@ class MachineFile:
 
     @contextmanager
     def located(self, path: KeyPath, keys: Iterable[str] = ()) -> Iterator[None]:
-        """Name the place of a ValueError: that of a key of the table which its text begins with."""
+        """Turn a ValueError into an error with a line.
+
+        Args:
+            path: Place of the value, or of its table.
+            keys: Keys of the table; the first one in the text of the error is the place.
+        """
         try:
             yield
         except (TypeError, ValueError) as error:
