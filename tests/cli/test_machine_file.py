@@ -156,3 +156,14 @@ def test_a_machine_file_without_a_target_is_refused(
     assert status == 1
     assert 'key "target" is missing' in err
     assert 'write target = "eth0"' in err
+
+
+def test_a_graph_begins_with_the_target_of_the_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write_small(tmp_path)
+    (tmp_path / "line.toml").unlink()
+    path.write_text(path.read_text().replace("virtual:line.toml", "virtual"))
+    status, out, _ = call(capsys, "graph", path)
+    assert status == 0
+    assert out.splitlines()[1].split()[4] == "virtual"
