@@ -85,6 +85,8 @@ class NetworksIteration:
         if self._cycle is None:
             flags = [one.engine.run(1) for one in self._runnings]
             self._cycle = NetworksCycle(self._runnings, self._quorum)
+            for one in self._runnings:
+                one.engine.zero_ns = self._runnings[0].engine.zero_ns
         else:
             for one in self._runnings:
                 one.engine.commit_targets()

@@ -217,6 +217,7 @@ class CyclePlan:
     acyclic_ns: int = 0  # wire time per cycle for acyclic frames; one frame in any case
     busy_wait_ns: int = 0  # before each cycle start; costs as much processor time
     log_cycles: int = 1000  # how far the log reaches back
+    log_axes: bool = False  # the log has the values of the axes, too
     cpu: int | None = None  # of the native thread
     priority: int | None = 80  # SCHED_FIFO; None: leave the scheduling as it is
     clock: ClockPlan | None = None  # None: no distributed clocks

@@ -6,6 +6,7 @@ import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
+from catenary import notebook
 from catenary.errors import ConfigurationError
 from catenary.model.device import DeviceDescription, Direction
 from catenary.plan.clocks import BURST, SyncPlan, choose_clocks, make_clock_plan, make_sync
@@ -56,6 +57,9 @@ class Plan:
         axes = [axis for table in self.tables for axis in table.axis_reports]
         return report(self.cycle, self.devices, self.layout, axes)
 
+    def _repr_html_(self) -> str:
+        return notebook.preformatted(str(self))
+
 
 def make_plan(
     devices: Sequence[DeviceDescription],
@@ -82,6 +86,7 @@ def make_plan(
     margin: float | None = None,
     burst: int = BURST,
     exact_matching: bool = False,
+    log_axes: bool = False,
 ) -> Plan:
     """Return the plan that fulfils all requests.
 
@@ -101,6 +106,7 @@ def make_plan(
         margin: [s] between the cycle start and the frames; None: by the execution mode.
         burst: frames that bring the clocks together before the cycle.
         exact_matching: every frame carries the cycle number (plan/frames.py).
+        log_axes: the log keeps the values of the axes, too.
 
     Raises:
         ConfigurationError: an object cannot be mapped, requests contradict each other, or the
@@ -162,6 +168,7 @@ def make_plan(
         acyclic_ns=acyclic_ns,
         busy_wait_ns=round(busy_wait * 1e9),
         log_cycles=log,
+        log_axes=log_axes,
         cpu=cpu,
         priority=priority,
         clock=None
