@@ -11,6 +11,7 @@ from catenary.bus import MainDevice
 from catenary.drive import Drives, ProcessData
 from catenary.loop.running import Running
 from catenary.loop.signals import SignalGuard
+from catenary.plan.cycle import ExecutionMode
 from catenary.realtime import VirtualClock
 from catenary.virtual import Coupler, Segment, Servo
 from catenary.virtual.faults import power_cycle
@@ -145,11 +146,11 @@ def test_a_device_that_is_not_required_may_be_gone(cell: Cell) -> None:
 
 
 @pytest.mark.parametrize("execution", ["threaded", "inline"])
-def test_in_both_modes(cell: Cell, execution: str) -> None:
+def test_in_both_modes(cell: Cell, execution: ExecutionMode) -> None:
     with cell.main as main:
         main.scan()
         data = ProcessData(main.subs[SENSOR], safe={"Lamp": 7})
-        with cat.Loop(data, execution=execution) as loop:  # type: ignore[arg-type]
+        with cat.Loop(data, execution=execution) as loop:
             data["Lamp"] = 50
             next(loop)
             next(loop)
@@ -170,3 +171,18 @@ def test_on_each_of_several_networks() -> None:
                 next(loop)
             assert [sensor.lamp for sensor in sensors] == [50, 50]
         assert [sensor.lamp for sensor in sensors] == [7, 7]
+
+
+@pytest.mark.parametrize("execution", ["threaded", "inline"])
+def test_in_real_time_the_native_thread_sends_them(execution: ExecutionMode) -> None:
+    """Nothing is said of how timely."""
+    sensor = ForceSensor()
+    with MainDevice(Segment([Coupler(), sensor], clock="monotonic")) as main:
+        data = ProcessData(main.scan()[1], safe={"Lamp": 7})
+        patience = cat.StopPolicy(lost_limit=1_000_000)
+        with cat.Loop(data, period=2e-3, execution=execution, watchdog=0, stop=patience) as loop:
+            for _ in loop:
+                data["Lamp"] = 50
+                if sensor.lamp == 50:
+                    break
+    assert sensor.lamp == 7

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
-from typing import Generic, NamedTuple, TypeVar, overload
+from collections.abc import Mapping, Sequence
+from typing import Generic, TypeVar, overload
 
 import numpy.typing as npt
 
 from catenary.bus import SubDevice
 from catenary.drive.arguments import PdoList, clock_wish, cycles_between, written_pdos
-from catenary.drive.channel import Channel, ChannelSpec, channel_of, make_channels
+from catenary.drive.channel import ChannelSpec, make_channels
+from catenary.drive.device_channels import (
+    chosen_channels,
+    column,
+    mapped_channels,
+    with_written,
+)
 from catenary.drive.request import Request
-from catenary.errors import MappingError
-from catenary.model.device import Assignment, DeviceDescription, Direction, Entry, Pdo
-from catenary.plan.cycle import Bank, Column
-from catenary.plan.numbers import ANY, Which
-from catenary.plan.pdo_rewrite import write_down
-from catenary.plan.pdo_search import pdo_names
+from catenary.model.device import Direction
+from catenary.plan.cycle import Bank
 from catenary.plan.start_up_object import StartUp
 from catenary.plan.wish import (
     Bytes,
@@ -29,19 +29,9 @@ from catenary.plan.wish import (
     Reals,
     Views,
     WishTables,
-    WrittenPdo,
 )
 
 A = TypeVar("A", Reals, Integers, Bytes)
-
-
-class NamedChannel(NamedTuple):
-    """A channel of one device and the name it goes by."""
-
-    name: str
-    device: int
-    channel: Channel
-    which: Which = ANY  # where the device maps the object more than once
 
 
 class BankArray(Generic[A]):
@@ -101,7 +91,11 @@ class Channels(Request):
         self._arrays: dict[Bank, Reals | Integers | Bytes] | None = None
         self._unit_valid: Bytes | None = None
         if named:
-            self._channels = chosen_channels(subs, named, scale)
+            if len(subs) != 1:
+                raise ValueError(f"channels= needs one device, not {len(subs)}: one request each")
+            if scale is not None:
+                raise ValueError("scale= is for mapped channels; use channels= (..., type, scale)")
+            self._channels = chosen_channels(subs[0], named)
         else:
             devices = [with_written(sub.description, self.direction, self._pdos) for sub in subs]
             self._channels = mapped_channels(devices, self.direction, scale or {})
@@ -211,127 +205,3 @@ class Outputs(Channels):
     def bind(self, views: Views) -> None:
         """Receives the arrays of the loop that opens."""
         self._bind(views.output_reals, views.output_integers, views.output_bits, views.unit_valid)
-
-
-def chosen_channels(
-    subs: Sequence[SubDevice], named: Mapping[str, Channel], scale: Mapping[str, float] | None
-) -> tuple[NamedChannel, ...]:
-    """Return the channels that the application chose. ValueError unless there is one device."""
-    if len(subs) != 1:
-        raise ValueError(f"channels= needs one device, not {len(subs)}: make one request for each")
-    if scale is not None:
-        raise ValueError("scale= belongs to mapped channels: give channels= (..., type, scale)")
-    return tuple(
-        NamedChannel(name, subs[0].position, channel, Which(bit_length=channel.bit_length))
-        for name, channel in named.items()
-    )
-
-
-def mapped_channels(
-    devices: Iterable[DeviceDescription], direction: Direction, scale: Mapping[str, float]
-) -> tuple[NamedChannel, ...]:
-    """All channels of the devices, each with a name of its own. ValueError: there are none."""
-    devices = list(devices)
-    if not devices:
-        raise ValueError(
-            f"no device is given whose {direction.name.lower()} process data are meant: was one "
-            "found? main.subs shows all; a group is empty where no device has its alias"
-        )
-    found = [
-        (device, pdo, entry)
-        for device in devices
-        for assignment in device.assignments(direction)
-        for pdo, entry in number_entries(assignment)
-    ]
-    if not found:
-        raise ValueError(
-            f"no {direction.name.lower()} process data in the devices given"
-            f"{_choice(devices, direction)}"
-        )
-    names = unique_names([(e.name, pdo.name, str(device.position)) for device, pdo, e in found])
-    for name in scale:
-        if name not in names:
-            raise ValueError(f"scale: no channel {name!r}; there are: {', '.join(names)}")
-    return place_entries(names, found, scale)
-
-
-def place_entries(
-    names: Sequence[str],
-    found: Sequence[tuple[DeviceDescription, Pdo, Entry]],
-    scale: Mapping[str, float],
-) -> tuple[NamedChannel, ...]:
-    """Return mapped entries as channels. One that is mapped twice keeps its own place."""
-    alike: Counter[tuple[int, int, int, int, int]] = Counter()
-    made = []
-    for name, (device, pdo, entry) in zip(names, found, strict=True):
-        place = (device.position, pdo.index, entry.index, entry.subindex, entry.bit_length)
-        which = Which(pdo.index, entry.bit_length, alike[place])
-        alike[place] += 1
-        channel = channel_of(entry, scale.get(name))
-        made.append(NamedChannel(name, device.position, channel, which))
-    return tuple(made)
-
-
-def _choice(devices: Sequence[DeviceDescription], direction: Direction) -> str:
-    """Return the PDOs that could be assigned, if there are any."""
-    offered = [pdo for device in devices for pdo in device.pdos(direction)]
-    return f": none is assigned; choose with pdos= from {pdo_names(offered)}" if offered else ""
-
-
-def with_written(
-    device: DeviceDescription, direction: Direction, pdos: Sequence[WrittenPdo]
-) -> DeviceDescription:
-    """Return the device as if it had these PDOs; unchanged without PDOs."""
-    if not pdos:
-        return device
-    return device.with_process_data(direction, write_down(device, direction, pdos).assignments)
-
-
-def number_entries(assignment: Assignment) -> list[tuple[Pdo, Entry]]:
-    """Return all entries with their PDOs, without gaps and without what no number can hold."""
-    return [
-        (pdo, entry)
-        for pdo in assignment.pdos
-        for entry in pdo.entries
-        if entry.index and 1 <= entry.bit_length <= 64
-    ]
-
-
-def unique_names(parts: list[tuple[str, str, str]]) -> list[str]:
-    """A name for each (entry, PDO, position): as short as tells them apart, then numbered.
-
-    Terminals call every channel's entry "Output" and tell them apart by their PDO, "Channel 3".
-    """
-    for spelling in (short_name, pdo_name, full_name):
-        names = [spelling(*part) for part in parts]
-        if len(set(names)) == len(names):
-            return names
-    return [f"{name} {names[: i + 1].count(name)}" for i, name in enumerate(names)]
-
-
-def short_name(entry: str, pdo: str, position: str) -> str:
-    return entry or pdo or "value"
-
-
-def pdo_name(entry: str, pdo: str, position: str) -> str:
-    return f"{pdo} {entry}".strip() or "value"
-
-
-def full_name(entry: str, pdo: str, position: str) -> str:
-    return f"{position} {pdo_name(entry, pdo, position)}"
-
-
-def column(named: NamedChannel, layout: ImageLayout, direction: Direction) -> Column:
-    """Return the channel with its place."""
-    channel = named.channel
-    find = layout.output if direction is Direction.OUTPUT else layout.input
-    number = find(named.device, channel.index, channel.subindex, named.which)
-    if number is None:
-        raise MappingError(f"device {named.device}: {channel.place} is not in its process data")
-    return Column(
-        name=named.name,
-        number=replace(number, kind=channel.kind, scale=channel.scale or 1.0, offset=0.0),
-        bank=channel.bank,
-        device=named.device,
-        sync_unit=layout.sync_unit(named.device),
-    )

@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
-from typing import NamedTuple
 
 from catenary.bus import SubDevice
 from catenary.drive.arguments import PdoList, clock_wish, cycles_between, written_pdos
 from catenary.drive.channel import Channel, ChannelSpec, make_channels
-from catenary.drive.io import (
+from catenary.drive.device_channels import (
     NamedChannel,
+    chosen_channels,
     column,
     number_entries,
     place_entries,
     unique_names,
     with_written,
 )
+from catenary.drive.image_place import Place, make_place
 from catenary.drive.request import Request
-from catenary.errors import ConfigurationError, MappingError
+from catenary.errors import ConfigurationError
 from catenary.model.device import Direction
 from catenary.plan.cycle import ImageArea
-from catenary.plan.numbers import Which
 from catenary.plan.start_up_object import StartUp
 from catenary.plan.wish import (
     Bytes,
@@ -32,25 +32,6 @@ from catenary.plan.wish import (
     WishTables,
     WrittenPdo,
 )
-
-
-class Place(NamedTuple):
-    """Bits of a channel in the bytes of its device."""
-
-    channel: Channel
-    first: int  # byte
-    end: int
-    shift: int  # of its lowest bit
-
-    def read(self, image: memoryview | bytearray) -> float | int:
-        raw = int.from_bytes(image[self.first : self.end], "little") >> self.shift
-        return self.channel.decode(raw & ((1 << self.channel.bit_length) - 1))
-
-    def write(self, image: memoryview | bytearray, value: float | int) -> None:
-        mask = (1 << self.channel.bit_length) - 1 << self.shift
-        raw = int.from_bytes(image[self.first : self.end], "little") & ~mask
-        raw |= self.channel.encode(value) << self.shift
-        image[self.first : self.end] = raw.to_bytes(self.end - self.first, "little")
 
 
 class ProcessData(Request):
@@ -108,8 +89,7 @@ class ProcessData(Request):
         self._writes = outputs is None or bool(outputs)
         self._is_named = inputs is not None
         self._channels = {
-            direction: _chosen_channels(sub, channels or {})
-            for direction, channels in named.items()
+            direction: chosen_channels(sub, channels or {}) for direction, channels in named.items()
         }
         unnamed = [direction for direction, channels in named.items() if channels is None]
         self._channels |= _mapped_channels(sub, unnamed, self._pdos, known)
@@ -198,7 +178,7 @@ class ProcessData(Request):
         device = self._subs[0].position
         self._unit = layout.sync_unit(device)
         self._places = {
-            each.name: (direction, _placed(each, layout, direction))
+            each.name: (direction, make_place(each, layout, direction))
             for direction, channels in self._channels.items()
             for each in channels
         }
@@ -270,13 +250,6 @@ class ProcessData(Request):
         raise KeyError(f"{self!r}: {_unknown(name, self.names)}")
 
 
-def _chosen_channels(sub: SubDevice, named: Mapping[str, Channel]) -> tuple[NamedChannel, ...]:
-    return tuple(
-        NamedChannel(name, sub.position, each, Which(bit_length=each.bit_length))
-        for name, each in named.items()
-    )
-
-
 def _mapped_channels(
     sub: SubDevice,
     directions: Sequence[Direction],
@@ -315,19 +288,3 @@ def _unknown(name: str, known: Sequence[str] | Mapping[str, object]) -> str:
     near = get_close_matches(name, known, n=1)
     guess = f"; did you mean {near[0]!r}?" if near else ""
     return f"no name {name!r}; there are: {', '.join(known) or 'none'}{guess}"
-
-
-def _placed(each: NamedChannel, layout: ImageLayout, direction: Direction) -> Place:
-    find = layout.output if direction is Direction.OUTPUT else layout.input
-    channel = each.channel
-    number = find(each.device, channel.index, channel.subindex, each.which)
-    if number is None or number.bit_length != channel.bit_length:
-        found = "is not" if number is None else f"has {number.bit_length} bits"
-        raise MappingError(
-            f"device {each.device}: {channel.place} ({each.name!r}, {channel.bit_length} bits) "
-            f"{found} in its process data",
-            hint="another request may have changed the mapping; print(sub.pdos) shows it",
-        )
-    bit = number.bit_offset - 8 * layout.byte_range(each.device, direction).start
-    first, shift = divmod(bit, 8)
-    return Place(channel, first, first + (shift + channel.bit_length + 7) // 8, shift)

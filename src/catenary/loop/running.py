@@ -39,6 +39,7 @@ from catenary.loop.laws.runner import LawRunner
 from catenary.loop.log_rows import read_log
 from catenary.loop.options import StopPolicy
 from catenary.loop.publishing import Publisher
+from catenary.loop.safe_outputs import confirm_safe, make_safe
 from catenary.loop.service import Service
 from catenary.loop.signals import SignalGuard
 from catenary.loop.stop_error import stopped_error
@@ -56,8 +57,6 @@ ENABLE_TIMEOUT_NS = 5_000_000_000  # mains contactors and brakes are slow, but n
 ENABLE_CYCLES = 20  # where the period is long
 SETTLE_CYCLES = 50  # until the first cycle with all answers
 STOP_SLICE_NS = 20_000_000  # between looks at "hurry" while the drives brake
-SAFE_TIMEOUT_NS = 100_000_000  # for an exchange with safe outputs, or so many exchanges:
-SAFE_EXCHANGES = 5
 
 
 class Running:
@@ -343,34 +342,11 @@ class Running:
 
     def make_outputs_safe(self) -> None:
         """Set bytes of process data to their safe values. The next cycle sends them."""
-        safe = b"".join(area.safe for area in self.plan.cycle.output_areas)
-        self.views.output_bytes[:] = np.frombuffer(safe, np.uint8)
+        make_safe(self.plan.cycle, self.views)
 
     def _confirm_safe_outputs(self, guard: SignalGuard) -> None:
-        """Exchange until the devices with safe outputs have received them.
-
-        Raises:
-            LoopError: A required one did not answer in time.
-        """
-        areas = self.plan.cycle.output_areas
-        if not areas or not self._opened:
-            return
-        units = {area.sync_unit: self.plan.cycle.sync_units[area.sync_unit] for area in areas}
-        round_cycles = max(unit.divider for unit in units.values()) + 2  # one may have been sent
-        limit = max(SAFE_TIMEOUT_NS // self.plan.cycle.period_ns, SAFE_EXCHANGES * round_cycles)
-        missing = list(units)
-        for done in range(limit):
-            if self.cycle() & (CYCLE_STOPPED | CYCLE_NONE):
-                break
-            valid = self.engine.buffers["unit_valid"].tolist()
-            missing = [u for u, unit in units.items() if not (valid[u] or unit.optional)]
-            if done + 1 >= round_cycles and (not missing or guard.hurry):
-                return
-        names = ", ".join(f"device {area.name}" for area in areas if area.sync_unit in missing)
-        raise LoopError(
-            f"{names}: did not confirm the safe values of the outputs",
-            hint="the outputs have what the device does without a MainDevice: see its watchdog",
-        )
+        if self._opened:
+            confirm_safe(self.plan.cycle, self.views, self.cycle, guard)
 
     def _stop_axes(self, guard: SignalGuard) -> None:
         """Quick stop as each drive's 0x605A says, exchanged until all stand."""
