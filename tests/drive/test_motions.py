@@ -19,7 +19,7 @@ PERIOD = 1e-3
 
 
 class Answer:
-    """What a write by SDO comes to."""
+    """Result of a write by SDO."""
 
     def __init__(self, code: int | None) -> None:
         self.done = True

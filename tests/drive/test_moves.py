@@ -127,7 +127,7 @@ def test_stop_decelerates_and_holds() -> None:
         held = arm.actual.position.item(0)
         loop_for(loop, 0.2)
         assert arm.actual.position[0] == pytest.approx(held, abs=1e-3)
-        loop.wait(move)  # a stop that was asked for is not an error
+        loop.wait(move)  # a requested stop is not an error
 
 
 def test_a_stop_with_limited_jerk() -> None:

@@ -531,7 +531,7 @@ class Drives:
         )
 
     def _set_column(self, index: int, name: str, value: float) -> bool:
-        """Write one axis' value of a column. Return False if there is no such column."""
+        """Write one axis' value of a column. Return False if the column does not exist."""
         if name not in self._all_columns():
             return False
         self._target[name][index] = value

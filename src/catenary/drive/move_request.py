@@ -1,4 +1,4 @@
-"""What `move_to` and `move_by` ask for, checked against the limits before anything moves."""
+"""Requests of `move_to` and `move_by`, checked against the limits before anything moves."""
 
 from __future__ import annotations
 
