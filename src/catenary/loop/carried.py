@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from catenary.bus import Carrier, CycleClock, MainDevice, SubDevice
+from catenary.bus import Carrier, CycleClock, MainDevice, Pending, SubDevice
 from catenary.bus.event import DeviceLost, DeviceReturned, StateLost
 from catenary.core import Engine
 from catenary.errors import CatenaryError, ConfigurationError
 from catenary.loop.diagnosis import described, is_astray, silence_error, state_error
 from catenary.loop.running import FATAL, Running
-from catenary.loop.watch import LOOK
+from catenary.loop.watch import LOOK, Attendance
 from catenary.plan.cycle import DatagramKind
 from catenary.plan.make import Plan
 from catenary.procedure.exchange import Procedure, after
@@ -21,74 +21,77 @@ from catenary.wire.al import State
 from catenary.wire.cia402 import SLOT_OFFSET, Object
 
 
-class CarriedRunning(Running):
-    """Owns the engine of a MainDevice with a carrier while its loop is open."""
+class CarriedExchange:
+    """Owns the watch of a session whose frames another master sends. Implements `Exchange`."""
 
-    def _make_engine(self) -> Engine:
-        cycle = replace(self.plan.cycle, clock=None)  # which the carrier keeps
-        return Engine(cycle, self.main.link.capsule, self._carrier.image)
+    def __init__(self, session: Running) -> None:
+        self._session = session
 
-    def _clock(self) -> CycleClock:
+    def make_engine(self) -> Engine:
+        cycle = replace(self._session.plan.cycle, clock=None)  # which the carrier keeps
+        return Engine(cycle, self._session.main.link.capsule, self._carrier.image)
+
+    def cycle_clock(self) -> CycleClock:
         clock = self._carrier.clock
         assert clock is not None  # it was configured by this plan
         return clock
 
-    def _attend(self) -> None:
+    def attend(self) -> None:
         optional = {
             position
-            for unit in self.plan.cycle.sync_units
+            for unit in self._session.plan.cycle.sync_units
             if unit.optional
             for position in unit.devices
         }
-        announce = self._announce_clocks
-        self.watch = CarriedWatch(self.main, self._carrier, self.engine, optional, announce)
+        announce = self._session.announce_clocks
+        self.watch: Attendance = CarriedWatch(
+            self._session.main, self._carrier, self._session.engine, optional, announce
+        )
 
     @property
     def _carrier(self) -> Carrier:
-        carrier = self.main.carrier
+        carrier = self._session.main.carrier
         if carrier is None:
             raise RuntimeError("the MainDevice is closed")
         return carrier
 
-    def _bring_to_op(self) -> None:
-        """The carrier leads the devices while cycles flow; until then nobody need answer."""
-        required = [sub.position for sub in self.main.subs if self.watch.requires(sub.position)]
-        self.service.converse(self._carrier.bring_to_op(required))
-        self._settle()
-        for sub in self.main.subs:
-            sub.state = State.OP
-        self._watches = [self.service.runner.submit(self.watch.run())]
-
-    def _silence_error(self) -> CatenaryError:
-        lost, log = self.engine.lost_in_row, self.log()
-        suspects = [
-            position
-            for unit, valid in zip(self.plan.cycle.sync_units, self._valid_units(), strict=True)
-            if not valid and not unit.optional
-            for position in unit.devices
+    def bring_to_op(self) -> list[Pending[None]]:
+        """The carrier leads the devices while cycles flow; until then none must answer."""
+        required = [
+            sub.position for sub in self._session.main.subs if self.watch.requires(sub.position)
         ]
-        self.stop_axes_at_once()
-        [answers] = self.service.converse(self._carrier.survey())
+        self._session.service.converse(self._carrier.bring_to_op(required))
+        self._session.settle()
+        for sub in self._session.main.subs:
+            sub.state = State.OP
+        return [self._session.service.runner.submit(self.watch.run())]
+
+    def silence_error(self) -> CatenaryError:
+        """Ask the carrier for all devices."""
+        session = self._session
+        lost, log, suspects = session.engine.lost_in_row, session.log(), session.suspects()
+        session.stop_axes_at_once()
+        [answers] = session.service.converse(self._carrier.survey())
         return silence_error(answers, suspects, lost, log)
 
-    def _raise_astray(self) -> None:
-        log = self.log()
-        [answers] = self.service.converse(self._carrier.survey())
+    def raise_astray(self) -> None:
+        log = self._session.log()
+        [answers] = self._session.service.converse(self._carrier.survey())
         needed = [a for a in answers if self.watch.requires(a.station.position)]
         error = state_error(needed, log)
         if error is not None:
             raise error
 
-    def _error_code(self, axis: int) -> int | None:
-        plan = self.plan.cycle.axes[axis]
-        sub = self.main.subs[plan.device]
+    def error_code(self, axis: int) -> int | None:
+        plan = self._session.plan.cycle.axes[axis]
+        sub = self._session.main.subs[plan.device]
         try:
             answer = sub.sdo.request(Object.ERROR_CODE + SLOT_OFFSET * plan.slot, type=UINT)
             while not answer.done:
-                if self.cycle() & FATAL:
+                if self._session.cycle() & FATAL:
                     return None
-                if self.service.beside is not None:
-                    self.service.step()
+                if self._session.service.beside is not None:
+                    self._session.service.step()
             return answer.result()
         except CatenaryError:
             return None  # a drive in trouble may not talk; the error says that the code is unknown

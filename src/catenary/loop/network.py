@@ -15,9 +15,10 @@ from catenary.core import (
     CYCLE_STOPPED,
     CYCLE_WORKING_COUNTER,
 )
-from catenary.loop.carried import CarriedRunning, carried
+from catenary.loop.carried import CarriedExchange, carried
 from catenary.loop.clocks import Clocks
 from catenary.loop.devices import DeviceWish
+from catenary.loop.exchange import FrameExchange
 from catenary.loop.laws.law import Law
 from catenary.loop.options import ClockOptions, Scheduling, StopPolicy
 from catenary.loop.running import LogArray, Running
@@ -120,12 +121,13 @@ class Network:
         plan = self._make_plan()
         self.main.configure(plan)
         is_carried = self.main.carrier is not None
-        running = (CarriedRunning if is_carried else Running)(
+        running = Running(
             self.main,
             carried(plan) if is_carried else plan,
             self._requests,
             abandon=abandon,
             stop=self._settings.stop,
+            exchange=CarriedExchange if is_carried else FrameExchange,
         )
         running.switch_interval = self._settings.scheduling.switch_interval
         for law in self._settings.laws:

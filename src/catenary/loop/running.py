@@ -9,7 +9,7 @@ from contextlib import ExitStack
 import numpy as np
 import numpy.typing as npt
 
-from catenary.bus import CycleClock, MainDevice, Pending
+from catenary.bus import MainDevice, Pending
 from catenary.core import (
     AXIS_FOLLOWED,
     CYCLE_CLOCKS,
@@ -23,23 +23,17 @@ from catenary.core import (
     GOAL_QUICK_STOP,
     GOAL_RESET,
     RECORD_FIELDS,
-    Engine,
 )
 from catenary.errors import CatenaryError, DriveError, LinkError, LoopError
-from catenary.link import forget_in_child, ring_of
+from catenary.link import forget_in_child
 from catenary.loop.axis_watch import AxisWatch, RefusedMode, StoppedAxis
 from catenary.loop.buffers import bind_wishes
 from catenary.loop.clocks import Clocks
 from catenary.loop.diagnosis import (
     AxisTrouble,
     drive_error,
-    forgetful_error,
-    silence_error,
-    state_error,
-    tight_period,
 )
-from catenary.loop.error_watch import ErrorWatch
-from catenary.loop.frame_watch import FrameWatch
+from catenary.loop.exchange import Exchange, FrameExchange
 from catenary.loop.interpreter import switch_interval
 from catenary.loop.laws.runner import LawRunner
 from catenary.loop.options import StopPolicy
@@ -47,20 +41,12 @@ from catenary.loop.publishing import Publisher
 from catenary.loop.service import Service
 from catenary.loop.signals import SignalGuard
 from catenary.loop.stop_error import stopped_error
-from catenary.loop.watch import Attendance, Watch
-from catenary.model.device import Direction
-from catenary.model.silence import judge_silence
 from catenary.plan.make import Plan
 from catenary.plan.sink import Sink
 from catenary.plan.stop_reason import UNASKED, StopReason
 from catenary.plan.wish import Wish
-from catenary.procedure.al_state import request_state
-from catenary.procedure.probe import probe_inputs
-from catenary.procedure.sdo import upload
-from catenary.procedure.survey import survey
-from catenary.types import UINT
 from catenary.wire.al import State
-from catenary.wire.cia402 import IN_FAULT, SLOT_OFFSET, Mode, Object, state_of
+from catenary.wire.cia402 import IN_FAULT, Mode, state_of
 from catenary.wire.cia402 import State as DriveState
 
 LogArray = npt.NDArray[np.void]
@@ -83,67 +69,33 @@ class Running:
         *,
         abandon: Callable[[], object],
         stop: StopPolicy,
+        exchange: Callable[[Running], Exchange] = FrameExchange,
     ) -> None:
         self.main = main
         self.plan = plan
-        self.engine = self._make_engine()
+        self.exchange: Exchange = exchange(self)
+        self.engine = self.exchange.make_engine()
         self.views = bind_wishes(wishes, plan.tables, self.engine.buffers)
         self._axis_watch = AxisWatch(self.views, plan.cycle.axes)
-        self._stop = stop
+        self.stop = stop
         self.laws = LawRunner(self.engine, plan)
         clock = plan.cycle.clock
         self.clocks: Clocks | None = None
         if clock is not None:
-            self.clocks = Clocks(main, self.engine, self._clock(), clock, self.cycle)
+            self.clocks = Clocks(main, self.engine, self.exchange.cycle_clock(), clock, self.cycle)
         self.service = Service(main, self.engine, plan)
-        self._attend()
+        self.exchange.attend()
+        self.watch = self.exchange.watch
         self.switch_interval: float | None = None  # [s] of the interpreter, inline
         self._attached = ExitStack()
         self._opened = self._left = False
         self._abandon = abandon  # leaves the loop, when the MainDevice is closed round it
         self._process = os.getpid()
         forget_in_child(self)
-        self._stations = [sub.station for sub in main.subs]
         self._companions: Sequence[Running] = ()
         self._watches: list[Pending[None]] = []
         self._publisher: Publisher | None = None
         self.service.cycle = self.cycle
-
-    def _make_engine(self) -> Engine:
-        return Engine(self.plan.cycle, self.main.link.capsule)
-
-    def _clock(self) -> CycleClock:
-        """What the cycle knows of the clocks, which there are."""
-        clock = self.engine.clock
-        assert clock is not None  # a plan with clocks makes an engine with clocks
-        clock.set_epoch(self.main.clock_epoch_ns)
-        return clock
-
-    def _attend(self) -> None:
-        """Who watches over the devices beside the cycle."""
-        self.watch: Attendance = Watch(
-            self.main,
-            self.plan,
-            disturbed=lambda: self.engine.disturbed,
-            submit=self.service.runner.submit,
-            now=lambda: self.engine.now() * 1e-9,
-            rejoin=None if self.clocks is None else self.clocks.rejoin,
-            cables_seen=self._announce_clocks,
-            on_return=self._stop.on_return,
-            on_replacement=self._stop.on_replacement,
-        )
-        self.errors = ErrorWatch(self.main, now=lambda: self.engine.now() * 1e-9)
-        self.frames = FrameWatch(
-            self._repeated_frames,
-            put=self.main.events.put,
-            now=lambda: self.engine.now() * 1e-9,
-        )
-
-    def _repeated_frames(self) -> int:
-        """Frames so far that came back more than once, or that a ring could not assign."""
-        ring = ring_of(self.main.link)
-        unassigned = 0 if ring is None else ring.counts["alien"]
-        return self.engine.counters["repeated"] + unassigned
 
     # Opening
 
@@ -185,17 +137,7 @@ class Running:
         self.engine.start(origin_ns)
         self._opened = True
         self.service.start()
-        self._bring_to_op()
-
-    def _bring_to_op(self) -> None:
-        self._settle()
-        if self.clocks is not None:
-            self.clocks.settle(self._raise_ended)
-        self.service.converse(*(request_state(station, State.OP) for station in self._stations))
-        for sub in self.main.subs:
-            sub.state = State.OP
-        watches = (self.watch, self.errors, self.frames)
-        self._watches = [self.service.runner.submit(watch.run()) for watch in watches]
+        self._watches = self.exchange.bring_to_op()
 
     def reset_figures(self) -> None:
         """Begin the histograms and the figures of the clocks anew."""
@@ -251,14 +193,14 @@ class Running:
             hint="wait before the first torque is committed, disable the axes, or switch to CSP",
         )
 
-    def _settle(self) -> None:
+    def settle(self) -> None:
         """Until all units answer: the first cycles of a new thread may find nobody."""
         for _ in range(SETTLE_CYCLES):
             flags = self.cycle()
-            self._raise_ended(flags)
+            self.raise_ended(flags)
             if flags & CYCLE_OK:
                 return
-        raise self._silence_error()
+        raise self.exchange.silence_error()
 
     # Running
 
@@ -266,16 +208,16 @@ class Running:
         """Announce what happened in a cycle in trouble, and raise its error, if it is one."""
         for mover in list(self.views.movers):
             mover.check()
-        self._raise_ended(flags)
+        self.raise_ended(flags)
         stops = self._announce_axes() if flags & CYCLE_DROPPED else []
         if flags & CYCLE_CLOCKS:
-            self._announce_clocks()
+            self.announce_clocks()
         if flags & CYCLE_WORKING_COUNTER:
-            raise self._silence_error()
+            raise self.exchange.silence_error()
         if flags & CYCLE_LAW_FAILED:
             self.laws.raise_failure(self.log())
         if self.engine.al_status != State.OP and not self.watch.excuses:
-            self._raise_astray()
+            self.exchange.raise_astray()
             stops += self._announce_axes(explained=True)  # the flags of its cycles are lost
         states = [state_of(word) for word in self.views.statusword.tolist()]
         faulty = [
@@ -285,7 +227,7 @@ class Running:
         ]
         if faulty and faults:
             if self.engine.al_status != State.OP:
-                self._raise_astray()  # the fault may be its consequence
+                self.exchange.raise_astray()  # the fault may be its consequence
             raise self._drive_error(faulty, "in fault")
         self._raise_stopped([s for s in stops if self.watch.requires(s.device)], faults=faults)
 
@@ -314,16 +256,16 @@ class Running:
         if faults and left:
             raise self._drive_error(left, "left OPERATION_ENABLED by itself")
         unasked = [s for s in stops if s.reason in UNASKED]
-        if unasked and self._stop.on_axis_stopped == "raise":
+        if unasked and self.stop.on_axis_stopped == "raise":
             log = self.log()
             self.stop_axes_at_once()
             raise stopped_error(unasked, self.plan.cycle, log)
 
-    def _announce_clocks(self) -> None:
+    def announce_clocks(self) -> None:
         if self.clocks is not None:
             self.clocks.announce()
 
-    def _raise_ended(self, flags: int) -> None:
+    def raise_ended(self, flags: int) -> None:
         if flags & CYCLE_STOPPED:
             raise LoopError("the cycle has ended: the link failed", log=self.log())
         if flags & CYCLE_NONE:
@@ -411,52 +353,16 @@ class Running:
 
     # Errors
 
-    def _silence_error(self) -> CatenaryError:
-        lost, log = self.engine.lost_in_row, self.log()
-        suspects = [
+    def suspects(self) -> list[int]:
+        """Return the positions of required devices whose unit did not answer last."""
+        units = self.plan.cycle.sync_units
+        valid = self.engine.buffers["unit_valid"].tolist()
+        return [
             position
-            for unit, valid in zip(self.plan.cycle.sync_units, self._valid_units(), strict=True)
-            if not valid and not unit.optional
+            for unit, answered in zip(units, valid, strict=True)
+            if not answered and not unit.optional
             for position in unit.devices
         ]
-        self.stop_axes_at_once()  # what still answers need not wait for the questions
-        [answers] = self.service.converse(survey(self._stations))
-        [noise] = self.service.converse(self.errors.look())
-        silent = [answer.station.position for answer in answers if answer.word is None]
-        silence = judge_silence(self.errors.topology, self.errors.names, silent)
-        [mute] = self.service.converse(probe_inputs(self._input_areas(suspects)))
-        cycle = self.plan.cycle
-        tight = tight_period(cycle.wire_ns, cycle.period_ns)
-        findings = silence or noise
-        return silence_error(answers, suspects, lost, log, findings, mute=mute, tight=tight)
-
-    def _input_areas(self, positions: Sequence[int]) -> dict[int, tuple[int, int]]:
-        """Where the inputs of some devices lie, as far as they have some."""
-        return {
-            position: (fmmu.logical_start, fmmu.length)
-            for position in positions
-            for fmmu in self.plan.devices[position].layout.fmmus
-            if fmmu.direction is Direction.INPUT
-        }
-
-    def _valid_units(self) -> list[int]:
-        return list(self.engine.buffers["unit_valid"].tolist())
-
-    def _raise_astray(self) -> None:
-        """Somebody says that it is not in OP. Who does not answer under its address twice, while
-        something does, has forgotten it."""
-        log = self.log()
-        for look in range(2):
-            [answers] = self.service.converse(survey(self._stations))
-            needed = [a for a in answers if self.watch.requires(a.station.position)]
-            error = state_error(needed, log, self.main.other_masters)
-            if error is not None:
-                raise error
-            silent = [answer for answer in needed if answer.word is None]
-            if not silent or len(silent) == len(answers) or self.engine.al_status == State.OP:
-                return
-            if look:
-                raise forgetful_error(silent, self.engine.al_status, log)
 
     def _drive_error(self, axes: Sequence[int], what: str) -> DriveError:
         """The error for some axes, with what each drive says about it."""
@@ -464,23 +370,10 @@ class Running:
         states = [state_of(self.views.statusword.item(axis)) for axis in axes]
         self.stop_axes_at_once()
         troubles = [
-            AxisTrouble(self.plan.cycle.axes[axis].name, state, self._error_code(axis))
+            AxisTrouble(self.plan.cycle.axes[axis].name, state, self.exchange.error_code(axis))
             for axis, state in zip(axes, states, strict=True)
         ]
         return drive_error(troubles, what, log)
-
-    def _error_code(self, axis: int) -> int | None:
-        """Object 0x603F of the axis; None where the drive does not tell."""
-        plan = self.plan.cycle.axes[axis]
-        channel = self.main.subs[plan.device].channel
-        if channel is None:
-            return None
-        index = Object.ERROR_CODE + SLOT_OFFSET * plan.slot
-        try:
-            [data] = self.service.converse(upload(channel, index, 0))
-            return UINT.decode(data)
-        except CatenaryError:
-            return None  # a drive in trouble may not talk; the error says that the code is unknown
 
 
 def take_down(main: MainDevice) -> list[Exception]:
