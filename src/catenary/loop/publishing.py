@@ -14,14 +14,14 @@ import numpy as np
 from catenary.bus import MainDevice
 from catenary.bus.event import Event
 from catenary.core import RECORD_FIELDS, Engine
-from catenary.plan.cycle import Bank, Column
+from catenary.plan.cycle import Bank, Column, ImageArea
 from catenary.plan.make import Plan
 from catenary.plan.sink import Block, Incident, Sink, SinkField, SinkLayout
 
 Places = dict[str, tuple[int, str, int | None]]  # name → offset, format, count
 
 BANKS = {Bank.REAL: "reals", Bank.INTEGER: "integers", Bank.BIT: "bits"}
-LEFT_OUT = ("reserved", *BANKS.values())
+LEFT_OUT = ("reserved", "bytes", *BANKS.values())
 PER_UNIT = ("unit_valid",)
 UNITS = {"position": ("rad", "m"), "velocity": ("rad/s", "m/s"), "torque": ("N·m", "N")}
 EVENT_FIELDS = {field.name for field in fields(Event)}
@@ -98,6 +98,8 @@ def sink_layout(engine: Engine, plan: Plan) -> SinkLayout:
     columns = [
         *columns_of("actual", actual, (table.input_columns for table in plan.tables)),
         *columns_of("target", target, (table.output_columns for table in plan.tables)),
+        *areas_of("actual", "input_bytes", actual, plan.cycle.input_areas),
+        *areas_of("target", "output_bytes", target, plan.cycle.output_areas),
     ]
     record_size, actual_size, target_size = engine.sink_sizes
     return SinkLayout(
@@ -157,6 +159,16 @@ def columns_of(
                 used[bank] += len(part)
                 name, count = (group, len(part)) if group else (part[0].name, None)
                 yield SinkField(name, block, offset, code, count), part[0].device
+
+
+def areas_of(
+    block: Block, name: str, places: Places, areas: Iterable[ImageArea]
+) -> Iterator[tuple[SinkField, int]]:
+    """The bytes of each area as one array, with its device."""
+    offset, code, _ = places["bytes"]
+    for area in areas:
+        yield SinkField(name, block, offset, code, area.size), area.device
+        offset += area.size
 
 
 def with_own_names(
