@@ -218,7 +218,7 @@ def test_the_default_velocity_is_not_raised_by_the_drive() -> None:
 
 def test_a_linear_axis_has_defaults_and_messages_of_its_own() -> None:
     subs = [fake_sub(3, BRAKING), fake_sub(4, BRAKING)]
-    with pytest.warns(UserWarning) as warned:
+    with pytest.warns(UserWarning, match="no velocity_limit") as warned:
         drives = Drives(subs, counts_per_turn=1000, metres_per_turn=[0.01, None])
     texts = [str(each.message) for each in warned]
     assert "3 Servo: 0.1 m/s" in texts[0]

@@ -71,7 +71,7 @@ def test_a_wait_in_the_background_that_takes_too_long_stops_the_move() -> None:
             next(loop)
             move = arm.move_to(1.0)
             with pytest.raises(MoveError, match="was still moving after 0 s"):
-                wait_in_background(move, 0.0)  # nobody iterates
+                wait_in_background(move, 0.0)  # no thread iterates
             for _ in loop:
                 if move.done:
                     break

@@ -8,7 +8,6 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import msgspec
-import msgspec
 import numpy as np
 import pytest
 from matplotlib.image import imread

@@ -133,8 +133,8 @@ class Axis:
         return self.options.on_loss == "csp_hold"
 
     def _optional(self) -> set[AxisObject]:
-        """What a drive may lack: velocity and torque, unless asked for by name; the mode, which
-        the start-up list sets, where it never changes; and the rates of profiles, which are
+        """Objects that a drive may lack: velocity and torque, unless asked for by name; the mode,
+        which the start-up list sets, where it never changes; and the rates of profiles, which are
         written by SDO then."""
         optional = set() if self.measured_required else {MEASURED["velocity"], MEASURED["torque"]}
         if len(self.modes) == 1 and not self.holds_on_loss:

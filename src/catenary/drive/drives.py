@@ -42,7 +42,7 @@ from catenary.drive.move_request import (
     require_enabled,
     values_of,
 )
-from catenary.drive.objects import ACTUAL_VELOCITY, PROFILE_OBJECTS, AxisObject
+from catenary.drive.objects import ACTUAL_VELOCITY, PROFILE_OBJECTS
 from catenary.drive.port import AxisPort
 from catenary.drive.request import Request
 from catenary.drive.state_machine import Goal
@@ -231,7 +231,7 @@ class Drives(Request):
         self._actual = AxisValues("actual")
         self._target = AxisValues("target")
         self._views: Views | None = None
-        self._profile_columns: dict[str, AxisObject] = {}  # mapped, and not asked for by name
+        self._mapped_rates: tuple[tuple[str, int], ...] = ()  # object and axis
         self._measures_velocity: list[bool] = []
         self._ports: tuple[AxisPort, ...] = ()
         self._moves: Moves | None = None
@@ -465,25 +465,32 @@ class Drives(Request):
         """Return the axes in their order; columns by name, then by axis: a name is one array."""
         self._is_read = False  # the next plan reads again
         self._units = np.array([layout.sync_unit(axis.device) for axis in self._axes], np.intp)
-        self._profile_columns = {
-            name: wanted
+        # Rates of profiles that are mapped anyway follow the columns that were asked for.
+        self._mapped_rates = tuple(
+            (name, i)
             for name, wanted in PROFILE_OBJECTS.items()
             if name not in self._columns
-            and all(axis.uses_profile and axis.maps(wanted, layout) for axis in self._axes)
-        }
-        columns = self._all_columns()
+            for i, axis in enumerate(self._axes)
+            if axis.uses_profile and axis.maps(wanted, layout)
+        )
         self._measures_velocity = [axis.maps(ACTUAL_VELOCITY, layout) for axis in self._axes]
         return WishTables(
             axes=tuple(axis.plan(layout) for axis in self._axes),
-            output_columns=tuple(
-                axis.column(name, wanted, layout)
-                for name, wanted in columns.items()
-                if wanted.output
-                for axis in self._axes
+            output_columns=(
+                *(
+                    axis.column(name, wanted, layout)
+                    for name, wanted in self._columns.items()
+                    if wanted.output
+                    for axis in self._axes
+                ),
+                *(
+                    self._axes[i].column(name, PROFILE_OBJECTS[name], layout)
+                    for name, i in self._mapped_rates
+                ),
             ),
             input_columns=tuple(
                 axis.column(name, wanted, layout)
-                for name, wanted in columns.items()
+                for name, wanted in self._columns.items()
                 if not wanted.output
                 for axis in self._axes
             ),
@@ -531,10 +538,15 @@ class Drives(Request):
         )
 
     def _set_column(self, index: int, name: str, value: float) -> bool:
-        """Write one axis' value of a column. Return False if there is no such column."""
-        if name not in self._all_columns():
+        """Write one axis' value of a column. Return False if the column does not exist."""
+        if name in self._columns:
+            self._target[name][index] = value
+        elif (name, index) in self._mapped_rates:
+            rank = self._mapped_rates.index((name, index))
+            reals = self._bound().output_reals
+            reals[len(reals) - len(self._mapped_rates) + rank] = value
+        else:
             return False
-        self._target[name][index] = value
         return True
 
     def _preset_columns(self) -> None:
@@ -548,15 +560,11 @@ class Drives(Request):
             if "max_torque" in self._columns:
                 self._set_column(index, "max_torque", torque or 1000 * abs(axis.units.torque_scale))
 
-    def _all_columns(self) -> dict[str, AxisObject]:
-        """Return the columns by name: those asked for, and mapped rates of profiles."""
-        return {**self._columns, **self._profile_columns}
-
     def _slices(self, reals: Array, integers: Array, *, output: bool) -> dict[str, Array]:
         """Each column's part of its bank's array."""
         used = {Bank.REAL: 0, Bank.INTEGER: 0}
         slices: dict[str, Array] = {}
-        for name, wanted in self._all_columns().items():
+        for name, wanted in self._columns.items():
             if wanted.output is not output:
                 continue
             bank = column_bank(wanted)

@@ -124,7 +124,7 @@ def of_record() -> Iterator[SinkField]:
 
 
 def of_block(block: Block, places: Places, kinds: Sequence[bool] = ()) -> Iterator[SinkField]:
-    """What every loop has; arrays of no length are left out. `kinds`: see `unit_of`."""
+    """Yield what every loop has; arrays of no length are left out. `kinds`: see `unit_of`."""
     for name, (offset, code, count) in places.items():
         if name in LEFT_OUT or count == 0:
             continue
