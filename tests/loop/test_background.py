@@ -294,6 +294,55 @@ def test_a_with_block_raises_the_error_at_its_end() -> None:
             run()
 
 
+def test_a_fault_during_a_move_raises_the_error_of_the_loop(cell: Cell) -> None:
+    move = cell.arm.move_to(3.0, velocity=0.5)
+    cell.segment[1].inject_fault(0x2310)
+    with pytest.raises(DriveError, match="0x2310"):
+        cell.loop.wait(move)
+    assert move.outcome == "failed"
+
+
+def test_closing_during_a_move_ends_it(cell: Cell) -> None:
+    move = cell.arm.move_to(3.0, velocity=0.5)
+    until(lambda: cell.moved(0))
+    cell.loop.close()
+    with pytest.raises(MoveError, match="was moving when the loop ended"):
+        cell.loop.wait(move)
+
+
+# ---- laws and streams
+
+
+@cat.law
+def creep(target, memory, dt, parameters):
+    memory[0] += parameters[0] * dt
+    for i in range(len(target.position)):
+        target.position[i] = memory[0]
+
+
+def test_a_law_runs_while_the_program_changes_its_parameters(cell: Cell) -> None:
+    run = cell.loop.start(creep, memory=[0.0], parameters=[0.5])
+    until(lambda: cell.arm.actual.position[0] > 0.05)
+    run.parameters = [-0.5]
+    until(lambda: cell.arm.actual.position[0] < 0.0)
+    run.stop()
+    until(lambda: not run.running)
+    with cell.loop.update():
+        cell.arm.target.position[:] = 0.04
+    until(lambda: cell.arm.actual.position[0] > 0.03)
+
+
+def test_a_stream_is_written_ahead(cell: Cell) -> None:
+    stream = cell.loop.stream()
+    path = np.linspace(0.0, 0.1, 200)[:, None] * np.ones(2)
+    stream.write(path)
+    until(lambda: stream.taken == 200)
+    stream.close()
+    until(lambda: cell.arm.actual.position[0] > 0.09)
+    cell.pass_cycles(100)
+    assert cell.arm.enabled.all()
+
+
 # ---- what is refused
 
 
@@ -311,6 +360,22 @@ def test_calls_inside_an_update(cell: Cell) -> None:
             raise AssertionError
         with pytest.raises(RuntimeError, match=r"wait\(\) inside"):
             cell.loop.wait(Condition(lambda: True))
+
+
+def test_waiting_in_the_thread_that_iterates(cell: Cell) -> None:
+    errors: list[str] = []
+
+    def step(ended: threading.Event) -> None:
+        try:
+            cell.loop.wait(Condition(lambda: True))
+        except RuntimeError as error:
+            errors.append(str(error))
+
+    background = cell.loop._background
+    assert background is not None
+    background._pace.keep = step  # type: ignore[method-assign]
+    until(lambda: errors)
+    assert "would wait for itself" in errors[0]
 
 
 def test_update_needs_the_background() -> None:
@@ -422,6 +487,15 @@ def test_the_end_of_the_program_closes_the_loop_in_silence(end: Literal["", "rai
     assert done.stderr == ""
     assert done.stdout == "SWITCH ON DISABLED 2\n"
     assert done.returncode == 0
+
+
+def test_sigterm_closes_the_loop() -> None:
+    end = "import os, signal; os.kill(os.getpid(), signal.SIGTERM)"
+    program = [sys.executable, "-W", "error", "-c", EXIT.format(end=end)]
+    done = subprocess.run(program, capture_output=True, text=True, timeout=120, check=False)
+    assert done.stderr == ""
+    assert done.stdout == "SWITCH ON DISABLED 2\n"
+    assert done.returncode == 143
 
 
 def test_a_forked_child_has_no_loop(cell: Cell) -> None:

@@ -135,6 +135,10 @@ class Background:
     def wait(self, move: Awaited, timeout: float | None) -> None:
         """See `Loop.wait`."""
         self._refuse_inside_update("wait")
+        if threading.current_thread() is self._thread:
+            raise RuntimeError(
+                "loop.wait() in the thread that iterates the loop would wait for itself"
+            )
         limit = move.patience if timeout is None else timeout
         end = time.monotonic() + limit
         with self._cycled:

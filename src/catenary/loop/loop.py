@@ -365,7 +365,7 @@ class Loop:
     def stream(self, capacity: int = 1000) -> Stream:
         """Return a `Stream`: up to `capacity` rows of set-points, one per cycle, that a slower
         thread fills in advance."""
-        self._only("a stream").require_open()
+        self._only("a stream")
         return self._networks[0].stream(capacity)
 
     def restore(self, sub: SubDevice) -> None:

@@ -104,6 +104,7 @@ class Network:
 
     def stream(self, capacity: int = 1000) -> Stream:
         """Return a `Stream` of set-points for the axes of this network."""
+        self.session.require_open()
         return Stream(self.session.engine, self.session.views, capacity)
 
     @property
