@@ -63,4 +63,4 @@ class DeviceRequest:
         return WishTables()
 
     def bind(self, views: Views) -> None:
-        """Receive the views of the loop that opens; there is nothing to see."""
+        """Receive the views of the loop that opens. The request has none of its own."""

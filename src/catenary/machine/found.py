@@ -85,7 +85,7 @@ def make_found(file: MachineFile, found: Sequence[Comparison]) -> Found:
 def _roles(
     file: MachineFile, kind: str, tables: Mapping[str, object], absent: Mapping[str, str]
 ) -> tuple[list[str], dict[str, str]]:
-    """Return the roles whose devices are all there, and why the others are not."""
+    """Return the roles with all of their devices, and the reason for each of the others."""
     reasons = {
         role: f'device "{name}": {absent[name]}'
         for role in tables
