@@ -9,8 +9,8 @@ from catenary.core import (
     CYCLE_LATE,
     CYCLE_OK,
     RECORD_FIELDS,
-    Engine,
     Cycle,
+    Engine,
 )
 from catenary.plan.cycle import ClockPlan, DatagramKind
 from catenary.wire.datagram import Command, Datagram
