@@ -10,6 +10,7 @@ from catenary.core import (
     CYCLE_OK,
     RECORD_FIELDS,
     Cycle,
+    Engine,
 )
 from catenary.plan.cycle import ClockPlan, DatagramKind
 from catenary.wire.datagram import Command, Datagram
@@ -259,6 +260,12 @@ def test_a_wait_that_fails_is_an_os_error(execution: str, method: str) -> None:
         b.engine.next() if method == "next" else b.engine.run(1)
     assert caught.value.errno == 100
     assert b.engine.run(1) & CYCLE_OK  # it may recover
+
+
+def test_nothing_runs_before_start() -> None:
+    b = bench(axis(0))
+    with pytest.raises(RuntimeError, match="start it first"):
+        Engine(b.plan, b.link.capsule).next()
 
 
 def test_nothing_runs_after_stop() -> None:
