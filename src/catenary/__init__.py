@@ -18,7 +18,7 @@ TYPE_CHECKING = False  # of `typing`, which takes longer to import than all of t
 if TYPE_CHECKING:
     from catenary import control, drive, errors, realtime, record, share, types, virtual
     from catenary.bus import SubDevice
-    from catenary.bus import event as events
+    from catenary.bus import event_types as events
     from catenary.drive import DistributedClock, Drives, Inputs, Outputs, ProcessData, StartUp
     from catenary.errors import (
         CatenaryError,
@@ -115,7 +115,7 @@ def __getattr__(name: str) -> object:
     if name in _MODULES:
         return import_module(f"catenary.{name}")
     if name == "events":
-        return import_module("catenary.bus.event")
+        return import_module("catenary.bus.event_types")
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(_HOMES[name]), name)

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from catenary.errors import LeaseError, ShareError
 from catenary.plan.sink import SinkLayout
+from catenary.share.command_table import Desk, geometry, make_desk, open_desk
 from catenary.share.commands import CommandReader
-from catenary.share.desk import Desk, geometry, make_desk, open_desk
 from catenary.share.layout import make_layout
 from catenary.share.lease import Lease
 from catenary.share.process import this_process
@@ -105,6 +105,8 @@ def test_memory_that_is_not_sealed_is_refused(
 ) -> None:
     descriptor = os.memfd_create("open", os.MFD_ALLOW_SEALING)
     os.ftruncate(descriptor, WHERE.size)
-    monkeypatch.setattr("catenary.share.desk.request_descriptor", lambda path, owner: descriptor)
+    monkeypatch.setattr(
+        "catenary.share.command_table.request_descriptor", lambda path, owner: descriptor
+    )
     with pytest.raises(ShareError, match="seals 0x0"):
         open_desk(LAYOUT, tmp_path_factory.getbasetemp(), os.geteuid())

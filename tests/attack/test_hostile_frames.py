@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from catenary.realtime.child import Child, start_python
-from catenary.wire.datagram import Command, Datagram
+from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import decode_frame, encode_frame
 
 ETHERCAT = 0x88A4
@@ -29,10 +29,10 @@ BLOCK = 200  # frames between two questions
 # The clock at -2^62, the first pulse at 2^62 + 2^61: the difference exceeds 63 bits.
 HANG = encode_frame(
     [
-        Datagram(Command.BWR, OFFSET << 16, struct.pack("<q", -(2**62))),
-        Datagram(Command.BWR, SYNC_START << 16, struct.pack("<Q", 2**62 + 2**61)),
-        Datagram(Command.BWR, SYNC0_CYCLE << 16, struct.pack("<I", 1000)),
-        Datagram(Command.BWR, SYNC_ACTIVATION << 16, b"\x03"),
+        Datagram(EcatCommand.BWR, OFFSET << 16, struct.pack("<q", -(2**62))),
+        Datagram(EcatCommand.BWR, SYNC_START << 16, struct.pack("<Q", 2**62 + 2**61)),
+        Datagram(EcatCommand.BWR, SYNC0_CYCLE << 16, struct.pack("<I", 1000)),
+        Datagram(EcatCommand.BWR, SYNC_ACTIVATION << 16, b"\x03"),
     ]
 )
 IN_VIRTUAL_TIME = f"""
@@ -55,7 +55,7 @@ class Wire:
     def send(self, frame: bytes) -> None:
         self._socket.send(frame)
 
-    def ask(self, command: Command, address: int, data: bytes) -> tuple[int, bytes] | None:
+    def ask(self, command: EcatCommand, address: int, data: bytes) -> tuple[int, bytes] | None:
         """(working counter, data) of the answer, or None: the frame got lost."""
         self._index = self._index % 255 + 1
         self.send(encode_frame([Datagram(command, address, data, index=self._index)]))
@@ -70,7 +70,7 @@ class Wire:
                 return answer.working_counter, answer.data
         return None
 
-    def await_answer(self, command: Command, address: int, data: bytes, counter: int) -> bytes:
+    def await_answer(self, command: EcatCommand, address: int, data: bytes, counter: int) -> bytes:
         deadline = time.monotonic() + SECONDS
         while True:
             answer = self.ask(command, address, data)
@@ -102,9 +102,9 @@ def applications_work(wire: Wire) -> bool:
     """All devices follow a request of INIT, the servos' microcontrollers among them."""
     deadline = time.monotonic() + SECONDS
     while time.monotonic() < deadline:
-        wire.ask(Command.BWR, AL_CONTROL << 16, b"\x11\x00")
-        wire.ask(Command.BWR, AL_CONTROL << 16, b"\x01\x00")
-        answer = wire.ask(Command.BRD, AL_STATUS << 16, bytes(2))
+        wire.ask(EcatCommand.BWR, AL_CONTROL << 16, b"\x11\x00")
+        wire.ask(EcatCommand.BWR, AL_CONTROL << 16, b"\x01\x00")
+        answer = wire.ask(EcatCommand.BRD, AL_STATUS << 16, bytes(2))
         if answer == (DEVICES, b"\x01\x00"):
             return True
     return False
@@ -113,7 +113,7 @@ def applications_work(wire: Wire) -> bool:
 def test_one_frame_does_not_hang_a_served_segment(served: tuple[Wire, Child]) -> None:
     wire, server = served
     wire.send(HANG)
-    wire.await_answer(Command.BRD, 0, b"\0", DEVICES)
+    wire.await_answer(EcatCommand.BRD, 0, b"\0", DEVICES)
     assert applications_work(wire)
     server.process.send_signal(signal.SIGTERM)
     assert server.process.wait(SECONDS) == 0
@@ -130,17 +130,17 @@ def test_pulses_beyond_all_bounds_keep_no_frame_waiting(
     with serving(veth, "--config", str(file)) as (wire, server):
         for position in range(100):  # the first pulses soon: local times begin apart
             address = (-position & 0xFFFF) | 0x0910 << 16
-            time_now = wire.await_answer(Command.APRD, address, bytes(8), 1)
+            time_now = wire.await_answer(EcatCommand.APRD, address, bytes(8), 1)
             start = int.from_bytes(time_now, "little") + 50_000_000
             for register, data in (
                 (SYNC_START, struct.pack("<Q", start)),
                 (SYNC0_CYCLE, struct.pack("<I", 10_001)),
                 (SYNC_ACTIVATION, b"\x03"),
             ):
-                wire.await_answer(Command.APWR, (-position & 0xFFFF) | register << 16, data, 1)
+                wire.await_answer(EcatCommand.APWR, (-position & 0xFFFF) | register << 16, data, 1)
         time.sleep(0.5)  # real time, over a real wire: the pulses are due
         for _ in range(20):
-            wire.await_answer(Command.BRD, 0, b"\0", 100)
+            wire.await_answer(EcatCommand.BRD, 0, b"\0", 100)
         assert server.running
 
 
@@ -161,7 +161,7 @@ def hostile(chance: random.Random) -> bytes:
         )
         data = struct.pack("<Q", edge)[: chance.choice([1, 2, 4, 8])]
         ado = chance.choice([chance.randrange(0x0600, 0x0A00), chance.randrange(0x0104, 0x2000)])
-        datagrams.append(Datagram(Command.BWR, ado << 16, data))
+        datagrams.append(Datagram(EcatCommand.BWR, ado << 16, data))
     return encode_frame(datagrams)
 
 
@@ -173,5 +173,5 @@ def test_random_writes_do_not_stop_a_served_segment(served: tuple[Wire, Child], 
         for _ in range(BLOCK):
             wire.send(hostile(chance))
         assert server.running
-    wire.await_answer(Command.BRD, 0, b"\0", DEVICES)
+    wire.await_answer(EcatCommand.BRD, 0, b"\0", DEVICES)
     assert applications_work(wire)

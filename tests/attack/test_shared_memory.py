@@ -183,7 +183,7 @@ def test_operators_use_a_mutex_together(machine: Machine) -> None:
 
 HOSTILE_OPERATOR = f"""{SAY}
 import fcntl, mmap, os, sys
-from catenary.share import desk, desk_socket
+from catenary.share import command_table as desk, desk_socket
 folder = "/run/catenary"
 said(lambda: os.truncate(folder + "/share-arm", 0))
 said(lambda: os.unlink(folder + "/share-arm"))

@@ -11,7 +11,7 @@ import catenary as cat
 from catenary.bus.diagnosis import Diagnosis
 from catenary.model.finding import Kind
 from catenary.model.topology import Cable
-from catenary.procedure.exercise import exercise
+from catenary.procedure.cable_traffic import exercise
 from catenary.virtual import Junction, faults
 
 

@@ -22,7 +22,7 @@ from catenary.virtual.sii_image import (
     SYNC_MANAGER,
     TX_PDO,
 )
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 
 MS = 1_000_000
 MAILBOX_WRITTEN = 2  # event of the controller
@@ -50,7 +50,7 @@ def test_one_that_stays_busy_is_named() -> None:
         with pytest.raises(EepromError, match=r"device 1.*busy") as caught:
             main.scan()
         assert caught.value.hint
-        assert main.subs[2].state == State.PRE_OP
+        assert main.subs[2].state == AlState.PRE_OP
 
 
 # ---- mailbox
@@ -127,8 +127,8 @@ def test_an_sii_without_one_of_its_categories(
 
     with cat.MainDevice(changed(monkeypatch, without)) as main:
         servo = main.scan()[1]
-        assert main.subs[2].state == State.PRE_OP
-        assert servo.state == State.PRE_OP
+        assert main.subs[2].state == AlState.PRE_OP
+        assert servo.state == AlState.PRE_OP
         assert servo.name
         assert servo.sdo.read(0x1018, 1, type=UDINT) == servo.identity.vendor
         arm = cat.Drives([servo], counts_per_turn=2**20, velocity_limit=100.0)
@@ -160,7 +160,7 @@ def test_every_answer_comes_twice() -> None:
     link.inject(Fault(kind="duplicate"))
     with cat.MainDevice(link) as main:
         subs = main.scan()
-        assert [sub.state for sub in subs] == [State.PRE_OP] * 3
+        assert [sub.state for sub in subs] == [AlState.PRE_OP] * 3
         assert subs[1].sdo.read(0x1018, 1, type=UDINT) == subs[1].identity.vendor
         arm = cat.Drives(subs.drives, counts_per_turn=2**20, velocity_limit=100.0)
         with cat.Loop(arm) as loop:

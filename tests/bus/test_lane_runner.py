@@ -14,7 +14,7 @@ from catenary.procedure.exchange import Procedure, after, read
 from catenary.procedure.sdo import upload
 from catenary.types import UDINT
 from catenary.virtual import demo_segment
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from catenary.wire.frame import decode_frame
 from catenary.wire.register import AL_STATUS
 
@@ -225,7 +225,7 @@ def test_pauses_are_counted_in_the_lanes_time() -> None:
 
 
 def _state(station: int) -> Procedure[int]:
-    [reply] = yield [read(Command.FPRD, station, AL_STATUS)]
+    [reply] = yield [read(EcatCommand.FPRD, station, AL_STATUS)]
     return AL_STATUS.unpack(reply.data)
 
 
@@ -240,10 +240,10 @@ def test_a_loop_that_begins_waits_for_who_talks_and_others_go_beside_it() -> Non
         order: list[str] = []
 
         def talks() -> Procedure[None]:
-            yield [read(Command.FPRD, drive.station.address, AL_STATUS)]
+            yield [read(EcatCommand.FPRD, drive.station.address, AL_STATUS)]
             talking.set()
             go_on.wait(60.0)
-            yield [read(Command.FPRD, drive.station.address, AL_STATUS)]
+            yield [read(EcatCommand.FPRD, drive.station.address, AL_STATUS)]
             order.append("talked")
 
         first = threading.Thread(target=main.converse, args=(talks(),))

@@ -27,8 +27,8 @@ from catenary.virtual import (
     Servo,
     demo_segment,
 )
-from catenary.wire.al import State
-from catenary.wire.datagram import Command
+from catenary.wire.al import AlState
+from catenary.wire.datagram import EcatCommand
 from tests.bus.links import Echo
 from tests.plan.devices import Asking, asks
 
@@ -53,8 +53,8 @@ def test_a_scan_ends_in_pre_op_with_names_and_profiles() -> None:
         assert [sub.position for sub in subs.drives] == [2, 3, 4]
         assert subs.drives[0].slots == (0,)
         assert [sub.description.parent for sub in subs] == [None, 0, 1, 2, 3, 4]
-        assert all(sub.state is State.PRE_OP for sub in subs)
-        assert [device.state for device in segment] == [State.PRE_OP] * 6
+        assert all(sub.state is AlState.PRE_OP for sub in subs)
+        assert [device.state for device in segment] == [AlState.PRE_OP] * 6
 
 
 def test_every_axis_of_a_drive_is_a_slot() -> None:
@@ -75,8 +75,8 @@ def test_closing_brings_all_devices_to_init() -> None:
     with MainDevice(segment) as main:
         main.scan()
         main.configure(main.plan())
-        assert [device.state for device in segment] == [State.SAFE_OP] * 6
-    assert [device.state for device in segment] == [State.INIT] * 6
+        assert [device.state for device in segment] == [AlState.SAFE_OP] * 6
+    assert [device.state for device in segment] == [AlState.INIT] * 6
 
 
 def test_an_exception_in_the_block_closes_too() -> None:
@@ -85,7 +85,7 @@ def test_an_exception_in_the_block_closes_too() -> None:
     with pytest.raises(KeyboardInterrupt):
         scan_and_interrupt(main)
     assert not main.is_open
-    assert [device.state for device in segment] == [State.INIT] * 6
+    assert [device.state for device in segment] == [AlState.INIT] * 6
 
 
 def test_sdo_of_every_kind() -> None:
@@ -150,7 +150,7 @@ def test_attributes_send_nothing() -> None:
 
 def test_read_state_asks() -> None:
     with MainDevice(demo_segment()) as main:
-        assert main.scan()[2].read_state().state is State.PRE_OP
+        assert main.scan()[2].read_state().state is AlState.PRE_OP
 
 
 def test_no_device() -> None:
@@ -177,7 +177,7 @@ def test_a_device_that_refuses_a_state() -> None:
     segment = demo_segment()
     with MainDevice(segment) as main:
         main.scan()
-        segment[3].refuse_state(State.SAFE_OP, 0x001E)
+        segment[3].refuse_state(AlState.SAFE_OP, 0x001E)
         with pytest.raises(StateError, match=r"device 3 .*SAFE-OP.*0x001E"):
             main.configure(main.plan())
 
@@ -186,7 +186,7 @@ def test_a_device_that_never_reaches_a_state() -> None:
     segment = demo_segment()
     with MainDevice(segment) as main:
         main.scan()
-        segment[4].delay_state(State.SAFE_OP, None)
+        segment[4].delay_state(AlState.SAFE_OP, None)
         start = main.link.now()
         with pytest.raises(StateError, match=r"device 4 .*did not reach within 10 s SAFE-OP"):
             main.configure(main.plan())
@@ -240,7 +240,7 @@ def test_a_wish_beyond_the_default_is_mapped_and_verified() -> None:
         plan = main.plan(wish)
         assert plan.devices[3].mapping_changed
         main.configure(plan)
-        assert segment[3].state == State.SAFE_OP
+        assert segment[3].state == AlState.SAFE_OP
         count = subs[3].sdo.read(0x1C13, 0, type=USINT)
         pdos = [subs[3].sdo.read(0x1C13, k + 1, type=UINT) for k in range(count)]
         assert pdos == [pdo.index for a in plan.devices[3].inputs for pdo in a.pdos]
@@ -300,7 +300,7 @@ def test_leaving_brings_devices_from_safe_op_to_pre_op() -> None:
         main.scan()
         main.configure(main.plan())
         main.leave()
-        assert [device.state for device in segment] == [State.PRE_OP] * 6
+        assert [device.state for device in segment] == [AlState.PRE_OP] * 6
 
 
 def test_all_kinds_of_devices_reach_safe_op_whatever_their_controller_can() -> None:
@@ -310,7 +310,7 @@ def test_all_kinds_of_devices_reach_safe_op_whatever_their_controller_can() -> N
         subs = main.scan()
         plan = make_plan([sub.description for sub in subs])
         main.configure(plan)
-        assert [device.state for device in segment] == [State.SAFE_OP] * 5
+        assert [device.state for device in segment] == [AlState.SAFE_OP] * 5
         assert len(plan.cycle.sync_units) == 2
 
 
@@ -329,9 +329,9 @@ def test_one_indication_is_enough_to_do_without_lrw(by_sii: bool) -> None:
         assert (first.supports_lrw, second.supports_lrw) == (False, True)
         plan = make_plan([first, second])
         main.configure(plan)
-        assert [device.state for device in segment] == [State.SAFE_OP] * 2
+        assert [device.state for device in segment] == [AlState.SAFE_OP] * 2
         units = {d.sync_unit: d.command for d in plan.cycle.frames[0].datagrams if d.sync_unit >= 0}
-        assert sorted(units.values()) == [Command.LRD, Command.LRW]
+        assert sorted(units.values()) == [EcatCommand.LRD, EcatCommand.LRW]
 
 
 def test_a_hundred_devices_in_few_frames() -> None:

@@ -11,10 +11,10 @@ from catenary.bus import MainDevice
 from catenary.errors import MappingError
 from catenary.model.device import DeviceDescription, Direction
 from catenary.plan import ObjectReference, PdoWish
-from catenary.plan.wish import DistributedClock, WrittenPdo
+from catenary.plan.request import DistributedClock, WrittenPdo
 from catenary.types import UINT, USINT
 from catenary.virtual import AnalogInputs, Coupler, MappingQuirks, Segment, Servo
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 from tests.plan.devices import Asking
 
 STATUS, POSITION = ObjectReference(0x6041, 0, 16), ObjectReference(0x6064, 0, 32)
@@ -69,7 +69,7 @@ def test_a_mapping_that_carries_what_is_asked_for_is_not_written() -> None:
         plan = main.plan(asking(STATUS, POSITION))
         assert plan.devices[1].downloads == ()
         main.configure(plan)
-        assert main.subs[1].state is State.SAFE_OP
+        assert main.subs[1].state is AlState.SAFE_OP
 
 
 # -- fixed PDOs ----------------------------------------------------------------------------------

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from catenary.bus.packing import batches
 from catenary.procedure.exchange import read
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from catenary.wire.register import AL_STATUS
 
-SHARES = read(Command.FPRD, 0x1001, AL_STATUS)
+SHARES = read(EcatCommand.FPRD, 0x1001, AL_STATUS)
 ALONE = SHARES._replace(alone=True)
 
 

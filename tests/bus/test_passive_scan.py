@@ -10,7 +10,7 @@ import catenary as cat
 from catenary.errors import EepromError, StateError
 from catenary.procedure.al_state import DeviceState
 from catenary.virtual import faults
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 
 OUTPUTS, SERVO = 2, 1
 
@@ -28,8 +28,8 @@ def main(segment: cat.Segment) -> Iterator[cat.MainDevice]:
         yield main
 
 
-def states(segment: cat.Segment) -> list[State]:
-    return [State(segment.core.peek(n, 0x0130, 1)[0] & 15) for n in range(len(segment))]
+def states(segment: cat.Segment) -> list[AlState]:
+    return [AlState(segment.core.peek(n, 0x0130, 1)[0] & 15) for n in range(len(segment))]
 
 
 def test_a_look_finds_what_a_scan_finds(main: cat.MainDevice) -> None:
@@ -39,11 +39,11 @@ def test_a_look_finds_what_a_scan_finds(main: cat.MainDevice) -> None:
 
 def test_a_look_changes_no_state_and_closing_brings_nobody_down(segment: cat.Segment) -> None:
     with cat.MainDevice(segment) as main:
-        main.request_states(main.passive_scan(), range(3), State.PRE_OP)
-    assert states(segment) == [State.PRE_OP] * 3
+        main.request_states(main.passive_scan(), range(3), AlState.PRE_OP)
+    assert states(segment) == [AlState.PRE_OP] * 3
     with cat.MainDevice(segment) as main:
         main.passive_scan()
-    assert states(segment) == [State.PRE_OP] * 3
+    assert states(segment) == [AlState.PRE_OP] * 3
 
 
 def test_without_names_nothing_is_read_from_the_eeproms(main: cat.MainDevice) -> None:
@@ -55,32 +55,32 @@ def test_without_names_nothing_is_read_from_the_eeproms(main: cat.MainDevice) ->
 
 def test_safe_op_is_reached_from_every_state(segment: cat.Segment, main: cat.MainDevice) -> None:
     subs = main.passive_scan()
-    for before in (State.INIT, State.PRE_OP, State.SAFE_OP):
+    for before in (AlState.INIT, AlState.PRE_OP, AlState.SAFE_OP):
         main.request_states(subs, range(3), before)
-        found = main.request_states(subs, range(3), State.SAFE_OP)
+        found = main.request_states(subs, range(3), AlState.SAFE_OP)
         assert [each.state for each in found.values() if isinstance(each, DeviceState)] == [
-            State.SAFE_OP
+            AlState.SAFE_OP
         ] * 3
-    assert states(segment) == [State.SAFE_OP] * 3
+    assert states(segment) == [AlState.SAFE_OP] * 3
 
 
 def test_one_device_alone(segment: cat.Segment, main: cat.MainDevice) -> None:
-    main.request_states(main.passive_scan(), [SERVO], State.PRE_OP)
-    assert states(segment) == [State.INIT, State.PRE_OP, State.INIT]
+    main.request_states(main.passive_scan(), [SERVO], AlState.PRE_OP)
+    assert states(segment) == [AlState.INIT, AlState.PRE_OP, AlState.INIT]
 
 
 def test_who_refuses_says_why_and_the_others_go_on(
     segment: cat.Segment, main: cat.MainDevice
 ) -> None:
-    found = main.request_states(main.passive_scan(), range(3), State.OP)
+    found = main.request_states(main.passive_scan(), range(3), AlState.OP)
     error = found[SERVO]
     assert isinstance(error, StateError)
     assert error.code == 0x0019
-    assert states(segment) == [State.OP, State.SAFE_OP, State.OP]
+    assert states(segment) == [AlState.OP, AlState.SAFE_OP, AlState.OP]
 
 
 def test_boot_needs_a_bootstrap_mailbox(main: cat.MainDevice) -> None:
-    error = main.request_states(main.passive_scan(), [SERVO], State.BOOT)[SERVO]
+    error = main.request_states(main.passive_scan(), [SERVO], AlState.BOOT)[SERVO]
     assert isinstance(error, EepromError)
     assert "no bootstrap mailbox" in error.message
 

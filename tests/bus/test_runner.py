@@ -13,7 +13,7 @@ from catenary.errors import CatenaryError
 from catenary.procedure.exchange import Procedure, after, read
 from catenary.types import VISIBLE_STRING
 from catenary.virtual import Coupler, DigitalOutputs, Segment, Servo
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from catenary.wire.register import AL_STATUS, DL_STATUS
 from tests.bus.links import Echo, meddled
 
@@ -73,7 +73,7 @@ class Halting(Echo):
 
 def test_answers_that_came_while_the_program_was_halted_are_not_lost() -> None:
     def asks() -> Procedure[bool]:
-        [reply] = yield [read(Command.BRD, 0, AL_STATUS)]
+        [reply] = yield [read(EcatCommand.BRD, 0, AL_STATUS)]
         return reply.lost
 
     runner = BlockingRunner(Halting())
@@ -94,12 +94,12 @@ def test_the_others_are_finished_before_an_error_is_raised() -> None:
     finished: list[str] = []
 
     def fails() -> Procedure[None]:
-        yield [read(Command.BRD, 0, AL_STATUS)]
+        yield [read(EcatCommand.BRD, 0, AL_STATUS)]
         raise ValueError("first")
 
     def goes_on() -> Procedure[None]:
         yield after(0.5)
-        yield [read(Command.BRD, 0, DL_STATUS)]
+        yield [read(EcatCommand.BRD, 0, DL_STATUS)]
         finished.append("second")
 
     with pytest.raises(ValueError, match="first"):
@@ -112,7 +112,7 @@ def test_an_interrupt_ends_the_procedures() -> None:
 
     def interrupted() -> Procedure[None]:
         try:
-            yield [read(Command.BRD, 0, AL_STATUS)]
+            yield [read(EcatCommand.BRD, 0, AL_STATUS)]
             raise KeyboardInterrupt
         finally:
             ended.append(True)
@@ -140,5 +140,5 @@ def test_time_passes_on_the_links_clock() -> None:
 
 
 def _state(station: int) -> Procedure[int]:
-    [reply] = yield [read(Command.FPRD, station, AL_STATUS)]
+    [reply] = yield [read(EcatCommand.FPRD, station, AL_STATUS)]
     return AL_STATUS.unpack(reply.data)

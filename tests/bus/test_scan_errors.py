@@ -6,7 +6,7 @@ import pytest
 
 import catenary as cat
 from catenary.errors import CatenaryError, MailboxError, StateError
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 
 REFUSED = 0x0016  # invalid mailbox configuration, PRE-OP
 
@@ -21,7 +21,7 @@ def segment() -> cat.Segment:
             cat.virtual.DigitalOutputs(),
         ]
     )
-    segment[1].refuse_state(State.PRE_OP, REFUSED)
+    segment[1].refuse_state(AlState.PRE_OP, REFUSED)
     return segment
 
 
@@ -31,10 +31,10 @@ def test_strict_it_is_raised_and_the_others_are_there(segment: cat.Segment) -> N
             main.scan()
         assert caught.value.position == 1
         assert [sub.state for sub in main.subs] == [
-            State.PRE_OP,
+            AlState.PRE_OP,
             None,
-            State.PRE_OP,
-            State.PRE_OP,
+            AlState.PRE_OP,
+            AlState.PRE_OP,
         ]
         assert [device.state for device in segment][2:] == [2, 2]
 
@@ -56,15 +56,15 @@ def test_else_it_is_raised_when_the_device_is_used(segment: cat.Segment) -> None
 def test_mended_and_scanned_again_it_is_whole(segment: cat.Segment) -> None:
     with cat.MainDevice(segment) as main:
         before = main.scan(strict=False)[2]
-        segment[1].refuse_state(State.PRE_OP, None)
+        segment[1].refuse_state(AlState.PRE_OP, None)
         subs = main.scan()
         assert subs[2] is before
         assert [sub.error for sub in subs] == [None] * 4
-        assert [sub.state for sub in subs] == [State.PRE_OP] * 4
+        assert [sub.state for sub in subs] == [AlState.PRE_OP] * 4
 
 
 def test_further_ones_are_notes(segment: cat.Segment) -> None:
-    segment[2].refuse_state(State.PRE_OP, REFUSED)
+    segment[2].refuse_state(AlState.PRE_OP, REFUSED)
     with cat.MainDevice(segment) as main:
         with pytest.raises(CatenaryError, match="device 1") as caught:
             main.scan()

@@ -8,7 +8,7 @@ import catenary as cat
 from catenary.bus.sub_devices import SubDevices
 from catenary.errors import SegmentError, StateError
 from catenary.virtual import Coupler, DigitalOutputs, Segment, Servo
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 
 
 def positions(subs: tuple[cat.SubDevice, ...]) -> list[int]:
@@ -70,13 +70,13 @@ def test_a_position_that_does_not_exist_names_the_number_of_devices() -> None:
         SubDevices()[0]
 
 
-@pytest.mark.parametrize("state", ["SAFE_OP", "safeop", State.SAFE_OP])
-def test_a_device_is_brought_to_a_state(state: State | str) -> None:
+@pytest.mark.parametrize("state", ["SAFE_OP", "safeop", AlState.SAFE_OP])
+def test_a_device_is_brought_to_a_state(state: AlState | str) -> None:
     with cat.MainDevice(Segment([Coupler(), Servo()])) as main:
         servo = main.scan()[1]
-        assert servo.request_state(state).state is State.SAFE_OP
-        assert servo.read_state().state is servo.state is State.SAFE_OP
-        assert servo.request_state("PREOP").state is State.PRE_OP
+        assert servo.request_state(state).state is AlState.SAFE_OP
+        assert servo.read_state().state is servo.state is AlState.SAFE_OP
+        assert servo.request_state("PREOP").state is AlState.PRE_OP
         with pytest.raises(ValueError, match="invalid state 'RUN': INIT, PRE-OP"):
             servo.request_state("RUN")
 

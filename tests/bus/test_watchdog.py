@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 import catenary as cat
-from catenary.plan.wish import ObjectReference, PdoWish
+from catenary.plan.request import ObjectReference, PdoWish
 from catenary.virtual import DigitalOutputs, ServoQuirks
 from tests.plan.devices import Asking
 

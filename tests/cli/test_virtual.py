@@ -11,7 +11,7 @@ import pytest
 from catenary.cli.main import main
 from catenary.realtime import scheduling
 from catenary.realtime.child import start_python
-from catenary.wire.datagram import Command, Datagram
+from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import encode_frame
 
 ETHERCAT = 0x88A4
@@ -25,7 +25,7 @@ def test_lost_frames_are_reported_in_the_end(veth: tuple[str, str]) -> None:
     with start_python(command) as server, socket.socket(socket.AF_PACKET, socket.SOCK_RAW) as wire:
         assert server.read_line(SECONDS), "the virtual segment did not start"
         wire.bind((ours, ETHERCAT))
-        wire.send(encode_frame([Datagram(Command.BRD, 0, b"\0")]))
+        wire.send(encode_frame([Datagram(EcatCommand.BRD, 0, b"\0")]))
         time.sleep(0.1)  # real time, over a real wire: the frame has arrived
         server.process.send_signal(signal.SIGTERM)
         said = server.read_line(SECONDS)

@@ -25,7 +25,7 @@ from catenary.plan.cycle import (
     NumberKind,
     SyncUnit,
 )
-from catenary.wire.datagram import Command, Datagram
+from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import decode_frame, encode_frame
 from tests.link_table import (
     NOW,
@@ -211,13 +211,13 @@ class Segment:
 
     def process(self, datagram: Datagram) -> Datagram:
         answering = [k for k in range(len(self.drives)) if k not in self.silent]
-        if datagram.command == Command.BRD:
+        if datagram.command == EcatCommand.BRD:
             address = datagram.address + len(self.drives)  # every device counts ADP up
             data = bytes([self.al_state if answering else 0, 0])
             return replace(datagram, address=address, data=data, working_counter=len(answering))
-        if datagram.command == Command.LRW:
+        if datagram.command == EcatCommand.LRW:
             return self.process_logical(datagram, answering)
-        if datagram.command == Command.NOP:
+        if datagram.command == EcatCommand.NOP:
             return datagram
         return replace(datagram, working_counter=len(answering))
 
@@ -266,10 +266,10 @@ def frame_plan(parts: Sequence[tuple[DatagramKind, Datagram, int, int]]) -> Fram
     datagrams, offset = [], 16
     for kind, datagram, counter, unit in parts:
         copies: tuple[Copy, ...] = ()
-        if datagram.command in (Command.LRW, Command.LRD, Command.LWR):
+        if datagram.command in (EcatCommand.LRW, EcatCommand.LRD, EcatCommand.LWR):
             copies = (Copy(offset + 10, datagram.address - LOGICAL, len(datagram.data)),)
-        reads = datagram.command != Command.LWR
-        writes = datagram.command != Command.LRD
+        reads = datagram.command != EcatCommand.LWR
+        writes = datagram.command != EcatCommand.LRD
         datagrams.append(
             DatagramPlan(
                 kind,
@@ -287,16 +287,16 @@ def frame_plan(parts: Sequence[tuple[DatagramKind, Datagram, int, int]]) -> Fram
 
 
 def al_status(devices: int) -> tuple[DatagramKind, Datagram, int, int]:
-    brd = Datagram(Command.BRD, 0x0130 << 16, bytes(2))
+    brd = Datagram(EcatCommand.BRD, 0x0130 << 16, bytes(2))
     return DatagramKind.AL_STATUS, brd, devices, -1
 
 
 def cycle_number() -> tuple[DatagramKind, Datagram, int, int]:
-    return DatagramKind.CYCLE_NUMBER, Datagram(Command.NOP, 0, bytes(4)), 0, -1
+    return DatagramKind.CYCLE_NUMBER, Datagram(EcatCommand.NOP, 0, bytes(4)), 0, -1
 
 
 def lrw(unit: int, size: int = DRIVE_SIZE) -> tuple[DatagramKind, Datagram, int, int]:
-    datagram = Datagram(Command.LRW, LOGICAL + unit * DRIVE_SIZE, bytes(size))
+    datagram = Datagram(EcatCommand.LRW, LOGICAL + unit * DRIVE_SIZE, bytes(size))
     return DatagramKind.PROCESS_DATA, datagram, 3, unit
 
 

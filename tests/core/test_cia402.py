@@ -11,7 +11,7 @@ from catenary.core import (
     state_of,
 )
 from catenary.wire import cia402
-from catenary.wire.cia402 import State
+from catenary.wire.cia402 import AxisState
 
 GOALS = (GOAL_DISABLED, GOAL_ENABLED, GOAL_QUICK_STOP, GOAL_RESET)
 
@@ -22,7 +22,7 @@ def test_every_statusword_has_the_state_the_standard_codes() -> None:
         assert state_of(statusword) == (255 if expected is None else expected)
 
 
-def next_states(state: State, controlword: int, before: int) -> set[State]:
+def next_states(state: AxisState, controlword: int, before: int) -> set[AxisState]:
     """Where the standard's commands can lead, without what a drive does by itself."""
     edge = controlword & ~before & 0x80
     return {
@@ -37,24 +37,24 @@ def next_states(state: State, controlword: int, before: int) -> set[State]:
 @pytest.mark.parametrize(
     ("start", "goal", "path"),
     [
-        (State.SWITCH_ON_DISABLED, GOAL_ENABLED, [2, 3, 4]),
-        (State.FAULT, GOAL_ENABLED, [1, 2, 3, 4]),
-        (State.FAULT, GOAL_RESET, [1]),
-        (State.FAULT, GOAL_DISABLED, []),
-        (State.FAULT, GOAL_QUICK_STOP, []),
-        (State.QUICK_STOP_ACTIVE, GOAL_ENABLED, [1, 2, 3, 4]),
-        (State.QUICK_STOP_ACTIVE, GOAL_QUICK_STOP, []),
-        (State.OPERATION_ENABLED, GOAL_QUICK_STOP, [5]),
-        (State.OPERATION_ENABLED, GOAL_DISABLED, [3, 2]),
-        (State.OPERATION_ENABLED, GOAL_RESET, [3, 2]),
-        (State.READY_TO_SWITCH_ON, GOAL_QUICK_STOP, [1]),
-        (State.SWITCHED_ON, GOAL_QUICK_STOP, [1]),
-        (State.SWITCH_ON_DISABLED, GOAL_DISABLED, []),
-        (State.NOT_READY_TO_SWITCH_ON, GOAL_ENABLED, []),
-        (State.FAULT_REACTION_ACTIVE, GOAL_ENABLED, []),
+        (AxisState.SWITCH_ON_DISABLED, GOAL_ENABLED, [2, 3, 4]),
+        (AxisState.FAULT, GOAL_ENABLED, [1, 2, 3, 4]),
+        (AxisState.FAULT, GOAL_RESET, [1]),
+        (AxisState.FAULT, GOAL_DISABLED, []),
+        (AxisState.FAULT, GOAL_QUICK_STOP, []),
+        (AxisState.QUICK_STOP_ACTIVE, GOAL_ENABLED, [1, 2, 3, 4]),
+        (AxisState.QUICK_STOP_ACTIVE, GOAL_QUICK_STOP, []),
+        (AxisState.OPERATION_ENABLED, GOAL_QUICK_STOP, [5]),
+        (AxisState.OPERATION_ENABLED, GOAL_DISABLED, [3, 2]),
+        (AxisState.OPERATION_ENABLED, GOAL_RESET, [3, 2]),
+        (AxisState.READY_TO_SWITCH_ON, GOAL_QUICK_STOP, [1]),
+        (AxisState.SWITCHED_ON, GOAL_QUICK_STOP, [1]),
+        (AxisState.SWITCH_ON_DISABLED, GOAL_DISABLED, []),
+        (AxisState.NOT_READY_TO_SWITCH_ON, GOAL_ENABLED, []),
+        (AxisState.FAULT_REACTION_ACTIVE, GOAL_ENABLED, []),
     ],
 )
-def test_the_words_lead_along_the_transitions(start: State, goal: int, path: list[int]) -> None:
+def test_the_words_lead_along_the_transitions(start: AxisState, goal: int, path: list[int]) -> None:
     state, word, taken = start, 0x0F, []
     for _ in range(12):
         before, word = word, controlword_towards(state, goal, word)
@@ -67,9 +67,9 @@ def test_the_words_lead_along_the_transitions(start: State, goal: int, path: lis
 
 
 def test_an_enabled_drive_that_fell_into_fault_sees_its_commands_cleared_before_the_reset() -> None:
-    assert controlword_towards(State.FAULT, GOAL_ENABLED, 0x0F) == 0
-    assert controlword_towards(State.FAULT, GOAL_ENABLED, 0x00) == 0x80
-    assert controlword_towards(State.FAULT, GOAL_ENABLED, 0x80) == 0x80
+    assert controlword_towards(AxisState.FAULT, GOAL_ENABLED, 0x0F) == 0
+    assert controlword_towards(AxisState.FAULT, GOAL_ENABLED, 0x00) == 0x80
+    assert controlword_towards(AxisState.FAULT, GOAL_ENABLED, 0x80) == 0x80
 
 
 def test_no_command_for_an_unknown_state() -> None:

@@ -13,7 +13,7 @@ from catenary.core import (
     Engine,
 )
 from catenary.plan.cycle import ClockPlan, DatagramKind
-from catenary.wire.datagram import Command, Datagram
+from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import decode_frame
 from tests.core.rig import (
     MS,
@@ -397,7 +397,7 @@ class DriftingReference(Trace):
         process = self.segment.process
 
         def with_time(datagram: Datagram) -> Datagram:
-            if datagram.command != Command.FRMW:
+            if datagram.command != EcatCommand.FRMW:
                 return process(datagram)
             time = round(self.link.time * (1 + self.PPM * 1e-6)) + 123_456_789
             data = (time & 0xFFFF_FFFF).to_bytes(4, "little")
@@ -407,7 +407,7 @@ class DriftingReference(Trace):
 
 
 def clocked(execution: str) -> DriftingReference:
-    time = Datagram(Command.FRMW, 0x1001 | 0x0910 << 16, bytes(4))
+    time = Datagram(EcatCommand.FRMW, 0x1001 | 0x0910 << 16, bytes(4))
     frame = frame_plan([al_status(1), lrw(0), (DatagramKind.CLOCK, time, 1, -1)])
     return DriftingReference(
         make_plan([axis(0)], execution=execution, frames=(frame,), clock=CLOCK)

@@ -12,7 +12,7 @@ import pytest
 from catenary.core import CYCLE_NONE, CYCLE_OK, CYCLE_STOPPED, Engine
 from catenary.plan.cycle import CyclePlan
 from catenary.virtual import Coupler, Segment
-from catenary.wire.datagram import Command, Datagram
+from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import decode_frame, encode_frame
 from tests.core.rig import Bench, al_status, axis, frame_plan, make_plan
 
@@ -84,7 +84,7 @@ def test_a_signal_handler_runs_at_once_and_its_exception_comes_out(engine: Engin
 
 
 def test_the_lane_and_its_waiting_thread(engine: Engine) -> None:
-    frame = encode_frame([Datagram(Command.BRD, 0x0130 << 16, bytes(2), index=0x91)])
+    frame = encode_frame([Datagram(EcatCommand.BRD, 0x0130 << 16, bytes(2), index=0x91)])
     answers = []
 
     def serve() -> None:

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from catenary.wire import al, datagram, frame
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 
 HEADER = Path(__file__).resolve().parents[2] / "src" / "catenary" / "native" / "ethercat.h"
 
@@ -12,7 +12,7 @@ HEADER = Path(__file__).resolve().parents[2] / "src" / "catenary" / "native" / "
 def test_the_header_has_the_numbers_of_wire() -> None:
     found = re.findall(r"^ +CAT_(\w+) = (\w+)", HEADER.read_text(), re.MULTILINE)
     assert {name: int(value, 0) for name, value in found} == {
-        **{command.name: command.value for command in Command},
+        **{command.name: command.value for command in EcatCommand},
         "ETHERNET_HEADER": frame.ETHERNET_HEADER_SIZE,
         "ETHERCAT_HEADER": frame.ETHERCAT_HEADER_SIZE,
         "DATAGRAM_HEADER": datagram.HEADER_SIZE,

@@ -6,7 +6,7 @@ import pytest
 
 from catenary.core import CYCLE_OK, CYCLE_WORKING_COUNTER, Engine
 from catenary.plan.cycle import Copy, DatagramKind, SyncUnit
-from catenary.wire.datagram import Command, Datagram
+from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import decode_frame, encode_frame
 from tests.core.rig import (
     DRIVE_SIZE,
@@ -164,7 +164,7 @@ def test_cycle_numbers_count_the_cycles() -> None:
         int.from_bytes(datagram.data, "little")
         for frame in b.link.sent
         for datagram in decode_frame(frame).datagrams
-        if datagram.command == Command.NOP
+        if datagram.command == EcatCommand.NOP
     ]
     assert numbers == [1, 2, 2, 3, 4, 4]
 
@@ -204,7 +204,7 @@ def test_how_many_frames_a_cycle_may_have(
 
 def test_an_index_never_sent_is_alien() -> None:
     b = bench(axis(0))
-    b.link.arrive(encode_frame([Datagram(Command.BRD, 0, bytes(2), index=0x55)]), 1_000_000)
+    b.link.arrive(encode_frame([Datagram(EcatCommand.BRD, 0, bytes(2), index=0x55)]), 1_000_000)
     b.engine.run(1)
     assert kinds(b) == {"alien": 1}
     assert b.ok
@@ -264,7 +264,7 @@ def test_any_bytes_are_counted_and_nothing_worse() -> None:
 
 def test_a_flood_does_not_hold_the_cycle_up() -> None:
     b = bench(axis(0))
-    b.link.arrivals = [(0, encode_frame([Datagram(Command.NOP, 0, b"")]))] * 1000
+    b.link.arrivals = [(0, encode_frame([Datagram(EcatCommand.NOP, 0, b"")]))] * 1000
     b.engine.run(1)
     assert b.engine.counters["alien"] + b.engine.counters["corrupt"] <= 256
     assert len(b.link.arrivals) >= 700
@@ -273,7 +273,7 @@ def test_a_flood_does_not_hold_the_cycle_up() -> None:
 def test_what_arrived_before_the_start_is_flushed() -> None:
     b = bench(axis(0))
     b.engine.stop()
-    b.link.arrive(encode_frame([Datagram(Command.NOP, 0, b"")]))
+    b.link.arrive(encode_frame([Datagram(EcatCommand.NOP, 0, b"")]))
     b.engine.start()
     b.engine.run(1)
     assert kinds(b) == {}
@@ -389,15 +389,15 @@ def test_a_unit_in_frames_of_different_cycles_is_refused() -> None:
 
 
 def test_a_unit_of_lrd_and_lwr_needs_both_before_its_inputs_count() -> None:
-    lrd = Datagram(Command.LRD, LOGICAL, bytes(DRIVE_SIZE))
-    lwr = Datagram(Command.LWR, LOGICAL, bytes(DRIVE_SIZE))
+    lrd = Datagram(EcatCommand.LRD, LOGICAL, bytes(DRIVE_SIZE))
+    lwr = Datagram(EcatCommand.LWR, LOGICAL, bytes(DRIVE_SIZE))
     data = DatagramKind.PROCESS_DATA
     frames = (frame_plan([(data, lrd, 1, 0)]), frame_plan([(data, lwr, 1, 0)]))
     b = Bench(replace(make_plan([axis(0)]), frames=frames))
     b.drives[0].position = 3000
 
     def process(datagram: Datagram) -> Datagram:
-        if datagram.command == Command.LRD:
+        if datagram.command == EcatCommand.LRD:
             return replace(datagram, data=b.drives[0].inputs(), working_counter=1)
         return replace(datagram, working_counter=writes)
 

@@ -2,13 +2,13 @@
 
 import pytest
 
-from catenary.wire.datagram import Command, Datagram
+from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import decode_frame, encode_frame
 from tests.core.rig import Bench, axis, bench
 
 
 def request(number: int = 0, size: int = 2, index: int = 0x80) -> bytes:
-    return encode_frame([Datagram(Command.FPRD, number, bytes(size), index=index)])
+    return encode_frame([Datagram(EcatCommand.FPRD, number, bytes(size), index=index)])
 
 
 def lane_frames(b: Bench) -> list[bytes]:

@@ -11,9 +11,9 @@ import pytest
 
 from catenary.doctor.change import (
     Change,
+    HostState,
     MachineGround,
     Made,
-    State,
     StateError,
     apply,
     chosen,
@@ -45,7 +45,7 @@ class Ground:
 
 @pytest.fixture
 def state(tmp_path):
-    return State(tmp_path / "state" / "doctor.json", "boot 1")
+    return HostState(tmp_path / "state" / "doctor.json", "boot 1")
 
 
 def test_applied_and_undone(state):
@@ -113,7 +113,7 @@ def test_it_is_noted_before_it_is_made(state):
 
 def test_after_a_reboot_there_is_nothing_to_undo(state):
     list(apply([Change("a", "8")], Ground(a="1"), state))
-    assert State(state.path, "boot 2").load() == []
+    assert HostState(state.path, "boot 2").load() == []
 
 
 def test_where_nothing_can_be_noted_nothing_is_changed(state, monkeypatch):

@@ -11,7 +11,7 @@ from catenary.errors import SdoAbort
 from catenary.model.device import Direction
 from catenary.plan.cycle import Number, NumberKind
 from catenary.plan.numbers import ANY, Which
-from catenary.plan.wish import PdoWish, Views, WishTables
+from catenary.plan.request import PdoWish, Views, WishTables
 
 
 @dataclass

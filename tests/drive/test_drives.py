@@ -13,7 +13,7 @@ from catenary.drive.objects import AxisObject
 from catenary.errors import ConfigurationError, MappingError
 from catenary.plan.cycle import AxisLimits, Bank
 from catenary.plan.stop_reason import StopReason
-from catenary.wire.cia402 import Mode, State
+from catenary.wire.cia402 import AxisState, Mode
 from tests.drive.fakes import FakeLayout, fake_sub, views_of
 
 MILLISECOND = 1_000_000
@@ -225,9 +225,13 @@ def test_states_and_faults_are_read_from_the_cycle() -> None:
     drives = opened(Drives([fake_sub(1), fake_sub(2), fake_sub(3)], counts_per_turn=1))
     views = drives._views
     assert views is not None
-    views.axis_state[:] = [State.OPERATION_ENABLED, State.FAULT, State.FAULT_REACTION_ACTIVE]
+    views.axis_state[:] = [
+        AxisState.OPERATION_ENABLED,
+        AxisState.FAULT,
+        AxisState.FAULT_REACTION_ACTIVE,
+    ]
     views.axis_flags[:] = [1, 0, 2]
-    assert drives.state[0] is State.OPERATION_ENABLED
+    assert drives.state[0] is AxisState.OPERATION_ENABLED
     assert drives.faults == (1, 2)
     assert drives.enabled.tolist() == [True, False, False]
     assert drives.limited.tolist() == [False, False, True]
@@ -254,8 +258,8 @@ def test_the_reason_of_a_stop_is_kept() -> None:
 def test_a_statusword_that_codes_no_state_is_none() -> None:
     drives = opened(Drives([fake_sub(1), fake_sub(2)], counts_per_turn=1))
     assert drives._views is not None
-    drives._views.axis_state[:] = [state_of(0x0022), State.FAULT]  # core: 255
-    assert drives.state == (None, State.FAULT)
+    drives._views.axis_state[:] = [state_of(0x0022), AxisState.FAULT]  # core: 255
+    assert drives.state == (None, AxisState.FAULT)
     assert drives.faults == (1,)
 
 

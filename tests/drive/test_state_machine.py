@@ -4,16 +4,16 @@ import pytest
 
 from catenary import core
 from catenary.drive.state_machine import Goal, controlword_towards
-from catenary.wire.cia402 import COMMANDS, TRANSITIONS, State, state_of
+from catenary.wire.cia402 import COMMANDS, TRANSITIONS, AxisState, state_of
 
 # The drive's side, by the standard's own table of transitions (IEC 61800-7-201 table 29).
 BY_ITSELF = {
-    State.NOT_READY_TO_SWITCH_ON: State.SWITCH_ON_DISABLED,  # transition 1
-    State.FAULT_REACTION_ACTIVE: State.FAULT,  # transition 14
+    AxisState.NOT_READY_TO_SWITCH_ON: AxisState.SWITCH_ON_DISABLED,  # transition 1
+    AxisState.FAULT_REACTION_ACTIVE: AxisState.FAULT,  # transition 14
 }
 
 
-def obey(state: State, controlword: int, previous: int) -> State:
+def obey(state: AxisState, controlword: int, previous: int) -> AxisState:
     """What a drive does with a controlword, by the standard's table of transitions."""
     if state in BY_ITSELF:
         return BY_ITSELF[state]
@@ -27,7 +27,7 @@ def obey(state: State, controlword: int, previous: int) -> State:
     return state
 
 
-def walk(state: State, goal: Goal, previous: int) -> list[State]:
+def walk(state: AxisState, goal: Goal, previous: int) -> list[AxisState]:
     """The states a drive goes through when it is led towards a goal."""
     path = [state]
     for _ in range(12):
@@ -38,39 +38,46 @@ def walk(state: State, goal: Goal, previous: int) -> list[State]:
     return path
 
 
-@pytest.mark.parametrize("state", State)
+@pytest.mark.parametrize("state", AxisState)
 @pytest.mark.parametrize("previous", [0x0000, 0x000F, 0x0007, 0x0080])
-def test_every_state_can_be_enabled(state: State, previous: int) -> None:
-    if state is State.FAULT and previous == 0x0080:
+def test_every_state_can_be_enabled(state: AxisState, previous: int) -> None:
+    if state is AxisState.FAULT and previous == 0x0080:
         pytest.skip("bit 7 was set before the fault: the core clears it while the fault reacts")
-    assert walk(state, Goal.ENABLED, previous)[-1] is State.OPERATION_ENABLED
+    assert walk(state, Goal.ENABLED, previous)[-1] is AxisState.OPERATION_ENABLED
 
 
-@pytest.mark.parametrize("state", set(State) - {State.FAULT, State.FAULT_REACTION_ACTIVE})
-def test_disabled_ends_without_power(state: State) -> None:
+@pytest.mark.parametrize(
+    "state", set(AxisState) - {AxisState.FAULT, AxisState.FAULT_REACTION_ACTIVE}
+)
+def test_disabled_ends_without_power(state: AxisState) -> None:
     end = walk(state, Goal.DISABLED, 0)[-1]
-    assert end in (State.SWITCH_ON_DISABLED, State.READY_TO_SWITCH_ON)
+    assert end in (AxisState.SWITCH_ON_DISABLED, AxisState.READY_TO_SWITCH_ON)
 
 
 def test_a_fault_is_kept_until_somebody_asks() -> None:
-    assert walk(State.FAULT_REACTION_ACTIVE, Goal.DISABLED, 0x000F)[-1] is State.FAULT
-    assert walk(State.FAULT, Goal.QUICK_STOP, 0x000F)[-1] is State.FAULT
-    assert walk(State.FAULT, Goal.RESET, 0x000F)[-1] is State.SWITCH_ON_DISABLED
+    assert walk(AxisState.FAULT_REACTION_ACTIVE, Goal.DISABLED, 0x000F)[-1] is AxisState.FAULT
+    assert walk(AxisState.FAULT, Goal.QUICK_STOP, 0x000F)[-1] is AxisState.FAULT
+    assert walk(AxisState.FAULT, Goal.RESET, 0x000F)[-1] is AxisState.SWITCH_ON_DISABLED
 
 
 def test_quick_stop_stays_until_told_otherwise() -> None:
-    assert walk(State.OPERATION_ENABLED, Goal.QUICK_STOP, 0x000F)[-1] is State.QUICK_STOP_ACTIVE
-    assert walk(State.QUICK_STOP_ACTIVE, Goal.DISABLED, 0x0002)[-1] is State.SWITCH_ON_DISABLED
+    assert (
+        walk(AxisState.OPERATION_ENABLED, Goal.QUICK_STOP, 0x000F)[-1]
+        is AxisState.QUICK_STOP_ACTIVE
+    )
+    assert (
+        walk(AxisState.QUICK_STOP_ACTIVE, Goal.DISABLED, 0x0002)[-1] is AxisState.SWITCH_ON_DISABLED
+    )
 
 
 def test_enabling_out_of_a_quick_stop_goes_through_the_whole_machine() -> None:
-    path = walk(State.QUICK_STOP_ACTIVE, Goal.ENABLED, 0x0002)
-    assert path[1] is State.SWITCH_ON_DISABLED
-    assert path[-1] is State.OPERATION_ENABLED
+    path = walk(AxisState.QUICK_STOP_ACTIVE, Goal.ENABLED, 0x0002)
+    assert path[1] is AxisState.SWITCH_ON_DISABLED
+    assert path[-1] is AxisState.OPERATION_ENABLED
 
 
 def test_only_commands_of_the_standard_are_given() -> None:
-    for state in State:
+    for state in AxisState:
         for goal in Goal:
             word = controlword_towards(state, goal, 0)
             assert any(command.matches(word) for command in COMMANDS)
@@ -89,7 +96,7 @@ def test_the_compiled_twin_agrees_on_states() -> None:
 @pytest.mark.parametrize("goal", Goal)
 def test_the_compiled_twin_agrees_on_commands(goal: Goal) -> None:
     for previous in range(256):
-        for state in State:
+        for state in AxisState:
             assert core.controlword_towards(state, goal, previous) == controlword_towards(
                 state, goal, previous
             )

@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from catenary.cli.sii_text import text_lines, tolerant
-from catenary.doctor.change import MachineGround, Made, State, StateError, undo
+from catenary.doctor.change import HostState, MachineGround, Made, StateError, undo
 from catenary.errors import ConfigurationError, DecodeError, RecordingError, ShareError
 from catenary.link import Replay
 from catenary.realtime.analysis_file import read_demands
@@ -373,7 +373,7 @@ STATE = msgspec.json.encode({"boot": "b", "made": [{"target": "/x", "before": "1
 @given(content=damaged(STATE) | st.recursive(PLAIN, st.lists).map(lambda v: json.dumps(v).encode()))
 @settings(max_examples=200)
 def test_a_state_of_the_doctor(folder: Path, content: bytes) -> None:
-    state = State(folder / "doctor.json", "b")
+    state = HostState(folder / "doctor.json", "b")
     state.path.write_bytes(content)
     state.path.chmod(0o600)
     with_error(lambda: list(undo(MachineGround(folder), state)), StateError)
@@ -383,13 +383,13 @@ def test_a_state_of_the_doctor(folder: Path, content: bytes) -> None:
 @example(target="\x00", before="", after="")
 def test_a_change_that_somebody_made_up(folder: Path, target: str, before: str, after: str) -> None:
     """Saving and undoing end without an error, or with the documented one."""
-    state = State(folder / "doctor.json", "b")
+    state = HostState(folder / "doctor.json", "b")
     with_error(lambda: state.save([Made(target, before, after)]), StateError, UnicodeEncodeError)
     with_error(lambda: list(undo(MachineGround(folder), state)), StateError)
 
 
 def test_a_state_nested_without_end(folder: Path) -> None:
-    state = State(folder / "deep.json", "b")
+    state = HostState(folder / "deep.json", "b")
     state.path.write_bytes(b'{"boot": "b", "x": ' + b"[" * 100_000)
     os.chmod(state.path, 0o600)
     with pytest.raises(StateError):

@@ -16,7 +16,7 @@ from catenary.errors import (
     NoDeviceError,
 )
 from catenary.igh import Master
-from catenary.igh import refusal as module
+from catenary.igh import failures as module
 from tests.igh.double import Double
 
 

@@ -9,7 +9,7 @@ import pytest
 
 import catenary as cat
 from catenary.igh import Master
-from catenary.plan.make import make_plan
+from catenary.plan.planner import make_plan
 from tests.igh.double import Double
 from tests.igh.loops import clocked_loop, kernel_of
 

@@ -12,7 +12,7 @@ from catenary.igh._ecrt import Exchange, KernelTime
 from catenary.igh.configure import Domain
 from catenary.igh.library import Library
 from catenary.igh.master import Master
-from catenary.loop.carried import carried
+from catenary.loop.external_cycle import carried
 from tests.igh.double import Double
 from tests.igh.loops import kernel_of
 from tests.loop_options import grouped

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import catenary as cat
-from catenary.igh import carrier
+from catenary.igh import kernel_cycle as carrier
 from catenary.igh.kernel_log import KernelLog
 from tests.igh.double import Double
 from tests.igh.loops import clocked_loop

@@ -9,9 +9,9 @@ import pytest
 
 from catenary.errors import DecodeError, LinkError
 from catenary.link import Recorder, Replay
-from catenary.link.exchanges import pair, read_exchanges
+from catenary.link.frame_pairs import pair, read_exchanges
 from catenary.wire.capture import decode_capture
-from catenary.wire.datagram import Command, Datagram
+from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import Frame
 from catenary.wire.pcapng import Direction, Packet
 from tests.link.python_link import PythonLink, frame
@@ -132,8 +132,8 @@ def test_a_lost_frame_gets_no_answer_of_a_later_one(seconds):
 
 def test_pairs_by_content_where_only_the_address_was_counted_up():
     """A broadcast or position read that no device answers comes back uncounted."""
-    asked = Frame((Datagram(Command.APRD, 0x0130_FFFE, bytes(40), 7),), b"\x02" + bytes(5))
-    answer = Frame((Datagram(Command.APRD, 0x0130_0001, bytes(40), 7),), asked.source)
+    asked = Frame((Datagram(EcatCommand.APRD, 0x0130_FFFE, bytes(40), 7),), b"\x02" + bytes(5))
+    answer = Frame((Datagram(EcatCommand.APRD, 0x0130_0001, bytes(40), 7),), asked.source)
     assert pair([Packet(1, asked.encode()), Packet(4, answer.encode())]) == [
         (asked.encode(), answer.encode(), 3)
     ]

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from catenary.link import Ring
 from catenary.link._ring import RingLink, merge, second_copy
 from catenary.link.ring_state import RingState, Shape
-from catenary.wire.datagram import Command, Datagram
+from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import decode_frame, encode_frame
 from tests.link_table import (
     FORETELLS,
@@ -75,12 +75,12 @@ class RingOfDevices:
     def answer(self, d: Datagram, stations: Sequence[int]) -> Datagram:
         data, counter = d.data, 0
         for station in stations:
-            if d.command is Command.FPRD and d.adp == station:
+            if d.command is EcatCommand.FPRD and d.adp == station:
                 data, counter = station.to_bytes(len(data), "little"), counter + 1
-            elif d.command is Command.FPWR and d.adp == station:
+            elif d.command is EcatCommand.FPWR and d.adp == station:
                 self.written.setdefault(station, []).append(d.data)
                 counter += 1
-            elif d.command in (Command.BRD, Command.FRMW) or d.command is Command.APRD:
+            elif d.command in (EcatCommand.BRD, EcatCommand.FRMW) or d.command is EcatCommand.APRD:
                 counter += 1
         return Datagram(d.command, d.address, data, d.index, counter)
 
@@ -145,11 +145,11 @@ def exchange(link: RingLink, *datagrams: Datagram, within: int = 1_000_000) -> l
 
 
 def question(station: int, index: int = 1) -> Datagram:
-    return Datagram(Command.FPRD, station | 0x10 << 16, bytes(2), index)
+    return Datagram(EcatCommand.FPRD, station | 0x10 << 16, bytes(2), index)
 
 
 def count(index: int = 2) -> Datagram:
-    return Datagram(Command.BRD, 0x130 << 16, bytes(2), index)
+    return Datagram(EcatCommand.BRD, 0x130 << 16, bytes(2), index)
 
 
 @pytest.fixture
@@ -257,17 +257,17 @@ def test_no_port_is_an_error(ring: RingOfDevices, link: RingLink) -> None:
 def test_positions_count_from_the_first_end_alone(ring: RingOfDevices, link: RingLink) -> None:
     """Behind a cut they would count from the other end and mean somebody else."""
     ring.cut = 1
-    asked = Datagram(Command.APRD, 0x10 << 16, bytes(2), 5)
-    time = Datagram(Command.FRMW, 0x1001 | 0x910 << 16, bytes(8), 5)
+    asked = Datagram(EcatCommand.APRD, 0x10 << 16, bytes(2), 5)
+    time = Datagram(EcatCommand.FRMW, 0x1001 | 0x910 << 16, bytes(8), 5)
     back = exchange(link, asked, time, question(0x1004, 5))
-    assert [d.command for d in back] == [Command.APRD, Command.FRMW, Command.FPRD]
+    assert [d.command for d in back] == [EcatCommand.APRD, EcatCommand.FRMW, EcatCommand.FPRD]
     assert [d.working_counter for d in back] == [2, 2, 1]
 
 
 def test_the_second_port_alone_speaks_of_positions_too(ring: RingOfDevices, link: RingLink) -> None:
     ring.cut = 1
     link.route = "second"
-    [back] = exchange(link, Datagram(Command.APRD, 0x10 << 16, bytes(2), 5))
+    [back] = exchange(link, Datagram(EcatCommand.APRD, 0x10 << 16, bytes(2), 5))
     assert back.working_counter == 2
     assert ring.ends[0].sent == []
     with pytest.raises(ValueError, match="route"):
@@ -342,12 +342,20 @@ def test_links_that_cannot_be_waited_for_together_are_refused(ring: RingOfDevice
         RingLink(*ring.ends)
 
 
-COPIED = st.sampled_from([Command.FPRD, Command.FPWR, Command.BRD, Command.LRW, Command.LWR])
-NOT_COPIED = [Command.APRD, Command.APWR, Command.APRW, Command.FRMW, Command.ARMW]
+COPIED = st.sampled_from(
+    [EcatCommand.FPRD, EcatCommand.FPWR, EcatCommand.BRD, EcatCommand.LRW, EcatCommand.LWR]
+)
+NOT_COPIED = [
+    EcatCommand.APRD,
+    EcatCommand.APWR,
+    EcatCommand.APRW,
+    EcatCommand.FRMW,
+    EcatCommand.ARMW,
+]
 
 
 @given(st.lists(st.tuples(COPIED, st.binary(min_size=1, max_size=40)), min_size=1, max_size=8))
-def test_merging_ors_the_data_and_adds_the_counters(parts: list[tuple[Command, bytes]]) -> None:
+def test_merging_ors_the_data_and_adds_the_counters(parts: list[tuple[EcatCommand, bytes]]) -> None:
     first = [Datagram(c, 0, data, 7, 3) for c, data in parts]
     second = [Datagram(c, 0, bytes(len(data)), 7, 2) for c, data in parts]
     back = decode_frame(merge(encode_frame(first), encode_frame(second))).datagrams
@@ -362,10 +370,12 @@ def test_no_bytes_make_merging_fail_otherwise(first: bytes, second: bytes) -> No
 
 
 @pytest.mark.parametrize("command", NOT_COPIED)
-def test_what_must_not_be_there_twice_is_not_in_the_second_copy(command: Command) -> None:
-    frame = encode_frame([Datagram(command, 0, bytes(4), 1), Datagram(Command.BRD, 0, bytes(2), 1)])
+def test_what_must_not_be_there_twice_is_not_in_the_second_copy(command: EcatCommand) -> None:
+    frame = encode_frame(
+        [Datagram(command, 0, bytes(4), 1), Datagram(EcatCommand.BRD, 0, bytes(2), 1)]
+    )
     commands = [d.command for d in decode_frame(second_copy(frame)).datagrams]
-    assert commands == [Command.NOP, Command.BRD]
+    assert commands == [EcatCommand.NOP, EcatCommand.BRD]
 
 
 def test_the_time_that_is_expected_leads_the_clocks_behind_a_cut(
@@ -373,12 +383,12 @@ def test_the_time_that_is_expected_leads_the_clocks_behind_a_cut(
 ) -> None:
     """The second copy asks nobody for it; what comes back is what the reference clock has said."""
     ring.cut = 1
-    expected = Datagram(Command.FRMW, 0x1001 | 0x910 << 16, bytes(3) + b"\x01", 5)
+    expected = Datagram(EcatCommand.FRMW, 0x1001 | 0x910 << 16, bytes(3) + b"\x01", 5)
     [back] = exchange(link, expected)
     assert back.working_counter == 2
     [behind] = decode_frame(ring.ends[1].sent[-1]).datagrams
-    assert (behind.command, behind.adp, behind.data) == (Command.FRMW, 0xFFFF, expected.data)
-    asked = [Datagram(Command.FRMW, 0x1001 | 0x910 << 16, b"\x5a\x5a", 5, 3)]
+    assert (behind.command, behind.adp, behind.data) == (EcatCommand.FRMW, 0xFFFF, expected.data)
+    asked = [Datagram(EcatCommand.FRMW, 0x1001 | 0x910 << 16, b"\x5a\x5a", 5, 3)]
     first, other = encode_frame(asked), second_copy(encode_frame(asked))
     assert merge(first, other) == first
 
@@ -387,5 +397,5 @@ def test_a_time_that_only_the_second_copy_brought_is_nobodys(
     ring: RingOfDevices, link: RingLink
 ) -> None:
     ring.cut = -1
-    [back] = exchange(link, Datagram(Command.FRMW, 0x1001 | 0x910 << 16, b"\x01\x02", 5))
+    [back] = exchange(link, Datagram(EcatCommand.FRMW, 0x1001 | 0x910 << 16, b"\x01\x02", 5))
     assert (back.data, back.working_counter) == (b"\x01\x02", 0)

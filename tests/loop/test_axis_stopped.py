@@ -17,8 +17,8 @@ from catenary.errors import DriveError
 from catenary.loop.axis_watch import AxisWatch, StoppedAxis
 from catenary.loop.stop_error import stopped_error
 from catenary.plan.cycle import AxisPlan, CyclePlan, Number, NumberKind
+from catenary.plan.request import Views, WishTables
 from catenary.plan.stop_reason import UNASKED, StopReason
-from catenary.plan.wish import Views, WishTables
 from tests.drive.fakes import views_of
 from tests.loop_options import grouped
 

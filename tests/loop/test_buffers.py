@@ -4,7 +4,7 @@ import numpy as np
 
 from catenary.loop.buffers import AXIS_BUFFERS, COLUMN_BUFFERS, bind_wishes
 from catenary.plan.cycle import AxisPlan, Bank, Column, ImageArea, Number, NumberKind
-from catenary.plan.wish import Views, WishTables
+from catenary.plan.request import Views, WishTables
 
 WORD = Number(0, 16, NumberKind.UNSIGNED)
 

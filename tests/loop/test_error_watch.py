@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import catenary as cat
-from catenary.bus.event import FaultFound
+from catenary.bus.event_types import FaultFound
 from catenary.loop.error_watch import ErrorWatch
 from catenary.procedure.exchange import After, Reply, Request
 from catenary.virtual import Coupler, Segment, Servo

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import catenary as cat
-from catenary.bus.event import Event
+from catenary.bus.event_types import Event
 from catenary.realtime import VirtualClock
 from catenary.virtual import Segment, Servo
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from catenary.bus.event import DuplicateFrames, Event
+from catenary.bus.event_types import DuplicateFrames, Event
 from catenary.loop.frame_watch import DUPLICATES_MIN, SILENCE, FrameWatch
 
 

@@ -7,7 +7,7 @@ from typing import Literal
 import pytest
 
 import catenary as cat
-from catenary.bus.event import Emergency, Event
+from catenary.bus.event_types import Emergency, Event
 from catenary.virtual import Coupler, Segment, Server, Servo
 
 PATIENCE = 30_000  # cycles of 2 ms: a machine may stop for as long as it likes before that

@@ -9,7 +9,7 @@ import pytest
 import catenary as cat
 from catenary.bus import MainDevice
 from catenary.drive import Drives, ProcessData
-from catenary.loop.running import Running
+from catenary.loop.session import Running
 from catenary.loop.signals import SignalGuard
 from catenary.plan.cycle import ExecutionMode
 from catenary.realtime import VirtualClock

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from catenary.virtual import Segment
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from tests.virtual.main_device import SII_CONTROL, STATION, MainDevice
 
 PRE_OP, SAFE_OP, OP, ACKNOWLEDGE = 2, 4, 8, 0x10
@@ -190,7 +190,7 @@ class Soem:
         return [self.main.al_status(STATION + k)[0] for k in range(len(self.records))]
 
     def _request(self, state: int) -> None:
-        self.main.exchange(Command.BWR, 0, 0x0120, struct.pack("<H", state))
+        self.main.exchange(EcatCommand.BWR, 0, 0x0120, struct.pack("<H", state))
         self.main.let_pass(5)
 
     # -- src/ec_main.c, ecx_main_send_processdata and ecx_receive_processdata_group
@@ -199,7 +199,7 @@ class Soem:
         """The working counter, as SOEM counts it: an LWR twice, to be like an LRW."""
         if not self.blocks_lrw:
             image = bytes(self.outputs + self.inputs)
-            return self.main.exchange_logical(Command.LRW, 0, image).working_counter
-        read = self.main.exchange_logical(Command.LRD, self.outputs, bytes(self.inputs))
-        written = self.main.exchange_logical(Command.LWR, 0, bytes(self.outputs))
+            return self.main.exchange_logical(EcatCommand.LRW, 0, image).working_counter
+        read = self.main.exchange_logical(EcatCommand.LRD, self.outputs, bytes(self.inputs))
+        written = self.main.exchange_logical(EcatCommand.LWR, 0, bytes(self.outputs))
         return read.working_counter + 2 * written.working_counter

@@ -16,7 +16,7 @@ import pytest
 
 from catenary.virtual import AnalogInputs, Coupler, DigitalOutputs, Segment, Server, Servo
 from catenary.virtual.server import NEVER_NS, stamp_arrivals
-from catenary.wire.datagram import Command, Datagram
+from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import decode_frame, encode_frame
 from tests.peers.soem import MAX_BUF, OP, Port, Soem
 
@@ -76,7 +76,7 @@ class Wire:
 
 def numbered(number: int) -> bytes:
     """A write with the number of its frame in the answer."""
-    return encode_frame([Datagram(Command.BWR, USER_RAM << 16, struct.pack("<I", number))])
+    return encode_frame([Datagram(EcatCommand.BWR, USER_RAM << 16, struct.pack("<I", number))])
 
 
 def number_in(frame: bytes | None) -> int | None:

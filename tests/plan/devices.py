@@ -14,7 +14,7 @@ from catenary.model.device import (
     Pdo,
     SyncManager,
 )
-from catenary.plan.wish import ImageLayout, ObjectReference, PdoWish, Views, WishTables
+from catenary.plan.request import ImageLayout, ObjectReference, PdoWish, Views, WishTables
 from catenary.wire.features import Feature, Information, PortKind
 from catenary.wire.sii import MailboxProtocol
 from catenary.wire.sii_categories import SyncManagerUse

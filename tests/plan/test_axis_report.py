@@ -5,8 +5,8 @@ import math
 import pytest
 
 from catenary.plan.axis_report import AxisReport
-from catenary.plan.make import make_plan
-from catenary.plan.wish import ImageLayout, WishTables
+from catenary.plan.planner import make_plan
+from catenary.plan.request import ImageLayout, WishTables
 from tests.plan.devices import Asking, demo
 
 

@@ -11,9 +11,9 @@ from catenary.errors import ConfigurationError
 from catenary.model.device import DeviceDescription, OpMode
 from catenary.plan.clocks import SyncPlan, make_sync, start_time_ns
 from catenary.plan.cycle import DatagramKind
-from catenary.plan.make import Plan, make_plan
-from catenary.plan.wish import DistributedClock, PdoWish
-from catenary.wire.datagram import Command, decode_datagram
+from catenary.plan.planner import Plan, make_plan
+from catenary.plan.request import DistributedClock, PdoWish
+from catenary.wire.datagram import EcatCommand, decode_datagram
 from catenary.wire.features import Feature
 from tests.plan.devices import Asking, coupler, lamps, servo
 
@@ -39,7 +39,7 @@ def planned(devices: list[DeviceDescription], *positions: int, **options: object
     return make_plan(devices, [wishing(*positions)], **options)  # type: ignore[arg-type]
 
 
-def clock_datagrams(plan: Plan) -> list[tuple[Command, int, int, int]]:
+def clock_datagrams(plan: Plan) -> list[tuple[EcatCommand, int, int, int]]:
     """Command, station, register and expected counter, in the order of the frame."""
     frame = plan.cycle.frames[0]
     found = []
@@ -63,8 +63,8 @@ def test_the_first_clock_is_the_reference() -> None:
     assert plan.cycle.clock.reference == 0
     assert plan.cycle.clock.followers == (2, 3)
     assert clock_datagrams(plan) == [
-        (Command.FRMW, 0x1001, 0x0910, 3),
-        (Command.FPRD, 0x1003, 0x092C, 1),
+        (EcatCommand.FRMW, 0x1001, 0x0910, 3),
+        (EcatCommand.FPRD, 0x1003, 0x092C, 1),
     ]
 
 
@@ -77,14 +77,14 @@ def test_a_reference_that_is_given() -> None:
 def test_the_reference_follows_us() -> None:
     plan = planned(cell(), 2, clock="main")
     assert clock_datagrams(plan)[:2] == [
-        (Command.FPWR, 0x1001, 0x0910, 1),
-        (Command.FRMW, 0x1001, 0x0910, 3),
+        (EcatCommand.FPWR, 0x1001, 0x0910, 1),
+        (EcatCommand.FRMW, 0x1001, 0x0910, 3),
     ]
 
 
 def test_a_reference_alone_has_nobody_to_watch() -> None:
     plan = planned([clocked(servo(0))], 0)
-    assert clock_datagrams(plan) == [(Command.FRMW, 0x1001, 0x0910, 1)]
+    assert clock_datagrams(plan) == [(EcatCommand.FRMW, 0x1001, 0x0910, 1)]
 
 
 def test_frames_are_through_before_the_beat() -> None:

@@ -19,8 +19,8 @@ from catenary.model.device import (
 )
 from catenary.plan import make_plan
 from catenary.plan.mapping import make_mapping
+from catenary.plan.request import ObjectReference, PdoWish, WrittenPdo
 from catenary.plan.start_up import Download, mapping_downloads
-from catenary.plan.wish import ObjectReference, PdoWish, WrittenPdo
 from tests.plan.devices import SERVO_INPUTS, Asking, asks, coupler, demo, lamps, servo
 
 FOLLOWING_ERROR = ObjectReference(0x60F4, 0, 32)

@@ -18,7 +18,7 @@ from catenary.plan.pdo_search import (
     explain_failure,
     find_combination,
 )
-from catenary.plan.wish import ObjectReference
+from catenary.plan.request import ObjectReference
 
 
 def pdo(index: int, *objects: tuple[int, int, int], **options: object) -> Pdo:

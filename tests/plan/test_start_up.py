@@ -9,9 +9,9 @@ import pytest
 from catenary import types
 from catenary.errors import ConfigurationError
 from catenary.model.device import ObjectInformation, ObjectValue
-from catenary.plan.make import Plan, make_plan
+from catenary.plan.planner import Plan, make_plan
+from catenary.plan.request import ObjectReference, PdoWish
 from catenary.plan.start_up_object import StartUp
-from catenary.plan.wish import ObjectReference, PdoWish
 from tests.plan.devices import Asking, demo
 
 FOLLOWING_ERROR = ObjectReference(0x60F4, 0, 32)

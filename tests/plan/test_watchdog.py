@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from catenary.model.device import DeviceDescription
-from catenary.plan.make import make_plan
-from catenary.plan.wish import ObjectReference, PdoWish
+from catenary.plan.planner import make_plan
+from catenary.plan.request import ObjectReference, PdoWish
 from tests.plan.devices import Asking, lamps, servo
 
 MILLISECOND = 1_000_000

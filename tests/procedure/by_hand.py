@@ -22,7 +22,7 @@ from catenary.wire.coe import (
     UploadSegmentRequest,
     decode_coe,
 )
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from catenary.wire.mailbox import Mailbox, Type, decode_mailbox, next_counter
 from catenary.wire.sii import MailboxProtocol
 
@@ -97,7 +97,7 @@ class MailboxDevice:
 
     def _mailbox(self, request: Request, address: int) -> Reply:
         if address == LAYOUT.receive_offset:
-            assert request.command is Command.FPWR
+            assert request.command is EcatCommand.FPWR
             if self._out_full:
                 return Reply(request.data, 0)
             self._take(decode_mailbox(request.data))

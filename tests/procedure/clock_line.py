@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from catenary.model.delays import PROCESSING_NS
 from catenary.model.device import DeviceDescription, Identity
 from catenary.procedure.exchange import Reply, Request
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from catenary.wire.features import Feature, Information, PortKind
 
 STATION = 0x1001
@@ -77,13 +77,13 @@ class ClockLine:
     def __call__(self, request: Request) -> Reply:
         self.now += 1000
         address, station = request.address >> 16, request.address & 0xFFFF
-        if request.command is Command.BWR:
+        if request.command is EcatCommand.BWR:
             return self._broadcast(address, request)
         position = station - STATION
         clock = self.clocks[position]
         if position in self.dead or not self._has(clock, address):
             return Reply(request.data, 0)
-        if request.command is Command.FPWR:
+        if request.command is EcatCommand.FPWR:
             size = len(request.data)
             if clock.kind == SHORT and size == 8 and address in (0x920, 0x990):
                 return Reply(request.data, 0)

@@ -9,7 +9,7 @@ import pytest
 from catenary.errors import ResponseTimeout, SegmentError, StateError
 from catenary.procedure.al_state import read_state, request_state
 from catenary.procedure.exchange import Reply, Request
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 from tests.procedure.by_hand import STATION, play
 
 
@@ -50,19 +50,19 @@ class Registers:
 def test_a_state_is_asked_for_once_and_waited_for() -> None:
     device = Registers()
     device.slow = 20
-    assert play(request_state(STATION, State.PRE_OP), device).state is State.PRE_OP
+    assert play(request_state(STATION, AlState.PRE_OP), device).state is AlState.PRE_OP
     assert device.asked == [0x02]
 
 
 def test_a_device_that_is_there_already_is_left_alone() -> None:
     device = Registers(0x02)
-    play(request_state(STATION, State.PRE_OP), device)
+    play(request_state(STATION, AlState.PRE_OP), device)
     assert device.asked == []
 
 
 def test_a_pending_error_is_acknowledged_first() -> None:
     device = Registers(0x12, code=0x001B)
-    assert play(request_state(STATION, State.SAFE_OP), device).state is State.SAFE_OP
+    assert play(request_state(STATION, AlState.SAFE_OP), device).state is AlState.SAFE_OP
     assert device.asked == [0x12, 0x04]
 
 
@@ -70,7 +70,7 @@ def test_a_refusal_tells_code_text_and_cause() -> None:
     device = Registers(0x02)
     device.refuse = {0x04: 0x001E}
     with pytest.raises(StateError, match=r"Probe.*SAFE-OP.*PRE-OP.*0x001E.*nput") as caught:
-        play(request_state(STATION, State.SAFE_OP), device)
+        play(request_state(STATION, AlState.SAFE_OP), device)
     error = caught.value
     assert (error.position, error.requested, error.actual, error.code) == (3, 4, 2, 0x001E)
     assert error.hint
@@ -80,12 +80,12 @@ def test_a_state_never_reached_ends_in_time() -> None:
     device = Registers(0x02)
     device.slow = 1_000_000
     with pytest.raises(StateError, match="did not reach"):
-        play(request_state(STATION, State.SAFE_OP, timeout=0.5), device, steps=1000)
+        play(request_state(STATION, AlState.SAFE_OP, timeout=0.5), device, steps=1000)
 
 
 def test_a_state_that_is_none_is_waited_out() -> None:
     device = Registers(0x00)
-    assert play(request_state(STATION, State.PRE_OP), device).state is State.PRE_OP
+    assert play(request_state(STATION, AlState.PRE_OP), device).state is AlState.PRE_OP
 
 
 def test_a_device_that_went_away_is_named() -> None:

@@ -18,7 +18,7 @@ from catenary.procedure.sdo import download, upload
 from catenary.procedure.station import Station
 from catenary.wire.capture import decode_capture
 from catenary.wire.coe import DownloadRequest, UploadRequest, UploadResponse, decode_coe
-from catenary.wire.datagram import Command, Datagram
+from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import decode_frame
 from catenary.wire.mailbox import decode_mailbox
 from catenary.wire.register import DL_STATUS
@@ -41,8 +41,8 @@ def returned(path: Path) -> Iterator[Datagram]:
 
 def exchanges(path: Path) -> list[Exchange]:
     mailboxes = [d for d in returned(path) if d.ado >= 0x1000 and len(d.data) >= 128]
-    requests = [d for d in mailboxes if d.command is Command.FPWR]
-    answers = [d for d in mailboxes if d.command is Command.FPRD]
+    requests = [d for d in mailboxes if d.command is EcatCommand.FPWR]
+    answers = [d for d in mailboxes if d.command is EcatCommand.FPRD]
     assert len(requests) == len(answers)
     return [Exchange(*pair) for pair in zip(requests, answers, strict=True)]
 
@@ -59,7 +59,7 @@ class Recorded:
             return Reply(b"\x00", 1)
         if request.address >> 16 == 0x080D:
             return Reply(b"\x08" if self._answer is not None else b"\x00", 1)
-        if request.command is Command.FPWR:
+        if request.command is EcatCommand.FPWR:
             recorded = next(self._conversation)
             assert (request.address, request.data) == (
                 recorded.request.address,

@@ -14,7 +14,7 @@ from catenary.procedure.clocks import (
     read_system_time,
 )
 from catenary.procedure.exchange import Reply, Request
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from tests.procedure.by_hand import ROUND_TRIP_NS, play
 from tests.procedure.clock_line import HOP_NS, LONG, NONE, SHORT, STAMPS, ClockLine, ClockModel
 
@@ -84,7 +84,7 @@ def test_a_device_that_misses_the_latch_is_no_measurement() -> None:
 
     def one_missing(request: Request) -> Reply:
         reply = segment(request)
-        if request.command is Command.BWR:
+        if request.command is EcatCommand.BWR:
             return reply._replace(working_counter=1)
         return reply
 
@@ -115,7 +115,7 @@ def test_the_burst_is_so_many_frames() -> None:
 
 
 def test_a_reference_that_follows_is_told_our_time_in_each_frame() -> None:
-    told: list[tuple[Command, int]] = []
+    told: list[tuple[EcatCommand, int]] = []
 
     def note(request: Request) -> Reply:
         told.append((request.command, int.from_bytes(request.data, "little")))
@@ -123,8 +123,8 @@ def test_a_reference_that_follows_is_told_our_time_in_each_frame() -> None:
 
     play(lead(line(LONG).descriptions()[0], 2, EPOCH_NS), note)
     times = [(EPOCH_NS + k * ROUND_TRIP_NS) % 2**32 for k in (1, 2)]
-    burst = [(Command.FPWR, times[0]), (Command.FRMW, 0), (Command.FPWR, times[1])]
-    assert told == [(Command.FPRD, 0), *burst, (Command.FRMW, 0)]
+    burst = [(EcatCommand.FPWR, times[0]), (EcatCommand.FRMW, 0), (EcatCommand.FPWR, times[1])]
+    assert told == [(EcatCommand.FPRD, 0), *burst, (EcatCommand.FRMW, 0)]
 
 
 def test_a_burst_without_a_reference_ends() -> None:
@@ -144,7 +144,7 @@ UNIT = {0x1001: "520f623cf5000000", 0x1003: "ec65803cf5000000"}
 
 def real_segment(request: Request) -> Reply:
     station, address = request.address & 0xFFFF, request.address >> 16
-    if request.command is Command.BWR:
+    if request.command is EcatCommand.BWR:
         return Reply(request.data, 3)
     if address == 0x900:
         data = (EK1100, EL2828, EL2889)[station - 0x1001][: len(request.data)]

@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 
 from catenary.errors import ConfigurationError
-from catenary.plan.make import make_plan
+from catenary.plan.planner import make_plan
 from catenary.procedure.configure import configure_process_data
 from catenary.procedure.exchange import Reply, Request
 from catenary.procedure.station import Station
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from tests.plan.devices import coupler, servo
 from tests.procedure.by_hand import play
 
@@ -27,10 +27,10 @@ class Memory:
         assert request.address & 0xFFFF == STATION.address
         start = request.address >> 16
         span = range(start, start + len(request.data))
-        if request.command is Command.FPWR:
+        if request.command is EcatCommand.FPWR:
             self.bytes |= dict(zip(span, request.data, strict=True)) | self.stuck
             return Reply(request.data, 1)
-        assert request.command is Command.FPRD
+        assert request.command is EcatCommand.FPRD
         return Reply(bytes(self.bytes.get(address, 0) for address in span), 1)
 
 
@@ -39,7 +39,11 @@ class LockedMemory(Memory):
 
     def __call__(self, request: Request) -> Reply:
         start = request.address >> 16
-        if request.command is Command.FPWR and 0x0800 <= start < 0x0880 and len(request.data) == 8:
+        if (
+            request.command is EcatCommand.FPWR
+            and 0x0800 <= start < 0x0880
+            and len(request.data) == 8
+        ):
             enabled = self.bytes.get(start + 6, 0) & 1
             self.stuck = {k: self.bytes[k] for k in range(start, start + 5)} if enabled else {}
         return super().__call__(request)

@@ -8,9 +8,9 @@ import pytest
 
 import catenary as cat
 from catenary.errors import NoDeviceError, ResponseTimeout
+from catenary.procedure.cable_traffic import exercise
 from catenary.procedure.error_counters import clear_error_counters, read_error_counters
 from catenary.procedure.exchange import Reply, Request
-from catenary.procedure.exercise import exercise
 from catenary.procedure.station import Station
 from catenary.wire.error_counters import ErrorCounters, PortErrors
 from tests.procedure.by_hand import play

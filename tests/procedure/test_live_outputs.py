@@ -8,7 +8,7 @@ import pytest
 
 from catenary.procedure.exchange import Reply, Request
 from catenary.procedure.live_outputs import Running, find_refreshed, find_running
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 from catenary.wire.sync_manager import INPUTS, OUTPUTS, SyncManager
 from tests.procedure.by_hand import play
 
@@ -47,15 +47,15 @@ class Line:
         return Reply(value.to_bytes(size, "little"), 1)
 
 
-def running(*positions: int, state: State = State.OP) -> list[Running]:
+def running(*positions: int, state: AlState = AlState.OP) -> list[Running]:
     return [Running(position, state, False, 2) for position in positions]
 
 
 def test_finds_safe_op_and_op() -> None:
     line = Line([0x01, 0x08, 0x14, 0x02])
     assert play(find_running(4), line.answer) == [
-        Running(1, State.OP, False, 2),
-        Running(2, State.SAFE_OP, True, 2),
+        Running(1, AlState.OP, False, 2),
+        Running(2, AlState.SAFE_OP, True, 2),
     ]
 
 
@@ -91,5 +91,5 @@ def test_a_device_that_cannot_tell_is_not_asked(line: Line) -> None:
 
 def test_safe_op_is_no_evidence() -> None:
     line = Line([0x04], {0: [1]})
-    assert play(find_refreshed(running(0, state=State.SAFE_OP)), line.answer) == []
+    assert play(find_refreshed(running(0, state=AlState.SAFE_OP)), line.answer) == []
     assert line.reads == 0

@@ -8,8 +8,8 @@ import pytest
 
 from catenary.errors import MappingError
 from catenary.model.device import Assignment, DeviceDescription, Direction, Entry, ObjectValue, Pdo
-from catenary.plan.make import make_plan
-from catenary.plan.wish import ObjectReference, PdoWish
+from catenary.plan.planner import make_plan
+from catenary.plan.request import ObjectReference, PdoWish
 from catenary.procedure.pdo import read_mapping, write_downloads
 from catenary.procedure.pdo_offers import read_first_mapping, read_offers, read_values
 from catenary.wire.coe import Abort, DownloadRequest, decode_coe

@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 
 from catenary.procedure.state_path import path
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 
 INIT, PRE_OP, SAFE_OP, OP, BOOT = (
-    State.INIT,
-    State.PRE_OP,
-    State.SAFE_OP,
-    State.OP,
-    State.BOOT,
+    AlState.INIT,
+    AlState.PRE_OP,
+    AlState.SAFE_OP,
+    AlState.OP,
+    AlState.BOOT,
 )
 
 
@@ -33,5 +33,5 @@ INIT, PRE_OP, SAFE_OP, OP, BOOT = (
         (None, INIT, (INIT,)),
     ],
 )
-def test_path(now: State | None, target: State, between: tuple[State, ...]) -> None:
+def test_path(now: AlState | None, target: AlState, between: tuple[AlState, ...]) -> None:
     assert path(now, target) == between

@@ -9,7 +9,7 @@ from catenary.plan.clocks import SyncPlan
 from catenary.procedure.clocks import align, measure
 from catenary.procedure.exchange import Reply, Request
 from catenary.procedure.sync import bring_together, start, stop
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from tests.procedure.by_hand import play
 from tests.procedure.clock_line import LONG, NONE, SHORT, ClockLine, ClockModel
 
@@ -65,7 +65,7 @@ def test_telling_takes_too_long() -> None:
     devices = segment.descriptions()
 
     def slow(request: Request) -> Reply:
-        if request.command is Command.FPWR and request.address >> 16 == 0x0990:
+        if request.command is EcatCommand.FPWR and request.address >> 16 == 0x0990:
             segment.now += 200_000_000
         return segment(request)
 

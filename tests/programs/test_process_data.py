@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import pytest
 
 from catenary.drive import Drives, Inputs, ProcessData
-from catenary.plan.make import Plan
+from catenary.plan.planner import Plan
 from catenary.virtual import Coupler, DigitalInputs, DigitalOutputs, Segment, Servo
 from tests.force_sensor import ForceSensor, TunedServo
 

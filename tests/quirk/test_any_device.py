@@ -17,7 +17,7 @@ from catenary.types import UDINT
 from catenary.virtual import Coupler, DigitalOutputs, Segment, Servo
 from catenary.virtual.devices.application import Application
 from catenary.virtual.sii_image import checksum
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 from tests.plan.devices import Asking
 
 STRANGE, SOUND = 2, 3  # positions
@@ -155,7 +155,7 @@ def assert_others_are_found(segment: Segment) -> None:
         assert [sub.position for sub in subs] == [0, 1, 2, 3]
         others = [sub for sub in subs if sub.position != STRANGE]
         assert [sub.error for sub in others] == [None] * 3
-        assert [sub.state for sub in others] == [State.PRE_OP] * 3
+        assert [sub.state for sub in others] == [AlState.PRE_OP] * 3
         assert subs[SOUND].sdo.read(0x1018, 4, type=UDINT) == 2
         assert_named(subs[STRANGE].error)
         if subs[STRANGE].error is None:

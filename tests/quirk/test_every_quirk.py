@@ -12,7 +12,7 @@ from catenary.errors import CatenaryError
 from catenary.link import Fault, FaultInjector
 from catenary.types import UDINT, UINT
 from catenary.virtual import Segment, Servo
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 from tests.quirk.table import QUIRKS, QUIRKY, SOUND, Quirk
 from tests.scenario.clocked import run_for, true_differences
 
@@ -40,7 +40,7 @@ def test_scan(quirk: Quirk) -> None:
     with cat.MainDevice(segment) as main:
         subs = main.scan()
         assert [sub.error for sub in subs] == [None] * 4
-        assert [sub.state for sub in subs] == [State.PRE_OP] * 4
+        assert [sub.state for sub in subs] == [AlState.PRE_OP] * 4
         assert [sub.identity.serial for sub in subs][QUIRKY:] == [1, 2]
         assert subs[QUIRKY].is_drive
         assert all(text.isprintable() for sub in subs for text in (sub.name, sub.order))
@@ -58,7 +58,7 @@ def test_scan_of_a_device_that_cannot_be_used(quirk: Quirk) -> None:
         assert quirk.broken in str(error)
         others = [sub for sub in subs if sub.position != QUIRKY]
         assert [sub.error for sub in others] == [None] * 3
-        assert [sub.state for sub in others] == [State.PRE_OP] * 3
+        assert [sub.state for sub in others] == [AlState.PRE_OP] * 3
         assert subs[SOUND].sdo.read(*SERIAL, type=UDINT) == 2
         assert any(quirk.notes in note for note in main.notes) or not quirk.notes
         with pytest.raises(CatenaryError, match=f"device {QUIRKY}"):

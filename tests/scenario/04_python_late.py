@@ -9,7 +9,7 @@ import catenary as cat
 from catenary import events
 from catenary.errors import DriveError
 from catenary.plan.stop_reason import StopReason
-from catenary.wire.cia402 import State
+from catenary.wire.cia402 import AxisState
 from tests.scenario.cell import OP, Cell
 
 
@@ -81,7 +81,7 @@ def test_enabling_again_starts_from_where_it_stands(cell: Cell) -> None:
                 stopped = [servo.position_rad for servo in cell.servos]
             if cycle.time > 1.0:
                 break
-        assert arm.state == (State.OPERATION_ENABLED,) * 2
+        assert arm.state == (AxisState.OPERATION_ENABLED,) * 2
         assert arm.enabled.all()
         assert [servo.position_rad for servo in cell.servos] == pytest.approx(stopped, abs=1e-3)
 

@@ -7,7 +7,7 @@ import pytest
 
 import catenary as cat
 from catenary.errors import DriveError
-from catenary.wire.cia402 import State
+from catenary.wire.cia402 import AxisState
 from tests.scenario.cell import Cell
 from tests.scenario.clocked import clocked_cell
 
@@ -68,7 +68,7 @@ def test_an_application_may_go_on_and_decide_itself(cell: Cell) -> None:
                 arm.reset_faults()
             if cycle.number == 400:
                 assert arm.faults == ()
-                assert arm.state == (State.OPERATION_ENABLED, State.SWITCH_ON_DISABLED)
+                assert arm.state == (AxisState.OPERATION_ENABLED, AxisState.SWITCH_ON_DISABLED)
                 arm.enable(1)
             if cycle.number == 405:
                 assert faulty.position_rad == pytest.approx(stopped, abs=1e-3)

@@ -6,14 +6,14 @@ import pytest
 
 import catenary as cat
 from catenary.errors import StateError
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 from tests.scenario.cell import PRE_OP, Cell
 
 NO_SYNC = 0x002D
 
 
-@pytest.mark.parametrize("state", [State.SAFE_OP, State.OP])
-def test_a_device_that_never_gets_there_is_named(cell: Cell, state: State) -> None:
+@pytest.mark.parametrize("state", [AlState.SAFE_OP, AlState.OP])
+def test_a_device_that_never_gets_there_is_named(cell: Cell, state: AlState) -> None:
     cell.servos[1].delay_state(state, None)
     with pytest.raises(StateError, match=rf"did not .*{state}.*: it is in") as caught:
         enter(cell)
@@ -24,8 +24,8 @@ def test_a_device_that_never_gets_there_is_named(cell: Cell, state: State) -> No
     comes_down(cell)
 
 
-@pytest.mark.parametrize("state", [State.SAFE_OP, State.OP])
-def test_a_device_that_says_no_is_told_with_its_code(cell: Cell, state: State) -> None:
+@pytest.mark.parametrize("state", [AlState.SAFE_OP, AlState.OP])
+def test_a_device_that_says_no_is_told_with_its_code(cell: Cell, state: AlState) -> None:
     cell.servos[1].refuse_state(state, NO_SYNC)
     with pytest.raises(StateError, match="0x002D") as caught:
         enter(cell)
@@ -36,12 +36,12 @@ def test_a_device_that_says_no_is_told_with_its_code(cell: Cell, state: State) -
 
 
 def test_the_device_may_change_its_mind(cell: Cell) -> None:
-    cell.servos[1].refuse_state(State.OP, NO_SYNC)
+    cell.servos[1].refuse_state(AlState.OP, NO_SYNC)
     with pytest.raises(StateError):
         enter(cell)
-    cell.servos[1].refuse_state(State.OP, None)
+    cell.servos[1].refuse_state(AlState.OP, None)
     with cat.Loop(cell.drives()):
-        assert cell.states == [State.OP] * 4
+        assert cell.states == [AlState.OP] * 4
 
 
 def enter(cell: Cell) -> None:

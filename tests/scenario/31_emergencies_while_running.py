@@ -10,7 +10,7 @@ import pytest
 
 import catenary as cat
 from catenary.bus import SubDevice
-from catenary.bus.event import AxisStopped, Emergency, Event
+from catenary.bus.event_types import AxisStopped, Emergency, Event
 from catenary.types import UDINT
 from tests.scenario.cell import Cell
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 import pytest
 
 import catenary as cat
-from catenary.bus import event
+from catenary.bus import event_types
 from catenary.errors import EepromError, MailboxError, StateError, WorkingCounterError
 from catenary.model.device import Identity
 from catenary.procedure import restore
@@ -63,7 +63,7 @@ def run(
     good: bool = True,
     each: Callable[[cat.Cycle, cat.Drives, cat.Drives, cat.Outputs, cat.Loop], None] | None = None,
     **options: object,
-) -> list[event.Event]:
+) -> list[event_types.Event]:
     """The arm moves throughout and never misses a cycle; what happened meanwhile."""
     arm, tool, gripper = wishes(cell)
     with cat.Loop(arm, tool, gripper, **grouped(options)) as loop:  # type: ignore[arg-type]
@@ -85,14 +85,16 @@ def run(
     return list(cell.main.events)
 
 
-def kinds(events: list[event.Event]) -> list[tuple[str, int]]:
+def kinds(events: list[event_types.Event]) -> list[tuple[str, int]]:
     """What was told of devices; what they told themselves, and what the error counters say of
     their cables and power, are other scenarios."""
     return [
         (type(e).__name__, e.sub.position)
         for e in events
         if e.sub is not None
-        and not isinstance(e, event.Emergency | event.FaultFound | event.AxisStopped)
+        and not isinstance(
+            e, event_types.Emergency | event_types.FaultFound | event_types.AxisStopped
+        )
     ]
 
 
@@ -230,7 +232,7 @@ def test_held_by_policy_until_it_is_released(cell: Cell) -> None:
 def test_another_one_of_its_kind_is_told_and_held(cell: Cell) -> None:
     new = Servo(name="tool", serial=99)
     events = run(cell, swap(TOOL, new, at=0.2, for_=0.3))
-    [replaced] = [e for e in events if isinstance(e, event.DeviceReplaced)]
+    [replaced] = [e for e in events if isinstance(e, event_types.DeviceReplaced)]
     assert (replaced.expected.serial, replaced.found.serial) == (3, 99)
     assert ("DeviceReturned", GRIPPER) in kinds(events)
     assert ("DeviceReturned", TOOL) not in kinds(events)
@@ -250,7 +252,7 @@ def test_one_whose_eeprom_cannot_be_read_is_not_taken_for_the_one_before(
     monkeypatch.setattr(restore, "identify", unreadable)
     events = run(cell, swap(TOOL, with_=Servo(name="tool", serial=99), at=0.1))
     assert len(asked) > 3  # at every look again
-    [held] = [e for e in events if isinstance(e, event.DeviceHeld)]
+    [held] = [e for e in events if isinstance(e, event_types.DeviceHeld)]
     assert "does not say what it is" in held.reason
     assert ("DeviceReturned", TOOL) not in kinds(events)
     assert cell.states[TOOL] & 0x0F < PRE_OP
@@ -268,7 +270,7 @@ def test_another_one_of_its_kind_is_taken_by_policy(cell: Cell) -> None:
         each=look,
         on_replacement="restore",
     )
-    assert any(isinstance(e, event.DeviceReplaced) for e in events)
+    assert any(isinstance(e, event_types.DeviceReplaced) for e in events)
     assert ("DeviceReturned", TOOL) in kinds(events)
 
 
@@ -289,7 +291,7 @@ def test_one_that_was_let_in_belongs_there_from_then_on(cell: Cell) -> None:
         seconds=2.0,
         each=look,
     )
-    assert sum(isinstance(e, event.DeviceReplaced) for e in events) == 1
+    assert sum(isinstance(e, event_types.DeviceReplaced) for e in events) == 1
     assert kinds(events).count(("DeviceReturned", TOOL)) == 2
 
 
@@ -338,7 +340,7 @@ def test_another_product_is_never_taken(cell: Cell) -> None:
         each=look,
         on_replacement="restore",
     )
-    [replaced] = [e for e in events if isinstance(e, event.DeviceReplaced)]
+    [replaced] = [e for e in events if isinstance(e, event_types.DeviceReplaced)]
     assert replaced.found.product != replaced.expected.product
 
 
@@ -348,7 +350,7 @@ def test_one_that_leaves_op_by_itself_is_led_back(cell: Cell) -> None:
             assert cell.states == [OP] * 5
 
     events = run(cell, leave_state(TOOL, at=0.2, state="SAFE-OP", code=0x001B), each=look)
-    [lost] = [e for e in events if isinstance(e, event.StateLost)]
+    [lost] = [e for e in events if isinstance(e, event_types.StateLost)]
     assert (lost.sub, lost.state, lost.code) == (cell.subs[TOOL], 4, 0x001B)
 
 

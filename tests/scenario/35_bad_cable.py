@@ -7,7 +7,7 @@ A device that answers, but gives no process data, is named too.
 import pytest
 
 import catenary as cat
-from catenary.bus.event import FaultFound
+from catenary.bus.event_types import FaultFound
 from catenary.errors import WorkingCounterError
 from catenary.model.finding import Kind
 from catenary.model.topology import Cable

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import catenary as cat
-from catenary.bus.event import DuplicateFrames
+from catenary.bus.event_types import DuplicateFrames
 from catenary.link import Link
 from catenary.virtual import Coupler, Segment, Servo
 from tests.link_table import (

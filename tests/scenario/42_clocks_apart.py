@@ -7,7 +7,7 @@ from __future__ import annotations
 import pytest
 
 import catenary as cat
-from catenary.bus.event import ClockLocked, ClockUnlocked
+from catenary.bus.event_types import ClockLocked, ClockUnlocked
 from catenary.errors import ClockError
 from catenary.virtual import Coupler, Crystal, Servo
 from tests.scenario.cell import cell_of

@@ -9,7 +9,7 @@ from __future__ import annotations
 import pytest
 
 import catenary as cat
-from catenary.bus.event import ClockLocked, ClockUnlocked
+from catenary.bus.event_types import ClockLocked, ClockUnlocked
 from catenary.errors import StateError
 from tests.scenario.cell import Cell
 from tests.scenario.clocked import clocked_cell, run_for, true_differences

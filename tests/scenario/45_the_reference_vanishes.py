@@ -11,7 +11,7 @@ from random import Random
 import pytest
 
 import catenary as cat
-from catenary.bus import event
+from catenary.bus import event_types
 from catenary.virtual import Junction, Servo
 from catenary.virtual.faults import power_cycle
 from tests.scenario.cell import OP, Cell, cell_of
@@ -30,7 +30,7 @@ def star() -> Iterator[Cell]:
         yield cell
 
 
-def ride(cell: Cell, vanishing: int, seconds: float = 6.0) -> list[event.Event]:
+def ride(cell: Cell, vanishing: int, seconds: float = 6.0) -> list[event_types.Event]:
     """The others hold while one is without power for half a second."""
     others = [cell.subs[p] for p in (FIRST, SECOND, THIRD) if p != vanishing]
     arm = cat.Drives(others, counts_per_turn=2**20, velocity_limit=100.0, dc=True)
@@ -63,15 +63,20 @@ def ride(cell: Cell, vanishing: int, seconds: float = 6.0) -> list[event.Event]:
     return list(cell.main.events)
 
 
-def kinds(events: list[event.Event]) -> list[str]:
-    told = (event.ClockLocked, event.ClockUnlocked, event.DeviceLost, event.DeviceReturned)
+def kinds(events: list[event_types.Event]) -> list[str]:
+    told = (
+        event_types.ClockLocked,
+        event_types.ClockUnlocked,
+        event_types.DeviceLost,
+        event_types.DeviceReturned,
+    )
     return [type(e).__name__ for e in events if isinstance(e, told)]
 
 
 def test_the_reference(star: Cell) -> None:
     events = ride(star, FIRST)
     assert set(kinds(events)) == {"ClockUnlocked", "ClockLocked", "DeviceLost", "DeviceReturned"}
-    left = next(e for e in events if isinstance(e, event.ClockUnlocked))
+    left = next(e for e in events if isinstance(e, event_types.ClockUnlocked))
     assert left.sub is star.subs[FIRST]
     assert "the reference clock, does not answer" in left.message
     assert kinds(events)[-1] == "ClockLocked"

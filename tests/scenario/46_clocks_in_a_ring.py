@@ -10,7 +10,7 @@ from random import Random
 import pytest
 
 import catenary as cat
-from catenary.bus.event import ClockLocked, ClockUnlocked
+from catenary.bus.event_types import ClockLocked, ClockUnlocked
 from catenary.errors import ClockError
 from catenary.virtual import Coupler, Segment, Servo
 from catenary.virtual.faults import cut, join

@@ -10,7 +10,7 @@ import random
 import pytest
 
 import catenary as cat
-from catenary.bus import event
+from catenary.bus import event_types
 from catenary.errors import WorkingCounterError
 from catenary.virtual import Coupler, Segment, Servo
 from catenary.virtual.faults import cut, join, power_cycle
@@ -53,10 +53,12 @@ def test_any_cable_may_be_pulled_and_put_in_again(
                 if cycle.number == 250:
                     break
             assert loop.timing.counters["lost"] == 0
-        told = [e for e in main.events if isinstance(e, event.LinkLost | event.LinkRestored)]
+        told = [
+            e for e in main.events if isinstance(e, event_types.LinkLost | event_types.LinkRestored)
+        ]
         assert [(type(e), e.between) for e in told] == [
-            (event.LinkLost, between),
-            (event.LinkRestored, between),
+            (event_types.LinkLost, between),
+            (event_types.LinkRestored, between),
         ]
 
 
@@ -116,7 +118,7 @@ def test_cut_twice_an_island_that_is_not_required_is_named_and_comes_back(
                 if cycle.number == 900:
                     assert others.present.all()
                     break
-        lost = [e for e in main.events if isinstance(e, event.LinkLost)]
+        lost = [e for e in main.events if isinstance(e, event_types.LinkLost)]
     assert [e.between for e in lost] == [(2, 3), (4, 5)]
     assert all("3 to 4 are an island" in e.message for e in lost)
 

@@ -13,8 +13,8 @@ import pytest
 import catenary as cat
 from catenary.errors import LeaseError, ShareError
 from catenary.share import Reason, lease
+from catenary.share.command_table import COMMANDS, PLACES, Desk
 from catenary.share.commands import CommandReader
-from catenary.share.desk import COMMANDS, PLACES, Desk
 from catenary.share.process import Process
 from catenary.share.reader import Reader
 from catenary.virtual import Segment, Servo

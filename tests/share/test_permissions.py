@@ -104,7 +104,7 @@ def test_memory_for_commands_that_is_refused_leaves_nothing(
     def refused(name: str, size: int) -> None:
         raise OSError(errno.EMFILE, "Too many open files")
 
-    monkeypatch.setattr("catenary.share.desk.make_sealed", refused)
+    monkeypatch.setattr("catenary.share.command_table.make_sealed", refused)
     with cat.MainDevice(Segment([Servo()])) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
         share = cat.Share(name)

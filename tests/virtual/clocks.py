@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 
 from catenary.virtual import Segment
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from tests.virtual.main_device import STATION, MainDevice
 
 RECEIVE_TIMES, UNIT_TIME = 0x0900, 0x0918
@@ -38,7 +38,7 @@ class Clocks(MainDevice):
 
     def latch(self) -> list[tuple[int, int, int]]:
         """(port 0, port 1, processing unit) of every device, local times [ns]."""
-        self.exchange(Command.BWR, 0, RECEIVE_TIMES, bytes(4))
+        self.exchange(EcatCommand.BWR, 0, RECEIVE_TIMES, bytes(4))
         times = []
         for k in range(len(self.segment)):
             port0, port1 = struct.unpack("<II", self.read(STATION + k, RECEIVE_TIMES, 8))
@@ -60,7 +60,7 @@ class Clocks(MainDevice):
             self.write(STATION + k, OFFSET, struct.pack("<qI", offset, delay))
 
     def distribute(self) -> None:
-        self.exchange(Command.FRMW, STATION, SYSTEM_TIME, bytes(4))
+        self.exchange(EcatCommand.FRMW, STATION, SYSTEM_TIME, bytes(4))
 
     def burst(self, frames: int) -> None:
         for _ in range(frames):

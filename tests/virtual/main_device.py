@@ -6,7 +6,7 @@ import struct
 from typing import NamedTuple
 
 from catenary.virtual import Segment
-from catenary.wire.datagram import Command, Datagram
+from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import decode_frame, encode_frame
 
 MILLISECOND = 1_000_000
@@ -31,10 +31,10 @@ class MainDevice:
         self.link = segment.open_link()
         self._counter = 0
 
-    def exchange(self, command: Command, adp: int, ado: int, data: bytes) -> Answer:
+    def exchange(self, command: EcatCommand, adp: int, ado: int, data: bytes) -> Answer:
         return self.exchange_logical(command, (adp & 0xFFFF) | ado << 16, data)
 
-    def exchange_logical(self, command: Command, address: int, data: bytes) -> Answer:
+    def exchange_logical(self, command: EcatCommand, address: int, data: bytes) -> Answer:
         self.link.send(encode_frame([Datagram(command, address, data)]))
         assert self.link.wait_until(self.link.now() + 10 * MILLISECOND, True)
         frame = self.link.receive()
@@ -43,19 +43,19 @@ class MainDevice:
         return Answer(datagram.data, datagram.working_counter, datagram.address)
 
     def read(self, station: int, ado: int, size: int) -> bytes:
-        answer = self.exchange(Command.FPRD, station, ado, bytes(size))
+        answer = self.exchange(EcatCommand.FPRD, station, ado, bytes(size))
         assert answer.working_counter == 1
         return answer.data
 
     def write(self, station: int, ado: int, data: bytes) -> int:
-        return self.exchange(Command.FPWR, station, ado, data).working_counter
+        return self.exchange(EcatCommand.FPWR, station, ado, data).working_counter
 
     def let_pass(self, milliseconds: float) -> None:
         self.link.wait_until(self.link.now() + round(milliseconds * MILLISECOND), False)
 
     def number_stations(self) -> None:
         for k in range(len(self.segment)):
-            self.exchange(Command.APWR, -k, 0x0010, struct.pack("<H", STATION + k))
+            self.exchange(EcatCommand.APWR, -k, 0x0010, struct.pack("<H", STATION + k))
 
     def request(self, station: int, state: int) -> tuple[int, int]:
         """(AL status, AL status code) a while after asking for `state`."""
@@ -106,7 +106,7 @@ class MainDevice:
     def fetch(self, station: int, size: int = 128) -> bytes | None:
         """The next answer with its header, or None if there is none within 5 ms."""
         for _ in range(25):
-            answer = self.exchange(Command.FPRD, station, 0x1000 + size, bytes(size))
+            answer = self.exchange(EcatCommand.FPRD, station, 0x1000 + size, bytes(size))
             if answer.working_counter:
                 [length] = struct.unpack_from("<H", answer.data)
                 return answer.data[: 6 + length]

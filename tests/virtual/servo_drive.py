@@ -6,7 +6,7 @@ import struct
 from dataclasses import dataclass
 
 from catenary.virtual import Segment, Servo
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from tests.virtual.main_device import MILLISECOND, STATION, MainDevice
 
 CSP, CSV, CST = 8, 9, 10
@@ -43,7 +43,7 @@ class Drive:
             out = struct.pack(
                 "<HbiiH", self.word, self.mode, self.velocity, self.position, self.torque & 0xFFFF
             )
-            answer = self.main.exchange_logical(Command.LRW, 0, out + bytes(13))
+            answer = self.main.exchange_logical(EcatCommand.LRW, 0, out + bytes(13))
             assert answer.working_counter == 3
             self.main.link.wait_until(start + MILLISECOND, False)
         return Inputs(*struct.unpack("<Hbiih", answer.data[13:]))

@@ -22,7 +22,7 @@ from catenary.virtual.faults import (
     swap,
 )
 from catenary.virtual.wiring import Neighbour
-from catenary.wire.datagram import Command, Datagram
+from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import decode_frame, encode_frame
 
 MILLISECOND = 1_000_000
@@ -32,7 +32,7 @@ CABLES: dict[bool, list[tuple[Neighbour, Neighbour]]] = {
     True: [("main", 0), (0, 1), (1, 2), (2, 3), (1, 4), (1, 5), (5, 6), (5, 7), (7, "main")],
 }
 TWO_PORTS = [0, 2, 3, 4, 6, 7]
-LATCH = encode_frame([Datagram(Command.BRW, 0x0900 << 16, bytes(8))])
+LATCH = encode_frame([Datagram(EcatCommand.BRW, 0x0900 << 16, bytes(8))])
 
 
 def devices() -> list[Device]:
@@ -58,7 +58,7 @@ def any_fault(dice: random.Random, tree: bool) -> Fault:
 
 def any_loops(dice: random.Random) -> bytes:
     """A frame that writes DL control of one device, or of all."""
-    command = dice.choice([Command.BWR, Command.APWR])
+    command = dice.choice([EcatCommand.BWR, EcatCommand.APWR])
     data = bytes([dice.choice([1, 3]), dice.randrange(256)])
     address = (-dice.randrange(8) & 0xFFFF) | 0x0100 << 16
     return encode_frame([Datagram(command, address, data)])
@@ -92,7 +92,7 @@ def test_after_any_bad_day_everybody_answers(seed: int, tree: bool) -> None:
         links[0].wait_until(links[0].now() + MILLISECOND, False)
     while links[1].receive():
         pass
-    links[0].send(encode_frame([Datagram(Command.BRD, 0, b"\0")]))
+    links[0].send(encode_frame([Datagram(EcatCommand.BRD, 0, b"\0")]))
     assert links[1].wait_until(links[1].now() + MILLISECOND, True)
     frame = links[1].receive()
     assert frame is not None

@@ -11,7 +11,7 @@ from dataclasses import replace
 import pytest
 
 from catenary.virtual import Coupler, Crystal, Segment
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from tests.virtual.clocks import (
     ACTIVATION,
     DELAY,
@@ -220,9 +220,9 @@ def test_a_device_without_a_clock_has_none_of_it() -> None:
     main = Clocks(Segment([Coupler(), DigitalInputs()]))
     assert main.number(1, 0x0008, "<H") & 0x000C == 0
     assert main.put_number(1, OFFSET, "<Q", 1) == 0
-    main.exchange(Command.BWR, 0, RECEIVE_TIMES, bytes(4))
+    main.exchange(EcatCommand.BWR, 0, RECEIVE_TIMES, bytes(4))
     assert main.read(STATION + 1, RECEIVE_TIMES, 16) == bytes(16)
-    assert main.exchange(Command.FRMW, STATION, SYSTEM_TIME, bytes(4)).working_counter == 1
+    assert main.exchange(EcatCommand.FRMW, STATION, SYSTEM_TIME, bytes(4)).working_counter == 1
 
 
 def test_a_crystal_counts_too_fast_by_its_error() -> None:

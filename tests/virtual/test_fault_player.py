@@ -32,11 +32,11 @@ from catenary.virtual.faults import (
     unplug,
     wrong_working_counter,
 )
-from catenary.wire.datagram import Command, Datagram
+from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import decode_frame, encode_frame
 from tests.virtual.main_device import MILLISECOND, STATION, MainDevice
 
-BRD = encode_frame([Datagram(Command.BRD, 0x0130 << 16, bytes(2))])
+BRD = encode_frame([Datagram(EcatCommand.BRD, 0x0130 << 16, bytes(2))])
 UPLOAD_SERIAL = struct.pack("<HBHB4x", 2 << 12, 0x40, 0x1018, 4)
 
 
@@ -95,7 +95,7 @@ def test_every_third_frame_is_lost() -> None:
 def test_a_frame_lost_on_its_way_back_has_been_there() -> None:
     for way, station in (("out", 0), ("back", 0x4321)):
         main = line(lose_frames(1, way=way))
-        main.link.send(encode_frame([Datagram(Command.APWR, 0x0010 << 16, b"\x21\x43")]))
+        main.link.send(encode_frame([Datagram(EcatCommand.APWR, 0x0010 << 16, b"\x21\x43")]))
         assert struct.unpack("<H", main.segment.core.peek(0, 0x0010, 2)) == (station,)
 
 
@@ -116,7 +116,7 @@ def test_corrupt_frames_are_counted_behind_the_bad_cable() -> None:
 
 def test_a_corrupt_frame_changes_nothing_behind_the_bad_cable() -> None:
     main = line(corrupt(1, between=(1, 2)))
-    main.link.send(encode_frame([Datagram(Command.BWR, 0x0F80 << 16, b"\x55")]))
+    main.link.send(encode_frame([Datagram(EcatCommand.BWR, 0x0F80 << 16, b"\x55")]))
     memory = [main.segment.core.peek(k, 0x0F80, 1) for k in range(5)]
     assert memory == [b"\x55", b"\x55", b"\0", b"\0", b"\0"]
 
@@ -138,13 +138,13 @@ def test_garbled_frames_come_back_with_other_bytes() -> None:
 def test_a_delayed_frame_is_overtaken() -> None:
     main = line(delay(1, by=50e-6))
     main.link.send(BRD)
-    main.link.send(encode_frame([Datagram(Command.NOP, 0, b"")]))
+    main.link.send(encode_frame([Datagram(EcatCommand.NOP, 0, b"")]))
     commands = []
     while main.link.wait_until(main.link.now() + MILLISECOND, True):
         frame = main.link.receive()
         assert frame is not None
         commands.append(decode_frame(frame).datagrams[0].command)
-    assert commands == [Command.NOP, Command.BRD]
+    assert commands == [EcatCommand.NOP, EcatCommand.BRD]
 
 
 def test_a_duplicate_comes_back_twice() -> None:
@@ -224,7 +224,7 @@ def test_a_device_comes_back_with_its_defaults() -> None:
     main.let_pass(20)
     assert main.segment.core.peek(2, 0x0010, 2) == b"\0\0"
     assert main.segment.core.peek(2, 0x0F80, 1) == b"\0"
-    main.exchange(Command.APWR, -2, 0x0010, struct.pack("<H", STATION + 2))
+    main.exchange(EcatCommand.APWR, -2, 0x0010, struct.pack("<H", STATION + 2))
     main.start_mailbox(STATION + 2)
     read = main.ask(STATION + 2, struct.pack("<HBHB4x", 2 << 12, 0x40, 0x2102, 0))
     assert read[6:8] == b"\0\0"
@@ -315,7 +315,7 @@ def test_a_device_that_lets_process_data_pass() -> None:
     main.start_servo(STATION + 2, 0)
 
     def counter() -> int:
-        return main.exchange_logical(Command.LRW, 0, bytes(26)).working_counter
+        return main.exchange_logical(EcatCommand.LRW, 0, bytes(26)).working_counter
 
     assert counter() == 3
     main.link.wait_until(200 * MILLISECOND, False)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from catenary.virtual import AnalogInputs, Coupler, DigitalOutputs, Segment, Servo
-from catenary.wire.datagram import Command, Datagram
+from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import decode_frame, encode_frame
 
 HEADER = bytes(6) + b"\x00\x01\x02\x03\x04\x05" + b"\x88\xa4"
@@ -58,7 +58,7 @@ def test_any_datagrams_into_any_register_in_any_order(
 
 def test_a_length_beyond_the_frame_leaves_it_unprocessed() -> None:
     line = segment()
-    body = struct.pack("<BBIHH", Command.BRD, 1, 0, 100, 0) + bytes(12)
+    body = struct.pack("<BBIHH", EcatCommand.BRD, 1, 0, 100, 0) + bytes(12)
     frame = HEADER + struct.pack("<H", len(body) | 0x1000) + body
     returned = line.core.pass_frame(frame)
     assert returned is not None
@@ -68,8 +68,8 @@ def test_a_length_beyond_the_frame_leaves_it_unprocessed() -> None:
 
 def test_datagrams_before_a_broken_one_are_processed() -> None:
     line = segment()
-    good = struct.pack("<BBIHH", Command.BRD, 1, 0, 1 | 0x8000, 0) + bytes(3)
-    broken = struct.pack("<BBIHH", Command.BRD, 2, 0, 1000, 0) + bytes(3)
+    good = struct.pack("<BBIHH", EcatCommand.BRD, 1, 0, 1 | 0x8000, 0) + bytes(3)
+    broken = struct.pack("<BBIHH", EcatCommand.BRD, 2, 0, 1000, 0) + bytes(3)
     frame = HEADER + struct.pack("<H", len(good + broken) | 0x1000) + good + broken
     returned = line.core.pass_frame(frame)
     assert returned is not None
@@ -86,8 +86,8 @@ def test_foreign_frames_do_not_come_back() -> None:
 def test_several_datagrams_in_a_frame_are_worked_in_order() -> None:
     line = segment()
     datagrams = [
-        Datagram(Command.APWR, 0x0010_0000, b"\x34\x12"),
-        Datagram(Command.FPRD, 0x0010_1234, bytes(2)),
+        Datagram(EcatCommand.APWR, 0x0010_0000, b"\x34\x12"),
+        Datagram(EcatCommand.FPRD, 0x0010_1234, bytes(2)),
     ]
     returned = line.core.pass_frame(encode_frame(datagrams))
     assert returned is not None

@@ -19,7 +19,7 @@ from catenary.virtual import (
     Servo,
     ServoQuirks,
 )
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from tests.virtual.clocks import ACTIVATION, OFFSET, START_TIME, SYNC0_CYCLE
 from tests.virtual.hostile import compile_frames, send_frames
 from tests.virtual.main_device import STATION, MainDevice
@@ -68,9 +68,9 @@ def test_clocks_at_the_edges_of_their_numbers_go_on(offset: int, start: int) -> 
         (SYNC0_CYCLE, "<I", 1 * MS),
         (ACTIVATION, "<B", 3),
     ):
-        main.exchange(Command.BWR, 0, address, struct.pack(form, value))
+        main.exchange(EcatCommand.BWR, 0, address, struct.pack(form, value))
     main.let_pass(20)
-    assert main.exchange(Command.BRD, 0, 0, b"\0").working_counter == 5
+    assert main.exchange(EcatCommand.BRD, 0, 0, b"\0").working_counter == 5
 
 
 @pytest.mark.parametrize("ahead", [10 * MS, 2**63 - 1])
@@ -115,7 +115,7 @@ def test_random_writes_never_end_the_application(
         main.start_servo(STATION + position, 64 * position)
     main.write(STATION + 1, 0x1000, mailbox.ljust(128, b"\0"))
     for address, data in writes:
-        main.exchange(Command.BWR, 0, address, data)
+        main.exchange(EcatCommand.BWR, 0, address, data)
         main.let_pass(1.3)
     main.let_pass(30)
 

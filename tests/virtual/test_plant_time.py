@@ -12,7 +12,7 @@ import pytest
 
 from catenary.errors import ConfigurationError
 from catenary.virtual import Joint, Plant, Segment, Server, Servo
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from tests.virtual.main_device import MainDevice
 from tests.virtual.plants import PENDULUM, Time, frictionless, model
 from tests.virtual.test_server import BRD, answer, wire
@@ -62,7 +62,7 @@ def test_a_frame_is_answered_without_a_step(tmp_path: Path) -> None:
     segment.plant.stop()
     before = steps(segment)
     for _ in range(50):
-        answer = main.exchange(Command.BRD, 0, 0x0130, bytes(2))
+        answer = main.exchange(EcatCommand.BRD, 0, 0x0130, bytes(2))
         assert answer.working_counter == 1
     assert steps(segment) == before
     segment.plant.start()

@@ -9,7 +9,7 @@ import pytest
 
 from catenary.virtual import Coupler, Junction, Segment
 from catenary.virtual.faults import cut, power_cycle
-from catenary.wire.datagram import Command, Datagram
+from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import decode_frame, encode_frame
 from tests.virtual.main_device import MILLISECOND, STATION, MainDevice
 
@@ -36,7 +36,7 @@ def tree() -> MainDevice:
 
 
 def answers(main: MainDevice) -> int | None:
-    main.link.send(encode_frame([Datagram(Command.BRD, 0, b"\0")]))
+    main.link.send(encode_frame([Datagram(EcatCommand.BRD, 0, b"\0")]))
     if not main.link.wait_until(main.link.now() + MILLISECOND, True):
         return None
     frame = main.link.receive()
@@ -84,7 +84,7 @@ def test_a_branch_that_is_cut_leaves_the_others() -> None:
 
 def test_frames_come_back_to_each_port_after_its_branch() -> None:
     main = tree()
-    main.exchange(Command.BWR, 0, 0x0900, bytes(4))
+    main.exchange(EcatCommand.BWR, 0, 0x0900, bytes(4))
     at = times(main, 1)
     # port 3: two devices, both processed, one turns, one forwards; then port 1, then port 2
     assert at[3] - at[0] == PROCESSED + PROCESSED + PROCESSED + BACK
@@ -94,16 +94,16 @@ def test_frames_come_back_to_each_port_after_its_branch() -> None:
 
 def test_a_port_nothing_comes_to_keeps_its_time() -> None:
     main = tree()
-    main.exchange(Command.BWR, 0, 0x0900, bytes(4))
+    main.exchange(EcatCommand.BWR, 0, 0x0900, bytes(4))
     assert times(main, 5)[1:] == [0, 0, 0]
 
 
 def test_a_longer_cable_takes_longer() -> None:
     main = line(2)
-    main.exchange(Command.BWR, 0, 0x0900, bytes(4))
+    main.exchange(EcatCommand.BWR, 0, 0x0900, bytes(4))
     short = times(main, 0)
     main.segment.wires.delay_cable(1, 550)
-    main.exchange(Command.BWR, 0, 0x0900, bytes(4))
+    main.exchange(EcatCommand.BWR, 0, 0x0900, bytes(4))
     long = times(main, 0)
     assert (long[1] - long[0]) - (short[1] - short[0]) == 2 * 500
 
@@ -158,13 +158,13 @@ def test_auto_close_opens_when_it_is_written_again() -> None:
 def test_auto_close_opens_by_a_frame_that_comes_to_it() -> None:
     segment = Segment([Coupler(), Coupler()], ring=True)
     with segment.open_link() as link, segment.second.open_link() as other:
-        control = Datagram(Command.APWR, (DL_CONTROL + 1) << 16, bytes([AUTO_CLOSE << 2]))
+        control = Datagram(EcatCommand.APWR, (DL_CONTROL + 1) << 16, bytes([AUTO_CLOSE << 2]))
         link.send(encode_frame([control]))
         segment.inject(cut(between=(0, 1), for_=0.01))
         link.wait_until(20 * MILLISECOND, False)
         segment.take_losses()
         assert segment.wires.processed(0) == [0]
-        other.send(encode_frame([Datagram(Command.BRD, 0, b"\0")]))
+        other.send(encode_frame([Datagram(EcatCommand.BRD, 0, b"\0")]))
         assert not other.wait_until(other.now() + MILLISECOND, True)  # the one that opened it
     assert [loss.cause for loss in segment.take_losses()] == ["closed port"]
     assert segment.wires.processed(0) == [0, 1]
@@ -203,7 +203,7 @@ def test_a_change_of_links_is_an_event() -> None:
 
 def test_a_frame_whose_lengths_do_not_fit_is_an_error_of_every_processing_unit() -> None:
     main = line()
-    frame = bytearray(encode_frame([Datagram(Command.BRD, 0, bytes(20))]))
+    frame = bytearray(encode_frame([Datagram(EcatCommand.BRD, 0, bytes(20))]))
     frame[16 + 6] = 200  # the datagram is longer than the frame says
     main.link.send(bytes(frame))
     assert [main.segment.core.peek(k, 0x030C, 1) for k in range(3)] == [b"\x01"] * 3

@@ -7,7 +7,7 @@ import struct
 import pytest
 
 from catenary.virtual import Coupler, DigitalInputs, DigitalOutputs, Segment
-from catenary.wire.datagram import Command, Datagram
+from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import decode_frame, encode_frame
 from tests.virtual.main_device import STATION, MainDevice
 
@@ -24,54 +24,56 @@ def main() -> MainDevice:
 @pytest.mark.parametrize(
     ("command", "adp", "expected"),
     [
-        (Command.NOP, 0, 0),
-        (Command.APRD, -1, 1),
-        (Command.APWR, -1, 1),
-        (Command.APRW, -1, 3),
-        (Command.APRD, -3, 0),
-        (Command.FPRD, STATION + 2, 1),
-        (Command.FPWR, STATION + 2, 1),
-        (Command.FPRW, STATION + 2, 3),
-        (Command.FPRD, 0x2222, 0),
-        (Command.BRD, 0, 3),
-        (Command.BWR, 0, 3),
-        (Command.BRW, 0, 9),
-        (Command.ARMW, -1, 3),
-        (Command.FRMW, STATION, 3),
+        (EcatCommand.NOP, 0, 0),
+        (EcatCommand.APRD, -1, 1),
+        (EcatCommand.APWR, -1, 1),
+        (EcatCommand.APRW, -1, 3),
+        (EcatCommand.APRD, -3, 0),
+        (EcatCommand.FPRD, STATION + 2, 1),
+        (EcatCommand.FPWR, STATION + 2, 1),
+        (EcatCommand.FPRW, STATION + 2, 3),
+        (EcatCommand.FPRD, 0x2222, 0),
+        (EcatCommand.BRD, 0, 3),
+        (EcatCommand.BWR, 0, 3),
+        (EcatCommand.BRW, 0, 9),
+        (EcatCommand.ARMW, -1, 3),
+        (EcatCommand.FRMW, STATION, 3),
     ],
 )
-def test_working_counter_of(main: MainDevice, command: Command, adp: int, expected: int) -> None:
+def test_working_counter_of(
+    main: MainDevice, command: EcatCommand, adp: int, expected: int
+) -> None:
     assert main.exchange(command, adp, USER_RAM, b"\x5a\xa5").working_counter == expected
 
 
-@pytest.mark.parametrize("command", [Command.LRD, Command.LWR, Command.LRW])
+@pytest.mark.parametrize("command", [EcatCommand.LRD, EcatCommand.LWR, EcatCommand.LRW])
 def test_logical_commands_without_a_mapping_count_nothing(
-    main: MainDevice, command: Command
+    main: MainDevice, command: EcatCommand
 ) -> None:
     assert main.exchange_logical(command, 0, bytes(4)).working_counter == 0
 
 
 def test_positions_and_broadcasts_count_the_devices_in_the_address(main: MainDevice) -> None:
-    assert main.exchange(Command.BRD, 0, 0, b"\0").address & 0xFFFF == 3
-    assert main.exchange(Command.APRD, -1, 0, b"\0").address & 0xFFFF == 2
-    assert main.exchange(Command.FPRD, STATION, 0, b"\0").address & 0xFFFF == STATION
+    assert main.exchange(EcatCommand.BRD, 0, 0, b"\0").address & 0xFFFF == 3
+    assert main.exchange(EcatCommand.APRD, -1, 0, b"\0").address & 0xFFFF == 2
+    assert main.exchange(EcatCommand.FPRD, STATION, 0, b"\0").address & 0xFFFF == STATION
 
 
 def test_broadcast_reads_are_ored(main: MainDevice) -> None:
     for k in range(3):
         main.write(STATION + k, USER_RAM, bytes([1 << k]))
-    assert main.exchange(Command.BRD, 0, USER_RAM, b"\x80").data == b"\x87"
+    assert main.exchange(EcatCommand.BRD, 0, USER_RAM, b"\x80").data == b"\x87"
 
 
 def test_read_write_gives_what_was_there_before(main: MainDevice) -> None:
     main.write(STATION, USER_RAM, b"\x11")
-    assert main.exchange(Command.FPRW, STATION, USER_RAM, b"\x22").data == b"\x11"
+    assert main.exchange(EcatCommand.FPRW, STATION, USER_RAM, b"\x22").data == b"\x11"
     assert main.read(STATION, USER_RAM, 1) == b"\x22"
 
 
 def test_read_multiple_write_hands_one_devices_value_to_the_ones_behind(main: MainDevice) -> None:
     main.write(STATION + 1, USER_RAM, b"\x77")
-    main.exchange(Command.FRMW, STATION + 1, USER_RAM, b"\x01")
+    main.exchange(EcatCommand.FRMW, STATION + 1, USER_RAM, b"\x01")
     values = [main.read(STATION + k, USER_RAM, 1) for k in range(3)]
     assert values == [b"\x01", b"\x77", b"\x77"]
 
@@ -92,16 +94,16 @@ def test_a_write_over_both_kinds_changes_the_writable_part_only(main: MainDevice
 def test_the_alias_is_heard_only_when_enabled() -> None:
     main = MainDevice(Segment([Coupler(), Coupler(alias=77)]))
     main.number_stations()
-    assert main.exchange(Command.FPRD, 77, 0x0012, bytes(2)).working_counter == 0
+    assert main.exchange(EcatCommand.FPRD, 77, 0x0012, bytes(2)).working_counter == 0
     main.write(STATION + 1, 0x0103, b"\x01")
-    assert main.exchange(Command.FPRD, 77, 0x0012, bytes(2)) == (b"\x4d\x00", 1, 0x0012_004D)
+    assert main.exchange(EcatCommand.FPRD, 77, 0x0012, bytes(2)) == (b"\x4d\x00", 1, 0x0012_004D)
     assert main.write(STATION + 1, 0x0012, b"\x05\x00") == 0
 
 
 def test_the_memory_ends(main: MainDevice) -> None:
-    assert main.exchange(Command.FPRD, STATION, 0xFFF0, bytes(64)).working_counter == 0
-    assert main.exchange(Command.FPWR, STATION, 0x3000, bytes(64)).working_counter == 0
-    assert main.exchange(Command.FPRD, STATION, 0x2FF0, bytes(64)).working_counter == 1
+    assert main.exchange(EcatCommand.FPRD, STATION, 0xFFF0, bytes(64)).working_counter == 0
+    assert main.exchange(EcatCommand.FPWR, STATION, 0x3000, bytes(64)).working_counter == 0
+    assert main.exchange(EcatCommand.FPRD, STATION, 0x2FF0, bytes(64)).working_counter == 1
 
 
 def test_dl_status_shows_a_line_that_ends(main: MainDevice) -> None:
@@ -112,10 +114,10 @@ def test_dl_status_shows_a_line_that_ends(main: MainDevice) -> None:
 
 def test_a_cut_line_answers_up_to_the_cut(main: MainDevice) -> None:
     main.segment.plug(devices=2)
-    assert main.exchange(Command.BRD, 0, 0x0000, b"\0").working_counter == 2
+    assert main.exchange(EcatCommand.BRD, 0, 0x0000, b"\0").working_counter == 2
     assert main.read(STATION + 1, 0x0111, 1) == b"\x56"
     main.segment.unplug()
-    main.link.send(encode_frame([Datagram(Command.BRD, 0, b"\0")]))
+    main.link.send(encode_frame([Datagram(EcatCommand.BRD, 0, b"\0")]))
     assert not main.link.wait_until(main.link.now() + 1_000_000, True)
     assert main.segment.frames.lost == 1
 
@@ -131,8 +133,8 @@ def test_error_counters_are_cleared_by_writing_any_of_their_group(main: MainDevi
 def test_event_requests_ride_in_the_interrupt_field_where_masked_in(main: MainDevice) -> None:
     main.write(STATION, 0x0200, struct.pack("<H", 0x0008))
     main.write(STATION, 0x0120, b"\x02\x00")
-    main.link.send(encode_frame([Datagram(Command.NOP, 0, b"\0")] * 2))
-    frame = encode_frame([Datagram(Command.APRD, 0, bytes(2))])
+    main.link.send(encode_frame([Datagram(EcatCommand.NOP, 0, b"\0")] * 2))
+    frame = encode_frame([Datagram(EcatCommand.APRD, 0, bytes(2))])
     returned = main.segment.core.pass_frame(frame)
     assert returned is not None
     assert decode_frame(returned).datagrams[0].interrupt == 0x0008
@@ -146,7 +148,7 @@ def test_event_requests_ride_in_the_interrupt_field_where_masked_in(main: MainDe
 
 def test_processed_frames_carry_the_local_bit_in_their_source_address() -> None:
     segment = Segment([Coupler()])
-    frame = encode_frame([Datagram(Command.NOP, 0, b"")])
+    frame = encode_frame([Datagram(EcatCommand.NOP, 0, b"")])
     returned = segment.core.pass_frame(frame)
     assert returned is not None
     assert returned[6] == frame[6] | 0x02

@@ -10,12 +10,12 @@ from catenary.link import Ring
 from catenary.virtual import Coupler, Segment, Servo
 from catenary.virtual._segment_link import SegmentLink
 from catenary.virtual.faults import Fault, cut, join, power_cycle
-from catenary.wire.datagram import Command, Datagram
+from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import Frame, decode_frame, encode_frame
 
 MILLISECOND = 1_000_000
 COUNT = 6
-BRD = encode_frame([Datagram(Command.BRD, 0x0130 << 16, bytes(2))])
+BRD = encode_frame([Datagram(EcatCommand.BRD, 0x0130 << 16, bytes(2))])
 LOCAL = 0x02  # of the source address: a processing unit had it
 
 
@@ -140,13 +140,15 @@ def test_station_addresses_hold_on_both_sides_of_a_cut() -> None:
     ring = Ends()
     for k in range(COUNT):
         data = (0x1000 + k).to_bytes(2, "little")
-        ring.links[0].send(encode_frame([Datagram(Command.APWR, -k & 0xFFFF | 0x10 << 16, data)]))
+        ring.links[0].send(
+            encode_frame([Datagram(EcatCommand.APWR, -k & 0xFFFF | 0x10 << 16, data)])
+        )
     ring.let_pass(1)
     while ring.links[1].receive():
         pass
     ring.segment.inject(cut(between=(3, 4)))
     ring.let_pass(1)
-    read = encode_frame([Datagram(Command.FPRD, 0x1005 | 0x10 << 16, bytes(2))])
+    read = encode_frame([Datagram(EcatCommand.FPRD, 0x1005 | 0x10 << 16, bytes(2))])
     for link in ring.links:
         link.send(read)
     ring.let_pass(1)

@@ -8,11 +8,11 @@ import struct
 import pytest
 
 from catenary.virtual import Coupler, DigitalOutputs, Segment, Servo, demo_segment
-from catenary.wire.datagram import Command, Datagram
+from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import encode_frame
 from tests.virtual.main_device import STATION, MainDevice
 
-BRD = encode_frame([Datagram(Command.BRD, 0, b"\0")])
+BRD = encode_frame([Datagram(EcatCommand.BRD, 0, b"\0")])
 
 
 def test_time_stands_still_except_while_waiting() -> None:
@@ -62,7 +62,7 @@ def run(steps: int) -> list[bytes]:
     answers = []
     for k in range(steps):
         out = struct.pack("<HbiiH", (6, 7, 15)[min(k // 10, 2)], 10, 0, 0, 150)
-        answers.append(main.exchange_logical(Command.LRW, 0, out + bytes(13)).data)
+        answers.append(main.exchange_logical(EcatCommand.LRW, 0, out + bytes(13)).data)
         if k == 0:
             main.request(STATION, 8)
         main.let_pass(1)
@@ -94,7 +94,7 @@ def test_a_device_stands_in_one_segment() -> None:
 def test_three_hundred_devices() -> None:
     segment = Segment([Coupler(), *(Servo() for _ in range(299))])
     main = MainDevice(segment)
-    assert main.exchange(Command.BRD, 0, 0x0130, bytes(2)).working_counter == 300
+    assert main.exchange(EcatCommand.BRD, 0, 0x0130, bytes(2)).working_counter == 300
     main.number_stations()
     assert main.read(STATION + 299, 0x0010, 2) == struct.pack("<H", STATION + 299)
 

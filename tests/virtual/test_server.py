@@ -12,11 +12,11 @@ from catenary.errors import LinkError
 from catenary.realtime import private_network
 from catenary.virtual import Coupler, Segment, Server
 from catenary.virtual.faults import cut
-from catenary.wire.datagram import Command, Datagram
+from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import decode_frame, encode_frame
 
 ETHERCAT = 0x88A4
-BRD = encode_frame([Datagram(Command.BRD, 0, b"\0")])
+BRD = encode_frame([Datagram(EcatCommand.BRD, 0, b"\0")])
 
 
 def ring() -> Segment:

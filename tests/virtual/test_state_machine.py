@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from catenary.virtual import Coupler, Segment, Servo
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from tests.virtual.main_device import STATION, MainDevice
 
 INIT, PRE_OP, BOOT, SAFE_OP, OP = 1, 2, 3, 4, 8
@@ -55,7 +55,7 @@ def test_a_local_error_does_not_replace_a_request_to_go_down(
 ) -> None:
     """IgH stops its cycle and requests INIT: the watchdog expires before the device is there."""
     main.start_servo(STATION, 0)
-    main.exchange_logical(Command.LRW, 0, bytes(26))
+    main.exchange_logical(EcatCommand.LRW, 0, bytes(26))
     assert main.request(STATION, OP) == (OP, 0)
     servo_of(main).delay_state(requested, 0.15)  # the watchdog expires after 100 ms
     main.request(STATION, requested)
@@ -68,7 +68,7 @@ def test_a_local_error_does_not_replace_a_request_to_go_down(
 def test_a_local_error_cancels_a_request_to_go_up(main: MainDevice) -> None:
     main.start_servo(STATION, 0)
     servo_of(main).delay_state(OP, 0.01)
-    main.exchange_logical(Command.LRW, 0, bytes(26))
+    main.exchange_logical(EcatCommand.LRW, 0, bytes(26))
     main.request(STATION, OP)
     servo_of(main).application.states.fail(SAFE_OP, 0x001A)
     main.let_pass(100)
@@ -98,21 +98,21 @@ def test_op_needs_outputs(main: MainDevice) -> None:
     assert main.request(STATION, OP) == (SAFE_OP, 0)
     main.let_pass(300)
     assert main.al_status(STATION) == (SAFE_OP | ERROR, 0x0019)
-    main.exchange_logical(Command.LRW, 0, bytes(26))
+    main.exchange_logical(EcatCommand.LRW, 0, bytes(26))
     assert main.request(STATION, OP | ACKNOWLEDGE) == (OP, 0)
 
 
 def test_outputs_that_come_late_take_it_up(main: MainDevice) -> None:
     main.start_servo(STATION, 0)
     main.request(STATION, OP)
-    main.exchange_logical(Command.LRW, 0, bytes(26))
+    main.exchange_logical(EcatCommand.LRW, 0, bytes(26))
     main.let_pass(1)
     assert main.al_status(STATION) == (OP, 0)
 
 
 def test_silence_in_op_is_a_watchdog_error(main: MainDevice) -> None:
     main.start_servo(STATION, 0)
-    main.exchange_logical(Command.LRW, 0, bytes(26))
+    main.exchange_logical(EcatCommand.LRW, 0, bytes(26))
     assert main.request(STATION, OP) == (OP, 0)
     main.let_pass(150)
     assert main.al_status(STATION) == (SAFE_OP | ERROR, 0x001B)
@@ -122,10 +122,10 @@ def test_silence_in_op_is_a_watchdog_error(main: MainDevice) -> None:
 
 def test_down_from_anywhere_in_one_step(main: MainDevice) -> None:
     main.start_servo(STATION, 0)
-    main.exchange_logical(Command.LRW, 0, bytes(26))
+    main.exchange_logical(EcatCommand.LRW, 0, bytes(26))
     main.request(STATION, OP)
     assert main.request(STATION, INIT) == (INIT, 0)
-    assert main.exchange_logical(Command.LRW, 0, bytes(26)).working_counter == 0
+    assert main.exchange_logical(EcatCommand.LRW, 0, bytes(26)).working_counter == 0
 
 
 def test_injected_refusal_and_delay(main: MainDevice) -> None:

@@ -7,7 +7,7 @@ import struct
 import pytest
 
 from catenary.virtual import DigitalInputs, DigitalOutputs, Segment, Servo
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from tests.virtual.main_device import STATION, MainDevice
 
 SERVO = STATION
@@ -32,28 +32,28 @@ def test_a_full_mailbox_refuses_a_second_request(main: MainDevice) -> None:
 
 
 def test_an_empty_mailbox_cannot_be_read_and_reading_empties_it(main: MainDevice) -> None:
-    assert main.exchange(Command.FPRD, SERVO, 0x1080, bytes(128)).working_counter == 0
+    assert main.exchange(EcatCommand.FPRD, SERVO, 0x1080, bytes(128)).working_counter == 0
     main.put(SERVO, IDENTITY)
     main.let_pass(2)
     assert main.read(SERVO, 0x080D, 1)[0] & FULL
-    assert main.exchange(Command.FPRD, SERVO, 0x1080, bytes(128)).working_counter == 1
+    assert main.exchange(EcatCommand.FPRD, SERVO, 0x1080, bytes(128)).working_counter == 1
     assert not main.read(SERVO, 0x080D, 1)[0] & FULL
 
 
 def test_access_begins_with_the_first_byte_and_ends_with_the_last(main: MainDevice) -> None:
     main.put(SERVO, IDENTITY)
     main.let_pass(2)
-    assert main.exchange(Command.FPRD, SERVO, 0x1088, bytes(120)).working_counter == 0
-    head = main.exchange(Command.FPRD, SERVO, 0x1080, bytes(6))
+    assert main.exchange(EcatCommand.FPRD, SERVO, 0x1088, bytes(120)).working_counter == 0
+    head = main.exchange(EcatCommand.FPRD, SERVO, 0x1080, bytes(6))
     assert head.working_counter == 1
     assert main.read(SERVO, 0x080D, 1)[0] & FULL
-    main.exchange(Command.FPRD, SERVO, 0x1086, bytes(122))
+    main.exchange(EcatCommand.FPRD, SERVO, 0x1086, bytes(122))
     assert not main.read(SERVO, 0x080D, 1)[0] & FULL
 
 
 def test_the_wrong_direction_is_refused(main: MainDevice) -> None:
-    assert main.exchange(Command.FPRD, SERVO, 0x1000, bytes(128)).working_counter == 0
-    assert main.exchange(Command.FPWR, SERVO, 0x1080, bytes(128)).working_counter == 0
+    assert main.exchange(EcatCommand.FPRD, SERVO, 0x1000, bytes(128)).working_counter == 0
+    assert main.exchange(EcatCommand.FPWR, SERVO, 0x1080, bytes(128)).working_counter == 0
 
 
 def test_a_repeat_brings_the_last_answer_again_before_the_next(main: MainDevice) -> None:
@@ -93,7 +93,7 @@ def test_disabling_gives_the_memory_free_and_empties_the_mailbox(main: MainDevic
 
 def test_process_data_is_closed_until_the_application_opens_it(main: MainDevice) -> None:
     main.sync_manager(SERVO, 2, 0x1100, 13, 0x64)
-    assert main.exchange(Command.FPWR, SERVO, 0x1100, bytes(13)).working_counter == 0
+    assert main.exchange(EcatCommand.FPWR, SERVO, 0x1100, bytes(13)).working_counter == 0
 
 
 def test_three_buffers_give_the_last_complete_write() -> None:
@@ -107,7 +107,7 @@ def test_three_buffers_give_the_last_complete_write() -> None:
     assert segment.core.output_image(0, 0) == b"\x01\x02"
     main.write(STATION, 0x1001, b"\x06")
     assert segment.core.output_image(0, 0) == b"\x05\x06"
-    assert main.exchange(Command.FPWR, STATION, 0x1002, bytes(2)).working_counter == 0
+    assert main.exchange(EcatCommand.FPWR, STATION, 0x1002, bytes(2)).working_counter == 0
 
 
 def test_inputs_stay_whole_while_they_are_read_in_parts() -> None:

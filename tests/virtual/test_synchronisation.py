@@ -12,7 +12,7 @@ import pytest
 from catenary.virtual import Coupler, Crystal, Segment, Servo, ServoQuirks
 from catenary.virtual.faults import power_cycle
 from catenary.virtual.op_modes import EASYCAT, EASYCAT_STORED, EL3702, SYNC1_ALONE, OpMode
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from catenary.wire.sii import decode_sii
 from tests.virtual.clocks import ACTIVATION, START_TIME, SYNC0_CYCLE, SYNC1_CYCLE, Clocks
 from tests.virtual.main_device import STATION
@@ -80,7 +80,7 @@ class Drive(Clocks):
 
     def swap(self) -> tuple[int, int, int, int, int]:
         """Process data out and in."""
-        answer = self.exchange_logical(Command.LRW, LOGICAL, self.targets + bytes(13))
+        answer = self.exchange_logical(EcatCommand.LRW, LOGICAL, self.targets + bytes(13))
         assert answer.working_counter == 3
         return OUTPUTS.unpack(answer.data[13:])
 

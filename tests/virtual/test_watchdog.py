@@ -7,7 +7,7 @@ import struct
 import pytest
 
 from catenary.virtual import DigitalOutputs, Segment, Servo
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from tests.virtual.main_device import STATION, MainDevice
 
 OUTPUTS = DigitalOutputs
@@ -79,5 +79,5 @@ def test_reading_does_not_feed_it(main: MainDevice) -> None:
     main.write(STATION, 0x1000, b"\x0f")
     for _ in range(11):
         main.let_pass(10)
-        main.exchange(Command.BRD, 0, 0x0130, bytes(2))
+        main.exchange(EcatCommand.BRD, 0, 0x0130, bytes(2))
     assert outputs(main) == 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from catenary.virtual import DigitalOutputs, Segment, Servo
-from catenary.wire.datagram import Command, Datagram
+from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import decode_frame, encode_frame
 from tests.virtual.main_device import MILLISECOND, STATION, MainDevice
 
@@ -23,7 +23,7 @@ def main() -> MainDevice:
 
 def together(main: MainDevice, *writes: tuple[int, bytes]) -> list[int]:
     """The working counters of writes to the first device, all in one frame."""
-    datagrams = [Datagram(Command.APWR, address << 16, data) for address, data in writes]
+    datagrams = [Datagram(EcatCommand.APWR, address << 16, data) for address, data in writes]
     main.link.send(encode_frame(datagrams))
     assert main.link.wait_until(main.link.now() + MILLISECOND, True)
     frame = main.link.receive()
@@ -59,8 +59,8 @@ def test_process_data_do_not_pass_a_protected_controller(main: MainDevice) -> No
     main.let_pass(30)
     main.start_servo(STATION + 1, 0)
     main.write(STATION + 1, ESC, b"\x01")
-    assert main.exchange_logical(Command.LRW, 0, bytes(26)).working_counter == 1
-    assert main.exchange_logical(Command.LWR, 0, bytes(26)).working_counter == 0
+    assert main.exchange_logical(EcatCommand.LRW, 0, bytes(26)).working_counter == 1
+    assert main.exchange_logical(EcatCommand.LWR, 0, bytes(26)).working_counter == 0
 
 
 def test_three_letters_reset_a_device(main: MainDevice) -> None:
@@ -71,9 +71,9 @@ def test_three_letters_reset_a_device(main: MainDevice) -> None:
         shown.append(main.segment.core.peek(1, RESET, 1)[0])
     assert shown == [1, 2, 0]
     main.let_pass(5)
-    assert main.exchange(Command.BRD, 0, 0, b"\0").working_counter == 1
+    assert main.exchange(EcatCommand.BRD, 0, 0, b"\0").working_counter == 1
     main.let_pass(25)
-    assert main.exchange(Command.BRD, 0, 0, b"\0").working_counter == 2
+    assert main.exchange(EcatCommand.BRD, 0, 0, b"\0").working_counter == 2
     assert main.segment[1].state == 1
     assert main.segment.core.peek(1, REGISTER, 2) == b"\0\0"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hypothesis import strategies as st
 
-from catenary.wire.datagram import Command, Datagram
+from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import Frame
 
 u8 = st.integers(0, 0xFF)
@@ -17,7 +17,7 @@ mac = st.binary(min_size=6, max_size=6)
 
 datagrams = st.builds(
     Datagram,
-    command=st.sampled_from(Command),
+    command=st.sampled_from(EcatCommand),
     address=u32,
     data=st.binary(max_size=100),
     index=u8,

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 
 from catenary.errors import DecodeError
-from catenary.wire.al import STATUS_CODES, AlControl, AlStatus, State, states_in, status_code
+from catenary.wire.al import STATUS_CODES, AlControl, AlState, AlStatus, states_in, status_code
 from tests.wire.strategies import u16
 
 
@@ -14,10 +14,10 @@ from tests.wire.strategies import u16
     ("word", "status"),
     [
         # ethercrab's tests/replay-dc.pcapng, frames 95 (error pending after power-on) and 1163
-        (0x0011, AlStatus(State.INIT, error=True)),
-        (0x0002, AlStatus(State.PRE_OP)),
-        (0x0028, AlStatus(State.OP, identification=True)),
-        (0x0014, AlStatus(State.SAFE_OP, error=True)),
+        (0x0011, AlStatus(AlState.INIT, error=True)),
+        (0x0002, AlStatus(AlState.PRE_OP)),
+        (0x0028, AlStatus(AlState.OP, identification=True)),
+        (0x0014, AlStatus(AlState.SAFE_OP, error=True)),
     ],
 )
 def test_status_words(word, status):
@@ -29,10 +29,10 @@ def test_status_words(word, status):
     ("word", "control"),
     [
         # the same capture, frame 2: acknowledges while asking for INIT
-        (0x0011, AlControl(State.INIT, acknowledge=True)),
-        (0x0008, AlControl(State.OP)),
-        (0x0022, AlControl(State.PRE_OP, request_identification=True)),
-        (0x0003, AlControl(State.BOOT)),
+        (0x0011, AlControl(AlState.INIT, acknowledge=True)),
+        (0x0008, AlControl(AlState.OP)),
+        (0x0022, AlControl(AlState.PRE_OP, request_identification=True)),
+        (0x0003, AlControl(AlState.BOOT)),
     ],
 )
 def test_control_words(word, control):
@@ -42,7 +42,7 @@ def test_control_words(word, control):
 
 @given(u16)
 def test_every_word_is_a_value_or_decode_error(word):
-    if word & 0x0F in list(State):
+    if word & 0x0F in list(AlState):
         assert AlStatus.from_word(word).word == word & 0x3F
         assert AlControl.from_word(word).word == word & 0x3F
         return
@@ -52,13 +52,13 @@ def test_every_word_is_a_value_or_decode_error(word):
 
 
 def test_states_of_a_broadcast_read():
-    assert states_in(State.PRE_OP | State.OP) == {State.PRE_OP, State.OP}
-    assert states_in(0x0008) == {State.OP}
+    assert states_in(AlState.PRE_OP | AlState.OP) == {AlState.PRE_OP, AlState.OP}
+    assert states_in(0x0008) == {AlState.OP}
     assert states_in(0) == set()
 
 
 def test_states_are_written_as_in_the_standard():
-    assert [str(state) for state in State] == ["INIT", "PRE-OP", "BOOT", "SAFE-OP", "OP"]
+    assert [str(state) for state in AlState] == ["INIT", "PRE-OP", "BOOT", "SAFE-OP", "OP"]
 
 
 def test_status_codes_have_text_and_cause():

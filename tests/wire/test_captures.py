@@ -17,7 +17,7 @@ from catenary.wire.coe import (
     UploadResponse,
     decode_coe,
 )
-from catenary.wire.datagram import Command, Datagram
+from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.fmmu import decode_fmmu
 from catenary.wire.frame import Frame, decode_frame
 from catenary.wire.mailbox import Mailbox, Type, decode_mailbox
@@ -75,7 +75,7 @@ def mailboxes(frames: list[Frame]) -> Iterator[tuple[Datagram, Mailbox]]:
     """Messages that a device took or gave: in the memory of mailboxes, whole buffers."""
     for frame in frames:
         for datagram in frame.datagrams:
-            physical = datagram.command in (Command.FPRD, Command.FPWR)
+            physical = datagram.command in (EcatCommand.FPRD, EcatCommand.FPWR)
             if physical and datagram.ado >= PROCESS_RAM and datagram.working_counter:
                 yield datagram, decode_mailbox(datagram.data)
 
@@ -105,9 +105,9 @@ def test_every_mailbox_message_comes_back(shared_data, name):
     assert count == CAPTURES[name][1]
 
 
-def check_coe(command: Command, data: bytes) -> None:
+def check_coe(command: EcatCommand, data: bytes) -> None:
     message = decode_coe(data)
-    if command is Command.FPWR:
+    if command is EcatCommand.FPWR:
         assert message.encode() == data
     else:  # the reserved bytes of the EL3004's download responses hold rubbish
         assert decode_coe(message.encode()) == message
@@ -136,7 +136,7 @@ def test_blocks_of_sync_managers_and_fmmus_come_back(shared_data):
         datagram
         for frame in frames
         for datagram in frame.datagrams
-        if datagram.command is Command.FPWR and datagram.ado in DECODERS and any(datagram.data)
+        if datagram.command is EcatCommand.FPWR and datagram.ado in DECODERS and any(datagram.data)
     ]
     assert len(blocks) >= 8
     for datagram in blocks:

@@ -10,9 +10,9 @@ from catenary.wire.cia402 import (
     COMMANDS,
     STATE_CODING,
     TRANSITIONS,
+    AxisState,
     Control,
     Mode,
-    State,
     Status,
     state_of,
 )
@@ -23,15 +23,15 @@ from tests.wire.strategies import u16
 @pytest.mark.parametrize(
     ("statusword", "state"),
     [
-        (0x0000, State.NOT_READY_TO_SWITCH_ON),
-        (0x0250, State.SWITCH_ON_DISABLED),
-        (0x0231, State.READY_TO_SWITCH_ON),
-        (0x0233, State.SWITCHED_ON),
-        (0x1637, State.OPERATION_ENABLED),
-        (0x0217, State.QUICK_STOP_ACTIVE),
-        (0x021F, State.FAULT_REACTION_ACTIVE),
-        (0x0218, State.FAULT),
-        (0x0238, State.FAULT),
+        (0x0000, AxisState.NOT_READY_TO_SWITCH_ON),
+        (0x0250, AxisState.SWITCH_ON_DISABLED),
+        (0x0231, AxisState.READY_TO_SWITCH_ON),
+        (0x0233, AxisState.SWITCHED_ON),
+        (0x1637, AxisState.OPERATION_ENABLED),
+        (0x0217, AxisState.QUICK_STOP_ACTIVE),
+        (0x021F, AxisState.FAULT_REACTION_ACTIVE),
+        (0x0218, AxisState.FAULT),
+        (0x0238, AxisState.FAULT),
     ],
 )
 def test_states_of_statuswords(statusword, state):
@@ -54,8 +54,8 @@ def test_a_word_that_codes_no_state():
 
 def test_the_numbers_of_states_are_fixed():
     # core and the plan's Views exchange them as bytes
-    assert [state.value for state in State] == list(range(8))
-    assert State.OPERATION_ENABLED == 4
+    assert [state.value for state in AxisState] == list(range(8))
+    assert AxisState.OPERATION_ENABLED == 4
 
 
 # CiA 402-2, table "command coding"
@@ -87,7 +87,7 @@ def test_the_table_has_all_transitions_in_order():
 
 
 def test_every_command_leads_from_a_state_to_one_other():
-    for state in State:
+    for state in AxisState:
         for command in COMMANDS:
             targets = [
                 each.target
@@ -98,11 +98,15 @@ def test_every_command_leads_from_a_state_to_one_other():
 
 
 def test_enabling_takes_three_commands():
-    state, path = State.SWITCH_ON_DISABLED, []
+    state, path = AxisState.SWITCH_ON_DISABLED, []
     for command in (cia402.SHUTDOWN, cia402.SWITCH_ON, cia402.ENABLE_OPERATION):
         [state] = [t.target for t in TRANSITIONS if t.source is state and command in t.commands]
         path.append(state)
-    assert path == [State.READY_TO_SWITCH_ON, State.SWITCHED_ON, State.OPERATION_ENABLED]
+    assert path == [
+        AxisState.READY_TO_SWITCH_ON,
+        AxisState.SWITCHED_ON,
+        AxisState.OPERATION_ENABLED,
+    ]
 
 
 def test_modes_and_their_bits():

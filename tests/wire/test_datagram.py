@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from catenary.errors import DecodeError
-from catenary.wire.datagram import Command, Datagram, decode_datagram
+from catenary.wire.datagram import Datagram, EcatCommand, decode_datagram
 from tests.wire.strategies import datagrams
 
 # ethercrab's tests/replay-ek1100-el2828-el2889.pcapng, frame 2296: FPRD of AL status, more follows
@@ -16,7 +16,7 @@ GOLDEN = bytes.fromhex("047c001030010280000000000000")
 
 def test_golden_bytes():
     datagram, more_follows = decode_datagram(GOLDEN)
-    assert datagram == Datagram(Command.FPRD, 0x0130_1000, b"\x00\x00", index=0x7C)
+    assert datagram == Datagram(EcatCommand.FPRD, 0x0130_1000, b"\x00\x00", index=0x7C)
     assert (datagram.adp, datagram.ado) == (0x1000, 0x0130)
     assert more_follows
     assert datagram.encode(more_follows=True) == GOLDEN
@@ -30,7 +30,7 @@ def test_comes_back_from_any_offset(datagram, more_follows, before):
 
 
 def test_circulating_is_bit_14_of_the_length():
-    encoded = Datagram(Command.NOP, 0, b"", circulating=True).encode()
+    encoded = Datagram(EcatCommand.NOP, 0, b"", circulating=True).encode()
     assert encoded[6:8] == b"\x00\x40"
 
 
@@ -57,9 +57,9 @@ def test_an_offset_outside_is_refused():
 @pytest.mark.parametrize(
     "datagram",
     [
-        Datagram(Command.LRW, 1 << 32, b""),
-        Datagram(Command.LRW, 0, b"", index=256),
-        Datagram(Command.LRW, 0, bytes(2048)),
+        Datagram(EcatCommand.LRW, 1 << 32, b""),
+        Datagram(EcatCommand.LRW, 0, b"", index=256),
+        Datagram(EcatCommand.LRW, 0, bytes(2048)),
     ],
 )
 def test_fields_that_do_not_fit_are_refused_before_sending(datagram):
@@ -68,12 +68,12 @@ def test_fields_that_do_not_fit_are_refused_before_sending(datagram):
 
 
 def test_commands_know_what_they_do():
-    readers = [command for command in Command if command.reads]
-    assert Command.LRW.reads
-    assert Command.LRW.writes
-    assert Command.LRW.is_logical
-    assert Command.BWR not in readers
-    assert not Command.FPRD.writes
-    assert not Command.NOP.reads
-    assert not Command.NOP.writes
-    assert [command.value for command in Command] == list(range(15))
+    readers = [command for command in EcatCommand if command.reads]
+    assert EcatCommand.LRW.reads
+    assert EcatCommand.LRW.writes
+    assert EcatCommand.LRW.is_logical
+    assert EcatCommand.BWR not in readers
+    assert not EcatCommand.FPRD.writes
+    assert not EcatCommand.NOP.reads
+    assert not EcatCommand.NOP.writes
+    assert [command.value for command in EcatCommand] == list(range(15))

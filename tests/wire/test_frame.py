@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from catenary.errors import DecodeError
 from catenary.wire import frame
-from catenary.wire.datagram import Command, Datagram
+from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import Frame, decode_frame, encode_frame, is_alien, is_own
 from tests.fuzz.fuzz_wire import FRAME, TWINCAT_FRAME
 from tests.wire.strategies import frames
@@ -43,25 +43,25 @@ def test_any_payload_gives_a_frame_with_the_same_bytes_or_decode_error(payload):
 
 
 def test_pads_to_the_minimum_of_ethernet():
-    encoded = encode_frame([Datagram(Command.BRD, 0, b"\x00")])
+    encoded = encode_frame([Datagram(EcatCommand.BRD, 0, b"\x00")])
     assert len(encoded) == 60
     assert encoded[12:16] == bytes.fromhex("88a40d10")
     assert decode_frame(encoded).padding == bytes(60 - 16 - 13)
 
 
 def test_the_largest_frame():
-    encoded = encode_frame([Datagram(Command.LRW, 0, bytes(frame.MAXIMUM_DATA))])
+    encoded = encode_frame([Datagram(EcatCommand.LRW, 0, bytes(frame.MAXIMUM_DATA))])
     assert len(encoded) == frame.MAXIMUM_SIZE
     with pytest.raises(ValueError, match="at most"):
-        encode_frame([Datagram(Command.LRW, 0, bytes(frame.MAXIMUM_DATA + 1))])
+        encode_frame([Datagram(EcatCommand.LRW, 0, bytes(frame.MAXIMUM_DATA + 1))])
 
 
 @pytest.mark.parametrize(
     "value",
     [
         Frame(()),
-        Frame((Datagram(Command.NOP, 0, b""),), source=b"short"),
-        Frame((Datagram(Command.NOP, 0, b""),), counted_padding=1),
+        Frame((Datagram(EcatCommand.NOP, 0, b""),), source=b"short"),
+        Frame((Datagram(EcatCommand.NOP, 0, b""),), counted_padding=1),
     ],
 )
 def test_impossible_frames_are_refused(value):

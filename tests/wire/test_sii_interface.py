@@ -6,21 +6,21 @@ import pytest
 from hypothesis import given
 
 from catenary.errors import DecodeError
-from catenary.wire.sii_interface import Command, ControlStatus
+from catenary.wire.sii_interface import ControlStatus, SiiCommand
 from tests.wire.strategies import u16
 
 
 def test_a_busy_reading_eight_byte_interface():
     status = ControlStatus.from_word(0x8140)
-    assert status == ControlStatus(Command.READ, eight_bytes=True, busy=True)
+    assert status == ControlStatus(SiiCommand.READ, eight_bytes=True, busy=True)
     assert status.read_size == 8
     assert not status.failed
 
 
 def test_commands_as_masters_write_them():
-    assert ControlStatus(Command.READ).word == 0x0100
-    assert ControlStatus(Command.WRITE, write_enable=True).word == 0x0201
-    assert ControlStatus(Command.RELOAD).word == 0x0400
+    assert ControlStatus(SiiCommand.READ).word == 0x0100
+    assert ControlStatus(SiiCommand.WRITE, write_enable=True).word == 0x0201
+    assert ControlStatus(SiiCommand.RELOAD).word == 0x0400
     assert ControlStatus().word == 0
 
 
@@ -31,7 +31,7 @@ def test_errors(word):
 
 @given(u16)
 def test_every_word_is_a_value_or_decode_error(word):
-    if word >> 8 & 7 in list(Command):
+    if word >> 8 & 7 in list(SiiCommand):
         assert ControlStatus.from_word(word).word == word & ~0x001E
     else:
         with pytest.raises(DecodeError, match="no command"):

@@ -22,7 +22,7 @@ from catenary.drive import Stop
 from catenary.realtime import Demand, Tasks, Verdict, analyse
 from catenary.realtime.statistics import measured_demand
 from catenary.record.timeline import braking
-from catenary.wire.cia402 import STATE_CODING, State
+from catenary.wire.cia402 import STATE_CODING, AxisState
 
 MAIN, PRIORITY = "main control", 90
 DEVICES = "virtual devices"
@@ -130,7 +130,7 @@ class Reaction:
 def reactions(recording: record.Recording) -> list[Reaction]:
     """Of every stop that a marker tells of, by the controlwords that were sent. ValueError: no
     quick stop followed."""
-    mask, value = STATE_CODING[State.OPERATION_ENABLED]
+    mask, value = STATE_CODING[AxisState.OPERATION_ENABLED]
     moving = (recording["statusword"] & mask) == value
     stopping = (braking(recording) | ~moving).all(axis=1)
     instants = recording["scheduled_ns"].astype(np.int64)

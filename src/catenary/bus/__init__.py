@@ -1,6 +1,6 @@
 """MainDevice and SubDevice, and the runners of procedures."""
 
-from catenary.bus.carrier import Carrier, CycleClock
+from catenary.bus.external_master import Carrier, CycleClock
 from catenary.bus.lane_runner import Lane, LaneRunner
 from catenary.bus.main_device import MainDevice
 from catenary.bus.pending import Pending

@@ -19,11 +19,11 @@ from catenary.errors import (
 from catenary.link import RingLink
 from catenary.model.device import DeviceDescription, Direction, mapped_pdos
 from catenary.plan.clocks import SYNC_OBJECTS
-from catenary.plan.make import Plan, gather_wishes
 from catenary.plan.pdo_search import any_carries
+from catenary.plan.planner import Plan, gather_wishes
+from catenary.plan.request import ObjectReference, PdoWish, Wish
 from catenary.plan.start_up import DevicePlan
 from catenary.plan.start_up_object import StartUp
-from catenary.plan.wish import ObjectReference, PdoWish, Wish
 from catenary.procedure.al_state import request_state
 from catenary.procedure.clocks import ClockMeasurement
 from catenary.procedure.configure import configure_process_data
@@ -35,7 +35,7 @@ from catenary.procedure.pdo_offers import read_offers, read_values
 from catenary.procedure.profile import read_object
 from catenary.procedure.station import within
 from catenary.procedure.sync import bring_together, read_types, stop, write_types
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 
 READ_TIMEOUT = 60.0  # [s] for what a plan needs of one device: hundreds of slow SDOs
 WRITE_TIMEOUT = 60.0  # [s] for the objects that a plan writes to one device, and reads again
@@ -83,9 +83,9 @@ def bring_to_safe_op(
                 devices, syncs, clock.reference, epoch_ns, clock.burst, clock.follow, end
             )
         )
-    runner.run_all([request_state(sub.station, State.SAFE_OP) for sub in subs])
+    runner.run_all([request_state(sub.station, AlState.SAFE_OP) for sub in subs])
     for sub in subs:
-        sub.state = State.SAFE_OP
+        sub.state = AlState.SAFE_OP
     return measured
 
 
@@ -143,7 +143,7 @@ def _unmapped(
 
 def _prepare(sub: SubDevice, plan: DevicePlan) -> Procedure[None]:
     device = sub.description
-    yield from request_state(sub.station, State.PRE_OP)
+    yield from request_state(sub.station, AlState.PRE_OP)
     if device.coe and plan.sync is not None and not sub.sync_types:
         sub.sync_types = yield from read_types(_channel(sub))
     elif plan.sync is None and sub.sync_types:

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 from catenary.bus.sub_device import SubDevice
 from catenary.errors import DecodeError
+from catenary.model.break_location import judge_silence
 from catenary.model.diagnosis import Observation, judge
 from catenary.model.finding import Finding, Kind, Names
-from catenary.model.silence import judge_silence
 from catenary.model.topology import Topology, make_topology
+from catenary.procedure.al_status_poll import Answer, survey
 from catenary.procedure.error_counters import counted_since, read_error_counters
 from catenary.procedure.exchange import Procedure
-from catenary.procedure.survey import Answer, survey
 from catenary.wire.al import ERROR_FLAG, AlStatus, status_code
 from catenary.wire.error_counters import ErrorCounters
 

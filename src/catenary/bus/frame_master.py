@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-from catenary.bus import event
+from catenary.bus import event_types
 from catenary.bus.runner import BlockingRunner
 from catenary.bus.sdo import Objects, read_each
-from catenary.bus.segment_scan import Found, find, oddities, with_places
+from catenary.bus.segment_scan import ScannedDevice, find, oddities, with_places
 from catenary.bus.sub_device import SubDevice
 from catenary.errors import LinkError
 from catenary.link import ring_of
@@ -24,14 +24,14 @@ from catenary.procedure.stations import (
     duplicate_aliases,
     reset,
 )
-from catenary.wire.al import STATE_MASK, State
+from catenary.wire.al import STATE_MASK, AlState
 
 if TYPE_CHECKING:  # plan needs NumPy, a scan does not
     from catenary.bus.diagnosis import Diagnosis
     from catenary.bus.main_device import MainDevice
     from catenary.bus.states import Outcome
-    from catenary.plan.make import Plan
-    from catenary.plan.wish import Wish
+    from catenary.plan.planner import Plan
+    from catenary.plan.request import Wish
 
 
 class FrameMaster:
@@ -73,7 +73,7 @@ class FrameMaster:
         self, runner: BlockingRunner, device_count: int, states: int
     ) -> tuple[str, ...]:
         """Return a note on devices that another program has left in SAFE-OP or OP."""
-        if states & STATE_MASK <= State.BOOT:
+        if states & STATE_MASK <= AlState.BOOT:
             return ()
         running = runner.run(find_running(device_count))
         if not self._force:
@@ -113,7 +113,7 @@ class FrameMaster:
         return passive_scan(self._main.runner, ring_of(self._main.link), names)
 
     def request_states(
-        self, devices: Sequence[DeviceDescription], positions: Sequence[int], state: State
+        self, devices: Sequence[DeviceDescription], positions: Sequence[int], state: AlState
     ) -> dict[int, Outcome]:
         """Bring devices of a passive scan to a state and leave them there."""
         from catenary.bus.states import request_states
@@ -152,20 +152,20 @@ class FrameMaster:
 
     def leave(self, timeout: float) -> None:
         """Bring all devices to SAFE-OP, then to PRE-OP."""
-        self._bring_down(State.SAFE_OP, timeout)
-        self._bring_down(State.PRE_OP, timeout)
+        self._bring_down(AlState.SAFE_OP, timeout)
+        self._bring_down(AlState.PRE_OP, timeout)
 
     def close(self, timeout: float) -> None:
         """Bring all devices to INIT."""
-        self._bring_down(State.INIT, timeout)
+        self._bring_down(AlState.INIT, timeout)
 
-    def _bring_down(self, state: State, timeout: float) -> None:
+    def _bring_down(self, state: AlState, timeout: float) -> None:
         subs = self._main.subs
         self._main.runner.run(bring_all_down([sub.station for sub in subs], state, timeout))
         for sub in subs:
             sub.state = state
 
-    def _handle(self, found: Found) -> SubDevice:
+    def _handle(self, found: ScannedDevice) -> SubDevice:
         """Return the known handle of this place, if it is the same device; else a new one."""
         subs = self._main.subs
         position = found.description.position
@@ -176,8 +176,8 @@ class FrameMaster:
         if known.channel is not None:
             known.channel.listen(partial(self._hear, known))
         known.error = found.error
-        known.state = State.PRE_OP if found.error is None else None
+        known.state = AlState.PRE_OP if found.error is None else None
         return known
 
     def _hear(self, sub: SubDevice, heard: Heard) -> None:
-        self._main.events.put(event.emergency(heard.time_ns * 1e-9, sub, heard.emergency))
+        self._main.events.put(event_types.emergency(heard.time_ns * 1e-9, sub, heard.emergency))

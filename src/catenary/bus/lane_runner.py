@@ -13,8 +13,8 @@ from typing import Any, Protocol, TypeVar
 
 from catenary.bus.packing import Parcel, batches, indices, make_parcel, replies_of
 from catenary.bus.pending import Pending
+from catenary.bus.procedure_run import Task
 from catenary.bus.runner import ATTEMPTS, FRAME_TIMEOUT, FrameCounts
-from catenary.bus.task import Task
 from catenary.errors import DecodeError, LoopError
 from catenary.procedure.exchange import Procedure, Reply, Request
 from catenary.wire.frame import decode_frame

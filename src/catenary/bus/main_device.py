@@ -8,9 +8,9 @@ import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Self, TypeVar
 
-from catenary.bus import event
-from catenary.bus.carrier import Carrier
-from catenary.bus.events import Callback, Callbacks, Events
+from catenary.bus import event_types
+from catenary.bus.event_queue import Callback, Callbacks, Events
+from catenary.bus.external_master import Carrier
 from catenary.bus.frame_master import FrameMaster
 from catenary.bus.master import Master, MasterSource
 from catenary.bus.pending import Pending
@@ -30,14 +30,14 @@ from catenary.link import (
 )
 from catenary.model.device import Identity
 from catenary.procedure.exchange import Procedure
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 
 if TYPE_CHECKING:  # plan needs NumPy, a scan does not
     from catenary.bus.diagnosis import Diagnosis
     from catenary.bus.states import Outcome
     from catenary.plan.cycle import ExecutionMode, ReceiveMode
-    from catenary.plan.make import Plan
-    from catenary.plan.wish import Wish
+    from catenary.plan.planner import Plan
+    from catenary.plan.request import Wish
 
 T = TypeVar("T")
 
@@ -192,7 +192,7 @@ class MainDevice:
         any thread may call it. `time` [s]: when it was, on the link's clock (`time.monotonic()` on
         a NIC), which other threads know, too; None: now."""
         when = self.link.now() * 1e-9 if time is None else float(time)
-        self.events.put(event.Marker(when, None, message))
+        self.events.put(event_types.Marker(when, None, message))
 
     def deliver_events(self) -> None:
         """In virtual time: calls the callbacks with what has happened. Else a thread does."""
@@ -237,7 +237,7 @@ class MainDevice:
         return SubDevices([SubDevice(self, each, None) for each in found])
 
     def request_states(
-        self, subs: Sequence[SubDevice], positions: Sequence[int], state: State
+        self, subs: Sequence[SubDevice], positions: Sequence[int], state: AlState
     ) -> dict[int, Outcome]:
         """Bring devices of a `passive_scan` to a state and leave them there. Not while a loop runs.
 
@@ -278,7 +278,7 @@ class MainDevice:
 
         For more to choose: `read_mappings`, then `catenary.plan.make_plan`.
         """
-        from catenary.plan.make import make_plan
+        from catenary.plan.planner import make_plan
 
         self.read_mappings(*wishes, period=period)
         return make_plan(
@@ -295,7 +295,7 @@ class MainDevice:
         """Update the descriptions: what is mapped, and what the dictionaries say of wanted objects
         that are not. Raises the error of a device that is not in PRE-OP."""
         self._raise_errors()
-        from catenary.plan.make import period_in_ns
+        from catenary.plan.planner import period_in_ns
 
         self.master.read_mappings(wishes, period_in_ns(period))
 

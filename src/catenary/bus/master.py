@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 from catenary.bus.sdo import Objects
 from catenary.bus.sub_device import SubDevice
 from catenary.model.device import DeviceDescription
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 
 if TYPE_CHECKING:  # plan needs NumPy, a scan does not
     from catenary.bus.diagnosis import Diagnosis
     from catenary.bus.main_device import MainDevice
     from catenary.bus.states import Outcome
-    from catenary.plan.make import Plan
-    from catenary.plan.wish import Wish
+    from catenary.plan.planner import Plan
+    from catenary.plan.request import Wish
 
 
 class Master(Protocol):
@@ -31,7 +31,7 @@ class Master(Protocol):
     def passive_scan(self, *, names: bool) -> Sequence[DeviceDescription]: ...
 
     def request_states(
-        self, devices: Sequence[DeviceDescription], positions: Sequence[int], state: State
+        self, devices: Sequence[DeviceDescription], positions: Sequence[int], state: AlState
     ) -> dict[int, Outcome]: ...
 
     def diagnose(

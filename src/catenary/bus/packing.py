@@ -10,12 +10,20 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from catenary.procedure.exchange import Reply, Request
-from catenary.wire.datagram import OVERHEAD, Command, Datagram
+from catenary.wire.datagram import OVERHEAD, Datagram, EcatCommand
 from catenary.wire.frame import MAXIMUM_DATA, MAXIMUM_PAYLOAD, Frame, encode_frame
 
 INDEX_FIRST, INDEX_LAST = 0x80, 0xFF  # 0x00 to 0x7F belong to the cycle
 _COUNTED_ADDRESS = frozenset(  # their ADP counts up on the way
-    (Command.APRD, Command.APWR, Command.APRW, Command.ARMW, Command.BRD, Command.BWR, Command.BRW)
+    (
+        EcatCommand.APRD,
+        EcatCommand.APWR,
+        EcatCommand.APRW,
+        EcatCommand.ARMW,
+        EcatCommand.BRD,
+        EcatCommand.BWR,
+        EcatCommand.BRW,
+    )
 )
 
 

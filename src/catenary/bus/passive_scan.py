@@ -12,11 +12,11 @@ from catenary.link import RingLink
 from catenary.link.ring_state import Shape
 from catenary.model.device import DeviceDescription
 from catenary.procedure.exchange import Procedure
+from catenary.procedure.read_device import distinct, give_addresses, read_addresses, visit
 from catenary.procedure.sii import read_image
 from catenary.procedure.sii_owner import with_eeprom
 from catenary.procedure.station import Station, within
 from catenary.procedure.stations import StationRegisters, count, read_registers
-from catenary.procedure.visit import distinct, give_addresses, read_addresses, visit
 
 
 def passive_scan(

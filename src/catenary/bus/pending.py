@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from typing import Generic, TypeVar
 
-from catenary.bus.task import Task
+from catenary.bus.procedure_run import Task
 from catenary.errors import CatenaryError
 
 T = TypeVar("T")

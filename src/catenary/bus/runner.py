@@ -15,7 +15,7 @@ from typing import Any, Protocol, TypeVar
 
 from catenary.bus.packing import Parcel, batches, indices, make_parcel, replies_of
 from catenary.bus.pending import Pending
-from catenary.bus.task import Task
+from catenary.bus.procedure_run import Task
 from catenary.errors import DecodeError
 from catenary.link import Link
 from catenary.procedure.exchange import Procedure, Reply, Request

@@ -21,13 +21,13 @@ from catenary.procedure.sii import read_image
 from catenary.procedure.sii_owner import hand_over
 from catenary.procedure.station import Station, within
 from catenary.procedure.stations import StationRegisters
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 
 READ_TIMEOUT = 30.0  # [s] for the registers and the SII of one device
 BRING_UP_TIMEOUT = 30.0  # [s] from there to PRE-OP, the profile included
 
 
-class Found(NamedTuple):
+class ScannedDevice(NamedTuple):
     """One device in PRE-OP with its mailbox, or the error that prevented PRE-OP."""
 
     description: DeviceDescription
@@ -35,7 +35,7 @@ class Found(NamedTuple):
     error: CatenaryError | None = None
 
 
-def find(registers: StationRegisters) -> Procedure[Found]:
+def find(registers: StationRegisters) -> Procedure[ScannedDevice]:
     """Bring one device to PRE-OP, or return its error: the other devices are not affected."""
     device = unread(registers)
     station = Station(registers.position, registers.station_address)  # its name is not known yet
@@ -44,9 +44,9 @@ def find(registers: StationRegisters) -> Procedure[Found]:
         station = station_of(device)
         return (yield from within(BRING_UP_TIMEOUT, station, bring_to_pre_op(device)))
     except (DecodeError, ValueError) as error:  # of a decoder: it does not know the device
-        return Found(device, error=_unreadable(station, error))
+        return ScannedDevice(device, error=_unreadable(station, error))
     except CatenaryError as error:
-        return Found(device, error=error)
+        return ScannedDevice(device, error=error)
 
 
 def _unreadable(station: Station, error: Exception) -> SegmentError:
@@ -61,22 +61,22 @@ def station_of(device: DeviceDescription) -> Station:
     return Station(device.position, device.station_address, device.name)
 
 
-def bring_to_pre_op(device: DeviceDescription) -> Procedure[Found]:
+def bring_to_pre_op(device: DeviceDescription) -> Procedure[ScannedDevice]:
     """Open the mailbox, request PRE-OP, read the profile, the mapping and names the SII lacks."""
     station = station_of(device)
     if device.mailbox is None:
         yield from hand_over(station)
-        yield from request_state(station, State.PRE_OP)
-        return Found(device)
+        yield from request_state(station, AlState.PRE_OP)
+        return ScannedDevice(device)
     channel = MailboxChannel(station, device.mailbox)
     yield from configure_mailbox(channel)
     yield from hand_over(station)
-    yield from request_state(station, State.PRE_OP)
+    yield from request_state(station, AlState.PRE_OP)
     if device.coe:
         device = yield from read_profile(channel, device)
         device = yield from read_first_mapping(channel, device)
     device = yield from name_entries(channel, device)
-    return Found(device, channel)
+    return ScannedDevice(device, channel)
 
 
 def unread(registers: StationRegisters) -> DeviceDescription:

@@ -8,12 +8,12 @@ from typing import TypeAlias, TypeVar
 from catenary.bus.runner import BlockingRunner
 from catenary.errors import CatenaryError
 from catenary.model.device import DeviceDescription
-from catenary.plan.make import make_plan
+from catenary.plan.planner import make_plan
 from catenary.procedure.al_state import DeviceState, read_state, request_state
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.state_path import bring_to_safe_op, climb, restart
 from catenary.procedure.station import Station
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 
 T = TypeVar("T")
 Outcome: TypeAlias = DeviceState | CatenaryError
@@ -23,7 +23,7 @@ def request_states(
     runner: BlockingRunner,
     devices: Sequence[DeviceDescription],
     positions: Iterable[int],
-    target: State,
+    target: AlState,
 ) -> dict[int, Outcome]:
     """Brings the devices at `positions` to a state: where each is then, or why it is not there.
     One that fails does not keep the others from it.
@@ -32,7 +32,7 @@ def request_states(
     without process data, which devices with outputs refuse.
     """
     chosen = {position: devices[position] for position in positions}
-    if target in (State.INIT, State.PRE_OP, State.BOOT):
+    if target in (AlState.INIT, AlState.PRE_OP, AlState.BOOT):
         return _run(runner, {p: _climb(device, target) for p, device in chosen.items()})
     failed = _configure(runner, devices, _below_safe_op(runner, chosen))
     asked = {p: request_state(_station(d), target) for p, d in chosen.items() if p not in failed}
@@ -41,7 +41,7 @@ def request_states(
 
 def _below_safe_op(runner: BlockingRunner, chosen: Mapping[int, DeviceDescription]) -> list[int]:
     states = _run(runner, {p: read_state(_station(device)) for p, device in chosen.items()})
-    above = (State.SAFE_OP, State.OP)
+    above = (AlState.SAFE_OP, AlState.OP)
     return [p for p, now in states.items() if isinstance(now, Exception) or now.state not in above]
 
 
@@ -87,7 +87,7 @@ def _parted(
     return good, bad
 
 
-def _climb(device: DeviceDescription, target: State) -> Procedure[DeviceState]:
+def _climb(device: DeviceDescription, target: AlState) -> Procedure[DeviceState]:
     station = _station(device)
     yield from climb(station, device, target)
     return (yield from read_state(station))

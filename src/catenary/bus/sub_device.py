@@ -11,7 +11,7 @@ from catenary.model.device import DeviceDescription, Identity
 from catenary.procedure.al_state import DeviceState, read_state
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.station import Station
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 from catenary.wire.coe import Emergency
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ class SubDevice:
         self.main = main
         self.description = description
         self.channel = channel  # None: it has no mailbox
-        self.state: State | None = None  # last known; None: unknown
+        self.state: AlState | None = None  # last known; None: unknown
         self.error: CatenaryError | None = None  # why the last scan could not bring it to PRE-OP
         self.sync_types: dict[int, bytes] = {}  # 0x1C32:01, 0x1C33:01 before a loop with clocks
         self.sdo = Sdo(self)
@@ -85,7 +85,7 @@ class SubDevice:
         self.state = found.state
         return found
 
-    def request_state(self, state: State | str) -> DeviceState:
+    def request_state(self, state: AlState | str) -> DeviceState:
         """Bring this device to a state, through the states between, and leave it there.
 
         A device that goes to SAFE-OP gets the mapping that it has. A loop configures its devices
@@ -101,7 +101,7 @@ class SubDevice:
             StateError: The device refuses the state; the error names its reason.
             ValueError: The text is not the name of a state.
         """
-        target = State.from_name(state) if isinstance(state, str) else State(state)
+        target = AlState.from_name(state) if isinstance(state, str) else AlState(state)
         outcome = self.main.request_states(self.main.subs, [self.position], target)[self.position]
         if isinstance(outcome, CatenaryError):
             raise outcome

@@ -45,8 +45,8 @@ def add_parser(commands: Commands) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    from catenary.procedure.cable_traffic import exercise
     from catenary.procedure.error_counters import clear_error_counters
-    from catenary.procedure.exercise import exercise
     from catenary.target import MainDevice
 
     sent = 0

@@ -49,8 +49,8 @@ def draw(target: str, main: MainDevice, subs: Sequence[SubDevice]) -> Drawing:
     """Asks for what is drawn."""
     from catenary.cli.drawing import Drawing, Node
     from catenary.model.cable_delay import cable_delays_ns
+    from catenary.procedure.al_status_poll import survey
     from catenary.procedure.receive_times import read_receive_times
-    from catenary.procedure.survey import survey
 
     found = main.diagnose(subs=subs)
     times = main.converse(read_receive_times([sub.description for sub in subs]))

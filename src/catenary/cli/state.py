@@ -50,10 +50,10 @@ def add_parser(commands: Commands) -> None:
 
 def state_name(text: str) -> str:
     """Return the name of a state in `wire.al.State`."""
-    from catenary.wire.al import State
+    from catenary.wire.al import AlState
 
     try:
-        return State.from_name(text).name
+        return AlState.from_name(text).name
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
 
@@ -61,7 +61,7 @@ def state_name(text: str) -> str:
 def run(arguments: argparse.Namespace) -> int:
     from catenary.cli.devices import device_at
     from catenary.target import MainDevice
-    from catenary.wire.al import State
+    from catenary.wire.al import AlState
 
     reads = arguments.state is None
     with MainDevice(arguments.target, force=reads or arguments.force) as main:
@@ -73,7 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
         chosen = range(len(devices)) if arguments.position is None else [arguments.position]
         errors: dict[int, CatenaryError] = {}
         if arguments.state is not None:
-            outcomes = main.request_states(devices, chosen, State[arguments.state])
+            outcomes = main.request_states(devices, chosen, AlState[arguments.state])
             errors = {p: each for p, each in outcomes.items() if isinstance(each, Exception)}
         rows = [(devices[p], devices[p].read_state()) for p in chosen]
     print(as_json(rows, errors) if arguments.json else as_table(rows))

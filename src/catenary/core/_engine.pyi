@@ -23,7 +23,7 @@ class Engine:
     def __init__(self, plan: object, link: object, image: object = None) -> None: ...
     @property
     def buffers(self) -> dict[str, memoryview]:
-        """The private buffers, one per name of plan.wish.Views, typed ("d", "q", "I", "H", "b",
+        """The private buffers, one per name of plan.request.Views, typed ("d", "q", "I", "H", "b",
         "B"), for `numpy.asarray`. Read-only: actual_position, actual_velocity, actual_torque,
         statusword, mode_actual, axis_state, axis_flags, input_reals, input_integers, input_bits,
         input_bytes, and unit_valid ("B"), unit_counter ("H") per sync unit. Writable: target_position,

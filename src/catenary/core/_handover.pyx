@@ -31,7 +31,7 @@ cdef enum:
 
 
 # Arrays of the two blocks, in the order of actual_t and target_t (_handover.pxd): name, NumPy format,
-# what it counts, and its names for Python's views (plan.wish.Views), for laws and for sinks; None:
+# what it counts, and its names for Python's views (plan.request.Views), for laws and for sinks; None:
 # not shown there. Items of 8 bytes come first, so that each array is aligned.
 ACTUAL = (
     ("position", "<f8", "axes", "actual_position", "position", "position"),
@@ -193,7 +193,7 @@ cdef class Handover:
             self.c.target[k].header.hold = 1  # nothing was committed yet
 
     def fields(self):
-        """Return Python's own arrays by the names of plan.wish.Views, as memoryviews."""
+        """Return Python's own arrays by the names of plan.request.Views, as memoryviews."""
         fields = self.views(<void **>&self.c.actual[PRIVATE], ACTUAL, False)
         return fields | self.views(<void **>&self.c.target[PRIVATE], TARGET, True)
 

@@ -8,7 +8,15 @@
 It sends no frame and changes nothing; `apply` and `undo` are called by those who were asked.
 """
 
-from catenary.doctor.change import Change, MachineGround, State, StateError, apply, open_state, undo
+from catenary.doctor.change import (
+    Change,
+    HostState,
+    MachineGround,
+    StateError,
+    apply,
+    open_state,
+    undo,
+)
 from catenary.doctor.check import Check
 from catenary.doctor.examination import Examination, examine, this_machine, watch
 from catenary.doctor.latency import Latency, obtainable_cpu
@@ -19,10 +27,10 @@ __all__ = [
     "Change",
     "Check",
     "Examination",
+    "HostState",
     "Latency",
     "Machine",
     "MachineGround",
-    "State",
     "StateError",
     "apply",
     "as_json",

@@ -125,7 +125,7 @@ def chosen(text: str) -> str:
     return words[0][1:-1] if words else text
 
 
-class State:
+class HostState:
     """Owns the file of what was changed since the machine was started."""
 
     def __init__(self, path: Path, boot: str) -> None:
@@ -187,7 +187,7 @@ class State:
         self.path.unlink(missing_ok=True)
 
 
-def open_state() -> State:
+def open_state() -> HostState:
     """Return the state below $XDG_STATE_HOME if that is set, else in /run for root and in
     ~/.local/state for others.
 
@@ -196,13 +196,13 @@ def open_state() -> State:
     boot = Path(BOOT_ID).read_text().strip()
     folder = os.environ.get("XDG_STATE_HOME")
     if not folder and os.geteuid() == 0:
-        return State(Path("/run/catenary-doctor.json"), boot)
-    return State(
+        return HostState(Path("/run/catenary-doctor.json"), boot)
+    return HostState(
         Path(folder or Path.home() / ".local" / "state") / "catenary" / "doctor.json", boot
     )
 
 
-def apply(changes: Sequence[Change], ground: Ground, state: State) -> Iterator[str]:
+def apply(changes: Sequence[Change], ground: Ground, state: HostState) -> Iterator[str]:
     """Makes them one by one, and says of each what became of it."""
     made = state.load()
     for change in changes:
@@ -221,7 +221,7 @@ def apply(changes: Sequence[Change], ground: Ground, state: State) -> Iterator[s
         yield f"done: {change} (was {before})"
 
 
-def undo(ground: Ground, state: State) -> Iterator[str]:
+def undo(ground: Ground, state: HostState) -> Iterator[str]:
     """Takes all back, the last first. What somebody changed since is left as it is; what is refused
     stays noted."""
     left: list[Made] = []

@@ -6,8 +6,8 @@ from catenary.drive.homing import HomingMethod
 from catenary.drive.io import Inputs, Outputs
 from catenary.drive.process_data import ProcessData
 from catenary.drive.recovery import Phase, Recovery, Stop
+from catenary.plan.request import DistributedClock
 from catenary.plan.start_up_object import StartUp
-from catenary.plan.wish import DistributedClock
 
 __all__ = [
     "Channel",

@@ -13,7 +13,7 @@ from catenary.drive.channel import Channel, ChannelSpec, make_channel
 from catenary.drive.objects import NAMED_COLUMNS, WRITTEN_OBJECTS, AxisObject
 from catenary.model.device import mapped_entries
 from catenary.plan.cycle import NumberKind
-from catenary.plan.wish import DistributedClock, ObjectReference, WrittenPdo
+from catenary.plan.request import DistributedClock, ObjectReference, WrittenPdo
 from catenary.wire.cia402 import Mode
 
 AxisSource: TypeAlias = SubDevice | tuple[SubDevice, int]

@@ -16,8 +16,8 @@ from catenary.errors import MappingError
 from catenary.plan.axis_report import AxisReport
 from catenary.plan.cycle import AxisPlan, Bank, Column, Number, NumberKind
 from catenary.plan.numbers import Which
+from catenary.plan.request import ImageLayout, PdoWish, WrittenPdo
 from catenary.plan.start_up_object import StartUp
-from catenary.plan.wish import ImageLayout, PdoWish, WrittenPdo
 from catenary.wire.cia402 import SLOT_OFFSET, Mode
 
 TARGETS: dict[int, AxisObject] = {

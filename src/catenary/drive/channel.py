@@ -10,7 +10,7 @@ from typing import SupportsIndex, TypeAlias, cast
 
 from catenary.model.device import Entry
 from catenary.plan.cycle import Bank, NumberKind
-from catenary.plan.wish import ObjectReference
+from catenary.plan.request import ObjectReference
 from catenary.types import BOOL, Boolean, DataType, Integer, Real, by_index
 
 NumberType: TypeAlias = DataType[bool] | DataType[int] | DataType[float]

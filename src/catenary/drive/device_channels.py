@@ -15,7 +15,7 @@ from catenary.plan.cycle import Column
 from catenary.plan.numbers import ANY, Which
 from catenary.plan.pdo_rewrite import write_down
 from catenary.plan.pdo_search import pdo_names
-from catenary.plan.wish import ImageLayout, WrittenPdo
+from catenary.plan.request import ImageLayout, WrittenPdo
 
 
 class NamedChannel(NamedTuple):

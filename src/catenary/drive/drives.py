@@ -49,17 +49,17 @@ from catenary.drive.state_machine import Goal
 from catenary.drive.units import AxisUnits, one_each, per_axis
 from catenary.drive.values import Array, AxisValues
 from catenary.plan.cycle import Bank, OnLoss
+from catenary.plan.request import DistributedClock, ImageLayout, PdoWish, Views, WishTables
 from catenary.plan.start_up_object import StartUp
 from catenary.plan.stop_reason import StopReason
-from catenary.plan.wish import DistributedClock, ImageLayout, PdoWish, Views, WishTables
 from catenary.types import UDINT
-from catenary.wire.cia402 import IN_FAULT, Mode, State
+from catenary.wire.cia402 import IN_FAULT, AxisState, Mode
 
 V = TypeVar("V")
 PerAxis: TypeAlias = V | Sequence[V]
 Axes: TypeAlias = int | Sequence[int] | slice
 
-STATES = {int(state): state for state in State}
+STATES = {int(state): state for state in AxisState}
 ALL = slice(None)
 HOMING_PATIENCE = 60.0  # [s] default timeout of a wait
 
@@ -258,7 +258,7 @@ class Drives(Request):
         return tuple(axis.name for axis in self._axes)
 
     @property
-    def state(self) -> tuple[State | None, ...]:
+    def state(self) -> tuple[AxisState | None, ...]:
         """The CiA 402 state of every axis, as of the last `next(loop)`; None: its statusword codes
         none."""
         return tuple(STATES.get(value) for value in self._bound().axis_state.tolist())
@@ -431,7 +431,7 @@ class Drives(Request):
         assert self._moves is not None  # bound together with the views
         return self._moves
 
-    # plan.wish.Wish
+    # plan.request.Wish
 
     def pdos(self, period_ns: int) -> Mapping[int, PdoWish]:
         """Return the process-data request of each device, by position.

@@ -8,7 +8,7 @@ from catenary.drive.channel import Channel
 from catenary.drive.device_channels import NamedChannel
 from catenary.errors import MappingError
 from catenary.model.device import Direction
-from catenary.plan.wish import ImageLayout
+from catenary.plan.request import ImageLayout
 
 
 class Place(NamedTuple):

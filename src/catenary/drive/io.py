@@ -19,8 +19,7 @@ from catenary.drive.device_channels import (
 from catenary.drive.request import Request
 from catenary.model.device import Direction
 from catenary.plan.cycle import Bank
-from catenary.plan.start_up_object import StartUp
-from catenary.plan.wish import (
+from catenary.plan.request import (
     Bytes,
     DistributedClock,
     ImageLayout,
@@ -30,6 +29,7 @@ from catenary.plan.wish import (
     Views,
     WishTables,
 )
+from catenary.plan.start_up_object import StartUp
 
 A = TypeVar("A", Reals, Integers, Bytes)
 

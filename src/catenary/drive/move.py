@@ -13,7 +13,7 @@ import numpy.typing as npt
 from catenary.drive.motions import HALT, OWN_BITS
 from catenary.drive.port import AxisPort, Complaint, Steps
 from catenary.errors import CatenaryError, MoveError
-from catenary.plan.wish import Mover
+from catenary.plan.request import Mover
 
 Outcome: TypeAlias = Literal["reached", "stopped", "replaced", "failed"]
 
@@ -141,7 +141,7 @@ class Moves:
                     part.steps.close()
                     part.steps = part.stop()
 
-    # plan.wish.Mover
+    # plan.request.Mover
 
     def step(self, now: float) -> None:
         """Compute one step of each axis that moves, at the time of the cycle [s]."""

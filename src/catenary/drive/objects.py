@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from catenary.plan.wish import ObjectReference
+from catenary.plan.request import ObjectReference
 from catenary.wire.cia402 import SLOT_OFFSET, Object
 
 

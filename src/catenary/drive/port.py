@@ -10,9 +10,9 @@ from catenary.drive.profile import Motion
 from catenary.drive.state_machine import Goal
 from catenary.drive.units import AxisUnits
 from catenary.errors import MoveError
+from catenary.plan.request import Views
 from catenary.plan.stop_reason import StopReason
-from catenary.plan.wish import Views
-from catenary.wire.cia402 import IN_FAULT, Mode, State
+from catenary.wire.cia402 import IN_FAULT, AxisState, Mode
 
 if TYPE_CHECKING:
     from catenary.bus import Pending
@@ -126,7 +126,7 @@ class AxisPort:
     def state_text(self) -> str:
         """Return the CiA 402 state, for messages."""
         try:
-            return State(self._views.axis_state.item(self._index)).name
+            return AxisState(self._views.axis_state.item(self._index)).name
         except ValueError:
             return "no CiA 402 state"
 

@@ -22,8 +22,7 @@ from catenary.drive.request import Request
 from catenary.errors import ConfigurationError
 from catenary.model.device import Direction
 from catenary.plan.cycle import ImageArea
-from catenary.plan.start_up_object import StartUp
-from catenary.plan.wish import (
+from catenary.plan.request import (
     Bytes,
     DistributedClock,
     ImageLayout,
@@ -32,6 +31,7 @@ from catenary.plan.wish import (
     WishTables,
     WrittenPdo,
 )
+from catenary.plan.start_up_object import StartUp
 
 
 class ProcessData(Request):
@@ -154,7 +154,7 @@ class ProcessData(Request):
         except (TypeError, ValueError) as error:
             raise type(error)(f"{self!r}: {name!r} = {value!r}: {error}") from None
 
-    # plan.wish.Wish
+    # plan.request.Wish
 
     def pdos(self, period_ns: int) -> Mapping[int, PdoWish]:
         """Request the objects, or what is mapped already."""

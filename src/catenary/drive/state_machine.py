@@ -16,8 +16,8 @@ from catenary.wire.cia402 import (
     QUICK_STOP,
     SHUTDOWN,
     SWITCH_ON,
-    Command,
-    State,
+    AxisState,
+    Controlword,
 )
 
 
@@ -32,27 +32,27 @@ class Goal(IntEnum):
 
 # (state, goal): the command that leads there. What is not listed: DISABLE_VOLTAGE, which waits in
 # a state the drive leaves by itself (0, 14), leaves a quick stop (12) and clears bit 7 in a fault.
-TOWARDS: dict[tuple[State, Goal], Command] = {
-    (State.READY_TO_SWITCH_ON, Goal.DISABLED): SHUTDOWN,  # stays
-    (State.SWITCHED_ON, Goal.DISABLED): SHUTDOWN,  # transition 6
-    (State.OPERATION_ENABLED, Goal.DISABLED): DISABLE_OPERATION,  # transition 5, ramp of 0x605C
-    (State.SWITCH_ON_DISABLED, Goal.ENABLED): SHUTDOWN,  # transition 2
-    (State.READY_TO_SWITCH_ON, Goal.ENABLED): SWITCH_ON,  # transition 3
-    (State.SWITCHED_ON, Goal.ENABLED): ENABLE_OPERATION,  # transition 4
-    (State.OPERATION_ENABLED, Goal.ENABLED): ENABLE_OPERATION,  # stays
-    (State.FAULT, Goal.ENABLED): FAULT_RESET,  # transition 15
-    (State.READY_TO_SWITCH_ON, Goal.QUICK_STOP): QUICK_STOP,  # transition 7
-    (State.SWITCHED_ON, Goal.QUICK_STOP): QUICK_STOP,  # transition 10
-    (State.OPERATION_ENABLED, Goal.QUICK_STOP): QUICK_STOP,  # transition 11, by 0x605A
-    (State.QUICK_STOP_ACTIVE, Goal.QUICK_STOP): QUICK_STOP,  # stays; 16 would move at once
-    (State.READY_TO_SWITCH_ON, Goal.RESET): SHUTDOWN,
-    (State.SWITCHED_ON, Goal.RESET): SHUTDOWN,
-    (State.OPERATION_ENABLED, Goal.RESET): DISABLE_OPERATION,
-    (State.FAULT, Goal.RESET): FAULT_RESET,
+TOWARDS: dict[tuple[AxisState, Goal], Controlword] = {
+    (AxisState.READY_TO_SWITCH_ON, Goal.DISABLED): SHUTDOWN,  # stays
+    (AxisState.SWITCHED_ON, Goal.DISABLED): SHUTDOWN,  # transition 6
+    (AxisState.OPERATION_ENABLED, Goal.DISABLED): DISABLE_OPERATION,  # transition 5, ramp of 0x605C
+    (AxisState.SWITCH_ON_DISABLED, Goal.ENABLED): SHUTDOWN,  # transition 2
+    (AxisState.READY_TO_SWITCH_ON, Goal.ENABLED): SWITCH_ON,  # transition 3
+    (AxisState.SWITCHED_ON, Goal.ENABLED): ENABLE_OPERATION,  # transition 4
+    (AxisState.OPERATION_ENABLED, Goal.ENABLED): ENABLE_OPERATION,  # stays
+    (AxisState.FAULT, Goal.ENABLED): FAULT_RESET,  # transition 15
+    (AxisState.READY_TO_SWITCH_ON, Goal.QUICK_STOP): QUICK_STOP,  # transition 7
+    (AxisState.SWITCHED_ON, Goal.QUICK_STOP): QUICK_STOP,  # transition 10
+    (AxisState.OPERATION_ENABLED, Goal.QUICK_STOP): QUICK_STOP,  # transition 11, by 0x605A
+    (AxisState.QUICK_STOP_ACTIVE, Goal.QUICK_STOP): QUICK_STOP,  # stays; 16 would move at once
+    (AxisState.READY_TO_SWITCH_ON, Goal.RESET): SHUTDOWN,
+    (AxisState.SWITCHED_ON, Goal.RESET): SHUTDOWN,
+    (AxisState.OPERATION_ENABLED, Goal.RESET): DISABLE_OPERATION,
+    (AxisState.FAULT, Goal.RESET): FAULT_RESET,
 }
 
 
-def controlword_towards(state: State | None, goal: Goal, previous: int) -> int:
+def controlword_towards(state: AxisState | None, goal: Goal, previous: int) -> int:
     """The command bits (0 to 3 and 7) that lead from `state` towards `goal`.
 
     `previous`: the controlword sent last. A fault is reset by a rising edge of bit 7, so the

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from catenary.drive.attributes import unknown_attribute
-from catenary.plan.wish import Modes, Reals
+from catenary.plan.request import Modes, Reals
 
 QUANTITIES = ("position", "velocity", "torque", "mode")
 Array = npt.NDArray[np.float64] | npt.NDArray[np.int64]

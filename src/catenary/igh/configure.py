@@ -15,7 +15,7 @@ from catenary.model.device import DeviceDescription, Direction, Pdo
 from catenary.plan.clocks import SyncPlan
 from catenary.plan.cycle import ClockPlan
 from catenary.plan.layout import UnitLayout
-from catenary.plan.make import Plan
+from catenary.plan.planner import Plan
 from catenary.plan.start_up import WATCHDOG_DIVIDER, DevicePlan, Download
 from catenary.procedure.pdo import LEFT_ALONE
 

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 from catenary.errors import MailboxError, SdoAbort
 from catenary.igh import abi
+from catenary.igh.failures import NoMailboxError
 from catenary.igh.master import Reservation
-from catenary.igh.refusal import NoMailboxError
 from catenary.model.describe import assignments
 from catenary.model.device import (
     DeviceDescription,

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, NoReturn
 
 from catenary import bus
-from catenary.bus import SubDevices, event
+from catenary.bus import SubDevices, event_types
 from catenary.errors import (
     CatenaryError,
     ConfigurationError,
@@ -18,24 +18,24 @@ from catenary.errors import (
     SegmentError,
 )
 from catenary.igh.address import place
-from catenary.igh.carrier import KernelCarrier
 from catenary.igh.configure import Configuration, DeviceConfiguration, configure
 from catenary.igh.describe import describe, object_information, read_if_there
+from catenary.igh.kernel_cycle import KernelCarrier
 from catenary.igh.master import Reservation
 from catenary.igh.sub_device import SubDevice
 from catenary.igh.sync_types import read_types, write_types
 from catenary.igh.topology import check_delays
 from catenary.model.device import DeviceDescription, Direction, mapped_entries
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 from catenary.wire.coe import Emergency
 
 if TYPE_CHECKING:  # plan needs NumPy, a scan does not
     from catenary.bus import MainDevice
     from catenary.bus.diagnosis import Diagnosis
     from catenary.bus.states import Outcome
-    from catenary.plan.make import Plan
+    from catenary.plan.planner import Plan
+    from catenary.plan.request import PdoWish, Wish
     from catenary.plan.start_up import DevicePlan
-    from catenary.plan.wish import PdoWish, Wish
 
 # [s] An INIT request to a device that fails at that moment may be lost: the master repeats it after
 # 5 s (ec_fsm_change_timeout_ms in IgH's master/fsm_change.c). Seen at every second stop.
@@ -99,7 +99,7 @@ class KernelMaster:
 
     def read_mappings(self, wishes: Sequence[Wish], period_ns: int) -> None:
         """Read what is mapped, and how long other wanted objects are."""
-        from catenary.plan.make import gather_wishes
+        from catenary.plan.planner import gather_wishes
 
         asked = gather_wishes(wishes, period_ns)
         for sub in self.subs:
@@ -262,7 +262,7 @@ class KernelMaster:
         heard = Emergency(*_EMERGENCY.unpack(message))
         if isinstance(sub, SubDevice):
             sub.hear(heard)
-        self.main.events.put(event.emergency(self.main.link.now() * 1e-9, sub, heard))
+        self.main.events.put(event_types.emergency(self.main.link.now() * 1e-9, sub, heard))
 
     # What the master keeps to itself
 
@@ -280,7 +280,7 @@ class KernelMaster:
         self._cannot("read the error counters of all devices", "ethercat crc, ethercat graph CRC")
 
     def request_states(
-        self, devices: Sequence[DeviceDescription], positions: Sequence[int], state: State
+        self, devices: Sequence[DeviceDescription], positions: Sequence[int], state: AlState
     ) -> dict[int, Outcome]:
         """Raise ConfigurationError: the master leads the states."""
         self._cannot("request a state of single devices", f"ethercat states {state}")

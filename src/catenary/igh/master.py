@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Self
 from catenary.errors import CatenaryError, LinkError, SegmentError
 from catenary.igh import abi
 from catenary.igh._ecrt import KernelTime
-from catenary.igh.beside import Beside
+from catenary.igh.failures import refused, sdo_error
+from catenary.igh.kernel_calls import Beside
 from catenary.igh.library import Library
-from catenary.igh.refusal import refused, sdo_error
 from catenary.link import forget_in_child
 from catenary.model.device import Identity
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 
 if TYPE_CHECKING:
     from catenary.bus import MainDevice
@@ -192,11 +192,11 @@ class Reservation:
         while self.now() - begun < SETTLE_TIMEOUT * 1e9:
             infos = [self.slave(position) for position in range(self._present())]
             states = [info.al_state & 0xF for info in infos if not info.error_flag]
-            if all(state == State.PRE_OP for state in states):
+            if all(state == AlState.PRE_OP for state in states):
                 return
             if states != before:
                 before, changed = states, self.now()
-            limit = PREOP_TIMEOUT if State.INIT in states else patience
+            limit = PREOP_TIMEOUT if AlState.INIT in states else patience
             if self.now() - changed >= limit * 1e9:
                 return
             self.wait_until(self.now() + round(LOOK * 1e9), False)

@@ -17,7 +17,7 @@ from catenary.procedure.al_state import DeviceState
 from catenary.procedure.exchange import Procedure, after
 from catenary.procedure.sdo_information import DescribedObject
 from catenary.types import DataType
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 from catenary.wire.coe import Emergency
 from catenary.wire.sdo_information import ObjectDescription
 
@@ -57,8 +57,8 @@ class SubDevice(bus.SubDevice):
         """What the master saw last of its EtherCAT state."""
         info = self.kernel.reservation.slave(self.kernel.place_of(self.position))
         word = info.al_state | (0x10 if info.error_flag else 0)
-        known = word & 0xF in tuple(State)
-        self.state = State(word & 0xF) if known else None
+        known = word & 0xF in tuple(AlState)
+        self.state = AlState(word & 0xF) if known else None
         return DeviceState(self.state, bool(info.error_flag), 0, word)
 
     def read_register(self, address: int, size: int) -> Procedure[bytes]:

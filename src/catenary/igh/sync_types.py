@@ -13,7 +13,7 @@ from catenary.igh.describe import read_if_there
 from catenary.igh.master import Reservation
 from catenary.plan.clocks import SYNC_OBJECTS
 from catenary.procedure.al_state import DeviceState
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 
 
 def read_types(master: Reservation, position: int) -> dict[int, bytes]:
@@ -37,12 +37,12 @@ def write_types(
         StateError: The device is in another state, where it would refuse them.
         CatenaryError: It refuses them, or does not answer.
     """
-    if state.state is not State.PRE_OP or state.error:
+    if state.state is not AlState.PRE_OP or state.error:
         raise StateError(
             f"device {position} is not in PRE-OP but in {state.state or 'an unknown state'}: "
             f"{_named(types)} cannot be restored, and it goes on waiting for SYNC0",
             position=position,
-            requested=int(State.PRE_OP),
+            requested=int(AlState.PRE_OP),
             actual=state.word,
             code=state.code,
             hint=_by_hand(position, types),

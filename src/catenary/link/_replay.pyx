@@ -15,7 +15,7 @@ from catenary.link._table cimport CAT_FRAME_MAX, CAT_LINK_VIRTUAL_TIME, TableLin
 import os
 
 from catenary.errors import DecodeError
-from catenary.link.exchanges import Exchange, by_question, read_exchanges
+from catenary.link.frame_pairs import Exchange, by_question, read_exchanges
 
 LATENCY_MAX = 900 * 10**9             # [ns] a quarter of an hour
 

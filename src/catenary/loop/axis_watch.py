@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from catenary.bus import SubDevice
-from catenary.bus.event import AxisStopped, ModeRefused
+from catenary.bus.event_types import AxisStopped, ModeRefused
 from catenary.core import AXIS_MODE_REFUSED, GOAL_ENABLED
 from catenary.plan.cycle import AxisPlan
+from catenary.plan.request import Views
 from catenary.plan.stop_reason import StopReason
-from catenary.plan.wish import Views
 from catenary.wire.cia402 import Mode
 
 

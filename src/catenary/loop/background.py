@@ -20,7 +20,7 @@ from catenary.core import Iteration
 from catenary.errors import LoopError
 from catenary.loop.moves import Awaited, stopped_late
 from catenary.loop.networks import VIRTUAL, NetworksIteration, leave_all
-from catenary.loop.running import Running
+from catenary.loop.session import Session
 from catenary.loop.signals import SignalGuard
 
 END_TIMEOUT = 30.0  # [s] and some periods: to leave a loop after an error takes some seconds
@@ -37,7 +37,7 @@ class Background:
 
     def __init__(
         self,
-        runnings: Sequence[Running],
+        runnings: Sequence[Session],
         iteration: Iteration | NetworksIteration,
         guard: SignalGuard,
     ) -> None:
@@ -208,7 +208,7 @@ def program_ends() -> bool:
 class _Pace:
     """Keeps virtual time to the wall clock."""
 
-    def __init__(self, running: Running) -> None:
+    def __init__(self, running: Session) -> None:
         self._engine = running.engine
         self._is_virtual = running.engine.scheduling == VIRTUAL
         self._offset: float | None = None  # [s] virtual time minus the wall clock's, at the start

@@ -8,7 +8,7 @@ from dataclasses import fields
 import numpy as np
 
 from catenary.plan.cycle import Bank
-from catenary.plan.wish import Mover, Views, Wish, WishTables
+from catenary.plan.request import Mover, Views, Wish, WishTables
 
 COLUMN_BUFFERS: dict[tuple[bool, Bank], str] = {
     (False, Bank.REAL): "input_reals",

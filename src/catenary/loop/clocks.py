@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Mapping
 
 from catenary.bus import CycleClock, MainDevice, SubDevice
-from catenary.bus.event import ClockLocked, ClockUnlocked
+from catenary.bus.event_types import ClockLocked, ClockUnlocked
 from catenary.core import Engine
 from catenary.errors import ClockError
 from catenary.link import ring_of

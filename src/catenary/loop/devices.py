@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from catenary.bus import MainDevice, SubDevice
-from catenary.plan.wish import Wish
+from catenary.plan.request import Wish
 
 
 class DeviceWish(Wish, Protocol):

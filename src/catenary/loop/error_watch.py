@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from catenary.bus import MainDevice
-from catenary.bus.event import FaultFound
+from catenary.bus.event_types import FaultFound
 from catenary.errors import CatenaryError
 from catenary.link import ring_of
 from catenary.model.diagnosis import Observation, judge

@@ -9,27 +9,27 @@ from catenary.bus import CycleClock, Pending
 from catenary.core import Engine
 from catenary.errors import CatenaryError
 from catenary.link import ring_of
-from catenary.loop.diagnosis import (
+from catenary.loop.cycle_errors import (
     forgetful_error,
     silence_error,
     state_error,
     tight_period,
 )
+from catenary.loop.device_watch import Attendance, Watch
 from catenary.loop.error_watch import ErrorWatch
 from catenary.loop.frame_watch import FrameWatch
-from catenary.loop.watch import Attendance, Watch
+from catenary.model.break_location import judge_silence
 from catenary.model.device import Direction
-from catenary.model.silence import judge_silence
 from catenary.procedure.al_state import request_state
-from catenary.procedure.probe import probe_inputs
+from catenary.procedure.al_status_poll import survey
+from catenary.procedure.process_data_check import probe_inputs
 from catenary.procedure.sdo import upload
-from catenary.procedure.survey import survey
 from catenary.types import UINT
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 from catenary.wire.cia402 import SLOT_OFFSET, Object
 
 if TYPE_CHECKING:
-    from catenary.loop.running import Running
+    from catenary.loop.session import Session
 
 
 class Exchange(Protocol):
@@ -64,7 +64,7 @@ class Exchange(Protocol):
 class FrameExchange:
     """Owns the watches of a session that sends its own frames. Implements `Exchange`."""
 
-    def __init__(self, session: Running) -> None:
+    def __init__(self, session: Session) -> None:
         self._session = session
         self._stations = [sub.station for sub in session.main.subs]
 
@@ -113,9 +113,11 @@ class FrameExchange:
         session.settle()
         if session.clocks is not None:
             session.clocks.settle(session.raise_ended)
-        session.service.converse(*(request_state(station, State.OP) for station in self._stations))
+        session.service.converse(
+            *(request_state(station, AlState.OP) for station in self._stations)
+        )
         for sub in session.main.subs:
-            sub.state = State.OP
+            sub.state = AlState.OP
         watches = (self.watch, self.errors, self.frames)
         return [session.service.runner.submit(watch.run()) for watch in watches]
 
@@ -159,7 +161,7 @@ class FrameExchange:
             if error is not None:
                 raise error
             silent = [answer for answer in needed if answer.word is None]
-            if not silent or len(silent) == len(answers) or session.engine.al_status == State.OP:
+            if not silent or len(silent) == len(answers) or session.engine.al_status == AlState.OP:
                 return
             if look:
                 raise forgetful_error(silent, session.engine.al_status, log)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from catenary.bus.event import DuplicateFrames, Event
+from catenary.bus.event_types import DuplicateFrames, Event
 from catenary.procedure.exchange import Procedure, after
 
 PERIOD = 1.0  # [s] between two readings of the counters

@@ -34,14 +34,14 @@ from catenary.loop.networks import (
 )
 from catenary.loop.options import ClockOptions, Scheduling, StopPolicy, one_of
 from catenary.loop.publishing import one_sink_each
-from catenary.loop.running import Running, take_down
+from catenary.loop.session import Session, take_down
 from catenary.loop.signals import SignalGuard
 from catenary.loop.stream import Stream
 from catenary.loop.timing import Timing
 from catenary.plan.cycle import ExecutionMode
-from catenary.plan.make import Plan, period_in_ns
+from catenary.plan.planner import Plan, period_in_ns
 from catenary.plan.sink import Sink
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 
 LOG_LIMIT = 2**24  # cycles: a gigabyte
 
@@ -291,7 +291,7 @@ class Loop:
             first.engine,
             partial(first.judge, faults=self._faults),
             trouble=TROUBLE,
-            al_status=State.OP,
+            al_status=AlState.OP,
             beside=first.service.beside,
             movers=first.views.movers,
         )
@@ -453,7 +453,7 @@ class Loop:
             running.service.step()
         self._networks[0].check(flags)
 
-    def _only(self, what: str) -> Running:
+    def _only(self, what: str) -> Session:
         """Return what runs of the one network.
 
         Raises:
@@ -464,12 +464,12 @@ class Loop:
         return self._opened
 
     @property
-    def _runnings(self) -> list[Running]:
+    def _runnings(self) -> list[Session]:
         """What runs of each network."""
         return [network.running for network in self._networks if network.running is not None]
 
     @property
-    def _opened(self) -> Running:
+    def _opened(self) -> Session:
         return self._networks[0].session
 
     def _abandon(self) -> None:
@@ -477,7 +477,7 @@ class Loop:
         for problem in self._leave():
             warnings.warn(f"the loop was left open: {problem}", RuntimeWarning, stacklevel=2)
 
-    def _leave_at_the_latest(self, runnings: Sequence[Running]) -> None:
+    def _leave_at_the_latest(self, runnings: Sequence[Session]) -> None:
         """Leave the loop when it is deleted, or when the program ends, if it is open then."""
         self._finalizer = weakref.finalize(self, leave_open_loop, runnings, self._guard)
 
@@ -518,7 +518,7 @@ def checked_quorum(quorum: int | None, count: int) -> int:
     return count if quorum is None else quorum
 
 
-def leave_open_loop(runnings: Sequence[Running], guard: SignalGuard) -> None:
+def leave_open_loop(runnings: Sequence[Session], guard: SignalGuard) -> None:
     """Stop the axes of a loop that nothing refers to any more, then warn: a warning may be an
     error. A loop in the background may stay open until the program ends."""
     if not any(running.is_open for running in runnings):

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from catenary.bus import LaneRunner, Pending, SubDevice
 from catenary.errors import CatenaryError
-from catenary.plan.make import Plan
+from catenary.plan.planner import Plan
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel, drain, exclusively
 

@@ -16,19 +16,19 @@ from catenary.core import (
     CYCLE_WORKING_COUNTER,
 )
 from catenary.log import Log
-from catenary.loop.carried import CarriedExchange, carried
 from catenary.loop.clocks import Clocks
 from catenary.loop.devices import DeviceWish
 from catenary.loop.exchange import FrameExchange
+from catenary.loop.external_cycle import CarriedExchange, carried
 from catenary.loop.laws.law import Law
 from catenary.loop.options import ClockOptions, Scheduling, StopPolicy
-from catenary.loop.running import Running
+from catenary.loop.session import Session
 from catenary.loop.stream import Stream
 from catenary.loop.timing import Timing
 from catenary.plan.cycle import ExecutionMode
-from catenary.plan.make import Plan, make_plan
+from catenary.plan.planner import Plan, make_plan
 from catenary.plan.sink import Sink
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 
 ENDING = CYCLE_WORKING_COUNTER | CYCLE_DROPPED | CYCLE_STOPPED | CYCLE_NONE | CYCLE_LAW_FAILED
 TROUBLE = ENDING | CYCLE_CLOCKS
@@ -63,7 +63,7 @@ class Network:
         sink: Sink | None,
     ) -> None:
         self.main = main
-        self.running: Running | None = None
+        self.running: Session | None = None
         self._requests = requests
         self._settings = settings
         self._cpu = cpu
@@ -108,13 +108,13 @@ class Network:
         return Stream(self.session.engine, self.session.views, capacity)
 
     @property
-    def session(self) -> Running:
+    def session(self) -> Session:
         """Its engine and what belongs to it. RuntimeError before the loop is open."""
         if self.running is None:
             raise RuntimeError("the loop is not open: with Loop(...) as loop:")
         return self.running
 
-    def prepare(self, abandon: Callable[[], object]) -> Running:
+    def prepare(self, abandon: Callable[[], object]) -> Session:
         """Bring all devices to SAFE-OP and compile all laws.
 
         Args:
@@ -124,7 +124,7 @@ class Network:
         plan = self._make_plan()
         self.main.configure(plan)
         is_carried = self.main.carrier is not None
-        running = Running(
+        running = Session(
             self.main,
             carried(plan) if is_carried else plan,
             self._requests,
@@ -181,7 +181,7 @@ class Network:
     def check(self, flags: int) -> None:
         """Raise the error of a cycle in trouble, if it is one."""
         running = self.session
-        if flags & TROUBLE or running.engine.al_status != State.OP:
+        if flags & TROUBLE or running.engine.al_status != AlState.OP:
             running.judge(flags, faults=self._settings.stop.raise_faults)
 
     def wait_locked(self, within: float, timeout: float) -> None:

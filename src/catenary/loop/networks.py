@@ -16,9 +16,9 @@ from catenary.errors import CatenaryError, LoopError
 from catenary.link import Link
 from catenary.loop.network import TROUBLE, Network
 from catenary.loop.options import ClockOptions
-from catenary.loop.running import STOP_SLICE_NS, Running
+from catenary.loop.session import STOP_SLICE_NS, Session
 from catenary.loop.signals import SignalGuard
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 
 NETWORK_TROUBLE = CYCLE_WORKING_COUNTER | CYCLE_STOPPED | CYCLE_NONE
 VIRTUAL = "virtual time"
@@ -27,7 +27,7 @@ VIRTUAL = "virtual time"
 class NetworksCycle(Cycle):
     """One cycle of several networks. Number and time are those of the first."""
 
-    def __init__(self, runnings: Sequence[Running], quorum: int) -> None:
+    def __init__(self, runnings: Sequence[Session], quorum: int) -> None:
         super().__init__(runnings[0].engine)
         self._networks = tuple(Cycle(running.engine) for running in runnings)
         self.alive = (True,) * len(runnings)  # whether each one's devices are in OP
@@ -118,12 +118,12 @@ class NetworksIteration:
         for one, mine, lives in zip(self._runnings, flags, alive, strict=True):
             if not lives and sum(alive) >= self._quorum:
                 continue
-            if mine & TROUBLE or one.engine.al_status != State.OP:
+            if mine & TROUBLE or one.engine.al_status != AlState.OP:
                 if not lives:
                     self._stop_others(one)
                 one.judge(mine, faults=self._faults)
 
-    def _lives(self, one: Running, flags: int) -> bool:
+    def _lives(self, one: Session, flags: int) -> bool:
         """Return whether a network carries its devices.
 
         A network that had failed and answers again counts once its devices are in OP: those that
@@ -131,17 +131,17 @@ class NetworksIteration:
         """
         if flags & NETWORK_TROUBLE:
             self._dead.add(id(one))
-        elif one.engine.al_status == State.OP:
+        elif one.engine.al_status == AlState.OP:
             self._dead.discard(id(one))
         return id(one) not in self._dead
 
-    def _stop_others(self, dead: Running) -> None:
+    def _stop_others(self, dead: Session) -> None:
         for one in self._runnings:
             if one is not dead:
                 one.stop_axes_at_once()
 
 
-def share_time(runnings: Sequence[Running]) -> None:
+def share_time(runnings: Sequence[Session]) -> None:
     """In virtual time, let this thread run the cycles of all networks in turns.
 
     Raises:
@@ -159,7 +159,7 @@ def share_time(runnings: Sequence[Running]) -> None:
         one.share_time([other for other in runnings if other is not one])
 
 
-def leave_all(runnings: Sequence[Running], guard: SignalGuard) -> list[Exception]:
+def leave_all(runnings: Sequence[Session], guard: SignalGuard) -> list[Exception]:
     """Stop every network that answers, whatever happens to the others. Return the problems."""
     problems: list[Exception] = []
     try:
@@ -174,7 +174,7 @@ def leave_all(runnings: Sequence[Running], guard: SignalGuard) -> list[Exception
     return problems
 
 
-def brake(runnings: Sequence[Running], guard: SignalGuard) -> None:
+def brake(runnings: Sequence[Session], guard: SignalGuard) -> None:
     """Stop all axes of all networks at once, in slices, until they stand or the deadline."""
     for one in runnings:
         one.make_outputs_safe()
@@ -229,7 +229,7 @@ def _have_one_clock(links: Sequence[Link]) -> bool:
     return all(link.now() >= later for link in others)
 
 
-def _stands(running: Running) -> bool:
+def _stands(running: Session) -> bool:
     try:
         return running.engine.run_until_stopped(STOP_SLICE_NS)
     except (CatenaryError, OSError):

@@ -12,10 +12,10 @@ from itertools import groupby
 import numpy as np
 
 from catenary.bus import MainDevice
-from catenary.bus.event import Event
+from catenary.bus.event_types import Event
 from catenary.core import RECORD_FIELDS, Engine
 from catenary.plan.cycle import Bank, Column, ImageArea
-from catenary.plan.make import Plan
+from catenary.plan.planner import Plan
 from catenary.plan.sink import Block, Incident, Sink, SinkField, SinkLayout
 
 Places = dict[str, tuple[int, str, int | None]]  # name → offset, format, count

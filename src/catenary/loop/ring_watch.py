@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from catenary.bus.event import Event, LinkLost, LinkRestored
+from catenary.bus.event_types import Event, LinkLost, LinkRestored
 from catenary.bus.ring import Cuts, Ends, HasState, find_cuts, named
 
 

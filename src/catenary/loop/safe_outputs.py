@@ -10,7 +10,7 @@ from catenary.core import CYCLE_NONE, CYCLE_STOPPED
 from catenary.errors import LoopError
 from catenary.loop.signals import SignalGuard
 from catenary.plan.cycle import CyclePlan
-from catenary.plan.wish import Views
+from catenary.plan.request import Views
 
 TIMEOUT_NS = 100_000_000  # for an exchange with safe outputs, or so many exchanges:
 EXCHANGES = 5

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from catenary import core
-from catenary.plan.wish import Views
+from catenary.plan.request import Views
 
 Rows = npt.ArrayLike
 

@@ -12,8 +12,8 @@ from catenary.machine.file import MachineFile
 from catenary.machine.lines import KeyPath
 from catenary.machine.references import data_type, object_of
 from catenary.machine.schema import StartUpTable
+from catenary.plan.request import ImageLayout, PdoWish, Views, WishTables
 from catenary.plan.start_up_object import StartUp
-from catenary.plan.wish import ImageLayout, PdoWish, Views, WishTables
 from catenary.types import Octets
 
 

@@ -22,7 +22,7 @@ from catenary.machine.requests import (
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class MachineParts:
     """Devices, drives and process data by name, and all requests for a loop."""
 
     subs: ByName[SubDevice] = field(default_factory=lambda: ByName("device", {}, {}))
@@ -58,7 +58,7 @@ def _error(file: MachineFile, found: Comparison) -> CatenaryError:
     )
 
 
-def make_found(file: MachineFile, found: Sequence[Comparison]) -> Found:
+def make_found(file: MachineFile, found: Sequence[Comparison]) -> MachineParts:
     """Return what the program gets by name.
 
     Raises:
@@ -74,7 +74,7 @@ def make_found(file: MachineFile, found: Sequence[Comparison]) -> Found:
     drives = {role: make_drives(file, role, subs) for role in present}
     present, missing_data = _roles(file, "process_data", file.tables.process_data, absent)
     data = {role: make_process_data(file, role, subs) for role in present}
-    return Found(
+    return MachineParts(
         subs=ByName("device", subs, absent),
         drives=ByName("drives", drives, missing),
         process_data=ByName("process data", data, missing_data),

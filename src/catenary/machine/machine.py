@@ -18,7 +18,7 @@ from catenary.loop.devices import DeviceWish
 from catenary.loop.laws.law import Law, LawFunction
 from catenary.machine.by_name import ByName
 from catenary.machine.comparison import compare
-from catenary.machine.found import Found, make_found, raise_differences
+from catenary.machine.found import MachineParts, make_found, raise_differences
 from catenary.machine.options import loop_options
 from catenary.machine.read import read_machine, refuse_unsupported
 from catenary.plan.cycle import ExecutionMode
@@ -60,7 +60,7 @@ class Machine:
         self._segment = segment_of(source)
         self._main = MainDevice(source, force=force)
         self._has_own_master = isinstance(source, MasterSource)
-        self._found = Found()
+        self._found = MachineParts()
 
     def __enter__(self) -> Self:
         self.open()
@@ -173,12 +173,12 @@ class Machine:
         return Loop(*found.requests, laws=laws, sink=sink, **options)
 
     @property
-    def _opened(self) -> Found:
+    def _opened(self) -> MachineParts:
         if not self._main.is_open:
             raise RuntimeError("the machine is not open: use it in a with block")
         return self._found
 
-    def _find(self) -> Found:
+    def _find(self) -> MachineParts:
         """Check the identities without changing a device, then scan and make the requests."""
         file = self._file
         if not self._has_own_master:  # that of IgH refuses a passive scan

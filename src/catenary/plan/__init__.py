@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from catenary.plan.cycle import CyclePlan, Number, NumberKind
-    from catenary.plan.make import Plan, make_plan
-    from catenary.plan.wish import ImageLayout, ObjectReference, PdoWish, Views, Wish, WishTables
+    from catenary.plan.planner import Plan, make_plan
+    from catenary.plan.request import ImageLayout, ObjectReference, PdoWish, Views, Wish, WishTables
 
 __all__ = [
     "CyclePlan",
@@ -29,10 +29,10 @@ __all__ = [
 
 _HOMES = {
     **dict.fromkeys(("CyclePlan", "Number", "NumberKind"), "catenary.plan.cycle"),
-    **dict.fromkeys(("Plan", "make_plan"), "catenary.plan.make"),
+    **dict.fromkeys(("Plan", "make_plan"), "catenary.plan.planner"),
     **dict.fromkeys(
         ("ImageLayout", "ObjectReference", "PdoWish", "Views", "Wish", "WishTables"),
-        "catenary.plan.wish",
+        "catenary.plan.request",
     ),
 }
 

@@ -24,7 +24,7 @@ from catenary.wire.clock import Activation
 from catenary.wire.frame import wire_time_ns
 
 if TYPE_CHECKING:  # needs NumPy, a scan does not
-    from catenary.plan.wish import DistributedClock
+    from catenary.plan.request import DistributedClock
 
 SYNC_BY_ECAT = 0x0300  # AssignActivate: cyclic operation and SYNC0, controlled by EtherCAT
 BURST = 15_000  # frames: ESC data sheet I §9.1.5; KickCAT sends as many, ethercrab 10 000

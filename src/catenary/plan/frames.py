@@ -20,7 +20,7 @@ from catenary.plan.cycle import Copy, DatagramKind, DatagramPlan, FramePlan
 from catenary.plan.layout import UnitLayout
 from catenary.plan.mailboxes import MailboxArea
 from catenary.wire.datagram import HEADER_SIZE as DATAGRAM_HEADER
-from catenary.wire.datagram import OVERHEAD, Command, Datagram
+from catenary.wire.datagram import OVERHEAD, Datagram, EcatCommand
 from catenary.wire.frame import HEADER_SIZE, MAXIMUM_PAYLOAD, encode_frame, wire_time_ns
 from catenary.wire.register import (
     AL_STATUS,
@@ -41,7 +41,7 @@ class _Piece:
     """A datagram before it has a place in a frame. Offsets count from its data."""
 
     kind: DatagramKind
-    command: Command
+    command: EcatCommand
     address: int
     length: int
     expected_counter: int
@@ -171,7 +171,7 @@ def _cycle_number(first: _Piece) -> _Piece:
     """The last datagram of a frame: a NOP, which passes every device unchanged."""
     return _Piece(
         DatagramKind.CYCLE_NUMBER,
-        Command.NOP,
+        EcatCommand.NOP,
         0,
         CYCLE_NUMBER_SIZE - OVERHEAD,
         expected_counter=0,
@@ -184,7 +184,7 @@ def _cycle_number(first: _Piece) -> _Piece:
 def _al_status(device_count: int) -> _Piece:
     address = AL_STATUS.address << 16
     return _Piece(
-        DatagramKind.AL_STATUS, Command.BRD, address, AL_STATUS.size, device_count, sync_unit=-1
+        DatagramKind.AL_STATUS, EcatCommand.BRD, address, AL_STATUS.size, device_count, sync_unit=-1
     )
 
 
@@ -198,17 +198,17 @@ def _of_clocks(clocks: ClockChoice | None) -> list[_Piece]:
     if clocks is None:
         return []
     station = clocks.reference.station_address
-    pieces = [_clock_piece(Command.FRMW, station, SYSTEM_TIME_LOW, clocks.listeners)]
+    pieces = [_clock_piece(EcatCommand.FRMW, station, SYSTEM_TIME_LOW, clocks.listeners)]
     if clocks.follow == "main":
-        pieces.insert(0, _clock_piece(Command.FPWR, station, SYSTEM_TIME_LOW, 1))
+        pieces.insert(0, _clock_piece(EcatCommand.FPWR, station, SYSTEM_TIME_LOW, 1))
     if clocks.followers:
         first = clocks.followers[0].station_address
-        pieces.append(_clock_piece(Command.FPRD, first, SYSTEM_TIME_DIFFERENCE, 1))
+        pieces.append(_clock_piece(EcatCommand.FPRD, first, SYSTEM_TIME_DIFFERENCE, 1))
     return pieces
 
 
 def _clock_piece(
-    command: Command, station: int, register: Register[int], expected_counter: int
+    command: EcatCommand, station: int, register: Register[int], expected_counter: int
 ) -> _Piece:
     address = station | register.address << 16
     return _Piece(
@@ -224,7 +224,7 @@ def _of_mailboxes(area: MailboxArea | None) -> list[_Piece]:
     return [
         _Piece(
             DatagramKind.PROCESS_DATA,
-            Command.LRD,
+            EcatCommand.LRD,
             area.logical_start,
             area.size,
             len(area.devices),
@@ -240,7 +240,7 @@ def _of_unit(unit: UnitLayout, number: int) -> list[_Piece]:
         return [
             _Piece(
                 DatagramKind.PROCESS_DATA,
-                Command.LRW,
+                EcatCommand.LRW,
                 unit.logical_start,
                 out_size + in_size,
                 2 * unit.output_devices + unit.input_devices,
@@ -255,7 +255,7 @@ def _of_unit(unit: UnitLayout, number: int) -> list[_Piece]:
         pieces.append(
             _Piece(
                 DatagramKind.PROCESS_DATA,
-                Command.LWR,
+                EcatCommand.LWR,
                 unit.logical_start,
                 out_size,
                 unit.output_devices,
@@ -268,7 +268,7 @@ def _of_unit(unit: UnitLayout, number: int) -> list[_Piece]:
         pieces.append(
             _Piece(
                 DatagramKind.PROCESS_DATA,
-                Command.LRD,
+                EcatCommand.LRD,
                 unit.logical_start + out_size,
                 in_size,
                 unit.input_devices,

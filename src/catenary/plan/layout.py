@@ -132,7 +132,7 @@ class DeviceData:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """All places. Fulfils `plan.wish.ImageLayout`."""
+    """All places. Fulfils `plan.request.ImageLayout`."""
 
     units: tuple[UnitLayout, ...]
     devices: tuple[DeviceLayout, ...]

@@ -39,7 +39,7 @@ from catenary.plan.pdo_search import (
 )
 
 if TYPE_CHECKING:  # wish.py needs NumPy, a scan does not
-    from catenary.plan.wish import ObjectReference, WrittenPdo
+    from catenary.plan.request import ObjectReference, WrittenPdo
 
 BITS_MAX = 1486 * 8  # a device's data must fit one datagram of one frame
 OFFERS_SHOWN = 12

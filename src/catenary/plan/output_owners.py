@@ -9,7 +9,7 @@ from catenary.errors import ConfigurationError
 from catenary.model.device import DeviceDescription, Direction
 from catenary.plan.cycle import AxisPlan, Number
 from catenary.plan.layout import Layout
-from catenary.plan.wish import Wish, WishTables
+from catenary.plan.request import Wish, WishTables
 
 AXIS_OUTPUTS = (
     *("controlword", "mode_target", "target_position", "target_velocity", "target_torque"),

@@ -10,7 +10,7 @@ from catenary.errors import MappingError
 from catenary.model.device import Assignment, DeviceDescription, Direction, Pdo, mapped_pdos
 
 if TYPE_CHECKING:  # wish.py needs NumPy, a scan does not
-    from catenary.plan.wish import ObjectReference
+    from catenary.plan.request import ObjectReference
 
 
 ASSIGNMENT_BASE = 0x1C10  # + SyncManager

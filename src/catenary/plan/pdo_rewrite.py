@@ -12,7 +12,7 @@ from catenary.plan.pdo_mapping import Mapping, assignment_refusal, available_pdo
 from catenary.plan.pdo_search import carries, pdo_names
 
 if TYPE_CHECKING:  # wish.py needs NumPy, a scan does not
-    from catenary.plan.wish import ObjectReference, WrittenPdo
+    from catenary.plan.request import ObjectReference, WrittenPdo
 
 ENTRIES_MAX = 254  # subindices of a mapping object, ETG.1000.6 table 75
 

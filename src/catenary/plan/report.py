@@ -15,7 +15,7 @@ from catenary.plan.numbers import entry_places
 from catenary.plan.start_up import DevicePlan, Download
 from catenary.wire.cia402 import Mode
 from catenary.wire.clock import Activation
-from catenary.wire.datagram import OVERHEAD, Command
+from catenary.wire.datagram import OVERHEAD, EcatCommand
 from catenary.wire.frame import HEADER_SIZE, wire_time_ns
 
 _ARROW = {Direction.OUTPUT: "out", Direction.INPUT: "in "}
@@ -210,7 +210,7 @@ def _exact_matching(frames: Sequence[FramePlan]) -> Iterator[str]:
 def _datagram(datagram: DatagramPlan) -> str:
     unit = "" if datagram.sync_unit < 0 else f"  sync unit {datagram.sync_unit}"
     return (
-        f"{Command(datagram.command).name}  {datagram.length} bytes at {datagram.offset}  "
+        f"{EcatCommand(datagram.command).name}  {datagram.length} bytes at {datagram.offset}  "
         f"expected counter {datagram.expected_counter}{unit}  {datagram.kind.name}"
     )
 

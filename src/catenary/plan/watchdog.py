@@ -7,8 +7,8 @@ CSV its own loops hold it meanwhile. In CST it applies a stale torque, so the de
 from __future__ import annotations
 
 from catenary.model.device import DeviceDescription
+from catenary.plan.request import PdoWish
 from catenary.plan.start_up import WATCHDOG_UNIT_NS
-from catenary.plan.wish import PdoWish
 from catenary.wire.cia402 import SLOT_OFFSET, Object
 
 DEFAULT_NS = 100_000_000

@@ -7,17 +7,17 @@ from typing import NamedTuple
 from catenary.errors import DecodeError, StateError
 from catenary.procedure.exchange import Procedure, after, read_memory, write
 from catenary.procedure.station import Deadline, Pace, Station, answered
-from catenary.wire.al import AlControl, AlStatus, State, status_code
-from catenary.wire.datagram import Command
+from catenary.wire.al import AlControl, AlState, AlStatus, status_code
+from catenary.wire.datagram import EcatCommand
 from catenary.wire.register import AL_CONTROL, AL_STATUS, AL_STATUS_CODE
 
 # By the state asked for [s]; the ESI's defaults (ETG.2000, StateMachine/Timeout).
 TIMEOUTS = {
-    State.INIT: 5.0,  # back to INIT
-    State.PRE_OP: 3.0,
-    State.BOOT: 3.0,
-    State.SAFE_OP: 10.0,
-    State.OP: 10.0,
+    AlState.INIT: 5.0,  # back to INIT
+    AlState.PRE_OP: 3.0,
+    AlState.BOOT: 3.0,
+    AlState.SAFE_OP: 10.0,
+    AlState.OP: 10.0,
 }
 
 ACKNOWLEDGE_TIMEOUT = 0.5  # [s]
@@ -30,7 +30,7 @@ _STATUS_SIZE = AL_STATUS_CODE.address + AL_STATUS_CODE.size - AL_STATUS.address
 class DeviceState(NamedTuple):
     """AL status and its code, read together."""
 
-    state: State | None  # None: a value the standard does not have
+    state: AlState | None  # None: a value the standard does not have
     error: bool
     code: int
     word: int
@@ -47,7 +47,7 @@ def read_state(station: Station) -> Procedure[DeviceState]:
 
 
 def request_state(
-    station: Station, target: State, *, timeout: float | None = None
+    station: Station, target: AlState, *, timeout: float | None = None
 ) -> Procedure[DeviceState]:
     """Asks for a state and waits until the device is there. A pending error is acknowledged
     first. StateError with the device's own code if it refuses or takes too long."""
@@ -66,7 +66,7 @@ def write_control(station: Station, control: AlControl) -> Procedure[None]:
     deadline, pace = Deadline(TAKE_TIMEOUT), Pace()
     while True:
         [taken, status] = yield [
-            write(Command.FPWR, station.address, AL_CONTROL, control.word),
+            write(EcatCommand.FPWR, station.address, AL_CONTROL, control.word),
             read_memory(station.address, _STATUS_START, _STATUS_SIZE, repeatable=True),
         ]
         if not taken.lost and taken.working_counter == 1:
@@ -83,7 +83,7 @@ def acknowledge(station: Station, pending: DeviceState) -> Procedure[DeviceState
     A controller that emulates its application only copies AL control into AL status, so its error
     is the copy of an acknowledgement: asking without one clears it.
     """
-    state = pending.state or State.INIT
+    state = pending.state or AlState.INIT
     now = pending
     for control in (AlControl(state, acknowledge=True), AlControl(state)):
         yield from write_control(station, control)
@@ -103,7 +103,7 @@ def _await_no_error(station: Station, timeout: float) -> Procedure[DeviceState]:
         yield after(pace.pause())
 
 
-def _await_state(station: Station, target: State, timeout: float) -> Procedure[DeviceState]:
+def _await_state(station: Station, target: AlState, timeout: float) -> Procedure[DeviceState]:
     deadline, pace = Deadline(timeout), Pace()
     while True:
         [reply] = yield [read_memory(station.address, _STATUS_START, _STATUS_SIZE, repeatable=True)]
@@ -127,7 +127,7 @@ def _decoded(data: bytes) -> DeviceState:
     return DeviceState(status.state, status.error, code, word)
 
 
-def _refused(station: Station, target: State, now: DeviceState, what: str) -> StateError:
+def _refused(station: Station, target: AlState, now: DeviceState, what: str) -> StateError:
     known = status_code(now.code)
     reason = f", AL status code 0x{now.code:04X}: {known.text}" if now.code else ""
     return StateError(

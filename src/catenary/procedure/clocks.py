@@ -18,10 +18,10 @@ from catenary.model.delays import ClockPlace, PortTimes, delays_ns
 from catenary.model.device import DeviceDescription
 from catenary.plan.clocks import BURST
 from catenary.procedure.exchange import Procedure, Reply, Request, read, write
-from catenary.procedure.line import as_line
+from catenary.procedure.open_ring import as_line
 from catenary.procedure.station import Station, answered
 from catenary.wire.clock import decode_receive_times
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from catenary.wire.register import (
     RECEIVE_TIME_LATCH,
     RECEIVE_TIME_PROCESSING_UNIT,
@@ -128,7 +128,7 @@ def align(
         requests += alignment(device, offset, behind)
     requests += filters()
     for reply, request in zip((yield requests), requests, strict=True):
-        if request.command is Command.FPWR:
+        if request.command is EcatCommand.FPWR:
             answered(reply, _station_at(devices, request), "offset and delay of its clock")
 
 
@@ -153,12 +153,12 @@ def lead(device: DeviceDescription, count: int, epoch_ns: int) -> Procedure[None
     a phase some 10 us behind, which the cycle makes good.
     """
     register = SYSTEM_TIME_LOW
-    [reply] = yield [read(Command.FPRD, device.station_address, register)]
+    [reply] = yield [read(EcatCommand.FPRD, device.station_address, register)]
     spread = distribute(device)._replace(alone=False)
     silent = 0
     for _ in range(count):
         now = (reply.time_ns + epoch_ns) % SPAN_32
-        told = write(Command.FPWR, device.station_address, register, now, repeatable=False)
+        told = write(EcatCommand.FPWR, device.station_address, register, now, repeatable=False)
         answer, reply = yield [told, spread]
         silent = 0 if _is_answer(answer) else silent + 1
         if silent > LOST_MAX:
@@ -178,7 +178,7 @@ def _no_reference(device: DeviceDescription) -> ClockError:
 
 def distribute(device: DeviceDescription) -> Request:
     """FRMW of the system time's low half, which is all that a time loop compares."""
-    request = read(Command.FRMW, device.station_address, SYSTEM_TIME_LOW)
+    request = read(EcatCommand.FRMW, device.station_address, SYSTEM_TIME_LOW)
     return request._replace(repeatable=False, alone=True)
 
 
@@ -186,16 +186,16 @@ def alignment(device: DeviceDescription, offset: int, delay: int) -> tuple[Reque
     """Writes what its system time is ahead of its local one, and its delay [ns]."""
     station = device.station_address
     if device.clock_bits == 64:
-        written = write(Command.FPWR, station, SYSTEM_TIME_OFFSET, offset % SPAN_64)
+        written = write(EcatCommand.FPWR, station, SYSTEM_TIME_OFFSET, offset % SPAN_64)
     else:  # ethercrab #322: eight bytes to a 32-bit clock are refused
-        written = write(Command.FPWR, station, SYSTEM_TIME_OFFSET_LOW, offset % SPAN_32)
-    return written, write(Command.FPWR, station, SYSTEM_TIME_DELAY, delay)
+        written = write(EcatCommand.FPWR, station, SYSTEM_TIME_OFFSET_LOW, offset % SPAN_32)
+    return written, write(EcatCommand.FPWR, station, SYSTEM_TIME_DELAY, delay)
 
 
 def filters(station: int | None = None) -> tuple[Request, ...]:
     """Lets the time loop of one device, or of all, begin anew. Depths first: several controllers
     take them over with the write that resets the loop."""
-    command = Command.BWR if station is None else Command.FPWR
+    command = EcatCommand.BWR if station is None else EcatCommand.FPWR
     return (
         write(command, station or 0, SYSTEM_TIME_DIFFERENCE_FILTER, DIFFERENCE_FILTER),
         write(command, station or 0, SPEED_COUNTER_FILTER, SPEED_FILTER),
@@ -206,7 +206,7 @@ def filters(station: int | None = None) -> tuple[Request, ...]:
 def read_system_time(device: DeviceDescription) -> Procedure[int]:
     """What its clock says now [ns]; of a 32-bit clock, the low half."""
     register = SYSTEM_TIME if device.clock_bits == 64 else SYSTEM_TIME_LOW
-    [reply] = yield [read(Command.FPRD, device.station_address, register)]
+    [reply] = yield [read(EcatCommand.FPRD, device.station_address, register)]
     return register.unpack(answered(reply, _station(device), "its system time"))
 
 
@@ -221,8 +221,8 @@ def no_system_time(device: DeviceDescription) -> ClockError:
 
 def _latch(clocks: Sequence[DeviceDescription]) -> Procedure[int]:
     """One broadcast that stamps all ports; when that was."""
-    [before] = yield [read(Command.FPRD, clocks[0].station_address, RECEIVE_TIME_LATCH)]
-    [reply] = yield [write(Command.BWR, 0, RECEIVE_TIME_LATCH, 0)]
+    [before] = yield [read(EcatCommand.FPRD, clocks[0].station_address, RECEIVE_TIME_LATCH)]
+    [reply] = yield [write(EcatCommand.BWR, 0, RECEIVE_TIME_LATCH, 0)]
     if reply.lost or reply.working_counter < len(clocks):
         raise ClockError(
             f"{reply.working_counter} of {len(clocks)} devices with clocks took the broadcast that "
@@ -236,10 +236,10 @@ def _questions(device: DeviceDescription) -> tuple[Request, Request]:
     """Port times, and the local time at the processing unit: of a 32-bit clock that is port 0's."""
     station = device.station_address
     if device.clock_bits == 64:
-        unit = read(Command.FPRD, station, RECEIVE_TIME_PROCESSING_UNIT)
+        unit = read(EcatCommand.FPRD, station, RECEIVE_TIME_PROCESSING_UNIT)
     else:
-        unit = read(Command.FPRD, station, RECEIVE_TIME_LATCH)
-    return read(Command.FPRD, station, RECEIVE_TIMES), unit
+        unit = read(EcatCommand.FPRD, station, RECEIVE_TIME_LATCH)
+    return read(EcatCommand.FPRD, station, RECEIVE_TIMES), unit
 
 
 def _pairs(replies: Sequence[Reply]) -> Iterator[tuple[Reply, Reply]]:

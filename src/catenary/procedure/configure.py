@@ -14,7 +14,7 @@ from catenary.procedure.exchange import Procedure, Request, read, write
 from catenary.procedure.mailbox import IN, OUT, MailboxChannel
 from catenary.procedure.station import Station, answered
 from catenary.wire import fmmu, register
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from catenary.wire.register import Register
 from catenary.wire.sii import MailboxArea
 from catenary.wire.sync_manager import (
@@ -70,9 +70,9 @@ def configure_process_data(
     used_fmmus = len(plan.layout.fmmus) + (plan.layout.mailbox is not None)
     for number in range(used_fmmus, min(device.controller.fmmu_count, register.FMMU_COUNT)):
         block = register.fmmu(number)
-        requests.append(write(Command.FPWR, station.address, block, bytes(block.size)))
+        requests.append(write(EcatCommand.FPWR, station.address, block, bytes(block.size)))
     watchdog = _watchdog_registers(plan)
-    requests += [write(Command.FPWR, station.address, reg, value) for reg, value in watchdog]
+    requests += [write(EcatCommand.FPWR, station.address, reg, value) for reg, value in watchdog]
     yield from _write_all(station, requests, "SyncManagers and FMMUs")
     yield from _verify_watchdog(station, plan, watchdog)
 
@@ -96,7 +96,7 @@ def _verify_watchdog(
     ]
     if not expected:
         return
-    replies = yield [read(Command.FPRD, station.address, reg) for reg, _, _ in expected]
+    replies = yield [read(EcatCommand.FPRD, station.address, reg) for reg, _, _ in expected]
     for (reg, value, mask), reply in zip(expected, replies, strict=True):
         found = reg.unpack(answered(reply, station, reg.name))
         if (found ^ value) & mask:
@@ -133,12 +133,12 @@ def _planned_manager(station: Station, plan: SyncManagerPlan) -> Request:
 
 
 def _sync_manager(station: Station, index: int, block: SyncManager) -> Request:
-    return write(Command.FPWR, station.address, register.sync_manager(index), block.encode())
+    return write(EcatCommand.FPWR, station.address, register.sync_manager(index), block.encode())
 
 
 def _switched_off(station: Station, index: int) -> Request:
     activation = register.sync_manager_activation(index)
-    return write(Command.FPWR, station.address, activation, int(Activation(0)))
+    return write(EcatCommand.FPWR, station.address, activation, int(Activation(0)))
 
 
 def _planned_fmmu(station: Station, plan: FmmuPlan) -> Request:
@@ -149,14 +149,14 @@ def _planned_fmmu(station: Station, plan: FmmuPlan) -> Request:
         reads=plan.direction is Direction.INPUT,
         writes=plan.direction is Direction.OUTPUT,
     )
-    return write(Command.FPWR, station.address, register.fmmu(plan.index), block.encode())
+    return write(EcatCommand.FPWR, station.address, register.fmmu(plan.index), block.encode())
 
 
 def _mailbox_fmmu(station: Station, plan: MailboxFmmu) -> Request:
     status = register.sync_manager_status(IN).address
     full = 8 * status + int(Status.MAILBOX_FULL).bit_length() - 1
     block = fmmu.bits(plan.logical_bit, full, 1, reads=True)
-    return write(Command.FPWR, station.address, register.fmmu(plan.index), block.encode())
+    return write(EcatCommand.FPWR, station.address, register.fmmu(plan.index), block.encode())
 
 
 def _write_all(station: Station, requests: list[Request], what: str) -> Procedure[None]:

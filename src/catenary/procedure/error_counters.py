@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 from catenary.procedure.exchange import Procedure, Request, read, write
 from catenary.procedure.station import Station, answered
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from catenary.wire.error_counters import ErrorCounters, decode_error_counters
 from catenary.wire.register import (
     ERROR_COUNTERS,
@@ -30,7 +30,9 @@ def read_error_counters(stations: Sequence[Station]) -> Procedure[Totals]:
     others are not silent."""
     if not stations:
         return ()
-    replies = yield [read(Command.FPRD, station.address, ERROR_COUNTERS) for station in stations]
+    replies = yield [
+        read(EcatCommand.FPRD, station.address, ERROR_COUNTERS) for station in stations
+    ]
     if all(reply.lost for reply in replies):
         return (None,) * len(stations)
     return tuple(
@@ -60,9 +62,9 @@ def clear_error_counters(stations: Sequence[Station]) -> Procedure[None]:
 
 def _clearing(address: int) -> list[Request]:
     return [
-        write(Command.FPWR, address, RX_ERROR_COUNTERS, bytes(8)),
-        write(Command.FPWR, address, FORWARDED_RX_ERROR_COUNTERS, bytes(4)),
-        write(Command.FPWR, address, PROCESSING_UNIT_ERROR_COUNTER, 0),
-        write(Command.FPWR, address, PDI_ERROR_COUNTER, 0),
-        write(Command.FPWR, address, LOST_LINK_COUNTERS, bytes(4)),
+        write(EcatCommand.FPWR, address, RX_ERROR_COUNTERS, bytes(8)),
+        write(EcatCommand.FPWR, address, FORWARDED_RX_ERROR_COUNTERS, bytes(4)),
+        write(EcatCommand.FPWR, address, PROCESSING_UNIT_ERROR_COUNTER, 0),
+        write(EcatCommand.FPWR, address, PDI_ERROR_COUNTER, 0),
+        write(EcatCommand.FPWR, address, LOST_LINK_COUNTERS, bytes(4)),
     ]

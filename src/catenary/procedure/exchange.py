@@ -7,7 +7,7 @@ value is the result. It knows the time from its replies alone (`Reply.time_ns`, 
 which is how deadlines are kept without a clock.
 
     def read_al_status(station):
-        [reply] = yield [read(Command.FPRD, station, AL_STATUS)]
+        [reply] = yield [read(EcatCommand.FPRD, station, AL_STATUS)]
         return AL_STATUS.unpack(reply.data)
 """
 
@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Generator
 from typing import NamedTuple, TypeAlias, TypeVar
 
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from catenary.wire.register import Register
 
 
@@ -27,7 +27,7 @@ class Request(NamedTuple):
     repeatable comes back as a lost reply, and the procedure recovers by the standard's own means.
     """
 
-    command: Command
+    command: EcatCommand
     address: int  # 32 bits as on the wire: ADP | ADO << 16, or the logical address
     data: bytes
     repeatable: bool
@@ -61,13 +61,13 @@ def physical(station: int, address: int) -> int:
     return (station & 0xFFFF) | (address & 0xFFFF) << 16
 
 
-def read(command: Command, station: int, register: Register[V]) -> Request:
+def read(command: EcatCommand, station: int, register: Register[V]) -> Request:
     """Reads one register; `station` is a station address, a negative position or 0 (broadcast)."""
     return Request(command, physical(station, register.address), bytes(register.size), True)
 
 
 def write(
-    command: Command, station: int, register: Register[V], value: V, *, repeatable: bool = True
+    command: EcatCommand, station: int, register: Register[V], value: V, *, repeatable: bool = True
 ) -> Request:
     """Writes one register."""
     return Request(command, physical(station, register.address), register.pack(value), repeatable)
@@ -75,9 +75,9 @@ def write(
 
 def read_memory(station: int, address: int, size: int, *, repeatable: bool) -> Request:
     """Reads a device's memory by its station address (FPRD)."""
-    return Request(Command.FPRD, physical(station, address), bytes(size), repeatable)
+    return Request(EcatCommand.FPRD, physical(station, address), bytes(size), repeatable)
 
 
 def write_memory(station: int, address: int, data: bytes, *, repeatable: bool) -> Request:
     """Writes a device's memory by its station address (FPWR)."""
-    return Request(Command.FPWR, physical(station, address), data, repeatable)
+    return Request(EcatCommand.FPWR, physical(station, address), data, repeatable)

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 from catenary.errors import DecodeError
 from catenary.procedure.exchange import Procedure, Reply, Request, after, physical, read
-from catenary.wire.al import ERROR_FLAG, STATE_MASK, State
-from catenary.wire.datagram import Command
+from catenary.wire.al import ERROR_FLAG, STATE_MASK, AlState
+from catenary.wire.datagram import EcatCommand
 from catenary.wire.register import (
     AL_STATUS,
     SYNC_MANAGER_COUNT,
@@ -26,7 +26,7 @@ from catenary.wire.register import (
 )
 from catenary.wire.sync_manager import SIZE, Activation, Direction, decode_sync_manager
 
-RUNNING = (State.SAFE_OP, State.OP)
+RUNNING = (AlState.SAFE_OP, AlState.OP)
 ACTIVE = 0x01  # 0x0440: the watchdog has not expired, or is off
 POLL = 0.010  # [s]
 LONGEST_NS = 5_000_000_000  # twice a longer watchdog time is too long to wait
@@ -36,7 +36,7 @@ class Running(NamedTuple):
     """A device that was found in SAFE-OP or OP."""
 
     position: int
-    state: State
+    state: AlState
     error: bool
     sync_managers: int  # how many it has
 
@@ -51,7 +51,7 @@ def find_running(device_count: int) -> Procedure[list[Running]]:
     out.
     """
     replies = yield [
-        read(Command.APRD, -position, register)
+        read(EcatCommand.APRD, -position, register)
         for position in range(device_count)
         for register in (AL_STATUS, SYNC_MANAGERS_SUPPORTED)
     ]
@@ -61,7 +61,7 @@ def find_running(device_count: int) -> Procedure[list[Running]]:
         word = AL_STATUS.unpack(status.data)
         if _answers(status) and word & STATE_MASK in RUNNING:
             count = SYNC_MANAGERS_SUPPORTED.unpack(supported.data)
-            state, error = State(word & STATE_MASK), bool(word & ERROR_FLAG)
+            state, error = AlState(word & STATE_MASK), bool(word & ERROR_FLAG)
             found.append(Running(position, state, error, count))
     return found
 
@@ -75,7 +75,7 @@ def find_refreshed(running: Sequence[Running]) -> Procedure[list[int]]:
     """
     watched = {}
     for device in running:
-        if device.state is State.OP:
+        if device.state is AlState.OP:
             time_ns = yield from _watchdog_time(device)
             if time_ns:
                 watched[device.position] = time_ns
@@ -83,7 +83,7 @@ def find_refreshed(running: Sequence[Running]) -> Procedure[list[int]]:
     refreshed: list[int] = []
     while watched and not refreshed:
         replies = yield [
-            read(Command.APRD, -position, WATCHDOG_STATUS_PROCESS_DATA) for position in watched
+            read(EcatCommand.APRD, -position, WATCHDOG_STATUS_PROCESS_DATA) for position in watched
         ]
         start = replies[0].time_ns if start is None else start
         for position, reply in zip(list(watched), replies, strict=True):
@@ -100,10 +100,10 @@ def _watchdog_time(device: Running) -> Procedure[int]:
     """Return the watchdog time of a device [ns]; 0 if its outputs do not trigger a watchdog."""
     count = min(device.sync_managers, SYNC_MANAGER_COUNT)
     replies = yield [
-        read(Command.APRD, -device.position, WATCHDOG_DIVIDER),
-        read(Command.APRD, -device.position, WATCHDOG_TIME_PROCESS_DATA),
+        read(EcatCommand.APRD, -device.position, WATCHDOG_DIVIDER),
+        read(EcatCommand.APRD, -device.position, WATCHDOG_TIME_PROCESS_DATA),
         Request(
-            Command.APRD,
+            EcatCommand.APRD,
             physical(-device.position, sync_manager(0).address),
             bytes(max(count, 1) * SIZE),
             True,

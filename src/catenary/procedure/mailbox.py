@@ -34,7 +34,7 @@ from catenary.procedure.mailbox_channel import Heard as Heard
 from catenary.procedure.mailbox_channel import MailboxChannel as MailboxChannel
 from catenary.procedure.station import Deadline, Pace, answered
 from catenary.wire import coe
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from catenary.wire.mailbox import Mailbox, Type, decode_error, decode_mailbox, next_counter
 from catenary.wire.register import (
     sync_manager_activation,
@@ -177,7 +177,7 @@ def _post(channel: MailboxChannel, message: bytes) -> Procedure[tuple[bool, bool
     """
     deadline, pace = Deadline(WRITE_TIMEOUT), Pace()
     station, layout = channel.station.address, channel.layout
-    look = read(Command.FPRD, station, sync_manager_status(IN))._replace(repeatable=False)
+    look = read(EcatCommand.FPRD, station, sync_manager_status(IN))._replace(repeatable=False)
     while True:
         request = write_memory(station, layout.receive_offset, message, repeatable=False)
         seen, reply = yield [look, request]
@@ -257,7 +257,9 @@ def _look(channel: MailboxChannel) -> Procedure[tuple[bool, Mailbox | None, int]
     if careful or channel.unsure_ns is not None:
         return (yield from _look_first(channel))
     station = channel.station
-    look = read(Command.FPRD, station.address, sync_manager_status(IN))._replace(repeatable=False)
+    look = read(EcatCommand.FPRD, station.address, sync_manager_status(IN))._replace(
+        repeatable=False
+    )
     status, reply = yield [look, _read_request(channel)]
     if reply.lost:
         channel.unsure_ns = reply.time_ns
@@ -284,7 +286,7 @@ def _look_first(channel: MailboxChannel) -> Procedure[tuple[bool, Mailbox | None
 
 def _is_full(channel: MailboxChannel, number: int) -> Procedure[tuple[bool, Reply]]:
     register = sync_manager_status(number)
-    [reply] = yield [read(Command.FPRD, channel.station.address, register)]
+    [reply] = yield [read(EcatCommand.FPRD, channel.station.address, register)]
     status = Status(register.unpack(answered(reply, channel.station, "mailbox status")))
     return Status.MAILBOX_FULL in status, reply
 
@@ -332,11 +334,11 @@ def _ask_again(channel: MailboxChannel) -> Procedure[bool]:
         activation |= Activation.REPEAT_REQUEST
     register, answer = sync_manager_activation(IN), sync_manager_pdi_control(IN)
     station = channel.station
-    [reply] = yield [write(Command.FPWR, station.address, register, int(activation))]
+    [reply] = yield [write(EcatCommand.FPWR, station.address, register, int(activation))]
     answered(reply, station, "mailbox repeat request")
     deadline, pace = Deadline(REPEAT_TIMEOUT), Pace()
     while True:
-        [reply] = yield [read(Command.FPRD, station.address, answer)]
+        [reply] = yield [read(EcatCommand.FPRD, station.address, answer)]
         value = PdiControl(answer.unpack(answered(reply, station, "mailbox repeat acknowledge")))
         acknowledged = (PdiControl.REPEAT_ACKNOWLEDGE in value) == channel.repeat_requested
         if acknowledged and (yield from _is_full(channel, IN))[0]:

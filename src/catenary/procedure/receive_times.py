@@ -9,7 +9,7 @@ from catenary.model.delays import PortTimes
 from catenary.model.device import DeviceDescription
 from catenary.procedure.exchange import Procedure, read, write
 from catenary.wire.clock import decode_receive_times
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from catenary.wire.register import RECEIVE_TIME_LATCH, RECEIVE_TIMES
 
 
@@ -20,8 +20,8 @@ def read_receive_times(
     clocks = [device for device in devices if device.controller.supports_clocks]
     if not clocks:
         return (None,) * len(devices)
-    [latched] = yield [write(Command.BWR, 0, RECEIVE_TIME_LATCH, 0)]
-    replies = yield [read(Command.FPRD, each.station_address, RECEIVE_TIMES) for each in clocks]
+    [latched] = yield [write(EcatCommand.BWR, 0, RECEIVE_TIME_LATCH, 0)]
+    replies = yield [read(EcatCommand.FPRD, each.station_address, RECEIVE_TIMES) for each in clocks]
     times: dict[int, PortTimes] = {}
     for device, reply in zip(clocks, replies, strict=True):
         if not (latched.lost or reply.lost) and reply.working_counter == 1:

@@ -19,8 +19,8 @@ from catenary.procedure.sii import read_identity
 from catenary.procedure.sii_owner import hand_over
 from catenary.procedure.station import Station, answered
 from catenary.procedure.stations import FMMU_BLOCK, SYNC_MANAGER_BLOCK
-from catenary.wire.al import State
-from catenary.wire.datagram import Command
+from catenary.wire.al import AlState
+from catenary.wire.datagram import EcatCommand
 from catenary.wire.register import (
     ACTIVATION,
     AL_STATUS,
@@ -42,7 +42,7 @@ class Presence(NamedTuple):
 def look_around(at_most: int) -> Procedure[list[Presence]]:
     """Who is there, by position. Devices that come or go meanwhile are left for the next look;
     those behind the cut of a ring are counted and have no position."""
-    [counted] = yield [read(Command.BRD, 0, AL_STATUS)]
+    [counted] = yield [read(EcatCommand.BRD, 0, AL_STATUS)]
     count = min(counted.working_counter, at_most)
     if counted.lost or count == 0:
         return []
@@ -50,8 +50,8 @@ def look_around(at_most: int) -> Procedure[list[Presence]]:
         request
         for rank in range(count)
         for request in (
-            read(Command.APRD, -rank, STATION_ADDRESS),
-            read(Command.APRD, -rank, STATION_ALIAS),
+            read(EcatCommand.APRD, -rank, STATION_ADDRESS),
+            read(EcatCommand.APRD, -rank, STATION_ALIAS),
         )
     ]
     there = [not reply.lost and reply.working_counter == 1 for reply in replies]
@@ -66,20 +66,20 @@ def look_around(at_most: int) -> Procedure[list[Presence]]:
 
 def give_address(presence: Presence, station: Station) -> Procedure[None]:
     """The station address of a place, to the device that stands there."""
-    [reply] = yield [write(Command.APWR, -presence.rank, STATION_ADDRESS, station.address)]
+    [reply] = yield [write(EcatCommand.APWR, -presence.rank, STATION_ADDRESS, station.address)]
     answered(reply, station, "station address")
 
 
 def forget_address(presence: Presence) -> Procedure[None]:
     """Takes the station address from a device that is not ours: two must not answer to one."""
-    yield [write(Command.APWR, -presence.rank, STATION_ADDRESS, 0)]
+    yield [write(EcatCommand.APWR, -presence.rank, STATION_ADDRESS, 0)]
 
 
 def identify(station: Station) -> Procedure[Identity]:
     """What its EEPROM says it is. Takes the EEPROM from the device's application first."""
     replies = yield [
-        write(Command.FPWR, station.address, SII_CONFIGURATION, CONFIGURATION_FORCE),
-        write(Command.FPWR, station.address, SII_CONFIGURATION, 0),
+        write(EcatCommand.FPWR, station.address, SII_CONFIGURATION, CONFIGURATION_FORCE),
+        write(EcatCommand.FPWR, station.address, SII_CONFIGURATION, 0),
     ]
     for reply in replies:
         answered(reply, station, "EEPROM access")
@@ -88,18 +88,18 @@ def identify(station: Station) -> Procedure[Identity]:
 
 def bring_to_pre_op(station: Station, channel: MailboxChannel | None) -> Procedure[None]:
     """From whatever state to PRE-OP by way of INIT, with nothing left of before."""
-    yield from request_state(station, State.INIT)
+    yield from request_state(station, AlState.INIT)
     requests = [
         _cleared(station, *FMMU_BLOCK),
         _cleared(station, *SYNC_MANAGER_BLOCK),
     ]
     for reply in (yield requests):
         answered(reply, station, "FMMUs and SyncManagers")
-    yield [write(Command.FPWR, station.address, ACTIVATION, 0)]  # has no answer without clocks
+    yield [write(EcatCommand.FPWR, station.address, ACTIVATION, 0)]  # has no answer without clocks
     if channel is not None:
         yield from configure_mailbox(channel)
     yield from hand_over(station)
-    yield from request_state(station, State.PRE_OP)
+    yield from request_state(station, AlState.PRE_OP)
 
 
 def bring_to_safe_op(
@@ -120,7 +120,7 @@ def bring_to_safe_op(
     yield from configure_process_data(station, device, plan)
     if clock is not None:
         yield from clock
-    yield from request_state(station, State.SAFE_OP)
+    yield from request_state(station, AlState.SAFE_OP)
 
 
 def _cleared(station: Station, start: int, size: int) -> Request:

@@ -15,7 +15,7 @@ from catenary.model.device import Identity
 from catenary.procedure.exchange import Procedure, after, read_memory, write_memory
 from catenary.procedure.station import Deadline, Pace, Station, answered
 from catenary.wire.register import SII_CONTROL_STATUS, SII_DATA
-from catenary.wire.sii_interface import Command, ControlStatus
+from catenary.wire.sii_interface import ControlStatus, SiiCommand
 
 READ_TIMEOUT = 0.5  # [s] for 4 or 8 bytes; an I²C EEPROM needs less than a millisecond
 SHORTEN = 0.9
@@ -113,7 +113,7 @@ class _Reader:
         then it is unknown which of the two the EEPROM has read, and `word` must be asked for
         again."""
         started_ns = yield from self._under_way(word)
-        command = _COMMAND.pack(Command.READ << 8, ahead)
+        command = _COMMAND.pack(SiiCommand.READ << 8, ahead)
         station = self._station
         fetched, commanded = yield [
             read_memory(station.address, _START, _SIZE, repeatable=False),
@@ -148,7 +148,7 @@ class _Reader:
         self._commanded = (-1, 0)
         if commanded == word:
             return since_ns
-        return (yield from self._command(Command.READ, word))
+        return (yield from self._command(SiiCommand.READ, word))
 
     def _read_alone(self, word: int) -> Procedure[bytes]:
         station = self._station
@@ -168,8 +168,8 @@ class _Reader:
                 errors += 1
                 if errors > ERRORS_FORGIVEN:
                     raise _failed(station, word, status)
-                yield from self._command(Command.IDLE, word)
-                yield from self._command(Command.READ, word)
+                yield from self._command(SiiCommand.IDLE, word)
+                yield from self._command(SiiCommand.READ, word)
             if deadline.passed(reply):
                 raise _failed(station, word, status)
             yield after(pace.pause())
@@ -183,7 +183,7 @@ class _Reader:
             shorter = SHORTEN * self._typical
             self._typical = shorter if shorter > NOT_WORTH_WAITING else 0.0
 
-    def _command(self, command: Command, word: int) -> Procedure[int]:
+    def _command(self, command: SiiCommand, word: int) -> Procedure[int]:
         """Writes a command with its address; when it was back [ns]."""
         data = _COMMAND.pack(command << 8, word)
         [reply] = yield [write_memory(self._station.address, _START, data, repeatable=True)]

@@ -8,7 +8,7 @@ from typing import TypeVar
 from catenary.errors import CatenaryError, EepromError
 from catenary.procedure.exchange import Procedure, read, write
 from catenary.procedure.station import Station, answered
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from catenary.wire.register import SII_CONFIGURATION, SII_PDI_ACCESS
 from catenary.wire.sii_interface import (
     CONFIGURATION_FORCE,
@@ -45,8 +45,8 @@ def with_eeprom(station: Station, procedure: Procedure[T], *, force: bool = Fals
 def _take(station: Station, force: bool) -> Procedure[bool]:
     """Whether it was the processor's before."""
     owner, access = yield [
-        read(Command.FPRD, station.address, SII_CONFIGURATION),
-        read(Command.FPRD, station.address, SII_PDI_ACCESS),
+        read(EcatCommand.FPRD, station.address, SII_CONFIGURATION),
+        read(EcatCommand.FPRD, station.address, SII_PDI_ACCESS),
     ]
     was_theirs = bool(answered(owner, station, "EEPROM owner")[0] & CONFIGURATION_TO_PDI)
     in_use = bool(answered(access, station, "EEPROM access")[0] & PDI_ACCESS_ACTIVE)
@@ -63,5 +63,5 @@ def _take(station: Station, force: bool) -> Procedure[bool]:
 
 
 def _configure(station: Station, value: int) -> Procedure[None]:
-    [reply] = yield [write(Command.FPWR, station.address, SII_CONFIGURATION, value)]
+    [reply] = yield [write(EcatCommand.FPWR, station.address, SII_CONFIGURATION, value)]
     answered(reply, station, "EEPROM owner")

@@ -9,7 +9,7 @@ from catenary.errors import DecodeError
 from catenary.procedure.exchange import Procedure, read
 from catenary.procedure.sii import CATEGORIES_MAX, END, HEADER_WORDS, read_words
 from catenary.procedure.station import Station, answered
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from catenary.wire.register import SII_CONTROL_STATUS
 from catenary.wire.sii import MAXIMUM_SIZE, decode_header
 from catenary.wire.sii_check import BYTES_PER_KBIT
@@ -31,7 +31,7 @@ class Extent(NamedTuple):
 def read_extent(station: Station) -> Procedure[Extent]:
     """The size by the header; where that is damaged, up to the end mark; where there is none, a
     small bound. An image that goes on for ever, as an unprogrammed one, ends here."""
-    [reply] = yield [read(Command.FPRD, station.address, SII_CONTROL_STATUS)]
+    [reply] = yield [read(EcatCommand.FPRD, station.address, SII_CONTROL_STATUS)]
     word = SII_CONTROL_STATUS.unpack(answered(reply, station, "SII status"))
     limit = MAXIMUM_SIZE if ControlStatus.from_word(word).two_byte_address else SMALL
     data = yield from read_words(station, 0, HEADER_WORDS)

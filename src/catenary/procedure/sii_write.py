@@ -10,10 +10,10 @@ from catenary.errors import EepromError
 from catenary.procedure.exchange import Procedure, after, read, write_memory
 from catenary.procedure.sii import read_words
 from catenary.procedure.station import Deadline, Pace, Station, answered
-from catenary.wire.datagram import Command as Datagram
+from catenary.wire.datagram import EcatCommand
 from catenary.wire.register import SII_CONTROL_STATUS
 from catenary.wire.sii import CONFIGURATION_WORDS
-from catenary.wire.sii_interface import Command, ControlStatus
+from catenary.wire.sii_interface import ControlStatus, SiiCommand
 
 WRITE_TIMEOUT = 0.5  # [s] for a word; EEPROMs need 3 to 10 ms
 ATTEMPTS = 4  # of a word: an EEPROM behind a busy processor misses an acknowledge now and then
@@ -21,7 +21,7 @@ REST = 5e-3  # [s] the longest write cycle of an I²C EEPROM; some devices show 
 
 _COMMAND = struct.Struct("<HIH")  # control, address and data in one datagram: the enable bit
 # holds for the frame it comes in alone (ESC data sheet, register 0x0502)
-_WRITE = ControlStatus(command=Command.WRITE, write_enable=True).word
+_WRITE = ControlStatus(command=SiiCommand.WRITE, write_enable=True).word
 _ADDRESSES = 0x10000
 
 
@@ -73,7 +73,7 @@ def write_word(station: Station, wanted: Change) -> Procedure[None]:
 def _until_idle(station: Station, word: int) -> Procedure[ControlStatus]:
     deadline, pace = Deadline(WRITE_TIMEOUT), Pace()
     while True:
-        [reply] = yield [read(Datagram.FPRD, station.address, SII_CONTROL_STATUS)]
+        [reply] = yield [read(EcatCommand.FPRD, station.address, SII_CONTROL_STATUS)]
         data = answered(reply, station, "SII status")
         status = ControlStatus.from_word(SII_CONTROL_STATUS.unpack(data))
         if not status.busy:

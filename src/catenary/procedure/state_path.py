@@ -20,40 +20,40 @@ from catenary.procedure.pdo import read_mapping
 from catenary.procedure.sii import read_words
 from catenary.procedure.sii_owner import hand_over, with_eeprom
 from catenary.procedure.station import Station
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 from catenary.wire.sii import BOOTSTRAP_WORD, MailboxArea
 
-UPWARDS = (State.INIT, State.PRE_OP, State.SAFE_OP, State.OP)
+UPWARDS = (AlState.INIT, AlState.PRE_OP, AlState.SAFE_OP, AlState.OP)
 
 
-def path(now: State | None, target: State) -> tuple[State, ...]:
+def path(now: AlState | None, target: AlState) -> tuple[AlState, ...]:
     """The states to ask for in turn; `target` by itself where it is there already."""
     if now is target:
         return (target,)
-    if now is None or State.BOOT in (now, target):  # no state at all; BOOT has one neighbour
-        start = () if now is State.INIT or target is State.INIT else (State.INIT,)
+    if now is None or AlState.BOOT in (now, target):  # no state at all; BOOT has one neighbour
+        start = () if now is AlState.INIT or target is AlState.INIT else (AlState.INIT,)
         return (*start, *(upwards(target) or (target,)))
     return upwards(target, above=now) or (target,)
 
 
-def upwards(target: State, above: State = State.INIT) -> tuple[State, ...]:
+def upwards(target: AlState, above: AlState = AlState.INIT) -> tuple[AlState, ...]:
     """The states above one, up to another; none where that is below."""
-    if target is State.BOOT:
-        return (State.BOOT,)
+    if target is AlState.BOOT:
+        return (AlState.BOOT,)
     return UPWARDS[UPWARDS.index(above) + 1 : UPWARDS.index(target) + 1]
 
 
 def climb(
-    station: Station, device: DeviceDescription, target: State
+    station: Station, device: DeviceDescription, target: AlState
 ) -> Procedure[MailboxChannel | None]:
     """Brings a device to INIT, PRE-OP or BOOT. Its mailbox, where it was opened on the way."""
     channel = None
     before = (yield from read_state(station)).state
     for state in path(before, target):
-        if state is State.PRE_OP and before not in (State.SAFE_OP, State.OP):
+        if state is AlState.PRE_OP and before not in (AlState.SAFE_OP, AlState.OP):
             channel = yield from _open_mailbox(station, device)
             yield from hand_over(station)
-        elif state is State.BOOT and before is not State.BOOT:
+        elif state is AlState.BOOT and before is not AlState.BOOT:
             yield from _open_bootstrap(station)
         yield from request_state(station, state)
         before = state
@@ -63,8 +63,8 @@ def climb(
 def restart(station: Station, device: DeviceDescription) -> Procedure[DeviceDescription]:
     """From INIT to PRE-OP, with the mapping it has there. By INIT also where it is in PRE-OP: only
     then its mailbox is known to begin with the same counters as ours."""
-    yield from request_state(station, State.INIT)
-    channel = yield from climb(station, device, State.PRE_OP)
+    yield from request_state(station, AlState.INIT)
+    channel = yield from climb(station, device, AlState.PRE_OP)
     if channel is None or not device.coe:
         return device
     return (yield from read_mapping(channel, device))
@@ -75,7 +75,7 @@ def bring_to_safe_op(
 ) -> Procedure[DeviceState]:
     """From PRE-OP to SAFE-OP with the mapping it has."""
     yield from configure_process_data(station, device, plan)
-    return (yield from request_state(station, State.SAFE_OP))
+    return (yield from request_state(station, AlState.SAFE_OP))
 
 
 def _open_mailbox(station: Station, device: DeviceDescription) -> Procedure[MailboxChannel | None]:

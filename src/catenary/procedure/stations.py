@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from catenary.errors import NoDeviceError, SegmentError, StateError
+from catenary.procedure.al_status_poll import survey
 from catenary.procedure.exchange import Procedure, Request, after, physical, read, write
 from catenary.procedure.station import Deadline, Pace, Station, answered
-from catenary.procedure.survey import survey
-from catenary.wire.al import AlControl, State
-from catenary.wire.datagram import Command
+from catenary.wire.al import AlControl, AlState
+from catenary.wire.datagram import EcatCommand
 from catenary.wire.register import (
     ACTIVATION,
     AL_CONTROL,
@@ -52,7 +52,7 @@ class Counted(NamedTuple):
 
 def count() -> Procedure[Counted]:
     """Count the devices that process a broadcast. NoDeviceError if none does."""
-    [reply] = yield [read(Command.BRD, 0, AL_STATUS)]
+    [reply] = yield [read(EcatCommand.BRD, 0, AL_STATUS)]
     if reply.lost:
         raise NoDeviceError(
             "no device: no frame comes back",
@@ -69,13 +69,13 @@ def count() -> Procedure[Counted]:
 def reset(device_count: int) -> Procedure[None]:
     """All devices to INIT with errors acknowledged; FMMUs, SyncManagers, SYNC signals cleared;
     their EEPROM taken from the process data interface."""
-    yield from _all_to(State.INIT, RESET_TIMEOUT)
+    yield from _all_to(AlState.INIT, RESET_TIMEOUT)
     replies = yield [
         _clear(*FMMU_BLOCK),
         _clear(*SYNC_MANAGER_BLOCK),
-        write(Command.BWR, 0, ACTIVATION, 0),
-        write(Command.BWR, 0, SII_CONFIGURATION, CONFIGURATION_FORCE),
-        write(Command.BWR, 0, SII_CONFIGURATION, 0),
+        write(EcatCommand.BWR, 0, ACTIVATION, 0),
+        write(EcatCommand.BWR, 0, SII_CONFIGURATION, CONFIGURATION_FORCE),
+        write(EcatCommand.BWR, 0, SII_CONFIGURATION, 0),
     ]
     if replies[-1].working_counter != device_count:
         raise SegmentError(
@@ -84,7 +84,7 @@ def reset(device_count: int) -> Procedure[None]:
         )
 
 
-def bring_all_down(stations: Sequence[Station], state: State, timeout: float) -> Procedure[None]:
+def bring_all_down(stations: Sequence[Station], state: AlState, timeout: float) -> Procedure[None]:
     """All devices to a lower state by broadcast, whatever each of them is in. StateError names
     the first that stays up. Devices that are gone are nobody's business here: those that are
     left must come down all the same."""
@@ -103,7 +103,7 @@ def bring_all_down(stations: Sequence[Station], state: State, timeout: float) ->
         )
 
 
-def _all_to(state: State, timeout: float) -> Procedure[bool]:
+def _all_to(state: AlState, timeout: float) -> Procedure[bool]:
     """Asks all at once, errors acknowledged, and waits. Whether all are there.
 
     Controllers that emulate their application copy AL control into AL status, the acknowledgement
@@ -124,8 +124,8 @@ def _ask_all(word: int, timeout: float) -> Procedure[bool]:
     deadline, pace = Deadline(timeout), Pace()
     taken = False
     while True:
-        asked = [] if taken else [write(Command.BWR, 0, AL_CONTROL, word)]
-        replies = yield [*asked, read(Command.BRD, 0, AL_STATUS)]
+        asked = [] if taken else [write(EcatCommand.BWR, 0, AL_CONTROL, word)]
+        replies = yield [*asked, read(EcatCommand.BRD, 0, AL_STATUS)]
         status = replies[-1]
         taken = taken or replies[0].working_counter >= status.working_counter
         if taken and AL_STATUS.unpack(status.data) & 0x1F in (word, word & 0x0F):
@@ -140,7 +140,7 @@ def assign(places: Sequence[int]) -> Procedure[tuple[StationRegisters, ...]]:
     reads their registers by them."""
     addresses = [STATION_BASE + place for place in places]
     replies = yield [
-        write(Command.APWR, -rank, STATION_ADDRESS, address)
+        write(EcatCommand.APWR, -rank, STATION_ADDRESS, address)
         for rank, address in enumerate(addresses)
     ]
     for place, address, reply in zip(places, addresses, replies, strict=True):
@@ -184,12 +184,12 @@ def duplicate_aliases(registers: Sequence[StationRegisters]) -> dict[int, tuple[
 
 def _questions(address: int) -> list[Request]:
     return [
-        read(Command.FPRD, address, INFORMATION),
-        read(Command.FPRD, address, STATION_ALIAS),
-        read(Command.FPRD, address, DL_STATUS),
-        read(Command.FPRD, address, SYSTEM_TIME_LOW),
+        read(EcatCommand.FPRD, address, INFORMATION),
+        read(EcatCommand.FPRD, address, STATION_ALIAS),
+        read(EcatCommand.FPRD, address, DL_STATUS),
+        read(EcatCommand.FPRD, address, SYSTEM_TIME_LOW),
     ]
 
 
 def _clear(start: int, size: int) -> Request:
-    return Request(Command.BWR, physical(0, start), bytes(size), True)
+    return Request(EcatCommand.BWR, physical(0, start), bytes(size), True)

@@ -32,7 +32,7 @@ from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.pdo import LEFT_ALONE
 from catenary.procedure.sdo import download, upload
 from catenary.procedure.station import Station, answered
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from catenary.wire.register import (
     ACTIVATION,
     ASSIGN_ACTIVATE,
@@ -150,20 +150,20 @@ def write_types(channel: MailboxChannel, types: Mapping[int, bytes]) -> Procedur
 def stop(devices: Sequence[DeviceDescription]) -> Procedure[None]:
     """No SYNC signals any more."""
     yield from _write_all(
-        devices, [write(Command.FPWR, d.station_address, ACTIVATION, 0) for d in devices]
+        devices, [write(EcatCommand.FPWR, d.station_address, ACTIVATION, 0) for d in devices]
     )
 
 
 def _now(reference: DeviceDescription, epoch_ns: int) -> Procedure[int]:
     """The system time, in full: the low half as the reference says it, near the link's time."""
-    [reply] = yield [read(Command.FPRD, reference.station_address, SYSTEM_TIME_LOW)]
+    [reply] = yield [read(EcatCommand.FPRD, reference.station_address, SYSTEM_TIME_LOW)]
     low = SYSTEM_TIME_LOW.unpack(answered(reply, _station(reference), "its system time"))
     return _near(low, reply.time_ns + epoch_ns)
 
 
 def _system_time(device: DeviceDescription) -> Request:
     register = SYSTEM_TIME if device.clock_bits == 64 else SYSTEM_TIME_LOW
-    return read(Command.FPRD, device.station_address, register)
+    return read(EcatCommand.FPRD, device.station_address, register)
 
 
 def _read_time(reply: Reply, device: DeviceDescription, epoch_ns: int) -> int:
@@ -178,19 +178,19 @@ def _near(low: int, near: int) -> int:
 
 def _cycle_times(device: DeviceDescription, sync: SyncPlan) -> Request:
     times = struct.pack("<II", sync.cycle_ns, sync.sync1_ns)
-    return write(Command.FPWR, device.station_address, SYNC_CYCLE_TIMES, times)
+    return write(EcatCommand.FPWR, device.station_address, SYNC_CYCLE_TIMES, times)
 
 
 def _start_time(device: DeviceDescription, sync: SyncPlan, beat_ns: int) -> Request:
     start_ns = beat_ns + sync.shift_ns
     if device.clock_bits == 64:
-        return write(Command.FPWR, device.station_address, SYNC0_START_TIME, start_ns % SPAN_64)
-    return write(Command.FPWR, device.station_address, SYNC0_START_TIME_LOW, start_ns % SPAN_32)
+        return write(EcatCommand.FPWR, device.station_address, SYNC0_START_TIME, start_ns % SPAN_64)
+    return write(EcatCommand.FPWR, device.station_address, SYNC0_START_TIME_LOW, start_ns % SPAN_32)
 
 
 def _activation(device: DeviceDescription, sync: SyncPlan) -> Request:
     assign = struct.pack("<H", sync.assign_activate)
-    return write(Command.FPWR, device.station_address, ASSIGN_ACTIVATE, assign)
+    return write(EcatCommand.FPWR, device.station_address, ASSIGN_ACTIVATE, assign)
 
 
 def _write_all(devices: Sequence[DeviceDescription], requests: list[Request]) -> Procedure[None]:

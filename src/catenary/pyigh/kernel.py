@@ -11,8 +11,8 @@ from catenary.igh import KernelMaster, abi
 from catenary.igh.configure import Domain
 from catenary.model.device import Direction
 from catenary.plan.cycle import Number
-from catenary.plan.make import Plan
 from catenary.plan.numbers import Which
+from catenary.plan.planner import Plan
 from catenary.pyigh.slaves import Cell, RawObject, SlaveBase
 
 if TYPE_CHECKING:

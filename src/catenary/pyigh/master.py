@@ -9,7 +9,7 @@ from catenary import bus, igh
 from catenary.bus import SubDevice
 from catenary.errors import ConfigurationError
 from catenary.link import LinkSource
-from catenary.plan.wish import ImageLayout, PdoWish, Views, WishTables
+from catenary.plan.request import ImageLayout, PdoWish, Views, WishTables
 from catenary.pyigh.kernel import KernelSteps
 from catenary.pyigh.own import OwnSteps
 from catenary.pyigh.slaves import SlaveBase, columns_of, pdos_of
@@ -186,7 +186,7 @@ class MasterBase:
 
 
 class Wish:
-    """All slaves as one wish (`plan.wish.Wish`)."""
+    """All slaves as one wish (`plan.request.Wish`)."""
 
     def __init__(self, main: bus.MainDevice, slaves: Sequence[SlaveBase]) -> None:
         self.main = main

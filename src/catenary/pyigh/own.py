@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from catenary.loop import Loop
 from catenary.model.device import Direction
-from catenary.plan.wish import Integers
+from catenary.plan.request import Integers
 from catenary.pyigh.slaves import Cell, SlaveBase
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 
 if TYPE_CHECKING:
     from catenary.pyigh.master import Wish
@@ -63,7 +63,7 @@ class OwnSteps:
 
     def state(self, position: int) -> tuple[bool, bool, int]:
         sub = self._wish.main.subs[position]
-        return sub.state is not None, sub.state is State.OP, int(sub.state or 0)
+        return sub.state is not None, sub.state is AlState.OP, int(sub.state or 0)
 
     def close(self) -> None:
         self._loop.__exit__(None, None, None)

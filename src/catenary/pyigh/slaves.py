@@ -10,15 +10,15 @@ from catenary.errors import ConfigurationError, DriveError, MappingError
 from catenary.model.device import DeviceDescription, Direction, mapped_entries
 from catenary.plan.cycle import Bank, Column, NumberKind
 from catenary.plan.numbers import Which
-from catenary.plan.wish import ImageLayout, ObjectReference, PdoWish, WishTables
-from catenary.wire.cia402 import Mode, Object, State, state_of
+from catenary.plan.request import ImageLayout, ObjectReference, PdoWish, WishTables
+from catenary.wire.cia402 import AxisState, Mode, Object, state_of
 
 COMMANDS = {
-    State.SWITCH_ON_DISABLED: 0x06,  # shutdown
-    State.READY_TO_SWITCH_ON: 0x07,  # switch on
-    State.SWITCHED_ON: 0x0F,  # enable operation
-    State.OPERATION_ENABLED: 0x0F,
-    State.FAULT: 0x80,  # fault reset
+    AxisState.SWITCH_ON_DISABLED: 0x06,  # shutdown
+    AxisState.READY_TO_SWITCH_ON: 0x07,  # switch on
+    AxisState.SWITCHED_ON: 0x0F,  # enable operation
+    AxisState.OPERATION_ENABLED: 0x0F,
+    AxisState.FAULT: 0x80,  # fault reset
 }
 
 
@@ -132,7 +132,7 @@ class SlaveServo(SlaveBase):
         if self.has(Object.MODE_OF_OPERATION):
             self.write(Object.MODE_OF_OPERATION, self._mode)
         self.write(Object.CONTROLWORD, COMMANDS.get(state, 0) if state is not None else 0)
-        if state is State.OPERATION_ENABLED:
+        if state is AxisState.OPERATION_ENABLED:
             return True
         if self.has(Object.TARGET_POSITION):
             self.write(Object.TARGET_POSITION, self.read_position())
@@ -143,13 +143,13 @@ class SlaveServo(SlaveBase):
         self.write(Object.CONTROLWORD, 0)
 
     @property
-    def state(self) -> State | None:
+    def state(self) -> AxisState | None:
         """Its CiA 402 state; None: its statusword codes none."""
         return state_of(self.read(Object.STATUSWORD))
 
     def check(self) -> None:
         """DriveError in fault."""
-        if self.state in (State.FAULT, State.FAULT_REACTION_ACTIVE):
+        if self.state in (AxisState.FAULT, AxisState.FAULT_REACTION_ACTIVE):
             raise DriveError(f"slave {self.position}: in fault", hint="read its object 0x603F")
 
     def set_position(self, counts: int) -> None:

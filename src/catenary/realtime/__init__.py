@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from catenary.realtime.analysis_file import read_demands
     from catenary.realtime.clock import Participant, VirtualClock
     from catenary.realtime.exchange import Queue, Silence, Value
+    from catenary.realtime.job import Job, Running
     from catenary.realtime.preparation import Session, session
-    from catenary.realtime.running import Job, Running
     from catenary.realtime.statistics import Statistics
     from catenary.realtime.task import Task
     from catenary.realtime.tasks import Tasks

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 if TYPE_CHECKING:
-    from catenary.realtime.running import Job
+    from catenary.realtime.job import Job
     from catenary.realtime.trigger import Signal
 
 OnMiss: TypeAlias = "Literal['count', 'skip', 'stop'] | Callable[[Job], object]"

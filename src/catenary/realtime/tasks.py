@@ -22,10 +22,10 @@ from catenary.realtime.analysis import Demand, Verdict, analyse
 from catenary.realtime.clock import VirtualClock
 from catenary.realtime.handle import Handle
 from catenary.realtime.preparation import Session
-from catenary.realtime.runner import START_SECONDS, Work
 from catenary.realtime.statistics import as_table, measured_demand
 from catenary.realtime.supervisor import Supervisor
 from catenary.realtime.task import Task
+from catenary.realtime.task_main import START_SECONDS, Work
 from catenary.realtime.worker import ProcessWorker, ThreadWorker, Worker, Workers, check_importable
 
 LEAD_SECONDS = 0.01  # from the last task's start to the first release of all

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from catenary.realtime._clock import Timer
 from catenary.realtime._task import Block
-from catenary.realtime.place import Place
+from catenary.realtime.task_memory import Place
 
 
 class Signal:

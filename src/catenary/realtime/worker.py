@@ -12,8 +12,8 @@ from multiprocessing.context import SpawnProcess
 from typing import Literal, Protocol, TypeAlias
 
 from catenary.realtime.preparation import Session
-from catenary.realtime.runner import Work, run_in_process, start_thread
 from catenary.realtime.task import Task
+from catenary.realtime.task_main import Work, run_in_process, start_thread
 
 Workers: TypeAlias = Literal["processes", "threads"]
 

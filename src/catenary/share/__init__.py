@@ -4,8 +4,8 @@ with cat.Share("arm") as share, cat.Loop(arm, sink=share) as loop: ...      # on
 with cat.attach("arm") as arm: ...                                          # any others
 """
 
-from catenary.share.commands import Command, LeaseEnd
-from catenary.share.desk import Reason
+from catenary.share.command_table import Reason
+from catenary.share.commands import AxisCommand, LeaseEnd
 from catenary.share.events import SharedEvent
 from catenary.share.layout import ShareField, ShareLayout
 from catenary.share.lease import Lease
@@ -15,7 +15,7 @@ from catenary.share.reader import Reader, attach
 from catenary.share.share import Share
 
 __all__ = [
-    "Command",
+    "AxisCommand",
     "Lease",
     "LeaseEnd",
     "Mutex",

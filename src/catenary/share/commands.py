@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from catenary.share.desk import QUANTITIES, Desk, Reason, Values
+from catenary.share.command_table import QUANTITIES, Desk, Reason, Values
 from catenary.share.layout import ShareLayout
 from catenary.share.process import Process
 
@@ -38,7 +38,7 @@ class Commanded(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class AxisCommand:
     """Set-points of a client; None: not said."""
 
     axes: tuple[int, ...]  # in the layout's order
@@ -79,7 +79,7 @@ class CommandReader:
         self._ended: list[LeaseEnd] = []
         self._look_ns = 0
 
-    def commands(self) -> list[Command]:
+    def commands(self) -> list[AxisCommand]:
         """Those of valid leases that have come since the last call; by client, oldest first."""
         self._follow_leases()
         return [
@@ -91,7 +91,7 @@ class CommandReader:
         ended, self._ended = self._ended, []
         return ended
 
-    def _read(self, place: int, known: _Known) -> list[Command]:
+    def _read(self, place: int, known: _Known) -> list[AxisCommand]:
         desk = self._desk
         taken = desk.taken.load(place)
         rows, lost = desk.rings[place].copy_after(taken)
@@ -102,13 +102,13 @@ class CommandReader:
         desk.taken.store(place, taken + lost + len(array))
         return [self._command(row, known) for row in array if row["lease"] == known.serial]
 
-    def _command(self, row: np.void, known: _Known) -> Command:
+    def _command(self, row: np.void, known: _Known) -> AxisCommand:
         axes = list(known.axes)
         position, velocity, torque = (
             row[name][axes] if int(row["quantities"]) >> bit & 1 else None
             for bit, name in enumerate(QUANTITIES)
         )
-        return Command(known.axes, position, velocity, torque, known.client)
+        return AxisCommand(known.axes, position, velocity, torque, known.client)
 
     def _follow_leases(self) -> None:
         """Notes new leases, and ends those that are over."""
@@ -152,7 +152,7 @@ class CommandReader:
 
 
 def apply(
-    commands: Sequence[Command],
+    commands: Sequence[AxisCommand],
     ended: Sequence[LeaseEnd],
     drives: Sequence[Commanded],
     axes: Sequence[str],

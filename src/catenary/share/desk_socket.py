@@ -64,7 +64,7 @@ class DeskSocket:
         os.close(self._descriptor)
 
     def _serve(self) -> None:
-        from catenary.bus.background import step_behind  # readers of a share need no bus
+        from catenary.bus.thread_priority import step_behind  # readers of a share need no bus
 
         step_behind()
         while not self._ended.is_set():

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from catenary.errors import LeaseError
-from catenary.share.desk import COMMANDS, PLACES, QUANTITIES, Desk, Reason
+from catenary.share.command_table import COMMANDS, PLACES, QUANTITIES, Desk, Reason
 from catenary.share.layout import ShareLayout
 from catenary.share.process import this_process
 

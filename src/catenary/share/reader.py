@@ -13,7 +13,7 @@ import numpy.typing as npt
 from catenary.errors import ShareError
 from catenary.share import folder, memory
 from catenary.share._rows import Ring
-from catenary.share.desk import Desk, open_desk
+from catenary.share.command_table import Desk, open_desk
 from catenary.share.events import SharedEvent, decode_event
 from catenary.share.layout import ShareLayout, decode_head
 from catenary.share.lease import Lease, lease_of

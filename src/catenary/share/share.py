@@ -14,8 +14,8 @@ from catenary.errors import ShareError
 from catenary.plan.sink import Incident, SinkLayout
 from catenary.share import folder, memory
 from catenary.share._rows import CycleWriter, Ring
-from catenary.share.commands import Command, Commanded, CommandReader, LeaseEnd, apply
-from catenary.share.desk import Desk, Values, make_desk
+from catenary.share.command_table import Desk, Values, make_desk
+from catenary.share.commands import AxisCommand, Commanded, CommandReader, LeaseEnd, apply
 from catenary.share.desk_socket import DeskSocket
 from catenary.share.events import encode_event
 from catenary.share.layout import ShareLayout, decode_head, encode_head, make_layout
@@ -100,7 +100,7 @@ class Share:
             apply(commands, ended, drives, self.layout.axes, self._commanded_position())
         return ended
 
-    def commands(self) -> list[Command]:
+    def commands(self) -> list[AxisCommand]:
         """The commands that have come since the last call, of leases that are valid; of each client
         oldest first. Never waits."""
         return self._reader().commands()

@@ -13,7 +13,7 @@ ERROR_FLAG = 0x0010  # AL status: an error is pending; AL control: acknowledge i
 _IDENTIFICATION = 0x0020
 
 
-class State(IntEnum):
+class AlState(IntEnum):
     """The states of a SubDevice, with their code in AL control and AL status."""
 
     INIT = 1
@@ -26,7 +26,7 @@ class State(IntEnum):
         return self.name.replace("_", "-")
 
     @classmethod
-    def from_name(cls, text: str) -> State:
+    def from_name(cls, text: str) -> AlState:
         """Return the state of a name: "SAFE_OP", "SAFE-OP", "safeop", "OPERATIONAL".
 
         Raises:
@@ -52,7 +52,7 @@ _LONG_NAMES = {
 class AlControl:
     """What the MainDevice asks for (0x0120)."""
 
-    state: State
+    state: AlState
     acknowledge: bool = False  # of a pending error
     request_identification: bool = False  # explicit device identification, ETG.1020 §22
 
@@ -74,7 +74,7 @@ class AlControl:
 class AlStatus:
     """The state a SubDevice is in (0x0130)."""
 
-    state: State
+    state: AlState
     error: bool = False  # the last request failed, or the state was left: see the AL status code
     identification: bool = False  # the AL status code holds the device identification
 
@@ -95,9 +95,9 @@ class AlStatus:
         return cls(_state(word), bool(word & ERROR_FLAG), bool(word & _IDENTIFICATION))
 
 
-def states_in(word: int) -> frozenset[State]:
+def states_in(word: int) -> frozenset[AlState]:
     """The states that the or of many AL status words can hold. BOOT looks like INIT | PRE-OP."""
-    return frozenset(state for state in State if word & state == state)
+    return frozenset(state for state in AlState if word & state == state)
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,9 +117,9 @@ def status_code(code: int) -> StatusCode:
     return StatusCode(code, f"{text} AL status code", "see the manual of the device")
 
 
-def _state(word: int) -> State:
+def _state(word: int) -> AlState:
     try:
-        return State(word & STATE_MASK)
+        return AlState(word & STATE_MASK)
     except ValueError:
         raise DecodeError(f"no EtherCAT state: {word & STATE_MASK} (word 0x{word:04X})") from None
 

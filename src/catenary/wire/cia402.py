@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 
 
-class State(IntEnum):
+class AxisState(IntEnum):
     """The states of the drive's state machine, in the standard's order."""
 
     NOT_READY_TO_SWITCH_ON = 0
@@ -24,21 +24,21 @@ class State(IntEnum):
 
 STATE_CODING = {
     # state: (mask, value) of the statusword, CiA 402-2 table 30
-    State.NOT_READY_TO_SWITCH_ON: (0x004F, 0x0000),
-    State.SWITCH_ON_DISABLED: (0x004F, 0x0040),
-    State.READY_TO_SWITCH_ON: (0x006F, 0x0021),
-    State.SWITCHED_ON: (0x006F, 0x0023),
-    State.OPERATION_ENABLED: (0x006F, 0x0027),
-    State.QUICK_STOP_ACTIVE: (0x006F, 0x0007),
-    State.FAULT_REACTION_ACTIVE: (0x004F, 0x000F),
-    State.FAULT: (0x004F, 0x0008),
+    AxisState.NOT_READY_TO_SWITCH_ON: (0x004F, 0x0000),
+    AxisState.SWITCH_ON_DISABLED: (0x004F, 0x0040),
+    AxisState.READY_TO_SWITCH_ON: (0x006F, 0x0021),
+    AxisState.SWITCHED_ON: (0x006F, 0x0023),
+    AxisState.OPERATION_ENABLED: (0x006F, 0x0027),
+    AxisState.QUICK_STOP_ACTIVE: (0x006F, 0x0007),
+    AxisState.FAULT_REACTION_ACTIVE: (0x004F, 0x000F),
+    AxisState.FAULT: (0x004F, 0x0008),
 }
 
 
-IN_FAULT = (State.FAULT_REACTION_ACTIVE, State.FAULT)
+IN_FAULT = (AxisState.FAULT_REACTION_ACTIVE, AxisState.FAULT)
 
 
-def state_of(statusword: int) -> State | None:
+def state_of(statusword: int) -> AxisState | None:
     """The state a statusword codes; None if its bits code none."""
     for state, (mask, value) in STATE_CODING.items():
         if statusword & mask == value:
@@ -98,7 +98,7 @@ MODE_CONTROL_BITS = 0xFA70  # bits 4, 5, 6, 9, 11 to 15: free of the state machi
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class Controlword:
     """A device control command: the bits of the controlword it means, CiA 402-2 table 28."""
 
     name: str
@@ -114,13 +114,13 @@ class Command:
         return controlword & ~self.mask & 0xFFFF | self.value
 
 
-SHUTDOWN = Command("shutdown", 0x0087, 0x0006)
-SWITCH_ON = Command("switch on", 0x008F, 0x0007)
-ENABLE_OPERATION = Command("enable operation", 0x008F, 0x000F)
-DISABLE_OPERATION = Command("disable operation", 0x008F, 0x0007)  # the same bits as switch on
-DISABLE_VOLTAGE = Command("disable voltage", 0x0082, 0x0000)
-QUICK_STOP = Command("quick stop", 0x0086, 0x0002)
-FAULT_RESET = Command("fault reset", 0x0080, 0x0080)  # a rising edge of bit 7
+SHUTDOWN = Controlword("shutdown", 0x0087, 0x0006)
+SWITCH_ON = Controlword("switch on", 0x008F, 0x0007)
+ENABLE_OPERATION = Controlword("enable operation", 0x008F, 0x000F)
+DISABLE_OPERATION = Controlword("disable operation", 0x008F, 0x0007)  # the same bits as switch on
+DISABLE_VOLTAGE = Controlword("disable voltage", 0x0082, 0x0000)
+QUICK_STOP = Controlword("quick stop", 0x0086, 0x0002)
+FAULT_RESET = Controlword("fault reset", 0x0080, 0x0080)  # a rising edge of bit 7
 
 COMMANDS = (
     *(SHUTDOWN, SWITCH_ON, ENABLE_OPERATION, DISABLE_OPERATION),
@@ -133,33 +133,35 @@ class Transition:
     """One arrow of the state machine. No command: the drive moves by itself."""
 
     number: int
-    source: State | None  # None: switched off (0) or any state (13)
-    target: State
-    commands: tuple[Command, ...] = ()
+    source: AxisState | None  # None: switched off (0) or any state (13)
+    target: AxisState
+    commands: tuple[Controlword, ...] = ()
 
 
 TRANSITIONS = (
-    Transition(0, None, State.NOT_READY_TO_SWITCH_ON),
-    Transition(1, State.NOT_READY_TO_SWITCH_ON, State.SWITCH_ON_DISABLED),
-    Transition(2, State.SWITCH_ON_DISABLED, State.READY_TO_SWITCH_ON, (SHUTDOWN,)),
-    Transition(3, State.READY_TO_SWITCH_ON, State.SWITCHED_ON, (SWITCH_ON,)),
-    Transition(4, State.SWITCHED_ON, State.OPERATION_ENABLED, (ENABLE_OPERATION,)),
-    Transition(5, State.OPERATION_ENABLED, State.SWITCHED_ON, (DISABLE_OPERATION,)),
-    Transition(6, State.SWITCHED_ON, State.READY_TO_SWITCH_ON, (SHUTDOWN,)),
+    Transition(0, None, AxisState.NOT_READY_TO_SWITCH_ON),
+    Transition(1, AxisState.NOT_READY_TO_SWITCH_ON, AxisState.SWITCH_ON_DISABLED),
+    Transition(2, AxisState.SWITCH_ON_DISABLED, AxisState.READY_TO_SWITCH_ON, (SHUTDOWN,)),
+    Transition(3, AxisState.READY_TO_SWITCH_ON, AxisState.SWITCHED_ON, (SWITCH_ON,)),
+    Transition(4, AxisState.SWITCHED_ON, AxisState.OPERATION_ENABLED, (ENABLE_OPERATION,)),
+    Transition(5, AxisState.OPERATION_ENABLED, AxisState.SWITCHED_ON, (DISABLE_OPERATION,)),
+    Transition(6, AxisState.SWITCHED_ON, AxisState.READY_TO_SWITCH_ON, (SHUTDOWN,)),
     Transition(
-        7, State.READY_TO_SWITCH_ON, State.SWITCH_ON_DISABLED, (DISABLE_VOLTAGE, QUICK_STOP)
+        7, AxisState.READY_TO_SWITCH_ON, AxisState.SWITCH_ON_DISABLED, (DISABLE_VOLTAGE, QUICK_STOP)
     ),
-    Transition(8, State.OPERATION_ENABLED, State.READY_TO_SWITCH_ON, (SHUTDOWN,)),
-    Transition(9, State.OPERATION_ENABLED, State.SWITCH_ON_DISABLED, (DISABLE_VOLTAGE,)),
-    Transition(10, State.SWITCHED_ON, State.SWITCH_ON_DISABLED, (DISABLE_VOLTAGE, QUICK_STOP)),
-    Transition(11, State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, (QUICK_STOP,)),
+    Transition(8, AxisState.OPERATION_ENABLED, AxisState.READY_TO_SWITCH_ON, (SHUTDOWN,)),
+    Transition(9, AxisState.OPERATION_ENABLED, AxisState.SWITCH_ON_DISABLED, (DISABLE_VOLTAGE,)),
+    Transition(
+        10, AxisState.SWITCHED_ON, AxisState.SWITCH_ON_DISABLED, (DISABLE_VOLTAGE, QUICK_STOP)
+    ),
+    Transition(11, AxisState.OPERATION_ENABLED, AxisState.QUICK_STOP_ACTIVE, (QUICK_STOP,)),
     # 12 also happens by itself, when the drive stands and 0x605A is 1 to 4
-    Transition(12, State.QUICK_STOP_ACTIVE, State.SWITCH_ON_DISABLED, (DISABLE_VOLTAGE,)),
-    Transition(13, None, State.FAULT_REACTION_ACTIVE),
-    Transition(14, State.FAULT_REACTION_ACTIVE, State.FAULT),
-    Transition(15, State.FAULT, State.SWITCH_ON_DISABLED, (FAULT_RESET,)),
+    Transition(12, AxisState.QUICK_STOP_ACTIVE, AxisState.SWITCH_ON_DISABLED, (DISABLE_VOLTAGE,)),
+    Transition(13, None, AxisState.FAULT_REACTION_ACTIVE),
+    Transition(14, AxisState.FAULT_REACTION_ACTIVE, AxisState.FAULT),
+    Transition(15, AxisState.FAULT, AxisState.SWITCH_ON_DISABLED, (FAULT_RESET,)),
     # 16 only where 0x605A is 5 to 8
-    Transition(16, State.QUICK_STOP_ACTIVE, State.OPERATION_ENABLED, (ENABLE_OPERATION,)),
+    Transition(16, AxisState.QUICK_STOP_ACTIVE, AxisState.OPERATION_ENABLED, (ENABLE_OPERATION,)),
 )
 
 

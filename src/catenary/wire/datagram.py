@@ -9,7 +9,7 @@ from enum import IntEnum
 from catenary.errors import DecodeError
 
 
-class Command(IntEnum):
+class EcatCommand(IntEnum):
     """What every controller on the way does with a datagram, ETG.1000.4 §5.4.1."""
 
     NOP = 0
@@ -41,19 +41,33 @@ class Command(IntEnum):
     @property
     def is_logical(self) -> bool:
         """Whether the address is a logical one."""
-        return self in (Command.LRD, Command.LWR, Command.LRW)
+        return self in (EcatCommand.LRD, EcatCommand.LWR, EcatCommand.LRW)
 
 
 _READS = frozenset(
     (
-        *(Command.APRD, Command.APRW, Command.FPRD, Command.FPRW, Command.BRD, Command.BRW),
-        *(Command.LRD, Command.LRW, Command.ARMW, Command.FRMW),
+        *(
+            EcatCommand.APRD,
+            EcatCommand.APRW,
+            EcatCommand.FPRD,
+            EcatCommand.FPRW,
+            EcatCommand.BRD,
+            EcatCommand.BRW,
+        ),
+        *(EcatCommand.LRD, EcatCommand.LRW, EcatCommand.ARMW, EcatCommand.FRMW),
     )
 )
 _WRITES = frozenset(
     (
-        *(Command.APWR, Command.APRW, Command.FPWR, Command.FPRW, Command.BWR, Command.BRW),
-        *(Command.LWR, Command.LRW, Command.ARMW, Command.FRMW),
+        *(
+            EcatCommand.APWR,
+            EcatCommand.APRW,
+            EcatCommand.FPWR,
+            EcatCommand.FPRW,
+            EcatCommand.BWR,
+            EcatCommand.BRW,
+        ),
+        *(EcatCommand.LWR, EcatCommand.LRW, EcatCommand.ARMW, EcatCommand.FRMW),
     )
 )
 
@@ -77,7 +91,7 @@ class Datagram:
     requests of all devices, or-ed together.
     """
 
-    command: Command
+    command: EcatCommand
     address: int
     data: bytes
     index: int = 0
@@ -121,7 +135,7 @@ def decode_datagram(data: bytes, offset: int = 0) -> tuple[Datagram, bool]:
             f"datagram at byte {offset}: {max(len(data) - offset, 0)} bytes left, needs {OVERHEAD}"
         )
     command, index, address, length, interrupt = _HEADER.unpack_from(data, offset)
-    if command > Command.FRMW:
+    if command > EcatCommand.FRMW:
         raise DecodeError(f"datagram at byte {offset}: unknown command {command}")
     if length & _RESERVED_MASK:
         raise DecodeError(f"datagram at byte {offset}: reserved bits set in 0x{length:04X}")
@@ -133,7 +147,7 @@ def decode_datagram(data: bytes, offset: int = 0) -> tuple[Datagram, bool]:
             f"{max(len(data) - start - WORKING_COUNTER_SIZE, 0)} received"
         )
     datagram = Datagram(
-        Command(command),
+        EcatCommand(command),
         address,
         bytes(data[start:end]),
         index,

@@ -12,7 +12,7 @@ CONFIGURATION_FORCE = 0x02  # of 0x0500: take it back whatever the processor doe
 PDI_ACCESS_ACTIVE = 0x01  # of 0x0501
 
 
-class Command(IntEnum):
+class SiiCommand(IntEnum):
     """Bits 8 to 10 of control/status."""
 
     IDLE = 0  # written: clears error bits
@@ -25,7 +25,7 @@ class Command(IntEnum):
 class ControlStatus:
     """SII control/status (0x0502). Everything but `write_enable` and `command` is read only."""
 
-    command: Command = Command.IDLE
+    command: SiiCommand = SiiCommand.IDLE
     write_enable: bool = False  # valid for the datagram that also writes the command
     emulation: bool = False  # the device's processor plays the EEPROM
     eight_bytes: bool = False  # a read gives 8 bytes, else 4
@@ -66,7 +66,7 @@ class ControlStatus:
     def from_word(cls, word: int) -> ControlStatus:
         """The reverse of `word`. DecodeError for a command that does not exist."""
         try:
-            command = Command(word >> 8 & 7)
+            command = SiiCommand(word >> 8 & 7)
         except ValueError:
             raise DecodeError(
                 f"SII control/status 0x{word:04X}: no command {word >> 8 & 7}"

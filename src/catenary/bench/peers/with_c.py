@@ -22,14 +22,14 @@ from catenary.bench.compiler import compile_peer
 from catenary.bench.job import PHASES, Body, Job, Round
 from catenary.errors import CatenaryError
 from catenary.plan.cycle import AxisPlan, CyclePlan, DatagramKind, FramePlan, Number
-from catenary.wire.al import State
-from catenary.wire.datagram import Command, Datagram
+from catenary.wire.al import AlState
+from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import encode_frame
 from catenary.wire.register import AL_CONTROL
 
 BODY = {Body.SINE: 0, Body.PD: 1}
 MODE = {Body.SINE: "csp", Body.PD: "cst"}
-WAY_TO_OPERATIONAL = (State.PRE_OP, State.SAFE_OP, State.OP)
+WAY_TO_OPERATIONAL = (AlState.PRE_OP, AlState.SAFE_OP, AlState.OP)
 DATAGRAM_HEADER = 10
 BUSY = "c-busy"  # the peer that busy-waits
 
@@ -96,8 +96,8 @@ def _settings(job: Job, folder: Path) -> Iterator[str]:
     yield f"busy_wait_ns {round(job.busy_wait * 1e9) if job.peer == BUSY else 0}"
     yield f"counts_per_rad {job.counts_per_rad}"
     yield f"counts_per_torque {job.counts_per_torque}"
-    for state in (*WAY_TO_OPERATIONAL, State.INIT):  # the last one is for leaving
-        request = Datagram(Command.BWR, AL_CONTROL.address << 16, AL_CONTROL.pack(state))
+    for state in (*WAY_TO_OPERATIONAL, AlState.INIT):  # the last one is for leaving
+        request = Datagram(EcatCommand.BWR, AL_CONTROL.address << 16, AL_CONTROL.pack(state))
         yield f"request {state.value} {encode_frame([request]).hex()}"
 
 

@@ -19,7 +19,7 @@ from catenary.bench.soak.faults import Incident, draw
 from catenary.bench.soak.objects import Objects
 from catenary.bench.soak.setting import Setting
 from catenary.bench.soak.witness import CLOCK_BOUND, OP, Phase, Violation, Witness
-from catenary.bus.event import AxisStopped, DeviceHeld, DeviceReplaced
+from catenary.bus.event_types import AxisStopped, DeviceHeld, DeviceReplaced
 from catenary.bus.sub_device import SubDevice
 from catenary.errors import CatenaryError
 from catenary.model.device import Identity

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from catenary.core import Engine
 from catenary.plan.cycle import Bank, Column
-from catenary.plan.wish import WishTables
+from catenary.plan.request import WishTables
 
 Fields = Mapping[str, tuple[int, str, int | None]]  # name → offset, format, count
 RecordType = np.dtype[np.void]

@@ -16,7 +16,7 @@ from catenary.loop.laws.compiler import SOURCES, CompiledLaw, compile_law, count
 from catenary.loop.laws.law import Law
 from catenary.loop.laws.layout import law_layout, record_at
 from catenary.loop.laws.run import LawRun, Numbers, numbers
-from catenary.plan.make import Plan
+from catenary.plan.planner import Plan
 
 SLICE_NS = 10_000_000  # between looks at signals while a law runs
 GUARD_ABOVE = 1  # the thread that watches a law has so much more priority

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from catenary.model.break_location import behind, judge_silence
 from catenary.model.finding import Names
-from catenary.model.silence import behind, judge_silence
 from catenary.model.topology import Topology, make_topology
 from tests.model.tables import END, LINE, STAR, line
 

@@ -8,11 +8,11 @@ from functools import partial
 from typing import TypeVar
 
 from catenary.bus import LaneRunner, MainDevice
-from catenary.bus.background import step_behind
+from catenary.bus.thread_priority import step_behind
 from catenary.core import Engine
 from catenary.errors import LoopError
 from catenary.loop.mailbox_watch import MailboxWatch
-from catenary.plan.make import Plan
+from catenary.plan.planner import Plan
 from catenary.procedure.exchange import Procedure
 
 T = TypeVar("T")

@@ -14,7 +14,7 @@ from enum import Enum
 from typing import Any, Protocol
 
 from catenary.bus import MainDevice, SubDevice
-from catenary.bus.event import (
+from catenary.bus.event_types import (
     DeviceHeld,
     DeviceLost,
     DeviceReplaced,
@@ -24,18 +24,18 @@ from catenary.bus.event import (
 from catenary.bus.pending import Pending
 from catenary.errors import CatenaryError
 from catenary.link import ring_of
-from catenary.loop.diagnosis import described
+from catenary.loop.cycle_errors import described
 from catenary.loop.options import ReturnPolicy
 from catenary.loop.ring_watch import RingWatch
 from catenary.model.device import Identity
-from catenary.model.returning import vacancies
-from catenary.plan.make import Plan
+from catenary.model.device_matching import vacancies
+from catenary.plan.planner import Plan
 from catenary.plan.start_up import DevicePlan
 from catenary.procedure import restore
 from catenary.procedure.al_state import request_state
+from catenary.procedure.al_status_poll import Answer, survey
 from catenary.procedure.exchange import Procedure, after
-from catenary.procedure.survey import Answer, survey
-from catenary.wire.al import ERROR_FLAG, STATE_MASK, State
+from catenary.wire.al import ERROR_FLAG, STATE_MASK, AlState
 
 Submit = Callable[[Procedure[None]], Pending[None]]
 
@@ -183,7 +183,7 @@ class Watch:
             self._conclude(charge, task)
         if answer.word is None:
             self._lose(charge)
-        elif answer.word & (STATE_MASK | ERROR_FLAG) == State.OP:
+        elif answer.word & (STATE_MASK | ERROR_FLAG) == AlState.OP:
             if charge.standing is Standing.LOST and not self._lets_in(charge):
                 self._welcome(charge)  # out of OP, which it has never left
             elif charge.standing is not Standing.HELD:
@@ -194,7 +194,7 @@ class Watch:
             state = answer.word & STATE_MASK
             message = f"{described(answer)}, out of OP"
             self._tell(
-                StateLost(self._now(), charge.sub, message, int(State.OP), state, answer.code)
+                StateLost(self._now(), charge.sub, message, int(AlState.OP), state, answer.code)
             )
         elif charge.standing is Standing.LOST:
             # The cable was pulled, not the plug: it kept its address and stopped by its watchdog.
@@ -212,7 +212,7 @@ class Watch:
     def _is_back(self, charge: Charge) -> None:
         if charge.standing is Standing.LOST:
             self._tell_returned(charge)
-        charge.standing, charge.failures, charge.sub.state = Standing.RUNNING, 0, State.OP
+        charge.standing, charge.failures, charge.sub.state = Standing.RUNNING, 0, AlState.OP
 
     def _tell_returned(self, charge: Charge) -> None:
         message = f"{charge.sub.station} answers again"
@@ -333,21 +333,21 @@ class Watch:
     def _back_to_op(self, charge: Charge) -> Procedure[None]:
         """It kept its configuration, mostly: its error is acknowledged. Else all from INIT."""
         if charge.failures == 0:
-            yield from request_state(charge.sub.station, State.OP)
+            yield from request_state(charge.sub.station, AlState.OP)
         else:
             yield from self._restored(charge)
 
     def _restored(self, charge: Charge) -> Procedure[None]:
         sub, plan = charge.sub, charge.plan
         yield from restore.bring_to_pre_op(sub.station, sub.channel)
-        sub.state = State.PRE_OP
+        sub.state = AlState.PRE_OP
         clock = self._rejoin(plan.position, plan) if self._rejoin is not None else None
         yield from restore.bring_to_safe_op(sub.station, sub.channel, sub.description, plan, clock)
-        sub.state = State.SAFE_OP
-        yield from request_state(sub.station, State.OP)
+        sub.state = AlState.SAFE_OP
+        yield from request_state(sub.station, AlState.OP)
 
     def _waiting(self, charge: Charge) -> Procedure[Any]:
         """To PRE-OP, and no further."""
         yield from restore.bring_to_pre_op(charge.sub.station, charge.sub.channel)
-        charge.sub.state = State.PRE_OP
+        charge.sub.state = AlState.PRE_OP
         self._hold(charge, 'on_return="hold"')

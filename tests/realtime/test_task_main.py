@@ -9,7 +9,7 @@ import pytest
 
 from catenary.realtime import Task, Value
 from catenary.realtime.handle import Handle
-from catenary.realtime.runner import Work, start_thread
+from catenary.realtime.task_main import Work, start_thread
 from tests.realtime import bodies
 
 

@@ -23,10 +23,7 @@ from catenary.plan.mapping import make_mapping
 from catenary.plan.output_owners import check_owners
 from catenary.plan.pdo_mapping import Mapping
 from catenary.plan.report import report
-from catenary.plan.start_up import DevicePlan, make_device_plan
-from catenary.plan.start_up_object import StartUp
-from catenary.plan.watchdog import choose_watchdog
-from catenary.plan.wish import (
+from catenary.plan.request import (
     DistributedClock,
     ObjectReference,
     PdoWish,
@@ -34,6 +31,9 @@ from catenary.plan.wish import (
     WishTables,
     WrittenPdo,
 )
+from catenary.plan.start_up import DevicePlan, make_device_plan
+from catenary.plan.start_up_object import StartUp
+from catenary.plan.watchdog import choose_watchdog
 from catenary.wire.cia402 import Mode
 
 PERIOD_MIN, PERIOD_MAX = 1e-6, 1000.0  # [s]; the core's limits are wider

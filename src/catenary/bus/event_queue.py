@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from catenary.bus.background import step_behind
-from catenary.bus.event import Event
+from catenary.bus.event_types import Event
+from catenary.bus.thread_priority import step_behind
 
 if TYPE_CHECKING:
     import logging

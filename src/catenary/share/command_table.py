@@ -24,9 +24,9 @@ import numpy.typing as npt
 
 from catenary.errors import ShareError
 from catenary.share import _rows
+from catenary.share._atomic_words import Words
 from catenary.share._mutex import MUTEX_SIZE, SharedMutex
 from catenary.share._rows import Ring
-from catenary.share._words import Words
 from catenary.share.desk_socket import request_descriptor
 from catenary.share.layout import VERSION, ShareLayout
 from catenary.share.memory import make_sealed, map_sealed

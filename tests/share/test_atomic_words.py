@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from catenary.share._words import Words
+from catenary.share._atomic_words import Words
 
 
 def test_words_lie_where_they_are_said_to() -> None:

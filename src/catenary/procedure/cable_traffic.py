@@ -5,7 +5,7 @@ from __future__ import annotations
 from catenary.errors import NoDeviceError
 from catenary.procedure.exchange import Procedure, Reply, Request, after
 from catenary.procedure.station import Deadline
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 
 PAUSE = 1e-3  # [s] between two frames
 PATTERN = bytes(range(256)) * 5  # every byte, and nearly a full frame
@@ -17,7 +17,7 @@ def exercise(seconds: float) -> Procedure[tuple[int, int]]:
     not come back whole. NoDeviceError where the segment is gone."""
     deadline, sent, lost, in_vain = Deadline(seconds), 0, 0, 0
     while True:
-        [reply] = yield [Request(Command.NOP, 0, PATTERN, False)]
+        [reply] = yield [Request(EcatCommand.NOP, 0, PATTERN, False)]
         sent += 1
         in_vain = in_vain + 1 if _spoilt(reply) else 0
         lost += bool(in_vain)

@@ -9,8 +9,8 @@ import threading
 import pytest
 
 import catenary as cat
-from catenary.bus.event import DeviceLost, Emergency, Event
-from catenary.bus.events import Callbacks, Events
+from catenary.bus.event_queue import Callbacks, Events
+from catenary.bus.event_types import DeviceLost, Emergency, Event
 from catenary.procedure.mailbox import Heard
 from catenary.virtual import Servo, demo_segment
 from catenary.wire import coe

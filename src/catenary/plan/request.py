@@ -187,7 +187,7 @@ class Views:
     actual_torque: Reals  # (n,) [N·m]
     statusword: Words  # (n,)
     mode_actual: Modes  # (n,)
-    axis_state: Bytes  # (n,) CiA 402 state, wire.cia402.State
+    axis_state: Bytes  # (n,) CiA 402 state, wire.cia402.AxisState
     # axis_flags (n,): bit 0: set-points are followed; 1: the last one was limited; 2: the core
     # stopped the axis; 3: the target was refused (NaN, infinite, further than the step limit);
     # 4: no fresh target: fallback; 5: the drive refused the last mode change; bits 6 and 7: the

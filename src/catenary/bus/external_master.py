@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
+from catenary.procedure.al_status_poll import Answer
 from catenary.procedure.exchange import Procedure
-from catenary.procedure.survey import Answer
 
 
 class CycleClock(Protocol):

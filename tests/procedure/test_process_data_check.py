@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from catenary.procedure.exchange import Reply, Request
-from catenary.procedure.probe import probe_inputs
-from catenary.wire.datagram import Command
+from catenary.procedure.process_data_check import probe_inputs
+from catenary.wire.datagram import EcatCommand
 from tests.procedure.by_hand import play
 
 
 def test_who_gives_nothing_is_told_from_a_lost_frame() -> None:
     def answer(request: Request) -> Reply:
-        assert request.command is Command.LRD
+        assert request.command is EcatCommand.LRD
         counter = {0x10000: 1, 0x10010: 0, 0x10020: 0}[request.address]
         return Reply(request.data, counter, lost=request.address == 0x10020)
 

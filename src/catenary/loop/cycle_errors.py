@@ -8,10 +8,9 @@ from typing import NamedTuple
 from catenary.errors import DriveError, StateError, WorkingCounterError
 from catenary.log import Log
 from catenary.model.finding import Finding
-from catenary.procedure.survey import Answer
-from catenary.wire.al import ERROR_FLAG, STATE_MASK, State, status_code
-from catenary.wire.cia402 import IN_FAULT
-from catenary.wire.cia402 import State as DriveState
+from catenary.procedure.al_status_poll import Answer
+from catenary.wire.al import ERROR_FLAG, STATE_MASK, AlState, status_code
+from catenary.wire.cia402 import IN_FAULT, AxisState
 from catenary.wire.drive_error import error_text
 
 
@@ -90,7 +89,7 @@ def state_error(
     error = StateError(
         f"{described(first)}, out of OP",
         position=first.station.position,
-        requested=int(State.OP),
+        requested=int(AlState.OP),
         actual=(first.word or 0) & STATE_MASK,
         code=first.code,
         log=log,
@@ -121,8 +120,8 @@ def forgetful_error(silent: Sequence[Answer], al_status: int, log: Log | None) -
         f"{first.station} does not answer to its address any more, while not all that answer are "
         f"in OP (AL status 0x{al_status:02X}, all together)",
         position=first.station.position,
-        requested=int(State.OP),
-        actual=int(State.INIT),
+        requested=int(AlState.OP),
+        actual=int(AlState.INIT),
         code=0,
         log=log,
         hint="it was switched off and on for less time than the loop endures lost frames, or "
@@ -137,7 +136,7 @@ class AxisTrouble(NamedTuple):
     """One axis and what it says about itself."""
 
     name: str
-    state: DriveState | None
+    state: AxisState | None
     code: int | None  # object 0x603F; None: it could not be read
 
     def __str__(self) -> str:
@@ -161,14 +160,14 @@ def drive_error(axes: Sequence[AxisTrouble], what: str, log: Log | None) -> Driv
 
 def is_astray(answer: Answer) -> bool:
     """Answers, but not from OP."""
-    return answer.word is not None and answer.word & (STATE_MASK | ERROR_FLAG) != State.OP
+    return answer.word is not None and answer.word & (STATE_MASK | ERROR_FLAG) != AlState.OP
 
 
 def described(answer: Answer) -> str:
     """The device, its state and its reason."""
     assert answer.word is not None
     try:
-        state = str(State(answer.word & STATE_MASK))
+        state = str(AlState(answer.word & STATE_MASK))
     except ValueError:
         state = f"state {answer.word & STATE_MASK}"
     error = " with an error" if answer.word & ERROR_FLAG else ""

@@ -7,7 +7,7 @@ import threading
 
 import pytest
 
-from catenary.bus.background import BEHIND, step_behind
+from catenary.bus.thread_priority import BEHIND, step_behind
 
 
 def scheduling_of_a_thread_started_with(policy: int, priority: int) -> tuple[int, int]:

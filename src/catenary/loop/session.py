@@ -26,10 +26,11 @@ from catenary.core import (
 from catenary.errors import CatenaryError, DriveError, LinkError, LoopError
 from catenary.link import forget_in_child
 from catenary.log import Log
+from catenary.loop.acyclic_service import Service
 from catenary.loop.axis_watch import AxisWatch, RefusedMode, StoppedAxis
 from catenary.loop.buffers import bind_wishes
 from catenary.loop.clocks import Clocks
-from catenary.loop.diagnosis import (
+from catenary.loop.cycle_errors import (
     AxisTrouble,
     drive_error,
 )
@@ -40,17 +41,15 @@ from catenary.loop.log_rows import read_log
 from catenary.loop.options import StopPolicy
 from catenary.loop.publishing import Publisher
 from catenary.loop.safe_outputs import confirm_safe, make_safe
-from catenary.loop.service import Service
 from catenary.loop.signals import SignalGuard
 from catenary.loop.stop_error import stopped_error
 from catenary.loop.timing import Timing
-from catenary.plan.make import Plan
+from catenary.plan.planner import Plan
+from catenary.plan.request import Wish
 from catenary.plan.sink import Sink
 from catenary.plan.stop_reason import UNASKED, StopReason
-from catenary.plan.wish import Wish
-from catenary.wire.al import State
-from catenary.wire.cia402 import IN_FAULT, Mode, state_of
-from catenary.wire.cia402 import State as DriveState
+from catenary.wire.al import AlState
+from catenary.wire.cia402 import IN_FAULT, AxisState, Mode, state_of
 
 FATAL = CYCLE_WORKING_COUNTER | CYCLE_STOPPED | CYCLE_NONE
 ENABLE_TIMEOUT_NS = 5_000_000_000  # mains contactors and brakes are slow, but not this slow
@@ -59,7 +58,7 @@ SETTLE_CYCLES = 50  # until the first cycle with all answers
 STOP_SLICE_NS = 20_000_000  # between looks at "hurry" while the drives brake
 
 
-class Running:
+class Session:
     """Owns the engine of one MainDevice while its loop is open."""
 
     def __init__(
@@ -70,7 +69,7 @@ class Running:
         *,
         abandon: Callable[[], object],
         stop: StopPolicy,
-        exchange: Callable[[Running], Exchange] = FrameExchange,
+        exchange: Callable[[Session], Exchange] = FrameExchange,
     ) -> None:
         self.main = main
         self.plan = plan
@@ -93,7 +92,7 @@ class Running:
         self._abandon = abandon  # leaves the loop, when the MainDevice is closed round it
         self._process = os.getpid()
         forget_in_child(self)
-        self._companions: Sequence[Running] = ()
+        self._companions: Sequence[Session] = ()
         self._watches: list[Pending[None]] = []
         self._publisher: Publisher | None = None
         self._counted: Mapping[str, int] = {}  # by the engine, until the loop was entered
@@ -111,7 +110,7 @@ class Running:
         if self._publisher is not None:
             self._publisher.tell_end(error)
 
-    def share_time(self, companions: Sequence[Running]) -> None:
+    def share_time(self, companions: Sequence[Session]) -> None:
         """Networks whose cycles this thread must run as well, in virtual time."""
         self._companions = companions
         self.engine.take_turns()
@@ -185,7 +184,7 @@ class Running:
             axes = np.flatnonzero(waiting()).tolist()
             if not axes:
                 return
-            if flags & FATAL or self.engine.al_status != State.OP:
+            if flags & FATAL or self.engine.al_status != AlState.OP:
                 self.judge(flags, faults=False)
             if self.engine.now() > deadline:
                 raise self._drive_error(axes, "cannot be enabled")
@@ -194,7 +193,7 @@ class Running:
         """Raise LoopError for axes that are powered in CST: a waiting call commits no torque."""
         views = self.views
         in_torque = (views.mode_target == Mode.CST) | (views.mode_actual == Mode.CST)
-        powered = (views.axis_state == DriveState.OPERATION_ENABLED) & in_torque
+        powered = (views.axis_state == AxisState.OPERATION_ENABLED) & in_torque
         if not powered.any():
             return
         names = [self.plan.cycle.axes[i].name for i in np.flatnonzero(powered).tolist()]
@@ -213,7 +212,7 @@ class Running:
                 return
         raise self.exchange.silence_error()
 
-    # Running
+    # Session
 
     def reset_figures(self) -> None:
         """Begin the timing and the figures of the clocks anew."""
@@ -241,7 +240,7 @@ class Running:
             raise self.exchange.silence_error()
         if flags & CYCLE_LAW_FAILED:
             self.laws.raise_failure(self.log())
-        if self.engine.al_status != State.OP and not self.watch.excuses:
+        if self.engine.al_status != AlState.OP and not self.watch.excuses:
             self.exchange.raise_astray()
             stops += self._announce_axes(explained=True)  # the flags of its cycles are lost
         states = [state_of(word) for word in self.views.statusword.tolist()]
@@ -251,7 +250,7 @@ class Running:
             if state in IN_FAULT and self.watch.requires(self.plan.cycle.axes[axis].device)
         ]
         if faulty and faults:
-            if self.engine.al_status != State.OP:
+            if self.engine.al_status != AlState.OP:
                 self.exchange.raise_astray()  # the fault may be its consequence
             raise self._drive_error(faulty, "in fault")
         self._raise_stopped([s for s in stops if self.watch.requires(s.device)], faults=faults)

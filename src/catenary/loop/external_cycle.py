@@ -6,25 +6,25 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from catenary.bus import Carrier, CycleClock, MainDevice, Pending, SubDevice
-from catenary.bus.event import DeviceLost, DeviceReturned, StateLost
+from catenary.bus.event_types import DeviceLost, DeviceReturned, StateLost
 from catenary.core import Engine
 from catenary.errors import CatenaryError, ConfigurationError
-from catenary.loop.diagnosis import described, is_astray, silence_error, state_error
-from catenary.loop.running import FATAL, Running
-from catenary.loop.watch import LOOK, Attendance
+from catenary.loop.cycle_errors import described, is_astray, silence_error, state_error
+from catenary.loop.device_watch import LOOK, Attendance
+from catenary.loop.session import FATAL, Session
 from catenary.plan.cycle import DatagramKind
-from catenary.plan.make import Plan
+from catenary.plan.planner import Plan
+from catenary.procedure.al_status_poll import Answer
 from catenary.procedure.exchange import Procedure, after
-from catenary.procedure.survey import Answer
 from catenary.types import UINT
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 from catenary.wire.cia402 import SLOT_OFFSET, Object
 
 
 class CarriedExchange:
     """Owns the watch of a session whose frames another master sends. Implements `Exchange`."""
 
-    def __init__(self, session: Running) -> None:
+    def __init__(self, session: Session) -> None:
         self._session = session
 
     def make_engine(self) -> Engine:
@@ -63,7 +63,7 @@ class CarriedExchange:
         self._session.service.converse(self._carrier.bring_to_op(required))
         self._session.settle()
         for sub in self._session.main.subs:
-            sub.state = State.OP
+            sub.state = AlState.OP
         return [self._session.service.runner.submit(self.watch.run())]
 
     def silence_error(self) -> CatenaryError:
@@ -120,7 +120,7 @@ class CarriedWatch:
         while True:
             yield from self._carrier.listen()
             self._announce()
-            if self._engine.disturbed or any(a.word != State.OP for a in self._answers):
+            if self._engine.disturbed or any(a.word != AlState.OP for a in self._answers):
                 answers = yield from self._carrier.survey()
                 self._tell(answers)
                 self._answers = answers
@@ -145,7 +145,7 @@ class CarriedWatch:
         now = self._engine.now() * 1e-9
         for answer in answers:
             position, word = answer.station.position, answer.word
-            was, sub = before.get(position, int(State.OP)), self._main.subs[position]
+            was, sub = before.get(position, int(AlState.OP)), self._main.subs[position]
             if word is None and was is not None:
                 message = f"{answer.station} does not answer any more"
                 self._main.events.put(DeviceLost(now, sub, message))
@@ -153,13 +153,13 @@ class CarriedWatch:
             elif word is not None and was is None:
                 message = f"{answer.station} answers again"
                 self._main.events.put(DeviceReturned(now, sub, message))
-            if word is not None and word != State.OP and was == State.OP:
+            if word is not None and word != AlState.OP and was == AlState.OP:
                 message = f"{described(answer)}, out of OP"
-                lost = StateLost(now, sub, message, int(State.OP), word & 0xF, answer.code)
+                lost = StateLost(now, sub, message, int(AlState.OP), word & 0xF, answer.code)
                 self._main.events.put(lost)
                 sub.state = None
-            elif word == State.OP:
-                sub.state = State.OP
+            elif word == AlState.OP:
+                sub.state = AlState.OP
 
 
 def carried(plan: Plan) -> Plan:

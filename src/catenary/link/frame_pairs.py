@@ -21,7 +21,7 @@ from typing import NamedTuple, TypeAlias
 
 from catenary.errors import DecodeError
 from catenary.wire.capture import decode_capture
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from catenary.wire.frame import MINIMUM_SIZE, Frame, decode_frame
 from catenary.wire.pcapng import Direction, Packet
 
@@ -42,8 +42,8 @@ AT_ONCE_NS = (
 # Every controller counts their address up by one (ETG.1000.4 §5.4.1.2)
 _COUNTED_UP = frozenset(
     (
-        *(Command.APRD, Command.APWR, Command.APRW, Command.ARMW),
-        *(Command.BRD, Command.BWR, Command.BRW),
+        *(EcatCommand.APRD, EcatCommand.APWR, EcatCommand.APRW, EcatCommand.ARMW),
+        *(EcatCommand.BRD, EcatCommand.BWR, EcatCommand.BRW),
     )
 )
 

@@ -1,10 +1,10 @@
 """Errors that name the device."""
 
-from catenary.loop.diagnosis import AxisTrouble, drive_error, silence_error, state_error
+from catenary.loop.cycle_errors import AxisTrouble, drive_error, silence_error, state_error
+from catenary.procedure.al_status_poll import Answer
 from catenary.procedure.station import Station
-from catenary.procedure.survey import Answer
-from catenary.wire.al import State
-from catenary.wire.cia402 import State as DriveState
+from catenary.wire.al import AlState
+from catenary.wire.cia402 import AxisState
 
 COUPLER = Station(0, 0x1000, "Coupler")
 SERVO = Station(1, 0x1001, "Servo")
@@ -13,7 +13,7 @@ LOG = object()
 
 
 def test_silent_devices_are_named() -> None:
-    answers = [Answer(COUPLER, State.OP), Answer(SERVO, None), Answer(LAMP, None)]
+    answers = [Answer(COUPLER, AlState.OP), Answer(SERVO, None), Answer(LAMP, None)]
     error = silence_error(answers, [1, 2], 3, LOG)
     assert "device 1 (Servo), device 2 (Lamp)" in str(error)
     assert error.log is LOG
@@ -25,18 +25,18 @@ def test_silence_of_all_is_the_cable() -> None:
 
 
 def test_a_device_that_came_back_is_not_silent_but_not_in_op() -> None:
-    answers = [Answer(COUPLER, State.OP), Answer(SERVO, State.INIT)]
+    answers = [Answer(COUPLER, AlState.OP), Answer(SERVO, AlState.INIT)]
     assert "device 1 (Servo) is in INIT" in str(silence_error(answers, [1], 3, LOG))
 
 
 def test_lost_frames_without_a_silent_device_are_said_as_such() -> None:
-    error = silence_error([Answer(COUPLER, State.OP), Answer(SERVO, State.OP)], [1], 5, LOG)
+    error = silence_error([Answer(COUPLER, AlState.OP), Answer(SERVO, AlState.OP)], [1], 5, LOG)
     assert str(error).startswith("5 cycles in a row")
     assert "frames are lost" in error.hint
 
 
 def test_who_left_op_is_told_with_the_reason() -> None:
-    answers = [Answer(COUPLER, State.OP), Answer(SERVO, State.SAFE_OP | 0x10, 0x001B)]
+    answers = [Answer(COUPLER, AlState.OP), Answer(SERVO, AlState.SAFE_OP | 0x10, 0x001B)]
     error = state_error(answers, LOG)
     assert error is not None
     assert (error.position, error.requested, error.actual, error.code) == (1, 8, 4, 0x001B)
@@ -45,36 +45,36 @@ def test_who_left_op_is_told_with_the_reason() -> None:
 
 
 def test_a_state_left_without_a_reason_suspects_a_second_master() -> None:
-    error = state_error([Answer(SERVO, State.PRE_OP)], LOG)
+    error = state_error([Answer(SERVO, AlState.PRE_OP)], LOG)
     assert error is not None
     assert "look for a second master" in error.hint
 
 
 def test_a_second_master_that_is_seen_is_named() -> None:
-    answers = [Answer(SERVO, State.SAFE_OP | 0x10, 0x001B)]
+    answers = [Answer(SERVO, AlState.SAFE_OP | 0x10, 0x001B)]
     error = state_error(answers, LOG, ["PID 42 (scan) has an EtherCAT packet socket on eth0"])
     assert error is not None
     assert "PID 42 (scan)" in error.hint
 
 
 def test_all_in_op_is_no_error() -> None:
-    assert state_error([Answer(COUPLER, State.OP), Answer(SERVO, State.OP)], LOG) is None
+    assert state_error([Answer(COUPLER, AlState.OP), Answer(SERVO, AlState.OP)], LOG) is None
 
 
 def test_others_that_left_op_are_noted() -> None:
-    answers = [Answer(SERVO, State.SAFE_OP), Answer(LAMP, State.PRE_OP)]
+    answers = [Answer(SERVO, AlState.SAFE_OP), Answer(LAMP, AlState.PRE_OP)]
     error = state_error(answers, LOG)
     assert error is not None
     assert error.__notes__ == ["also: device 2 (Lamp) is in PRE-OP"]
 
 
 def test_a_fault_is_told_by_its_code() -> None:
-    error = drive_error([AxisTrouble("1 Servo", DriveState.FAULT, 0x8611)], "in fault", LOG)
+    error = drive_error([AxisTrouble("1 Servo", AxisState.FAULT, 0x8611)], "in fault", LOG)
     assert "0x8611 (following error)" in str(error)
     assert "resets the fault" in error.hint
 
 
 def test_a_drive_without_power_is_not_in_fault() -> None:
-    trouble = AxisTrouble("1 Servo", DriveState.SWITCH_ON_DISABLED, None)
+    trouble = AxisTrouble("1 Servo", AxisState.SWITCH_ON_DISABLED, None)
     error = drive_error([trouble], "cannot be enabled", LOG)
     assert "supply" in error.hint

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import pytest
 
 import catenary as cat
+from catenary.procedure.read_device import distinct, visit
 from catenary.procedure.stations import STATION_BASE
-from catenary.procedure.visit import distinct, visit
-from catenary.wire.al import State
+from catenary.wire.al import AlState
 
 
 @pytest.mark.parametrize(
@@ -45,7 +45,7 @@ def test_a_visit_leaves_addresses_and_states(segment: cat.Segment, main: cat.Mai
         segment.core.poke(position, 0x0010, bytes((0x50 + position, 0)))
     found = main.converse(visit(3))
     assert [each.station_address for each in found] == [0x50, 0x51, 0x52]
-    assert [segment.core.peek(n, 0x0130, 1)[0] for n in range(3)] == [State.PRE_OP] * 3
+    assert [segment.core.peek(n, 0x0130, 1)[0] for n in range(3)] == [AlState.PRE_OP] * 3
 
 
 def test_a_visit_of_devices_just_switched_on(segment: cat.Segment, main: cat.MainDevice) -> None:

@@ -8,7 +8,7 @@ from typing import TypeVar
 from catenary.errors import CatenaryError, ClockError
 from catenary.procedure.exchange import Procedure, after, read, write
 from catenary.procedure.station import Station, answered
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from catenary.wire.dl import DlStatus, Loop
 from catenary.wire.register import DL_CONTROL, DL_STATUS
 
@@ -25,7 +25,7 @@ def as_line(station: Station, port: int, procedure: Procedure[T]) -> Procedure[T
     ClockError: the port cannot be closed, or it opened by itself before the end, so that what was
     measured counts for nothing.
     """
-    [reply] = yield [read(Command.FPRD, station.address, DL_CONTROL)]
+    [reply] = yield [read(EcatCommand.FPRD, station.address, DL_CONTROL)]
     before = DL_CONTROL.unpack(answered(reply, station, "DL control"))
     closed = before | Loop.CLOSED << LOOPS + 2 * port
     yield from _write(station, closed | TEMPORARY)
@@ -60,11 +60,11 @@ def _await_closed(station: Station, port: int) -> Procedure[None]:
 
 
 def _is_closed(station: Station, port: int) -> Procedure[bool]:
-    [reply] = yield [read(Command.FPRD, station.address, DL_STATUS)]
+    [reply] = yield [read(EcatCommand.FPRD, station.address, DL_STATUS)]
     status = DlStatus.from_word(DL_STATUS.unpack(answered(reply, station, "DL status")))
     return status.ports[port].loop_closed
 
 
 def _write(station: Station, control: int) -> Procedure[None]:
-    [reply] = yield [write(Command.FPWR, station.address, DL_CONTROL, control)]
+    [reply] = yield [write(EcatCommand.FPWR, station.address, DL_CONTROL, control)]
     answered(reply, station, "DL control")

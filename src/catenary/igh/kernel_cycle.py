@@ -7,7 +7,7 @@ import ctypes
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from catenary.bus.event import LinkLost, LinkRestored
+from catenary.bus.event_types import LinkLost, LinkRestored
 from catenary.errors import (
     CatenaryError,
     IdentityError,
@@ -20,9 +20,9 @@ from catenary.igh.clock import KernelClock
 from catenary.igh.configure import Configuration
 from catenary.igh.kernel_log import KernelLog
 from catenary.igh.sub_device import SubDevice
+from catenary.procedure.al_status_poll import Answer
 from catenary.procedure.exchange import Procedure, after
-from catenary.procedure.survey import Answer
-from catenary.wire.al import State, status_code
+from catenary.wire.al import AlState, status_code
 from catenary.wire.register import AL_STATUS_CODE, SYSTEM_TIME_DIFFERENCE
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ class KernelCarrier:
                 answers.append(Answer(sub.station, None))
                 continue
             word, code = int(state.al_state), 0
-            if word != State.OP:
+            if word != AlState.OP:
                 code = yield from self._status_code(sub.position)
             answers.append(Answer(sub.station, word, code))
         return answers
@@ -186,7 +186,7 @@ class KernelCarrier:
             return StateError(
                 f"{sub.station} did not reach OP: it is not there any more ({error})",
                 position=sub.position,
-                requested=int(State.OP),
+                requested=int(AlState.OP),
                 actual=0,
                 code=0,
                 hint="look at its cable and power: ethercat slaves",
@@ -205,11 +205,11 @@ class KernelCarrier:
         reason = f" (AL status code 0x{code:04X}: {status_code(code).text})" if code else ""
         others = f"; with it {len(waiting) - 1} others" if len(waiting) > 1 else ""
         state = info.al_state & 0xF
-        named = str(State(state)) if state in tuple(State) else f"state {state}"
+        named = str(AlState(state)) if state in tuple(AlState) else f"state {state}"
         return StateError(
             f"{sub.station} did not reach OP: it is in {named}{reason}{others}",
             position=sub.position,
-            requested=int(State.OP),
+            requested=int(AlState.OP),
             actual=state,
             code=code,
             hint=(yield from self._cause(sub, code)),

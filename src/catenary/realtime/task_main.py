@@ -18,11 +18,11 @@ from catenary.errors import CatenaryError, RealtimeError
 from catenary.realtime import libc
 from catenary.realtime._stack import touch_stack
 from catenary.realtime._task import ENDED, FAILED, STARTED, Block, Releases
-from catenary.realtime.place import Place
+from catenary.realtime.job import Running
 from catenary.realtime.preparation import SET_CAPABILITIES, Session
-from catenary.realtime.running import Running
 from catenary.realtime.scheduling import Scheduling, refusal, what_scheduling
 from catenary.realtime.task import Task
+from catenary.realtime.task_memory import Place
 
 START_SECONDS = 60.0  # at most, from one task's start to that of all
 STACK_LEFT = 32 * 1024  # [bytes] not touched: what runs already lies there

@@ -13,14 +13,14 @@ from catenary.model.device import Direction
 from catenary.plan import Number, NumberKind, make_plan
 from catenary.plan.cycle import Copy, DatagramKind, DatagramPlan
 from catenary.plan.layout import MailboxFmmu
-from catenary.plan.wish import PdoWish, WishTables
-from catenary.wire.datagram import Command
+from catenary.plan.request import PdoWish, WishTables
+from catenary.wire.datagram import EcatCommand
 from catenary.wire.features import Feature
 from catenary.wire.frame import decode_frame
 from tests.plan.devices import Asking, asks, block, coupler, demo, lamps, servo
 
 MAILBOXES = DatagramPlan(  # of three drives, behind the 80 bytes of process data
-    DatagramKind.PROCESS_DATA, Command.LRD, 122, 1, 3, -1, inputs=(Copy(132, 39, 1),)
+    DatagramKind.PROCESS_DATA, EcatCommand.LRD, 122, 1, 3, -1, inputs=(Copy(132, 39, 1),)
 )
 
 
@@ -32,10 +32,10 @@ def test_the_demo_segment_in_one_frame() -> None:
     assert (cycle.output_size, cycle.input_size) == (1 + 3 * 13 + 1, 3 * 13 + 1)
     [frame] = cycle.frames
     assert frame.datagrams == (
-        DatagramPlan(DatagramKind.AL_STATUS, Command.BRD, 16, 2, 6, -1),
+        DatagramPlan(DatagramKind.AL_STATUS, EcatCommand.BRD, 16, 2, 6, -1),
         DatagramPlan(
             DatagramKind.PROCESS_DATA,
-            Command.LRW,
+            EcatCommand.LRW,
             30,
             80,
             13,
@@ -53,7 +53,11 @@ def test_the_demo_segment_in_one_frame() -> None:
 def test_the_template_is_a_frame_of_its_datagrams() -> None:
     [frame] = make_plan(demo()).cycle.frames
     decoded = decode_frame(frame.template)
-    assert [d.command for d in decoded.datagrams] == [Command.BRD, Command.LRW, Command.LRD]
+    assert [d.command for d in decoded.datagrams] == [
+        EcatCommand.BRD,
+        EcatCommand.LRW,
+        EcatCommand.LRD,
+    ]
     assert decoded.datagrams[0].address == 0x0130_0000
     assert decoded.datagrams[1].address == 0x0001_0000
     assert not any(decoded.datagrams[1].data)
@@ -142,7 +146,7 @@ def test_a_plan_prints_what_it_holds() -> None:
 def test_a_device_without_lrw_gets_lrd_and_lwr() -> None:
     cycle = make_plan([coupler(0), servo(1), servo(2, lrw=False)]).cycle
     kinds = [
-        (Command(d.command).name, d.length, d.expected_counter, d.sync_unit)
+        (EcatCommand(d.command).name, d.length, d.expected_counter, d.sync_unit)
         for d in cycle.frames[0].datagrams
     ]
     assert kinds == [
@@ -158,14 +162,14 @@ def test_a_device_without_lrw_gets_lrd_and_lwr() -> None:
 def test_the_sii_alone_can_deny_lrw() -> None:
     denied = replace(servo(2), sii_denies_lrw=True)
     cycle = make_plan([coupler(0), servo(1), denied]).cycle
-    kinds = [(Command(d.command).name, d.sync_unit) for d in cycle.frames[0].datagrams]
+    kinds = [(EcatCommand(d.command).name, d.sync_unit) for d in cycle.frames[0].datagrams]
     assert kinds[1:4] == [("LRW", 0), ("LWR", 1), ("LRD", 1)]
 
 
 def test_outputs_alone_need_no_lrw() -> None:
     cycle = make_plan([lamps(0), lamps(1)]).cycle
     datagram = cycle.frames[0].datagrams[1]
-    assert (datagram.command, datagram.expected_counter) == (Command.LWR, 2)
+    assert (datagram.command, datagram.expected_counter) == (EcatCommand.LWR, 2)
 
 
 @pytest.mark.parametrize("required", [True, False])

@@ -6,9 +6,9 @@ import pytest
 
 from catenary.errors import ClockError, ResponseTimeout
 from catenary.procedure.exchange import Procedure, Reply, Request
-from catenary.procedure.line import as_line
+from catenary.procedure.open_ring import as_line
 from catenary.procedure.station import Station
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from catenary.wire.register import AL_STATUS, DL_CONTROL, DL_STATUS
 
 STATION = Station(5, 0x1006)
@@ -26,7 +26,7 @@ class Controller:
 
     def answer(self, request: Request) -> Reply:
         register = request.address >> 16
-        if request.command is Command.FPWR:
+        if request.command is EcatCommand.FPWR:
             assert register == DL_CONTROL.address
             self.control = DL_CONTROL.unpack(request.data)
             self.seen.append(self.control)

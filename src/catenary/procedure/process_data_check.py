@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from catenary.procedure.exchange import Procedure, Request
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 
 
 def probe_inputs(areas: Mapping[int, tuple[int, int]]) -> Procedure[tuple[int, ...]]:
@@ -15,7 +15,7 @@ def probe_inputs(areas: Mapping[int, tuple[int, int]]) -> Procedure[tuple[int, .
     if not areas:
         return ()
     replies = yield [
-        Request(Command.LRD, start, bytes(length), True) for start, length in areas.values()
+        Request(EcatCommand.LRD, start, bytes(length), True) for start, length in areas.values()
     ]
     return tuple(
         position

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from catenary.procedure.exchange import Procedure, read, write
 from catenary.procedure.station import Station, answered
 from catenary.procedure.stations import STATION_BASE, StationRegisters, read_registers
-from catenary.wire.datagram import Command
+from catenary.wire.datagram import EcatCommand
 from catenary.wire.register import STATION_ADDRESS
 
 
@@ -26,7 +26,7 @@ def visit(device_count: int) -> Procedure[tuple[StationRegisters, ...]]:
 
 def read_addresses(device_count: int) -> Procedure[tuple[int, ...]]:
     """The station addresses of the devices, in the order of the frame."""
-    replies = yield [read(Command.APRD, -rank, STATION_ADDRESS) for rank in range(device_count)]
+    replies = yield [read(EcatCommand.APRD, -rank, STATION_ADDRESS) for rank in range(device_count)]
     return tuple(
         STATION_ADDRESS.unpack(answered(reply, Station(rank, 0), "station address"))
         for rank, reply in enumerate(replies)
@@ -38,7 +38,9 @@ def give_addresses(found: Sequence[int], wanted: Sequence[int]) -> Procedure[Non
     missing = [rank for rank in range(len(found)) if wanted[rank] != found[rank]]
     if not missing:
         return
-    replies = yield [write(Command.APWR, -rank, STATION_ADDRESS, wanted[rank]) for rank in missing]
+    replies = yield [
+        write(EcatCommand.APWR, -rank, STATION_ADDRESS, wanted[rank]) for rank in missing
+    ]
     for rank, reply in zip(missing, replies, strict=True):
         answered(reply, Station(rank, wanted[rank]), "station address")
 
