@@ -1,12 +1,18 @@
-"""A tool that may be plugged off and on while the arm moves: `python tool.py eth0`. The first of
-its devices has the alias 20: `catenary alias eth0 POSITION 20`, then switch it off and on.
+"""A tool that may be unplugged and plugged in while the arm moves: `python tool.py eth0`.
+
+Without an argument it runs on the virtual segment of tool.toml, where the tool loses power once.
+On yours, the first device of the tool needs the alias 20: `catenary alias eth0 POSITION 20`, then
+switch it off and on.
 """
 
 import sys
+from pathlib import Path
 
 import catenary as cat
 
-with cat.MainDevice(sys.argv[1]) as main:
+HERE = Path(__file__).parent
+
+with cat.MainDevice(sys.argv[1] if len(sys.argv) > 1 else f"virtual:{HERE}/tool.toml") as main:
     subs = main.scan()
     tool = subs.group(20)
     others = [drive for drive in subs.drives if drive not in tool]

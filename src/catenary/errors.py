@@ -7,6 +7,11 @@ network's or the machine's.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from catenary.log import Log
+
 
 class CatenaryError(Exception):
     """Base of all. `hint` is the next thing to do, without a full stop at its end."""
@@ -94,7 +99,7 @@ class StateError(CatenaryError):
         requested: int,
         actual: int,
         code: int,
-        log: object = None,
+        log: Log | None = None,
         hint: str = "",
     ) -> None:
         super().__init__(message, hint=hint)
@@ -112,7 +117,7 @@ class MappingError(CatenaryError):
 class LoopError(CatenaryError):
     """The cyclic exchange could not go on. `log` holds the last cycles, oldest first."""
 
-    def __init__(self, message: str, *, log: object = None, hint: str = "") -> None:
+    def __init__(self, message: str, *, log: Log | None = None, hint: str = "") -> None:
         super().__init__(message, hint=hint)
         self.log = log
 

@@ -40,7 +40,7 @@ def test_rounds_of_a_peer_are_one_run() -> None:
 
 def test_figures_of_each_round_are_kept() -> None:
     rounds = combine("c", [make_round(5000, 300, 5000, 1), make_round(7000, 300, 5000, 2)]).rounds
-    assert (rounds.cycles, rounds.lost, rounds.late) == ([100, 100], [1, 2], [0, 0])
+    assert (rounds.cycles, rounds.lost, rounds.uncommitted) == ([100, 100], [1, 2], [0, 0])
     assert rounds.cpu_us_per_cycle == [20.0, 20.0]
     assert rounds.timing_us["receive"]["p50"] == [5.0, 7.0]
     assert rounds.timing_us["output_delay"]["max"] == [60.3, 62.3]

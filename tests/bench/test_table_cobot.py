@@ -57,7 +57,7 @@ def test_ours_stands_beside_theirs(tmp_path: Path) -> None:
 def test_without_the_example_the_published_table_remains(tmp_path: Path) -> None:
     text = show(cobot.measure(Options(example=tmp_path / "none.py")))
     assert "main control (theirs)" in text
-    assert "133.5/339.4/225.2/19.4" in text
+    assert "225.2/339.4/133.5/19.4" in text
     assert "none.py (--example says where it is)" in text
 
 

@@ -66,6 +66,35 @@ def test_the_oldest_are_dropped_and_counted() -> None:
     assert events.dropped == 2
 
 
+def test_in_a_loop_times_count_from_its_first_iteration() -> None:
+    events, zero_ns = Events(), 0
+    events.put(DeviceLost(7.0, None, "before the loop"))
+    events.begin_loop(lambda: zero_ns)
+    events.put(DeviceLost(8.0, None, "start-up"))
+    events.put(DeviceLost(9.0, None, "start-up"))
+    before = events.get()
+    early = events.get()
+    assert before is not None
+    assert early is not None
+    assert (before.time, early.time) == (7.0, 8.0)  # there is no zero yet
+    zero_ns = 10_000_000_000
+    events.put(DeviceLost(10.5, None, "in the loop"))
+    events.end_loop()
+    zero_ns = 0
+    events.put(DeviceLost(12.0, None, "after the loop"))
+    assert [event.time for event in events] == [-1.0, 0.5, 12.0]
+
+
+def test_a_listener_has_the_clock_of_the_link() -> None:
+    events, told = Events(), list[float]()
+    events.begin_loop(lambda: 2_000_000_000)
+    events.listen(lambda event: told.append(event.time))
+    event = DeviceLost(3.0, None, "in the loop")
+    events.put(event)
+    assert told == [3.0]
+    assert events.stamped(event).time == 1.0
+
+
 def test_an_event_is_frozen_and_reads_well() -> None:
     event = DeviceLost(1.5, None, "device 3 (Servo) does not answer")
     assert str(event) == "1.500 s: device 3 (Servo) does not answer"

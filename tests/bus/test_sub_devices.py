@@ -86,3 +86,12 @@ def test_a_refused_state_is_an_error_of_the_device() -> None:
         servo = main.scan()[1]
         with pytest.raises(StateError, match="servo"):
             servo.request_state("OP")  # without process data
+
+
+def test_a_notebook_shows_a_table() -> None:
+    with cat.MainDevice(Segment([Coupler(), Servo(name="a<b>", alias=7)])) as main:
+        html = main.scan()._repr_html_()
+    assert html.count("<tr>") == 3
+    assert "<th>position</th>" in html
+    assert "<td>a&lt;b&gt;</td>" in html
+    assert "<td>7</td><td>PRE-OP</td>" in html

@@ -7,8 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from catenary.cli.main import main
+from catenary.cli.main import VIRTUAL_TIME, main
 from catenary.virtual.description import VENDOR_ID
+
+NOTE = f"note: {VIRTUAL_TIME}\n"
 
 
 def call(line: str, capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
@@ -30,7 +32,7 @@ def test_scan_notes_what_is_odd(tmp_path: Path, capsys: pytest.CaptureFixture[st
     path = tmp_path / "twins.toml"
     path.write_text('[[device]]\nkind = "servo"\nalias = 7\n' * 2)
     status, _, err = call(f"scan virtual:{path}", capsys)
-    assert (status, err) == (0, "note: devices (0, 1) have the same alias 7\n")
+    assert (status, err) == (0, f"note: devices (0, 1) have the same alias 7\n{NOTE}")
 
 
 def test_scan_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
@@ -64,7 +66,7 @@ def test_sdo_read_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_sdo_write(capsys: pytest.CaptureFixture[str]) -> None:
-    assert call("sdo write virtual 2 0x6065 0x1388 --type UDINT", capsys) == (0, "", "")
+    assert call("sdo write virtual 2 0x6065 0x1388 --type UDINT", capsys) == (0, "", NOTE)
 
 
 def test_sdo_list_names_every_entry(capsys: pytest.CaptureFixture[str]) -> None:
@@ -121,3 +123,10 @@ def test_mistakes_name_the_thing(
     assert err.startswith("catenary: ")
     assert len(err.splitlines()) <= 2
     assert "internal error" not in err
+
+
+def test_virtual_time_is_named_where_the_clock_is_the_segments(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert call("scan virtual", capsys)[2] == NOTE
+    assert call("scan virtual-realtime", capsys)[2] == ""

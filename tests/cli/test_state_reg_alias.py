@@ -8,7 +8,7 @@ import shlex
 import pytest
 
 import catenary as cat
-from catenary.cli.main import main
+from catenary.cli.main import VIRTUAL_TIME, main
 
 
 def call(line: str, capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
@@ -84,7 +84,7 @@ def test_reg_write_takes_numbers_and_bytes(value: str, capsys: pytest.CaptureFix
 
 def test_alias_now_and_after_the_next_power_up(capsys: pytest.CaptureFixture[str]) -> None:
     name = "device 2 (Catenary virtual servo 1)"
-    assert call("alias virtual 2", capsys) == (0, f"{name}: no alias\n", "")
+    assert call("alias virtual 2", capsys) == (0, f"{name}: no alias\n", f"note: {VIRTUAL_TIME}\n")
     assert call("alias virtual 2 17", capsys)[1] == (
         f"{name}: no alias, after its next power-up alias 17\n"
     )

@@ -58,6 +58,7 @@ def test_buffers_have_the_types_and_lengths_of_the_views() -> None:
         **dict.fromkeys(("axis_state", "axis_flags", "goal", "stop_reason"), "B"),
         "stop_cycle": "Q",
         **dict.fromkeys(("input_bits", "output_bits", "unit_valid"), "B"),
+        **dict.fromkeys(("input_bytes", "output_bytes"), "B"),
         "request": "I",
     }
     assert len(b.engine.buffers["target_position"]) == 2

@@ -22,18 +22,18 @@ def test_figures_of_a_skewed_distribution(scale: int) -> None:
     values = np.random.default_rng(7).exponential(scale, 20_000).astype(np.int64)
     summary = filled(values).summary()
     assert summary["count"] == len(values)
-    assert summary["mean"] == pytest.approx(values.mean() / 1e3, rel=1e-9)
-    assert summary["sd"] == pytest.approx(values.std() / 1e3, rel=1e-6)
-    assert summary["min"] == values.min() / 1e3
-    assert summary["max"] == values.max() / 1e3
+    assert summary["mean"] == pytest.approx(values.mean() / 1e9, rel=1e-9)
+    assert summary["sd"] == pytest.approx(values.std() / 1e9, rel=1e-6)
+    assert summary["min"] == values.min() / 1e9
+    assert summary["max"] == values.max() / 1e9
     for name, percent in PERCENTILES.items():
-        expected = np.percentile(values, percent, method="nearest") / 1e3
+        expected = np.percentile(values, percent, method="nearest") / 1e9
         assert summary[name] == pytest.approx(expected, rel=0.004, abs=0.001)
 
 
 def test_the_deviation_of_a_steady_period_survives_its_size() -> None:
     values = 1_000_000_000 + np.random.default_rng(1).integers(-5, 6, 10_000)
-    assert filled(values).summary()["sd"] == pytest.approx(values.std() / 1e3, rel=1e-9)
+    assert filled(values).summary()["sd"] == pytest.approx(values.std() / 1e9, rel=1e-9)
 
 
 @settings(max_examples=100, deadline=None)
@@ -41,14 +41,14 @@ def test_the_deviation_of_a_steady_period_survives_its_size() -> None:
 def test_a_value_is_in_its_bucket_and_buckets_are_narrow(value: int) -> None:
     [(lower, upper, count)] = filled(np.array([value])).counts()
     assert count == 1
-    assert lower <= value / 1e3 < upper
+    assert lower <= value / 1e9 < upper
     assert upper - lower <= max(0.001, 0.004 * lower) + 1e-9
 
 
 def test_what_is_out_of_range_is_counted_at_the_ends() -> None:
     histogram = filled(np.array([-5, 2**60]))
     assert histogram.summary()["min"] == 0
-    assert histogram.summary()["max"] == 2**60 / 1e3
+    assert histogram.summary()["max"] == 2**60 / 1e9
     assert sum(count for *_, count in histogram.counts()) == 2
 
 

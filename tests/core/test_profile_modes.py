@@ -103,7 +103,7 @@ def test_pv_stays_within_the_velocity_limit() -> None:
 
 
 def test_a_stop_that_finds_bit_12_of_pp_does_not_wait_for_it() -> None:
-    """It acknowledges a set-point there: its end is no sign that the drive reacts."""
+    """It acknowledges a set-point there: its end does not show that the drive reacts."""
     b = bench(axis(0), drives=[ScriptedDrive()])
     b.enable()  # the drive has shown bit 12 of CSP
     b.mode_target[0] = PP

@@ -51,6 +51,8 @@ def test_an_empty_stream_is_an_underrun_that_is_reported_and_ends(execution: str
     assert b.drives[0].state == 4
     assert b.engine.next() & CYCLE_DRY
     assert stream.dry > 40
+    counters = b.engine.counters
+    assert (counters["underrun"], counters["uncommitted"]) == (stream.dry, 0)
     stream.write(rows(0.002), b.engine.number)
     b.steps(20)
     assert b.drives[0].target_position == 2

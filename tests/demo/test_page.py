@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from catenary.demo.page import as_html, drawn_range
-from catenary.demo.result import FIGURES, PHASES, Device, Motion, Result, as_json
+from catenary.demo.result import PHASES, Device, Motion, Result, as_json
+from catenary.figures import FIGURES
+from catenary.loop.timing import Timing
 
 VOID = {"meta", "link", "br", "img", "rect", "path", "polyline"}
 
@@ -15,17 +17,17 @@ VOID = {"meta", "link", "br", "img", "rect", "path", "polyline"}
 def result() -> Result:
     time = np.arange(2000) * 1e-3
     reference = np.stack([np.sin(time + phase) for phase in (0.0, 1.0, 2.0)], axis=1)
-    figures = dict(zip(FIGURES, (2.0, 1.0, 9.0, 0.5, 2.0, 4.0, 5.0), strict=True))
-    buckets = [(1.0, 2.0, 1000), (2.0, 3.0, 999), (8.0, 9.0, 1)]
+    figures = dict(zip(FIGURES, (2e-6, 9e-6, 1e-6, 5e-7, 2e-6, 4e-6, 5e-6), strict=True))
+    buckets = [(1e-6, 2e-6, 1000), (2e-6, 3e-6, 999), (8e-6, 9e-6, 1)]
+    counters = {"cycles": 2000, "late": 1, "uncommitted": 2, "underrun": 0, "lost": 0}
+    phases = {phase: {"count": 2000, **figures} for phase in PHASES}
     return Result(
         devices=[Device(0, "A & B <coupler>", 2, 0x044C2C52, "OP")],
         period=1e-3,
         cycles=2000,
-        lost=0,
-        late=1,
-        timing_us=dict.fromkeys(PHASES, figures),
+        timing=Timing(phases, counters, period=1e-3, scheduling="SCHED_OTHER"),
         histograms={phase: buckets for phase in PHASES},
-        motion=Motion(time, reference, reference + 0.01),
+        motion=Motion(time, reference, np.roll(reference, 2, axis=0) + 0.01),
         link="veth",
         scheduling="SCHED_OTHER",
     )
@@ -55,9 +57,13 @@ def test_json_has_the_published_form(result: Result) -> None:
     assert list(read) == [
         "devices",
         "cycles",
-        "lost",
         "late",
+        "uncommitted",
+        "underrun",
+        "lost",
+        "verdict",
         "tracking_error_rad",
+        "transport_delay_s",
         "timing_us",
         "link",
         "scheduling",
@@ -72,6 +78,17 @@ def test_json_has_the_published_form(result: Result) -> None:
     assert set(read["timing_us"]) == set(PHASES)
     assert all(set(figures) == set(FIGURES) for figures in read["timing_us"].values())
     assert read["tracking_error_rad"] == {"rms": 0.01, "max": 0.01}
+    assert read["transport_delay_s"] == 2e-3
+    assert (read["late"], read["uncommitted"]) == (1, 2)
+    assert read["timing_us"]["period"]["max"] == 9.0
+
+
+def test_the_error_is_against_what_had_reached_the_drive() -> None:
+    time = np.array([0.0, 1e-3, 2e-3, 6e-3, 7e-3])  # the program missed three cycles
+    reference = np.array([[0.0], [1.0], [2.0], [3.0], [4.0]])
+    error = Motion(time, reference, np.zeros_like(reference)).error(2e-3)
+    assert np.isnan(error[:2]).all()
+    assert error[2:, 0].tolist() == [0.0, -2.0, -2.0]
 
 
 def test_page_is_well_formed_and_needs_nothing_from_elsewhere(result: Result) -> None:

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from catenary.cli.main import main
-from catenary.demo.result import FIGURES, PHASES
+from catenary.demo.result import PHASES
+from catenary.figures import FIGURES
 
 
 @pytest.fixture(scope="module")
@@ -44,4 +45,7 @@ def test_what_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert "no real frames here (asked for)" in printed
     assert "\r" not in printed  # no progress bar: this is no terminal
     assert "in_controller" in printed
+    assert " late, " in printed
+    assert "against the set-point that had reached the drive" in printed
+    assert "transport delay 2 ms" in printed
     assert str(tmp_path / "demo.html") in printed

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from catenary.errors import SdoAbort
+from catenary.model.device import Direction
 from catenary.plan.cycle import Number, NumberKind
 from catenary.plan.numbers import ANY, Which
 from catenary.plan.wish import PdoWish, Views, WishTables
@@ -38,6 +39,10 @@ class FakeLayout:
 
     def sync_unit(self, device: int) -> int:
         return device
+
+    def byte_range(self, device: int, direction: Direction) -> range:
+        sizes = (self.outputs if direction is Direction.OUTPUT else self.inputs).get(device, {})
+        return range((sum(sizes.values()) + 7) // 8)
 
 
 def place(
@@ -137,6 +142,8 @@ def views_of(tables: WishTables) -> Views:
         input_reals=np.zeros(count(tables.input_columns, 0)),
         input_integers=np.zeros(count(tables.input_columns, 1), np.int64),
         input_bits=np.zeros(count(tables.input_columns, 2), np.uint8),
+        input_bytes=np.zeros(sum(area.size for area in tables.input_areas), np.uint8),
+        output_bytes=np.zeros(sum(area.size for area in tables.output_areas), np.uint8),
         output_reals=np.zeros(count(tables.output_columns, 0)),
         output_integers=np.zeros(count(tables.output_columns, 1), np.int64),
         output_bits=np.zeros(count(tables.output_columns, 2), np.uint8),

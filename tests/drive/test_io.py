@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from catenary.drive import Inputs, Outputs
-from catenary.drive.io import unique_names
+from catenary.drive.device_channels import unique_names
 from catenary.model.device import Assignment, Direction, Entry, Pdo
 from catenary.plan.cycle import Bank, NumberKind
 from tests.drive.fakes import FakeLayout, views_of

@@ -211,3 +211,52 @@ def test_the_default_velocity_is_not_raised_by_the_drive() -> None:
     slow = make_bounds("a", LimitOptions(), [Mode.CSP], OwnLimits(velocity=3.0), AxisUnits(1))
     assert fast.velocity.value == pytest.approx(2 * math.pi)
     assert slow.velocity.value == 3.0
+
+
+# ---- linear axes
+
+
+def test_a_linear_axis_has_defaults_and_messages_of_its_own() -> None:
+    subs = [fake_sub(3, BRAKING), fake_sub(4, BRAKING)]
+    with pytest.warns(UserWarning, match="no velocity_limit") as warned:
+        drives = Drives(subs, counts_per_turn=1000, metres_per_turn=[0.01, None])
+    texts = [str(each.message) for each in warned]
+    assert "3 Servo: 0.1 m/s" in texts[0]
+    assert "4 Servo: 6.28 rad/s" in texts[1]
+    tables = drives.tables(FakeLayout.of(dict(drives.pdos(MILLISECOND))))
+    linear, rotary = tables.axes
+    assert (linear.limits.velocity, linear.standstill, linear.step_floor) == (0.1, 0.005, 0.005)
+    assert (rotary.standstill, rotary.step_floor) == (0.05, 0.1)
+    lines = "\n".join(tables.axis_reports[0].lines)
+    assert "velocity 0.1 m/s (default)" in lines
+    assert "step limit 0.005 m (default)" in lines
+    assert "limits: force none" in lines
+
+
+def test_a_force_limit_belongs_to_linear_axes_and_a_torque_limit_to_rotary_ones() -> None:
+    both = [fake_sub(3), fake_sub(4)]
+    drives = Drives(
+        both,
+        counts_per_turn=1000,
+        velocity_limit=1.0,
+        metres_per_turn=[0.01, None],
+        force_limit=[60.0, None],
+        torque_limit=[None, 2.0],
+    )
+    assert [axis.options.torque_limit for axis in drives._axes] == [60.0, 2.0]
+    with pytest.raises(ValueError, match="it is rotary; use torque_limit"):
+        Drives(both, counts_per_turn=1000, velocity_limit=1.0, force_limit=60.0)
+    with pytest.raises(ValueError, match="it is linear; use force_limit"):
+        Drives(
+            both, counts_per_turn=1000, velocity_limit=1.0, metres_per_turn=0.01, torque_limit=1.0
+        )
+    with pytest.raises(ValueError, match="force_limit must be positive"):
+        Drives(
+            both, counts_per_turn=1000, velocity_limit=1.0, metres_per_turn=0.01, force_limit=-1.0
+        )
+
+
+def test_the_motor_speed_limit_of_a_linear_axis_is_in_metres() -> None:
+    units = AxisUnits(1000, gear_ratio=2.0, metres_per_turn=0.01)
+    speed = own_limits(DriveSettings(max_motor_speed=6000), units)
+    assert speed.velocity == pytest.approx(100 / 2 * 0.01)

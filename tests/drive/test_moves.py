@@ -15,7 +15,7 @@ from catenary.drive import Drives
 from catenary.drive.move import Move
 from catenary.errors import ConfigurationError, DriveError, MoveError
 from catenary.loop import Loop, StopPolicy
-from catenary.virtual import Coupler, Segment, Servo
+from catenary.virtual import Coupler, Segment, Servo, _segment
 
 TURN = 2**20
 OPTIONS: dict[str, Any] = {"counts_per_turn": TURN, "velocity_limit": 2.0}
@@ -106,12 +106,12 @@ def test_the_defaults_are_the_limits_of_the_axis() -> None:
 
 
 def test_an_infinite_velocity_limit_needs_rates() -> None:
-    with opened(Servo(), velocity_limit=math.inf, step_limit=1.0, deceleration_limit=10.0) as (
-        arm,
-        loop,
-    ):
-        # the drive's own 0x6080 (350 rad/s) is known
-        assert arm.move_to(0.1).patience > 10.0
+    options: dict[str, Any] = {"velocity_limit": math.inf, "step_limit": 1.0}
+    with opened(Servo(), deceleration_limit=10.0, **options) as (arm, loop):
+        with pytest.raises(ValueError, match=r"no velocity for the move: give velocity= \[rad/s\]"):
+            arm.move_to(0.1)
+        with pytest.raises(ValueError, match=r"no acceleration for the move: .*\[rad/s²\]"):
+            arm.move_to(0.1, velocity=1.0)
         loop.wait(arm.move_to(0.2, velocity=1.0, acceleration=5.0))
 
 
@@ -127,7 +127,7 @@ def test_stop_decelerates_and_holds() -> None:
         held = arm.actual.position.item(0)
         loop_for(loop, 0.2)
         assert arm.actual.position[0] == pytest.approx(held, abs=1e-3)
-        loop.wait(move)  # a stop that was asked for is not an error
+        loop.wait(move)  # a requested stop is not an error
 
 
 def test_a_stop_with_limited_jerk() -> None:
@@ -333,15 +333,53 @@ PROFILE_PDO = [
 ]
 
 
-def test_pp_writes_the_rates_into_the_process_data_where_they_are_mapped() -> None:
-    servo = Servo()
-    with opened(servo, mode="pp", pdos={0x1600: PROFILE_PDO}) as (arm, loop):
-        assert arm.target["profile_velocity"] == pytest.approx(2.0)  # until a move
-        move = arm.move_to(0.5, velocity=0.5, acceleration=2.0)
-        fastest = max(trace(loop, move, lambda: arm.actual.velocity.item(0)))
-        assert arm.target["profile_velocity"] == pytest.approx(0.5)
-    assert fastest == pytest.approx(0.5, rel=0.02)
-    assert servo.position_rad == pytest.approx(0.5, abs=1e-3)
+@pytest.mark.parametrize("columns", [[], ["profile_velocity"]])
+def test_pp_writes_the_rates_into_the_process_data_where_they_are_mapped(
+    columns: list[str],
+) -> None:
+    mapped, other = Servo(), Servo()
+    others = Segment([mapped, other])
+    with cat.MainDevice(others) as main:
+        subs = main.scan().drives
+        left = Drives(subs[:1], mode="pp", pdos={0x1600: PROFILE_PDO}, columns=columns, **OPTIONS)
+        right = Drives(subs[1:], mode="pp", **OPTIONS)  # by SDO
+        with Loop(left, right) as loop:
+            next(loop)
+            assert rates_of(mapped)[0] == round(2.0 * TURN / math.tau)  # until a move
+            moves = [arm.move_to(0.5, velocity=0.5, acceleration=2.0) for arm in (left, right)]
+            for move in moves:
+                loop.wait(move)
+            for servo in (mapped, other):
+                assert rates_of(servo) == [round(v * TURN / math.tau) for v in (0.5, 2.0, 2.0)]
+                assert servo.position_rad == pytest.approx(0.5, abs=1e-3)
+            if columns:
+                assert left.target["profile_velocity"] == pytest.approx(0.5)
+
+
+def rates_of(servo: Servo) -> list[int]:
+    """Return 0x6081, 0x6083 and 0x6084 as the drive has them."""
+    slots = (
+        _segment.SLOT_PROFILE_VELOCITY,
+        _segment.SLOT_ACCELERATION,
+        _segment.SLOT_DECELERATION,
+    )
+    return [servo.core.slot(servo.position, slot) for slot in slots]
+
+
+@pytest.mark.parametrize("mode", ["csp", "pp"])
+@pytest.mark.parametrize(("execution", "divider"), [("inline", 1), ("threaded", 4), ("inline", 3)])
+def test_moves_in_every_execution_and_with_a_divider(
+    mode: str, execution: str, divider: int
+) -> None:
+    servos = Servo(axes=2), Servo()
+    with opened(*servos, mode=mode, execution=execution, divider=divider) as (arm, loop):
+        loop.wait(arm.move_to([0.2, -0.1, 0.3]))
+        old = arm.move_to(1.0)
+        loop_for(loop, 0.02)
+        loop.wait(arm.move_to(0.0))
+        assert old.outcome == "replaced"
+        truth = [servos[0].axis_position(0), servos[0].axis_position(1), servos[1].position_rad]
+        assert truth == pytest.approx([0.0] * 3, abs=1e-3)
 
 
 def test_a_stop_in_pp_halts_and_does_not_go_on() -> None:

@@ -85,3 +85,24 @@ def test_per_axis_repeats_one_value_or_takes_one_each() -> None:
     assert per_axis("gear_ratio", [1.0, 2.0], 2) == (1.0, 2.0)
     with pytest.raises(ValueError, match="gear_ratio has 2 values for 3 axes"):
         per_axis("gear_ratio", [1.0, 2.0], 3)
+
+
+def test_a_linear_axis_has_metres_per_turn_of_the_output_side() -> None:
+    units = AxisUnits(counts_per_turn=4096, gear_ratio=2, metres_per_turn=0.01, rated_torque=0.5)
+    assert si(units.apply(RAW, Unit.POSITION), 2 * 4096) == pytest.approx(0.01)
+    assert si(units.apply(RAW, Unit.VELOCITY), 2 * 4096) == pytest.approx(0.01)
+    force = 0.5 * 2 * 2 * math.pi / 0.01  # power is kept: F · 0.01 m = M · 2 turns
+    assert si(units.apply(RAW, Unit.TORQUE), 1000) == pytest.approx(force)
+    assert units.names.torque == "N"
+    assert units.defaults.velocity_limit == 0.1
+
+
+def test_a_velocity_unit_of_the_motor_is_in_radians_on_a_linear_axis_too() -> None:
+    units = AxisUnits(counts_per_turn=1, velocity_unit=2 * math.pi / 60, metres_per_turn=0.06)
+    assert si(units.apply(RAW, Unit.VELOCITY), 60) == pytest.approx(0.06)
+
+
+def test_magnitudes_have_no_direction() -> None:
+    units = AxisUnits(counts_per_turn=1000, direction=-1, rated_torque=1.0)
+    assert units.apply(RAW, Unit.SPEED).scale > 0 > units.apply(RAW, Unit.VELOCITY).scale
+    assert units.apply(RAW, Unit.EFFORT).scale > 0 > units.apply(RAW, Unit.TORQUE).scale

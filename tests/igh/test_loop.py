@@ -11,7 +11,10 @@ import numpy as np
 import pytest
 
 import catenary as cat
+from catenary.drive import ProcessData, StartUp
+from catenary.errors import ConfigurationError
 from catenary.igh import Master
+from catenary.types import DINT, USINT
 from tests.igh.double import Double
 from tests.igh.loops import kernel_of
 
@@ -323,3 +326,42 @@ def test_two_masters_in_one_loop(doubles: dict[str, Path], tmp_path: Path) -> No
                 if cycle.number > 20:
                     break
             assert all(arm.enabled.all() for arm in arms)
+
+
+def test_start_up_objects_are_told_to_the_master_in_their_order(
+    main: cat.MainDevice, double: Double
+) -> None:
+    """The kernel writes all of them before the mapping, and reads none back (docs/igh.md)."""
+    arm = arm_of(
+        main,
+        start_up=[
+            StartUp(0x60C2, 1, 2, type=USINT),
+            StartUp(0x605A, 0, b"\x02\x00", before_mapping=True),
+        ],
+    )
+    with cat.Loop(arm):
+        told = [call for call in double.changes() if call.startswith("config_sdo 1")]
+    places = [call.split()[2] for call in told]
+    assert places[0] == "605a:00"
+    assert places[-1] == "60c2:01"
+    assert double.value(1, 0x60C2, 1) == 2
+
+
+def test_libethercat_does_not_know_the_type_of_an_object(main: cat.MainDevice) -> None:
+    arm = arm_of(main, start_up=[StartUp(0x605A, 0, 2)])
+    with pytest.raises(ConfigurationError, match="type of start-up object 0x605A:00 is unknown"):
+        main.plan(arm)
+
+
+def test_process_data_as_bytes_and_by_name(main: cat.MainDevice, double: Double) -> None:
+    first, second = main.subs
+    raw = ProcessData(first, safe=b"\0\0" + bytes((1, 2, 3, 4)) + b"\0")
+    named = ProcessData(second, inputs={"position": (0x6064, 0, DINT)}, outputs={})
+    with cat.Loop(raw, named) as loop:
+        assert (len(raw.outputs), len(raw.inputs)) == (7, 9)
+        raw.outputs[2:6] = (0x12345678).to_bytes(4, "little")
+        for _ in range(4):
+            assert next(loop).ok
+        assert double.value(0, 0x607A, 0) == 0x12345678
+        assert named["position"] == 1000
+    assert double.value(0, 0x607A, 0) == 0x04030201

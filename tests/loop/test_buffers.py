@@ -3,7 +3,7 @@
 import numpy as np
 
 from catenary.loop.buffers import AXIS_BUFFERS, COLUMN_BUFFERS, bind_wishes
-from catenary.plan.cycle import AxisPlan, Bank, Column, Number, NumberKind
+from catenary.plan.cycle import AxisPlan, Bank, Column, ImageArea, Number, NumberKind
 from catenary.plan.wish import Views, WishTables
 
 WORD = Number(0, 16, NumberKind.UNSIGNED)
@@ -33,6 +33,8 @@ def buffers_of(tables: list[WishTables]) -> dict[str, memoryview]:
     for (output, bank), name in COLUMN_BUFFERS.items():
         columns = [c for t in tables for c in (t.output_columns if output else t.input_columns)]
         sizes[name] = sum(c.bank is bank for c in columns)
+    sizes["input_bytes"] = sum(area.size for t in tables for area in t.input_areas)
+    sizes["output_bytes"] = sum(area.size for t in tables for area in t.output_areas)
     sizes["unit_valid"] = 2
     return {name: memoryview(np.arange(size, dtype=np.float64)) for name, size in sizes.items()}
 
@@ -65,3 +67,14 @@ def test_views_are_no_copies() -> None:
     bind_wishes([wish], tables, buffers, lambda: True)  # type: ignore[list-item]
     wish.views.target_position[0] = 1.5
     assert buffers["target_position"][0] == 1.5
+
+
+def test_areas_of_two_wishes_lie_one_after_the_other() -> None:
+    first = ImageArea("a", 8, 3, 0, 0, bytes(3))
+    second = ImageArea("b", 0, 2, 1, 0, bytes(2))
+    tables = [WishTables(output_areas=(first,)), WishTables(output_areas=(second,))]
+    wishes = [Bound(), Bound()]
+    whole = bind_wishes(wishes, tables, buffers_of(tables), lambda: True)  # type: ignore[arg-type]
+    assert [wish.views.output_bytes.tolist() for wish in wishes] == [[0, 1, 2], [3, 4]]
+    assert whole.output_bytes.size == 5
+    assert whole.input_bytes.size == 0

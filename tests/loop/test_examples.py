@@ -1,4 +1,4 @@
-"""The examples of devices that come and go, and of two networks, run and say what they promise."""
+"""Every example runs without arguments; two of them are seen to do what they say."""
 
 from __future__ import annotations
 
@@ -6,22 +6,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+import pytest
 
-TOOL = """
-[[device]]
-kind = "coupler"
-[[device]]
-kind = "servo"
-[[device]]
-kind = "digital_outputs"
-alias = 20
-[[fault]]
-kind = "power_cycle"
-device = 2
-at = 1.0
-for = 0.5
-"""
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+TESTED_ELSEWHERE = ("compiled_law.py", "three_tasks.py", "tool.py", "two_networks.py")
 
 
 def run(name: str, *arguments: str) -> str:
@@ -36,10 +24,16 @@ def run(name: str, *arguments: str) -> str:
     return done.stdout
 
 
-def test_a_tool_that_comes_and_goes(tmp_path: Path) -> None:
-    cell = tmp_path / "cell.toml"
-    cell.write_text(TOOL)
-    out = run("tool.py", f"virtual:{cell}")
+@pytest.mark.parametrize(
+    "name",
+    sorted(path.name for path in EXAMPLES.glob("*.py") if path.name not in TESTED_ELSEWHERE),
+)
+def test_it_runs_without_arguments(name: str) -> None:
+    assert run(name)
+
+
+def test_a_tool_that_comes_and_goes() -> None:
+    out = run("tool.py")
     assert "device 2" in out
     assert "does not answer any more" in out
     assert "answers again" in out

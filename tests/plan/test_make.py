@@ -342,3 +342,9 @@ def test_the_watchdog_can_be_off() -> None:
     assert plan.devices[2].watchdog_count == 0
     assert plan.devices[2].layout.sync_managers[0].control == 0x24
     assert "13 out, 13 in, watchdog off" in str(plan)
+
+
+def test_a_notebook_shows_the_text() -> None:
+    html = make_plan(demo())._repr_html_()
+    assert html.startswith("<pre>Plan: ")
+    assert html.count("\n") == str(make_plan(demo())).count("\n")

@@ -34,6 +34,17 @@ class Memory:
         return Reply(bytes(self.bytes.get(address, 0) for address in span), 1)
 
 
+class LockedMemory(Memory):
+    """As ETG.1000.4 §6.7.2: an enabled SyncManager keeps its start, length and control."""
+
+    def __call__(self, request: Request) -> Reply:
+        start = request.address >> 16
+        if request.command is Command.FPWR and 0x0800 <= start < 0x0880 and len(request.data) == 8:
+            enabled = self.bytes.get(start + 6, 0) & 1
+            self.stuck = {k: self.bytes[k] for k in range(start, start + 5)} if enabled else {}
+        return super().__call__(request)
+
+
 def configure(memory: Memory, watchdog: float | None = None) -> Memory:
     device = servo(0)
     plan = make_plan([device], watchdog=watchdog).devices[0]
@@ -87,3 +98,10 @@ def test_a_device_without_outputs_has_no_watchdog_to_write() -> None:
     memory = Memory()
     play(configure_process_data(STATION, device, make_plan([device]).devices[0]), memory)
     assert not {0x0400, 0x0420} & memory.bytes.keys()
+
+
+def test_a_second_plan_with_another_length_is_written() -> None:
+    memory = LockedMemory()
+    configure(memory)
+    memory.bytes[0x0812] = 0xFF  # the length of another plan
+    assert configure(memory).bytes[0x0812] != 0xFF

@@ -202,3 +202,20 @@ def test_what_cannot_be_drawn_is_said(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="not in 'turns'"):
         record.plot(recording, tmp_path / "x.png", unit="turns")
     assert not list(tmp_path.iterdir())
+
+
+def test_linear_axes_are_drawn_in_their_units(tmp_path: Path) -> None:
+    layout = make_layout(2)
+    units = {"rad": "m", "rad/s": "m/s", "N·m": "N"}
+    fields = tuple(
+        msgspec.structs.replace(each, unit=units.get(each.unit, each.unit))
+        for each in layout.fields
+    )
+    layout = msgspec.structs.replace(layout, fields=fields)
+    recording = Recording(layout, make_rows(layout, 400), (), 0, "the loop ended")
+    titles = [plot.get_title(loc="left") for plot in draw(recording).subfigs[0].axes[:3]]
+    assert [title.partition("[")[2] for title in titles] == ["m]", "mm]", "N]"]
+    record.plot(recording, tmp_path / "x.html", unit="deg")
+    page = (tmp_path / "x.html").read_text()
+    assert "error, rms [mm]" in page
+    assert "torque, rms [N]" in page

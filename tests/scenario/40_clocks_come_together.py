@@ -82,7 +82,7 @@ def test_the_wake_up_takes_on_the_reference_clocks_rate() -> None:
             run_for(loop, 1.0)
             assert loop.clocks.rate == pytest.approx(150e-6, abs=1e-6)
             period = loop.timing["period"]["mean"]
-        assert period == pytest.approx(1000 / (1 + 150e-6), rel=5e-6)  # [us], of the machine
+        assert period == pytest.approx(1e-3 / (1 + 150e-6), rel=5e-6)  # of the machine
 
 
 def test_the_reference_takes_on_the_machines_rate() -> None:

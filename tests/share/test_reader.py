@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 import catenary as cat
+from catenary.drive import ProcessData
 from catenary.errors import DriveError, ShareError
 from catenary.loop.publishing import one_sink_each
 from catenary.share.reader import Reader
 from catenary.virtual import AnalogInputs, Coupler, DigitalOutputs, Segment, Servo
+from tests.force_sensor import ForceSensor
 from tests.share.names import state_file
 
 TURN = 2**20
@@ -144,6 +146,23 @@ def test_columns_of_one_name_get_their_devices_with_it(name: str) -> None:
                 assert now[lamps.names[0]] == 1
                 assert now[lamps.names[-1]] == 0
                 assert now[inputs.names[0]] == inputs[inputs.names[0]]
+
+
+def test_bytes_of_process_data_are_in_the_rows(name: str) -> None:
+    segment = Segment([Coupler(), ForceSensor(), DigitalOutputs()])
+    with cat.MainDevice(segment) as main:
+        subs = main.scan()
+        sensor, lamps = ProcessData(subs[1]), ProcessData(subs[2])
+        with cat.Share(name) as share, cat.Loop(sensor, lamps, sink=share) as loop:
+            sensor["Lamp"] = 0x1234
+            lamps.outputs[0] = 5
+            for _ in range(3):
+                next(loop)
+            with cat.attach(name) as reader:
+                now = reader.read()
+                assert now["input_bytes"].tolist() == list(sensor.inputs)
+                assert now["output_bytes of device 1"].tolist() == [0, 0x34, 0x12]
+                assert now["output_bytes of device 2"].tolist() == [5]
 
 
 def test_waiting_ends_with_the_loop(name: str) -> None:

@@ -10,6 +10,7 @@ from catenary.errors import CatenaryError, ConfigurationError
 from catenary.igh import Master
 from catenary.link import Interface, Ring
 from catenary.target import MainDevice, parse
+from catenary.target.parse import in_virtual_time
 from catenary.virtual import Coupler, Segment
 
 
@@ -31,6 +32,21 @@ def test_virtual_with_a_file(tmp_path: Path) -> None:
     segment = parse(f"virtual:{file}")
     assert isinstance(segment, Segment)
     assert len(segment) == 1
+
+
+@pytest.mark.parametrize(
+    ("target", "clock"), [("virtual", "virtual"), ("virtual-realtime", "monotonic")]
+)
+def test_a_virtual_segment_on_the_clock_of_the_machine(
+    target: str, clock: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "cell.toml"
+    file.write_text('[[device]]\nkind = "coupler"\n')
+    for source in (parse(target), parse(f"{target}:{file}")):
+        assert isinstance(source, Segment)
+        assert source.clock == clock
+    assert in_virtual_time(target) is (clock == "virtual")
+    assert not in_virtual_time("eth0")
 
 
 def test_a_file_that_is_not_there_is_named() -> None:

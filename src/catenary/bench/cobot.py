@@ -88,7 +88,7 @@ class Outcome:
         clock with the devices, where they are played here, and a release for every job: timer
         interrupt, wake-up, switch, at most as long as the first task was ever late to start."""
         first, executions = next(iter(self.tasks)), self.measured.executions
-        main = executions.get(MAIN, self.timing["in_controller"]["max"] * 1e-6)
+        main = executions.get(MAIN, self.timing["in_controller"]["max"])
         others = [(MAIN, main, PRIORITY)]
         if DEVICES in executions:
             others.append((DEVICES, executions[DEVICES], wire.PRIORITY))

@@ -89,7 +89,9 @@ class Round:
     lost: int
     cpu_per_cycle_ns: float  # CPU time of the process (all threads, user and system) / cycles
     scheduling: str = ""
-    late: int = 0  # cycles sent without fresh set-points because Python was late; threaded only
+    uncommitted: int = (
+        0  # cycles sent without fresh set-points because Python was late; threaded only
+    )
     answers: int = 0  # to SDO requests, from all devices, over the measured cycles
 
 
@@ -97,7 +99,7 @@ class _Summary(msgspec.Struct):
     lost: int
     cpu_per_cycle_ns: float
     scheduling: str
-    late: int = 0
+    uncommitted: int = 0
     answers: int = 0
 
 
@@ -111,7 +113,7 @@ def read_job(path: Path) -> Job:
 
 def write_round(result: Round, path: Path) -> None:
     summary = _Summary(
-        result.lost, result.cpu_per_cycle_ns, result.scheduling, result.late, result.answers
+        result.lost, result.cpu_per_cycle_ns, result.scheduling, result.uncommitted, result.answers
     )
     np.savez(
         path,
@@ -128,6 +130,6 @@ def read_round(path: Path) -> Round:
             summary.lost,
             summary.cpu_per_cycle_ns,
             summary.scheduling,
-            summary.late,
+            summary.uncommitted,
             summary.answers,
         )

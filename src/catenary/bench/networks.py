@@ -47,7 +47,7 @@ class Tally:
     cycles: int
     lost: int
     late: int  # instants that passed without a cycle (ours), cycles begun a period late (C's)
-    lateness_us: dict[str, float]  # p50, p99, max
+    lateness_us: dict[str, float]  # max, p50, p99
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,22 +132,22 @@ def tally(name: str, cycles: int, rounds: Sequence[Sequence[NetworkRound]]) -> I
             lost=sum(each.lost for each in mine),
             late=sum(each.late for each in mine),
             lateness_us={
+                "max": round(float(lateness.max()), 2),
                 "p50": round(float(p50), 2),
                 "p99": round(float(p99), 2),
-                "max": round(float(lateness.max()), 2),
             },
         )
 
 
 def as_text(tallies: Sequence[Tally]) -> str:
     lines = [
-        f"  {'':10}{'network':>8}{'cycles':>9}{'lost':>7}{'late':>7}"
-        f"{'lateness [us] p50, p99, max':>32}"
+        f"  {'':10}{'network':>8}{'cycles':>9}{'late':>7}{'lost':>7}"
+        f"{'lateness [us] max, p50, p99':>32}"
     ]
     for each in tallies:
         lateness = "".join(f"{value:10.1f}" for value in each.lateness_us.values())
         lines.append(
-            f"  {each.name:10}{each.network:8d}{each.cycles:9d}{each.lost:7d}{each.late:7d}"
+            f"  {each.name:10}{each.network:8d}{each.cycles:9d}{each.late:7d}{each.lost:7d}"
             f"  {lateness}"
         )
     return "\n".join(lines)

@@ -16,7 +16,7 @@ HEADLINES = {
     "input_age": "input age",
 }
 COLUMNS = ("period", "lateness", "receive", "process", "send", "in_controller", "tail")
-FIGURES = ("p50", "p99", "max")
+FIGURES = ("max", "p50", "p99")  # in the order of catenary.figures
 NAME, FIGURE, GAP = 20, 9, "   "  # widths of a name and of a figure, between groups of figures
 
 
@@ -57,8 +57,8 @@ def as_json(
             {
                 "name": run.name,
                 "cycles": run.cycles,
+                "uncommitted": run.uncommitted,
                 "lost": run.lost,
-                "late": run.late,
                 "cpu_us_per_cycle": round(run.cpu_us_per_cycle, 3),
                 **({"answers": run.answers} if run.answers else {}),
                 "scheduling": run.scheduling,
@@ -106,9 +106,9 @@ def _phases(runs: Sequence[Run], figure: str) -> str:
 
 
 def _counters(runs: Sequence[Run]) -> str:
-    lines = [f"{'':{NAME}}{'rounds':>8}{'cycles':>9}{'lost':>7}{'late':>7}"]
+    lines = [f"{'':{NAME}}{'rounds':>8}{'cycles':>9}{'uncommitted':>13}{'lost':>7}"]
     lines += [
-        f"{run.name:{NAME}}{len(run.rounds.cycles):8d}{run.cycles:9d}{run.lost:7d}{run.late:7d}"
+        f"{run.name:{NAME}}{len(run.rounds.cycles):8d}{run.cycles:9d}{run.uncommitted:13d}{run.lost:7d}"
         for run in runs
     ]
     return "\n".join(lines)

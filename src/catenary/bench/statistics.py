@@ -27,7 +27,7 @@ class Rounds:
 
     cycles: list[int]
     lost: list[int]
-    late: list[int]
+    uncommitted: list[int]
     cpu_us_per_cycle: list[float]
     timing_us: dict[str, dict[str, list[float | None]]]  # None: the phase did not occur
 
@@ -39,7 +39,7 @@ class Run:
     name: str
     cycles: int
     lost: int
-    late: int
+    uncommitted: int
     cpu_us_per_cycle: float
     scheduling: str
     timing_us: Timing
@@ -57,14 +57,14 @@ def combine(name: str, rounds: Sequence[Round]) -> Run:
         name=name,
         cycles=sum(counts),
         lost=sum(one.lost for one in rounds),
-        late=sum(one.late for one in rounds),
+        uncommitted=sum(one.uncommitted for one in rounds),
         cpu_us_per_cycle=cpu_ns * 1e-3 / sum(counts),
         scheduling=" / ".join(sorted({one.scheduling for one in rounds})),
         timing_us={column: summarise(values) for column, values in together.items()},
         rounds=Rounds(
             cycles=counts,
             lost=[one.lost for one in rounds],
-            late=[one.late for one in rounds],
+            uncommitted=[one.uncommitted for one in rounds],
             cpu_us_per_cycle=[round(one.cpu_per_cycle_ns * 1e-3, 3) for one in rounds],
             timing_us={column: _per_round([one[column] for one in each]) for column in together},
         ),

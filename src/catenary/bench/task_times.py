@@ -6,14 +6,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple, TypeAlias
 
+from catenary.figures import FIGURES as ALL_FIGURES
 from catenary.realtime import Statistics
 
-FIGURES = ("min", "max", "mean", "sd")
+FIGURES = ALL_FIGURES[:4]  # mean, max, min, sd
 Row: TypeAlias = tuple[float, float, float, float]
 
 
 class TaskTimes(NamedTuple):
-    """Each min, max, mean, sd: period [ms], jitter of the start and response [us]."""
+    """Each mean, max, min, sd: period [ms], jitter of the start and response [us]."""
 
     period: Row
     jitter: Row
@@ -25,8 +26,8 @@ def of_task(statistics: Statistics) -> TaskTimes:
 
     def row(name: str, scale: float) -> Row:
         figure = getattr(statistics, name)
-        low, high, mean, sd = (getattr(figure, each) * scale for each in FIGURES)
-        return low, high, mean, sd
+        mean, high, low, sd = (getattr(figure, each) * scale for each in FIGURES)
+        return mean, high, low, sd
 
     return TaskTimes(row("period", 1e3), row("jitter", 1e6), row("response", 1e6))
 
@@ -37,19 +38,19 @@ def of_loop(timing: Mapping[str, Mapping[str, float]]) -> TaskTimes:
     one cycle: the response is safe, not exact.)"""
 
     def row(scale: float, *phases: str) -> Row:
-        low, high, mean, sd = (
+        mean, high, low, sd = (
             sum(timing[phase][each] for phase in phases) * scale for each in FIGURES
         )
-        return low, high, mean, sd
+        return mean, high, low, sd
 
     return TaskTimes(
-        row(1e-3, "period"), row(1.0, "lateness"), row(1.0, "lateness", "in_controller")
+        row(1e3, "period"), row(1e6, "lateness"), row(1e6, "lateness", "in_controller")
     )
 
 
 def as_table(ours: Mapping[str, TaskTimes], published: Mapping[str, TaskTimes]) -> str:
     """Two lines a task. Of ours that are not published one."""
-    columns = ("period [ms] min/max/mean/sd", "jitter [us]", "response [us]")
+    columns = ("period [ms] mean/max/min/sd", "jitter [us]", "response [us]")
     lines = [f"{'task':14}" + "".join(f"{column:>31}" for column in columns)]
     for name, times in ours.items():
         lines.append(_line(name, times))

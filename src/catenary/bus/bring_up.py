@@ -22,6 +22,7 @@ from catenary.plan.clocks import SYNC_OBJECTS
 from catenary.plan.make import Plan, gather_wishes
 from catenary.plan.pdo_search import any_carries
 from catenary.plan.start_up import DevicePlan
+from catenary.plan.start_up_object import StartUp
 from catenary.plan.wish import ObjectReference, PdoWish, Wish
 from catenary.procedure.al_state import request_state
 from catenary.procedure.clocks import ClockMeasurement
@@ -105,6 +106,7 @@ def _describe(sub: SubDevice, wish: PdoWish) -> Procedure[DeviceDescription]:
     device = yield from read_mapping(channel, sub.description)
     device = yield from name_entries(channel, device)
     written = [(index, subindex) for index, subindex, _ in wish.start_up]
+    written += [(each.index, each.subindex) for each in wish.objects]
     if wish.clock is not None:
         written += [(index, subindex) for index in SYNC_OBJECTS for subindex in (1, 2)]
     device = yield from read_values(channel, device, written)
@@ -114,13 +116,15 @@ def _describe(sub: SubDevice, wish: PdoWish) -> Procedure[DeviceDescription]:
             device = yield from read_offers(channel, device, direction)
         required = [each for each in missing if each.required]
         device = yield from _with_objects(channel, device, required)
-    return device
+    return (yield from _with_objects(channel, device, wish.objects))
 
 
 def _with_objects(
-    channel: MailboxChannel, device: DeviceDescription, missing: Sequence[ObjectReference]
+    channel: MailboxChannel,
+    device: DeviceDescription,
+    missing: Sequence[ObjectReference] | Sequence[StartUp],
 ) -> Procedure[DeviceDescription]:
-    """Return the description with the dictionary's entries of the missing objects."""
+    """Return the description with the dictionary's entries of missing objects."""
     for reference in missing:
         if device.known_object(reference.index, reference.subindex) is None:
             found = yield from read_object(channel, device, reference.index, reference.subindex)

@@ -1,8 +1,9 @@
 """What can happen on a segment beside the cycle, as frozen values.
 
-`time` is the link's clock [s] (`time.monotonic()` on a NIC); `sub` the device it is about, None
-where it is about the segment; `message` says it in words, the device included. The rest is for
-programs:
+`time` [s] is on the clock of `cycle.time` while a loop is open: it counts from the first iteration,
+and is negative for events of the start-up. Without a loop, or before the first iteration, it is the
+link's clock (`time.monotonic()` on a NIC). `sub` is the device that the event is about, None if it
+is about the segment. `message` has all of it in words. The rest is for programs:
 
     for event in main.events:
         match event:

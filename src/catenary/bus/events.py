@@ -8,6 +8,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from catenary.bus.background import step_behind
@@ -22,6 +23,23 @@ CLOSE_TIMEOUT = 1.0  # [s] for a callback that is under way
 Callback = Callable[[Event], object]
 
 
+class LoopClock:
+    """Owns the zero of event times of one loop: the cycle start of its first iteration."""
+
+    def __init__(self, zero_ns: Callable[[], int]) -> None:
+        self._zero_ns = zero_ns  # on the link's clock; 0: no iteration yet
+
+    def stamped(self, event: Event) -> Event:
+        """Return the event with its time on the clock of `cycle.time`, if there is a zero."""
+        zero = self._zero_ns()
+        return replace(event, time=event.time - zero * 1e-9) if zero else event
+
+    def freeze(self) -> None:
+        """Keep the zero, and let go of the loop."""
+        zero = self._zero_ns()
+        self._zero_ns = lambda: zero
+
+
 class Events:
     """Owns the events that nobody has fetched yet; any thread may put and get.
 
@@ -30,22 +48,25 @@ class Events:
         event = main.events.get(timeout=1.0)      # the next one, or None
 
     Where nobody fetches, the oldest are dropped beyond `capacity`, and counted in `dropped`.
+    Events are put with times of the link's clock. Those of a loop are fetched with times of
+    `cycle.time`: those of its start-up are negative.
     """
 
     def __init__(self, capacity: int = CAPACITY) -> None:
         self.dropped = 0
-        self._pending: deque[Event] = deque()
+        self._pending: deque[tuple[Event, LoopClock | None]] = deque()
+        self._clock: LoopClock | None = None  # of the loop that is open
         self._capacity = capacity
         self._changed = threading.Condition()
         self._listeners: tuple[Callable[[Event], None], ...] = ()
 
     def put(self, event: Event) -> None:
-        """Adds one. Never waits."""
+        """Add one, with a time of the link's clock. Never waits."""
         with self._changed:
             if len(self._pending) >= self._capacity:
                 self._pending.popleft()
                 self.dropped += 1
-            self._pending.append(event)
+            self._pending.append((event, self._clock))
             self._changed.notify()
             listeners = self._listeners
         for listener in listeners:
@@ -61,22 +82,37 @@ class Events:
                 if left <= 0:
                     return None
                 self._changed.wait(left)
-            return self._pending.popleft()
+            return _stamped(*self._pending.popleft())
 
     def __iter__(self) -> Iterator[Event]:
         """Takes what is pending, oldest first."""
         while self._pending:
             try:
-                yield self._pending.popleft()
+                yield _stamped(*self._pending.popleft())
             except IndexError:  # another thread was quicker
                 return
 
     def __len__(self) -> int:
         return len(self._pending)
 
+    def begin_loop(self, zero_ns: Callable[[], int]) -> None:
+        """Count times from the first iteration of a loop. `zero_ns`: returns its cycle start on
+        the link's clock; 0 before it."""
+        self._clock = LoopClock(zero_ns)
+
+    def end_loop(self) -> None:
+        """Count times on the link's clock again. Events of the loop keep theirs."""
+        if self._clock is not None:
+            self._clock.freeze()
+            self._clock = None
+
+    def stamped(self, event: Event) -> Event:
+        """Return an event of now with its time on the clock of `cycle.time`, in a loop."""
+        return _stamped(event, self._clock)
+
     def listen(self, listener: Callable[[Event], None]) -> Callable[[], None]:
-        """Lets it be told of every event, in the thread that puts it; until what is returned is
-        called."""
+        """Call `listener` with every event, in the thread that puts it, until the function that is
+        returned is called. Times are of the link's clock."""
         with self._changed:
             self._listeners = (*self._listeners, listener)
 
@@ -85,6 +121,10 @@ class Events:
                 self._listeners = tuple(each for each in self._listeners if each is not listener)
 
         return forget
+
+
+def _stamped(event: Event, clock: LoopClock | None) -> Event:
+    return event if clock is None else clock.stamped(event)
 
 
 class Callbacks:

@@ -64,9 +64,9 @@ class MainDevice:
         self.clock_delays_ns: tuple[int | None, ...] = ()  # behind the first clock, by position
         self.clock_epoch_ns = 0  # system time of the clocks less the link's
         self.carrier: Carrier | None = None  # who exchanges the images; None: our own frames
-        self.events = Events()  # what happened: iterate, or get(timeout=)
-        self._callbacks = Callbacks()
-        self.events.listen(self._callbacks.tell)
+        self.events = events = Events()  # what happened: iterate, or get(timeout=)
+        self._callbacks = callbacks = Callbacks()
+        events.listen(lambda each: callbacks.tell(events.stamped(each)))
         self._source = source
         self._force = force
         self._ownership: Ownership | None = None
@@ -188,8 +188,9 @@ class MainDevice:
         self._callbacks.add(callback)
 
     def mark(self, message: str, *, time: float | None = None) -> None:
-        """Puts a `Marker` among the events, and so into what is shared and recorded. `time`
-        [s of the link's clock]: when it was; None: now. Never waits; any thread may."""
+        """Put a `Marker` among the events, and so into what is shared and recorded. Never waits;
+        any thread may call it. `time` [s]: when it was, on the link's clock (`time.monotonic()` on
+        a NIC), which other threads know, too; None: now."""
         when = self.link.now() * 1e-9 if time is None else float(time)
         self.events.put(event.Marker(when, None, message))
 

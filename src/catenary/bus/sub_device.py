@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from catenary.bus.pdo_table import PdoTable
 from catenary.bus.sdo import Sdo
 from catenary.errors import CatenaryError
 from catenary.model.device import DeviceDescription, Identity
@@ -62,6 +63,11 @@ class SubDevice:
     def slots(self) -> tuple[int, ...]:
         """Its CiA 402 axes: the objects of slot k lie 0x800·k above those of slot 0."""
         return self.description.slots
+
+    @property
+    def pdos(self) -> PdoTable:
+        """The mapping as of the last scan or plan: PDO, object, name, type and bit offset."""
+        return PdoTable(self.description)
 
     @property
     def emergencies(self) -> tuple[Emergency, ...]:

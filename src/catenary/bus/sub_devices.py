@@ -7,8 +7,15 @@ from difflib import get_close_matches
 from itertools import takewhile
 from typing import overload
 
+from catenary import notebook
 from catenary.bus.sub_device import SubDevice
 from catenary.errors import SegmentError
+
+HEADINGS = (
+    *("position", "name", "order"),
+    *("vendor", "product", "revision", "serial"),
+    *("alias", "state"),
+)
 
 
 class SubDevices(Sequence[SubDevice]):
@@ -110,8 +117,20 @@ class SubDevices(Sequence[SubDevice]):
     def __iter__(self) -> Iterator[SubDevice]:
         return iter(self._subs)
 
+    def _repr_html_(self) -> str:
+        """Return a table for notebooks."""
+        return notebook.table(HEADINGS, map(_cells, self._subs))
+
     def __repr__(self) -> str:
         return f"<{len(self._subs)} SubDevices: {', '.join(sub.name for sub in self._subs)}>"
+
+
+def _cells(sub: SubDevice) -> list[str]:
+    identity = sub.identity
+    numbers = f"0x{identity.vendor:08X}", f"0x{identity.product:08X}", f"0x{identity.revision:08X}"
+    state = "failed" if sub.error is not None else str(sub.state or "unknown")
+    names = sub.name, sub.order
+    return [str(sub.position), *names, *numbers, str(identity.serial), str(sub.alias), state]
 
 
 def _positions(subs: Sequence[SubDevice]) -> str:

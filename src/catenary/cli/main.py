@@ -27,6 +27,7 @@ from catenary.cli import (
 from catenary.cli.console import INTERRUPTED
 from catenary.cli.failure import USAGE, report, silence_stdout
 
+VIRTUAL_TIME = "virtual time: the segment's own clock, not this machine's"
 DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
     *(scan, state, graph, diag, sdo, reg, alias, sii),
@@ -38,6 +39,7 @@ TARGET is one of
   eth0,eth1          two of them, where the segment is a ring between both
   virtual            a virtual segment: coupler, outputs, three servos, outputs
   virtual:FILE.toml  another one (docs/virtual.md)
+  virtual-realtime[:FILE.toml]  the same, on this machine's clock
   igh:0              the IgH kernel master of that number (docs/igh.md): scan and sdo
 
 example:
@@ -94,11 +96,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return report(error)
 
 
+def note_virtual_time(target: str) -> None:
+    """Print a note on stderr if the times of a command were not those of this machine."""
+    if not target.startswith("virtual"):
+        return  # spares the import
+    from catenary.target.parse import in_virtual_time
+
+    if in_virtual_time(target):
+        print(f"note: {VIRTUAL_TIME}", file=sys.stderr)
+
+
 def run(arguments: Sequence[str]) -> int:
     try:
         parsed, unknown = make_parser().parse_known_args(arguments)
         if unknown:
             parsed.parser.error(f"unrecognized arguments: {' '.join(unknown)}")
-        return int(parsed.run(parsed))
+        status = int(parsed.run(parsed))
+        note_virtual_time(getattr(parsed, "target", ""))
+        return status
     finally:
         sys.stdout.flush()  # here, where a reader that went away can still be handled

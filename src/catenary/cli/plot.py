@@ -1,4 +1,4 @@
-"""`catenary plot FILE.mcap`: a recording as a picture or a page."""
+"""`catenary plot FILE`: a recording or a log as a picture or a page."""
 
 from __future__ import annotations
 
@@ -17,15 +17,17 @@ def add_parser(commands: Commands) -> None:
     parser = add_command(
         commands,
         "plot",
-        help="a recording as a picture or a page",
-        description="Draws a recording: position with its reference, tracking error and torque of "
-        "every axis, histograms of the timing, events as dashed lines. A page (.html) has the "
-        "figures of every axis and the events in words too. Needs catenary[log].",
+        help="a recording or a log as a picture or a page",
+        description="Draws a recording (.mcap), or the log of a loop that to_csv wrote (.csv): "
+        "position with its reference, tracking error and torque of every axis, histograms of the "
+        "timing, events as dashed lines. A page (.html) has the figures of every axis and the "
+        "events in words too. Needs catenary[log].",
         example="catenary plot arm.mcap\n"
         "catenary plot arm.mcap -o arm.html --degrees\n"
+        "catenary plot run.csv\n"
         "catenary plot arm.mcap -o stop.png --axis elbow --start 12.5 --end 13",
     )
-    parser.add_argument("file", metavar="FILE.mcap", help="the recording")
+    parser.add_argument("file", metavar="FILE", help="the recording (.mcap), or a log (.csv)")
     parser.add_argument(
         "-o", "--output", metavar="FILE", type=Path, help=f"{', '.join(KINDS)}; else FILE.png"
     )
@@ -46,9 +48,10 @@ def run(arguments: argparse.Namespace) -> int:
     output = arguments.output or Path(arguments.file).with_suffix(".png")
     if output.suffix.lower() not in KINDS:
         raise UsageError(f"{output}: a plot is one of {', '.join(KINDS)}", hint="-o x.png")
-    from catenary.record import plot, read
+    from catenary.record import plot, read, read_csv
 
-    recording = read(arguments.file, start=arguments.start, end=arguments.end)
+    open_file = read_csv if Path(arguments.file).suffix.lower() == ".csv" else read
+    recording = open_file(arguments.file, start=arguments.start, end=arguments.end)
     plot(
         recording,
         output,

@@ -9,6 +9,7 @@ from catenary.core._axes import (
     AXIS_MODE_REFUSED,
     AXIS_REFUSED,
 )
+from catenary.core._axis_log import AXIS_FIELDS
 from catenary.core._cia402 import (
     GOAL_DISABLED,
     GOAL_ENABLED,
@@ -52,6 +53,7 @@ from catenary.core._stream import Stream
 __all__ = [
     "AXIS_DROPPED",
     "AXIS_FALLBACK",
+    "AXIS_FIELDS",
     "AXIS_FOLLOWED",
     "AXIS_LIMITED",
     "AXIS_MODE_REFUSED",

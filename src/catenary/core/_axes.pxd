@@ -122,14 +122,23 @@ cdef struct column_t:
     uint8_t bank
     uint32_t rank              # in its bank
 
+cdef struct area_t:             # bytes of an image, as they are
+    uint32_t image_offset
+    uint32_t place             # in the private bytes
+    uint32_t size
+
 cdef struct axes_t:
     cat_image *image
     uint32_t axis_count
     uint32_t input_count
     uint32_t output_count
+    uint32_t input_area_count
+    uint32_t output_area_count
     axis_t *axes
     column_t *input_columns
     column_t *output_columns
+    area_t *input_areas
+    area_t *output_areas
     double period              # [s]
     uint64_t number            # cycle whose inputs were read, or whose outputs are computed
     uint32_t lost_limit        # this and the following in cycles; 0: off
@@ -161,7 +170,7 @@ cdef struct axes_t:
     uint32_t moving
 
 cdef class Axes:
-    """Owns the axis records and column tables."""
+    """Owns the axis records and the tables of columns and areas."""
     cdef axes_t c
     cdef cat_memory memory
 

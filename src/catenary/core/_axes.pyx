@@ -1,5 +1,5 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""Axes and columns: between the bytes of the process images and arrays in SI units.
+"""Axes, columns and areas: between the bytes of the process images and arrays in SI units.
 
 Theory of operation. An axis is a slot of a CiA 402 drive; each quantity has the place that the plan
 states, or none. `axes_read` runs after the inputs of a cycle: bytes → actual values, position counters
@@ -8,13 +8,15 @@ runs before the outputs: orders (_guard.pyx), set-points (_setpoints.pyx), contr
 is written only if it differs from what is in the image (`put_t`). `axes_apply_late` corrects outputs
 that a law has computed for a stop that came later. `axes_tell` reports the axes after the frames.
 `told` collects the flags of the cycle, `handed_over` counts the cycles of a hand-over, and
-`stop_asked` counts stop requests of any thread. _axes.pxd defines every word of an axis.
+`stop_asked` counts stop requests of any thread. Areas are bytes of an image that the application has
+as they are: copied, never interpreted. _axes.pxd defines every word of an axis.
 
 Budget: 60 ns per axis and direction.
 """
 
 from libc.math cimport INFINITY, NAN, isfinite
 from libc.stdint cimport int8_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
+from libc.string cimport memcpy
 
 from catenary.core._cia402 cimport (
     ENABLED,
@@ -149,6 +151,14 @@ cdef void read_columns(const axes_t *x, actual_t *out) noexcept nogil:
             out.input_bits[c.rank] = number_bits(&c.number, x.image.inputs) != 0
 
 
+cdef inline void read_areas(const axes_t *x, actual_t *out) noexcept nogil:
+    cdef const area_t *a
+    cdef uint32_t k
+    for k in range(x.input_area_count):
+        a = &x.input_areas[k]
+        memcpy(out.input_bytes + a.place, x.image.inputs + a.image_offset, a.size)
+
+
 cdef void axes_read(axes_t *x, actual_t *out, uint64_t number, int64_t instant) noexcept nogil:
     """After collect of cycle `number`, whose instant is `instant` [ns]: the input image → the actual
     values that a law computes with. `axes_tell` follows, when there is time."""
@@ -169,6 +179,7 @@ cdef void axes_read(axes_t *x, actual_t *out, uint64_t number, int64_t instant) 
         out.torque[i] = a.torque
         out.enabled[i] = a.followed
     read_columns(x, out)
+    read_areas(x, out)
 
 
 cdef void axes_tell(axes_t *x, actual_t *out) noexcept nogil:
@@ -258,6 +269,14 @@ cdef void write_columns(axes_t *x, const target_t *t) noexcept nogil:
             number_put_bits(&c.number, x.image.outputs, t.output_bits[c.rank] != 0)
 
 
+cdef inline void write_areas(axes_t *x, const target_t *t) noexcept nogil:
+    cdef const area_t *a
+    cdef uint32_t k
+    for k in range(x.output_area_count):
+        a = &x.output_areas[k]
+        memcpy(x.image.outputs + a.image_offset, t.output_bytes + a.place, a.size)
+
+
 cdef void write_velocity_offsets(axes_t *x) noexcept nogil:
     """After the columns: while an axis does not follow its set-points, 0x60B1 is the velocity of
     its command."""
@@ -309,6 +328,7 @@ cdef void axes_write(axes_t *x, const target_t *target, bint fresh, uint64_t num
             x.told |= REFUSED_SOME
     write_columns(x, target)
     write_velocity_offsets(x)
+    write_areas(x, target)
 
 
 cdef void axes_hand_over(axes_t *x) noexcept nogil:
@@ -430,6 +450,8 @@ cdef class Axes:
         self.c.axes = <axis_t *>memory_take(memory, len(plan.axes) + 1, sizeof(axis_t))
         self.c.input_columns = <column_t *>memory_take(memory, inputs + 1, sizeof(column_t))
         self.c.output_columns = <column_t *>memory_take(memory, outputs + 1, sizeof(column_t))
+        self.c.input_areas = <area_t *>memory_take(memory, len(plan.input_areas) + 1, sizeof(area_t))
+        self.c.output_areas = <area_t *>memory_take(memory, len(plan.output_areas) + 1, sizeof(area_t))
         if plan.lost_limit < 1:
             raise ValueError(f"lost_limit: {plan.lost_limit}")
         self.c.period = plan.period_ns / 1e9
@@ -445,6 +467,8 @@ cdef class Axes:
                 raise ValueError("late_limit_torque_ns: 0 would keep a stale torque without limit")
         self.c.input_count = self.make_columns(plan.input_columns, plan.input_size, True)
         self.c.output_count = self.make_columns(plan.output_columns, plan.output_size, False)
+        self.c.input_area_count = self.make_areas(plan.input_areas, plan.input_size, True)
+        self.c.output_area_count = self.make_areas(plan.output_areas, plan.output_size, False)
 
     def make_limits_in_time(self, plan):
         def limit(name):
@@ -543,6 +567,21 @@ cdef class Axes:
             c[k].rank = ranks[column.bank]
             ranks[column.bank] += 1
         return len(columns)
+
+    def make_areas(self, areas, image_size, bint inputs):
+        cdef area_t *a = self.c.input_areas if inputs else self.c.output_areas
+        place = 0
+        for k, area in enumerate(areas):
+            if area.size < 0 or not 0 <= area.image_offset <= image_size - area.size:
+                raise ValueError(
+                    f"area {area.name}: bytes {area.image_offset} to"
+                    f" {area.image_offset + area.size - 1} leave the image of {image_size} bytes"
+                )
+            a[k].image_offset = area.image_offset
+            a[k].place = place
+            a[k].size = area.size
+            place += area.size
+        return len(areas)
 
     def __dealloc__(self):
         cat_memory_free(&self.memory)

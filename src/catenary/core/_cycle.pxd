@@ -1,6 +1,7 @@
 from libc.stdint cimport int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 
 from catenary.core._axes cimport axes_t
+from catenary.core._axis_log cimport axis_log_t
 from catenary.core._clocks cimport clock_t
 from catenary.core._handover cimport actual_t, handover_t, target_t
 from catenary.core._histogram cimport histogram_t
@@ -93,9 +94,11 @@ cdef struct cycle_t:
     uint64_t late
     uint64_t missed_sync       # cycles whose frames left later than sync_margin
     uint64_t uncommitted
+    uint64_t underruns         # cycles for which the stream was empty
     uint64_t begun             # wake-ups since the start: the first has no period
     record_t *records
     uint64_t records_mask      # number of records less one; a power of two less one
+    axis_log_t axis_log        # as many rows; written with the actual values
     histogram_t *histograms    # PHASES of them; exchanged by Python (acquire, release)
 
 cdef void cycle_start(cycle_t *c, int64_t origin) noexcept nogil

@@ -41,6 +41,7 @@ from catenary.core._axes cimport (
     axes_tell,
     axes_write,
 )
+from catenary.core._axis_log cimport axis_log_put
 from catenary.core._clocks cimport clock_close
 from catenary.core._handover cimport (
     BEFORE_LAW,
@@ -280,7 +281,7 @@ cdef inline void judge(cycle_t *c) noexcept nogil:
             c.flags |= WORKING_COUNTER
 
 
-cdef void tell(cycle_t *c, actual_t *actual) noexcept nogil:
+cdef void tell(cycle_t *c, actual_t *actual, const target_t *target) noexcept nogil:
     """Report the cycle besides its values: axes, header, log, sticky flags."""
     cdef actual_header_t *header = actual.header
     cdef record_t *record = record_of(c)
@@ -307,6 +308,8 @@ cdef void tell(cycle_t *c, actual_t *actual) noexcept nogil:
     record.missing_frames = header.missing_frames
     record.al_counter = header.al_counter
     record.al_status = header.al_status
+    if c.axis_log.rows != NULL:
+        axis_log_put(&c.axis_log, c.number, actual, target)
     if c.flags & STICKY:
         cat_or32(&c.handover.sticky, c.flags & STICKY)
 
@@ -345,6 +348,7 @@ cdef bint take_streamed(cycle_t *c, target_t *target, bint fresh, uint64_t numbe
         target.header.hold = 0
         target.header.streamed = 1
         c.axes.told |= DRY
+        c.underruns += 1
         fresh = False
     cat_pointer_release(&c.stream)
     return fresh
@@ -445,13 +449,15 @@ cdef void take_law(cycle_t *c, const target_t *orders) noexcept nogil:
 
 
 cdef void take_orders(cycle_t *c, const target_t *committed) noexcept nogil:
-    """Copy what the application may request while a law computes: states, modes, control bits."""
+    """Copy what the application may request while a law computes: states, modes, control bits, and
+    bytes of areas, which a law does not have."""
     cdef target_t *target = &c.handover.target[OF_LAW]
     cdef uint32_t axes = c.handover.counts.axes
     memcpy(target.request, committed.request, axes * sizeof(uint32_t))
     memcpy(target.controlword_bits, committed.controlword_bits, axes * sizeof(uint16_t))
     memcpy(target.mode, committed.mode, axes)
     memcpy(target.goal, committed.goal, axes)
+    memcpy(target.output_bytes, committed.output_bytes, c.handover.counts.output_bytes)
 
 
 cdef bint step_law(cycle_t *c, actual_t *actual, target_t *target) noexcept nogil:
@@ -527,7 +533,8 @@ cdef void write_committed(cycle_t *c, target_t *committed, bint fresh) noexcept 
     axes_write(c.axes, committed, fresh, c.number)
     if not fresh and not c.axes.handed_over:
         c.flags |= UNCOMMITTED
-        c.uncommitted += 1
+        if not committed.header.streamed:  # else an underrun
+            c.uncommitted += 1
 
 
 cdef void note_return(cycle_t *c) noexcept nogil:
@@ -571,7 +578,7 @@ cdef void cycle_native(cycle_t *c) noexcept nogil:
         target = &c.handover.target[OF_LAW]
         record_of(c).receive_ns = short_ns(now(c) - c.image.frame_stamp[0])
         compute_next(c, actual, target)
-    tell(c, actual)
+    tell(c, actual, target)
     handover_publish(c.handover)
     published = now(c)
     handover_wake(c.handover)
@@ -590,7 +597,7 @@ cdef bint cycle_wants_native(cycle_t *c) noexcept nogil:
 cdef void cycle_inputs(cycle_t *c, actual_t *actual) noexcept nogil:
     """inline, after the wait."""
     collect(c, actual, 0)
-    tell(c, actual)
+    tell(c, actual, &c.handover.target[PRIVATE])
 
 
 cdef void cycle_usable(cycle_t *c) noexcept nogil:

@@ -50,6 +50,7 @@ cdef class Engine:
     cdef object sink           # keeps what is given the cycles alive
     cdef int64_t left          # when `next` returned [ns]; -1: no application since
     cdef int64_t input_age     # at that time [ns]
+    cdef int64_t zero          # cycle start of the first iteration, on the link's clock; 0: none yet
 
     cdef not_running(self)
     cdef uint32_t step(self, int64_t timeout_ns=*) except? 0xFFFFFFFF
@@ -81,5 +82,6 @@ cdef class Engine:
     cdef bint is_law_used(self, Law law) noexcept
     cdef bint is_stream_used(self, Stream stream) noexcept
     cdef connect(self, plan)
+    cdef void begin_iteration(self) noexcept
     cdef int64_t now_ns(self) noexcept
     cdef actual_header_t *actual_header(self) noexcept

@@ -26,9 +26,9 @@ class Engine:
         """The private buffers, one per name of plan.wish.Views, typed ("d", "q", "I", "H", "b",
         "B"), for `numpy.asarray`. Read-only: actual_position, actual_velocity, actual_torque,
         statusword, mode_actual, axis_state, axis_flags, input_reals, input_integers, input_bits,
-        and unit_valid ("B"), unit_counter ("H") per sync unit. Writable: target_position,
+        input_bytes, and unit_valid ("B"), unit_counter ("H") per sync unit. Writable: target_position,
         target_velocity, target_torque, mode_target, goal, request, controlword_bits,
-        output_reals, output_integers, output_bits.
+        output_reals, output_integers, output_bits, output_bytes.
 
         A quantity no object is mapped for reads NaN (velocity: estimated from the position).
         A goal is taken over when `request` of its axis has changed: goal[i] = 1; request[i] += 1.
@@ -109,6 +109,14 @@ class Engine:
     def now(self) -> int:
         """The link's clock [ns]."""
 
+    @property
+    def zero_ns(self) -> int:
+        """Cycle start of the first iteration [ns], on the link's clock: the zero of `Cycle.time`.
+        0 before the first iteration. Engines of one loop share that of the first one."""
+
+    @zero_ns.setter
+    def zero_ns(self, zero: int) -> None: ...
+
     # The cycle that `actual` belongs to.
     @property
     def number(self) -> int:
@@ -143,23 +151,26 @@ class Engine:
     @property
     def counters(self) -> dict[str, int]:
         """Counts since construction: cycles, lost (cycles not ok), late (cycles skipped),
-        uncommitted (cycles without new targets), missed_sync (frames that left later than the
+        uncommitted (cycles without new targets), underrun (cycles for which the stream was empty),
+        missed_sync (frames that left later than the
         margin before SYNC0), page_faults (of the native thread in runs that have ended), stale,
         alien, corrupt, duplicate, repeated, unprocessed (frames),
         lane_sent, lane_received, lane_dropped, send_errors, receive_errors."""
 
     def histograms(self) -> dict[str, dict[str, float]]:
-        """Return per phase (core/_cycle.pyx) count, mean, min, max, sd, p50, p99, p999 [us]; for
+        """Return per phase (core/_cycle.pyx) count, mean, min, max, sd, p50, p99, p999 [s]; for
         an empty phase the count 0 only."""
 
     def histogram_counts(self, phase: str) -> list[tuple[float, float, int]]:
-        """Return (lower, upper, count) of every bucket that is not empty [us]."""
+        """Return (lower, upper, count) of every bucket that is not empty [s]."""
 
     def reset_histograms(self) -> None:
         """Forget the figures so far, for example those of the start-up."""
 
     def log(self) -> bytes:
-        """Return the records (RECORD_FIELDS) of the last cycles, oldest first."""
+        """Return the records (RECORD_FIELDS) of the last cycles, oldest first. With the plan's
+        `log_axes`, each is followed by one record (AXIS_FIELDS) for each axis: what was measured,
+        the targets of the frames that brought it (law: those computed from it), and what was sent."""
 
     @property
     def scheduling(self) -> str:

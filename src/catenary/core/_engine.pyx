@@ -117,9 +117,10 @@ cdef void thread_loop(void *argument) noexcept nogil:
     cat_futex_wake(&e.cycle.handover.published)
 
 
-def columns_by_bank(columns):
-    """Return the number of columns in each bank."""
-    return [sum(column.bank == bank for column in columns) for bank in range(3)]
+def counts_of(columns, areas):
+    """Return the number of columns in each bank, and the bytes of the areas."""
+    banks = [sum(column.bank == bank for column in columns) for bank in range(3)]
+    return [*banks, sum(area.size for area in areas)]
 
 
 def check_plan(plan):
@@ -165,8 +166,8 @@ cdef class Engine:
         self.handover = Handover(
             len(plan.axes),
             len(plan.sync_units),
-            columns_by_bank(plan.input_columns),
-            columns_by_bank(plan.output_columns),
+            counts_of(plan.input_columns, plan.input_areas),
+            counts_of(plan.output_columns, plan.output_areas),
         )
         self.figures = Figures()
         self.connect(plan)
@@ -181,7 +182,7 @@ cdef class Engine:
         cdef cycle_t *c = &self.e.cycle
         cdef uint32_t i
         cdef int slot
-        self.figures.attach(c, plan.log_cycles)
+        self.figures.attach(c, plan.log_cycles, len(plan.axes) if plan.log_axes else 0)
         if self.frames is not None:
             self.frames.c.lane = &self.lane.c
         self.axes.c.image = self.image
@@ -217,6 +218,19 @@ cdef class Engine:
     cdef actual_header_t *actual_header(self) noexcept:
         """Of the cycle that Python's actual values belong to; lives as long as the engine."""
         return self.h.actual[PRIVATE].header
+
+    cdef void begin_iteration(self) noexcept:
+        """Make the present cycle start the zero of times, unless there is one."""
+        if self.zero == 0:
+            self.zero = self.e.cycle.origin + self.h.actual[PRIVATE].header.time_ns
+
+    @property
+    def zero_ns(self):
+        return self.zero
+
+    @zero_ns.setter
+    def zero_ns(self, int64_t zero):
+        self.zero = zero
 
     cdef int64_t now_ns(self) noexcept:
         return self.e.cycle.link.now(self.e.cycle.link.self)
@@ -843,6 +857,7 @@ cdef class Engine:
             "lost": self.e.cycle.lost,
             "late": self.e.cycle.late,
             "uncommitted": self.e.cycle.uncommitted,
+            "underrun": self.e.cycle.underruns,
             "missed_sync": self.e.cycle.missed_sync,
             "page_faults": self.e.thread.page_faults,
             "stale": 0,

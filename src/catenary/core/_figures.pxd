@@ -1,4 +1,4 @@
-from libc.stdint cimport uint64_t
+from libc.stdint cimport uint32_t, uint64_t
 
 from catenary.core._cycle cimport cycle_t
 from catenary.core._histogram cimport histogram_t
@@ -11,7 +11,7 @@ cdef class Figures:
     cdef cat_memory memory     # histograms
     cdef cat_memory log_memory
     cdef uint64_t log_cycles
-    cdef int attach(self, cycle_t *cycle, uint64_t log_cycles) except -1
+    cdef int attach(self, cycle_t *cycle, uint64_t log_cycles, uint32_t log_axes) except -1
     cdef bytes log(self)
     cdef dict histograms(self)
     cdef list counts(self, str phase)

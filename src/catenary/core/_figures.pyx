@@ -5,8 +5,9 @@ The native thread writes without waiting. A reader copies a record and drops it 
 overwritten it meanwhile; histograms are reset by exchanging them for cleared ones.
 """
 
-from libc.stdint cimport uint64_t
+from libc.stdint cimport uint8_t, uint32_t, uint64_t
 
+from catenary.core._axis_log cimport axis_log_row, axis_log_row_size
 from catenary.core._cycle cimport LOG_MARGIN, PHASES, cycle_t, record_t
 from catenary.core._cycle import PHASE_NAMES
 from catenary.core._histogram cimport (
@@ -20,8 +21,8 @@ from catenary.core._native cimport cat_fence, cat_store_release_pointer
 
 
 cdef class Figures:
-    cdef int attach(self, cycle_t *cycle, uint64_t log_cycles) except -1:
-        """Give a cycle its records and histograms."""
+    cdef int attach(self, cycle_t *cycle, uint64_t log_cycles, uint32_t log_axes) except -1:
+        """Give a cycle its records and histograms. `log_axes`: number of axes to log."""
         self.cycle = cycle
         self.log_cycles = log_cycles
         cycle.records_mask = (1 << (log_cycles + LOG_MARGIN - 1).bit_length()) - 1
@@ -30,10 +31,18 @@ cdef class Figures:
         cycle.records = <record_t *>memory_take(
             &self.log_memory, cycle.records_mask + 1, sizeof(record_t)
         )
+        if log_axes:
+            cycle.axis_log.axes = log_axes
+            cycle.axis_log.mask = cycle.records_mask
+            cycle.axis_log.row_size = axis_log_row_size(log_axes)
+            cycle.axis_log.rows = <uint8_t *>memory_take(
+                &self.log_memory, cycle.records_mask + 1, cycle.axis_log.row_size
+            )
         return 0
 
     cdef bytes log(self):
-        """Return the last records, oldest first; one that was overwritten meanwhile is left out."""
+        """Return the last records, oldest first, each followed by those of its axes if they are
+        logged. A cycle that is not complete yet, or was overwritten meanwhile, is left out."""
         cdef cycle_t *c = self.cycle
         cdef uint64_t last = c.number
         cdef uint64_t number
@@ -41,9 +50,11 @@ cdef class Figures:
         found = []
         for number in range(last - min(last, self.log_cycles) + 1, last + 1):
             record = c.records[number & c.records_mask]
+            axes = axis_log_row(&c.axis_log, number)
             cat_fence()
-            if record.number == number == c.records[number & c.records_mask].number:
+            if axes is not None and record.number == number == c.records[number & c.records_mask].number:
                 found.append((<char *>&record)[: sizeof(record_t)])
+                found.append(axes)
         return b"".join(found)
 
     cdef dict histograms(self):

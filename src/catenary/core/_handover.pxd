@@ -25,9 +25,11 @@ cdef struct counts_t:
     uint32_t input_reals
     uint32_t input_integers
     uint32_t input_bits
+    uint32_t input_bytes
     uint32_t output_reals
     uint32_t output_integers
     uint32_t output_bits
+    uint32_t output_bytes
 
 cdef struct actual_header_t:
     uint64_t number            # cycles done
@@ -65,6 +67,7 @@ cdef struct actual_t:           # a header and the arrays of ACTUAL (_handover.p
     uint8_t *stop_reason
     uint8_t *enabled           # bit 0 of flags, for laws
     uint8_t *input_bits
+    uint8_t *input_bytes
     uint8_t *unit_valid
 
 cdef struct target_header_t:
@@ -89,6 +92,7 @@ cdef struct target_t:           # a header and the arrays of TARGET, in its orde
     int8_t *mode
     uint8_t *goal
     uint8_t *output_bits
+    uint8_t *output_bytes
 
 cdef struct handover_t:
     counts_t counts

@@ -53,6 +53,7 @@ ACTUAL = (
     ("stop_reason", "u1", "axes", "stop_reason", None, None),
     ("enabled", "u1", "axes", None, "enabled", "enabled"),
     ("input_bits", "u1", "input_bits", "input_bits", "bits", "bits"),
+    ("input_bytes", "u1", "input_bytes", "input_bytes", None, "bytes"),
     ("unit_valid", "u1", "units", "unit_valid", None, "unit_valid"),
 )
 TARGET = (
@@ -66,6 +67,7 @@ TARGET = (
     ("mode", "i1", "axes", "mode_target", None, "target_mode"),
     ("goal", "u1", "axes", "goal", None, "goal"),
     ("output_bits", "u1", "output_bits", "output_bits", "bits", "bits"),
+    ("output_bytes", "u1", "output_bytes", "output_bytes", None, "bytes"),
 )
 CODES = {"<f8": b"d", "<i8": b"q", "<u8": b"Q", "<u4": b"I", "<u2": b"H", "i1": b"b", "u1": b"B"}
 SIZES = {"<f8": 8, "<i8": 8, "<u8": 8, "<u4": 4, "<u2": 2, "i1": 1, "u1": 1}
@@ -148,8 +150,8 @@ cdef class Field:
 
 cdef class Handover:
     def __cinit__(self, axes, units, input_counts, output_counts):
-        """Counts: of axes, sync units, and columns by bank (real, integer, bit)."""
-        counts = [axes, units, *input_counts, *output_counts]
+        """Counts: of axes, sync units, columns by bank (real, integer, bit), and bytes of areas."""
+        counts = [axes, units, *input_counts[:3], *output_counts[:3]]
         if not all(0 <= count <= COUNT_MAX for count in counts):
             raise ValueError(f"more than {COUNT_MAX} axes, sync units or columns: {counts}")
         self.c.counts = counts_t(
@@ -158,9 +160,11 @@ cdef class Handover:
             input_reals=input_counts[0],
             input_integers=input_counts[1],
             input_bits=input_counts[2],
+            input_bytes=input_counts[3],
             output_reals=output_counts[0],
             output_integers=output_counts[1],
             output_bits=output_counts[2],
+            output_bytes=output_counts[3],
         )
         self.counts = self.c.counts
         self.c.actual_size = lay(

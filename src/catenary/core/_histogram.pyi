@@ -8,7 +8,7 @@ class Histogram:
         """Counts a time [ns]; negative ones count as 0."""
 
     def summary(self) -> dict[str, float]:
-        """count, and mean, min, max, sd, p50, p99, p999 [us]; only count when empty."""
+        """count, and mean, min, max, sd, p50, p99, p999 [s]; only count when empty."""
 
     def counts(self) -> list[tuple[float, float, int]]:
-        """(lower, upper, count) of every bucket that is not empty [us]."""
+        """(lower, upper, count) of every bucket that is not empty [s]."""

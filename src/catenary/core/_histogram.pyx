@@ -1,5 +1,5 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""Histograms of times [ns] as Python reads them; native/histogram.h counts them."""
+"""Histograms of times as Python reads them, in seconds; native/histogram.h counts them in ns."""
 
 from libc.stdint cimport int64_t, uint32_t
 from libc.stdlib cimport calloc, free
@@ -17,13 +17,13 @@ cdef dict histogram_summary(const histogram_t *h):
         return {"count": 0}
     summary = {
         "count": h.count,
-        "mean": cat_histogram_mean(h) / 1e3,
-        "min": h.low / 1e3,
-        "max": h.high / 1e3,
-        "sd": cat_histogram_deviation(h) / 1e3,
+        "mean": cat_histogram_mean(h) / 1e9,
+        "min": h.low / 1e9,
+        "max": h.high / 1e9,
+        "sd": cat_histogram_deviation(h) / 1e9,
     }
     for name, fraction in PERCENTILES:
-        summary[name] = cat_histogram_percentile(h, fraction) / 1e3
+        summary[name] = cat_histogram_percentile(h, fraction) / 1e9
     return summary
 
 
@@ -33,7 +33,7 @@ cdef list histogram_counts(const histogram_t *h):
     for k in range(CAT_BUCKETS):
         if h.buckets[k]:
             lower, upper = cat_histogram_edge(k), cat_histogram_edge(k + 1)
-            counts.append((lower / 1e3, upper / 1e3, h.buckets[k]))
+            counts.append((lower / 1e9, upper / 1e9, h.buckets[k]))
     return counts
 
 

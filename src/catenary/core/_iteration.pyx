@@ -15,6 +15,7 @@ cdef class Cycle:
         self.header = engine.actual_header()
         self.first_number = self.header.number
         self.first_ns = self.header.time_ns
+        engine.begin_iteration()
 
     @property
     def number(self):

@@ -7,14 +7,18 @@ from html import escape
 from itertools import accumulate
 from pathlib import Path
 
+import numpy as np
+
 from catenary.demo.plot import Bucket, Line, histogram, line_plot
-from catenary.demo.result import FIGURES, PHASES, Device, Result
+from catenary.demo.result import PHASES, Device, Result
+from catenary.figures import FIGURES, heading
+from catenary.loop.verdict import COUNTED
 
 STYLE = Path(__file__).with_name("page.css")
 STYLES = ("a", "b", "c")
 SHOWN_SECONDS = 4.0  # of the motion, at its end
 SHOWN_POINTS = 400  # of each line
-HEADINGS = {"p999": "p99.9", "in_controller": "in controller", "round_trip": "round trip"}
+HEADINGS = {"in_controller": "in controller", "round_trip": "round trip"}
 MEANING = {
     "period": "from one wake-up to the next",
     "lateness": "woken after the planned instant",
@@ -46,6 +50,7 @@ def as_html(result: Result) -> str:
 <h2>Timing</h2>
 {timing_table(result)}
 <p class="note">Microseconds. {escape(ground(result))}</p>
+<p>{"<br>".join(map(escape, result.timing.verdict.splitlines()))}</p>
 <h2>Distributions</h2>
 <div class="four">
 {"".join(phase_figure(result, phase) for phase in MEANING if result.histograms.get(phase))}
@@ -80,11 +85,13 @@ def ground(result: Result) -> str:
 
 
 def tiles(result: Result) -> str:
-    timing, error = result.timing_us, result.tracking_error
+    timing, error, counters = result.timing_us, result.tracking_error, result.timing.counters
     cells = [
         tile(thousands(result.cycles), "", "cycles"),
-        tile(thousands(result.lost), "", "lost cycles", good=result.lost == 0),
-        tile(thousands(result.late), "", "late cycles", good=result.late == 0),
+        *(
+            tile(thousands(counters[name]), "", f"{name} cycles", good=counters[name] == 0)
+            for name in COUNTED
+        ),
         tile(f"{timing['in_controller']['p50']:.1f}", "µs", "in controller, median"),
         tile(f"{timing['lateness']['p99']:.1f}", "µs", "lateness, p99"),
         tile(f"{error['rms'] * 1e3:.2f}", "mrad", "tracking error, rms"),
@@ -106,7 +113,7 @@ def motion(result: Result) -> str:
     part = slice(first, None, every)
     seconds = time[part].tolist()
     reference, actual = result.motion.reference[part], result.motion.actual[part]
-    error = (actual - reference) * 1e3
+    error = np.nan_to_num(result.error[part]) * 1e3  # 0 until the first set-point arrived
     positions = [
         Line(f"reference {n + 1}", "reference", seconds, reference[:, n].tolist())
         for n in drives(result)
@@ -122,9 +129,10 @@ def motion(result: Result) -> str:
     return (
         f'<figure class="wide">{position_plot}<figcaption><b>Position</b> in the last seconds.'
         f"{key(result, reference=True)}</figcaption></figure>"
-        f"<figure>{error_plot}<figcaption><b>Tracking error</b>: measured minus reference of the "
-        f"same instant. A set-point reaches the motor some cycles later, which is most of it."
-        f"{key(result)}</figcaption></figure>"
+        f"<figure>{error_plot}<figcaption><b>Tracking error</b>: actual position minus the "
+        f"set-point that had reached the drive. The transport delay is "
+        f"{result.transport_delay * 1e3:g} ms: from writing a set-point to reading the first "
+        f"position that it has moved. {key(result)}</figcaption></figure>"
     )
 
 
@@ -135,10 +143,11 @@ def key(result: Result, *, reference: bool = False) -> str:
 
 
 def timing_table(result: Result) -> str:
-    head = "".join(f"<th>{HEADINGS.get(name, name)}</th>" for name in FIGURES)
+    head = "".join(f"<th>{heading(name)}</th>" for name in FIGURES)
+    figures = result.timing_us
     rows = "".join(
         f'<tr><th title="{escape(MEANING[phase])}">{HEADINGS.get(phase, phase)}</th>'
-        + "".join(f"<td>{result.timing_us[phase][name]:.1f}</td>" for name in FIGURES)
+        + "".join(f"<td>{figures[phase][name]:.1f}</td>" for name in FIGURES)
         + "</tr>"
         for phase in PHASES
     )
@@ -149,7 +158,7 @@ def timing_table(result: Result) -> str:
 
 
 def phase_figure(result: Result, phase: str) -> str:
-    buckets = result.histograms[phase]
+    buckets = [(a * 1e6, b * 1e6, count) for a, b, count in result.histograms[phase]]
     low, high = drawn_range(buckets)
     outside = sum(count for lower, upper, count in buckets if lower >= high or upper <= low)
     most = max(upper for _, upper, _ in buckets)

@@ -10,12 +10,18 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from catenary.figures import FIGURES
+from catenary.loop.timing import Timing
+from catenary.loop.verdict import COUNTED
+
 Reals = npt.NDArray[np.float64]
 Figures = Mapping[str, float]
-Bucket = tuple[float, float, int]  # lower, upper [us], count
+Bucket = tuple[float, float, int]  # lower, upper [s], count
 
 PHASES = ("period", "lateness", "receive", "process", "send", "in_controller", "tail")
-FIGURES = ("mean", "min", "max", "sd", "p50", "p99", "p999")
+# A set-point that is written in one cycle is sent in the next one. The position that comes back in
+# the cycle after that is the first one that it has moved.
+TRANSPORT_CYCLES = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,15 +35,19 @@ class Device:
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """One row per cycle, one column per drive."""
+    """One row per iteration, one column per drive."""
 
     time: Reals  # (cycles,) [s]
     reference: Reals  # (cycles, drives) [rad]
     actual: Reals  # (cycles, drives) [rad], measured when the reference was written
 
-    @property
-    def error(self) -> Reals:
-        return self.actual - self.reference
+    def error(self, delay: float) -> Reals:
+        """Return actual position minus the reference of `delay` [s] before, shape (cycles, drives)
+        [rad]: the set-point that had reached the drive. NaN where there was none yet."""
+        if not len(self.time):
+            return self.actual - self.reference
+        sent = np.searchsorted(self.time, self.time - delay + 1e-9, side="right") - 1
+        return np.where((sent >= 0)[:, None], self.actual - self.reference[sent], np.nan)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,20 +55,33 @@ class Result:
     devices: Sequence[Device]
     period: float  # [s]
     cycles: int
-    lost: int
-    late: int
-    timing_us: Mapping[str, Figures]  # by phase
+    timing: Timing
     histograms: Mapping[str, Sequence[Bucket]]  # by phase
     motion: Motion
     link: Literal["veth", "in-process"]
     scheduling: str
 
     @property
+    def transport_delay(self) -> float:
+        """From writing a set-point to reading the first position that it has moved [s]."""
+        return TRANSPORT_CYCLES * self.period
+
+    @property
+    def error(self) -> Reals:
+        """Actual position minus the set-point that had reached the drive [rad]."""
+        return self.motion.error(self.transport_delay)
+
+    @property
     def tracking_error(self) -> Figures:
-        error = self.motion.error
+        error = self.error[np.isfinite(self.error)]
         if error.size == 0:
             return {"rms": 0.0, "max": 0.0}
         return {"rms": float(np.sqrt(np.mean(error**2))), "max": float(np.abs(error).max())}
+
+    @property
+    def timing_us(self) -> Mapping[str, Figures]:
+        """The figures of each phase in microseconds."""
+        return {p: {name: self.timing[p][name] * 1e6 for name in FIGURES} for p in PHASES}
 
 
 def as_json(result: Result) -> str:
@@ -76,12 +99,13 @@ def as_json(result: Result) -> str:
                 for device in result.devices
             ],
             "cycles": result.cycles,
-            "lost": result.lost,
-            "late": result.late,
+            **{name: result.timing.counters[name] for name in COUNTED},
+            "verdict": result.timing.verdict,
             "tracking_error_rad": {k: round(v, 6) for k, v in result.tracking_error.items()},
+            "transport_delay_s": result.transport_delay,
             "timing_us": {
-                phase: {name: round(result.timing_us[phase][name], 3) for name in FIGURES}
-                for phase in PHASES
+                phase: {name: round(value, 3) for name, value in figures.items()}
+                for phase, figures in result.timing_us.items()
             },
             "link": result.link,
             "scheduling": result.scheduling,

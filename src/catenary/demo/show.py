@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import textwrap
 from pathlib import Path
 
 import catenary as cat
@@ -18,14 +18,14 @@ from catenary.demo.motion import (
 )
 from catenary.demo.page import as_html
 from catenary.demo.result import PHASES, Device, Result, as_json
-from catenary.demo.text import ProgressBar, closing_lines, device_lines, timing_lines
+from catenary.demo.text import ProgressBar, closing_lines, device_lines
 
 
 def show(seconds: float, folder: Path, *, refused: str | None) -> None:
     """`refused`: why there are no real frames; None: there are."""
     folder.mkdir(parents=True, exist_ok=True)
     result = run(seconds, refused=refused)
-    print(timing_lines(result))
+    print(textwrap.indent(str(result.timing), "  "))
     print(closing_lines(result))
     (folder / "demo.json").write_text(as_json(result) + "\n")
     (folder / "demo.html").write_text(as_html(result))
@@ -47,27 +47,18 @@ def run(seconds: float, *, refused: str | None) -> Result:
         ) as loop:
             devices = [device(sub) for sub in main.subs]
             print(device_lines(devices))
-            before = loop.timing.counters  # of the start-up
             follow(loop, arm, recording, progress)
             progress.clear()
-        after = loop.timing.counters
         return Result(
             devices=devices,
             period=PERIOD,
             cycles=len(recording),
-            lost=after["lost"] - before["lost"],
-            late=late(after) - late(before),
-            timing_us={phase: loop.timing[phase] for phase in PHASES},
+            timing=loop.timing,
             histograms={phase: loop.histogram(phase) for phase in (*PHASES, "round_trip")},
             motion=recording.motion(),
             link=here.link,
             scheduling=loop.scheduling,
         )
-
-
-def late(counters: Mapping[str, int]) -> int:
-    """Instants that were skipped, and those that Python had no new targets for."""
-    return counters["late"] + counters["uncommitted"]
 
 
 def device(sub: cat.SubDevice) -> Device:

@@ -1,4 +1,4 @@
-"""What the demo prints: devices, a progress bar, the table of figures."""
+"""Text of the demo: devices, a progress bar, the results."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ import sys
 from collections.abc import Sequence
 from typing import TextIO
 
-from catenary.demo.result import FIGURES, PHASES, Device, Result
+from catenary.demo.result import Device, Result
 
-HEADINGS = {"p999": "p99.9"}
 BAR = 40  # characters
 REDRAW_SECONDS = 0.1
 
@@ -21,20 +20,13 @@ def device_lines(devices: Sequence[Device]) -> str:
     )
 
 
-def timing_lines(result: Result) -> str:
-    head = f"  {'[us]':14}" + "".join(f"{HEADINGS.get(name, name):>10}" for name in FIGURES)
-    rows = [
-        f"  {phase:14}" + "".join(f"{result.timing_us[phase][name]:10.1f}" for name in FIGURES)
-        for phase in PHASES
-    ]
-    return "\n".join([head, *rows])
-
-
 def closing_lines(result: Result) -> str:
     error = result.tracking_error
     return (
-        f"  cycles {result.cycles}, lost {result.lost}, late {result.late}\n"
-        f"  tracking error {error['rms'] * 1e3:.2f} mrad rms, {error['max'] * 1e3:.2f} mrad max\n"
+        f"  tracking error {error['rms'] * 1e3:.2f} mrad rms, {error['max'] * 1e3:.2f} mrad max, "
+        "against the set-point that had reached the drive\n"
+        f"  transport delay {result.transport_delay * 1e3:g} ms, from writing a set-point to "
+        "reading the first position that it has moved\n"
         f"  scheduling {result.scheduling}; link {result.link}"
     )
 

@@ -12,6 +12,7 @@ from catenary.doctor.change import Change, Ground
 from catenary.doctor.check import Check, Status
 from catenary.doctor.examination import Examination
 from catenary.doctor.latency import Latency
+from catenary.figures import FIGURES
 
 COLOURS = {"PASS": "\033[32m", "WARN": "\033[33m", "FAIL": "\033[31m", "SKIP": "\033[2m"}
 PLAIN = "\033[0m"
@@ -137,7 +138,7 @@ def as_json(examination: Examination) -> str:
 
 def latency_us(latency: Latency) -> dict[str, object]:
     figure = latency.lateness
-    times = ("mean", "min", "max", "sd", "p50", "p99", "p999")
+    times = FIGURES
     return {
         "seconds": latency.seconds,
         "period": latency.period * 1e6,

@@ -1,18 +1,24 @@
 """CiA 402 axes and I/O as wishes: objects, units, arrays."""
 
+from catenary.drive.channel import Channel
 from catenary.drive.drives import Drives
 from catenary.drive.homing import HomingMethod
 from catenary.drive.io import Inputs, Outputs
+from catenary.drive.process_data import ProcessData
 from catenary.drive.recovery import Phase, Recovery, Stop
+from catenary.plan.start_up_object import StartUp
 from catenary.plan.wish import DistributedClock
 
 __all__ = [
+    "Channel",
     "DistributedClock",
     "Drives",
     "HomingMethod",
     "Inputs",
     "Outputs",
     "Phase",
+    "ProcessData",
     "Recovery",
+    "StartUp",
     "Stop",
 ]

@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
+from difflib import get_close_matches
 from typing import TypeAlias
 
 from catenary.bus import SubDevice
 from catenary.drive.axis import MEASURED, Axis
-from catenary.drive.objects import NAMED_COLUMNS, AxisObject
+from catenary.drive.channel import Channel, ChannelSpec, make_channel
+from catenary.drive.objects import NAMED_COLUMNS, WRITTEN_OBJECTS, AxisObject
 from catenary.model.device import mapped_entries
+from catenary.plan.cycle import NumberKind
 from catenary.plan.wish import DistributedClock, ObjectReference, WrittenPdo
 from catenary.wire.cia402 import Mode
 
 AxisSource: TypeAlias = SubDevice | tuple[SubDevice, int]
-PdoList: TypeAlias = Sequence[int] | Mapping[int, Sequence[tuple[int, int, int]]]
+PdoEntry: TypeAlias = tuple[int, int, int] | str  # (index, subindex, bits), or a channel's name
+PdoList: TypeAlias = Sequence[int] | Mapping[int, Sequence[PdoEntry]]
+ColumnSpec: TypeAlias = ChannelSpec | AxisObject
+Columns: TypeAlias = Sequence[str | tuple[str, ColumnSpec]] | Mapping[str, ColumnSpec]
 
 STATUSWORD = 0x6041
 EVERY_MAX = 10_000  # cycles: beyond, ask by SDO
@@ -88,11 +94,17 @@ def clock_wish(dc: DistributedClock | bool) -> DistributedClock | None:
     return dc
 
 
-def written_pdos(pdos: PdoList) -> tuple[WrittenPdo, ...]:
+def written_pdos(
+    pdos: PdoList, named: Mapping[str, Channel] | Mapping[str, AxisObject]
+) -> tuple[WrittenPdo, ...]:
     """Return the PDOs of `pdos=`, with their entries if they are given.
 
+    Args:
+        pdos: The option.
+        named: What its entries may name.
+
     Raises:
-        ValueError: An index is not one of a PDO.
+        ValueError: An index is not one of a PDO, or a name is unknown.
     """
     for index in pdos:
         if not 0x1600 <= index < 0x1C00:
@@ -103,9 +115,23 @@ def written_pdos(pdos: PdoList) -> tuple[WrittenPdo, ...]:
     if not isinstance(pdos, Mapping):
         return tuple(WrittenPdo(index) for index in pdos)
     return tuple(
-        WrittenPdo(index, tuple(ObjectReference(*entry) for entry in entries) or None)
+        WrittenPdo(index, tuple(_written_entry(index, each, named) for each in entries) or None)
         for index, entries in pdos.items()
     )
+
+
+def _written_entry(
+    pdo: int, entry: PdoEntry, named: Mapping[str, Channel] | Mapping[str, AxisObject]
+) -> ObjectReference:
+    if not isinstance(entry, str):
+        return ObjectReference(*entry)
+    if entry not in named:
+        near = get_close_matches(entry, named, n=1)
+        guess = f"; did you mean {near[0]!r}?" if near else ""
+        known = ", ".join(named) or "none"
+        raise ValueError(f"pdos: 0x{pdo:04X} names {entry!r}; names here: {known}{guess}")
+    found = named[entry]
+    return ObjectReference(found.index, found.subindex, found.bit_length)
 
 
 def mode_of(name: str) -> Mode:
@@ -129,11 +155,18 @@ def known(measured: Sequence[str]) -> tuple[str, ...]:
     return tuple(measured)
 
 
-def named_columns(columns: Sequence[str | tuple[str, AxisObject]]) -> dict[str, AxisObject]:
+def named_columns(columns: Columns) -> dict[str, AxisObject]:
+    """Return the objects of `columns=` by name.
+
+    Raises:
+        TypeError: An object is neither a Channel nor (index, subindex, type).
+        ValueError: A name without an object is unknown.
+    """
     named: dict[str, AxisObject] = {}
-    for column in columns:
-        if isinstance(column, tuple):
-            named[column[0]] = column[1]
+    for column in columns.items() if isinstance(columns, Mapping) else columns:
+        if not isinstance(column, str):
+            name, spec = column
+            named[name] = _axis_object(name, spec)
         elif column in NAMED_COLUMNS:
             named[column] = NAMED_COLUMNS[column]
         else:
@@ -164,3 +197,19 @@ def force_and_torque(
             raise ValueError(f"torque_limit for axis {axis}: it is linear; use force_limit= [N]")
         chosen.append(torque if metres is None else force)
     return tuple(chosen)
+
+
+def _axis_object(name: str, spec: ColumnSpec) -> AxisObject:
+    """Return a column's object. Objects that CiA 402 defines as outputs are written."""
+    if isinstance(spec, AxisObject):
+        return spec
+    channel = make_channel("columns", name, spec)
+    return AxisObject(
+        channel.index,
+        channel.subindex,
+        channel.bit_length,
+        signed=channel.kind is NumberKind.SIGNED,
+        output=channel.output or (channel.index, channel.subindex) in WRITTEN_OBJECTS,
+        real=channel.kind is NumberKind.REAL,
+        scale=channel.scale,
+    )

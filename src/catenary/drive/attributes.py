@@ -23,13 +23,15 @@ def unknown_attribute(owner: object, name: str, label: str = "") -> AttributeErr
 
 
 def check_writable(owner: object, name: str) -> None:
-    """Raise AttributeError unless the attribute is private, or a property with a setter."""
+    """Raise AttributeError unless the attribute is private, or can be assigned to."""
     if name.startswith("_"):
         return
     found = getattr(type(owner), name, None)
     if isinstance(found, property):
         if found.fset is None:
             raise AttributeError(f"{type(owner).__name__}.{name} is read-only", name=name)
+        return
+    if hasattr(type(found), "__set__"):
         return
     if callable(found):
         raise AttributeError(

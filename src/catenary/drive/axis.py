@@ -16,6 +16,7 @@ from catenary.errors import MappingError
 from catenary.plan.axis_report import AxisReport
 from catenary.plan.cycle import AxisPlan, Bank, Column, Number, NumberKind
 from catenary.plan.numbers import Which
+from catenary.plan.start_up_object import StartUp
 from catenary.plan.wish import ImageLayout, PdoWish, WrittenPdo
 from catenary.wire.cia402 import SLOT_OFFSET, Mode
 
@@ -51,6 +52,7 @@ class Axis:
     required: bool = True  # the cycle is not good without its device
     homing: HomingMethod | None = None
     pdos: tuple[WrittenPdo, ...] = ()  # as the application wrote them down
+    objects: tuple[StartUp, ...] = ()  # start-up objects of its device
     settings: DriveSettings = field(default_factory=DriveSettings)  # of the drive; read in PRE-OP
 
     def index(self, base: int) -> int:
@@ -117,6 +119,7 @@ class Axis:
             divider=self.divider,
             required=self.required,
             pdos=self.pdos,
+            objects=self.objects,
         )
 
     @property
@@ -130,8 +133,8 @@ class Axis:
         return self.options.on_loss == "csp_hold"
 
     def _optional(self) -> set[AxisObject]:
-        """What a drive may lack: velocity and torque, unless asked for by name; the mode, which
-        the start-up list sets, where it never changes; and the rates of profiles, which are
+        """Objects that a drive may lack: velocity and torque, unless asked for by name; the mode,
+        which the start-up list sets, where it never changes; and the rates of profiles, which are
         written by SDO then."""
         optional = set() if self.measured_required else {MEASURED["velocity"], MEASURED["torque"]}
         if len(self.modes) == 1 and not self.holds_on_loss:
@@ -167,6 +170,7 @@ class Axis:
             acceleration=bounds.acceleration.value,
             deceleration=bounds.deceleration.value,
             torque_slope=bounds.torque_slope.value,
+            linear=self.units.metres_per_turn is not None,
             standstill=self.units.defaults.standstill,
             step_floor=self.units.defaults.step_limit,
             on_loss=bounds.on_loss,
@@ -221,6 +225,9 @@ class Axis:
             return None
         # The layout knows places and widths; signs are the standard's, unless the device says REAL.
         kind = NumberKind.SIGNED if wanted.signed else NumberKind.UNSIGNED
+        if wanted.real or wanted.scale is not None:
+            kind = NumberKind.REAL if wanted.real else kind
+            return replace(place, kind=kind, scale=wanted.scale or 1.0, offset=0.0)
         if place.kind is not NumberKind.REAL:
             place = replace(place, kind=kind)
         return self.units.apply(place, wanted.unit)
@@ -228,7 +235,8 @@ class Axis:
 
 def column_bank(wanted: AxisObject) -> Bank:
     """Where a column of this object lives: SI values are float64, raw ones int64."""
-    return Bank.INTEGER if wanted.unit is Unit.RAW else Bank.REAL
+    is_float = wanted.unit is not Unit.RAW or wanted.real or wanted.scale is not None
+    return Bank.REAL if is_float else Bank.INTEGER
 
 
 EXPONENTS = (-3, -6, -4, -5, -2, -1, 0, -7, -8, -9)  # ms and us first: some drives know no other

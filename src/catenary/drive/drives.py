@@ -6,15 +6,16 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import NoReturn, TypeAlias, TypeVar
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from catenary.bus import Pending, SubDevice
-from catenary.drive import start_up
+from catenary.bus import Pending
+from catenary.drive import start_up as own_objects
 from catenary.drive.arguments import (
     AxisSource,
+    Columns,
     PdoList,
     axis_modes,
     axis_name,
@@ -28,7 +29,6 @@ from catenary.drive.arguments import (
     warn_of_default_velocity,
     written_pdos,
 )
-from catenary.drive.attributes import check_writable, unknown_attribute
 from catenary.drive.axis import MEASURED, Axis, column_bank
 from catenary.drive.homing import HomingMethod, home_axis, stop_homing
 from catenary.drive.limits import LimitOptions
@@ -42,12 +42,14 @@ from catenary.drive.move_request import (
     require_enabled,
     values_of,
 )
-from catenary.drive.objects import PROFILE_OBJECTS, AxisObject
+from catenary.drive.objects import ACTUAL_VELOCITY, PROFILE_OBJECTS
 from catenary.drive.port import AxisPort
+from catenary.drive.request import Request
 from catenary.drive.state_machine import Goal
 from catenary.drive.units import AxisUnits, one_each, per_axis
 from catenary.drive.values import Array, AxisValues
 from catenary.plan.cycle import Bank, OnLoss
+from catenary.plan.start_up_object import StartUp
 from catenary.plan.stop_reason import StopReason
 from catenary.plan.wish import DistributedClock, ImageLayout, PdoWish, Views, WishTables
 from catenary.types import UDINT
@@ -62,7 +64,7 @@ ALL = slice(None)
 HOMING_PATIENCE = 60.0  # [s] default timeout of a wait
 
 
-class Drives:
+class Drives(Request):
     """Process-data request for n axes.
 
     `subs`: SubDevices with all of their axes, or `(SubDevice, slot)` for single axes.
@@ -72,8 +74,10 @@ class Drives:
     - `other_modes`: modes that the axes may change to while the loop runs ("hm": see `home`).
     - `measured`: position, velocity, torque that the drives must supply. None: all three; a
       velocity that the drive lacks is estimated, a torque reads NaN.
-    - `columns`: further objects, by a name of `NAMED_COLUMNS` or as `(name, AxisObject)`. Read
-      them as `arm.actual["following_error"]`.
+    - `columns`: further objects: names of `NAMED_COLUMNS`, or `{name: (index, subindex, type)}` as
+      for `ProcessData`; the index is that of slot 0. Read them as `arm.actual["following_error"]`,
+      write them as `arm.target["torque_offset"] = 0.5`. Objects that CiA 402 does not define are
+      read; to write one, give `Channel(index, subindex, type, output=True)`.
     - `required`: False: the loop continues without a lost drive. Its axes hold their last values;
       enable them again when it is `present`.
     - `divider`: cycles of the loop between two exchanges.
@@ -82,6 +86,7 @@ class Drives:
     - `pdos`: PDOs of each device, instead of a search: `[0x1701, 0x1B01]`, or with their entries
       `{0x1600: [(0x6040, 0, 16), (0x607A, 0, 32)]}` (index, subindex, bits). They are written even
       if the SII says that this is impossible. A direction without PDOs here is searched.
+    - `start_up`: `StartUp` objects that are written to each device before SAFE-OP.
 
     Options with one value for all axes, or a sequence of one per axis:
 
@@ -146,11 +151,12 @@ class Drives:
         on_loss: PerAxis[OnLoss | None] = None,
         homing: PerAxis[HomingMethod | None] = None,
         measured: Sequence[str] | None = None,
-        columns: Sequence[str | tuple[str, AxisObject]] = (),
+        columns: Columns = (),
         required: bool = True,
         divider: int = 1,
         dc: DistributedClock | bool = False,
         pdos: PdoList = (),
+        start_up: Sequence[StartUp] = (),
     ) -> None:
         sources = axis_sources(subs)
         n = len(sources)
@@ -183,10 +189,10 @@ class Drives:
             if on_loss is None or isinstance(on_loss, str)
             else one_each("on_loss", on_loss, n),
         )
-        written = written_pdos(pdos)
         first_modes = (mode,) * n if isinstance(mode, str) else one_each("mode", mode, n)
-        self._subs = tuple(sub for sub, _ in sources)
+        super().__init__([sub for sub, _ in sources])
         self._columns = named_columns(columns)
+        written = written_pdos(pdos, self._columns)
         self._clock = clock_wish(dc)
         self._axes = tuple(
             Axis(
@@ -203,6 +209,7 @@ class Drives:
                 required=required,
                 homing=home,
                 pdos=written,
+                objects=tuple(start_up),
             )
             for (sub, slot), first, unit, limits, home in zip(
                 sources,
@@ -221,7 +228,8 @@ class Drives:
         self._actual = AxisValues("actual")
         self._target = AxisValues("target")
         self._views: Views | None = None
-        self._profile_columns: dict[str, AxisObject] = {}  # mapped, and not asked for by name
+        self._mapped_rates: tuple[tuple[str, int], ...] = ()  # object and axis
+        self._measures_velocity: list[bool] = []
         self._ports: tuple[AxisPort, ...] = ()
         self._moves: Moves | None = None
         self._units: npt.NDArray[np.intp] = np.zeros(0, np.intp)
@@ -231,18 +239,6 @@ class Drives:
 
     def __repr__(self) -> str:
         return f"Drives({', '.join(self.names)})"
-
-    def __getattr__(self, name: str) -> NoReturn:
-        raise unknown_attribute(self, name)  # reached only if there is none of this name
-
-    def __setattr__(self, name: str, value: object) -> None:
-        check_writable(self, name)
-        object.__setattr__(self, name, value)
-
-    @property
-    def subs(self) -> tuple[SubDevice, ...]:
-        """Device of each axis."""
-        return self._subs
 
     @property
     def actual(self) -> AxisValues:
@@ -444,7 +440,7 @@ class Drives:
         self._read_drives()
         wishes: dict[int, PdoWish] = {}
         for axis, sub in zip(self._axes, self.subs, strict=True):
-            wish = axis.pdo_wish(start_up.downloads(axis, sub, period_ns * axis.divider))
+            wish = axis.pdo_wish(own_objects.downloads(axis, sub, period_ns * axis.divider))
             wishes[axis.device] = (
                 joined(wishes[axis.device], wish) if axis.device in wishes else wish
             )
@@ -456,34 +452,42 @@ class Drives:
         if self._is_read:
             return
         rated = [
-            start_up.with_rated_torque(axis, sub)
+            own_objects.with_rated_torque(axis, sub)
             for axis, sub in zip(self._axes, self.subs, strict=True)
         ]
-        self._axes = start_up.with_settings(rated, self.subs)
+        self._axes = own_objects.with_settings(rated, self.subs)
         self._is_read = True
 
     def tables(self, layout: ImageLayout) -> WishTables:
         """Return the axes in their order; columns by name, then by axis: a name is one array."""
         self._is_read = False  # the next plan reads again
         self._units = np.array([layout.sync_unit(axis.device) for axis in self._axes], np.intp)
-        self._profile_columns = {
-            name: wanted
+        # Rates of profiles that are mapped anyway follow the columns that were asked for.
+        self._mapped_rates = tuple(
+            (name, i)
             for name, wanted in PROFILE_OBJECTS.items()
             if name not in self._columns
-            and all(axis.uses_profile and axis.maps(wanted, layout) for axis in self._axes)
-        }
-        columns = self._all_columns()
+            for i, axis in enumerate(self._axes)
+            if axis.uses_profile and axis.maps(wanted, layout)
+        )
+        self._measures_velocity = [axis.maps(ACTUAL_VELOCITY, layout) for axis in self._axes]
         return WishTables(
             axes=tuple(axis.plan(layout) for axis in self._axes),
-            output_columns=tuple(
-                axis.column(name, wanted, layout)
-                for name, wanted in columns.items()
-                if wanted.output
-                for axis in self._axes
+            output_columns=(
+                *(
+                    axis.column(name, wanted, layout)
+                    for name, wanted in self._columns.items()
+                    if wanted.output
+                    for axis in self._axes
+                ),
+                *(
+                    self._axes[i].column(name, PROFILE_OBJECTS[name], layout)
+                    for name, i in self._mapped_rates
+                ),
             ),
             input_columns=tuple(
                 axis.column(name, wanted, layout)
-                for name, wanted in columns.items()
+                for name, wanted in self._columns.items()
                 if not wanted.output
                 for axis in self._axes
             ),
@@ -525,15 +529,21 @@ class Drives:
             units=axis.units,
             exchange=period * axis.divider,
             period=period,
+            measures_velocity=self._measures_velocity[index],
             write=write,
             set_column=partial(self._set_column, index),
         )
 
     def _set_column(self, index: int, name: str, value: float) -> bool:
-        """Write one axis' value of a column. Return False if there is no such column."""
-        if name not in self._all_columns():
+        """Write one axis' value of a column. Return False if the column does not exist."""
+        if name in self._columns:
+            self._target[name][index] = value
+        elif (name, index) in self._mapped_rates:
+            rank = self._mapped_rates.index((name, index))
+            reals = self._bound().output_reals
+            reals[len(reals) - len(self._mapped_rates) + rank] = value
+        else:
             return False
-        self._target[name][index] = value
         return True
 
     def _preset_columns(self) -> None:
@@ -547,15 +557,11 @@ class Drives:
             if "max_torque" in self._columns:
                 self._set_column(index, "max_torque", torque or 1000 * abs(axis.units.torque_scale))
 
-    def _all_columns(self) -> dict[str, AxisObject]:
-        """Return the columns by name: those asked for, and mapped rates of profiles."""
-        return {**self._columns, **self._profile_columns}
-
     def _slices(self, reals: Array, integers: Array, *, output: bool) -> dict[str, Array]:
         """Each column's part of its bank's array."""
         used = {Bank.REAL: 0, Bank.INTEGER: 0}
         slices: dict[str, Array] = {}
-        for name, wanted in self._all_columns().items():
+        for name, wanted in self._columns.items():
             if wanted.output is not output:
                 continue
             bank = column_bank(wanted)

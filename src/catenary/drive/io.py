@@ -2,136 +2,110 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
-from typing import NamedTuple, NoReturn
+from collections.abc import Mapping, Sequence
+from typing import Generic, TypeVar, overload
 
 import numpy.typing as npt
 
 from catenary.bus import SubDevice
 from catenary.drive.arguments import PdoList, clock_wish, cycles_between, written_pdos
-from catenary.drive.attributes import check_writable, unknown_attribute
-from catenary.errors import MappingError
-from catenary.model.device import Assignment, DeviceDescription, Direction, Entry, Pdo
-from catenary.plan.cycle import Bank, Column, NumberKind
-from catenary.plan.numbers import ANY, Which
-from catenary.plan.pdo_rewrite import write_down
-from catenary.plan.pdo_search import pdo_names
+from catenary.drive.channel import ChannelSpec, make_channels
+from catenary.drive.device_channels import (
+    chosen_channels,
+    column,
+    mapped_channels,
+    with_written,
+)
+from catenary.drive.request import Request
+from catenary.model.device import Direction
+from catenary.plan.cycle import Bank
+from catenary.plan.start_up_object import StartUp
 from catenary.plan.wish import (
     Bytes,
     DistributedClock,
     ImageLayout,
     Integers,
-    ObjectReference,
     PdoWish,
     Reals,
     Views,
     WishTables,
-    WrittenPdo,
 )
 
-# Data types of ETG.1000.6 table 64 that are not unsigned integers.
-SIGNED_TYPES = frozenset((0x02, 0x03, 0x04, 0x10, 0x12, 0x13, 0x14, 0x15))
-REAL_TYPES = frozenset((0x08, 0x11))
+A = TypeVar("A", Reals, Integers, Bytes)
 
 
-class Channel(NamedTuple):
-    """One entry of a device's process data and the name it goes by."""
+class BankArray(Generic[A]):
+    """The array of a bank, as an attribute of Inputs and Outputs. Assigning writes its elements."""
 
-    name: str
-    device: int
-    entry: Entry
-    scale: float | None  # SI value = raw · scale; None: the raw number
-    which: Which = ANY  # where the device maps the object more than once
+    def __init__(self, bank: Bank) -> None:
+        self._bank = bank
 
-    @property
-    def kind(self) -> NumberKind:
-        if self.entry.data_type in REAL_TYPES:
-            return NumberKind.REAL
-        return NumberKind.SIGNED if self.entry.data_type in SIGNED_TYPES else NumberKind.UNSIGNED
+    @overload
+    def __get__(self, owner: None, kind: type[Channels]) -> BankArray[A]: ...
+    @overload
+    def __get__(self, owner: Channels, kind: type[Channels]) -> A: ...
+    def __get__(self, owner: Channels | None, kind: type[Channels]) -> BankArray[A] | A:
+        if owner is None:
+            return self
+        array: A = owner.array(self._bank)  # type: ignore[assignment]
+        return array
 
-    @property
-    def bank(self) -> Bank:
-        if self.scale is not None or self.kind is NumberKind.REAL:
-            return Bank.REAL
-        return Bank.BIT if self.entry.bit_length == 1 else Bank.INTEGER
+    def __set__(self, owner: Channels, values: npt.ArrayLike) -> None:
+        if owner.direction is Direction.INPUT:
+            raise AttributeError("inputs are read-only")
+        owner.array(self._bank)[:] = values
 
 
-class _Channels:
-    """The process data of some devices in one direction, as a wish."""
+class Channels(Request):
+    """The process data of some devices in one direction, as a request."""
 
     direction: Direction
+
+    bits: BankArray[Bytes] = BankArray(Bank.BIT)
+    """(k,) channels of one bit, 0 or 1, in the order of the process data."""
+    integers: BankArray[Integers] = BankArray(Bank.INTEGER)
+    """(k,) raw integers, in the order of the process data."""
+    reals: BankArray[Reals] = BankArray(Bank.REAL)
+    """(k,) channels with a scale and REAL numbers, in the order of the process data."""
 
     def __init__(
         self,
         *subs: SubDevice,
+        channels: Mapping[str, ChannelSpec] | None = None,
         scale: Mapping[str, float] | None = None,
         required: bool = True,
         divider: int = 1,
         dc: DistributedClock | bool = False,
         pdos: PdoList = (),
+        start_up: Sequence[StartUp] = (),
     ) -> None:
-        self._subs = subs
-        self._pdos = tuple(p for p in written_pdos(pdos) if p.direction is self.direction)
+        super().__init__(subs)
+        named = make_channels("channels", channels or {})
+        written = written_pdos(pdos, named)
+        self._pdos = tuple(pdo for pdo in written if pdo.direction is self.direction)
         self._required = required
         self._divider = cycles_between("divider", divider)
         self._clock = clock_wish(dc)
+        self._start_up = tuple(start_up)
         self._units: list[int] = []
-        self._arrays: tuple[Reals, Integers, Bytes] | None = None
+        self._arrays: dict[Bank, Reals | Integers | Bytes] | None = None
         self._unit_valid: Bytes | None = None
-        devices = [with_written(sub.description, self.direction, self._pdos) for sub in subs]
-        self._channels = channels(devices, self.direction, scale or {})
+        if named:
+            if len(subs) != 1:
+                raise ValueError(f"channels= needs one device, not {len(subs)}: one request each")
+            if scale is not None:
+                raise ValueError("scale= is for mapped channels; use channels= (..., type, scale)")
+            self._channels = chosen_channels(subs[0], named)
+        else:
+            devices = [with_written(sub.description, self.direction, self._pdos) for sub in subs]
+            self._channels = mapped_channels(devices, self.direction, scale or {})
         self._places: dict[str, tuple[Reals | Integers | Bytes, int]] = {}
 
-    def __getattr__(self, name: str) -> NoReturn:
-        raise unknown_attribute(self, name)  # reached only if there is none of this name
-
-    def __setattr__(self, name: str, value: object) -> None:
-        check_writable(self, name)
-        object.__setattr__(self, name, value)
-
-    @property
-    def subs(self) -> tuple[SubDevice, ...]:
-        """Devices of these channels."""
-        return self._subs
-
-    @property
-    def bits(self) -> Bytes:
-        """(k,) channels of one bit, 0 or 1, in the order of the process data."""
-        return self._bound()[2]
-
-    @bits.setter
-    def bits(self, values: npt.ArrayLike) -> None:
-        self._write(self.bits, values)
-
-    @property
-    def integers(self) -> Integers:
-        """(k,) raw integers, in the order of the process data."""
-        return self._bound()[1]
-
-    @integers.setter
-    def integers(self, values: npt.ArrayLike) -> None:
-        self._write(self.integers, values)
-
-    @property
-    def reals(self) -> Reals:
-        """(k,) channels with a scale and REAL numbers, in the order of the process data."""
-        return self._bound()[0]
-
-    @reals.setter
-    def reals(self, values: npt.ArrayLike) -> None:
-        self._write(self.reals, values)
-
-    def _bound(self) -> tuple[Reals, Integers, Bytes]:
+    def array(self, bank: Bank) -> Reals | Integers | Bytes:
+        """Return the array of a bank. RuntimeError before a loop is open."""
         if self._arrays is None:
             raise RuntimeError(f"{type(self).__name__} have no values before a Loop is open")
-        return self._arrays
-
-    def _write(self, array: Reals | Integers | Bytes, values: npt.ArrayLike) -> None:
-        if self.direction is Direction.INPUT:
-            raise AttributeError("inputs are read-only")
-        array[:] = values
+        return self._arrays[bank]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -145,10 +119,10 @@ class _Channels:
         return value
 
     def pdos(self, period_ns: int) -> Mapping[int, PdoWish]:
-        """Request what is mapped already, or `pdos`: without them nothing changes on the device."""
+        """Request the channels, or `pdos`: without either nothing changes on the device."""
         wishes: dict[int, PdoWish] = {}
         for sub in self.subs:
-            mine = tuple(reference(c.entry) for c in self._channels if c.device == sub.position)
+            mine = tuple(c.channel.reference() for c in self._channels if c.device == sub.position)
             output = self.direction is Direction.OUTPUT
             wishes[sub.position] = PdoWish(
                 outputs=mine if output else (),
@@ -157,6 +131,7 @@ class _Channels:
                 divider=self._divider,
                 required=self._required,
                 pdos=self._pdos,
+                objects=self._start_up,
             )
         return wishes
 
@@ -177,13 +152,14 @@ class _Channels:
 
     def _bind(self, reals: Reals, integers: Integers, bits: Bytes, unit_valid: Bytes) -> None:
         self._unit_valid = unit_valid
-        self._arrays = reals, integers, bits
         arrays: dict[Bank, Reals | Integers | Bytes]
         arrays = {Bank.REAL: reals, Bank.INTEGER: integers, Bank.BIT: bits}
+        self._arrays = arrays
         used = dict.fromkeys(Bank, 0)
-        for channel in self._channels:
-            self._places[channel.name] = (arrays[channel.bank], used[channel.bank])
-            used[channel.bank] += 1
+        for each in self._channels:
+            bank = each.channel.bank
+            self._places[each.name] = (arrays[bank], used[bank])
+            used[bank] += 1
 
     def _place(self, name: str) -> tuple[Reals | Integers | Bytes, int]:
         try:
@@ -194,14 +170,18 @@ class _Channels:
             raise KeyError(f"no channel {name!r}; there are: {', '.join(self.names)}") from None
 
 
-class Inputs(_Channels):
+class Inputs(Channels):
     """The inputs of SubDevices: `.bits` (uint8), `.integers` (int64) and `.reals` (float64), each
     in the order of the process data, or one by name: `buttons["Input 1"]`.
 
+    Without `channels`, those that are mapped, by the names of the SII or the dictionary. With it,
+    chosen objects of one device: `Inputs(sub, channels={"force": (0x6000, 1, types.REAL)})`, each
+    a `Channel` or (index, subindex, type[, scale]); they are mapped if they are not yet.
     `scale` turns raw numbers into floats: `Inputs(sub, scale={"Value": 10 / 0x7FFF})`.
     `required=False`: the loop goes on without a device that vanishes; its channels keep their last
     values, `present` tells. `divider`: exchanged every so many cycles of the loop.
     `dc`: distributed clocks, as for `Drives`. `pdos`: these PDOs instead of those assigned now.
+    `start_up`: objects that are written to each device before SAFE-OP.
     """
 
     direction = Direction.INPUT
@@ -211,10 +191,9 @@ class Inputs(_Channels):
         self._bind(views.input_reals, views.input_integers, views.input_bits, views.unit_valid)
 
 
-class Outputs(_Channels):
+class Outputs(Channels):
     """The outputs of SubDevices, all 0 at the start: write `.bits[:]`, `.integers[:]`, `.reals[:]`,
-    or one by name: `lamps["Output 1"] = 1`. `scale`, `required`, `divider`, `dc`, `pdos` as for
-    `Inputs`.
+    or one by name: `lamps["Output 1"] = 1`. The options are those of `Inputs`.
     What is out of its range is cut, and `cycle.limited` says so."""
 
     direction = Direction.OUTPUT
@@ -226,107 +205,3 @@ class Outputs(_Channels):
     def bind(self, views: Views) -> None:
         """Receives the arrays of the loop that opens."""
         self._bind(views.output_reals, views.output_integers, views.output_bits, views.unit_valid)
-
-
-def channels(
-    devices: Iterable[DeviceDescription], direction: Direction, scale: Mapping[str, float]
-) -> tuple[Channel, ...]:
-    """All channels of the devices, each with a name of its own. ValueError: there are none."""
-    devices = list(devices)
-    if not devices:
-        raise ValueError(
-            f"no device is given whose {direction.name.lower()} process data are meant: was one "
-            "found? main.subs shows all; a group is empty where no device has its alias"
-        )
-    found = [
-        (device, pdo, entry)
-        for device in devices
-        for assignment in device.assignments(direction)
-        for pdo, entry in number_entries(assignment)
-    ]
-    if not found:
-        raise ValueError(
-            f"no {direction.name.lower()} process data in the devices given"
-            f"{_choice(devices, direction)}"
-        )
-    names = unique_names([(e.name, pdo.name, str(device.position)) for device, pdo, e in found])
-    for name in scale:
-        if name not in names:
-            raise ValueError(f"scale: no channel {name!r}; there are: {', '.join(names)}")
-    alike: Counter[tuple[int, int, int, int, int]] = Counter()
-    made = []
-    for name, (device, pdo, entry) in zip(names, found, strict=True):
-        place = (device.position, pdo.index, entry.index, entry.subindex, entry.bit_length)
-        which = Which(pdo.index, entry.bit_length, alike[place])
-        alike[place] += 1
-        made.append(Channel(name, device.position, entry, scale.get(name), which))
-    return tuple(made)
-
-
-def _choice(devices: Sequence[DeviceDescription], direction: Direction) -> str:
-    """Return the PDOs that could be assigned, if there are any."""
-    offered = [pdo for device in devices for pdo in device.pdos(direction)]
-    return f": none is assigned; choose with pdos= from {pdo_names(offered)}" if offered else ""
-
-
-def with_written(
-    device: DeviceDescription, direction: Direction, pdos: Sequence[WrittenPdo]
-) -> DeviceDescription:
-    """Return the device as if it had these PDOs; unchanged without PDOs."""
-    if not pdos:
-        return device
-    return device.with_process_data(direction, write_down(device, direction, pdos).assignments)
-
-
-def number_entries(assignment: Assignment) -> list[tuple[Pdo, Entry]]:
-    """Return all entries with their PDOs, without gaps and without what no number can hold."""
-    return [
-        (pdo, entry)
-        for pdo in assignment.pdos
-        for entry in pdo.entries
-        if entry.index and 1 <= entry.bit_length <= 64
-    ]
-
-
-def unique_names(parts: list[tuple[str, str, str]]) -> list[str]:
-    """A name for each (entry, PDO, position): as short as tells them apart, then numbered.
-
-    Terminals call every channel's entry "Output" and tell them apart by their PDO, "Channel 3".
-    """
-    for spelling in (short_name, pdo_name, full_name):
-        names = [spelling(*part) for part in parts]
-        if len(set(names)) == len(names):
-            return names
-    return [f"{name} {names[: i + 1].count(name)}" for i, name in enumerate(names)]
-
-
-def short_name(entry: str, pdo: str, position: str) -> str:
-    return entry or pdo or "value"
-
-
-def pdo_name(entry: str, pdo: str, position: str) -> str:
-    return f"{pdo} {entry}".strip() or "value"
-
-
-def full_name(entry: str, pdo: str, position: str) -> str:
-    return f"{position} {pdo_name(entry, pdo, position)}"
-
-
-def reference(entry: Entry) -> ObjectReference:
-    return ObjectReference(entry.index, entry.subindex, entry.bit_length)
-
-
-def column(channel: Channel, layout: ImageLayout, direction: Direction) -> Column:
-    """The channel with its place."""
-    entry = channel.entry
-    find = layout.output if direction is Direction.OUTPUT else layout.input
-    number = find(channel.device, entry.index, entry.subindex, channel.which)
-    if number is None:
-        raise MappingError(f"device {channel.device}: {entry} is not in its process data")
-    return Column(
-        name=channel.name,
-        number=replace(number, kind=channel.kind, scale=channel.scale or 1.0, offset=0.0),
-        bank=channel.bank,
-        device=channel.device,
-        sync_unit=layout.sync_unit(channel.device),
-    )

@@ -53,7 +53,7 @@ class Move:
 
     @property
     def outcome(self) -> Outcome | None:
-        """How the move ended: "reached" its goal, "stopped" by `stop`, "replaced" by another move
+        """End of the move: "reached" its goal, "stopped" by `stop`, "replaced" by another move
         of one of its axes, "failed" (see `error`). The worst of its axes counts. None: not done."""
         if not self.done:
             return None

@@ -1,4 +1,4 @@
-"""What `move_to` and `move_by` ask for, checked against the limits before anything moves."""
+"""Requests of `move_to` and `move_by`, checked against the limits before anything moves."""
 
 from __future__ import annotations
 
@@ -84,11 +84,16 @@ def require_enabled(port: AxisPort) -> None:
 
 
 def default_acceleration(axis: Axis) -> float | None:
-    """Return `acceleration_limit`, else the velocity limit divided by 0.25 s; None: not known."""
+    """Return `acceleration_limit`, else the default velocity divided by 0.25 s; None: not known."""
     if axis.options.acceleration_limit is not None:
         return axis.options.acceleration_limit
-    velocity = axis.bounds.velocity.value
+    velocity = default_velocity(axis)
     return None if velocity is None else velocity / BRAKE_TIME
+
+
+def default_velocity(axis: Axis) -> float | None:
+    """Return the velocity limit; None if the application asked for none (`math.inf`)."""
+    return None if axis.options.velocity_limit == math.inf else axis.bounds.velocity.value
 
 
 def _part(axis: Axis, port: AxisPort, goal: float, rates: Rates) -> Part:
@@ -132,7 +137,7 @@ def _rates(axes: Sequence[Axis], options: RateOptions) -> list[Rates]:
         columns[name] = [None] * count if value is None else list(values_of(name, value, count))
     return [
         Rates(
-            _rate(axis, "velocity", velocity, axis.bounds.velocity.value),
+            _rate(axis, "velocity", velocity, default_velocity(axis)),
             _rate(axis, "acceleration", acceleration, default_acceleration(axis)),
             None if jerk is None else _positive(axis, "jerk", jerk),
         )

@@ -26,7 +26,8 @@ class Unit(Enum):
 
 @dataclass(frozen=True, slots=True)
 class AxisObject:
-    """One object of an axis. `output`: MainDevice → drive."""
+    """One object of an axis. `output`: MainDevice → drive. `scale`: of a RAW object that is read or
+    written as a float; None: as an integer."""
 
     index: int  # of slot 0
     subindex: int
@@ -34,6 +35,8 @@ class AxisObject:
     signed: bool = False
     unit: Unit = Unit.RAW
     output: bool = False
+    real: bool = False
+    scale: float | None = None
 
     def reference(self, slot: int, *, required: bool = True) -> ObjectReference:
         index = self.index + SLOT_OFFSET * slot
@@ -80,3 +83,13 @@ NAMED_COLUMNS: dict[str, AxisObject] = {
     "digital_inputs": AxisObject(Object.DIGITAL_INPUTS, 0, 32, False, Unit.RAW, False),
     "digital_outputs": AxisObject(Object.DIGITAL_OUTPUTS, 1, 32, False, Unit.RAW, True),
 }
+
+# Objects of a drive that the MainDevice writes, (index, subindex) of slot 0.
+WRITTEN_OBJECTS = frozenset(
+    (each.index, each.subindex)
+    for each in (
+        *NAMED_COLUMNS.values(),
+        *(CONTROLWORD, MODE_TARGET, TARGET_POSITION, TARGET_VELOCITY, TARGET_TORQUE),
+    )
+    if each.output
+)

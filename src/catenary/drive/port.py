@@ -23,6 +23,7 @@ SetColumn: TypeAlias = Callable[[str, float], bool]  # False: the axis has no su
 
 FOLLOWED = 1  # axis_flags
 GOAL_SHIFT = 6
+JUMPS = 3  # counts per exchange of an estimated velocity that are no motion
 
 
 class AxisPort:
@@ -37,6 +38,7 @@ class AxisPort:
         units: AxisUnits,
         exchange: float,
         period: float,
+        measures_velocity: bool,
         write: WriteObject,
         set_column: SetColumn,
     ) -> None:
@@ -45,6 +47,9 @@ class AxisPort:
         self.name = name
         self.units = units
         self.exchange = exchange  # [s] between two exchanges of its device
+        # An estimated velocity jumps by a count per exchange while the axis stands.
+        jump = 0.0 if measures_velocity else JUMPS * abs(units.position_scale) / exchange
+        self._standstill = max(units.defaults.standstill, jump)
         self.period = period  # [s] of the loop
         self.write_object = write
         self.set_column = set_column
@@ -84,7 +89,8 @@ class AxisPort:
 
     @property
     def at_rest(self) -> bool:
-        return abs(self.velocity) <= self.units.defaults.standstill
+        """True if the velocity is below the standstill, or cannot be told from it."""
+        return not abs(self.velocity) > self._standstill
 
     def set_target(self, position: float) -> None:
         self._views.target_position[self._index] = position

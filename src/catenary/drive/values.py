@@ -48,13 +48,22 @@ class AxisValues:
 
     def __getitem__(self, name: str) -> Array:
         """The column `name`, (n,): SI float64, or raw int64 for words of bits."""
+        if not hasattr(self, "_columns"):
+            raise RuntimeError(f"{self._owner}[{name!r}] has no values before a Loop is open")
         try:
             return self._columns[name]
         except KeyError:
             known = ", ".join(self._columns) or "none"
             raise KeyError(
-                f"no column {name!r}; asked for in Drives(columns=...): {known}"
+                f"no column {name!r} in {self._owner}; asked for in Drives(columns=...): {known}"
             ) from None
+
+    def __setitem__(self, name: str, values: npt.ArrayLike) -> None:
+        """Write the column `name`: one value for all axes, or one for each."""
+        array = self[name]
+        if not array.flags.writeable:
+            raise TypeError(f"{self._owner} values are read-only; write columns in target[...]")
+        array[:] = values
 
     def __getattr__(self, name: str) -> object:
         # Called only for an empty slot, or an attribute that does not exist.

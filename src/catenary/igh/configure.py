@@ -125,7 +125,7 @@ def _device(
     if not config:
         raise _no_handle(f"{who}: no configuration")
     _tell_process_data(master, plan, config, who)
-    for download in plan.start_up:
+    for download in (*plan.before_mapping, *plan.start_up):
         data = ctypes.create_string_buffer(download.data, len(download.data))
         if download.optional:  # the master gives a device up that refuses one of its list
             _download_if_there(master, plan.position, download)

@@ -7,7 +7,7 @@ from dataclasses import fields
 
 import numpy as np
 
-from catenary.plan.cycle import Bank, Column
+from catenary.plan.cycle import Bank
 from catenary.plan.wish import Mover, Views, Wish, WishTables
 
 COLUMN_BUFFERS: dict[tuple[bool, Bank], str] = {
@@ -18,7 +18,8 @@ COLUMN_BUFFERS: dict[tuple[bool, Bank], str] = {
     (True, Bank.INTEGER): "output_integers",
     (True, Bank.BIT): "output_bits",
 }
-OTHERS = (*COLUMN_BUFFERS.values(), "unit_valid", "movers", "is_open")
+PART_BUFFERS = (*COLUMN_BUFFERS.values(), "input_bytes", "output_bytes")
+OTHERS = (*PART_BUFFERS, "unit_valid", "movers", "is_open")
 AXIS_BUFFERS = tuple(each.name for each in fields(Views) if each.name not in OTHERS)
 
 
@@ -32,29 +33,27 @@ def bind_wishes(
 
     `is_open` returns True while the loop runs.
     """
-    arrays = {name: np.asarray(buffers[name]) for name in (*AXIS_BUFFERS, *COLUMN_BUFFERS.values())}
+    arrays = {name: np.asarray(buffers[name]) for name in (*AXIS_BUFFERS, *PART_BUFFERS)}
     unit_valid = np.asarray(buffers["unit_valid"])
     movers: list[Mover] = []
-    used = dict.fromkeys(("axes", *COLUMN_BUFFERS.values()), 0)
+    used = dict.fromkeys(("axes", *PART_BUFFERS), 0)
     for wish, table in zip(wishes, tables, strict=True):
-        sizes = dict.fromkeys(AXIS_BUFFERS, len(table.axes)) | column_sizes(table)
+        sizes = dict.fromkeys(AXIS_BUFFERS, len(table.axes)) | part_sizes(table)
         starts = {name: used.get(name, used["axes"]) for name in sizes}
         parts = {name: arrays[name][starts[name] :][: sizes[name]] for name in sizes}
         wish.bind(Views(**parts, unit_valid=unit_valid, movers=movers, is_open=is_open))
         used["axes"] += len(table.axes)
-        for name in COLUMN_BUFFERS.values():
+        for name in PART_BUFFERS:
             used[name] += sizes[name]
     return Views(**arrays, unit_valid=unit_valid, movers=movers, is_open=is_open)
 
 
-def column_sizes(table: WishTables) -> dict[str, int]:
-    """How many columns a wish has in each bank."""
-    sides: tuple[tuple[bool, tuple[Column, ...]], ...] = (
-        (False, table.input_columns),
-        (True, table.output_columns),
-    )
-    sizes = dict.fromkeys(COLUMN_BUFFERS.values(), 0)
-    for output, columns in sides:
+def part_sizes(table: WishTables) -> dict[str, int]:
+    """Return the number of columns that a request has in each bank, and of bytes in its areas."""
+    sizes = dict.fromkeys(PART_BUFFERS, 0)
+    for output, columns in ((False, table.input_columns), (True, table.output_columns)):
         for column in columns:
             sizes[COLUMN_BUFFERS[output, column.bank]] += 1
+    sizes["input_bytes"] = sum(area.size for area in table.input_areas)
+    sizes["output_bytes"] = sum(area.size for area in table.output_areas)
     return sizes

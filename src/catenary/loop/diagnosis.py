@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from catenary.errors import DriveError, StateError, WorkingCounterError
+from catenary.log import Log
 from catenary.model.finding import Finding
 from catenary.procedure.survey import Answer
 from catenary.wire.al import ERROR_FLAG, STATE_MASK, State, status_code
@@ -18,7 +19,7 @@ def silence_error(
     answers: Sequence[Answer],
     suspects: Sequence[int],
     lost: int,
-    log: object,
+    log: Log | None,
     findings: Sequence[Finding] = (),
     mute: Sequence[int] = (),
     tight: str = "",
@@ -77,7 +78,7 @@ def tight_period(wire_ns: int, period_ns: int) -> str:
 
 
 def state_error(
-    answers: Sequence[Answer], log: object, other_masters: Sequence[str] = ()
+    answers: Sequence[Answer], log: Log | None, other_masters: Sequence[str] = ()
 ) -> StateError | None:
     """Return the error for devices that left OP; None if all are there. `other_masters`: evidence
     of another master, as text."""
@@ -112,7 +113,7 @@ def _suspicion(answer: Answer, other_masters: Sequence[str]) -> str:
     )
 
 
-def forgetful_error(silent: Sequence[Answer], al_status: int, log: object) -> StateError:
+def forgetful_error(silent: Sequence[Answer], al_status: int, log: Log | None) -> StateError:
     """The error for devices that lost their addresses while all frames come back: they were off for
     a moment. `al_status`: the OR of all states."""
     first = silent[0]
@@ -146,7 +147,7 @@ class AxisTrouble(NamedTuple):
         return f"{self.name}: {state}, error code 0x{self.code:04X} ({error_text(self.code)})"
 
 
-def drive_error(axes: Sequence[AxisTrouble], what: str, log: object) -> DriveError:
+def drive_error(axes: Sequence[AxisTrouble], what: str, log: Log | None) -> DriveError:
     """The error for axes of which `what` is to be said: "in fault", "cannot be enabled"."""
     faulty = any(axis.state in IN_FAULT for axis in axes)
     hint = (

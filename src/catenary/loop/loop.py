@@ -16,6 +16,7 @@ from types import TracebackType
 from catenary.bus import SubDevice
 from catenary.core import Cycle, Iteration
 from catenary.errors import LawError
+from catenary.log import Log
 from catenary.loop.background import Background, program_ends
 from catenary.loop.clocks import Clocks
 from catenary.loop.devices import DeviceWish, by_network
@@ -33,7 +34,7 @@ from catenary.loop.networks import (
 )
 from catenary.loop.options import ClockOptions, Scheduling, StopPolicy, one_of
 from catenary.loop.publishing import one_sink_each
-from catenary.loop.running import LogArray, Running, take_down
+from catenary.loop.running import Running, take_down
 from catenary.loop.signals import SignalGuard
 from catenary.loop.stream import Stream
 from catenary.loop.timing import Timing
@@ -74,6 +75,7 @@ class Loop:
         stop: limits that stop axes or end the loop.
         scheduling: how the loop waits for time and frames.
         clocks: how distributed clocks are kept.
+        log_axes: the log has the values of every axis, too (docs/recording.md).
 
     Raises:
         ValueError: an option is impossible, or a request names devices of several MainDevices.
@@ -94,6 +96,7 @@ class Loop:
         stop: StopPolicy = StopPolicy(),
         scheduling: Scheduling = Scheduling(),
         clocks: ClockOptions = ClockOptions(),
+        log_axes: bool = False,
     ) -> None:
         one_of("execution", execution, ("threaded", "inline"))
         period_in_ns(period)
@@ -116,6 +119,7 @@ class Loop:
             watchdog=watchdog,
             priority=priority,
             log=log,
+            log_axes=log_axes,
             laws=[made_law(law) for law in laws],
             stop=stop,
             scheduling=scheduling,
@@ -389,7 +393,7 @@ class Loop:
 
     @property
     def timing(self) -> Timing:
-        """Phases of the cycles since the loop was opened; it stays readable afterwards."""
+        """Timing of the cycles since the loop was opened; it stays readable afterwards."""
         return self._networks[0].timing
 
     @property
@@ -403,12 +407,13 @@ class Loop:
         return self._networks[0].scheduling
 
     @property
-    def log(self) -> LogArray:
-        """The last cycles (1000, or `log`), oldest first, as a structured array."""
+    def log(self) -> Log:
+        """The last cycles (1000, or `log`), oldest first: an array, a pandas table, a CSV file."""
         return self._networks[0].log
 
     def histogram(self, phase: str) -> list[tuple[float, float, int]]:
-        """(lower, upper, count) in us of every bucket of a phase of `timing` that is not empty."""
+        """Return (lower [s], upper [s], count) of every bucket of a phase of `timing` that is not
+        empty."""
         return self._networks[0].histogram(phase)
 
     def wait_locked(self, within: float = 1e-6, timeout: float = 5.0) -> None:

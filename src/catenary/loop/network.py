@@ -15,13 +15,14 @@ from catenary.core import (
     CYCLE_STOPPED,
     CYCLE_WORKING_COUNTER,
 )
+from catenary.log import Log
 from catenary.loop.carried import CarriedExchange, carried
 from catenary.loop.clocks import Clocks
 from catenary.loop.devices import DeviceWish
 from catenary.loop.exchange import FrameExchange
 from catenary.loop.laws.law import Law
 from catenary.loop.options import ClockOptions, Scheduling, StopPolicy
-from catenary.loop.running import LogArray, Running
+from catenary.loop.running import Running
 from catenary.loop.stream import Stream
 from catenary.loop.timing import Timing
 from catenary.plan.cycle import ExecutionMode
@@ -42,6 +43,7 @@ class Settings:
     watchdog: float | None
     priority: int | None
     log: int
+    log_axes: bool
     laws: Sequence[Law]
     stop: StopPolicy
     scheduling: Scheduling
@@ -74,9 +76,8 @@ class Network:
 
     @property
     def timing(self) -> Timing:
-        """Phases of the cycles since the loop was opened; it stays readable afterwards."""
-        engine = self.session.engine
-        return Timing(engine.histograms(), engine.counters)
+        """Timing of the cycles since the loop was opened; it stays readable afterwards."""
+        return self.session.timing()
 
     @property
     def clocks(self) -> Clocks:
@@ -92,12 +93,13 @@ class Network:
         return self.session.engine.scheduling
 
     @property
-    def log(self) -> LogArray:
-        """The last cycles, oldest first, as a structured array."""
+    def log(self) -> Log:
+        """The last cycles, oldest first: an array, a pandas table, a CSV file."""
         return self.session.log()
 
     def histogram(self, phase: str) -> list[tuple[float, float, int]]:
-        """(lower, upper, count) in us of every bucket of a phase of `timing` that is not empty."""
+        """Return (lower [s], upper [s], count) of every bucket of a phase of `timing` that is not
+        empty."""
         return self.session.engine.histogram_counts(phase)
 
     def stream(self, capacity: int = 1000) -> Stream:
@@ -173,6 +175,7 @@ class Network:
             exact_matching=its.scheduling.exact_matching,
             cpu=self._cpu,
             priority=its.priority,
+            log_axes=its.log_axes,
         )
 
     def check(self, flags: int) -> None:

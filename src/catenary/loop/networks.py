@@ -87,6 +87,8 @@ class NetworksIteration:
         if self._cycle is None:
             flags = [one.engine.run(1) for one in self._runnings]
             self._cycle = NetworksCycle(self._runnings, self._quorum)
+            for one in self._runnings:
+                one.engine.zero_ns = self._runnings[0].engine.zero_ns
         else:
             self._commit_if_free(self._cycle)
             flags = [one.engine.next() for one in self._runnings]
@@ -174,6 +176,8 @@ def leave_all(runnings: Sequence[Running], guard: SignalGuard) -> list[Exception
 
 def brake(runnings: Sequence[Running], guard: SignalGuard) -> None:
     """Stop all axes of all networks at once, in slices, until they stand or the deadline."""
+    for one in runnings:
+        one.make_outputs_safe()
     moving = [one for one in runnings if one.is_open and one.plan.cycle.axes]
     for one in moving:
         one.stop_axes_at_once()

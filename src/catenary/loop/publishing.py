@@ -14,16 +14,16 @@ import numpy as np
 from catenary.bus import MainDevice
 from catenary.bus.event import Event
 from catenary.core import RECORD_FIELDS, Engine
-from catenary.plan.cycle import Bank, Column
+from catenary.plan.cycle import Bank, Column, ImageArea
 from catenary.plan.make import Plan
 from catenary.plan.sink import Block, Incident, Sink, SinkField, SinkLayout
 
 Places = dict[str, tuple[int, str, int | None]]  # name → offset, format, count
 
 BANKS = {Bank.REAL: "reals", Bank.INTEGER: "integers", Bank.BIT: "bits"}
-LEFT_OUT = ("reserved", *BANKS.values())
+LEFT_OUT = ("reserved", "bytes", *BANKS.values())
 PER_UNIT = ("unit_valid",)
-UNITS = {"position": "rad", "velocity": "rad/s", "torque": "N·m"}
+UNITS = {"position": ("rad", "m"), "velocity": ("rad/s", "m/s"), "torque": ("N·m", "N")}
 EVENT_FIELDS = {field.name for field in fields(Event)}
 
 
@@ -88,11 +88,18 @@ def plain(value: object) -> object:
 def sink_layout(engine: Engine, plan: Plan) -> SinkLayout:
     """What the loop gives in every cycle."""
     actual, target = engine.sink_fields()
-    own = [*of_record(), *of_block("actual", actual), *of_block("target", target)]
+    kinds = sorted({axis.linear for axis in plan.cycle.axes})  # linear axes after rotary ones
+    own = [
+        *of_record(),
+        *of_block("actual", actual, kinds),
+        *of_block("target", target, kinds),
+    ]
     taken = {each.name for each in own}
     columns = [
         *columns_of("actual", actual, (table.input_columns for table in plan.tables)),
         *columns_of("target", target, (table.output_columns for table in plan.tables)),
+        *areas_of("actual", "input_bytes", actual, plan.cycle.input_areas),
+        *areas_of("target", "output_bytes", target, plan.cycle.output_areas),
     ]
     record_size, actual_size, target_size = engine.sink_sizes
     return SinkLayout(
@@ -116,17 +123,26 @@ def of_record() -> Iterator[SinkField]:
             yield SinkField(name, "record", offset, kind.str, None, unit_of(name))
 
 
-def of_block(block: Block, places: Places) -> Iterator[SinkField]:
-    """What every loop has; arrays of no length are left out."""
+def of_block(block: Block, places: Places, kinds: Sequence[bool] = ()) -> Iterator[SinkField]:
+    """Yield what every loop has; arrays of no length are left out. `kinds`: see `unit_of`."""
     for name, (offset, code, count) in places.items():
         if name in LEFT_OUT or count == 0:
             continue
         per_axis = count is not None and name not in PER_UNIT
-        yield SinkField(name, block, offset, code, count, unit_of(name), per_axis)
+        yield SinkField(name, block, offset, code, count, unit_of(name, kinds), per_axis)
 
 
-def unit_of(name: str) -> str:
-    return "ns" if name.endswith("_ns") else UNITS.get(name.rpartition("_")[2], "")
+def unit_of(name: str, kinds: Sequence[bool] = ()) -> str:
+    """Return the unit of a field: "rad", of linear axes "m", "rad or m" if there are both.
+
+    Args:
+        name: Name of the field.
+        kinds: Kinds of axes that there are; True: linear.
+    """
+    if name.endswith("_ns"):
+        return "ns"
+    units = UNITS.get(name.rpartition("_")[2])
+    return "" if units is None else " or ".join(units[kind] for kind in kinds or (False,))
 
 
 def columns_of(
@@ -143,6 +159,16 @@ def columns_of(
                 used[bank] += len(part)
                 name, count = (group, len(part)) if group else (part[0].name, None)
                 yield SinkField(name, block, offset, code, count), part[0].device
+
+
+def areas_of(
+    block: Block, name: str, places: Places, areas: Iterable[ImageArea]
+) -> Iterator[tuple[SinkField, int]]:
+    """The bytes of each area as one array, with its device."""
+    offset, code, _ = places["bytes"]
+    for area in areas:
+        yield SinkField(name, block, offset, code, area.size), area.device
+        offset += area.size
 
 
 def with_own_names(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 
 import numpy as np
@@ -22,10 +22,10 @@ from catenary.core import (
     GOAL_ENABLED,
     GOAL_QUICK_STOP,
     GOAL_RESET,
-    RECORD_FIELDS,
 )
 from catenary.errors import CatenaryError, DriveError, LinkError, LoopError
 from catenary.link import forget_in_child
+from catenary.log import Log
 from catenary.loop.axis_watch import AxisWatch, RefusedMode, StoppedAxis
 from catenary.loop.buffers import bind_wishes
 from catenary.loop.clocks import Clocks
@@ -36,11 +36,14 @@ from catenary.loop.diagnosis import (
 from catenary.loop.exchange import Exchange, FrameExchange
 from catenary.loop.interpreter import switch_interval
 from catenary.loop.laws.runner import LawRunner
+from catenary.loop.log_rows import read_log
 from catenary.loop.options import StopPolicy
 from catenary.loop.publishing import Publisher
+from catenary.loop.safe_outputs import confirm_safe, make_safe
 from catenary.loop.service import Service
 from catenary.loop.signals import SignalGuard
 from catenary.loop.stop_error import stopped_error
+from catenary.loop.timing import Timing
 from catenary.plan.make import Plan
 from catenary.plan.sink import Sink
 from catenary.plan.stop_reason import UNASKED, StopReason
@@ -48,8 +51,6 @@ from catenary.plan.wish import Wish
 from catenary.wire.al import State
 from catenary.wire.cia402 import IN_FAULT, Mode, state_of
 from catenary.wire.cia402 import State as DriveState
-
-LogArray = npt.NDArray[np.void]
 
 FATAL = CYCLE_WORKING_COUNTER | CYCLE_STOPPED | CYCLE_NONE
 ENABLE_TIMEOUT_NS = 5_000_000_000  # mains contactors and brakes are slow, but not this slow
@@ -96,6 +97,7 @@ class Running:
         self._watches: list[Pending[None]] = []
         self._publisher: Publisher | None = None
         self.end_background: Callable[[], None] = _no_background  # the thread that iterates
+        self._counted: Mapping[str, int] = {}  # by the engine, until the loop was entered
         self.service.cycle = self.cycle
 
     # Opening
@@ -147,16 +149,12 @@ class Running:
         inline = self.plan.cycle.execution == "inline" and self.engine.scheduling != "virtual time"
         if inline and self.switch_interval is not None:
             self._attached.enter_context(switch_interval(self.switch_interval))
+        engine = self.engine
+        self.main.events.begin_loop(lambda: engine.zero_ns)
         self.engine.start(origin_ns)
         self._opened = True
         self.service.start()
         self._watches = self.exchange.bring_to_op()
-
-    def reset_figures(self) -> None:
-        """Begin the histograms and the figures of the clocks anew."""
-        self.engine.reset_histograms()
-        if self.clocks is not None:
-            self.clocks.reset()
 
     def enable(self) -> None:
         """Reset faults and enable all axes. Position axes hold when this returns; velocity and
@@ -216,6 +214,20 @@ class Running:
         raise self.exchange.silence_error()
 
     # Running
+
+    def reset_figures(self) -> None:
+        """Begin the timing and the figures of the clocks anew."""
+        self.engine.reset_histograms()
+        if self.clocks is not None:
+            self.clocks.reset()
+        self._counted = self.engine.counters
+
+    def timing(self) -> Timing:
+        """Return the timing since `reset_figures`."""
+        engine = self.engine
+        since = {name: n - self._counted.get(name, 0) for name, n in engine.counters.items()}
+        period = self.plan.cycle.period_ns * 1e-9
+        return Timing(engine.histograms(), since, period=period, scheduling=engine.scheduling)
 
     def judge(self, flags: int, *, faults: bool) -> None:
         """Announce what happened in a cycle in trouble, and raise its error, if it is one."""
@@ -288,9 +300,9 @@ class Running:
                 hint="the native thread does not get the CPU: see loop.scheduling",
             )
 
-    def log(self) -> LogArray:
+    def log(self) -> Log:
         """The last cycles, oldest first."""
-        return np.frombuffer(self.engine.log(), dtype=np.dtype(RECORD_FIELDS))
+        return read_log(self.engine, self.plan.cycle)
 
     # Leaving
 
@@ -311,8 +323,10 @@ class Running:
         self._left = True
         for mover in list(self.views.movers):
             mover.end()
+        self.make_outputs_safe()
         steps: tuple[Callable[[SignalGuard], None], ...] = (
             self._stop_axes,
+            self._confirm_safe_outputs,
             self._stop_cycle,
             self._tell_of_watches,
             self._take_down,
@@ -323,7 +337,16 @@ class Running:
                 step(guard)
             except Exception as problem:  # the next step matters more; all are told at the end
                 problems.append(problem)
+        self.main.events.end_loop()
         return problems
+
+    def make_outputs_safe(self) -> None:
+        """Set bytes of process data to their safe values. The next cycle sends them."""
+        make_safe(self.plan.cycle, self.views)
+
+    def _confirm_safe_outputs(self, guard: SignalGuard) -> None:
+        if self._opened:
+            confirm_safe(self.plan.cycle, self.views, self.cycle, guard)
 
     def _stop_axes(self, guard: SignalGuard) -> None:
         """Quick stop as each drive's 0x605A says, exchanged until all stand."""

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from catenary.core import CYCLE_DRY, CYCLE_UNCOMMITTED
 from catenary.errors import DriveError
+from catenary.log import Log
 from catenary.loop.axis_watch import StoppedAxis, mode_name
 from catenary.plan.cycle import CyclePlan
 from catenary.plan.stop_reason import StopReason
@@ -25,7 +26,7 @@ ADVICE: dict[StopReason, str] = {
     ),
     StopReason.REFUSED: (
         "look for NaN or a jump in the targets: begin at the commanded position and move by "
-        "small steps; Drives(step_limit=...) [rad] allows larger ones"
+        "small steps; Drives(step_limit=...) allows larger ones"
     ),
     StopReason.POSITION_LIMIT: (
         "slow down before position_min and position_max; the drive's 0x607D may be tighter: "
@@ -48,9 +49,7 @@ GO_ON = (
 )
 
 
-def stopped_error(
-    stops: Sequence[StoppedAxis], cycle: CyclePlan, log: npt.NDArray[np.void]
-) -> DriveError:
+def stopped_error(stops: Sequence[StoppedAxis], cycle: CyclePlan, log: Log) -> DriveError:
     """Return the error for axes that were stopped without a request.
 
     Args:
@@ -71,7 +70,7 @@ def stopped_error(
     return DriveError(told, log=log, hint=f"{advice}; {GO_ON}")
 
 
-def _details(stop: StoppedAxis, cycle: CyclePlan, log: npt.NDArray[np.void]) -> str:
+def _details(stop: StoppedAxis, cycle: CyclePlan, log: Log) -> str:
     """Return the limit that was exceeded, and what was late; empty for other reasons."""
     if stop.reason is StopReason.UNDERRUN:
         limit = _late_limit_ns(stop.mode, cycle) / 1e6
@@ -91,7 +90,7 @@ def _late_limit_ns(mode: int, cycle: CyclePlan) -> int:
     return cycle.late_limit_position_ns
 
 
-def _what_was_late(stop: StoppedAxis, log: npt.NDArray[np.void]) -> str:
+def _what_was_late(stop: StoppedAxis, log: Log) -> str:
     """Return the source of set-points that was late, and for how many cycles."""
     before = log[log["number"] <= stop.cycle]
     if len(before) and before["flags"][-1] & CYCLE_DRY:

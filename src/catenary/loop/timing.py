@@ -1,16 +1,20 @@
-"""The figures of a loop: the phases of its cycles, as numbers and as a table."""
+"""Timing of a loop: the phases of its cycles as numbers, as a table and in words."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator, Mapping
 
-BUSY_SHARE = 0.5  # of the switch interval: a wait this long shows a second busy thread
-FIGURES = ("mean", "max", "min", "sd", "p50", "p99", "p999")
+from catenary import notebook
+from catenary.figures import FIGURES, heading
+from catenary.loop.verdict import counts, verdict
+
+NAME, FIGURE = 14, 11  # widths of a table
 
 
 class Timing(Mapping[str, Mapping[str, float]]):
-    """Mean, max, min, sd and quantiles of each phase of the cycle [us].
+    """Count, mean, max, min, sd and quantiles of each phase of the cycle [s].
+
+    `timing["lateness"]["p99"]`; `print(timing)` shows them in microseconds, with `verdict`.
 
     period: wake-up to wake-up. lateness: cycle start → wake-up. receive: wake-up (threaded: last
     frame) → inputs usable. process: the body, or the law. send: wake-up (inline: end of the body) →
@@ -22,10 +26,17 @@ class Timing(Mapping[str, Mapping[str, float]]):
     """
 
     def __init__(
-        self, phases: Mapping[str, Mapping[str, float]], counters: Mapping[str, int]
+        self,
+        phases: Mapping[str, Mapping[str, float]],
+        counters: Mapping[str, int],
+        *,
+        period: float,
+        scheduling: str,
     ) -> None:
         self._phases = {name: figures for name, figures in phases.items() if figures["count"]}
-        self.counters = dict(counters)  # cycles, lost, late, ... as counted by the engine
+        self.counters = dict(counters)  # since the loop was entered: cycles, late, lost, ...
+        self.period = period  # [s]
+        self.scheduling = scheduling  # of the cycle thread; "virtual time"
 
     def __getitem__(self, phase: str) -> Mapping[str, float]:
         return self._phases[phase]
@@ -36,15 +47,30 @@ class Timing(Mapping[str, Mapping[str, float]]):
     def __len__(self) -> int:
         return len(self._phases)
 
+    @property
+    def is_virtual(self) -> bool:
+        """True if the times are of the segment's own clock, not of this machine."""
+        return self.scheduling == "virtual time"
+
+    @property
+    def verdict(self) -> str:
+        """Late, uncommitted, underrun and lost cycles in words, each with the next step. One line
+        each."""
+        return "\n".join(verdict(self))
+
     def __str__(self) -> str:
-        rows = [f"{'[us]':<14}" + "".join(f"{name:>11}" for name in FIGURES)]
-        for phase, figures in self._phases.items():
-            rows.append(f"{phase:<14}" + "".join(f"{figures[name]:>11.2f}" for name in FIGURES))
-        waits = self._phases.get("interpreter", {}).get("p99", 0.0)
-        if waits >= BUSY_SHARE * sys.getswitchinterval() * 1e6:
-            rows.append(
-                f"Another Python thread keeps the interpreter for up to {waits:.0f} us (p99): end "
-                "it, run it in a process, or shorten its turns with Loop(switch_interval=20e-6)."
-            )
-        counted = ", ".join(f"{self.counters[name]} {name}" for name in ("cycles", "lost", "late"))
-        return "\n".join([*rows, counted])
+        head = f"{'[us]':<{NAME}}" + "".join(f"{heading(name):>{FIGURE}}" for name in FIGURES)
+        rows = [f"{name:<{NAME}}" + "".join(f"{t:>{FIGURE}}" for t in r) for name, *r in self._rows]
+        return "\n".join([head, *rows, counts(self.counters), *verdict(self)])
+
+    def _repr_html_(self) -> str:
+        table = notebook.table(["[us]", *map(heading, FIGURES)], self._rows)
+        return table + notebook.lines([counts(self.counters), *verdict(self)])
+
+    @property
+    def _rows(self) -> list[list[str]]:
+        """One row of text for each phase [us]."""
+        return [
+            [phase, *(f"{figures[name] * 1e6:.2f}" for name in FIGURES)]
+            for phase, figures in self._phases.items()
+        ]

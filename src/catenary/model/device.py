@@ -163,6 +163,7 @@ class ObjectInformation:
     input_mappable: bool = True  # as TxPDO
     name: str = ""
     note: str = ""  # why the dictionary does not describe it
+    readable: bool = True  # False: the dictionary says that it can only be written
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,10 @@ from catenary.plan.pdo_search import pdo_names, place_names
 
 
 class Change(NamedTuple):
-    """One object of a device that gets another value. `old`: empty if it is not known."""
+    """One object of a device that gets another value. `old`: empty if it is not known.
+
+    `what`: "0x1C13" or "0x1A00" for a list of PDOs or entries, "0x6060:00" for a value.
+    """
 
     what: str
     old: str

@@ -59,6 +59,22 @@ class Column:
     group: str = ""  # neighbours in a bank with the same group are one array of this name
 
 
+@dataclass(frozen=True, slots=True)
+class ImageArea:
+    """Bytes of an image that an application reads or writes as they are. Their place among the
+    private bytes follows from the sizes of the areas before it in the plan.
+
+    `safe`: of outputs, the bytes that are sent when the loop ends; as long as the area.
+    """
+
+    name: str
+    image_offset: int
+    size: int
+    device: int  # position on the segment
+    sync_unit: int
+    safe: bytes = b""
+
+
 class DatagramKind(IntEnum):
     PROCESS_DATA = 0
     AL_STATUS = 1  # the BRD that rides in every cycle
@@ -150,6 +166,7 @@ class AxisPlan:
     # Shape of fallback and return, never of the application's set-points (docs/safety.md)
     acceleration: float = 25.0  # [rad/s²] on return to the set-points
     deceleration: float = 25.0  # [rad/s²] to standstill, and before a position limit in CSV
+    linear: bool = False  # m, m/s and N instead
     standstill: float = 0.05  # [rad/s] at most: at rest
     step_floor: float = 0.1  # [rad] the default step limit is at least this
     torque_slope: float | None = None  # [N·m/s] on return to the set-points in CST; None: at once
@@ -193,6 +210,8 @@ class CyclePlan:
     axes: tuple[AxisPlan, ...] = ()
     output_columns: tuple[Column, ...] = ()
     input_columns: tuple[Column, ...] = ()
+    output_areas: tuple[ImageArea, ...] = ()
+    input_areas: tuple[ImageArea, ...] = ()
     lost_limit: int = 3  # cycles in a row before WorkingCounterError
     # Without fresh set-points for this long (at least 3 cycles): quick stop. 0: off, not in CST
     late_limit_position_ns: int = 50_000_000  # CSP
@@ -207,6 +226,7 @@ class CyclePlan:
     acyclic_ns: int = 0  # wire time per cycle for acyclic frames; one frame in any case
     busy_wait_ns: int = 0  # before each cycle start; costs as much processor time
     log_cycles: int = 1000  # how far the log reaches back
+    log_axes: bool = False  # the log has the values of the axes, too
     cpu: int | None = None  # of the native thread
     priority: int | None = 80  # SCHED_FIFO; None: leave the scheduling as it is
     clock: ClockPlan | None = None  # None: no distributed clocks

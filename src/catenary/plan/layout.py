@@ -150,6 +150,13 @@ class Layout:
     def sync_unit(self, device: int) -> int:
         return self.devices[device].sync_unit
 
+    def byte_range(self, device: int, direction: Direction) -> range:
+        """Return the bytes of a device in the image of a direction."""
+        place = self.devices[device]
+        if direction is Direction.OUTPUT:
+            return range(place.output_offset, place.output_offset + place.output_size)
+        return range(place.input_offset, place.input_offset + place.input_size)
+
 
 def make_layout(devices: Sequence[DeviceData], unit_max: int = UNIT_MAX) -> Layout:
     """Return the places of all devices.

@@ -6,6 +6,7 @@ import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
+from catenary import notebook
 from catenary.errors import ConfigurationError
 from catenary.model.device import DeviceDescription, Direction
 from catenary.plan.clocks import BURST, SyncPlan, choose_clocks, make_clock_plan, make_sync
@@ -19,9 +20,11 @@ from catenary.plan.frames import (
 from catenary.plan.layout import EXACT_UNIT_MAX, UNIT_MAX, DeviceData, Layout, make_layout
 from catenary.plan.mailboxes import MailboxArea, with_mailboxes
 from catenary.plan.mapping import make_mapping
+from catenary.plan.output_owners import check_owners
 from catenary.plan.pdo_mapping import Mapping
 from catenary.plan.report import report
 from catenary.plan.start_up import DevicePlan, make_device_plan
+from catenary.plan.start_up_object import StartUp
 from catenary.plan.watchdog import choose_watchdog
 from catenary.plan.wish import (
     DistributedClock,
@@ -54,6 +57,9 @@ class Plan:
         axes = [axis for table in self.tables for axis in table.axis_reports]
         return report(self.cycle, self.devices, self.layout, axes)
 
+    def _repr_html_(self) -> str:
+        return notebook.preformatted(str(self))
+
 
 def make_plan(
     devices: Sequence[DeviceDescription],
@@ -82,6 +88,7 @@ def make_plan(
     margin: float | None = None,
     burst: int = BURST,
     exact_matching: bool = False,
+    log_axes: bool = False,
 ) -> Plan:
     """Return the plan that fulfils all requests.
 
@@ -102,6 +109,7 @@ def make_plan(
         margin: [s] between the cycle start and the frames; None: by the execution mode.
         burst: frames that bring the clocks together before the cycle.
         exact_matching: every frame carries the cycle number (plan/frames.py).
+        log_axes: the log keeps the values of the axes, too.
 
     Raises:
         ConfigurationError: an object cannot be mapped, requests contradict each other, or the
@@ -133,6 +141,7 @@ def make_plan(
     if execution == "threaded":
         check_return(wire_ns, period_ns, collect_ns)
     tables = tuple(wish.tables(layout) for wish in wishes)
+    check_owners(devices, wishes, tables, layout)
     _check_times(tables, late_limit_torque, handover)
     cycle = CyclePlan(
         period_ns=period_ns,
@@ -150,6 +159,8 @@ def make_plan(
             *(c for table in tables for c in table.input_columns),
             *mailboxes.columns,
         ),
+        output_areas=tuple(area for table in tables for area in table.output_areas),
+        input_areas=tuple(area for table in tables for area in table.input_areas),
         lost_limit=lost_limit,
         late_limit_position_ns=round(late_limit_position * 1e9),
         late_limit_velocity_ns=round(late_limit_velocity * 1e9),
@@ -162,6 +173,7 @@ def make_plan(
         acyclic_ns=acyclic_ns,
         busy_wait_ns=round(busy_wait * 1e9),
         log_cycles=log,
+        log_axes=log_axes,
         cpu=cpu,
         priority=priority,
         clock=None
@@ -177,6 +189,7 @@ def make_plan(
             asked.get(device.position, PdoWish()).start_up,
             each.watchdog_ns if place.output_size else 0,
             syncs.get(device.position),
+            asked.get(device.position, PdoWish()).objects,
         )
         for device, (outputs, inputs), place, each in zip(
             devices, mappings, layout.devices, data, strict=True
@@ -206,6 +219,7 @@ def gather_wishes(wishes: Sequence[Wish], period_ns: int) -> dict[int, PdoWish]:
                 math.gcd(before.divider, pdos.divider),
                 before.required or pdos.required,
                 _one_mapping(position, before.pdos, pdos.pdos),
+                _one_start_up(position, before.objects, pdos.objects),
             )
     return gathered
 
@@ -251,6 +265,22 @@ def _one_mapping(
                 hint="give both the same pdos=, or only one of them",
             )
     return first + tuple(pdo for pdo in second if pdo not in first)
+
+
+def _one_start_up(
+    position: int, first: tuple[StartUp, ...], second: tuple[StartUp, ...]
+) -> tuple[StartUp, ...]:
+    """Return the start-up objects of two requests. They may agree, not contradict each other."""
+    values = {(each.index, each.subindex): each for each in first}
+    for each in second:
+        other = values.get((each.index, each.subindex))
+        if other is not None and other != each and each not in first:
+            raise ConfigurationError(
+                f"device {position}: two requests write different values to start-up object "
+                f"{each.place}: {other.value!r} and {each.value!r}",
+                hint="give both the same start_up=, or only one of them",
+            )
+    return first + tuple(each for each in second if each not in first)
 
 
 def _clock_wishes(asked: dict[int, PdoWish]) -> dict[int, DistributedClock]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 
 from catenary.model.device import Assignment, Direction
@@ -12,7 +12,7 @@ from catenary.plan.cycle import ClockPlan, CyclePlan, DatagramKind, DatagramPlan
 from catenary.plan.frames import ACYCLIC_GUARD
 from catenary.plan.layout import Layout
 from catenary.plan.numbers import entry_places
-from catenary.plan.start_up import DevicePlan
+from catenary.plan.start_up import DevicePlan, Download
 from catenary.wire.cia402 import Mode
 from catenary.wire.clock import Activation
 from catenary.wire.datagram import OVERHEAD, Command
@@ -33,6 +33,7 @@ def report(
         [
             *_heading(cycle),
             *_devices(devices),
+            *_start_up(devices),
             *_axes(cycle, axes),
             *clocks,
             *_frames(cycle),
@@ -80,10 +81,34 @@ def _devices(devices: Sequence[DevicePlan]) -> Iterator[str]:
         yield from _entries(Direction.INPUT, device.inputs, place.input_offset)
         if device.left_out:
             yield f"    not exchanged (optional): {', '.join(device.left_out)}"
-        if device.downloads:
-            yield f"    {len(device.downloads)} SDO downloads before SAFE-OP"
-        for what, old, new in device.changes:
-            yield f"        {what}  {old or '(not read)'} → {new}"
+
+
+def _start_up(devices: Sequence[DevicePlan]) -> Iterator[str]:
+    """The SDO downloads in the order of writing, with old and new values."""
+    if not any(device.downloads for device in devices):
+        return
+    yield "start-up: SDOs written in PRE-OP, in this order"
+    for device in devices:
+        if not device.downloads:
+            continue
+        yield f"    device {device.position}  {device.name}"
+        old = {change.what: change.old or "(not read)" for change in device.changes}
+        yield from (_download("before mapping", each, old) for each in device.before_mapping)
+        for change in device.changes:
+            if ":" not in change.what:  # a list of PDOs or of entries
+                before = change.old or "(not read)"
+                yield f"        {'mapping':<15} {change.what}  {before} → {change.new}"
+        for each in device.start_up:
+            yield _download("yours" if each.text else "Catenary", each, old)
+
+
+def _download(owner: str, download: Download, old: Mapping[str, str]) -> str:
+    """`old`: values of objects that change, by place."""
+    before = old.get(download.place)
+    value = download.text or download.data.hex(" ")
+    unverified = ", not verified" if download.text and not download.verify else ""
+    change = f"{value} (as it is)" if before is None else f"{before} → {value}"
+    return f"        {owner:<15} {download.place}  {change}{unverified}"
 
 
 def _axes(cycle: CyclePlan, axes: Sequence[AxisReport]) -> Iterator[str]:

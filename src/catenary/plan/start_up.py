@@ -1,5 +1,8 @@
 """What is written to one device between PRE-OP and SAFE-OP: SDOs, then registers.
 
+The order of the SDOs: start-up objects of the application with `before_mapping`, the mapping, our
+own objects, the other start-up objects of the application.
+
 The order inside a changed mapping is the one of ETG.1020 §"PDO mapping": empty the assignment,
 empty and fill the mapping, fill the assignment. Only what differs is written. An assignment that
 cannot be changed is not emptied.
@@ -9,13 +12,26 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import cast
 
-from catenary.model.device import Assignment, DeviceDescription, Direction, Entry, Identity, Pdo
+from catenary.errors import ConfigurationError
+from catenary.model.device import (
+    Assignment,
+    DeviceDescription,
+    Direction,
+    Entry,
+    Identity,
+    ObjectInformation,
+    Pdo,
+)
 from catenary.plan.changes import Change, mapping_changes, value_changes
 from catenary.plan.clocks import SyncPlan
 from catenary.plan.layout import DeviceLayout
 from catenary.plan.pdo_mapping import ASSIGNMENT_BASE, Mapping, shape
+from catenary.plan.start_up_object import StartUp
+from catenary.types import Scalar, by_index
 from catenary.wire.register import watchdog_unit_ns
 
 WATCHDOG_DIVIDER = 2498  # the controller's reset value
@@ -31,6 +47,13 @@ class Download:
     data: bytes
     entry: Entry | None = None
     optional: bool = False  # a device that has no such object, or one that is fixed, is left alone
+    verify: bool = False  # read back and compared, unless it can only be written
+    text: str = ""  # the value that the application gave; empty: one of ours
+
+    @property
+    def place(self) -> str:
+        """Index and subindex as text."""
+        return f"0x{self.index:04X}:{self.subindex:02X}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,9 +67,10 @@ class DevicePlan:
     outputs: tuple[Assignment, ...]
     inputs: tuple[Assignment, ...]
     layout: DeviceLayout
-    downloads: tuple[Download, ...]
-    start_up: tuple[Download, ...]  # the last of the downloads: what wishes asked for
-    mapping_changed: bool  # the downloads begin with a new mapping
+    before_mapping: tuple[Download, ...]  # start-up objects of the application
+    mapping: tuple[Download, ...]  # empty: it stays as it is
+    start_up: tuple[Download, ...]  # our objects, then those of the application
+    mapping_changed: bool
     watchdog_ns: int  # of process data; 0: off
     sync: SyncPlan | None = None  # None: no SYNC signals
     changes: tuple[Change, ...] = ()  # what the downloads change, with old and new values
@@ -54,9 +78,9 @@ class DevicePlan:
     left_out: tuple[str, ...] = ()  # optional objects that are not exchanged
 
     @property
-    def new_mapping(self) -> tuple[Download, ...]:
-        """The first downloads: the new mapping."""
-        return self.downloads[: len(self.downloads) - len(self.start_up)]
+    def downloads(self) -> tuple[Download, ...]:
+        """All downloads in the order of writing."""
+        return (*self.before_mapping, *self.mapping, *self.start_up)
 
     @property
     def watchdog_count(self) -> int:
@@ -75,8 +99,19 @@ def make_device_plan(
     start_up: Sequence[tuple[int, int, bytes]],
     watchdog_ns: int,
     sync: SyncPlan | None = None,
+    objects: Sequence[StartUp] = (),
 ) -> DevicePlan:
+    """Return the plan of one device.
+
+    Args:
+        start_up: Our own objects: index, subindex, data.
+        objects: Start-up objects of the application.
+
+    Raises:
+        ConfigurationError: The device cannot have a start-up object, or its type is unknown.
+    """
     wished = tuple(Download(index, subindex, data) for index, subindex, data in start_up)
+    before, after = object_downloads(device, objects)
     told = sync.objects if sync is not None and device.coe else ()
     clocks = tuple(Download(*each, optional=True) for each in told)
     return DevicePlan(
@@ -87,20 +122,78 @@ def make_device_plan(
         outputs=outputs.assignments,
         inputs=inputs.assignments,
         layout=layout,
-        downloads=(*mapping_downloads(outputs), *mapping_downloads(inputs), *wished, *clocks),
-        start_up=(*wished, *clocks),
+        before_mapping=before,
+        mapping=(*mapping_downloads(outputs), *mapping_downloads(inputs)),
+        start_up=(*wished, *clocks, *after),
         mapping_changed=outputs.changed or inputs.changed,
         watchdog_ns=watchdog_ns,
         sync=sync,
         changes=(
             *mapping_changes(device, Direction.OUTPUT, outputs),
             *mapping_changes(device, Direction.INPUT, inputs),
-            *value_changes(device, [(d.index, d.subindex, d.data) for d in (*wished, *clocks)]),
+            *value_changes(
+                device,
+                [(d.index, d.subindex, d.data) for d in (*before, *wished, *clocks, *after)],
+            ),
         ),
         rejected=outputs.rejected + inputs.rejected,
         left_out=tuple(
             f"0x{each.index:04X}:{each.subindex:02X}" for each in outputs.left_out + inputs.left_out
         ),
+    )
+
+
+def object_downloads(
+    device: DeviceDescription, objects: Sequence[StartUp]
+) -> tuple[tuple[Download, ...], tuple[Download, ...]]:
+    """Return the downloads of start-up objects: before the mapping, and after it.
+
+    Raises:
+        ConfigurationError: The device has no CoE mailbox, or the type of an object is unknown.
+    """
+    before: list[Download] = []
+    after: list[Download] = []
+    for each in objects:
+        (before if each.before_mapping else after).append(_object_download(device, each))
+    return tuple(before), tuple(after)
+
+
+def _object_download(device: DeviceDescription, wanted: StartUp) -> Download:
+    if not device.coe:
+        raise ConfigurationError(
+            f"{device}: start-up object {wanted.place} cannot be written: the device has no CoE "
+            "mailbox",
+            hint="give start_up= only to devices with an object dictionary",
+        )
+    kind = wanted.type
+    known = device.known_object(wanted.index, wanted.subindex)
+    if wanted.needs_type:
+        kind = _dictionary_type(device, wanted, known)
+    return Download(
+        wanted.index,
+        wanted.subindex,
+        wanted.encode(kind),
+        verify=wanted.verify and (known is None or known.readable),
+        text=wanted.text(kind),
+    )
+
+
+def _dictionary_type(
+    device: DeviceDescription, wanted: StartUp, known: ObjectInformation | None
+) -> Scalar:
+    if known is not None and known.data_type:
+        with suppress(ValueError):
+            return cast(Scalar, by_index(known.data_type))
+    if known is None or not known.bit_length:
+        why = "the object dictionary does not describe it"
+    elif known.data_type:
+        why = f"its data type 0x{known.data_type:04X} is not a base data type"
+    else:
+        why = f"the device does not tell its data type ({known.bit_length} bits)"
+    raise ConfigurationError(
+        f"{device}: the type of start-up object {wanted.place} is unknown: {why}",
+        hint="give the type of the manual, StartUp(..., type=types.UDINT), or bytes; "
+        "`catenary sdo` lists the objects of a device",
     )
 
 
@@ -128,7 +221,7 @@ def renewed(plan: DevicePlan, device: DeviceDescription) -> DevicePlan:
     written = tuple(step for mapping in mappings for step in mapping_downloads(mapping))
     return replace(
         plan,
-        downloads=(*written, *plan.start_up),
+        mapping=written,
         mapping_changed=any(mapping.changed for mapping in mappings),
     )
 

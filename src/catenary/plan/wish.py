@@ -15,8 +15,9 @@ import numpy.typing as npt
 
 from catenary.model.device import Direction
 from catenary.plan.axis_report import AxisReport
-from catenary.plan.cycle import AxisPlan, Column, Number
+from catenary.plan.cycle import AxisPlan, Column, ImageArea, Number
 from catenary.plan.numbers import ANY, Which
+from catenary.plan.start_up_object import StartUp
 
 Reals = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -128,6 +129,7 @@ class PdoWish:
     divider: int = 1  # exchanged every so many cycles
     required: bool = True  # the cycle is not good without it
     pdos: tuple[WrittenPdo, ...] = ()  # exactly these, in directions that have any; else a search
+    objects: tuple[StartUp, ...] = ()  # start-up objects of the application, in their order
 
     def written(self, direction: Direction) -> tuple[WrittenPdo, ...]:
         """Return the PDOs of a direction that the application wrote down."""
@@ -144,6 +146,8 @@ class ImageLayout(Protocol):
         self, device: int, index: int, subindex: int, which: Which = ANY
     ) -> Number | None: ...
     def sync_unit(self, device: int) -> int: ...
+    def byte_range(self, device: int, direction: Direction) -> range:
+        """Return the bytes of a device in the image of a direction."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,6 +158,8 @@ class WishTables:
     output_columns: tuple[Column, ...] = ()
     input_columns: tuple[Column, ...] = ()
     axis_reports: tuple[AxisReport, ...] = ()
+    output_areas: tuple[ImageArea, ...] = ()
+    input_areas: tuple[ImageArea, ...] = ()
 
 
 class Mover(Protocol):
@@ -200,9 +206,11 @@ class Views:
     input_reals: Reals
     input_integers: Integers
     input_bits: Bytes
+    input_bytes: Bytes  # of the areas, one after the other
     output_reals: Reals
     output_integers: Integers
     output_bits: Bytes
+    output_bytes: Bytes
     unit_valid: Bytes  # (units of the whole plan,) whether each one's last exchange was valid
     movers: list[Mover] = field(default_factory=list)  # of the whole loop, while they move
     # Whether the loop runs: afterwards requests reach nothing

@@ -56,13 +56,15 @@ def configure_process_data(
     station: Station, device: DeviceDescription, plan: DevicePlan
 ) -> Procedure[None]:
     """SyncManagers and FMMUs of the process data and the watchdog. In PRE-OP. What an earlier
-    plan may have left is switched off."""
-    used = {manager.index for manager in plan.layout.sync_managers}
-    requests = [_planned_manager(station, manager) for manager in plan.layout.sync_managers]
-    for manager in device.sync_managers:
-        if manager.index not in used and not _is_mailbox(device, manager.index):
-            requests.append(_switched_off(station, manager.index))
-    requests += [_planned_fmmu(station, planned) for planned in plan.layout.fmmus]
+    plan may have left is switched off first: an enabled SyncManager keeps its length."""
+    planned = plan.layout.sync_managers
+    possible = {each.index for each in device.sync_managers if not _is_mailbox(device, each.index)}
+    requests = [
+        _switched_off(station, index)
+        for index in sorted(possible | {manager.index for manager in planned})
+    ]
+    requests += [_planned_manager(station, manager) for manager in planned]
+    requests += [_planned_fmmu(station, each) for each in plan.layout.fmmus]
     if plan.layout.mailbox is not None:
         requests.append(_mailbox_fmmu(station, plan.layout.mailbox))
     used_fmmus = len(plan.layout.fmmus) + (plan.layout.mailbox is not None)

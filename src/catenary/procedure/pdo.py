@@ -6,7 +6,7 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import replace
 
-from catenary.errors import MappingError, SdoAbort
+from catenary.errors import ConfigurationError, MappingError, SdoAbort
 from catenary.model.device import (
     Assignment,
     DeviceDescription,
@@ -20,8 +20,9 @@ from catenary.plan.pdo_search import place_names
 from catenary.plan.start_up import DevicePlan, Download, restoring_downloads
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
-from catenary.procedure.sdo import NOT_THERE, download, upload_small
+from catenary.procedure.sdo import NOT_THERE, download, refused, upload, upload_small
 
+WRITE_ONLY = frozenset((0x0601_0000, 0x0601_0001))  # access not supported; cannot be read
 # An optional object that is absent, read-only, or refuses the value or the state
 LEFT_ALONE = NOT_THERE | {0x0601_0000, 0x0601_0002, 0x0609_0030, 0x0800_0020, 0x0800_0022}
 
@@ -56,19 +57,43 @@ def write_downloads(
     Raises:
         MappingError: The device refused the new mapping. Names the object and the alternatives.
         SdoAbort: It refused another download.
+        ConfigurationError: A start-up object has another value after it was written.
     """
-    for step in plan.new_mapping:
+    for step in plan.before_mapping:
+        yield from _write_object(channel, step)
+    for step in plan.mapping:
         try:
             yield from download(channel, step.index, step.subindex, step.data)
         except SdoAbort as abort:
             yield from restore_mapping(channel, device, plan)
             raise _refused_mapping(channel, plan, step, abort) from abort
     for step in plan.start_up:
-        try:
-            yield from download(channel, step.index, step.subindex, step.data)
-        except SdoAbort as abort:
-            if not (step.optional and abort.code in LEFT_ALONE):
-                raise
+        yield from _write_object(channel, step)
+
+
+def _write_object(channel: MailboxChannel, step: Download) -> Procedure[None]:
+    """Write one object outside of the mapping, and verify it where the plan says so."""
+    try:
+        yield from download(channel, step.index, step.subindex, step.data)
+    except SdoAbort as abort:
+        if not (step.optional and abort.code in LEFT_ALONE):
+            what = f"start-up object {step.place} = {step.text or step.data.hex(' ')}"
+            raise refused(channel, step.index, step.subindex, abort.code, what=what) from abort
+    if not step.verify:
+        return
+    try:
+        found = yield from upload(channel, step.index, step.subindex)
+    except SdoAbort as abort:
+        if abort.code not in WRITE_ONLY:
+            raise
+        return
+    # Devices pad texts with zeros, or return an integer in a longer one.
+    if found.rstrip(b"\0") != step.data.rstrip(b"\0"):
+        raise ConfigurationError(
+            f"{channel.station}: start-up object {step.place}: wrote {step.text}, bytes "
+            f"{step.data.hex(' ')}; read back {found.hex(' ') or 'nothing'}",
+            hint="the device limits or ignores the value; correct it, or use verify=False",
+        )
 
 
 def restore_mapping(

@@ -14,6 +14,7 @@ from catenary.plan.pdo_search import pdo_names, place_names
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.pdo import read_entries, read_list, read_mapping
+from catenary.procedure.profile import READABLE
 from catenary.procedure.sdo import upload
 from catenary.procedure.sdo_information import describe_entry
 from catenary.procedure.station import within
@@ -21,7 +22,6 @@ from catenary.wire.sdo_information import Access
 
 MAPPING_TIMEOUT = 15.0  # [s] for the mapping of one device in a scan
 OFFERS_MAX = 64  # PDOs read in one direction; an EL6731 has 250 of them
-READABLE = Access.READ_PRE_OP | Access.READ_SAFE_OP | Access.READ_OP
 
 
 def read_first_mapping(

@@ -24,6 +24,8 @@ PROFILE_DRIVE = 402
 PROFILE_MODULAR = 5001
 SLOT_STRIDE = 0x800
 SLOTS_MAX = 16  # 0x6000 to 0xDFFF
+READABLE = Access.READ_PRE_OP | Access.READ_SAFE_OP | Access.READ_OP
+WRITABLE = Access.WRITE_PRE_OP | Access.WRITE_SAFE_OP | Access.WRITE_OP
 
 
 def read_profile(
@@ -69,6 +71,7 @@ def _information(entry: EntryDescription) -> ObjectInformation:
         Access.RXPDO_MAPPABLE in entry.access,
         Access.TXPDO_MAPPABLE in entry.access,
         printable(entry.name),
+        readable=bool(entry.access & READABLE) or not entry.access & WRITABLE,
     )
 
 

@@ -82,10 +82,10 @@ def measured_demand(task: Task, statistics: Statistics) -> Demand:
 
 
 def as_table(all_statistics: Iterable[Statistics]) -> str:
-    """Per task a line of each time, mean / min / max / sd, as the published tables have it."""
+    """Per task a line of each time, mean / max / min / sd, as the published tables have it."""
     lines = [
         f"{'task':14}{'jobs':>8}{'missed':>8}"
-        + "".join(f"{name + ' [ms]: mean/min/max/sd':>36}" for name in ("period", "response"))
+        + "".join(f"{name + ' [ms]: mean/max/min/sd':>36}" for name in ("period", "response"))
         + f"{'jitter max':>12}{'faults':>8}{'switches':>10}{'GC':>5}  scheduling"
     ]
     lines += [as_line(statistics) for statistics in all_statistics]
@@ -94,7 +94,7 @@ def as_table(all_statistics: Iterable[Statistics]) -> str:
 
 def as_line(s: Statistics) -> str:
     times = (
-        "/".join(f"{value * 1e3:.3f}" for value in (f.mean, f.min, f.max, f.sd))
+        "/".join(f"{value * 1e3:.3f}" for value in (f.mean, f.max, f.min, f.sd))
         for f in (s.period, s.response)
     )
     counts = (total(f) for f in (s.page_faults, s.switches, s.collections))

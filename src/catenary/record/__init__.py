@@ -13,6 +13,7 @@ It stands above `share` like the dashboard: it attaches to a loop and knows noth
 
 from catenary.record.figure import plot
 from catenary.record.layout import Field, Layout
+from catenary.record.log_file import read_csv
 from catenary.record.recorder import Recorder
 from catenary.record.recording import Recording, read
 from catenary.record.repair import Repaired, repair
@@ -25,5 +26,6 @@ __all__ = [
     "Repaired",
     "plot",
     "read",
+    "read_csv",
     "repair",
 ]

@@ -167,7 +167,11 @@ def make_columns(recording: Recording, reference: str | None, unit: str) -> list
     """What was recorded of position, tracking error and torque. ValueError: no such unit."""
     if unit not in ("rad", "deg"):
         raise ValueError(f"angles are drawn in rad or deg, not in {unit!r}")
-    factor, name = (1.0, "rad") if unit == "rad" else (degrees(1.0), "°")
+    length = recording.unit("position")
+    if length in ("", "rad"):
+        factor, name = (1.0, "rad") if unit == "rad" else (degrees(1.0), "°")
+    else:
+        factor, name = 1.0, length  # of linear axes
     commanded = of_axes(recording, "commanded_torque")
     columns = (
         _column(
@@ -185,7 +189,7 @@ def make_columns(recording: Recording, reference: str | None, unit: str) -> list
         ),
         _column(
             "torque",
-            "N·m",
+            recording.unit("torque") or "N·m",
             _line("commanded", commanded if was_commanded(commanded) else None, REFERENCE, WIDE),
             _line("actual", of_axes(recording, "torque"), TORQUE, NARROW),
         ),

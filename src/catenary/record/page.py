@@ -71,7 +71,12 @@ def _svg(figure: Any) -> str:
 
 
 def _axis_table(recording: Recording, reference: str | None, unit: str) -> str:
-    factor, name = (1e3, "mrad") if unit == "rad" else (degrees(1.0), "°")
+    length = recording.unit("position") or "rad"
+    if length != "rad" or unit == "rad":
+        factor, name = (1.0, length) if " " in length else (1e3, f"m{length}")
+    else:
+        factor, name = degrees(1.0), "°"
+    speed, effort = recording.unit("velocity") or "rad/s", recording.unit("torque") or "N·m"
     error = tracking_error(recording, reference)
     velocity, torque = of_axes(recording, "velocity"), of_axes(recording, "torque")
     columns = {"axis": list(recording.axes)}
@@ -79,10 +84,10 @@ def _axis_table(recording: Recording, reference: str | None, unit: str) -> str:
         columns[f"error, rms [{name}]"] = [f"{x * factor:.4g}" for x in rms(error)]
         columns[f"error, greatest [{name}]"] = [f"{x * factor:.4g}" for x in largest(error)]
     if velocity is not None:
-        columns["velocity, greatest [rad/s]"] = [f"{x:.4g}" for x in largest(velocity)]
+        columns[f"velocity, greatest [{speed}]"] = [f"{x:.4g}" for x in largest(velocity)]
     if torque is not None:
-        columns["torque, rms [N·m]"] = [f"{x:.4g}" for x in rms(torque)]
-        columns["torque, greatest [N·m]"] = [f"{x:.4g}" for x in largest(torque)]
+        columns[f"torque, rms [{effort}]"] = [f"{x:.4g}" for x in rms(torque)]
+        columns[f"torque, greatest [{effort}]"] = [f"{x:.4g}" for x in largest(torque)]
     if len(columns) == 1 or not len(recording):
         return ""
     rows = zip(*columns.values(), strict=True)

@@ -1,11 +1,17 @@
-"""Names of segments: "eth0", "eth0,eth1" (a ring), "virtual", "virtual:FILE.toml", "igh:0"."""
+"""Names of segments: "eth0", "eth0,eth1" (a ring), "virtual", "virtual:FILE.toml", "igh:0".
+
+"virtual-realtime[:FILE.toml]" is a virtual segment on this machine's clock.
+"""
 
 from __future__ import annotations
+
+from typing import Literal
 
 from catenary.errors import ConfigurationError
 from catenary.link import Interface, LinkSource, Ring
 
 VIRTUAL = "virtual"
+VIRTUAL_REALTIME = "virtual-realtime"
 IGH = "igh"
 
 
@@ -13,8 +19,8 @@ def parse(target: str) -> LinkSource:
     """The link source a name stands for; nothing is opened yet. A virtual segment is a new one
     each time. ConfigurationError for a name that cannot be."""
     kind, colon, rest = target.strip().partition(":")
-    if kind == VIRTUAL and (rest or not colon):
-        return _virtual(rest)
+    if kind in (VIRTUAL, VIRTUAL_REALTIME) and (rest or not colon):
+        return _virtual(rest, realtime=kind == VIRTUAL_REALTIME)
     if "," in target:
         return _ring(target)
     if kind == IGH:
@@ -23,7 +29,7 @@ def parse(target: str) -> LinkSource:
         raise ConfigurationError(
             f"{target!r} is no target",
             hint="give a network interface (eth0), two (eth0,eth1), virtual, virtual:FILE.toml, "
-            "or igh:0",
+            "virtual-realtime, or igh:0",
         )
     return Interface(kind)
 
@@ -53,8 +59,14 @@ def _ring(target: str) -> LinkSource:
     return Ring(first, second)
 
 
-def _virtual(path: str) -> LinkSource:
+def in_virtual_time(target: str) -> bool:
+    """Return True if the target is a virtual segment with its own clock."""
+    return target.strip().partition(":")[0] == VIRTUAL
+
+
+def _virtual(path: str, *, realtime: bool) -> LinkSource:
     from catenary.virtual import Segment, demo_segment  # a NIC needs none of it
 
-    segment = Segment.from_toml(path) if path else demo_segment()
+    clock: Literal["virtual", "monotonic"] = "monotonic" if realtime else "virtual"
+    segment = Segment.from_toml(path, clock=clock) if path else demo_segment(clock=clock)
     return Ring(segment.first, segment.second) if segment.ring else segment

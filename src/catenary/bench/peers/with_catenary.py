@@ -14,10 +14,10 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 import catenary as cat
 from catenary.bench.job import PHASES, Body, Job, Nanoseconds, Round
+from catenary.log import Log
 from catenary.loop.laws.law import Law
 
 STORM = "-sdo"
@@ -128,12 +128,12 @@ def measure(
         samples_of(loop.log[-job.cycles - 1 : -1]),  # the last cycle is incomplete
         lost=after["lost"] - before["lost"],
         cpu_per_cycle_ns=cpu,
-        late=after["uncommitted"] - before["uncommitted"],
+        uncommitted=after["uncommitted"] - before["uncommitted"],
         answers=sum(answers) - answered,
     )
 
 
-def samples_of(log: npt.NDArray[np.void]) -> Nanoseconds:
+def samples_of(log: Log) -> Nanoseconds:
     """Return the phases of the logged cycles, shape (cycles, phases) [ns]."""
     return np.stack([log[f"{phase}_ns"] for phase in PHASES], axis=1).astype(np.int64)
 

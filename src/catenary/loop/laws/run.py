@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from catenary import core
 from catenary.errors import LawError
+from catenary.log import Log
 from catenary.loop.laws.compiler import CompiledLaw
 from catenary.loop.laws.law import Law
 
@@ -78,7 +79,9 @@ class LawRun:
         if self.running:
             self._engine.stop_law()
 
-    def error(self, axes: Sequence[str], log: object, replay: Callable[[], str]) -> LawError | None:
+    def error(
+        self, axes: Sequence[str], log: Log | None, replay: Callable[[], str]
+    ) -> LawError | None:
         """Why it failed; None: it did not. `axes`: their names; `replay` runs its last step as
         Python and tells what that raises."""
         reasons: dict[int, Callable[[], tuple[str, str]]] = {

@@ -11,6 +11,7 @@ import numpy as np
 
 from catenary import core
 from catenary.errors import LawError
+from catenary.log import Log
 from catenary.loop.laws.compiler import SOURCES, CompiledLaw, compile_law, counted_allocations
 from catenary.loop.laws.law import Law
 from catenary.loop.laws.layout import law_layout, record_at
@@ -97,7 +98,7 @@ class LawRunner:
             judge(self._engine.run_law(SLICE_NS, trouble))
         self.raise_failure(None)
 
-    def raise_failure(self, log: object) -> None:
+    def raise_failure(self, log: Log | None) -> None:
         """The error of the law that has failed, if one has."""
         run = self._run
         error = run.error(self._axes, log, lambda: self._replay(run)) if run else None

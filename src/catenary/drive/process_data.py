@@ -1,0 +1,290 @@
+"""ProcessData: the inputs and outputs of one device, whatever it is: as bytes, and by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
+
+from catenary.bus import SubDevice
+from catenary.drive.arguments import PdoList, clock_wish, cycles_between, written_pdos
+from catenary.drive.channel import Channel, ChannelSpec, make_channels
+from catenary.drive.device_channels import (
+    NamedChannel,
+    chosen_channels,
+    column,
+    number_entries,
+    place_entries,
+    unique_names,
+    with_written,
+)
+from catenary.drive.image_place import Place, make_place
+from catenary.drive.request import Request
+from catenary.errors import ConfigurationError
+from catenary.model.device import Direction
+from catenary.plan.cycle import ImageArea
+from catenary.plan.start_up_object import StartUp
+from catenary.plan.wish import (
+    Bytes,
+    DistributedClock,
+    ImageLayout,
+    PdoWish,
+    Views,
+    WishTables,
+    WrittenPdo,
+)
+
+
+class ProcessData(Request):
+    """Process-data request for one device of any kind.
+
+        raw = ProcessData(sub)  # as mapped now: nothing is written to the device
+        sensor = ProcessData(sub, inputs={"force": (0x6000, 1, types.REAL)})
+
+    While a loop is open, `inputs` and `outputs` are memoryviews of the device's bytes, and
+    `sensor["force"]` is an object by name. Both change only at `next(loop)`, where outputs are sent
+    as they stand. They start as 0.
+
+    Args:
+        sub: Device.
+        inputs: `{name: (index, subindex, type[, scale])}`, or a `Channel` for each name. They are
+            mapped if they are not yet. None: as mapped, with the names of the SII or the
+            dictionary. `{}`: none.
+        outputs: The same for outputs. The request writes all bytes of the outputs; `{}`: it writes
+            none, so that another request can.
+        pdos: PDOs instead of a search: `[0x1A01]`, or with their entries, by name or as (index,
+            subindex, bits): `{0x1A00: ["force", "status"]}`.
+        safe: Values of outputs by name, or the bytes of all outputs. They are sent when the loop
+            ends, for whatever reason. Outputs without a safe value become 0.
+        start_up: Objects that are written to the device before SAFE-OP.
+        divider: Cycles of the loop between two exchanges.
+        required: False: the loop continues without the device; see `present`.
+        dc: Distributed clocks. True: as the SII of the device states.
+
+    Raises:
+        TypeError: An object is neither a Channel nor (index, subindex, type).
+        ValueError: A name is unknown or used twice, or a value does not fit.
+    """
+
+    def __init__(
+        self,
+        sub: SubDevice,
+        *,
+        inputs: Mapping[str, ChannelSpec] | None = None,
+        outputs: Mapping[str, ChannelSpec] | None = None,
+        pdos: PdoList | None = None,
+        safe: Mapping[str, float] | bytes = b"",
+        start_up: Sequence[StartUp] = (),
+        divider: int = 1,
+        required: bool = True,
+        dc: DistributedClock | bool = False,
+    ) -> None:
+        super().__init__([sub])
+        named = {
+            Direction.INPUT: None if inputs is None else make_channels("inputs", inputs),
+            Direction.OUTPUT: None if outputs is None else make_channels("outputs", outputs),
+        }
+        _check_names(inputs or {}, outputs or {})
+        known = {**(named[Direction.INPUT] or {}), **(named[Direction.OUTPUT] or {})}
+        self._pdos = written_pdos(pdos or (), known)
+        self._writes = outputs is None or bool(outputs)
+        self._is_named = inputs is not None
+        self._channels = {
+            direction: chosen_channels(sub, channels or {}) for direction, channels in named.items()
+        }
+        unnamed = [direction for direction, channels in named.items() if channels is None]
+        self._channels |= _mapped_channels(sub, unnamed, self._pdos, known)
+        self._safe = safe
+        self._check_safe()
+        self._start_up = tuple(start_up)
+        self._divider = cycles_between("divider", divider)
+        self._required = required
+        self._clock = clock_wish(dc)
+        self._places: dict[str, tuple[Direction, Place]] = {}
+        self._images: dict[Direction, memoryview] = {}
+        self._unit = -1
+        self._unit_valid: Bytes | None = None
+
+    @property
+    def inputs(self) -> memoryview:
+        """Bytes of the device's inputs, read-only; the same object while the loop is open."""
+        return self._image(Direction.INPUT)
+
+    @property
+    def outputs(self) -> memoryview:
+        """Bytes of the device's outputs, to be written; the same object while the loop is open."""
+        if not self._writes:
+            raise RuntimeError(f"{self!r} writes no outputs: it was made with outputs={{}}")
+        return self._image(Direction.OUTPUT)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of inputs, then of outputs."""
+        each = (*self._channels[Direction.INPUT], *self._channels[Direction.OUTPUT])
+        return tuple(channel.name for channel in each)
+
+    @property
+    def present(self) -> bool:
+        """True if the device answered in its last exchange."""
+        if self._unit_valid is None:
+            raise RuntimeError("nothing is exchanged before a Loop is open")
+        return bool(self._unit_valid[self._unit])
+
+    def __getitem__(self, name: str) -> float | int:
+        """Return a value by name: a bool, an integer, or a float where it is REAL or has a scale.
+
+        Raises:
+            KeyError: There is no such name.
+        """
+        direction, place = self._place(name)
+        return place.read(self._image(direction))
+
+    def __setitem__(self, name: str, value: float | int) -> None:
+        """Write an output by name.
+
+        Raises:
+            KeyError: There is no such name.
+            TypeError: It is an input, or an integer is needed.
+            ValueError: The type of the object cannot hold the value.
+        """
+        direction, place = self._place(name)
+        if direction is Direction.INPUT:
+            raise TypeError(f"{self!r}: {name!r} is an input: it is read-only")
+        try:
+            place.write(self._image(direction), value)
+        except (TypeError, ValueError) as error:
+            raise type(error)(f"{self!r}: {name!r} = {value!r}: {error}") from None
+
+    # plan.wish.Wish
+
+    def pdos(self, period_ns: int) -> Mapping[int, PdoWish]:
+        """Request the objects, or what is mapped already."""
+        references = {
+            direction: tuple(each.channel.reference() for each in channels)
+            for direction, channels in self._channels.items()
+        }
+        wish = PdoWish(
+            outputs=references[Direction.OUTPUT],
+            inputs=references[Direction.INPUT],
+            clock=self._clock,
+            divider=self._divider,
+            required=self._required,
+            pdos=self._pdos,
+            objects=self._start_up,
+        )
+        return {self._subs[0].position: wish}
+
+    def tables(self, layout: ImageLayout) -> WishTables:
+        """Return the bytes as areas. Named inputs are columns too, for laws and recordings."""
+        device = self._subs[0].position
+        self._unit = layout.sync_unit(device)
+        self._places = {
+            each.name: (direction, make_place(each, layout, direction))
+            for direction, channels in self._channels.items()
+            for each in channels
+        }
+        inputs = self._channels[Direction.INPUT] if self._is_named else ()
+        outputs = layout.byte_range(device, Direction.OUTPUT)
+        return WishTables(
+            input_columns=tuple(column(each, layout, Direction.INPUT) for each in inputs),
+            input_areas=self._areas(layout.byte_range(device, Direction.INPUT)),
+            output_areas=self._areas(outputs, self._safe_bytes(len(outputs)))
+            if self._writes
+            else (),
+        )
+
+    def bind(self, views: Views) -> None:
+        """Receive the bytes of the loop that opens."""
+        self._images = {
+            Direction.INPUT: views.input_bytes.data,
+            Direction.OUTPUT: views.output_bytes.data,
+        }
+        self._unit_valid = views.unit_valid
+
+    def _check_safe(self) -> None:
+        """Raise ValueError for safe values that cannot be sent."""
+        if self._safe and not self._writes:
+            raise ValueError("safe: this request writes no outputs (outputs={})")
+        if isinstance(self._safe, bytes):
+            return
+        channels = {each.name: each.channel for each in self._channels[Direction.OUTPUT]}
+        for name, value in self._safe.items():
+            if name not in channels:
+                raise ValueError(f"safe: {_unknown(name, channels)}")
+            try:
+                channels[name].encode(value)
+            except (TypeError, ValueError) as error:
+                raise type(error)(f"safe[{name!r}] = {value!r}: {error}") from None
+
+    def _safe_bytes(self, size: int) -> bytes:
+        if not isinstance(self._safe, bytes):
+            image = bytearray(size)
+            for name, value in self._safe.items():
+                self._places[name][1].write(image, value)
+            return bytes(image)
+        if self._safe and len(self._safe) != size:
+            raise ConfigurationError(
+                f"{self!r}: safe has {len(self._safe)} bytes, the outputs of the device have "
+                f"{size}",
+                hint="give a value for each byte, or values by name",
+            )
+        return self._safe or bytes(size)
+
+    def _areas(self, place: range, safe: bytes = b"") -> tuple[ImageArea, ...]:
+        if not place:
+            return ()
+        device = self._subs[0]
+        name = f"{device.position} {device.name}"
+        return (ImageArea(name, place.start, len(place), device.position, self._unit, safe),)
+
+    def _image(self, direction: Direction) -> memoryview:
+        if direction not in self._images:
+            raise RuntimeError(f"{self!r} has no values before a Loop is open")
+        return self._images[direction]
+
+    def _place(self, name: str) -> tuple[Direction, Place]:
+        found = self._places.get(name)
+        if found is not None:
+            return found
+        if name in self.names:
+            raise RuntimeError(f"{name!r} has no value before a Loop is open")
+        raise KeyError(f"{self!r}: {_unknown(name, self.names)}")
+
+
+def _mapped_channels(
+    sub: SubDevice,
+    directions: Sequence[Direction],
+    pdos: Sequence[WrittenPdo],
+    taken: Mapping[str, Channel],
+) -> dict[Direction, tuple[NamedChannel, ...]]:
+    """Return what is mapped in these directions. No name is given twice."""
+    found = []
+    for direction in directions:
+        written = [pdo for pdo in pdos if pdo.direction is direction]
+        device = with_written(sub.description, direction, written)
+        for assignment in device.assignments(direction):
+            found += [(direction, device, *each) for each in number_entries(assignment)]
+    names = unique_names([(entry.name, pdo.name, d.noun) for d, _, pdo, entry in found])
+    named = [
+        (f"{each[0].noun} {name}" if name in taken else name, each)
+        for name, each in zip(names, found, strict=True)
+    ]
+    return {
+        direction: place_entries(
+            [name for name, each in named if each[0] is direction],
+            [each[1:] for _, each in named if each[0] is direction],
+            {},
+        )
+        for direction in directions
+    }
+
+
+def _check_names(inputs: Mapping[str, object], outputs: Mapping[str, object]) -> None:
+    twice = [name for name in inputs if name in outputs]
+    if twice:
+        raise ValueError(f"{twice[0]!r} names an input and an output: each needs its own name")
+
+
+def _unknown(name: str, known: Sequence[str] | Mapping[str, object]) -> str:
+    near = get_close_matches(name, known, n=1)
+    guess = f"; did you mean {near[0]!r}?" if near else ""
+    return f"no name {name!r}; there are: {', '.join(known) or 'none'}{guess}"

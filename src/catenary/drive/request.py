@@ -1,0 +1,32 @@
+"""Request: the base of all process-data requests. It has their devices, and checks attributes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NoReturn
+
+from catenary.bus import SubDevice
+from catenary.drive.attributes import check_writable, unknown_attribute
+
+
+class Request:
+    """Owns the devices of a process-data request. Unknown attributes fail with the nearest name."""
+
+    def __init__(self, subs: Sequence[SubDevice]) -> None:
+        self._subs = tuple(subs)
+
+    def __getattr__(self, name: str) -> NoReturn:
+        raise unknown_attribute(self, name)  # reached only if the attribute does not exist
+
+    def __setattr__(self, name: str, value: object) -> None:
+        check_writable(self, name)
+        object.__setattr__(self, name, value)
+
+    def __repr__(self) -> str:
+        names = dict.fromkeys(f"{sub.position} {sub.name}" for sub in self._subs)
+        return f"{type(self).__name__}({', '.join(names)})"
+
+    @property
+    def subs(self) -> tuple[SubDevice, ...]:
+        """Devices of the request; of `Drives`, the device of each axis."""
+        return self._subs

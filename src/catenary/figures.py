@@ -1,0 +1,9 @@
+"""The statistics of a time, in the order in which every table shows them."""
+
+FIGURES = ("mean", "max", "min", "sd", "p50", "p99", "p999")
+HEADINGS = {"p999": "p99.9"}  # where it differs from the name
+
+
+def heading(figure: str) -> str:
+    """Return the heading of a figure's column."""
+    return HEADINGS.get(figure, figure)

@@ -1,0 +1,55 @@
+"""Safe values of outputs when a loop ends: set at once, and exchanged before the states go down."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from catenary.core import CYCLE_NONE, CYCLE_STOPPED
+from catenary.errors import LoopError
+from catenary.loop.signals import SignalGuard
+from catenary.plan.cycle import CyclePlan
+from catenary.plan.wish import Views
+
+TIMEOUT_NS = 100_000_000  # for an exchange with safe outputs, or so many exchanges:
+EXCHANGES = 5
+
+
+def make_safe(plan: CyclePlan, views: Views) -> None:
+    """Set the bytes of all areas to their safe values. The next cycle sends them."""
+    safe = b"".join(area.safe for area in plan.output_areas)
+    views.output_bytes[:] = np.frombuffer(safe, np.uint8)
+
+
+def confirm_safe(
+    plan: CyclePlan, views: Views, cycle: Callable[[], int], guard: SignalGuard
+) -> None:
+    """Run cycles until the devices with safe outputs have received them.
+
+    Args:
+        plan: Of the loop.
+        views: All private buffers.
+        cycle: Runs a cycle and returns its flags.
+        guard: Shortens the wait at a second signal.
+
+    Raises:
+        LoopError: A required device did not answer in time.
+    """
+    if not plan.output_areas:
+        return
+    missing = units = {area.sync_unit for area in plan.output_areas}
+    turn = max(plan.sync_units[unit].divider for unit in units) + 2  # one may have been sent
+    for done in range(max(TIMEOUT_NS // plan.period_ns, EXCHANGES * turn)):
+        if cycle() & (CYCLE_STOPPED | CYCLE_NONE):
+            break
+        missing = {
+            unit for unit in units if not (views.unit_valid[unit] or plan.sync_units[unit].optional)
+        }
+        if done + 1 >= turn and (not missing or guard.hurry):
+            return
+    names = ", ".join(f"device {a.name}" for a in plan.output_areas if a.sync_unit in missing)
+    raise LoopError(
+        f"{names}: did not confirm the safe values of the outputs",
+        hint="the outputs have what the device does without a MainDevice: see its watchdog",
+    )

@@ -1,0 +1,91 @@
+"""Each byte of the outputs belongs to one request: two that write it are an error."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from catenary.errors import ConfigurationError
+from catenary.model.device import DeviceDescription, Direction
+from catenary.plan.cycle import AxisPlan, Number
+from catenary.plan.layout import Layout
+from catenary.plan.wish import Wish, WishTables
+
+AXIS_OUTPUTS = (
+    *("controlword", "mode_target", "target_position", "target_velocity", "target_torque"),
+    "velocity_offset",
+)
+
+
+class Owned(NamedTuple):
+    """Bytes of the image of outputs that a request writes."""
+
+    request: int  # its rank
+    what: str
+    bytes: range
+
+
+def check_owners(
+    devices: Sequence[DeviceDescription],
+    wishes: Sequence[Wish],
+    tables: Sequence[WishTables],
+    layout: Layout,
+) -> None:
+    """Check that no byte of the outputs is written by two requests.
+
+    Raises:
+        ConfigurationError: Names both requests and the byte.
+    """
+    owners: dict[int, Owned] = {}
+    for rank, table in enumerate(tables):
+        for owned in _owned(rank, table):
+            for byte in owned.bytes:
+                other = owners.setdefault(byte, owned)
+                if other.request != rank:
+                    raise _conflict(devices, wishes, layout, other, owned, byte)
+
+
+def _owned(rank: int, table: WishTables) -> Iterator[Owned]:
+    for axis in table.axes:
+        for name, number in _axis_outputs(axis):
+            yield Owned(rank, name, _bytes(number))
+    for column in table.output_columns:
+        yield Owned(rank, column.name, _bytes(column.number))
+    for area in table.output_areas:
+        yield Owned(rank, "", range(area.image_offset, area.image_offset + area.size))
+
+
+def _axis_outputs(axis: AxisPlan) -> Iterator[tuple[str, Number]]:
+    for name in AXIS_OUTPUTS:
+        number: Number | None = getattr(axis, name)
+        if number is not None:
+            yield name, number
+
+
+def _bytes(number: Number) -> range:
+    last = number.bit_offset + number.bit_length - 1
+    return range(number.bit_offset // 8, last // 8 + 1)
+
+
+def _conflict(
+    devices: Sequence[DeviceDescription],
+    wishes: Sequence[Wish],
+    layout: Layout,
+    first: Owned,
+    second: Owned,
+    byte: int,
+) -> ConfigurationError:
+    places = (layout.byte_range(device.position, Direction.OUTPUT) for device in devices)
+    [(device, start)] = [
+        (device, place.start)
+        for device, place in zip(devices, places, strict=True)
+        if byte in place
+    ]
+    writers = " and ".join(
+        f"{wishes[owned.request]!r}" + (f" ({owned.what})" if owned.what else "")
+        for owned in (first, second)
+    )
+    return ConfigurationError(
+        f"{device}: byte {byte - start} of its outputs is written by two requests: {writers}",
+        hint="let one of them write it; ProcessData(sub, outputs={}) only reads",
+    )
