@@ -11,7 +11,7 @@ from typing import TypeAlias, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from catenary.bus import Pending, SubDevice
+from catenary.bus import Pending
 from catenary.drive import start_up as own_objects
 from catenary.drive.arguments import (
     AxisSource,
@@ -42,7 +42,7 @@ from catenary.drive.move_request import (
     require_enabled,
     values_of,
 )
-from catenary.drive.objects import ACTUAL_VELOCITY, PROFILE_OBJECTS, AxisObject
+from catenary.drive.objects import ACTUAL_VELOCITY, PROFILE_OBJECTS
 from catenary.drive.port import AxisPort
 from catenary.drive.request import Request
 from catenary.drive.state_machine import Goal

@@ -20,9 +20,7 @@ COLUMN_BUFFERS: dict[tuple[bool, Bank], str] = {
 }
 PART_BUFFERS = (*COLUMN_BUFFERS.values(), "input_bytes", "output_bytes")
 AXIS_BUFFERS = tuple(
-    each.name
-    for each in fields(Views)
-    if each.name not in (*PART_BUFFERS, "unit_valid", "movers")
+    each.name for each in fields(Views) if each.name not in (*PART_BUFFERS, "unit_valid", "movers")
 )
 
 
