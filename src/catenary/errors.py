@@ -140,7 +140,7 @@ class MoveError(DriveError):
     [rad], of a linear axis [m]; NaN in homing."""
 
     def __init__(
-        self, message: str, *, axis: str, remaining: float, log: object = None, hint: str = ""
+        self, message: str, *, axis: str, remaining: float, log: Log | None = None, hint: str = ""
     ) -> None:
         super().__init__(message, log=log, hint=hint)
         self.axis = axis

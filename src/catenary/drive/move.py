@@ -188,6 +188,9 @@ class Moves:
             self._finish(axis, "stopped" if part.is_stopping else "reached", None)
         except CatenaryError as error:
             self._finish(axis, "failed", error)
+        except BaseException:  # an interrupt: the motion has ended in the middle
+            self._fail(axis, part, Complaint("was interrupted", "start the move again", part.goal))
+            raise
 
     def _fail(self, axis: int, part: Part, complaint: Complaint) -> None:
         error = part.port.error(complaint)
