@@ -24,8 +24,6 @@ class Awaited(Protocol):
 
     def stop(self) -> None: ...
 
-    def wait_done(self, timeout: float) -> bool: ...
-
     def timeout_error(self, timeout: float) -> MoveError: ...
 
 
@@ -38,15 +36,6 @@ def wait_for_move(cycles: Iterator[Cycle], move: Awaited, timeout: float | None)
         begun = cycle.time if begun is None else begun
         if not move.done and cycle.time - begun > limit:
             raise stopped_late(move, limit)
-    if move.error is not None:
-        raise move.error
-
-
-def wait_in_background(move: Awaited, timeout: float | None) -> None:
-    """Wait while another thread iterates. See `Loop.wait`."""
-    limit = move.patience if timeout is None else timeout
-    if not move.wait_done(limit):
-        raise stopped_late(move, limit)
     if move.error is not None:
         raise move.error
 
