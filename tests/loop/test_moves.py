@@ -55,12 +55,13 @@ def test_moves_are_requested_and_stopped_from_another_thread() -> None:
     with cat.MainDevice(Segment([Servo()])) as main:
         arm = Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=2.0)
         with Loop(arm) as loop, iterated_by_a_thread(loop):
-            moves = [arm.move_to(0.1 * k) for k in range(20)]
+            moves = [arm.move_to(1.0 + 0.1 * k) for k in range(20)]
             moves[-1].stop()
             assert moves[-1].wait_done(MOST)
             assert all(move.done for move in moves)
             assert {move.outcome for move in moves[:-1]} <= {"replaced", "reached"}
-            assert isinstance(moves[0].error, MoveError)
+            for move in moves[:-1]:  # how many are reached depends on the threads
+                assert isinstance(move.error, MoveError) is (move.outcome == "replaced")
 
 
 def test_moves_on_two_networks() -> None:
