@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from catenary import control, drive, errors, realtime, record, share, types, virtual
     from catenary.bus import SubDevice
     from catenary.bus import event as events
-    from catenary.drive import DistributedClock, Drives, Inputs, Outputs
+    from catenary.drive import DistributedClock, Drives, Inputs, Outputs, ProcessData, StartUp
     from catenary.errors import (
         CatenaryError,
         ClockError,
@@ -53,9 +53,11 @@ __all__ = [
     "LoopError",
     "MainDevice",
     "Outputs",
+    "ProcessData",
     "Scheduling",
     "Segment",
     "Share",
+    "StartUp",
     "StateError",
     "StopPolicy",
     "SubDevice",
@@ -75,6 +77,7 @@ __all__ = [
 ]
 
 _MODULES = ("control", "drive", "errors", "realtime", "record", "share", "types", "virtual")
+_DRIVE = ("DistributedClock", "Drives", "Inputs", "Outputs", "ProcessData", "StartUp")
 _ERRORS = (  # that a loop raises; the others are in catenary.errors
     "CatenaryError",
     "ClockError",
@@ -87,7 +90,7 @@ _ERRORS = (  # that a loop raises; the others are in catenary.errors
 )
 _HOMES = {
     **dict.fromkeys(_ERRORS, "catenary.errors"),
-    **dict.fromkeys(("DistributedClock", "Drives", "Inputs", "Outputs"), "catenary.drive"),
+    **dict.fromkeys(_DRIVE, "catenary.drive"),
     **dict.fromkeys(
         ("ClockOptions", "Cycle", "Loop", "Scheduling", "StopPolicy", "law"), "catenary.loop"
     ),
