@@ -27,11 +27,13 @@ if TYPE_CHECKING:
         LawError,
         LinkError,
         LoopError,
+        MoveError,
         StateError,
         WorkingCounterError,
     )
     from catenary.link.interfaces import interfaces
     from catenary.loop import ClockOptions, Cycle, Loop, Scheduling, StopPolicy, law
+    from catenary.machine import Machine
     from catenary.share import Share, attach
     from catenary.target import MainDevice
     from catenary.virtual import Segment
@@ -51,7 +53,9 @@ __all__ = [
     "LinkError",
     "Loop",
     "LoopError",
+    "Machine",
     "MainDevice",
+    "MoveError",
     "Outputs",
     "ProcessData",
     "Scheduling",
@@ -85,6 +89,7 @@ _ERRORS = (  # that a loop raises; the others are in catenary.errors
     "LawError",
     "LinkError",
     "LoopError",
+    "MoveError",
     "StateError",
     "WorkingCounterError",
 )
@@ -94,6 +99,7 @@ _HOMES = {
     **dict.fromkeys(
         ("ClockOptions", "Cycle", "Loop", "Scheduling", "StopPolicy", "law"), "catenary.loop"
     ),
+    "Machine": "catenary.machine",
     "MainDevice": "catenary.target",
     "Segment": "catenary.virtual",
     "Share": "catenary.share",

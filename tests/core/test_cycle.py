@@ -10,6 +10,7 @@ from catenary.core import (
     CYCLE_OK,
     RECORD_FIELDS,
     Cycle,
+    Engine,
 )
 from catenary.plan.cycle import ClockPlan, DatagramKind
 from catenary.wire.datagram import Command, Datagram
@@ -261,13 +262,19 @@ def test_a_wait_that_fails_is_an_os_error(execution: str, method: str) -> None:
     assert b.engine.run(1) & CYCLE_OK  # it may recover
 
 
-def test_nothing_runs_before_start_or_after_stop() -> None:
+def test_nothing_runs_before_start() -> None:
+    b = bench(axis(0))
+    with pytest.raises(RuntimeError, match="start it first"):
+        Engine(b.plan, b.link.capsule).next()
+
+
+def test_nothing_runs_after_stop() -> None:
     b = bench(axis(0))
     with pytest.raises(RuntimeError, match="running"):
         b.engine.start()
     b.engine.stop()
     for call in (b.engine.next, lambda: b.engine.run(1), lambda: b.engine.run_until_stopped(1)):
-        with pytest.raises(RuntimeError, match="start"):
+        with pytest.raises(RuntimeError, match="its cycle has ended"):
             call()
     b.engine.stop()
 

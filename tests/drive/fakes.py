@@ -148,4 +148,5 @@ def views_of(tables: WishTables) -> Views:
         output_integers=np.zeros(count(tables.output_columns, 1), np.int64),
         output_bits=np.zeros(count(tables.output_columns, 2), np.uint8),
         unit_valid=np.ones(8, np.uint8),
+        is_open=lambda: True,
     )

@@ -48,7 +48,7 @@ def test_each_wish_gets_its_own_part() -> None:
         WishTables((axis("c"),), (column("valve", Bank.BIT),), ()),
     ]
     wishes = [Bound(), Bound(), Bound()]
-    whole = bind_wishes(wishes, tables, buffers_of(tables))  # type: ignore[arg-type]
+    whole = bind_wishes(wishes, tables, buffers_of(tables), lambda: True)  # type: ignore[arg-type]
     arm, io, last = (wish.views for wish in wishes)
     assert arm.actual_position.tolist() == [0, 1]
     assert last.target_torque.tolist() == [2]
@@ -64,7 +64,7 @@ def test_views_are_no_copies() -> None:
     tables = [WishTables((axis("a"),))]
     wish = Bound()
     buffers = buffers_of(tables)
-    bind_wishes([wish], tables, buffers)  # type: ignore[list-item]
+    bind_wishes([wish], tables, buffers, lambda: True)  # type: ignore[list-item]
     wish.views.target_position[0] = 1.5
     assert buffers["target_position"][0] == 1.5
 

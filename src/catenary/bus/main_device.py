@@ -344,12 +344,19 @@ class MainDevice:
             with contextlib.suppress(LinkLent):
                 return runner.submit(procedure)
 
+    def require_no_loop(self) -> None:
+        """Raise RuntimeError while a loop runs on this MainDevice."""
+        if self._attached is not None:
+            raise RuntimeError(
+                "a loop runs on this MainDevice: leave it first, or close() it (in a notebook, "
+                "before its cell is run again)"
+            )
+
     @contextlib.contextmanager
     def attached(self, runner: Runner, leave: Callable[[], object] | None = None) -> Iterator[None]:
         """While a loop runs: conversations go through its runner, scans are refused. Waits for
         those that other threads have under way: the link is the loop's alone."""
-        if self._attached is not None:
-            raise RuntimeError("a loop runs on this MainDevice already")
+        self.require_no_loop()
         blocking = self.runner
         self._attached, self._leave_loop = runner, leave
         blocking.lend()
@@ -375,8 +382,7 @@ class MainDevice:
         """What runs conversations while no loop does. RuntimeError while a loop runs."""
         if self._blocking is None or self._is_inherited:
             raise self._not_open()
-        if self._attached is not None:
-            raise RuntimeError("not possible while a loop runs on this MainDevice")
+        self.require_no_loop()
         return self._blocking
 
     def _raise_errors(self) -> None:

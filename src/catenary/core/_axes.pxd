@@ -157,7 +157,13 @@ cdef struct axes_t:
     uint32_t mute_limit
     uint32_t still_limit
     uint32_t beyond_limit
+    uint32_t command_timeout_velocity  # background: an update counts for so many cycles
+    uint32_t command_timeout_torque
     uint32_t handed_over       # cycles in a row of a hand-over
+    uint64_t handed_over_at    # cycle in which the last one began
+    uint8_t background         # the targets are those of a program in the background
+    uint8_t velocity_counts    # its last update is not older than the command timeout
+    uint8_t torque_counts
     uint32_t stop_asked        # counts; from any thread
     uint32_t stop_seen
     uint32_t told              # flags of the cycle that its axes set

@@ -30,12 +30,15 @@ from catenary.core._guard cimport (
     CSP,
     CST,
     NO_MODE,
+    TORQUE,
+    VELOCITY,
     guard_controlword,
     guard_observe,
     guard_orders,
     guard_stop,
     guard_take_orders,
     guard_works,
+    quantity_of,
 )
 from catenary.core._handover cimport LIMITED_SOME, REFUSED_SOME
 from catenary.core._memory cimport cat_memory, cat_memory_free, memory_take
@@ -291,13 +294,23 @@ cdef void write_velocity_offsets(axes_t *x) noexcept nogil:
                          a.command_velocity if a.mode == CSP else 0.0)
 
 
+cdef inline bint update_counts(const target_t *t, uint64_t number, uint32_t timeout) noexcept nogil:
+    """Return True if the last update of a program in the background counts in cycle `number`."""
+    return t.header.updated > 0 and number <= t.header.updated + timeout
+
+
 cdef void axes_write(axes_t *x, const target_t *target, bint fresh, uint64_t number) noexcept nogil:
     """Write the committed targets, as far as they count, into the output image of cycle `number`.
     `fresh`: they were committed since the last cycle."""
     cdef axis_t *a
     cdef uint32_t i
     x.number = number
+    x.background = target.header.background and not target.header.streamed
+    x.velocity_counts = update_counts(target, number, x.command_timeout_velocity)
+    x.torque_counts = update_counts(target, number, x.command_timeout_torque)
     if target.header.hold:
+        if x.handed_over == 0:
+            x.handed_over_at = number
         x.handed_over += 1
         fresh = False
     elif fresh:
@@ -368,16 +381,37 @@ cdef inline void follow(target_t *target, uint32_t i, bint followed, uint64_t si
         target.velocity[i] = commanded_velocity
 
 
+cdef inline void follow_update(const axes_t *x, const actual_t *actual, target_t *target, uint32_t i,
+                               double velocity, double torque) noexcept nogil:
+    """The same, in the background: velocity and torque stay while the last update counts, which may
+    enable the axis. Afterwards they are what is commanded, so that a later update of another axis
+    does not revive them."""
+    cdef uint64_t number = actual.header.number
+    cdef uint8_t quantity = quantity_of(target.mode[i])
+    if quantity == VELOCITY:
+        if update_counts(target, number, x.command_timeout_velocity):
+            target.velocity[i] = velocity
+        else:
+            target.velocity[i] = actual.commanded_velocity[i]
+    elif quantity == TORQUE:
+        if update_counts(target, number, x.command_timeout_torque):
+            target.torque[i] = torque
+        else:
+            target.torque[i] = actual.commanded_torque[i]
+
+
 cdef void axes_follow(const axes_t *x, const actual_t *actual, target_t *target) noexcept nogil:
     """Adapt the application's targets to the cycle that it sees."""
     cdef uint32_t i
-    cdef double position
+    cdef double position, velocity, torque
     for i in range(x.axis_count):
-        position = actual.position[i]
+        position, velocity, torque = actual.position[i], target.velocity[i], target.torque[i]
         if actual.state[i] == OPERATION_ENABLED:
             position = actual.commanded_position[i]
         follow(target, i, actual.flags[i] & FOLLOWED, actual.followed_since[i], position,
                actual.commanded_velocity[i], actual.commanded_torque[i])
+        if target.header.background:
+            follow_update(x, actual, target, i, velocity, torque)
 
 
 cdef void axes_follow_now(const axes_t *x, target_t *target) noexcept nogil:
@@ -445,6 +479,14 @@ cdef class Axes:
         self.c.late_limit_velocity = limit("late_limit_velocity_ns")
         self.c.late_limit_torque = limit("late_limit_torque_ns")
         self.c.handover_limit = max(cycles_of(plan.handover_ns, plan.period_ns, "handover_ns"), 1)
+        self.c.command_timeout_velocity = max(
+            cycles_of(plan.command_timeout_velocity_ns, plan.period_ns, "command_timeout_velocity_ns"),
+            LATE_CYCLES,
+        )
+        self.c.command_timeout_torque = max(
+            cycles_of(plan.command_timeout_torque_ns, plan.period_ns, "command_timeout_torque_ns"),
+            LATE_CYCLES,
+        )
         self.c.keep_limit = max(cycles_of(KEEP_NS, plan.period_ns, ""), LATE_CYCLES)
         self.c.mode_limit = max(cycles_of(MODE_NS, plan.period_ns, ""), 4)
         self.c.gap_limit = cycles_of(GAP_NS, plan.period_ns, "")

@@ -441,6 +441,7 @@ cdef void take_law(cycle_t *c, const target_t *orders) noexcept nogil:
         target.velocity[i] = c.axes.axes[i].commanded_velocity
         target.torque[i] = c.axes.axes[i].commanded_torque
     target.header.hold = 1
+    target.header.background = 0
     target.header.seen = c.number
     c.law_reserve = cycle_law_reserve(c, c.law.budget)
     if not law_begin(c.law, &c.monitor, c.scheduled):

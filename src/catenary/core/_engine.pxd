@@ -1,4 +1,4 @@
-from libc.stdint cimport int64_t, uint16_t, uint32_t
+from libc.stdint cimport int64_t, uint16_t, uint32_t, uint64_t
 
 from catenary.core._axes cimport Axes
 from catenary.core._clocks cimport Clock
@@ -44,6 +44,8 @@ cdef class Engine:
     cdef bint running
     cdef bint forgotten        # this is a forked child: the cycle is the parent's
     cdef bint committed        # the targets of the next step are on their way already
+    cdef bint writing          # another thread writes the targets: they stay as it leaves them
+    cdef uint64_t writing_since  # the cycle that it sees
     cdef bint emitted          # inline: the frames of this cycle are on their way
     cdef object sink           # keeps what is given the cycles alive
     cdef int64_t left          # when `next` returned [ns]; -1: no application since

@@ -57,6 +57,21 @@ class Engine:
         """Commits the target buffers for the next `next`, where that has a thread of its own to
         wait for: with several engines all commit before the first one is waited for."""
 
+    def keep_targets(self) -> None:
+        """Let the next `next` commit nothing."""
+
+    background: bool
+    """True if a thread repeats the targets of a program: CSP then has no late limit, and set-points
+    of CSV and CST count until the command timeout after an update; then their targets are what is
+    commanded. Not for inline cycles: ValueError."""
+
+    def begin_update(self) -> None:
+        """Let another thread than the one that iterates write the target buffers: until `end_update`
+        `next` does not change them. One thread at a time, which keeps the other from committing."""
+
+    def end_update(self, commit: bool) -> None:
+        """End an update; commit the target buffers as new ones of the program in the background."""
+
     @property
     def origin(self) -> int:
         """First cycle start [ns]; 0 before `start`. `start(origin_ns)` keeps to the grid of another

@@ -55,6 +55,7 @@ from catenary.core._handover cimport (
     actual_t,
     handover_commit,
     handover_swap,
+    target_header_t,
     target_t,
 )
 from catenary.core._histogram cimport histogram_add
@@ -349,6 +350,8 @@ cdef class Engine:
         """Return the error for a call that needs cycles."""
         if self.forgotten:
             return RuntimeError("the loop runs in the parent process: a forked child cannot use it")
+        if self.e.cycle.origin != 0:
+            return RuntimeError("the loop is closed, its cycle has ended: open it again")
         return RuntimeError("the engine is not running: start it first")
 
     # ---- steps
@@ -357,9 +360,35 @@ cdef class Engine:
         return self.step(timeout_ns)
 
     def commit_targets(self):
-        if self.native:
+        if self.e.cycle.execution != INLINE:
             self.commit(self.is_led())
             self.committed = True
+
+    def keep_targets(self):
+        self.committed = self.e.cycle.execution != INLINE
+
+    @property
+    def background(self):
+        return self.h.target[PRIVATE].header.background != 0
+
+    @background.setter
+    def background(self, bint value):
+        if self.e.cycle.execution == INLINE:
+            raise ValueError("an inline cycle cannot repeat targets in the background")
+        self.h.target[PRIVATE].header.background = value
+        self.h.target[PRIVATE].header.updated = 0
+
+    def begin_update(self):
+        self.writing = True
+        self.writing_since = self.h.actual[PRIVATE].header.number
+
+    def end_update(self, bint commit):
+        cdef target_header_t *header = self.h.target[PRIVATE].header
+        if commit:
+            if not self.is_led():
+                header.updated = max(self.e.cycle.number, <uint64_t>1)
+            self.commit_targets()
+        self.writing = False
 
     @property
     def origin(self):
@@ -377,7 +406,9 @@ cdef class Engine:
         if self.native:
             return self.step_native(timeout_ns)
         if self.is_native_cycle(True):
-            self.commit(self.is_led())
+            if not self.committed:
+                self.commit(self.is_led())
+            self.committed = False
             self.lockstep()
         else:
             self.inline_outputs(True)
@@ -413,9 +444,11 @@ cdef class Engine:
         runs that is all of them, and until the cycle of its end has been seen."""
         cdef actual_t *actual = &self.h.actual[PRIVATE]
         if self.law is None and self.stream is None:
-            axes_follow(&self.axes.c, actual, &self.h.target[PRIVATE])
+            if not self.writing:
+                axes_follow(&self.axes.c, actual, &self.h.target[PRIVATE])
             return
-        self.take_commanded()
+        if not self.writing:
+            self.take_commanded()
         if self.law is not None and self.law.ended_before(actual.header.number):
             # Python may have missed the cycle that said so.
             actual.header.flags |= LAW_FAILED if self.law.failed() else LAW_DONE
@@ -509,6 +542,8 @@ cdef class Engine:
         target.header.hold = hold
         target.header.seen = self.h.actual[PRIVATE].header.number
         target.header.stamp = target.header.seen + 1
+        if self.writing:  # an axis that became followed since does not follow this
+            target.header.seen = self.writing_since
         target.header.process_ns = -1
         target.header.input_age_ns = -1
         if self.left >= 0 and not hold:
@@ -574,7 +609,8 @@ cdef class Engine:
             cycles -= batch
             if until_stopped and (actual.header.moving == 0 or self.now_ns() >= deadline):
                 break
-        self.take_commanded()
+        if not self.writing:
+            self.take_commanded()
         return flags
 
     cdef uint32_t hold_native(self, int64_t cycles) except? 0xFFFFFFFF:
@@ -734,6 +770,7 @@ cdef class Engine:
         self.laws = [*self.laws, law]  # before it is offered: the cycle must not outlive it
         self.law = law
         law.c.threaded = self.native
+        self.h.target[PRIVATE].header.updated = 0  # it does not count after the law
         cat_pointer_offer(&self.e.cycle.law_request, &law.c)
         self.laws = [known for known in self.laws if self.is_law_used(known)]
 
@@ -800,6 +837,7 @@ cdef class Engine:
                 cat_memory_settle(&stream.memory)
             self.streams = [*self.streams, stream]  # before it is offered, as with laws
         self.stream = stream
+        self.h.target[PRIVATE].header.updated = 0  # it does not count after the stream
         cat_pointer_offer(&self.e.cycle.stream, NULL if stream is None else &stream.c)
         self.streams = [known for known in self.streams if self.is_stream_used(known)]
         handover_swap(self.h)

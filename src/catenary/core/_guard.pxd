@@ -53,6 +53,7 @@ cdef enum:  # plan.stop_reason.StopReason
     STOP_LEFT_OPERATION = 9
     STOP_FAULT = 10
     STOP_REQUEST = 11
+    STOP_COMMAND_TIMEOUT = 12
 
 cdef enum:  # commands of a stop, IEC 61800-7-201 table 26
     DISABLE_VOLTAGE = 0x00
@@ -69,6 +70,18 @@ cdef void lose_axis(axes_t *x, axis_t *a, uint8_t reason) noexcept nogil
 cdef uint16_t stop_command(axes_t *x, axis_t *a) noexcept nogil
 cdef void prepare_other_mode(axis_t *a) noexcept nogil
 cdef void refuse_mode(axes_t *x, axis_t *a, int8_t mode) noexcept nogil
+
+cdef inline bint is_commanded(const axes_t *x, int8_t mode) noexcept nogil:
+    """Return True if set-points count. Velocities and torques of a program in the background time
+    out."""
+    cdef uint8_t quantity = quantity_of(mode)
+    if not x.background:
+        return True
+    if quantity == VELOCITY:
+        return x.velocity_counts
+    if quantity == TORQUE:
+        return x.torque_counts
+    return True
 
 cdef inline bint shows_mode(const axis_t *a) noexcept nogil:
     return not a.mode_actual.present or a.mode_shown == a.mode

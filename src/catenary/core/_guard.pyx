@@ -129,7 +129,10 @@ cdef void take_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noex
             stop_axis(x, a, STOP_DEVICE_LOST)  # the request must not come true later
     if a.goal == ENABLED and not a.followed and not a.holding:
         if not t.header.hold:
-            a.armed = 1
+            if is_commanded(x, a.mode):
+                a.armed = 1
+            elif quantity_of(a.mode) == TORQUE:
+                a.armed = 0  # a torque that does not count any more
         if a.armed or quantity_of(a.mode) == POSITION:
             a.climbing_cycles += 1
         if a.climbing_cycles > x.climbing_limit:

@@ -75,8 +75,10 @@ cdef struct target_header_t:
     uint64_t stamp             # the cycle that the set-points are meant for
     int64_t process_ns         # what its body took; -1: unknown
     int64_t input_age_ns       # of its inputs when the body began; -1: unknown
+    uint64_t updated           # background: the cycle of the last update; 0: none counts
     uint32_t hold              # hand-over: no application commits set-points
     uint32_t streamed          # the set-points are a row of a stream
+    uint32_t background        # a thread repeats what a program has updated: see updated
 
 cdef struct target_t:           # a header and the arrays of TARGET, in its order
     target_header_t *header

@@ -17,4 +17,6 @@ cdef class Iteration:
     cdef list movers
     cdef uint32_t trouble
     cdef int al_status
+    cdef public object commit_lock
+    cdef int commit_if_free(self) except -1
     cdef int step_movers(self) except -1

@@ -1,6 +1,7 @@
 """Iteration of a loop, and the cycle that it yields."""
 
 from collections.abc import Callable, Sequence
+from threading import Lock
 from typing import Protocol, Self
 
 from catenary.core._engine import Engine
@@ -62,9 +63,9 @@ class Iteration:
 
     It calls `judge(flags)` if one of the CYCLE_* flags of `trouble` is set, or if the devices' AL
     states together differ from `al_status`; an exception of `judge` ends the iteration. The first
-    step commits nothing. `beside` is called before every step. Each
-    of the list `movers` computes targets before every step that commits, with the time of the
-    cycle [s].
+    step commits nothing. `beside` is called before every step. Each of the list `movers` computes
+    targets before every step that commits, with the time of the cycle [s]. With a `commit_lock`, a
+    step that finds it taken commits nothing: another thread is writing the targets.
     """
 
     def __init__(
@@ -77,5 +78,6 @@ class Iteration:
         beside: Callable[[], object] | None = None,
         movers: Sequence[Mover] | None = None,
     ) -> None: ...
+    commit_lock: Lock | None
     def __iter__(self) -> Self: ...
     def __next__(self) -> Cycle: ...

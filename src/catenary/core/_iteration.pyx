@@ -82,15 +82,32 @@ cdef class Iteration:
             flags = self.engine.run(1)
             self.cycle = Cycle(self.engine)
         else:
-            if self.movers:
+            if self.commit_lock is None:
                 self.step_movers()
+            else:
+                self.commit_if_free()
             flags = self.engine.step()
         if flags & self.trouble or self.cycle.header.al_status != self.al_status:
             self.judge(flags)
         return self.cycle
 
+    cdef int commit_if_free(self) except -1:
+        """Commit, unless another thread is writing the targets; never wait for it."""
+        if not self.commit_lock.acquire(False):
+            self.engine.keep_targets()
+            return 0
+        try:
+            self.step_movers()
+            self.engine.commit_targets()
+        finally:
+            self.commit_lock.release()
+        return 0
+
     cdef int step_movers(self) except -1:
-        cdef double now = self.cycle.time
+        cdef double now
+        if not self.movers:
+            return 0
+        now = self.cycle.time
         for mover in list(self.movers):  # a mover that has finished leaves the list
             mover.step(now)
         return 0

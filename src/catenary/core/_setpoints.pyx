@@ -1,7 +1,7 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
 """Set-points of one axis in one cycle: commanded_position, commanded_velocity, commanded_torque.
 
-Theory of operation. A followed axis gets the committed set-point, within its limits. Five situations
+Theory of operation. A followed axis gets the committed set-point, within its limits. Six situations
 decide what is sent instead:
 
 - not powered: target := actual; in SWITCHED_ON a committed torque is sent, so that it is there when
@@ -10,6 +10,9 @@ decide what is sent instead:
   after bit 12 was lost (`waiting_cycles`);
 - hand-over (`x.handed_over`): a law or stream ended, or a call of ours waits;
 - underrun: no set-point was committed, or the one of this axis was refused (`late_cycles`);
+- background (`x.background`): a thread repeats the set-points of a program. CSP falls back without a
+  late limit while nothing is committed; in CSV and CST a set-point counts until the last update is
+  older than the command timeout, then CSV decelerates and CST is stopped (`is_timed_out`);
 - stopping: another state was requested, or the core stopped the axis.
 
 In the profile modes the drive makes the trajectory. In PP the command stays until another one is
@@ -37,6 +40,7 @@ from catenary.core._guard cimport (
     POSITION,
     PROFILE_POSITION,
     PROFILE_VELOCITY,
+    STOP_COMMAND_TIMEOUT,
     STOP_HANDOVER,
     STOP_MODE_CHANGE,
     STOP_NOT_FOLLOWING,
@@ -45,6 +49,7 @@ from catenary.core._guard cimport (
     STOP_UNDERRUN,
     TORQUE,
     VELOCITY,
+    is_commanded,
     lose_axis,
     prepare_other_mode,
     quantity_of,
@@ -291,8 +296,10 @@ cdef void follow(axes_t *x, axis_t *a, const target_t *t, uint32_t i, bint fresh
         target = t.velocity[i]
     elif quantity == TORQUE:
         target = t.torque[i]
+    if x.background and not x.handed_over and quantity != POSITION:
+        fresh = is_commanded(x, a.mode)
     if not fresh or not is_number(a, target):
-        fall_back(x, a, not x.handed_over and a.refused_cycles == 0)
+        fall_back(x, a, not x.handed_over and a.refused_cycles == 0 and is_commanded(x, a.mode))
     elif quantity == POSITION:
         follow_position(x, a, t, target)
     elif quantity == VELOCITY:
@@ -307,6 +314,13 @@ cdef void follow(axes_t *x, axis_t *a, const target_t *t, uint32_t i, bint fresh
         limit_torque(x, a)
 
 
+cdef inline bint is_timed_out(const axes_t *x, const axis_t *a) noexcept nogil:
+    """Return True if the last update of a program in the background does not count any more. A
+    hand-over before it still has its own time."""
+    return (x.handed_over == 0 and not is_commanded(x, a.mode)
+            and x.number - x.handed_over_at > x.handover_limit)
+
+
 cdef void judge_lateness(axes_t *x, axis_t *a) noexcept nogil:
     """Stop a followed axis whose set-points have stayed away for too long."""
     cdef uint8_t quantity = quantity_of(a.mode)
@@ -318,7 +332,10 @@ cdef void judge_lateness(axes_t *x, axis_t *a) noexcept nogil:
         if x.handed_over > x.handover_limit:
             lose_axis(x, a, STOP_HANDOVER)
             return
-    if x.handed_over or not a.fallback_cycles:
+        if is_timed_out(x, a):
+            lose_axis(x, a, STOP_COMMAND_TIMEOUT)
+            return
+    if x.handed_over or not a.fallback_cycles or (x.background and not a.refused_cycles):
         a.late_cycles = 0
         return
     a.late_cycles += 1

@@ -17,7 +17,7 @@ from catenary.drive.arguments import (
     Columns,
     PdoList,
     axis_modes,
-    axis_name,
+    axis_names,
     axis_sources,
     clock_wish,
     cycles_between,
@@ -70,6 +70,7 @@ class Drives(Request):
 
     Options for all axes:
 
+    - `names`: one per axis, for errors, events and logs. None: position, device and slot.
     - `other_modes`: modes that the axes may change to while the loop runs ("hm": see `home`).
     - `measured`: position, velocity, torque that the drives must supply. None: all three; a
       velocity that the drive lacks is estimated, a torque reads NaN.
@@ -130,6 +131,7 @@ class Drives(Request):
         subs: Iterable[AxisSource],
         *,
         counts_per_turn: PerAxis[float],
+        names: Sequence[str] | None = None,
         mode: PerAxis[str] = "csp",
         other_modes: Sequence[str] = (),
         gear_ratio: PerAxis[float] = 1.0,
@@ -195,7 +197,7 @@ class Drives(Request):
         self._clock = clock_wish(dc)
         self._axes = tuple(
             Axis(
-                name=axis_name(sub, slot),
+                name=name,
                 device=sub.position,
                 slot=slot,
                 modes=axis_modes(first, other_modes),
@@ -210,8 +212,9 @@ class Drives(Request):
                 pdos=written,
                 objects=tuple(start_up),
             )
-            for (sub, slot), first, unit, limits, home in zip(
+            for (sub, slot), name, first, unit, limits, home in zip(
                 sources,
+                axis_names(sources, names),
                 first_modes,
                 units,
                 options,
@@ -294,19 +297,20 @@ class Drives(Request):
 
     def enable(self, axes: Axes = ALL) -> None:
         """Request that axes be enabled. Each starts from its actual position."""
-        self._ask(Goal.ENABLED, axes)
+        self._request("enable", Goal.ENABLED, axes)
 
     def disable(self, axes: Axes = ALL) -> None:
         """Request that axes be disabled."""
-        self._ask(Goal.DISABLED, axes)
+        self._request("disable", Goal.DISABLED, axes)
 
     def quick_stop(self, axes: Axes = ALL) -> None:
         """Request a quick stop. The ramp and the final state are the drive's (0x605A)."""
-        self._ask(Goal.QUICK_STOP, axes)
+        self._request("quick_stop", Goal.QUICK_STOP, axes)
 
     def reset_faults(self, axes: Axes = ALL) -> None:
         """Request a fault reset of those axes that are in fault. Nothing moves before `enable`."""
-        self._ask(Goal.RESET, sorted(set(self._numbers(axes)) & set(self.faults)))
+        chosen = set(self._numbers(axes))
+        self._request("reset_faults", Goal.RESET, sorted(chosen & set(self.faults)))
 
     def switch(self, mode: str, axes: Axes = ALL) -> None:
         """Request a change to `mode`, one of those that the Drives were made with.
@@ -317,8 +321,9 @@ class Drives(Request):
         for axis in self._numbers(axes):
             if wanted not in self._axes[axis].modes:
                 raise ValueError(f"{self.names[axis]}: make Drives with other_modes=[{mode!r}]")
-        self._bound().mode_target[axes] = wanted
-        self._bound().controlword_bits[axes] &= ~HALT & 0xFFFF
+        views = self._of_open_loop("switch()")
+        views.mode_target[axes] = wanted
+        views.controlword_bits[axes] &= ~HALT & 0xFFFF
 
     # Moves: the loop must be iterated meanwhile, by loop.wait(move) or by your own `for`.
 
@@ -411,7 +416,7 @@ class Drives(Request):
         return numbers
 
     def _moving(self) -> Moves:
-        self._bound()
+        self._of_open_loop("a move")
         assert self._moves is not None  # bound together with the views
         return self._moves
 
@@ -528,10 +533,19 @@ class Drives(Request):
             used[bank] += len(self)
         return slices
 
-    def _ask(self, goal: Goal, axes: Axes) -> None:
-        views = self._bound()
+    def _request(self, call: str, goal: Goal, axes: Axes) -> None:
+        views = self._of_open_loop(f"{call}()")
         views.goal[axes] = goal
         views.request[axes] += 1  # a goal that dropped comes back only by a new request
+
+    def _of_open_loop(self, call: str) -> Views:
+        """Return the views for a request; RuntimeError if no cycle would send it."""
+        views = self._bound()
+        if not views.is_open():
+            raise RuntimeError(
+                f"{call}: the loop is closed, and its drives were stopped; open a loop first"
+            )
+        return views
 
     def _bound(self) -> Views:
         if self._views is None:

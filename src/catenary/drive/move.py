@@ -83,14 +83,6 @@ class Move:
         """
         self._owner.stop(self._parts)
 
-    def wait_done(self, timeout: float) -> bool:
-        """Wait until another thread has iterated the loop to the end of the move.
-
-        Returns:
-            False if it is not done after `timeout` [s].
-        """
-        return self._finished.wait(timeout)
-
     def timeout_error(self, timeout: float) -> MoveError:
         """Return the error of a move that is not done after `timeout` [s]."""
         part = next((part for part in self._parts if part.outcome is None), self._parts[0])

@@ -83,7 +83,7 @@ class KernelMaster:
         Raises:
             NoDeviceError: there are none.
         """
-        self._refuse_beside_loop()
+        self.main.require_no_loop()
         count = self.reservation.device_count()
         self.reservation.wait_preop()
         found = [describe(self.reservation, position) for position in range(count)]
@@ -127,7 +127,7 @@ class KernelMaster:
 
     def configure(self, plan: Plan) -> None:
         """Tells the master the plan and activates it: from here on it waits for cycles."""
-        self._refuse_beside_loop()
+        self.main.require_no_loop()
         if self._kernel is not None:
             raise ConfigurationError(
                 f"{self.reservation.name} is activated already: nothing can be configured any more",
@@ -287,10 +287,6 @@ class KernelMaster:
 
     def _cannot(self, what: str, command: str) -> NoReturn:
         raise ConfigurationError(f"libethercat cannot {what}", hint=f"its tool does: {command}")
-
-    def _refuse_beside_loop(self) -> None:
-        if self.cycling:
-            raise RuntimeError("not possible while a loop runs on this MainDevice")
 
     def _handle(self, description: DeviceDescription) -> SubDevice:
         position = description.position

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 
 import numpy as np
@@ -19,15 +19,20 @@ COLUMN_BUFFERS: dict[tuple[bool, Bank], str] = {
     (True, Bank.BIT): "output_bits",
 }
 PART_BUFFERS = (*COLUMN_BUFFERS.values(), "input_bytes", "output_bytes")
-AXIS_BUFFERS = tuple(
-    each.name for each in fields(Views) if each.name not in (*PART_BUFFERS, "unit_valid", "movers")
-)
+OTHERS = (*PART_BUFFERS, "unit_valid", "movers", "is_open")
+AXIS_BUFFERS = tuple(each.name for each in fields(Views) if each.name not in OTHERS)
 
 
 def bind_wishes(
-    wishes: Sequence[Wish], tables: Sequence[WishTables], buffers: Mapping[str, memoryview]
+    wishes: Sequence[Wish],
+    tables: Sequence[WishTables],
+    buffers: Mapping[str, memoryview],
+    is_open: Callable[[], bool],
 ) -> Views:
-    """Binds every wish to its part of the buffers, in the order of the plan. Returns the whole."""
+    """Bind every wish to its part of the buffers, in the order of the plan. Return the whole.
+
+    `is_open` returns True while the loop runs.
+    """
     arrays = {name: np.asarray(buffers[name]) for name in (*AXIS_BUFFERS, *PART_BUFFERS)}
     unit_valid = np.asarray(buffers["unit_valid"])
     movers: list[Mover] = []
@@ -36,11 +41,11 @@ def bind_wishes(
         sizes = dict.fromkeys(AXIS_BUFFERS, len(table.axes)) | part_sizes(table)
         starts = {name: used.get(name, used["axes"]) for name in sizes}
         parts = {name: arrays[name][starts[name] :][: sizes[name]] for name in sizes}
-        wish.bind(Views(**parts, unit_valid=unit_valid, movers=movers))
+        wish.bind(Views(**parts, unit_valid=unit_valid, movers=movers, is_open=is_open))
         used["axes"] += len(table.axes)
         for name in PART_BUFFERS:
             used[name] += sizes[name]
-    return Views(**arrays, unit_valid=unit_valid, movers=movers)
+    return Views(**arrays, unit_valid=unit_valid, movers=movers, is_open=is_open)
 
 
 def part_sizes(table: WishTables) -> dict[str, int]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import warnings
 import weakref
 from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager
 from functools import partial
 from types import TracebackType
 
@@ -16,6 +17,7 @@ from catenary.bus import SubDevice
 from catenary.core import Cycle, Iteration
 from catenary.errors import LawError
 from catenary.log import Log
+from catenary.loop.background import Background, program_ends
 from catenary.loop.clocks import Clocks
 from catenary.loop.devices import DeviceWish, by_network
 from catenary.loop.laws.law import Law, LawFunction
@@ -25,9 +27,9 @@ from catenary.loop.moves import Awaited, wait_for_move
 from catenary.loop.network import ENDING, TROUBLE, Network, Settings, leave_method
 from catenary.loop.networks import (
     NetworksIteration,
-    brake,
     clocks_of_several,
     cpus_for,
+    leave_all,
     share_time,
 )
 from catenary.loop.options import ClockOptions, Scheduling, StopPolicy, one_of
@@ -131,16 +133,20 @@ class Loop:
         self._quorum = checked_quorum(scheduling.quorum, count)
         self._enable = enable
         self._faults = stop.raise_faults
-        self._guard = SignalGuard(
-            (Loop.__exit__.__code__, Loop._leave.__code__, leave_open_loop.__code__)
-        )
+        leaving = (Loop.close, Loop.__exit__, Loop._leave, leave_open_loop)
+        self._guard = SignalGuard(tuple(each.__code__ for each in leaving))
         self._iteration: Iteration | NetworksIteration | None = None
+        self._background: Background | None = None
         self._finalizer: weakref.finalize[..., Loop] | None = None
 
     def __enter__(self) -> Loop:
+        if any(running.is_open for running in self._runnings):
+            raise RuntimeError("the loop is open: `with` and open() open it; use one of them, once")
+        for network in self._networks:
+            network.main.require_no_loop()
         try:
             self._guard.install()
-            self._iteration = None
+            self._iteration = self._background = None
             for network in self._networks:
                 network.running = None
             abandon = leave_method(self._abandon)
@@ -171,14 +177,82 @@ class Loop:
         if error is not None:
             self._report_end(error)
         problems = self._leave()
+        if self._background is not None and (untold := self._background.untold_error()) is not None:
+            problems.insert(0, untold)
         if error is not None:
             for problem in problems:
                 error.add_note(f"on the way down: {problem}")
         elif problems:
             raise problems[0]
 
+    def open(self) -> Loop:
+        """Enter without a `with` block, for a notebook or a server. Return the loop.
+
+        `close` leaves it; so do the end of the program and the MainDevice's `close`.
+        """
+        return self.__enter__()
+
+    def close(self) -> None:
+        """Leave the loop: stop the axes, then the cycle. A no-op if it is closed.
+
+        Raises an error that ended the loop in the background, unless another call has raised it.
+        """
+        if not self._runnings:
+            return
+        if any(running.is_open for running in self._runnings):
+            self._guard.install()  # again: a notebook sets its own handlers in each cell
+        self.__exit__(None, None, None)
+
+    def run_in_background(self) -> None:
+        """Let a Python thread iterate the loop from now on, and return at once.
+
+        The thread commits the targets in every cycle: write them in `with loop.update():`. An
+        error of the loop stops the axes and closes the loop; the next `update`, `wait` or `close`
+        raises it. Interrupting the program (Ctrl-C) does not stop the loop; `close` and the end of
+        the program do. In virtual time the thread keeps to the wall clock. A no-op if it runs.
+
+        Raises:
+            ValueError: the loop is inline.
+            LoopError: an axis is powered in CST.
+        """
+        if self._background is not None:
+            self._background.raise_error()
+            if self._background.is_alive:
+                return
+        iteration = self._iterating()
+        background = Background(self._runnings, iteration, self._guard)
+        background.start()
+        self._background = background
+
+    def update(self) -> AbstractContextManager[None]:
+        """Return a context in which a program writes one consistent set of targets and requests.
+
+        While the loop runs in the background, all of the set is committed when the block ends; none
+        of it if the block raises. In CSV and CST it counts for `StopPolicy.command_timeout`: then
+        CSV decelerates, and CST is stopped.
+
+        Raises:
+            RuntimeError: the loop does not run in the background: `next(loop)` commits.
+            CatenaryError: what ended the loop in the background.
+        """
+        if self._background is None:
+            raise RuntimeError(
+                "update() needs run_in_background(): a program that iterates the loop itself "
+                "commits all it has written by `next(loop)`"
+            )
+        return self._background.update()
+
+    @property
+    def error(self) -> Exception | None:
+        """Error that ended the loop in the background; None if there is none."""
+        return None if self._background is None else self._background.error
+
     def __iter__(self) -> Iterator[Cycle]:
         """Iterating again continues where the last iteration ended."""
+        return self._iterating()
+
+    def _iterating(self) -> Iteration | NetworksIteration:
+        self._require_foreground()
         if self._iteration is None:
             self._iteration = self._make_iteration()
             for running in self._runnings:
@@ -191,6 +265,8 @@ class Loop:
     def wait(self, move: Awaited, timeout: float | None = None) -> None:
         """Iterate until a move is done: `loop.wait(arm.move_to(0.5), timeout=10.0)`.
 
+        While the loop runs in the background, only wait; in any thread.
+
         It returns when the axes have reached their goals, or after `move.stop()` are at rest.
 
         Args:
@@ -202,7 +278,10 @@ class Loop:
             MoveError: The move took too long, was replaced, or its axis was stopped.
             DriveError: A drive is in fault or was stopped; other errors of the iteration likewise.
         """
-        wait_for_move(iter(self), move, timeout)
+        if self._background is None:
+            wait_for_move(iter(self), move, timeout)
+        else:
+            self._background.wait(move, timeout)
 
     def _make_iteration(self) -> Iteration | NetworksIteration:
         first = self._opened
@@ -259,6 +338,7 @@ class Loop:
             compiled: False: run it as Python, in the thread of the caller. This is slow and gives
                 Python's errors: use it to find mistakes.
         """
+        self._require_foreground()
         running = self._only("a law")
         if not compiled:
             return self._run_as_python(made_law(law), memory, parameters)
@@ -348,6 +428,7 @@ class Loop:
             ClockError: after `timeout` [s], for each network.
             LoopError: an axis is powered in CST, whose torque would become stale meanwhile.
         """
+        self._require_foreground()
         with_clocks = [n for n in self._networks if n.running and n.running.clocks is not None]
         if not with_clocks:
             raise RuntimeError("no distributed clocks in this loop: Drives(..., dc=True)")
@@ -355,6 +436,15 @@ class Loop:
             running.refuse_powered_torque("wait_locked")
         for network in with_clocks:
             network.wait_locked(within, timeout)
+
+    def _require_foreground(self) -> None:
+        """Raise RuntimeError for a call that iterates if a thread does, or the loop is closed."""
+        if self._background is not None and self._background.is_alive:
+            raise RuntimeError(
+                "the loop runs in the background, where a thread iterates it: write targets in "
+                "`with loop.update():`, wait with loop.wait(move), start laws with loop.start()"
+            )
+        self._opened.require_open()
 
     def _advance(self, flags: int) -> None:
         """Do what belongs to each cycle that no iteration runs, and raise its error, if any."""
@@ -398,15 +488,11 @@ class Loop:
 
     def _leave(self) -> list[Exception]:
         """Stop every network that answers, whatever happens to the others. Return the problems."""
-        problems: list[Exception] = []
         try:
-            if len(self._networks) > 1:
-                brake(self._runnings, self._guard)
+            problems = leave_all(self._runnings, self._guard)
             for network in self._networks:
-                running = network.running
-                problems += (
-                    take_down(network.main) if running is None else running.leave(self._guard)
-                )
+                if network.running is None:
+                    problems += take_down(network.main)
         finally:
             self._guard.restore()
             if self._finalizer is not None:
@@ -434,14 +520,16 @@ def checked_quorum(quorum: int | None, count: int) -> int:
 
 def leave_open_loop(runnings: Sequence[Running], guard: SignalGuard) -> None:
     """Stop the axes of a loop that nothing refers to any more, then warn: a warning may be an
-    error."""
+    error. A loop in the background may stay open until the program ends."""
     if not any(running.is_open for running in runnings):
         return
     for running in runnings:
         if running.is_open:
             running.stop_axes_at_once()
-    problems = [problem for running in runnings for problem in running.leave(guard)]
+    problems = leave_all(runnings, guard)
     guard.restore()
-    text = "a Loop was not left: its axes have been stopped. Use it in a with block"
+    if program_ends() and not problems and all(one.in_background for one in runnings):
+        return
+    text = "a Loop was not left: its axes have been stopped. Use it in a with block, or close() it"
     text += "".join(f"; {problem}" for problem in problems)
     warnings.warn(text, RuntimeWarning, stacklevel=2)

@@ -104,6 +104,7 @@ class Network:
 
     def stream(self, capacity: int = 1000) -> Stream:
         """Return a `Stream` of set-points for the axes of this network."""
+        self.session.require_open()
         return Stream(self.session.engine, self.session.views, capacity)
 
     @property
@@ -144,6 +145,7 @@ class Network:
         its = self._settings
         self.main.read_mappings(*self._requests, period=its.period)
         late_position, late_velocity, late_torque = its.stop.late_limits
+        command_velocity, command_torque = its.stop.command_timeouts
         reference = its.clocks.reference
         if reference is not None and reference.main is not self.main:
             reference = None  # a device of another network of the loop
@@ -160,6 +162,8 @@ class Network:
             late_limit_velocity=late_velocity,
             late_limit_torque=late_torque,
             handover=its.stop.handover,
+            command_timeout_velocity=command_velocity,
+            command_timeout_torque=command_torque,
             stop_deadline=its.stop.stop_deadline,
             busy_wait=its.scheduling.busy_wait,
             collect_share=its.scheduling.collect_deadline,

@@ -9,9 +9,10 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import replace
+from threading import Lock
 
 from catenary.core import CYCLE_NONE, CYCLE_STOPPED, CYCLE_WORKING_COUNTER, Cycle
-from catenary.errors import CatenaryError
+from catenary.errors import CatenaryError, LoopError
 from catenary.link import Link
 from catenary.loop.network import TROUBLE, Network
 from catenary.loop.options import ClockOptions
@@ -74,6 +75,7 @@ class NetworksIteration:
         self._faults = faults
         self._dead: set[int] = set()  # by identity: those that have failed and not returned
         self._cycle: NetworksCycle | None = None
+        self.commit_lock: Lock | None = None  # see core.Iteration
 
     def __iter__(self) -> NetworksIteration:
         return self
@@ -88,13 +90,26 @@ class NetworksIteration:
             for one in self._runnings:
                 one.engine.zero_ns = self._runnings[0].engine.zero_ns
         else:
-            for one, cycle in zip(self._runnings, self._cycle.networks, strict=True):
-                for mover in list(one.views.movers):
-                    mover.step(cycle.time)
-                one.engine.commit_targets()
+            self._commit_if_free(self._cycle)
             flags = [one.engine.next() for one in self._runnings]
         self._judge(self._cycle, flags)
         return self._cycle
+
+    def _commit_if_free(self, cycle: NetworksCycle) -> None:
+        """Commit, unless another thread is writing the targets."""
+        lock = self.commit_lock
+        if lock is not None and not lock.acquire(blocking=False):
+            for one in self._runnings:
+                one.engine.keep_targets()
+            return
+        try:
+            for one, its in zip(self._runnings, cycle.networks, strict=True):
+                for mover in list(one.views.movers):
+                    mover.step(its.time)
+                one.engine.commit_targets()
+        finally:
+            if lock is not None:
+                lock.release()
 
     def _judge(self, cycle: NetworksCycle, flags: Sequence[int]) -> None:
         """Raise what ends the loop: too few networks, or trouble in one that is alive."""
@@ -142,6 +157,21 @@ def share_time(runnings: Sequence[Running]) -> None:
         )
     for one in runnings:
         one.share_time([other for other in runnings if other is not one])
+
+
+def leave_all(runnings: Sequence[Running], guard: SignalGuard) -> list[Exception]:
+    """Stop every network that answers, whatever happens to the others. Return the problems."""
+    problems: list[Exception] = []
+    try:
+        for running in runnings[:1]:  # one thread iterates all
+            running.end_background()
+    except LoopError as problem:
+        problems.append(problem)
+    if len(runnings) > 1:
+        brake(runnings, guard)
+    for running in runnings:
+        problems += running.leave(guard)
+    return problems
 
 
 def brake(runnings: Sequence[Running], guard: SignalGuard) -> None:

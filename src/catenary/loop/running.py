@@ -76,7 +76,7 @@ class Running:
         self.plan = plan
         self.exchange: Exchange = exchange(self)
         self.engine = self.exchange.make_engine()
-        self.views = bind_wishes(wishes, plan.tables, self.engine.buffers)
+        self.views = bind_wishes(wishes, plan.tables, self.engine.buffers, lambda: self.is_open)
         self._axis_watch = AxisWatch(self.views, plan.cycle.axes)
         self.stop = stop
         self.laws = LawRunner(self.engine, plan)
@@ -97,6 +97,7 @@ class Running:
         self._watches: list[Pending[None]] = []
         self._publisher: Publisher | None = None
         self._counted: Mapping[str, int] = {}  # by the engine, until the loop was entered
+        self.end_background: Callable[[], None] = _no_background  # the thread that iterates
         self.service.cycle = self.cycle
 
     # Opening
@@ -128,6 +129,18 @@ class Running:
     def is_open(self) -> bool:
         """True if its cycle runs, in this process."""
         return self._opened and not self._left and self._process == os.getpid()
+
+    @property
+    def in_background(self) -> bool:
+        """True if a thread of ours iterates, or did until the loop was left."""
+        return self.end_background is not _no_background
+
+    def require_open(self) -> None:
+        """Raise RuntimeError for a call that needs cycles, unless the loop is open."""
+        if self._process != os.getpid():
+            raise RuntimeError("the loop runs in the parent process: a forked child cannot use it")
+        if not self.is_open:
+            raise RuntimeError("the loop is closed: open it again, or use it in a with block")
 
     def open(self, origin_ns: int = 0) -> None:
         """From SAFE-OP to OP: the cycle starts, and valid outputs flow while the states change.
@@ -400,6 +413,10 @@ class Running:
             for axis, state in zip(axes, states, strict=True)
         ]
         return drive_error(troubles, what, log)
+
+
+def _no_background() -> None:
+    """The program iterates the loop itself."""
 
 
 def take_down(main: MainDevice) -> list[Exception]:

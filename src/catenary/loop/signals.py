@@ -33,13 +33,13 @@ class SignalGuard:
         self.hurry = False
 
     def install(self) -> None:
-        """Takes the signals over; nothing outside of the main thread."""
+        """Take the signals over; a no-op outside the main thread, and where they are ours."""
         if threading.current_thread() is not threading.main_thread():
             return
         for number in SIGNALS:
             before = signal.getsignal(number)
             # None: not from Python, so not ours to give back. SIG_IGN: ignored on purpose.
-            if before is None or before is signal.SIG_IGN:
+            if before is None or before is signal.SIG_IGN or before == self._handle:
                 continue
             self._before[number] = before
             signal.signal(number, self._handle)

@@ -37,6 +37,10 @@ ADVICE: dict[StopReason, str] = {
         "bits 11 and 12)"
     ),
     StopReason.MODE_CHANGE: "check that the drive supports the mode (0x6502, its manual)",
+    StopReason.COMMAND_TIMEOUT: (
+        "update torques more often than that from a thread, use a law (loop.start), change to "
+        "CSP, or give StopPolicy(command_timeout=...) a longer time [s]"
+    ),
     StopReason.NOT_ENABLED: "check its main supply, safe torque off and the enable input",
 }
 GO_ON = (
@@ -73,6 +77,8 @@ def _details(stop: StoppedAxis, cycle: CyclePlan, log: Log) -> str:
         return f" ({limit:g} ms in {mode_name(stop.mode)}), {_what_was_late(stop, log)}"
     if stop.reason is StopReason.HANDOVER:
         return f" ({cycle.handover_ns / 1e6:g} ms)"
+    if stop.reason is StopReason.COMMAND_TIMEOUT:
+        return f" ({cycle.command_timeout_torque_ns / 1e6:g} ms in CST)"
     return ""
 
 

@@ -218,6 +218,9 @@ class CyclePlan:
     late_limit_velocity_ns: int = 50_000_000  # CSV
     late_limit_torque_ns: int = 10_000_000  # CST
     handover_ns: int = 20_000_000  # CST keeps its torque for this long after a law or stream ended
+    # Set-points of a program in the background count for this long after an update
+    command_timeout_velocity_ns: int = 200_000_000  # CSV, then it decelerates
+    command_timeout_torque_ns: int = 20_000_000  # CST, then quick stop
     stop_deadline_ns: int = 2_000_000_000  # quick stop to standstill, at most
     wire_ns: int = 0  # wire time of the cyclic frames in the busiest cycle
     acyclic_ns: int = 0  # wire time per cycle for acyclic frames; one frame in any case

@@ -76,6 +76,8 @@ def make_plan(
     late_limit_velocity: float = 0.050,
     late_limit_torque: float = 0.010,
     handover: float = 0.020,
+    command_timeout_velocity: float = 0.200,
+    command_timeout_torque: float = 0.020,
     stop_deadline: float = 2.0,
     busy_wait: float = 0.0,
     log: int = 1000,
@@ -99,6 +101,7 @@ def make_plan(
         collect_share: threaded, the part of the period in which frames may come back.
         late_limit_position, late_limit_velocity, late_limit_torque: of CSP, CSV and CST [s].
         handover, stop_deadline: [s].
+        command_timeout_velocity, command_timeout_torque: of CSV and CST in the background [s].
         busy_wait: [s] before each cycle start.
         log: number of cycles that are kept.
         clock: clock that the others follow.
@@ -163,6 +166,8 @@ def make_plan(
         late_limit_velocity_ns=round(late_limit_velocity * 1e9),
         late_limit_torque_ns=round(late_limit_torque * 1e9),
         handover_ns=round(handover * 1e9),
+        command_timeout_velocity_ns=round(command_timeout_velocity * 1e9),
+        command_timeout_torque_ns=round(command_timeout_torque * 1e9),
         stop_deadline_ns=round(stop_deadline * 1e9),
         wire_ns=wire_ns,
         acyclic_ns=acyclic_ns,

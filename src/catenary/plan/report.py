@@ -124,6 +124,11 @@ def _axes(cycle: CyclePlan, axes: Sequence[AxisReport]) -> Iterator[str]:
         f"axes: late limit {limits}; "
         f"CST keeps its torque for {cycle.handover_ns / 1e6:g} ms after a law or stream ended"
     )
+    yield (
+        "    in the background, an update counts for "
+        f"{cycle.command_timeout_velocity_ns / 1e6:g} ms in CSV and PV, "
+        f"{cycle.command_timeout_torque_ns / 1e6:g} ms in CST"
+    )
     for number, axis in enumerate(axes):
         yield f"    axis {number}  {axis.name}  {', '.join(Mode(m).name for m in axis.modes)}"
         yield from (f"        {line}" for line in axis.lines)

@@ -20,6 +20,7 @@ class StopReason(IntEnum):
     LEFT_OPERATION = 9
     FAULT = 10
     STOP_REQUEST = 11
+    COMMAND_TIMEOUT = 12
 
     @property
     def text(self) -> str:
@@ -40,6 +41,7 @@ TEXTS: dict[StopReason, str] = {
     StopReason.LEFT_OPERATION: "the drive left OPERATION_ENABLED by itself (STO, enable input)",
     StopReason.FAULT: "the drive is in fault",
     StopReason.STOP_REQUEST: "a stop was requested",
+    StopReason.COMMAND_TIMEOUT: "the last loop.update() is older than command_timeout",
 }
 
 # Unrequested stops, without a fault or a lost device as cause: the iteration raises.
@@ -52,5 +54,6 @@ UNASKED = frozenset(
         StopReason.NOT_FOLLOWING,
         StopReason.MODE_CHANGE,
         StopReason.NOT_ENABLED,
+        StopReason.COMMAND_TIMEOUT,
     }
 )

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -213,6 +213,8 @@ class Views:
     output_bytes: Bytes
     unit_valid: Bytes  # (units of the whole plan,) whether each one's last exchange was valid
     movers: list[Mover] = field(default_factory=list)  # of the whole loop, while they move
+    # Whether the loop runs: afterwards requests reach nothing
+    is_open: Callable[[], bool] = lambda: True
 
 
 class Wish(Protocol):

@@ -1,0 +1,224 @@
+"""A Python thread that iterates an open loop while the program does something else.
+
+Theory of operation. The thread commits the targets in every cycle, under a lock that `update` also
+takes: while a program writes its targets, nothing is committed. The thread never waits for that
+lock. The native core judges how long the targets of the last update count (core/_setpoints.pyx), so
+a program that keeps the interpreter cannot keep an axis moving. An error of the loop ends the
+thread, which leaves the loop; the next call of the program raises the error. In virtual time the
+thread keeps to the wall clock, which nothing else does.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+from catenary.core import Iteration
+from catenary.errors import LoopError
+from catenary.loop.moves import Awaited, stopped_late
+from catenary.loop.networks import VIRTUAL, NetworksIteration, leave_all
+from catenary.loop.running import Running
+from catenary.loop.signals import SignalGuard
+
+END_TIMEOUT = 30.0  # [s] and some periods: to leave a loop after an error takes some seconds
+UPDATE_TIMEOUT = 5.0  # [s] for which another thread may be inside `update`
+BEHIND = 0.1  # [s] of virtual time that is not made up for
+LOOK = 0.5  # [s] between two looks of a waiting call, at most
+
+
+class Background:
+    """Owns the thread that iterates an open loop, and the lock under which targets are committed.
+
+    `error`: what ended the loop; None: nothing yet, or it was closed.
+    """
+
+    def __init__(
+        self,
+        runnings: Sequence[Running],
+        iteration: Iteration | NetworksIteration,
+        guard: SignalGuard,
+    ) -> None:
+        self.error: Exception | None = None
+        self._runnings = runnings
+        self._iteration = iteration
+        self._guard = guard
+        self._commit = threading.Lock()
+        self._updating = 0  # the thread that is inside `update`
+        self._cycled = threading.Condition()
+        self._ended = threading.Event()
+        self._told = False  # the error was raised
+        self._pace = _Pace(runnings[0])
+        self._process = os.getpid()
+        self._thread = threading.Thread(target=self._iterate, name="catenary loop", daemon=True)
+
+    def start(self) -> None:
+        """Start the thread.
+
+        Raises:
+            ValueError: an inline loop exchanges its frames in the thread of the program.
+            LoopError: an axis is powered in CST, and nothing updates its torque.
+        """
+        if self._runnings[0].plan.cycle.execution == "inline":
+            raise ValueError(
+                "run_in_background needs a threaded loop: in an inline one, frames would wait for "
+                "whatever else Python computes"
+            )
+        for running in self._runnings:
+            running.refuse_powered_torque("run_in_background")
+        for running in self._runnings:
+            running.engine.background = True
+            running.end_background = self.end
+        self._iteration.commit_lock = self._commit
+        next(self._iteration)  # the first one commits nothing: it must not meet an update
+        self._thread.start()
+
+    def end(self) -> None:
+        """End the thread and wait for it. No effect in the thread itself, or in a forked child."""
+        self._ended.set()
+        is_own = threading.current_thread() is self._thread
+        if is_own or self._thread.ident is None or self._process != os.getpid():
+            return
+        self._thread.join(END_TIMEOUT + 8e-9 * self._runnings[0].plan.cycle.period_ns)
+        if self._thread.is_alive():
+            raise LoopError("the thread that iterates the loop does not end: is a callback stuck?")
+
+    @property
+    def is_alive(self) -> bool:
+        """True while the thread iterates."""
+        return self._thread.is_alive() and not self._ended.is_set()
+
+    def raise_error(self) -> None:
+        """Raise what ended the loop."""
+        if self.error is not None:
+            self._told = True
+            raise self.error
+
+    def untold_error(self) -> Exception | None:
+        """Return what ended the loop, unless a call has raised it."""
+        error = None if self._told else self.error
+        self._told = True
+        return error
+
+    @contextmanager
+    def update(self) -> Iterator[None]:
+        """See `Loop.update`."""
+        self._take_commit()
+        try:
+            self._require_alive()
+            with self._written_targets():
+                yield
+                self._require_alive()  # else it would seem that they are sent
+        finally:
+            self._updating = 0
+            self._commit.release()
+
+    @contextmanager
+    def _written_targets(self) -> Iterator[None]:
+        """Commit what the block writes; nothing of it if the block raises."""
+        engines = [running.engine for running in self._runnings]
+        before = [bytes(engine.blocks()[1]) for engine in engines]
+        for engine in engines:
+            engine.begin_update()
+        complete = False
+        try:
+            yield
+            complete = True
+        finally:
+            for engine, targets in zip(engines, before, strict=True):
+                if not complete:
+                    engine.blocks()[1][:] = targets
+                engine.end_update(complete)
+
+    def wait(self, move: Awaited, timeout: float | None) -> None:
+        """See `Loop.wait`."""
+        self._refuse_inside_update("wait")
+        if threading.current_thread() is self._thread:
+            raise RuntimeError(
+                "loop.wait() in the thread that iterates the loop would wait for itself"
+            )
+        limit = move.patience if timeout is None else timeout
+        end = time.monotonic() + limit
+        with self._cycled:
+            while not move.done:
+                self._require_alive()
+                if time.monotonic() > end:
+                    raise stopped_late(move, limit)
+                self._cycled.wait(LOOK)
+            if move.error is not None and self._thread.is_alive():
+                self._cycled.wait(LOOK)  # it may be a consequence of what ends the loop now
+        if move.error is not None:
+            self.raise_error()
+            raise move.error
+
+    def _take_commit(self) -> None:
+        self._refuse_inside_update("update")
+        self._require_alive()
+        if not self._commit.acquire(timeout=UPDATE_TIMEOUT):
+            raise LoopError(
+                f"another thread has been inside loop.update() for {UPDATE_TIMEOUT:g} s",
+                hint="compute and wait before `with loop.update():`, and only write targets in it",
+            )
+        self._updating = threading.get_ident()
+
+    def _refuse_inside_update(self, call: str) -> None:
+        if self._updating == threading.get_ident():
+            raise RuntimeError(
+                f"loop.{call}() inside `with loop.update():`, which commits when it ends: leave it"
+            )
+
+    def _require_alive(self) -> None:
+        self.raise_error()
+        self._runnings[0].require_open()
+
+    def _iterate(self) -> None:
+        for running in self._runnings:
+            running.service.runner.adopt()
+        try:
+            while not self._ended.is_set():
+                next(self._iteration)
+                self._tell_cycle()
+                self._pace.keep(self._ended)
+        except Exception as error:  # a thread has no caller: the next call raises it
+            self._fail(error)
+        finally:
+            self._ended.set()
+            self._tell_cycle()
+
+    def _tell_cycle(self) -> None:
+        with self._cycled:
+            self._cycled.notify_all()
+
+    def _fail(self, error: Exception) -> None:
+        """Leave the loop as a `with` block would."""
+        for running in self._runnings:
+            running.tell_end(error)
+        self.error = error
+        for problem in leave_all(self._runnings, self._guard):
+            error.add_note(f"on the way down: {problem}")
+
+
+def program_ends() -> bool:
+    """Return True in the functions of `atexit`: Python marks its main thread as ended before."""
+    return not threading.main_thread().is_alive()
+
+
+class _Pace:
+    """Keeps virtual time to the wall clock."""
+
+    def __init__(self, running: Running) -> None:
+        self._engine = running.engine
+        self._is_virtual = running.engine.scheduling == VIRTUAL
+        self._offset: float | None = None  # [s] virtual time minus the wall clock's, at the start
+
+    def keep(self, ended: threading.Event) -> None:
+        """Wait until the wall clock is as late as virtual time; in real time no wait at all."""
+        if not self._is_virtual:
+            return
+        offset = self._engine.now() * 1e-9 - time.monotonic()
+        if self._offset is None or offset < self._offset - BEHIND:
+            self._offset = offset
+        if offset > self._offset:
+            ended.wait(offset - self._offset)
