@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from catenary import control, drive, errors, realtime, record, share, types, virtual
     from catenary.bus import SubDevice
     from catenary.bus import event as events
-    from catenary.drive import DistributedClock, Drives, Inputs, Outputs
+    from catenary.drive import DistributedClock, Drives, Inputs, Outputs, ProcessData, StartUp
     from catenary.errors import (
         CatenaryError,
         ClockError,
@@ -27,11 +27,13 @@ if TYPE_CHECKING:
         LawError,
         LinkError,
         LoopError,
+        MoveError,
         StateError,
         WorkingCounterError,
     )
     from catenary.link.interfaces import interfaces
     from catenary.loop import ClockOptions, Cycle, Loop, Scheduling, StopPolicy, law
+    from catenary.machine import Machine
     from catenary.share import Share, attach
     from catenary.target import MainDevice
     from catenary.virtual import Segment
@@ -51,11 +53,15 @@ __all__ = [
     "LinkError",
     "Loop",
     "LoopError",
+    "Machine",
     "MainDevice",
+    "MoveError",
     "Outputs",
+    "ProcessData",
     "Scheduling",
     "Segment",
     "Share",
+    "StartUp",
     "StateError",
     "StopPolicy",
     "SubDevice",
@@ -75,6 +81,7 @@ __all__ = [
 ]
 
 _MODULES = ("control", "drive", "errors", "realtime", "record", "share", "types", "virtual")
+_DRIVE = ("DistributedClock", "Drives", "Inputs", "Outputs", "ProcessData", "StartUp")
 _ERRORS = (  # that a loop raises; the others are in catenary.errors
     "CatenaryError",
     "ClockError",
@@ -82,15 +89,17 @@ _ERRORS = (  # that a loop raises; the others are in catenary.errors
     "LawError",
     "LinkError",
     "LoopError",
+    "MoveError",
     "StateError",
     "WorkingCounterError",
 )
 _HOMES = {
     **dict.fromkeys(_ERRORS, "catenary.errors"),
-    **dict.fromkeys(("DistributedClock", "Drives", "Inputs", "Outputs"), "catenary.drive"),
+    **dict.fromkeys(_DRIVE, "catenary.drive"),
     **dict.fromkeys(
         ("ClockOptions", "Cycle", "Loop", "Scheduling", "StopPolicy", "law"), "catenary.loop"
     ),
+    "Machine": "catenary.machine",
     "MainDevice": "catenary.target",
     "Segment": "catenary.virtual",
     "Share": "catenary.share",

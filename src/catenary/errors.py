@@ -33,6 +33,26 @@ class ConfigurationError(CatenaryError):
     """A file or a wish that cannot be: names the file, field or object."""
 
 
+class MachineFileError(ConfigurationError):
+    """A machine file that cannot be read or used. `path`, `line` and `key` name the place; None:
+    the file as a whole."""
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        path: str,
+        line: int | None = None,
+        key: str | None = None,
+        hint: str = "",
+    ) -> None:
+        place = ":".join(str(part) for part in (path, line) if part is not None)
+        super().__init__(": ".join(filter(None, (place, key, message))), hint=hint)
+        self.path = path
+        self.line = line
+        self.key = key
+
+
 class LinkError(CatenaryError):
     """A network interface that cannot be used: unknown, down, not permitted, or in use by another
     master."""

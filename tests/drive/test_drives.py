@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pytest
@@ -257,3 +257,19 @@ def test_a_statusword_that_codes_no_state_is_none() -> None:
     drives._views.axis_state[:] = [state_of(0x0022), State.FAULT]  # core: 255
     assert drives.state == (None, State.FAULT)
     assert drives.faults == (1,)
+
+
+def test_names_are_those_given() -> None:
+    arm = Drives(
+        [fake_sub(3), fake_sub(4)],
+        counts_per_turn=1000,
+        velocity_limit=1.0,
+        names=["base", "elbow"],
+    )
+    assert arm.names == ("base", "elbow")
+
+
+@pytest.mark.parametrize("names", [["base"], ["base", "base"], "ab"])
+def test_every_axis_has_its_own_name(names: Sequence[str]) -> None:
+    with pytest.raises(ValueError, match="name"):
+        Drives([fake_sub(3), fake_sub(4)], counts_per_turn=1000, velocity_limit=1.0, names=names)

@@ -59,7 +59,7 @@ def run(
             return super().step(cycle, reason, ready=ready)
 
     monkeypatch.setattr(cobot.realtime, "Tasks", tasks)
-    monkeypatch.setattr(cobot.cat, "Recovery", Watched, raising=False)
+    monkeypatch.setattr(cobot.cat.drive, "Recovery", Watched)
     options = {
         "arm": str(FOLDER / "arm.xml"),
         "folder": folder,

@@ -32,12 +32,12 @@ def add_parser(commands: Commands) -> None:
 def run(arguments: argparse.Namespace) -> int:
     from catenary.cli.drawing import as_text
     from catenary.cli.drawing_dot import as_dot
-    from catenary.target import MainDevice
+    from catenary.target import MainDevice, named_target
 
     with MainDevice(arguments.target, force=True) as main:  # it only reads
         note_other_masters(main)
         subs = main.passive_scan()
-        drawing = draw(arguments.target, main, subs)
+        drawing = draw(named_target(arguments.target), main, subs)
     print(as_dot(drawing) if arguments.dot else as_text(drawing))
     if arguments.dot:
         for text in drawing.topology.contradictions:

@@ -10,10 +10,12 @@ from typing import NoReturn
 from catenary.cli import (
     alias,
     bench,
+    check,
     demo,
     diag,
     doctor,
     graph,
+    init,
     plot,
     realtime,
     record,
@@ -31,6 +33,7 @@ VIRTUAL_TIME = "virtual time: the segment's own clock, not this machine's"
 DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
     *(scan, state, graph, diag, sdo, reg, alias, sii),
+    *(init, check),
     *(demo, doctor, bench, virtual, realtime, record, plot),
 )
 EPILOG = """\
@@ -40,6 +43,7 @@ TARGET is one of
   virtual            a virtual segment: coupler, outputs, three servos, outputs
   virtual:FILE.toml  another one (docs/virtual.md)
   virtual-realtime[:FILE.toml]  the same, on this machine's clock
+  machine.toml       the target that a machine file names (docs/machine.md)
   igh:0              the IgH kernel master of that number (docs/igh.md): scan and sdo
 
 example:
@@ -98,7 +102,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def note_virtual_time(target: str) -> None:
     """Print a note on stderr if the times of a command were not those of this machine."""
-    if not target.startswith("virtual"):
+    if not target.startswith("virtual") and not target.endswith(".toml"):
         return  # spares the import
     from catenary.target.parse import in_virtual_time
 
@@ -112,7 +116,7 @@ def run(arguments: Sequence[str]) -> int:
         if unknown:
             parsed.parser.error(f"unrecognized arguments: {' '.join(unknown)}")
         status = int(parsed.run(parsed))
-        note_virtual_time(getattr(parsed, "target", ""))
+        note_virtual_time(getattr(parsed, "target", None) or "")
         return status
     finally:
         sys.stdout.flush()  # here, where a reader that went away can still be handled

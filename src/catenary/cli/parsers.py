@@ -46,7 +46,7 @@ def add_json(parser: argparse.ArgumentParser) -> None:
 
 def add_target(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "target", metavar="TARGET", help="eth0, virtual, virtual:FILE.toml ...: catenary --help"
+        "target", metavar="TARGET", help="eth0, virtual, machine.toml ...: catenary --help"
     )
 
 

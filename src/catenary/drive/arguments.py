@@ -68,6 +68,23 @@ def axis_name(sub: SubDevice, slot: int) -> str:
     return f"{sub.position} {sub.name}" + (f" slot {slot}" if slot else "")
 
 
+def axis_names(
+    sources: Sequence[tuple[SubDevice, int]], names: Sequence[str] | None
+) -> tuple[str, ...]:
+    """Return a name for each axis.
+
+    Raises:
+        ValueError: `names` has not one name per axis, or has one twice.
+    """
+    if names is None:
+        return tuple(axis_name(sub, slot) for sub, slot in sources)
+    if isinstance(names, str) or len(names) != len(sources):
+        raise ValueError(f"names={names!r}: write a list of {len(sources)}, one name per axis")
+    if len(set(names)) < len(names):
+        raise ValueError(f"names={list(names)}: every axis needs its own name")
+    return tuple(names)
+
+
 def axis_modes(first: str, others: Sequence[str]) -> tuple[Mode, ...]:
     return tuple(dict.fromkeys(mode_of(name) for name in (first, *others)))
 

@@ -96,8 +96,8 @@ class Running:
         self._companions: Sequence[Running] = ()
         self._watches: list[Pending[None]] = []
         self._publisher: Publisher | None = None
-        self.end_background: Callable[[], None] = _no_background  # the thread that iterates
         self._counted: Mapping[str, int] = {}  # by the engine, until the loop was entered
+        self.end_background: Callable[[], None] = _no_background  # the thread that iterates
         self.service.cycle = self.cycle
 
     # Opening

@@ -1,6 +1,17 @@
 """What a person calls a segment, "eth0" or "virtual:cell.toml" → a MainDevice on it."""
 
-from catenary.target.main_device import MainDevice
-from catenary.target.parse import parse
+from catenary.target.main_device import MainDevice, source_of
+from catenary.target.parse import named_target, parse, segment_of
+from catenary.target.toml_file import TomlFile, is_machine_file, read_toml, target_of
 
-__all__ = ["MainDevice", "parse"]
+__all__ = [
+    "MainDevice",
+    "TomlFile",
+    "is_machine_file",
+    "named_target",
+    "parse",
+    "read_toml",
+    "segment_of",
+    "source_of",
+    "target_of",
+]

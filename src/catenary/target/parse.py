@@ -1,14 +1,19 @@
 """Names of segments: "eth0", "eth0,eth1" (a ring), "virtual", "virtual:FILE.toml", "igh:0".
 
-"virtual-realtime[:FILE.toml]" is a virtual segment on this machine's clock.
+"virtual-realtime[:FILE.toml]" is a virtual segment on this machine's clock. "machine.toml" is a
+machine file, which names one of these.
 """
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from catenary.errors import ConfigurationError
 from catenary.link import Interface, LinkSource, Ring
+from catenary.target.toml_file import is_machine_file, read_toml, target_of
+
+if TYPE_CHECKING:
+    from catenary.virtual import Segment
 
 VIRTUAL = "virtual"
 VIRTUAL_REALTIME = "virtual-realtime"
@@ -18,7 +23,8 @@ IGH = "igh"
 def parse(target: str) -> LinkSource:
     """The link source a name stands for; nothing is opened yet. A virtual segment is a new one
     each time. ConfigurationError for a name that cannot be."""
-    kind, colon, rest = target.strip().partition(":")
+    target = named_target(target)
+    kind, colon, rest = target.partition(":")
     if kind in (VIRTUAL, VIRTUAL_REALTIME) and (rest or not colon):
         return _virtual(rest, realtime=kind == VIRTUAL_REALTIME)
     if "," in target:
@@ -29,7 +35,7 @@ def parse(target: str) -> LinkSource:
         raise ConfigurationError(
             f"{target!r} is no target",
             hint="give a network interface (eth0), two (eth0,eth1), virtual, virtual:FILE.toml, "
-            "virtual-realtime, or igh:0",
+            "virtual-realtime, igh:0, or a machine file (machine.toml)",
         )
     return Interface(kind)
 
@@ -61,7 +67,17 @@ def _ring(target: str) -> LinkSource:
 
 def in_virtual_time(target: str) -> bool:
     """Return True if the target is a virtual segment with its own clock."""
-    return target.strip().partition(":")[0] == VIRTUAL
+    return named_target(target).partition(":")[0] == VIRTUAL
+
+
+def named_target(target: str) -> str:
+    """Return the target that a machine file names, or the target itself.
+
+    Raises:
+        MachineFileError: The machine file cannot be read, or names no target.
+    """
+    name = target.strip()
+    return target_of(read_toml(name)).strip() if is_machine_file(name) else name
 
 
 def _virtual(path: str, *, realtime: bool) -> LinkSource:
@@ -70,3 +86,13 @@ def _virtual(path: str, *, realtime: bool) -> LinkSource:
     clock: Literal["virtual", "monotonic"] = "monotonic" if realtime else "virtual"
     segment = Segment.from_toml(path, clock=clock) if path else demo_segment(clock=clock)
     return Ring(segment.first, segment.second) if segment.ring else segment
+
+
+def segment_of(source: LinkSource) -> Segment | None:
+    """Return the virtual segment that a source leads into; None if it is not virtual."""
+    from catenary.virtual.segment import Segment, SegmentEnd
+
+    end = source.first if isinstance(source, Ring) else source
+    if isinstance(end, SegmentEnd):
+        return end.segment
+    return end if isinstance(end, Segment) else None

@@ -50,6 +50,11 @@ class SegmentEnd:
         self._segment = segment
         self._second = second
 
+    @property
+    def segment(self) -> Segment:
+        """The segment that has this end."""
+        return self._segment
+
     def open_link(self) -> SegmentLink:
         """A link into the segment at this end; one at a time."""
         return self._segment.open_end(second=self._second)

@@ -1,0 +1,115 @@
+"""`catenary init TARGET`: a machine file from the devices of a segment; its JSON schema."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from catenary.cli.arguments import result_file
+from catenary.cli.parsers import Commands, add_command
+
+if TYPE_CHECKING:
+    from catenary.bus import SubDevice
+
+
+def add_parser(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "init",
+        help="write a machine file from the devices of a segment",
+        description="Brings all devices to PRE-OP and writes machine.toml: devices with their "
+        "identities, drives, process data by name. Lines marked FILL IN need your values. With "
+        "--schema: prints the JSON schema of such files, for editors.",
+        example="catenary init eth0 -o machine.toml\ncatenary init --schema",
+    )
+    parser.add_argument(
+        "target", metavar="TARGET", nargs="?", help="eth0, virtual, virtual:FILE.toml ..."
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="FILE",
+        type=result_file,
+        default=Path("machine.toml"),
+        help="file to write (machine.toml)",
+    )
+    parser.add_argument("--force", action="store_true", help="overwrite the file")
+    parser.add_argument("--schema", action="store_true", help="print the JSON schema and end")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from catenary.cli.failure import UsageError
+
+    if arguments.schema:
+        from catenary.machine.schema import json_schema
+
+        print(json.dumps(json_schema(), indent=2, ensure_ascii=False))
+        return 0
+    if arguments.target is None:
+        raise UsageError("TARGET is missing", hint="catenary init eth0")
+    if arguments.output.exists() and not arguments.force:
+        raise UsageError(f"{arguments.output} exists already", hint="-o FILE, or --force")
+    return write(arguments.target, arguments.output)
+
+
+def write(target: str, output: Path) -> int:
+    """Write the file and print what is left to do. Return the exit status."""
+    from catenary.cli.failure import with_hint
+    from catenary.machine.text import FILL_IN, machine_text
+    from catenary.target import MainDevice
+
+    with MainDevice(target) as main:
+        devices = main.scan(strict=False)
+        encoders = read_encoders(devices)
+    text = machine_text(
+        [device.description for device in devices], seen_from(target, output), encoders
+    )
+    output.write_text(text, encoding="utf-8")
+    open_lines = [n for n, line in enumerate(text.splitlines(), 1) if f"# {FILL_IN}" in line]
+    print(f"{output}: {len(devices)} devices")
+    for line in open_lines:
+        print(f"{output}:{line}: {FILL_IN}")
+    errors = [device.error for device in devices if device.error is not None]
+    for error in errors:
+        print(f"error: {with_hint(error)}", file=sys.stderr)
+    return 1 if errors else 0
+
+
+def read_encoders(devices: Sequence[SubDevice]) -> Mapping[tuple[int, int], float]:
+    """Return counts per turn by (position, slot), of the drives that report them (0x608F)."""
+    from catenary.errors import CatenaryError
+    from catenary.machine.text import ENCODER
+    from catenary.types import UDINT
+    from catenary.wire.cia402 import SLOT_OFFSET
+
+    found: dict[tuple[int, int], float] = {}
+    for device in devices:
+        for slot in device.slots:
+            try:
+                counts, turns = (
+                    device.sdo.read(index + SLOT_OFFSET * slot, subindex, type=UDINT)
+                    for index, subindex in ENCODER
+                )
+            except CatenaryError:
+                continue  # an optional object: the line stays without a value
+            if counts and turns:
+                found[device.position, slot] = counts / turns
+    return found
+
+
+def seen_from(target: str, output: Path) -> str:
+    """Return the target as the file names it: a path counts from the folder of the file."""
+    from catenary.target import named_target
+    from catenary.target.toml_file import VIRTUAL
+
+    target = named_target(target)
+    kind, colon, name = target.partition(":")
+    if kind not in VIRTUAL or not colon:
+        return target
+    return f"{kind}:{os.path.relpath(name, output.parent)}"

@@ -1,0 +1,202 @@
+"""A machine file compared with the devices that a scan has found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Literal, NamedTuple
+
+from msgspec import UNSET
+
+from catenary.bus import SubDevice
+from catenary.machine.schema import DeviceTable, IdentityTable
+from catenary.model.device import Identity
+
+Verdict = Literal["same", "absent", "different", "missing", "unknown"]
+HARMLESS: tuple[Verdict, ...] = ("same", "absent")
+
+
+class Comparison(NamedTuple):
+    """One device of the file, one of the segment, or both.
+
+    Verdicts: "same"; "absent": optional, and not there; "different": another identity; "missing";
+    "unknown": not in the file.
+    """
+
+    verdict: Verdict
+    expected: DeviceTable | None = None
+    found: SubDevice | None = None
+    fault: str = ""
+    cause: str = ""  # the likely cause and the next step
+
+    @property
+    def name(self) -> str:
+        """Name in the file; of an unknown device its own."""
+        if self.expected is not None:
+            return self.expected.name
+        return self.found.name if self.found is not None else ""
+
+
+def compare(expected: Sequence[DeviceTable], subs: Sequence[SubDevice]) -> tuple[Comparison, ...]:
+    """Return one comparison per device of the file, then the devices that it does not name.
+
+    Args:
+        expected: The devices of the file.
+        subs: All devices of the segment, by position.
+    """
+    found = [_candidates(device, subs) for device in expected]
+    taken = {sub.position for subs_of_one in found for sub in subs_of_one}
+    known = [
+        _compare(device, mine, expected, subs, taken)
+        for device, mine in zip(expected, found, strict=True)
+    ]
+    unknown = [
+        Comparison("unknown", found=sub, fault=f"{_place(sub)} is not in the file: {sub.identity}")
+        for sub in subs
+        if sub.position not in taken
+    ]
+    return (*known, *unknown)
+
+
+def address(device: DeviceTable) -> str:
+    """Return the address of a device in the file: "alias 11", "position 3"."""
+    return f"position {device.position}" if device.alias is UNSET else f"alias {device.alias}"
+
+
+def expected_identity(device: DeviceTable) -> str:
+    """Return the identity that the file gives, as errors show it."""
+    return _identity_text(device.identity)
+
+
+def agrees(expected: IdentityTable, found: Identity) -> bool:
+    """True if an identity has all numbers that the file gives."""
+    return not differences(expected, found)
+
+
+def differences(expected: IdentityTable, found: Identity) -> list[str]:
+    """Return the numbers of the identity that differ, by name."""
+    wanted: Mapping[str, object] = {
+        name: getattr(expected, name) for name in expected.__struct_fields__
+    }
+    return [n for n, value in wanted.items() if value is not UNSET and value != getattr(found, n)]
+
+
+def _candidates(device: DeviceTable, subs: Sequence[SubDevice]) -> list[SubDevice]:
+    if device.alias is UNSET:
+        return [sub for sub in subs if sub.position == device.position]
+    return [sub for sub in subs if sub.alias == device.alias]
+
+
+def _compare(
+    device: DeviceTable,
+    mine: Sequence[SubDevice],
+    expected: Sequence[DeviceTable],
+    subs: Sequence[SubDevice],
+    taken: set[int],
+) -> Comparison:
+    if len(mine) > 1:
+        positions = ", ".join(str(sub.position) for sub in mine)
+        fault = f"devices at positions {positions} have the same {address(device)}"
+        cause = "give each device its own alias: catenary alias TARGET POSITION VALUE"
+        return Comparison("different", device, mine[0], fault, cause)
+    if not mine:
+        verdict: Verdict = "missing" if device.required else "absent"
+        fault = f"no device has {address(device)}; expected {expected_identity(device)}"
+        return Comparison(verdict, device, None, fault, _cause_of_absence(device, subs, taken))
+    [sub] = mine
+    if agrees(device.identity, sub.identity):
+        return Comparison("same", device, sub)
+    alias = "" if device.alias is UNSET else f", {address(device)}"
+    fault = f"{_place(sub)}{alias}: expected {expected_identity(device)}, found {sub.identity}"
+    return Comparison(
+        "different", device, sub, fault, _cause_of_another(device, sub, expected, subs)
+    )
+
+
+def _cause_of_absence(device: DeviceTable, subs: Sequence[SubDevice], taken: set[int]) -> str:
+    free = [s for s in subs if agrees(device.identity, s.identity) and s.position not in taken]
+    if device.alias is UNSET:
+        return f"the segment has {len(subs)} devices; check cables and power, or the file"
+    if free:
+        [first, *_] = free
+        now = f"alias {first.alias}" if first.alias else "no alias"
+        return (
+            f"{_place(first)} has this identity and {now}; if it is the device: "
+            f"catenary alias TARGET {first.position} {device.alias}, then switch it off and on"
+        )
+    return "no free device has its identity; check cables and power"
+
+
+def _cause_of_another(
+    device: DeviceTable,
+    sub: SubDevice,
+    expected: Sequence[DeviceTable],
+    subs: Sequence[SubDevice],
+) -> str:
+    """Return the likely cause of a wrong identity at an address, and the next step."""
+    if not any(sub.identity):
+        notes = "".join(f"; {note}" for note in sub.description.notes)
+        return f"its EEPROM has no identity{notes}; catenary sii read TARGET {sub.position}"
+    differing = differences(device.identity, sub.identity)
+    if "vendor" not in differing and "product" not in differing:
+        text = " and ".join(differing)
+        return (
+            f"the same product with another {text}, perhaps exchanged or updated; if it is right, "
+            f"change {text} in the file"
+        )
+    if device.alias is not UNSET:
+        return (
+            f"alias {device.alias} was written to another device; catenary alias TARGET "
+            "POSITION VALUE writes it"
+        )
+    shift = _shift(expected, subs)
+    if shift:
+        more = "more" if shift > 0 else "fewer"
+        return (
+            f"{abs(shift)} {more} before it on the cable than in the file; restore the cable, "
+            "change the positions, or use aliases"
+        )
+    for other in expected:
+        if other is not device and agrees(other.identity, sub.identity):
+            return f'it has the identity of "{other.name}": swapped devices or cables?'
+    return "check the order of the devices on the cable, or correct the file"
+
+
+def _shift(expected: Sequence[DeviceTable], subs: Sequence[SubDevice]) -> int:
+    """Return how many devices more (fewer: negative) there are before the first wrong one; 0: the
+    order does not say."""
+    wrong = [
+        device for device in expected if device.position is not UNSET and not _fits(device, subs, 0)
+    ]
+    for count in (1, 2):
+        moved = wrong[count:]  # without those that were taken out
+        if len(wrong) > 1 and all(_fits(device, subs, count) for device in wrong):
+            return count
+        if (
+            moved
+            and _position(moved[-1]) >= len(subs)
+            and all(_fits(d, subs, -count) for d in moved)
+        ):
+            return -count
+    return 0
+
+
+def _fits(device: DeviceTable, subs: Sequence[SubDevice], shift: int) -> bool:
+    at = _position(device) + shift
+    return 0 <= at < len(subs) and agrees(device.identity, subs[at].identity)
+
+
+def _position(device: DeviceTable) -> int:
+    return -1 if device.position is UNSET else device.position
+
+
+def _place(sub: SubDevice) -> str:
+    return f"position {sub.position} ({sub.name})" if sub.name else f"position {sub.position}"
+
+
+def _identity_text(identity: IdentityTable) -> str:
+    words = [f"vendor 0x{identity.vendor:08X} product 0x{identity.product:08X}"]
+    if identity.revision is not UNSET:
+        words.append(f"revision 0x{identity.revision:08X}")
+    if identity.serial is not UNSET:
+        words.append(f"serial {identity.serial}")
+    return " ".join(words)

@@ -1,0 +1,66 @@
+"""Start-up objects of devices: the `start_up` lists of a machine file as a request of the loop."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from msgspec import UNSET
+
+from catenary.bus import SubDevice
+from catenary.machine.file import MachineFile
+from catenary.machine.lines import KeyPath
+from catenary.machine.references import data_type, object_of
+from catenary.machine.schema import StartUpTable
+from catenary.plan.start_up_object import StartUp
+from catenary.plan.wish import ImageLayout, PdoWish, Views, WishTables
+from catenary.types import Octets
+
+
+def start_up_objects(file: MachineFile, number: int) -> list[StartUp]:
+    """Return the start-up objects of [[device]] `number`.
+
+    Raises:
+        MachineFileError: An object, a type or a value is wrong.
+    """
+    device = file.tables.device[number]
+    path: KeyPath = ("device", number, "start_up")
+    return [_start_up(file, table, (*path, i)) for i, table in enumerate(device.start_up)]
+
+
+def _start_up(file: MachineFile, table: StartUpTable, path: KeyPath) -> StartUp:
+    index, subindex = object_of(file, (*path, "object"), table.object)
+    options: dict[str, Any] = {
+        name: getattr(table, name)
+        for name in ("before_mapping", "verify")
+        if getattr(table, name) is not UNSET
+    }
+    value: bool | int | float | str | bytes = table.value
+    if table.type is not UNSET:
+        options["type"] = kind = data_type(file, (*path, "type"), table.type)
+        if isinstance(kind, Octets) and isinstance(value, str):
+            with file.located((*path, "value")):
+                value = kind.parse(value)
+    with file.located((*path, "value")):
+        return StartUp(index, subindex, value, **options)
+
+
+class DeviceRequest:
+    """Request for a device without process data: start-up objects, whether it may be absent."""
+
+    def __init__(
+        self, sub: SubDevice, objects: Sequence[StartUp], *, required: bool, divider: int
+    ) -> None:
+        self.subs = (sub,)
+        self._wish = PdoWish(objects=tuple(objects), required=required, divider=divider)
+
+    def pdos(self, period_ns: int) -> Mapping[int, PdoWish]:
+        """Return the request, by position."""
+        return {self.subs[0].position: self._wish}
+
+    def tables(self, layout: ImageLayout) -> WishTables:
+        """Return no axes and no columns."""
+        return WishTables()
+
+    def bind(self, views: Views) -> None:
+        """Receive the views of the loop that opens. The request has none of its own."""

@@ -1,0 +1,95 @@
+"""The devices of a machine that were found, and what the program gets by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from catenary.bus import SubDevice
+from catenary.drive import Drives
+from catenary.drive.process_data import ProcessData
+from catenary.errors import CatenaryError, IdentityError, SegmentError
+from catenary.loop.devices import DeviceWish
+from catenary.machine.by_name import ByName
+from catenary.machine.comparison import Comparison, expected_identity
+from catenary.machine.file import MachineFile
+from catenary.machine.requests import (
+    devices_of,
+    make_device_requests,
+    make_drives,
+    make_process_data,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """Devices, drives and process data by name, and all requests for a loop."""
+
+    subs: ByName[SubDevice] = field(default_factory=lambda: ByName("device", {}, {}))
+    drives: ByName[Drives] = field(default_factory=lambda: ByName("drives", {}, {}))
+    process_data: ByName[ProcessData] = field(default_factory=lambda: ByName("data", {}, {}))
+    requests: tuple[DeviceWish, ...] = ()
+
+
+def raise_differences(file: MachineFile, found: Sequence[Comparison]) -> None:
+    """Raise the first difference between file and segment; the others are its notes.
+
+    Raises:
+        IdentityError: A device is not the one in the file.
+        SegmentError: A required device is missing, or an alias is there twice.
+    """
+    errors = [_error(file, each) for each in found if each.verdict in ("different", "missing")]
+    if errors:
+        for other in errors[1:]:
+            errors[0].add_note(f"also: {other}")
+        raise errors[0]
+
+
+def _error(file: MachineFile, found: Comparison) -> CatenaryError:
+    text = f'{file.path}: device "{found.name}": {found.fault}'
+    if found.found is None or found.expected is None:
+        return SegmentError(text, hint=found.cause)
+    return IdentityError(
+        text,
+        position=found.found.position,
+        expected=expected_identity(found.expected),
+        found=found.found.identity,
+        hint=found.cause,
+    )
+
+
+def make_found(file: MachineFile, found: Sequence[Comparison]) -> Found:
+    """Return what the program gets by name.
+
+    Raises:
+        CatenaryError: A device of the file could not be brought to PRE-OP.
+        MachineFileError: A table asks for what its device does not have.
+    """
+    subs = {each.name: each.found for each in found if each.verdict == "same" and each.found}
+    for sub in subs.values():
+        if sub.error is not None:
+            raise sub.error
+    absent = {each.name: each.fault for each in found if each.verdict == "absent"}
+    present, missing = _roles(file, "drives", file.tables.drives, absent)
+    drives = {role: make_drives(file, role, subs) for role in present}
+    present, missing_data = _roles(file, "process_data", file.tables.process_data, absent)
+    data = {role: make_process_data(file, role, subs) for role in present}
+    return Found(
+        subs=ByName("device", subs, absent),
+        drives=ByName("drives", drives, missing),
+        process_data=ByName("process data", data, missing_data),
+        requests=(*drives.values(), *data.values(), *make_device_requests(file, subs)),
+    )
+
+
+def _roles(
+    file: MachineFile, kind: str, tables: Mapping[str, object], absent: Mapping[str, str]
+) -> tuple[list[str], dict[str, str]]:
+    """Return the roles with all of their devices, and the reason for each of the others."""
+    reasons = {
+        role: f'device "{name}": {absent[name]}'
+        for role in tables
+        for name in devices_of(file, kind, role)
+        if name in absent
+    }
+    return [role for role in tables if role not in reasons], reasons

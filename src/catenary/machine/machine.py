@@ -1,0 +1,191 @@
+"""Machine: the devices, drives and process data that a machine file names, ready for a loop."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Self
+
+from msgspec import UNSET
+
+from catenary.bus import SubDevice
+from catenary.bus.master import MasterSource
+from catenary.drive import Drives
+from catenary.drive.process_data import ProcessData
+from catenary.link import LinkSource
+from catenary.loop import ClockOptions, Loop, Scheduling, StopPolicy
+from catenary.loop.devices import DeviceWish
+from catenary.loop.laws.law import Law, LawFunction
+from catenary.machine.by_name import ByName
+from catenary.machine.comparison import compare
+from catenary.machine.found import Found, make_found, raise_differences
+from catenary.machine.options import loop_options
+from catenary.machine.read import read_machine, refuse_unsupported
+from catenary.plan.cycle import ExecutionMode
+from catenary.plan.sink import Sink
+from catenary.target import MainDevice, segment_of, source_of
+
+if TYPE_CHECKING:
+    from catenary.virtual import Segment
+
+
+class Machine:
+    """Owns the MainDevice of a machine, and gives what its file names (docs/machine.md).
+
+        with cat.Machine("machine.toml") as machine:
+            arm = machine.drives["arm"]
+            with machine.loop() as loop:
+                loop.wait(arm.move_to(0.0, velocity=0.5))
+
+    Entering opens the link, reads the identities without changing a device, compares them with the
+    file, and only then brings the devices to PRE-OP. Leaving brings them to INIT.
+
+    Args:
+        path: The machine file.
+        target: Instead of the `target` in the file: "eth0", "virtual:line.toml", or a `Segment`.
+        force: Open it even if another master is live on the interface.
+
+    Raises:
+        MachineFileError: The file cannot be read, or is wrong; the error names line and key.
+        IdentityError: On entering: a device is not the one in the file.
+        SegmentError: On entering: a required device is missing.
+    """
+
+    def __init__(
+        self, path: str | Path, target: str | LinkSource | None = None, *, force: bool = False
+    ) -> None:
+        self._file = read_machine(path)
+        refuse_unsupported(self._file)
+        source = source_of(self._file.target if target is None else target)
+        self._segment = segment_of(source)
+        self._main = MainDevice(source, force=force)
+        self._has_own_master = isinstance(source, MasterSource)
+        self._found = Found()
+
+    def __enter__(self) -> Self:
+        self.open()
+        return self
+
+    def __exit__(self, *exc_info: object) -> None:
+        self.close()
+
+    def open(self) -> None:
+        """Open the link, check the identities, and bring the devices to PRE-OP."""
+        self._main.open()
+        try:
+            self._found = self._find()
+        except BaseException:
+            self._main.close()
+            raise
+
+    def close(self) -> None:
+        """Bring all devices to INIT and close the link."""
+        self._main.close()
+
+    @property
+    def main(self) -> MainDevice:
+        """MainDevice of the segment."""
+        return self._main
+
+    @property
+    def segment(self) -> Segment:
+        """The virtual segment.
+
+        Raises:
+            RuntimeError: The target is not a virtual segment.
+        """
+        if self._segment is None:
+            raise RuntimeError(
+                "the target of this machine is not virtual; open it with "
+                'cat.Machine(..., target="virtual:FILE.toml")'
+            )
+        return self._segment
+
+    @property
+    def subs(self) -> ByName[SubDevice]:
+        """Devices by their names in the file."""
+        return self._opened.subs
+
+    @property
+    def drives(self) -> ByName[Drives]:
+        """The [drives.NAME] tables."""
+        return self._opened.drives
+
+    @property
+    def process_data(self) -> ByName[ProcessData]:
+        """The [process_data.NAME] tables."""
+        return self._opened.process_data
+
+    @property
+    def requests(self) -> tuple[DeviceWish, ...]:
+        """Requests for a loop: `print(machine.main.plan(*machine.requests))`."""
+        return self._opened.requests
+
+    def loop(
+        self,
+        *,
+        period: float | None = None,
+        execution: ExecutionMode | None = None,
+        enable: bool | None = None,
+        watchdog: float | None = None,
+        cpu: int | None = None,
+        priority: int | None = None,
+        log: int | None = None,
+        log_axes: bool | None = None,
+        laws: Sequence[Law | LawFunction] = (),
+        sink: Sink | Sequence[Sink] | None = None,
+        stop: StopPolicy | None = None,
+        scheduling: Scheduling | None = None,
+        clocks: ClockOptions | None = None,
+    ) -> Loop:
+        """Return a loop with all drives and process data of the machine.
+
+        The options are those of `Loop`. None: as in the file; what the file does not give has the
+        default of `Loop`.
+
+        Raises:
+            MachineFileError: The file has no drives and no process data.
+            ValueError: An option is impossible.
+        """
+        found = self._opened
+        if not found.drives and not found.process_data:
+            raise self._file.error(
+                (),
+                "no drives and no process data",
+                hint="add a [drives.NAME] table: docs/machine.md",
+            )
+        reference = self._file.tables.clocks.reference
+        options = loop_options(self._file, None if reference is UNSET else self.subs[reference])
+        given = {
+            "period": period,
+            "execution": execution,
+            "enable": enable,
+            "watchdog": watchdog,
+            "cpu": cpu,
+            "priority": priority,
+            "log": log,
+            "log_axes": log_axes,
+            "stop": stop,
+            "scheduling": scheduling,
+            "clocks": clocks,
+        }
+        options |= {name: value for name, value in given.items() if value is not None}
+        return Loop(*found.requests, laws=laws, sink=sink, **options)
+
+    @property
+    def _opened(self) -> Found:
+        if not self._main.is_open:
+            raise RuntimeError("the machine is not open: use it in a with block")
+        return self._found
+
+    def _find(self) -> Found:
+        """Check the identities without changing a device, then scan and make the requests."""
+        file = self._file
+        if not self._has_own_master:  # that of IgH refuses a passive scan
+            raise_differences(file, compare(file.tables.device, self._main.passive_scan()))
+        found = compare(file.tables.device, self._main.scan(strict=False))
+        raise_differences(file, found)
+        return make_found(file, found)
+
+    def __repr__(self) -> str:
+        return f"<Machine {self._file.tables.name or self._file.path} on {self._main!r}>"

@@ -1,0 +1,191 @@
+"""Checks of a machine file that need no devices: names, addresses, lengths of lists."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from difflib import get_close_matches
+from typing import NamedTuple
+
+from msgspec import UNSET
+
+from catenary.machine.file import MachineFile
+from catenary.machine.lines import KeyPath
+from catenary.machine.schema import DrivesTable, ProcessDataTable
+from catenary.types import ALL, DataType, Value, by_name
+
+SLOTS_END = 8  # ETG.6010 §5.1: 0x6000 + 0x800 · slot, up to 0x9FFF
+_OBJECT = re.compile(r"0x([0-9A-Fa-f]{4}):([0-9A-Fa-f]{1,2})")
+WHOLE_LISTS = ("other_modes", "measured", "columns", "pdos", "axes")  # that are not one per axis
+
+
+class AxisAddress(NamedTuple):
+    """A device by its name in the file, and one of its axes; slot None: its only one."""
+
+    device: str
+    slot: int | None
+
+    def __str__(self) -> str:
+        return self.device if self.slot is None else f"{self.device}/{self.slot}"
+
+
+def check_references(file: MachineFile) -> None:
+    """Check what the schema cannot.
+
+    Raises:
+        MachineFileError: A name, an address or a list contradicts the rest of the file.
+    """
+    _check_devices(file)
+    _check_axes(file)
+    for name, table in file.tables.drives.items():
+        _check_lists(file, name, table)
+    for name, data in file.tables.process_data.items():
+        _check_process_data(file, ("process_data", name), data)
+    reference = file.tables.clocks.reference
+    if reference is not UNSET:
+        check_device(file, ("clocks", "reference"), reference)
+
+
+def check_device(file: MachineFile, path: KeyPath, name: str) -> None:
+    """Raise MachineFileError if no device of the file has this name."""
+    names = [device.name for device in file.tables.device]
+    if name not in names:
+        raise file.error(path, f'no device is named "{name}"{nearest(name, names)}')
+
+
+def nearest(name: str, names: Sequence[str]) -> str:
+    """Return the continuation of an error about an unknown name."""
+    near = get_close_matches(name, names, n=1)
+    if near:
+        return f'; did you mean "{near[0]}"?'
+    return f"; known: {', '.join(names)}" if names else ""
+
+
+def _check_devices(file: MachineFile) -> None:
+    seen: dict[tuple[str, str | int], int] = {}
+    for number, device in enumerate(file.tables.device):
+        path: KeyPath = ("device", number)
+        if "/" in device.name:
+            raise file.error((*path, "name"), f'"{device.name}": a name has no "/"')
+        if device.alias is UNSET and device.position is UNSET:
+            raise file.error(
+                path,
+                f'device "{device.name}" has neither alias nor position',
+                hint="write alias = 10, or position = 3; catenary scan shows positions",
+            )
+        if device.alias is not UNSET and device.position is not UNSET:
+            raise file.error(
+                (*path, "position"),
+                f'device "{device.name}" has alias and position',
+                hint="keep the alias: it stays valid when the device is plugged in elsewhere",
+            )
+        for key in ("name", "alias", "position"):
+            value = getattr(device, key)
+            if value is UNSET:
+                continue
+            first = seen.setdefault((key, value), number)
+            if first != number:
+                other = f'device[{first}], "{file.tables.device[first].name}"'
+                shown = f'"{value}"' if key == "name" else value
+                raise file.error((*path, key), f"{key} {shown} is that of {other} already")
+
+
+def axis_addresses(file: MachineFile, role: str) -> list[AxisAddress]:
+    """Return the axes of [drives.ROLE].
+
+    Raises:
+        MachineFileError: One is not a device, or device/slot.
+    """
+    found = []
+    for number, text in enumerate(file.tables.drives[role].axes):
+        path: KeyPath = ("drives", role, "axes", number)
+        device, slash, slot = text.partition("/")
+        check_device(file, path, device)
+        if slash and not (slot.isdecimal() and int(slot) < SLOTS_END):
+            raise file.error(
+                path, f'"{text}": the slot after the "/" must be a number from 0 to {SLOTS_END - 1}'
+            )
+        found.append(AxisAddress(device, int(slot) if slash else None))
+    return found
+
+
+def _check_axes(file: MachineFile) -> None:
+    """Check that every axis belongs to one role, once."""
+    owners: dict[AxisAddress, str] = {}
+    for role, table in file.tables.drives.items():
+        if not table.axes:
+            raise file.error(("drives", role, "axes"), "the list of axes is empty")
+        for number, axis in enumerate(axis_addresses(file, role)):
+            path = ("drives", role, "axes", number)
+            same = AxisAddress(axis.device, None if axis.slot == 0 else axis.slot)
+            if same in owners:
+                where = "twice" if owners[same] == role else f"in [drives.{owners[same]}] too"
+                raise file.error(path, f'axis "{axis}" is used {where}')
+            owners[same] = role
+
+
+def _check_lists(file: MachineFile, role: str, table: DrivesTable) -> None:
+    path: KeyPath = ("drives", role)
+    for key in table.__struct_fields__:
+        value = getattr(table, key)
+        if key not in WHOLE_LISTS and isinstance(value, list) and len(value) != len(table.axes):
+            raise file.error(
+                (*path, key),
+                f"{len(value)} values for {len(table.axes)} axes",
+                hint="write one value per axis, in the order of axes, or a single value for all",
+            )
+    names = [] if table.names is UNSET else table.names
+    for number, name in enumerate(names):
+        if name in names[:number]:
+            raise file.error((*path, "names", number), f'two axes are named "{name}"')
+
+
+def _check_process_data(file: MachineFile, path: KeyPath, table: ProcessDataTable) -> None:
+    check_device(file, (*path, "device"), table.device)
+    inputs = {} if table.inputs is UNSET else table.inputs
+    outputs = {} if table.outputs is UNSET else table.outputs
+    for name in outputs:
+        if name in inputs:
+            raise file.error((*path, "outputs", name), f'"{name}" is the name of an input too')
+    if table.outputs is not UNSET:  # else the names are those of the device
+        for name in table.safe:
+            if name not in outputs:
+                text = f'"{name}" is not an output{nearest(name, list(outputs))}'
+                raise file.error((*path, "safe", name), text)
+    known = [*inputs, *outputs]
+    for pdo, names in table.pdos.items():
+        pdo_index(file, (*path, "pdos", pdo), pdo)
+        for number, name in enumerate(names):
+            if name not in known:
+                text = f'"{name}" is not an input or output{nearest(name, known)}'
+                raise file.error((*path, "pdos", pdo, number), text)
+
+
+def pdo_index(file: MachineFile, path: KeyPath, text: str) -> int:
+    """Return the index of a PDO that is a key of the file: "0x1A00"."""
+    if re.fullmatch(r"0x1[6-9A-Ba-b][0-9A-Fa-f]{2}", text) is None:
+        raise file.error(path, f'"{text}" is not a PDO; expected "0x1600" to "0x1BFF"')
+    return int(text, 16)
+
+
+def object_of(file: MachineFile, path: KeyPath, text: str) -> tuple[int, int]:
+    """Return index and subindex of an object as text: "0x6000:11", both hexadecimal."""
+    found = _OBJECT.fullmatch(text)
+    if found is None:
+        raise file.error(
+            path,
+            f'"{text}" is not an object; expected "0xINDEX:SUBINDEX", both hexadecimal',
+            hint='four digits and one or two: "0x6000:11"',
+        )
+    return int(found[1], 16), int(found[2], 16)
+
+
+def data_type(file: MachineFile, path: KeyPath, text: str) -> DataType[Value]:
+    """Return the data type of a name: "UINT", "UNSIGNED16"."""
+    try:
+        return by_name(text)
+    except ValueError:
+        names = [name for kind in ALL for name in (kind.name, *kind.aliases)]
+        known = nearest(text.upper(), names) if get_close_matches(text.upper(), names) else ""
+        hint = "BOOL, SINT, INT, DINT, LINT, USINT, UINT, UDINT, ULINT, REAL, LREAL, ..."
+        raise file.error(path, f'"{text}" is not a data type{known}', hint=hint) from None

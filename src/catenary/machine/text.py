@@ -1,0 +1,193 @@
+"""A machine file for the devices of a segment, as text with comments: `catenary init`."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+
+from catenary.machine.schema import FORMAT
+from catenary.model.device import DeviceDescription, Direction, Entry
+from catenary.types import by_index
+
+FILL_IN = "FILL IN"
+ENCODER = (0x608F, 1), (0x608F, 2)  # counts of the encoder, turns of the motor
+_HEAD = """\
+# Written by `catenary init`. Check it against the segment: catenary check FILE
+# A number is in SI units (rad, s, N·m). Text carries a unit: "170 deg", "500 us", "90 rpm".
+# Complete the lines marked {mark} and remove the "#" before them. All keys: docs/machine.md
+format = "{format}"
+name = "machine"
+target = {target}                      # cat.Machine(..., target="virtual:FILE.toml") overrides it
+
+[loop]
+period = "1 ms"
+
+# Devices, in the order of the cable. Rename them as you like. A device is found by its alias, or
+# by its position where it has none: `catenary alias TARGET POSITION VALUE` gives it one.
+"""
+_DRIVES = """
+# Axes. Options are those of cat.Drives; a list has one value per axis, in the order of `axes`.
+[drives.axes]
+axes = [{axes}]
+mode = "csp"
+{counts}
+# gear_ratio = 1.0                    # motor turns per joint turn
+# direction = 1                       # -1: the joint turns against the motor
+# offset = "0 deg"                    # position of the joint where the drive reads 0
+# position_min = "-170 deg"
+# position_max = "170 deg"
+# velocity_limit = "90 deg/s"         # {mark}: without it 2π rad/s, and a warning
+# torque_limit = 20                   # [N·m]
+"""
+
+
+def machine_text(
+    devices: Sequence[DeviceDescription],
+    target: str,
+    encoders: Mapping[tuple[int, int], float],
+) -> str:
+    """Return the text of a machine file.
+
+    Args:
+        devices: All devices of the segment, in PRE-OP.
+        target: Name of the segment: "eth0".
+        encoders: Counts per turn by (position, slot), where a drive reports them.
+    """
+    names = _names(devices)
+    parts = [_HEAD.format(mark=FILL_IN, format=FORMAT, target=_quoted(target))]
+    repeated = _repeated([device.alias for device in devices])
+    for name, device in zip(names, devices, strict=True):
+        parts.append(_device(name, device, has_alias=device.alias not in {0, *repeated}))
+    parts.append(_drives(names, devices, encoders))
+    parts += [_process_data(n, d) for n, d in zip(names, devices, strict=True) if not d.is_drive]
+    return "".join(parts)
+
+
+def _device(name: str, device: DeviceDescription, *, has_alias: bool) -> str:
+    identity = device.identity
+    address = f"alias = {device.alias}" if has_alias else f"position = {device.position}"
+    label = ", ".join(part for part in (device.order, device.name) if part)
+    return f"""
+[[device]]                            # position {device.position}: {_comment(label)}
+name = "{name}"
+{address}
+identity = {{ vendor = 0x{identity.vendor:X}, product = 0x{identity.product:X}, \
+revision = 0x{identity.revision:X} }}
+# required = false                    # it may be absent
+"""
+
+
+def _drives(
+    names: Sequence[str],
+    devices: Sequence[DeviceDescription],
+    encoders: Mapping[tuple[int, int], float],
+) -> str:
+    axes = [
+        (f'"{name}/{slot}"' if len(device.slots) > 1 else f'"{name}"', (device.position, slot))
+        for name, device in zip(names, devices, strict=True)
+        for slot in device.slots
+    ]
+    if not axes:
+        return ""
+    counts = [encoders.get(place) for _, place in axes]
+    return _DRIVES.format(
+        mark=FILL_IN, axes=", ".join(text for text, _ in axes), counts=_counts(counts)
+    )
+
+
+def _counts(counts: Sequence[float | None]) -> str:
+    known = [count for count in counts if count is not None]
+    if len(known) < len(counts):
+        value = "0                  "
+        return f"# counts_per_turn = {value}# {FILL_IN}: counts of the motor's encoder per turn"
+    same = len(set(known)) == 1
+    texts = [str(int(count)) if count == int(count) else str(count) for count in known]
+    value = texts[0] if same else f"[{', '.join(texts)}]"
+    return (
+        f"# counts_per_turn = {value}          # {FILL_IN}: 0x608F of the drives gives this value"
+    )
+
+
+def _process_data(name: str, device: DeviceDescription) -> str:
+    outputs = dict(_channels(device, Direction.OUTPUT))
+    inputs = dict(_channels(device, Direction.INPUT))
+    if not outputs and not inputs:
+        return ""
+    text = f'\n[process_data.{name}]\ndevice = "{name}"\n'
+    if outputs:
+        first = next(iter(outputs))
+        text += f"# safe = {{ {first} = 0 }}{' ' * 15}# written when the loop ends; others: 0\n"
+    for heading, found in (("outputs", outputs), ("inputs", inputs)):
+        if found:
+            text += f"[process_data.{name}.{heading}]\n"
+            text += "".join(f"{channel} = {value}\n" for channel, value in found.items())
+    return text
+
+
+def _channels(device: DeviceDescription, direction: Direction) -> Iterator[tuple[str, str]]:
+    """Yield name and object of each number that is mapped now; of a repeated object the first."""
+    entries: dict[tuple[int, int], tuple[Entry, str]] = {}
+    for assignment in device.assignments(direction):
+        for pdo in assignment.pdos:
+            for entry in pdo.entries:
+                if entry.index and 1 <= entry.bit_length <= 64:
+                    entries.setdefault((entry.index, entry.subindex), (entry, pdo.name))
+    short = [entry.name for entry, _ in entries.values()]
+    unique = len(set(short)) == len(short)
+    names = _unique(
+        [_slug(e.name if unique else f"{pdo} {e.name}", "value") for e, pdo in entries.values()]
+    )
+    for name, (entry, _) in zip(names, entries.values(), strict=True):
+        place = f'"0x{entry.index:04X}:{entry.subindex:02X}"'
+        kind = _type_name(entry)
+        yield name, place if kind == "BOOL" else f'{{ object = {place}, type = "{kind}" }}'
+
+
+def _type_name(entry: Entry) -> str:
+    """Return the type of an entry; without a usable one, an unsigned integer of its length."""
+    try:
+        kind = by_index(entry.data_type)
+        if kind.bit_length == entry.bit_length:
+            return kind.name
+    except ValueError:
+        pass
+    bits = entry.bit_length
+    names = {1: "BOOL", 8: "USINT", 16: "UINT", 32: "UDINT", 64: "ULINT"}
+    return names.get(bits, f"BIT{bits}" if bits < 8 else f"UINT{bits}")
+
+
+def _names(devices: Sequence[DeviceDescription]) -> list[str]:
+    return _unique([_slug(device.order or device.name, "device") for device in devices])
+
+
+def _unique(names: Sequence[str]) -> list[str]:
+    """Return the names, those that occur more than once numbered from 1."""
+    repeated = _repeated(names)
+    used: dict[str, int] = {}
+    made: list[str] = []
+    for name in names:
+        unique = name
+        while name in repeated and (unique == name or unique in made or unique in names):
+            used[name] = used.get(name, 0) + 1
+            unique = f"{name}_{used[name]}"
+        made.append(unique)
+    return made
+
+
+def _repeated(values: Sequence[object]) -> set[object]:
+    return {value for value in values if values.count(value) > 1}
+
+
+def _slug(text: str, default: str) -> str:
+    """Return a text as a bare key of TOML: lower case, "_" for anything but letters and digits."""
+    return re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_") or default
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)
+
+
+def _comment(text: str) -> str:
+    """Return a device's text without characters that would end a comment."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text)

@@ -1,0 +1,97 @@
+"""TOML files that people write: reading them, with errors that name file and line."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+from catenary.errors import MachineFileError
+
+VIRTUAL = ("virtual", "virtual-realtime")  # targets with the file of a segment
+_PLACE = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)")
+
+
+@dataclass(frozen=True, slots=True)
+class TomlFile:
+    """The text of a TOML file and its content."""
+
+    path: Path
+    text: str
+    content: dict[str, object]
+
+
+def read_toml(path: str | Path) -> TomlFile:
+    """Read a file.
+
+    Raises:
+        MachineFileError: It cannot be opened, is not UTF-8, or is not TOML.
+    """
+    where = Path(path)
+    try:
+        text = where.read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        hint = "write one: catenary init TARGET -o machine.toml"
+        raise _unreadable(where, error.strerror or str(error), hint=hint) from error
+    except UnicodeDecodeError as error:
+        line = error.object.count(b"\n", 0, error.start) + 1
+        byte = f"byte 0x{error.object[error.start]:02X}"
+        hint = "save the file as UTF-8"
+        raise _unreadable(where, f"not UTF-8 text: {byte}", line, hint=hint) from error
+    try:
+        return TomlFile(where, text, tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        message, line = _parts(str(error), text)
+        raise _unreadable(where, f"not TOML: {message}", line, hint=_hint(text, line)) from error
+    except RecursionError as error:
+        raise _unreadable(where, "not TOML that can be read: nested too deeply") from error
+
+
+def target_of(file: TomlFile) -> str:
+    """Return the `target` that a machine file names.
+
+    A virtual segment's file counts from the folder of the machine file.
+
+    Raises:
+        MachineFileError: It names none, or not a target.
+    """
+    target = file.content.get("target")
+    if not isinstance(target, str) or not target.strip():
+        fault = 'key "target" is missing' if target is None else f"target = {target!r} is not text"
+        raise _unreadable(file.path, fault, hint='write target = "eth0" at the top of the file')
+    kind, colon, name = target.strip().partition(":")
+    if kind in VIRTUAL and colon:
+        return f"{kind}:{file.path.parent / name}"
+    if is_machine_file(target):
+        raise _unreadable(
+            file.path,
+            f"target = {target!r} is another machine file",
+            hint='write a network interface: target = "eth0"',
+        )
+    return target
+
+
+def is_machine_file(target: str) -> bool:
+    """True if a target is a machine file: it ends in .toml and is not `virtual:FILE.toml`."""
+    name = target.strip()
+    kind, colon, _ = name.partition(":")
+    return name.endswith(".toml") and not (colon and kind in VIRTUAL)
+
+
+def _unreadable(
+    path: Path, message: str, line: int | None = None, *, hint: str = ""
+) -> MachineFileError:
+    return MachineFileError(message, path=str(path), line=line, hint=hint)
+
+
+def _parts(message: str, text: str) -> tuple[str, int]:
+    """Return the message of `tomllib` without the place, and the line."""
+    found = _PLACE.search(message)
+    line = int(found[1]) if found is not None and found[1] else text.count("\n") + 1
+    return _PLACE.sub("", message), line
+
+
+def _hint(text: str, line: int) -> str:
+    content = text.splitlines()[line - 1 : line]
+    return f"the line is: {content[0].strip()}" if content and content[0].strip() else ""

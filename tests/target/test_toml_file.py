@@ -1,0 +1,57 @@
+"""A machine file as the name of a segment."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from catenary.errors import ConfigurationError, MachineFileError
+from catenary.igh import Master
+from catenary.link import Interface, Ring
+from catenary.target import MainDevice, is_machine_file, parse
+from catenary.virtual import Segment
+
+
+def named(folder: Path, target: str) -> str:
+    """Write a machine file with a target. Return its path."""
+    path = folder / "machine.toml"
+    path.write_text(f'target = "{target}"\n')
+    return str(path)
+
+
+def test_the_target_in_the_file_is_parsed(tmp_path: Path) -> None:
+    assert parse(named(tmp_path, "eth0")) == Interface("eth0")
+    assert parse(named(tmp_path, "eth0,eth1")) == Ring(Interface("eth0"), Interface("eth1"))
+    assert isinstance(parse(named(tmp_path, "igh:0")), Master)
+    assert isinstance(parse(named(tmp_path, "virtual")), Segment)
+
+
+def test_a_virtual_segment_counts_from_the_folder_of_the_file(tmp_path: Path) -> None:
+    (tmp_path / "line.toml").write_text('[[device]]\nkind = "coupler"\n')
+    with MainDevice(named(tmp_path, "virtual:line.toml")) as main:
+        assert len(main.scan()) == 1
+
+
+def test_the_suffix_decides() -> None:
+    assert is_machine_file("cell/machine.toml")
+    assert not is_machine_file("virtual:line.toml")
+    assert not is_machine_file("eth0")
+
+
+@pytest.mark.parametrize("target", ["other.toml", "", " ", "two words", "virtual:"])
+def test_what_is_not_a_target(target: str, tmp_path: Path) -> None:
+    with pytest.raises(ConfigurationError, match=r"target|is not|directory"):
+        parse(named(tmp_path, target))
+
+
+def test_another_machine_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(MachineFileError, match="is another machine file"):
+        parse(named(tmp_path, "machine.toml"))
+
+
+def test_a_target_that_is_not_text_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "machine.toml"
+    path.write_text("target = 3\n")
+    with pytest.raises(MachineFileError, match="target = 3 is not text"):
+        parse(str(path))
