@@ -183,17 +183,17 @@ def test_operators_use_a_mutex_together(machine: Machine) -> None:
 
 HOSTILE_OPERATOR = f"""{SAY}
 import fcntl, mmap, os, sys
-from catenary.share import command_table as desk, desk_socket
+from catenary.share import command_table, desk_socket
 folder = "/run/catenary"
 said(lambda: os.truncate(folder + "/share-arm", 0))
 said(lambda: os.unlink(folder + "/share-arm"))
 said(lambda: os.unlink(folder + "/socket-arm"))
 kept = []
-take = desk.map_sealed
+take = command_table.map_sealed
 def keep(descriptor, size):
     kept.append(os.dup(descriptor))
     return take(descriptor, size)
-desk.map_sealed = keep
+command_table.map_sealed = keep
 arm = cat.attach("arm", uid={ALICE})
 lease = arm.lease(axes=[0], for_=600.0)
 [memory] = kept

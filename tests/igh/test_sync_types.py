@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import catenary as cat
-from catenary.igh import kernel_cycle as carrier
+from catenary.igh import kernel_cycle
 from catenary.igh.kernel_log import KernelLog
 from tests.igh.double import Double
 from tests.igh.loops import clocked_loop
@@ -83,7 +83,7 @@ def test_the_kernels_log_tells_a_code_that_the_device_has_forgotten(
     """The master acknowledges an error, and the device clears its AL status code."""
     log = tmp_path / "kmsg"
     log.touch()
-    monkeypatch.setattr(carrier, "KernelLog", lambda: KernelLog(str(log)))
+    monkeypatch.setattr(kernel_cycle, "KernelLog", lambda: KernelLog(str(log)))
 
     def run() -> None:
         with clocked_loop(main) as loop:

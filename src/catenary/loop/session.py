@@ -320,10 +320,9 @@ class Session:
         if self._left:
             return []
         self._left = True
-        for mover in list(self.views.movers):
-            mover.end()
         self.make_outputs_safe()
         steps: tuple[Callable[[SignalGuard], None], ...] = (
+            self._end_moves,
             self._stop_axes,
             self._confirm_safe_outputs,
             self._stop_cycle,
@@ -346,6 +345,10 @@ class Session:
     def _confirm_safe_outputs(self, guard: SignalGuard) -> None:
         if self._opened:
             confirm_safe(self.plan.cycle, self.views, self.cycle, guard)
+
+    def _end_moves(self, guard: SignalGuard) -> None:
+        for mover in list(self.views.movers):
+            mover.end()
 
     def _stop_axes(self, guard: SignalGuard) -> None:
         """Quick stop as each drive's 0x605A says, exchanged until all stand."""
