@@ -42,7 +42,7 @@ def measure_loop(
         ValueError: unknown peer, or a busy-wait that is not less than the period.
     """
     from benchmarks import loop
-    from catenary.bench.loop import Setting
+    from catenary.bench.setting import Setting
 
     setting = Setting(
         drives=drives,

@@ -8,7 +8,8 @@ from pathlib import Path
 from benchmarks.needed import need
 from benchmarks.peers import MODULES, modules_of
 from benchmarks.ratios import ratios
-from catenary.bench.loop import LAW, OURS, STORM, Setting, own_names, run_setting, show
+from catenary.bench.loop import LAW, OURS, STORM, own_names, run_setting, show
+from catenary.bench.setting import Setting
 
 BUSY = "c-busy"  # C with a busy-wait
 NEEDS = {"pysoem": "pysoem", LAW: "numba", STORM: "numba"}  # packages

@@ -5,8 +5,9 @@ from importlib.util import find_spec
 
 import pytest
 
-from catenary.bench.loop import MODULES, Setting, check_busy_wait, own_names, show
+from catenary.bench.loop import MODULES, check_busy_wait, own_names, show
 from catenary.bench.report import as_text
+from catenary.bench.setting import Setting
 from catenary.bench.statistics import combine
 from tests.bench.test_statistics import make_round
 

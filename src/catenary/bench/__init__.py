@@ -1,4 +1,4 @@
-"""Measurements of this machine: what `catenary bench loop` runs.
+"""Measurements of this machine: `catenary bench loop`, `latency` and `report`.
 
 Comparisons with other programs and with published figures are in `benchmarks/` of the repository.
 

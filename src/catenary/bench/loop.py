@@ -6,12 +6,12 @@ import json
 import math
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from importlib.util import find_spec
 from pathlib import Path
 
 from catenary.bench.job import Body, Job
-from catenary.bench.report import as_json, as_text, machine
+from catenary.bench.report import as_json, loop_text, machine
 from catenary.bench.rounds import WARM_UP_CYCLES, interleave
 from catenary.bench.segment import (
     COUNTS_PER_TURN,
@@ -21,6 +21,7 @@ from catenary.bench.segment import (
     processors,
     served,
 )
+from catenary.bench.setting import Setting
 from catenary.bench.statistics import Run, combine
 
 OURS = ("catenary-inline", "catenary-threaded")
@@ -32,19 +33,6 @@ MODULES = {
     LAW: "catenary.bench.law_loop",
 }
 ROUND_CYCLES = 900  # less than a second at 1 kHz: disturbances affect all peers alike
-
-
-@dataclass(frozen=True, slots=True)
-class Setting:
-    """What is measured."""
-
-    drives: int = 3
-    rate: int = 1000  # [Hz]
-    seconds: float = 10.0  # of every peer
-    body: str = "sine"  # or "pd"
-    spin: bool = False  # a Python thread spins next to every loop
-    rounds: int | None = None  # of every peer; None: as many as keep a round below a second
-    busy_wait: float = 0.0  # [s] of our loops and of `c-busy` before each cycle start
 
 
 def measure(setting: Setting, file: Path | None) -> None:
@@ -89,12 +77,8 @@ def check_busy_wait(busy_wait: float, rate: int) -> None:
 def show(
     setting: Setting, runs: Sequence[Run], ratios: Mapping[str, float], file: Path | None
 ) -> None:
-    """Print the figures of all runs, and write them to `file` as JSON."""
-    notes = [f"{setting.drives} drives at {setting.rate} Hz, body {setting.body}"]
-    notes += ["spinning"] if setting.spin else []
-    notes += [f"busy-wait {setting.busy_wait * 1e6:g} us"] if setting.busy_wait else []
-    print(f"{machine()}\n{', '.join(notes)}\n")
-    print(as_text(runs, ratios))
+    """Print the figures of all runs and the verdicts, and write the figures to `file` as JSON."""
+    print(loop_text(machine(), setting, runs, ratios))
     chosen = asdict(setting)
     del chosen["rounds"]  # of each run, below
     write(file, as_json(runs, ratios, chosen))

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
-from catenary.cli.bench_options import add_loop_options
+from catenary.cli.arguments import fifo_priority, number
+from catenary.cli.bench_options import add_file, add_loop_options, add_seconds
+from catenary.cli.doctor import period
+from catenary.cli.failure import FAILED
 from catenary.cli.parsers import Commands, add_command
 
 
@@ -15,9 +19,13 @@ def add_parser(commands: Commands) -> None:
         help="measure the loop on this machine",
         description="Measures this machine. Comparisons with C, PySOEM and published figures are "
         "`python -m benchmarks` in a clone of the repository (docs/benchmarks.md).",
-        example="catenary bench loop --seconds 10 --json loop.json",
+        example="catenary bench loop --seconds 10 --json loop.json\n"
+        "catenary bench latency --seconds 60\n"
+        "catenary bench report loop.json",
     ).add_subparsers(title="commands", metavar="COMMAND", required=True)
     _add_loop(group)
+    _add_latency(group)
+    _add_report(group)
 
 
 def _add_loop(group: Commands) -> None:
@@ -36,13 +44,51 @@ def _add_loop(group: Commands) -> None:
     parser.set_defaults(run=run_loop)
 
 
+def _add_latency(group: Commands) -> None:
+    parser = add_command(
+        group,
+        "latency",
+        help="how late threads wake",
+        description="Wakes a thread again and again, as the latency check of `catenary doctor` "
+        "does, and judges the latest wake-up. Exit status 1 if the verdict is FAIL.",
+        example="catenary bench latency --seconds 60 --json latency.json\n"
+        "catenary bench latency --period 0.00025 --priority 90 --cpu 3",
+    )
+    add_seconds(parser, 10.0, "of the measurement")
+    parser.add_argument(
+        "--period", type=period, default=1e-3, metavar="S", help="of the wake-ups [s] (0.001)"
+    )
+    parser.add_argument(
+        "--priority", type=fifo_priority, default=80, metavar="P", help="of the thread (80)"
+    )
+    parser.add_argument(
+        "--cpu", type=number, metavar="N", help="of the thread (the last isolated, else the last)"
+    )
+    add_file(parser)
+    parser.set_defaults(run=run_latency)
+
+
+def _add_report(group: Commands) -> None:
+    parser = add_command(
+        group,
+        "report",
+        help="print a saved result again",
+        description="Prints the figures in a JSON file of `loop` or `latency` again, with the "
+        "verdict.",
+        example="catenary bench report loop.json",
+    )
+    parser.add_argument("file", type=Path, metavar="FILE", help="a result")
+    parser.set_defaults(run=run_report)
+
+
 def run_loop(arguments: argparse.Namespace) -> int:
     from catenary import bench
 
     bench.enter_private_network()
     from catenary.bench import loop  # imports NumPy
+    from catenary.bench.setting import Setting
 
-    setting = loop.Setting(
+    setting = Setting(
         drives=arguments.drives,
         rate=arguments.rate,
         seconds=arguments.seconds,
@@ -52,4 +98,24 @@ def run_loop(arguments: argparse.Namespace) -> int:
         busy_wait=arguments.busy_wait,
     )
     loop.measure(setting, arguments.json)
+    return 0
+
+
+def run_latency(arguments: argparse.Namespace) -> int:
+    from catenary.bench import latency
+
+    held = latency.measure(
+        seconds=arguments.seconds,
+        period=arguments.period,
+        priority=arguments.priority,
+        cpu=arguments.cpu,
+        file=arguments.json,
+    )
+    return 0 if held else FAILED
+
+
+def run_report(arguments: argparse.Namespace) -> int:
+    from catenary.bench import saved
+
+    print(saved.as_text(arguments.file))
     return 0
