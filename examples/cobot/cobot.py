@@ -20,7 +20,7 @@ from catenary.demo.terminal import on_enter
 from catenary.demo.wire import program_target
 from catenary.virtual import read_segment
 
-sys.path.append(str(Path(__file__).resolve().parents[2]))  # of the repository
+sys.path.append(str(Path(__file__).resolve().parents[2]))  # the repository has `benchmarks`
 from benchmarks.cobot import Measured, Outcome, report
 
 HERE = Path(__file__).parent
