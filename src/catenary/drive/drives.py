@@ -26,6 +26,7 @@ from catenary.drive.arguments import (
     known,
     mode_of,
     named_columns,
+    start_up_list,
     warn_of_default_velocity,
     written_pdos,
 )
@@ -211,7 +212,7 @@ class Drives(Request):
                 required=required,
                 homing=home,
                 pdos=written,
-                objects=tuple(start_up),
+                objects=start_up_list(start_up),
             )
             for (sub, slot), name, first, unit, limits, home in zip(
                 sources,

@@ -13,6 +13,11 @@ class Request:
     """Owns the devices of a process-data request. Unknown attributes fail with the nearest name."""
 
     def __init__(self, subs: Sequence[SubDevice]) -> None:
+        for sub in subs:
+            if isinstance(sub, Sequence):
+                raise TypeError(
+                    f"{type(self).__name__}: expected a device, such as main.subs[3], not {sub!r}"
+                )
         self._subs = tuple(subs)
 
     def __getattr__(self, name: str) -> NoReturn:
