@@ -353,6 +353,14 @@ MISTAKES: dict[str, tuple[str, ...]] = {
         "clocks.reference",
         'did you mean "coupler"',
     ),
+    "table that is not there": ("[drives.arm]", "[drive.arm]", "drive", 'did you mean "drives"'),
+    "drives without a name": (
+        "[drives.arm]",
+        "[drives]",
+        "drives.axes",
+        r"expected a table, found a list(?s:.*)has a name of yours: \[drives\.NAME\]",
+        'axes = ["j1"',
+    ),
     "lead that is not there": (
         'lead = "reference"',
         'lead = "master"',

@@ -53,10 +53,10 @@ def compare_with_segment(file: str, target: str | None) -> Sequence[Comparison]:
     from catenary.machine import compare, read_machine
     from catenary.target import MainDevice
 
-    expected = read_machine(file).tables.device
-    with MainDevice(file if target is None else target, force=True) as main:
+    expected = read_machine(file)
+    with MainDevice(expected.target if target is None else target, force=True) as main:
         note_other_masters(main)
-        return compare(expected, main.passive_scan())
+        return compare(expected.tables.device, main.passive_scan())
 
 
 def as_table(found: Sequence[Comparison]) -> str:
