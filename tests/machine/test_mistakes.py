@@ -353,6 +353,13 @@ MISTAKES: dict[str, tuple[str, ...]] = {
         "clocks.reference",
         'did you mean "coupler"',
     ),
+    "op_mode of a device that no role uses": (
+        "product = 0x10001 }",
+        'product = 0x10001 }\nop_mode = "DC Sync0"',
+        "device[0].op_mode",
+        r'no role uses the device "coupler"(?s:.*)\[process_data\.NAME\]',
+        "op_mode",
+    ),
     "table that is not there": ("[drives.arm]", "[drive.arm]", "drive", 'did you mean "drives"'),
     "drives without a name": (
         "[drives.arm]",
