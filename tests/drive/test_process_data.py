@@ -179,7 +179,7 @@ def test_mistakes_are_told_before_anything_is_sent(cell: Cell) -> None:
 def test_arguments_of_another_kind_are_named(cell: Cell) -> None:
     sub = cell.main.subs[SENSOR]
     wrong: Any = cell.main.subs  # type checkers refuse all of these, too
-    with pytest.raises(TypeError, match=r"ProcessData: expected a device.*not <\d SubDevices"):
+    with pytest.raises(TypeError, match=r"ProcessData takes SubDevices.*not <\d SubDevices"):
         ProcessData(wrong)
     for wrong in ([1], 3):
         with pytest.raises(TypeError, match=r"safe: \{name: value\}, or the bytes of all outputs"):
@@ -198,7 +198,7 @@ def test_arguments_of_another_kind_are_named(cell: Cell) -> None:
 
 def test_a_device_list_is_not_a_device(cell: Cell) -> None:
     subs: Any = cell.main.subs
-    with pytest.raises(TypeError, match=r"Inputs: expected a device, such as main\.subs\[3\]"):
+    with pytest.raises(TypeError, match=r"Inputs takes SubDevices, such as subs\[1\]"):
         Inputs(subs)
 
 

@@ -14,10 +14,9 @@ class Request:
 
     def __init__(self, subs: Sequence[SubDevice]) -> None:
         for sub in subs:
-            if isinstance(sub, Sequence):
-                raise TypeError(
-                    f"{type(self).__name__}: expected a device, such as main.subs[3], not {sub!r}"
-                )
+            if not hasattr(sub, "position"):
+                kind = type(self).__name__
+                raise TypeError(f"{kind} takes SubDevices, such as subs[1]; not {sub!r}")
         self._subs = tuple(subs)
 
     def __getattr__(self, name: str) -> NoReturn:
