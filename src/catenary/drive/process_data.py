@@ -60,7 +60,8 @@ class ProcessData(Request):
         pdos: PDOs instead of a search: `[0x1A01]`, or with their entries, by name or as (index,
             subindex, bits): `{0x1A00: ["force", "status"]}`.
         safe: Values of outputs by name, or the bytes of all outputs. They are sent when the loop
-            ends, for whatever reason. Outputs without a safe value become 0.
+            ends, for whatever reason. Outputs without a safe value become 0. Then the device leaves
+            OP, and decides by itself what its outputs do.
         start_up: Objects that are written to the device before SAFE-OP.
         divider: Cycles of the loop between two exchanges.
         required: False: the loop continues without the device; see `present`.

@@ -47,7 +47,7 @@ class Machine:
 
     Raises:
         MachineFileError: The file cannot be read, or is wrong; the error names line and key.
-        IdentityError: On entering: a device is not the one in the file.
+        IdentityError: On entering: a device is not the one in the file, or two have its alias.
         SegmentError: On entering: a required device is missing.
     """
 
