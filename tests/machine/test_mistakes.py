@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from catenary.errors import MachineFileError
-from catenary.machine import read_machine
+from catenary.machine import Machine, read_machine
 from tests.machine.files import SMALL, write_small
 
 
@@ -475,3 +475,17 @@ def test_deep_nesting_is_refused(tmp_path: Path) -> None:
     path.write_text("format = " + "[" * 100_000)
     with pytest.raises(MachineFileError, match="not TOML"):
         read_machine(path)
+
+
+@pytest.mark.parametrize(
+    ("target", "message"),
+    [
+        ("et h0", "'et h0' is no target"),
+        ("virtual:", "'virtual:' is no target"),
+        ("virtual:nothing.toml", r"nothing\.toml: No such file"),
+    ],
+)
+def test_a_target_that_cannot_be_has_its_line(target: str, message: str, tmp_path: Path) -> None:
+    path = write_small(tmp_path, SMALL.replace("virtual:line.toml", target))
+    with pytest.raises(MachineFileError, match=rf"machine\.toml:2: target: .*{message}"):
+        Machine(path)

@@ -56,7 +56,7 @@ class Machine:
     ) -> None:
         self._file = read_machine(path)
         refuse_unsupported(self._file)
-        source = source_of(self._file.target if target is None else target)
+        source = self._file.source() if target is None else source_of(target)
         self._segment = segment_of(source)
         self._main = MainDevice(source, force=force)
         self._has_own_master = isinstance(source, MasterSource)
