@@ -480,8 +480,8 @@ def test_deep_nesting_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("target", "message"),
     [
-        ("et h0", "'et h0' is no target"),
-        ("virtual:", "'virtual:' is no target"),
+        ("et h0", "invalid target 'et h0'"),
+        ("virtual:", "invalid target 'virtual:'"),
         ("virtual:nothing.toml", r"nothing\.toml: No such file"),
     ],
 )
