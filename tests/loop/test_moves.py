@@ -1,11 +1,6 @@
-"""Moves while another thread iterates, and on several networks."""
+"""Moves while a thread in the background iterates, and on several networks."""
 
 from __future__ import annotations
-
-import asyncio
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 import pytest
 
@@ -19,47 +14,15 @@ from catenary.virtual import Segment, Servo
 MOST = 60.0  # [s] of the machine; the segment's time is virtual
 
 
-@contextmanager
-def iterated_by_a_thread(loop: Loop) -> Iterator[None]:
-    end = threading.Event()
-
-    def iterate() -> None:
-        for _ in loop:
-            if end.is_set():
-                return
-
-    thread = threading.Thread(target=iterate)
-    thread.start()
-    try:
-        yield
-    finally:
-        end.set()
-        thread.join()
-
-
-def test_another_thread_iterates() -> None:
+def test_moves_are_requested_and_stopped_while_another_thread_steps_them() -> None:
     with cat.MainDevice(Segment([Servo()])) as main:
         arm = Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=2.0)
-        with Loop(arm) as loop, iterated_by_a_thread(loop):
-            assert arm.move_to(0.3).wait_done(MOST)
-            assert arm.actual.position[0] == pytest.approx(0.3, abs=1e-3)
-
-            async def program() -> bool:
-                return await asyncio.to_thread(arm.move_to(0.0).wait_done, MOST)
-
-            assert asyncio.run(program())
-            assert arm.actual.position[0] == pytest.approx(0.0, abs=1e-3)
-
-
-def test_moves_are_requested_and_stopped_from_another_thread() -> None:
-    with cat.MainDevice(Segment([Servo()])) as main:
-        arm = Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=2.0)
-        with Loop(arm) as loop, iterated_by_a_thread(loop):
+        with Loop(arm) as loop:
+            loop.run_in_background()
             moves = [arm.move_to(1.0 + 0.1 * k) for k in range(20)]
             moves[-1].stop()
-            assert moves[-1].wait_done(MOST)
-            assert all(move.done for move in moves)
-            assert {move.outcome for move in moves[:-1]} <= {"replaced", "reached"}
+            loop.wait(moves[-1], timeout=MOST)
+            assert moves[-1].outcome in ("stopped", "reached")
             for move in moves[:-1]:  # how many are reached depends on the threads
                 assert isinstance(move.error, MoveError) is (move.outcome == "replaced")
 
