@@ -625,3 +625,43 @@ def test_csp_holds_while_the_program_keeps_the_interpreter() -> None:
     assert arm.stopped == (None,)
     loop.close()
     main.close()
+
+
+def test_each_thread_that_closes_the_loop_returns_when_the_axes_stand() -> None:
+    cell = Cell("csp", servos=1)
+    cell.loop.run_in_background()
+    cell.arm.move_to(20.0, velocity=2.0)
+    until(lambda: cell.arm.actual.velocity[0] > 1.9)
+    left: list[str] = []
+
+    def close() -> None:
+        cell.loop.close()
+        left.append(cell.segment[0].drive_state())
+
+    threads = [threading.Thread(target=close) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(left) == 4
+    assert "OPERATION ENABLED" not in left
+    cell.main.close()
+
+
+def test_a_loop_that_cannot_run_in_the_background_keeps_its_late_limits(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def failing() -> Iterator[None]:
+        raise LoopError("no new cycle for 1 s")
+        yield
+
+    cell = Cell("csp", servos=1)
+    with monkeypatch.context() as patch:
+        patch.setattr(cat.Loop, "_iterating", lambda self: failing())
+        with pytest.raises(LoopError, match="no new cycle"):
+            cell.loop.run_in_background()
+    assert not cell.loop._opened.engine.background
+    with pytest.raises(RuntimeError, match="needs run_in_background"):
+        cell.loop.update()
+    cell.loop.close()
+    cell.main.close()
