@@ -287,6 +287,20 @@ def test_no_move_while_a_stream_sets_the_targets() -> None:
         loop.stream(100)
 
 
+def test_a_law_that_begins_after_the_request_ends_the_move() -> None:
+    pytest.importorskip("numba")
+
+    def hold(time: float) -> bool:
+        return False
+
+    with opened(Servo()) as (arm, loop):
+        loop.start(cat.law(hold))
+        move = arm.move_to(0.5)
+        with pytest.raises(MoveError, match="a law or a stream sets its targets now"):
+            loop.wait(move)
+        assert arm.actual.position[0] == pytest.approx(0.0, abs=1e-3)
+
+
 # ---- what cannot be
 
 

@@ -22,6 +22,7 @@ import pytest
 
 import catenary as cat
 from catenary.errors import CatenaryError, DriveError, LoopError, MoveError
+from catenary.loop.running import Running
 from catenary.realtime import VirtualClock
 from catenary.types import SINT
 from catenary.virtual import Segment, Servo
@@ -664,4 +665,20 @@ def test_a_loop_that_cannot_run_in_the_background_keeps_its_late_limits(
     with pytest.raises(RuntimeError, match="needs run_in_background"):
         cell.loop.update()
     cell.loop.close()
+    cell.main.close()
+
+
+def test_an_exit_in_the_thread_stops_the_axes(monkeypatch: pytest.MonkeyPatch) -> None:
+    cell = Cell("csp", servos=1)
+
+    def leave(self: Running, flags: int, *, faults: bool) -> None:
+        raise SystemExit(1)
+
+    monkeypatch.setattr(Running, "judge", leave)
+    cell.loop.run_in_background()
+    cell.segment[0].inject_fault(0x2310)
+    until(lambda: cell.loop.error is not None)
+    with pytest.raises(LoopError, match=r"was ended by SystemExit\(1\)"):
+        cell.loop.close()
+    assert cell.segment[0].drive_state() != "OPERATION ENABLED"
     cell.main.close()

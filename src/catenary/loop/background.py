@@ -195,6 +195,8 @@ class Background:
                 self._pace.keep(self._ended)
         except Exception as error:  # a thread has no caller: the next call raises it
             self._fail(error)
+        except BaseException as end:  # SystemExit: the axes must not go on without the thread
+            self._fail(LoopError(f"the thread that iterates the loop was ended by {end!r}"))
         finally:
             self._ended.set()
             self._tell_cycle()
