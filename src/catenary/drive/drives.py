@@ -412,7 +412,7 @@ class Drives(Request):
         return moves.begin(dict(zip(chosen, parts, strict=True)), patience)
 
     def _numbers(self, axes: Axes) -> list[int]:
-        """Return the numbers of chosen axes. IndexError if there is none of that number."""
+        """Return the numbers of chosen axes. IndexError for a number without an axis."""
         wanted = axes if isinstance(axes, slice) else np.asarray(axes)
         if not isinstance(wanted, slice) and wanted.size == 0:
             return []
