@@ -3,7 +3,7 @@
 # PYTHON=/path/to/python3.12 takes another interpreter, and makes .venv anew for it.
 # TEST="-k axis" passes options to pytest, COBOT=--realtime to `make cobot`. `make rtlab` runs the
 # benchmarks on a real-time kernel in QEMU: TABLE=quick or TABLE=pyigh,tasks instead of all of them,
-# RTLAB="--out docs/benchmarks" keeps the results there. TABLE=igh wants IGH=path, a build of IgH's master.
+# RTLAB="--out FOLDER" keeps the results there. TABLE=igh wants IGH=path, a build of IgH's master.
 PYTHON ?= python3
 VENV := .venv
 TEST ?=
@@ -13,7 +13,7 @@ RTLAB ?=
 IGH ?=
 SOURCES := CMakeLists.txt pyproject.toml \
            $(shell find src -name '*.pyx' -o -name '*.pxd' -o -name '*.pxi' -o -name '*.h')
-CHECKED := src tests tools examples
+CHECKED := src tests tools examples benchmarks
 
 ifneq ($(origin PYTHON),file)
   PREFIX := -c 'import sys; print(sys.base_prefix)'

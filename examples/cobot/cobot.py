@@ -8,6 +8,7 @@ All joints go to 90 degrees and back, twice. Enter stops them; on virtual drives
 """
 
 import argparse
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -15,10 +16,12 @@ import ruckig  # noqa: F401  of trajectories: not in the first of them
 
 import catenary as cat
 from catenary import control, realtime, record
-from catenary.bench.cobot import Measured, Outcome, report
 from catenary.demo.terminal import on_enter
 from catenary.demo.wire import program_target
 from catenary.virtual import read_segment
+
+sys.path.append(str(Path(__file__).resolve().parents[2]))  # the repository has `benchmarks`
+from benchmarks.cobot import Measured, Outcome, report
 
 HERE = Path(__file__).parent
 PERIOD, JOINTS = 1e-3, 6  # [s]

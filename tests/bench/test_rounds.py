@@ -50,6 +50,7 @@ def test_each_round_begins_with_another_peer(monkeypatch: pytest.MonkeyPatch) ->
     jobs = [
         Job(
             peer=name,
+            module="",
             interface="",
             drives=(1,),
             body=Body.SINE,

@@ -3,7 +3,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catenary.bench.cost import Point, fit
 from catenary.bench.job import (
     PHASES,
     Body,
@@ -14,7 +13,7 @@ from catenary.bench.job import (
     write_job,
     write_round,
 )
-from catenary.bench.statistics import DERIVED, combine, ratios
+from catenary.bench.statistics import DERIVED, combine
 
 LATENESS = 50_000
 
@@ -68,56 +67,8 @@ def test_the_first_period_of_a_round_is_not_counted() -> None:
     assert combine("c", [first, first]).timing_us["period"]["max"] == 1000.0
 
 
-def test_ratios_are_the_medians_of_the_rounds_ratios() -> None:
-    ours = [
-        make_round(n, 1000, 1000, cpu_ns=cpu) for n, cpu in ((1000, 2.0), (9000, 2.0), (9, 6.0))
-    ]
-    theirs = [make_round(n, 1000, 1000, cpu_ns=1.0) for n in (2000, 9000, 1000)]
-    found = ratios([combine("catenary-law", ours), combine("c", theirs)])
-    assert found["receive: catenary-law / c"] == 0.5
-    assert found["cpu_per_cycle: catenary-law / c"] == 2.0
-    assert found["wake_to_sent: catenary-law / c"] == 0.75
-
-
-def test_a_round_without_a_phase_is_left_out_of_its_ratio() -> None:
-    lacking = make_round(4000, 1000, 1000)
-    lacking.samples[:, PHASES.index("process")] = -1
-    ours = combine("catenary-threaded", [lacking, make_round(4000, 3000, 1000)])
-    theirs = combine("c", [make_round(4000, 1000, 1000)] * 2)
-    assert ours.rounds.timing_us["process"]["p50"] == [None, 3.0]
-    found = ratios([ours, theirs])
-    assert found["process: catenary-threaded / c"] == 3.0
-    assert found["receive: catenary-threaded / c"] == 1.0
-
-
-def test_ratios_are_only_of_peers_that_ran() -> None:
-    runs = [
-        combine("catenary-inline", [make_round(500, 4000, 5500)]),
-        combine("pysoem", [make_round(5000, 4000, 11000)]),
-    ]
-    found = ratios(runs)
-    assert found["in_controller: catenary-inline / pysoem"] == 0.5
-    assert found["receive: catenary-inline / pysoem"] == 0.1
-    assert not any(name.endswith("/ c") for name in found)
-
-
-def test_cost_is_found_again() -> None:
-    points = [
-        Point(n, size, 3.0 + 0.5 * n + 0.002 * size)
-        for n, size in ((3, 78), (10, 260), (33, 858), (3, 400), (10, 1000))
-    ]
-    cost = fit(points)
-    assert (cost.base_us, cost.per_axis_us, cost.per_byte_us) == pytest.approx((3.0, 0.5, 0.002))
-    assert cost.residual_us == pytest.approx(0.0, abs=1e-9)
-
-
-def test_cost_of_proportional_segments_is_refused() -> None:
-    with pytest.raises(ValueError, match="do not tell"):
-        fit([Point(n, 26 * n, float(n)) for n in (3, 10, 33)])
-
-
 def test_job_and_round_survive_a_file(tmp_path) -> None:
-    job = Job("c", "cat0a", (2, 3), Body.PD, 1_000_000, 200, 1000, None, 80, 2.0**20, 1.0)
+    job = Job("c", "peer", "cat0a", (2, 3), Body.PD, 1_000_000, 200, 1000, None, 80, 2.0**20, 1.0)
     write_job(job, tmp_path / "job.json")
     assert read_job(tmp_path / "job.json") == job
     write_round(make_round(1, 2, 3, 4), tmp_path / "r.npz")

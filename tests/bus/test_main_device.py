@@ -335,7 +335,7 @@ def test_one_indication_is_enough_to_do_without_lrw(by_sii: bool) -> None:
 
 
 def test_a_hundred_devices_in_few_frames() -> None:
-    """PySOEM's config_init takes about 100 frames a device (`catenary bench scan` counts them)."""
+    """PySOEM's config_init takes about 100 frames a device (`python -m benchmarks scan`)."""
     segment = Segment([Coupler(), *(Servo() for _ in range(99))])
     with MainDevice(segment) as main:
         assert len(main.scan()) == 100

@@ -75,7 +75,7 @@ def test_every_help_has_an_example_that_parses(name: str) -> None:
         "virtual serve",
         "virtual serve veth1 --priority 100",
         "virtual serve veth1 --max-age -1",
-        "bench soak --minutes 1 --json nowhere/soak.json",
+        "bench loop --json nowhere/loop.json",
     ],
 )
 def test_a_wrong_command_line_is_one_line_a_hint_and_status_2(

@@ -10,7 +10,7 @@ import pytest
 from tools.rtlab import __main__ as lab
 
 
-def write(file: Path, median: float, command: str = "catenary bench table x") -> Path:
+def write(file: Path, median: float, command: str = "python -m benchmarks table x") -> Path:
     entries = [
         {"way": "C", "name": "tau1", "response": {"p50": 5.0, "max": median}},
         {"way": "C", "name": "tau2", "response": {"p50": median}},
@@ -55,6 +55,6 @@ def test_what_is_no_result_is_said_in_one_line(
 
 def test_two_commands_are_not_compared(tmp_path: Path, capsys) -> None:
     one = write(tmp_path / "a.json", 1.0)
-    other = write(tmp_path / "b.json", 1.0, "catenary bench table y")
+    other = write(tmp_path / "b.json", 1.0, "python -m benchmarks table y")
     assert lab.main(["--compare", str(one), str(other)]) == 1
     assert "two commands" in capsys.readouterr().err

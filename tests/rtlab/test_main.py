@@ -31,8 +31,8 @@ def test_an_unknown_table_is_answered_with_those_there_are(capsys) -> None:
     assert "quick" in said
 
 
-def test_every_table_is_a_command_of_catenary_that_writes_its_figures() -> None:
-    from catenary.cli.main import make_parser
+def test_every_table_is_a_benchmark_that_writes_its_figures() -> None:
+    from benchmarks.cli.main import make_parser
 
     commands = [table for table in tables.TABLES.values() if not table.program]
     assert len(commands) == len(tables.TABLES) - 1  # igh is a program of the guest's own
@@ -97,6 +97,6 @@ def test_a_record_says_what_its_figures_depend_on(monkeypatch: pytest.MonkeyPatc
     )
     assert json.loads(json.dumps(made)) == made
     assert made["ns_per_instruction"] == 1
-    assert made["command"].startswith("catenary bench loop")
+    assert made["command"].startswith("python -m benchmarks loop")
     assert (made["kernel_package"], made["qemu"]) == ("linux_1", "7.2.22")
     assert "no latency measurement of hardware" in made["note"]

@@ -32,7 +32,7 @@ def test_the_device_and_its_reason_are_told(cell: Cell, position: int) -> None:
 
 def test_one_that_was_off_for_a_moment_has_forgotten_its_address(cell: Cell) -> None:
     """So short that fewer cycles are lost than the loop endures; the coupler has no process data
-    that would be missed. (Found by the soak: `catenary bench soak --minutes 1 --seed 52`.)"""
+    that would be missed. (Found by the soak: `python -m benchmarks soak --minutes 1 --seed 52`.)"""
     arm = cell.drives()
     with pytest.raises(StateError) as caught, cat.Loop(arm) as loop:
         home = arm.actual.position.copy()

@@ -1,7 +1,7 @@
 """Ten drives, then thirty-three, whose crystals differ by up to 200 ppm from each other, drift with
 the temperature, and whose differences are read within a microsecond. Two seconds after the loop was
 entered, its burst included, no clock is further than a microsecond from the reference; and none is
-for long after. (`catenary bench clocks` runs ten minutes of it.)"""
+for long after. (`python -m benchmarks clocks` runs ten minutes of it.)"""
 
 from __future__ import annotations
 

@@ -20,8 +20,8 @@ pytest.importorskip("mujoco", reason="the arm is simulated by MuJoCo: pip instal
 pytest.importorskip("ruckig", reason="motions are made by ruckig: pip install 'catenary[traj]'")
 pytest.importorskip("mcap", reason="recordings are MCAP files: pip install 'catenary[log]'")
 
+from benchmarks.cobot import reactions
 from catenary import record
-from catenary.bench.cobot import reactions
 from catenary.drive import Phase, Recovery
 from catenary.errors import CatenaryError, TaskError
 from catenary.virtual.faults import Fault, cut, drive_fault, safe_torque_off

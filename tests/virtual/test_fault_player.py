@@ -335,7 +335,7 @@ def test_drive_fault_sto_and_a_model_that_stands_still() -> None:
 
 
 def test_a_frozen_device_may_be_taken_away_before_it_thaws() -> None:
-    """(Found by the soak: `catenary bench soak --minutes 1 --seed 24`.)"""
+    """(Found by the soak: `python -m benchmarks soak --minutes 1 --seed 24`.)"""
     other = Servo()
     main = line(freeze(3, at=0.01, for_=0.05), swap(3, other, at=0.02))
     main.let_pass(100)

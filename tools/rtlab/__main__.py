@@ -137,7 +137,7 @@ def run_table(
 def program(table: tables.Table) -> list[str]:
     if table.program:
         return [sys.executable, table.program]
-    return [str(Path(sys.executable).with_name("catenary"))]
+    return [sys.executable, "-m", "benchmarks"]
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import catenary as cat
-from catenary.bench.peers.with_catenary_law import sine
+from catenary.bench.law_loop import sine
 from catenary.bench.segment import COUNTS_PER_TURN, PRIORITY, served
 from catenary.errors import CatenaryError, ConfigurationError, NoDeviceError
 

@@ -10,7 +10,7 @@ import tempfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from catenary.bench.compiler import compile_all
+from benchmarks.compiler import compile_all
 from tools.rtlab import archive, root
 from tools.rtlab.archive import Entry
 from tools.rtlab.kernel import Kernel

@@ -142,6 +142,8 @@ def files_of(one: Distribution) -> Iterator[Path]:
 def package(repository: Path) -> Iterator[Path]:
     yield from under(repository / "src" / "catenary")
     yield from under(repository / "examples")
+    benchmarks = repository / "benchmarks"
+    yield from (path for path in under(benchmarks) if benchmarks / "results" not in path.parents)
 
 
 def programs() -> Iterator[Path]:

@@ -1,4 +1,4 @@
-"""What the lab runs: one command of `catenary` a table, each in a guest of its own."""
+"""What the lab runs: one command of `python -m benchmarks` a table, each in a guest of its own."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ RESULT = "FILE"  # the guest puts the path of the result in its place
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    command: str  # of `catenary`; it understands --json
+    command: str  # of `python -m benchmarks`; it understands --json
     minutes: float  # at most, of the host's time
     help: str
     of_all: bool = True  # whether "all" runs it
     # What real-time tasks may have, [us] of every second; -1: all. Less lets a table end that asks
     # for more than there is, and makes each switch 0.4 us longer.
     real_time_us: int = -1
-    program: str = ""  # of the guest, instead of `catenary`
+    program: str = ""  # of the guest, instead of the benchmarks
 
     @property
     def shown(self) -> str:
         """The command as a person reads it."""
-        return f"{self.program or 'catenary'} {self.command}".rstrip()
+        return f"{self.program or 'python -m benchmarks'} {self.command}".rstrip()
 
     @property
     def arguments(self) -> list[str]:
@@ -34,60 +34,60 @@ class Table:
 
 TABLES: Mapping[str, Table] = {
     "quick": Table(
-        "bench loop --seconds 2 --rounds 1 --peers c",
+        "loop --seconds 2 --rounds 1 --peers c",
         10,
         "two seconds of the loop beside C: shows that the lab works",
         of_all=False,
     ),
     "loop": Table(
-        "bench loop --seconds 5 --rounds 1 --peers c,c-ring,pysoem",
+        "loop --seconds 5 --rounds 1 --peers c,c-ring,pysoem",
         90,
         "the loop beside C and PySOEM, three drives at 1 kHz",
     ),
     "pyigh": Table(
-        "bench table pyigh --seconds 60 --rounds 8",
+        "table pyigh --seconds 60 --rounds 8",
         90,
         "in-controller delay: C, PySOEM and ours, three drives at 1 kHz",
     ),
     "pyigh-busy": Table(
-        "bench table pyigh --seconds 5 --rounds 1 --busy-wait 0.00005",
+        "table pyigh --seconds 5 --rounds 1 --busy-wait 0.00005",
         30,
         "the same with a busy-wait of 50 us before each cycle start",
     ),
     "tasks": Table(
-        "bench table tasks --seconds 4",
+        "table tasks --seconds 4",
         60,
         "three spinning tasks beside their analysis",
     ),
     "tocabi": Table(
-        "bench table tocabi --seconds 1 --rounds 1 --peers law --rates 4000,5000,6250",
+        "table tocabi --seconds 1 --rounds 1 --peers law --rates 4000,5000,6250",
         45,
         "33 axes on two networks by laws, 4 to 6.25 kHz",
         real_time_us=950_000,  # the kernel's own
     ),
     "tocabi-60": Table(
-        "bench table tocabi --seconds 60 --rounds 1 --peers law --rates 4000",
+        "table tocabi --seconds 60 --rounds 1 --peers law --rates 4000",
         90,
         "33 axes on two networks by laws at 4 kHz for 60 s: none skipped, none lost",
         of_all=False,
         real_time_us=950_000,
     ),
     "tocabi-8k": Table(
-        "bench table tocabi --seconds 5 --rounds 1 --peers law --rates 8000 --axes 3,3",
+        "table tocabi --seconds 5 --rounds 1 --peers law --rates 8000 --axes 3,3",
         45,
         "6 axes on two networks by laws at 8 kHz for 5 s",
         of_all=False,
         real_time_us=950_000,
     ),
     "cobot": Table(
-        "bench table cobot --realtime --short --stretch 5",
+        "table cobot --realtime --short --stretch 5",
         60,
         "six tasks of a cobot beside their analysis",
     ),
-    "rteml": Table("bench table rteml", 60, "intervals of frames in a capture at 5 kHz"),
-    "skew": Table("bench table skew", 30, "two digital outputs at both ends of the line"),
-    "interrupt": Table("bench table interrupt", 60, "reaction of a waiting task to an event"),
-    "law": Table("bench law", 20, "what one call of a compiled law takes"),
+    "rteml": Table("table rteml", 60, "intervals of frames in a capture at 5 kHz"),
+    "skew": Table("table skew", 30, "two digital outputs at both ends of the line"),
+    "interrupt": Table("table interrupt", 60, "reaction of a waiting task to an event"),
+    "law": Table("law", 20, "what one call of a compiled law takes"),
     "igh": Table(
         "",
         60,

@@ -44,6 +44,7 @@ class Body(StrEnum):
 @dataclass(frozen=True, slots=True)
 class Job:
     peer: str
+    module: str  # has `run(job) -> Round`
     interface: str
     drives: tuple[int, ...]  # positions on the segment
     body: Body

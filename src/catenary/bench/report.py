@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
+from catenary.bench import verdict
+from catenary.bench.setting import Setting
 from catenary.bench.statistics import Run
 
 HEADLINES = {
@@ -69,6 +71,14 @@ def as_json(
         ],
         "ratios": dict(ratios),
     }
+
+
+def loop_text(
+    machine: str, setting: Setting, runs: Sequence[Run], ratios: Mapping[str, float]
+) -> str:
+    """Return the machine, the setting, all tables and the verdicts."""
+    blocks = [f"{machine}\n{setting}", as_text(runs, ratios), verdict.as_text(runs, setting.rate)]
+    return "\n\n".join(blocks)
 
 
 def as_text(runs: Sequence[Run], ratios: Mapping[str, float]) -> str:

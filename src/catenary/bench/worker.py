@@ -10,19 +10,19 @@ import gc
 import os
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
-from catenary.bench import peers
-from catenary.bench.job import Job, read_job, write_round
+from catenary.bench.job import Job, Round, read_job, write_round
 from catenary.realtime.scheduling import Scheduling, request_scheduling, what_scheduling
 
 
 def main(arguments: Sequence[str]) -> None:
     job_path, result_path = map(Path, arguments)
     job = read_job(job_path)
-    peer = peers.load(job.peer)
+    peer: Callable[[Job], Round] = import_module(job.module).run
     with spinning(job) if job.spin else contextlib.nullcontext():
         obtained = schedule(job)
         result = peer(job)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from catenary.cli.arguments import positive_number, positive_seconds, result_file
+from catenary.cli.arguments import positive_number, positive_seconds, result_file, seconds
 
 
 def add_file(parser: argparse.ArgumentParser) -> None:
@@ -31,3 +31,30 @@ def add_seconds(parser: argparse.ArgumentParser, default: float, what: str) -> N
         metavar="S",
         help=f"{what} ({default:g})",
     )
+
+
+def add_loop_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the commands that measure the loop."""
+    add_drives(parser)
+    add_rate(parser)
+    add_seconds(parser, 10.0, "of every peer")
+    parser.add_argument(
+        "--body", choices=("sine", "pd"), default="sine", help="what the user computes (sine)"
+    )
+    parser.add_argument(
+        "--spin", action="store_true", help="a Python thread spins beside every loop"
+    )
+    parser.add_argument(
+        "--rounds",
+        type=positive_number,
+        metavar="N",
+        help="of every peer, each in a fresh process (so many that each takes 0.9 s at 1 kHz)",
+    )
+    parser.add_argument(
+        "--busy-wait",
+        type=seconds,
+        default=0.0,
+        metavar="S",
+        help="busy-wait before each cycle start [s] (0)",
+    )
+    add_file(parser)

@@ -28,10 +28,10 @@ class UsageError(Exception):
         self.hint = hint
 
 
-def report(error: Exception) -> int:
-    """Prints one line and a hint to stderr; the exit status."""
+def report(error: Exception, program: str = "catenary") -> int:
+    """Print one line and a hint to stderr; return the exit status."""
     message, hint = describe(error)
-    print(f"catenary: {message}", file=sys.stderr)
+    print(f"{program}: {message}", file=sys.stderr)
     if hint:
         print(f"  hint: {hint}", file=sys.stderr)
     return USAGE if isinstance(error, UsageError) else FAILED

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NoReturn
 
 from catenary.cli import (
@@ -30,6 +30,7 @@ from catenary.cli.console import INTERRUPTED
 from catenary.cli.failure import USAGE, report, silence_stdout
 
 VIRTUAL_TIME = "virtual time: the segment's own clock, not this machine's"
+PROGRAM = "catenary"
 DESCRIPTION = "Real-time EtherCAT for Python."
 COMMANDS = (
     *(scan, state, graph, diag, sdo, reg, alias, sii),
@@ -71,7 +72,7 @@ class ShowVersion(argparse.Action):
 
 def make_parser() -> argparse.ArgumentParser:
     parser = Parser(
-        prog="catenary",
+        prog=PROGRAM,
         description=DESCRIPTION,
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -84,12 +85,20 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs one command. The exit status: 0, 1 for what failed, 2 for a wrong command line."""
+def main(
+    arguments: Sequence[str] | None = None,
+    parser: Callable[[], argparse.ArgumentParser] = make_parser,
+    *,
+    program: str = PROGRAM,
+) -> int:
+    """Run one command of `parser`, by default of `catenary`.
+
+    Return the exit status: 0, 1 if something failed, 2 for a wrong command line.
+    """
     given = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in given  # before or after the command
     try:
-        return run([word for word in given if word != "--debug"])
+        return run([word for word in given if word != "--debug"], parser())
     except KeyboardInterrupt:
         return INTERRUPTED
     except BrokenPipeError:
@@ -97,7 +106,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Exception as error:
         if debug:
             raise
-        return report(error)
+        return report(error, program)
 
 
 def note_virtual_time(target: str) -> None:
@@ -110,9 +119,9 @@ def note_virtual_time(target: str) -> None:
         print(f"note: {VIRTUAL_TIME}", file=sys.stderr)
 
 
-def run(arguments: Sequence[str]) -> int:
+def run(arguments: Sequence[str], parser: argparse.ArgumentParser) -> int:
     try:
-        parsed, unknown = make_parser().parse_known_args(arguments)
+        parsed, unknown = parser.parse_known_args(arguments)
         if unknown:
             parsed.parser.error(f"unrecognized arguments: {' '.join(unknown)}")
         status = int(parsed.run(parsed))

@@ -1,0 +1,73 @@
+"""One network's loop with a law, in a process of its own, as the published humanoid has one for
+each network: `python -m benchmarks.network_law JOB`. It says "here" once all is imported,
+opens the loop at SIGUSR1, says "ready" once the law runs, measures from the next SIGUSR1 on, and
+says what it came to. So no loop takes the processor from another one that still comes up."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import time
+from collections.abc import Sequence
+from importlib import import_module
+
+import msgspec
+
+import catenary as cat
+from benchmarks.networks import NetworkRound, phases_of
+from catenary.bench.job import Job
+from catenary.bench.law_loop import sine
+from catenary.bench.python_loop import opened
+from catenary.errors import CatenaryError
+
+GO = signal.SIGUSR1
+PATIENCE = 120.0  # [s] for the others to be ready
+LOOK = 500  # cycles from one look at the counters to the next
+NEVER = 1e9  # [s]
+BUDGET_SHARE = 0.1  # of the period: the frames of two networks on one processor need the rest
+
+
+def run_law(job: Job) -> NetworkRound:
+    import_module("numba")  # opening the loop compiles the law
+    wait_to_go("here")
+    with opened(job, laws=[sine]) as (loop, arm):
+        home = arm.actual.position.copy()
+        parameters = [job.amplitude, job.stiffness, job.damping, NEVER]
+        loop.start(
+            sine, memory=home, parameters=parameters, budget=BUDGET_SHARE * job.period_ns * 1e-9
+        )
+        wait_to_go("ready")
+        return count(loop, job)
+
+
+def wait_to_go(said: str) -> None:
+    print(said, flush=True)
+    if signal.sigtimedwait({GO}, PATIENCE) is None:
+        raise CatenaryError(f"nobody said go within {PATIENCE:.0f} s")
+
+
+def count(loop: cat.Loop, job: Job) -> NetworkRound:
+    """The law needs nobody meanwhile; a loop that stands still is asked why."""
+    before = loop.timing.counters
+    first = now = before["cycles"]
+    while (left := first + job.cycles - now) > 0:
+        time.sleep(max(min(left, LOOK), 1) * job.period_ns * 1e-9)
+        seen, now = now, loop.timing.counters["cycles"]
+        if now == seen:
+            next(loop)
+    after = loop.timing.counters
+    return NetworkRound(
+        lost=after["lost"] - before["lost"],
+        late=after["late"] - before["late"],
+        phases_ns=phases_of(loop, after["cycles"] - first),
+    )
+
+
+def main(arguments: Sequence[str]) -> None:
+    signal.pthread_sigmask(signal.SIG_BLOCK, {GO})  # who starts us has done so before any import
+    job = msgspec.json.decode(arguments[0], type=Job)
+    print(msgspec.json.encode(run_law(job)).decode(), flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,110 @@
+"""What is asked of a table and what it comes to, for people and for programs."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from catenary.bench.report import machine
+from catenary.realtime.scheduling import what_scheduling
+
+RATIOS = "other machines: compare ratios, not microseconds"
+PACKAGES = ("catenary", "numpy", "numba", "pysoem")
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """What the command line says; None: as the table has it."""
+
+    seconds: float | None = None
+    rounds: int | None = None  # of programs that take turns, at least
+    rates: tuple[int, ...] | None = None  # [Hz]
+    peers: tuple[str, ...] | None = None  # of those that the table compares
+    ring: bool = False
+    axes: tuple[int, ...] | None = None  # drives on each network
+    busy_wait: float = 0.0  # [s] of our loops before each cycle start
+    example: Path | None = None  # the program of examples/cobot
+    realtime: bool = False  # on the machine's clock, where virtual time is the default
+    stretch: float | None = None  # periods so many times as long, for a slow processor
+    short: bool = False  # less of it
+    refused: str = ""  # why there is no private network
+
+
+@dataclass(frozen=True, slots=True)
+class Sheet:
+    """One table: theirs and ours as text, all of it as figures, what was left out and why."""
+
+    title: str
+    conditions: str  # ours
+    text: str
+    figures: Mapping[str, object]
+    left_out: Sequence[str] = ()
+
+
+def show(sheet: Sheet) -> str:
+    lines = [f"{sheet.title}\n{machine()}\n{sheet.conditions}; {RATIOS}\n", sheet.text]
+    lines += [f"left out: {reason}" for reason in sheet.left_out]
+    return "\n".join(lines)
+
+
+def as_json(name: str, sheet: Sheet) -> str:
+    return json.dumps(
+        {
+            "table": name,
+            "title": sheet.title,
+            "machine": machine(),
+            "date": datetime.now(UTC).isoformat(timespec="seconds"),
+            "command": shlex.join(["python", "-m", "benchmarks", *sys.argv[1:]]),
+            "versions": versions(),
+            "cpus": sorted(os.sched_getaffinity(0)),
+            "scheduling": str(what_scheduling()),
+            "conditions": sheet.conditions,
+            "note": RATIOS,
+            "left_out": list(sheet.left_out),
+            **sheet.figures,
+        },
+        indent=1,
+    )
+
+
+def versions() -> dict[str, str]:
+    """Of what takes part, as far as it is installed."""
+    found = {"python": sys.version.split()[0]}
+    for package in PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def as_failures(failed: Sequence[str]) -> list[str]:
+    """Rounds that were done again, in a line: what befell them is missing in the figures."""
+    if not failed:
+        return []
+    return [f"rounds that failed and were done again: {len(failed)} (the first: {failed[0][:110]})"]
+
+
+def grid(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Columns as wide as their widest; the first one to the left."""
+    table = [header, *rows]
+    widths = [max(len(row[k]) for row in table) for k in range(len(header))]
+    return "\n".join(
+        "  ".join(
+            text.ljust(width) if k == 0 else text.rjust(width)
+            for k, (text, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in table
+    )
+
+
+def slashed(values: Sequence[float | None], digits: int) -> str:
+    """`8.849/44.000/...`; what is not published is a dash."""
+    return "/".join("-" if value is None else f"{value:.{digits}f}" for value in values)

@@ -1,0 +1,363 @@
+"""`python -m benchmarks table tocabi`: 18 + 15 axes on two networks, 4 and 8 kHz.
+
+Three ways in turn: one loop over both networks, whose Python body gives targets in every cycle; a
+loop with a law for each network in a process of its own, with a Python task of 1 kHz beside; and
+two C programs. The published loop waits in the cycle for the answer to its frame; `c` receives the
+frame of the previous cycle. Compare `receive` among ours only, and `output delay` (cycle start →
+last cyclic frame handed to the kernel) between ours and `c`.
+
+A rate holds for a way where nothing was lost, no instant passed without a cycle and no job of the
+task was missed. `--peers law --rates 4000,5000,6000` looks for the highest."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from benchmarks.compiler import has_programs
+from benchmarks.network_law import GO, PATIENCE
+from benchmarks.networks import DRIVES, C, NetworkRound, run_c, run_ours
+from benchmarks.peers import modules_of
+from benchmarks.processor import processor_time
+from benchmarks.tables.published import TOCABI, TOCABI_CONDITIONS, Channel, spread_of
+from benchmarks.tables.sheet import Options, Sheet, as_failures, grid, slashed
+from benchmarks.tasks import compute_little
+from catenary.bench.job import Body, Job
+from catenary.bench.loop import make_jobs, show_progress
+from catenary.bench.rounds import BRING_UP_SECONDS, RoundError, begin_anew
+from catenary.bench.segment import Served, processors, served
+from catenary.bench.statistics import summarise
+from catenary.realtime import Statistics, Task, Tasks, session
+from catenary.realtime.child import Child, start_python
+
+RATES, SECONDS, ROUNDS = (4000, 8000), 10.0, 2
+NETWORKS = ("upper", "lower")
+LOOKED_AT = 0.8  # of what is measured: shares of the processor
+LOOP, LAW = "loop", "law"
+TASK_PERIOD, TASK_PRIORITY = 1e-3, 60  # below loops and segments
+HEADER = ("avg/max/min/sd [us]", "latency", "send", "receive", "output delay", "overflows", "lost")
+OUTPUT_DELAY = "output_delay"
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One network of one way, over all rounds."""
+
+    name: str
+    cycles: int
+    lost: int
+    overflows: int  # instants that passed without a cycle; C: cycles begun a period late
+    timing_us: dict[str, dict[str, float]]
+
+    def channel(self) -> Channel:
+        latency, send, receive = (
+            spread_of(self.timing_us[name]) for name in ("lateness", "send", "receive")
+        )
+        return Channel(latency, send, receive, str(self.overflows))
+
+
+def measure(options: Options) -> Sheet:
+    rates = options.rates or RATES
+    seconds, rounds = options.seconds or SECONDS, options.rounds or ROUNDS
+    ways, left_out = ways_for(options)
+    failed: list[str] = []
+    found = {
+        rate: run(rate, seconds, rounds, ways, options, failed) if ways else {} for rate in rates
+    }
+    shape = "rings" if options.ring else "lines"
+    axes = axes_of(options)
+    blocks = [as_table(rate, of_ways) for rate, of_ways in found.items()]
+    return Sheet(
+        title=f"TOCABI, 18 + 15 axes on two networks; {TOCABI_CONDITIONS}",
+        conditions=f"ours: {' + '.join(map(str, axes))} virtual drives, two {shape} of veth, "
+        f"{rounds} x {seconds / rounds:g} s",
+        text="\n\n".join([*blocks, "\n".join(as_verdicts(found)), *as_failures(failed)]),
+        figures={
+            "published": {f"{rate}, {name}": c._asdict() for (rate, name), c in TOCABI.items()},
+            "ring": options.ring,
+            "axes": axes,
+            "seconds": seconds,
+            "rounds": rounds,
+            "rounds_done_again": failed,
+            "rates": [as_figures(rate, of_ways) for rate, of_ways in found.items()],
+        },
+        left_out=left_out,
+    )
+
+
+def axes_of(options: Options) -> tuple[int, ...]:
+    """Return the number of drives on each network. ValueError unless there are two networks."""
+    axes = options.axes or DRIVES
+    if len(axes) != len(NETWORKS):
+        raise ValueError(f"tocabi has {len(NETWORKS)} networks, not {len(axes)}: --axes 6,6")
+    return axes
+
+
+@dataclass(slots=True)
+class WayRounds:
+    """Owns what one way came to, round by round."""
+
+    networks: list[list[NetworkRound]]
+    task: list[Statistics]  # of the task beside, where there is one
+    shares: list[dict[str, float]]  # of a processor, by process, where it was looked at
+
+
+Way = Callable[[Sequence[Job], "Places", WayRounds], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Places:
+    """Where a way runs."""
+
+    segments: Sequence[Served]
+    folder: Path
+
+
+def ways_for(options: Options) -> tuple[dict[str, Way], list[str]]:
+    """Those asked for that this machine can; why others are left out. ValueError: no such way."""
+    ways: dict[str, Way] = {LOOP: one_loop, LAW: two_laws, C: two_programs}
+    asked = options.peers or tuple(ways)
+    for name in asked:
+        if name not in ways:
+            raise ValueError(f"tocabi has no peer {name!r}; it has {', '.join(ways)}")
+    if options.refused:
+        return {}, [f"all of ours: no private network ({options.refused})"]
+    reasons = why_not(options)
+    left_out = [f"{name}: {reason}" for name, reason in reasons.items() if name in asked]
+    return {name: ways[name] for name in asked if name not in reasons}, left_out
+
+
+def why_not(options: Options) -> dict[str, str]:
+    """Ways that cannot be gone here."""
+    reasons = {}
+    if find_spec("numba") is None:
+        reasons[LAW] = "Numba is not installed (pip install 'catenary[law]')"
+    if options.ring:
+        reasons[C] = "the C programs know one wire, not the two of a ring"
+    elif not has_programs():
+        reasons[C] = "no C compiler (sudo apt install gcc libc6-dev)"
+    return reasons
+
+
+def run(
+    rate: int,
+    seconds: float,
+    rounds: int,
+    ways: Mapping[str, Way],
+    options: Options,
+    failed: list[str],
+) -> dict[str, WayRounds]:
+    """All ways in turn, round by round."""
+    found = {name: WayRounds([], [], []) for name in ways}
+    with contextlib.ExitStack() as stack:
+        segments = [stack.enter_context(served(n, ring=options.ring)) for n in axes_of(options)]
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="catenary-bench-")))
+        cycles = round(seconds * rate / rounds)
+        jobs = [
+            replace(
+                make_jobs(modules_of([C]), segment, rate, cycles, Body.SINE, spin=False)[0],
+                busy_wait=options.busy_wait,
+            )
+            for segment in segments
+        ]
+        for number in range(rounds):
+            for name, way in ways.items():
+                show_progress(f"{name}, {rate} Hz", number + 1, rounds)
+                begin_anew(partial(way, jobs, Places(segments, folder), found[name]), failed)
+    return found
+
+
+def one_loop(jobs: Sequence[Job], _places: Places, found: WayRounds) -> None:
+    found.networks.append(run_ours(jobs))
+
+
+def two_programs(jobs: Sequence[Job], places: Places, found: WayRounds) -> None:
+    found.networks.append(run_c(jobs, places.folder))
+
+
+def two_laws(jobs: Sequence[Job], places: Places, found: WayRounds) -> None:
+    """Both are measured while the task runs."""
+    measured = jobs[0].cycles * jobs[0].period_ns * 1e-9
+    with contextlib.ExitStack() as stack:
+        children = [stack.enter_context(start_law(job)) for job in jobs]
+        for child in children:
+            expect(child, PATIENCE, "here")
+        tasks = stack.enter_context(beside())
+        go(children)
+        for child in children:
+            expect(child, PATIENCE, "ready")
+        processes = {
+            f"{what}, {network}": pid
+            for what, pids in (
+                (LAW, [child.pid for child in children]),
+                ("segment", [segment.pid for segment in places.segments]),
+            )
+            for network, pid in zip(NETWORKS, pids, strict=True)
+        }
+        before = tasks["python"].statistics  # the loops' coming up is no part of it
+        go(children)
+        took = shares(processes, LOOKED_AT * measured)
+        said = [expect(child, BRING_UP_SECONDS + measured, "{") for child in children]
+        statistics = tasks["python"].statistics
+    while_measured = replace(
+        statistics,
+        jobs=statistics.jobs - before.jobs,
+        misses=statistics.misses - before.misses,
+    )
+    found.task.append(while_measured)
+    found.shares.append(took)
+    found.networks.append([msgspec.json.decode(each, type=NetworkRound) for each in said])
+
+
+def shares(processes: Mapping[str, int], seconds: float) -> dict[str, float]:
+    """How much of a processor each took, by its number, while these seconds passed."""
+    before = {name: processor_time(pid) for name, pid in processes.items()}
+    start = time.monotonic()
+    time.sleep(seconds)
+    passed = time.monotonic() - start
+    return {
+        name: round((processor_time(pid) - before[name]) / passed, 4)
+        for name, pid in processes.items()
+    }
+
+
+def start_law(job: Job) -> Child:
+    """Its threads, those of imported libraries too, inherit that GO is blocked: it waits for it."""
+    arguments = ["-m", "benchmarks.network_law", msgspec.json.encode(job).decode()]
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {GO})
+    try:
+        return start_python(arguments)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def beside() -> Tasks:
+    return Tasks(
+        Task(
+            compute_little,
+            name="python",
+            period=TASK_PERIOD,
+            priority=TASK_PRIORITY,
+            cpu=processors().masters,
+        ),
+        workers="processes",
+        session=session(best_effort=True),
+        best_effort=True,
+    )
+
+
+def go(children: Sequence[Child]) -> None:
+    for child in children:
+        os.kill(child.pid, GO)
+
+
+def expect(child: Child, seconds: float, start: str) -> str:
+    said = child.read_line(seconds)
+    if said is None or not said.startswith(start):
+        raise RoundError(f"a loop with a law failed: {said or 'it said nothing'}")
+    return said
+
+
+# ---- for people and programs
+
+
+def in_columns(found: Mapping[str, WayRounds]) -> tuple[list[Column], list[Statistics]]:
+    columns = [
+        column(f"{name}, {NETWORKS[network]}", mine)
+        for name, way in found.items()
+        for network, mine in enumerate(zip(*way.networks, strict=True))
+    ]
+    return columns, [statistics for way in found.values() for statistics in way.task]
+
+
+def column(name: str, rounds: Sequence[NetworkRound]) -> Column:
+    phases = {
+        phase: np.concatenate([each.phases_ns[phase] for each in rounds]) * 1e-3
+        for phase in rounds[0].phases_ns
+    }
+    return Column(
+        name=name,
+        cycles=len(phases["lateness"]),
+        lost=sum(each.lost for each in rounds),
+        overflows=sum(each.late for each in rounds),
+        # -1 ns: the phase did not occur in that cycle
+        timing_us={
+            phase: summarise(values if phase == "lateness" else values[values >= 0])
+            for phase, values in phases.items()
+        },
+    )
+
+
+def as_table(rate: int, found: Mapping[str, WayRounds]) -> str:
+    columns, task = in_columns(found)
+    rows = [
+        row(f"theirs: {name}", channel, "-", "-")
+        for (published, name), channel in TOCABI.items()
+        if published == rate
+    ]
+    rows += [
+        row(
+            each.name,
+            each.channel(),
+            slashed(spread_of(each.timing_us[OUTPUT_DELAY]), 2),
+            f"{each.lost} of {each.cycles}",
+        )
+        for each in columns
+    ]
+    lines = [f"{rate} Hz", grid(HEADER, rows)]
+    if task:
+        jobs, missed = sum(each.jobs for each in task), sum(each.misses for each in task)
+        lines.append(f"the Python task of 1 kHz beside the laws: {missed} of {jobs} jobs missed")
+    for each in (shares for way in found.values() for shares in way.shares):
+        took = ", ".join(f"{name} {share:.1%}" for name, share in each.items())
+        lines.append(f"of a processor: {took}")
+    return "\n".join(lines)
+
+
+def as_verdicts(found: Mapping[int, Mapping[str, WayRounds]]) -> list[str]:
+    """A line for each way: the rates that hold, and those that do not."""
+    lines = []
+    for name in next(iter(found.values()), {}):
+        held = [rate for rate, ways in found.items() if holds(name, ways[name])]
+        others = [rate for rate in found if rate not in held]
+        lines.append(f"{name}: nothing lost, late or missed at {in_hertz(held)}")
+        lines[-1] += f"; not so at {in_hertz(others)}" if others else ""
+    return lines
+
+
+def in_hertz(rates: Sequence[int]) -> str:
+    return f"{', '.join(map(str, rates))} Hz" if rates else "no rate"
+
+
+def holds(name: str, way: WayRounds) -> bool:
+    columns, task = in_columns({name: way})
+    return not any(each.lost or each.overflows for each in columns) and not any(
+        each.misses for each in task
+    )
+
+
+def row(name: str, channel: Channel, output_delay: str, lost: str) -> list[str]:
+    texts = [slashed(each, 2) for each in (channel.latency, channel.send, channel.receive)]
+    return [name, *texts, output_delay, channel.overflows, lost]
+
+
+def as_figures(rate: int, found: Mapping[str, WayRounds]) -> dict[str, object]:
+    columns, task = in_columns(found)
+    return {
+        "rate": rate,
+        "columns": [asdict(each) for each in columns],
+        "task_beside": [asdict(each) for each in task],
+        "shares": {name: way.shares for name, way in found.items() if way.shares},
+        "holds": {name: holds(name, way) for name, way in found.items()},
+    }
