@@ -117,7 +117,11 @@ def __getattr__(name: str) -> object:
     if name == "events":
         return import_module("catenary.bus.event")
     if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        from difflib import get_close_matches
+
+        near = get_close_matches(name, __all__, n=1)
+        guess = f"; did you mean {near[0]!r}?" if near and not name.startswith("_") else ""
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}{guess}", name=name)
     return getattr(import_module(_HOMES[name]), name)
 
 

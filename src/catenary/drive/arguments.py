@@ -23,7 +23,7 @@ ColumnSpec: TypeAlias = ChannelSpec | AxisObject
 Columns: TypeAlias = Sequence[str | tuple[str, ColumnSpec]] | Mapping[str, ColumnSpec]
 
 STATUSWORD = 0x6041
-EVERY_MAX = 10_000  # cycles: beyond, ask by SDO
+DIVIDER_MAX = 10_000  # cycles: beyond, ask by SDO
 MODES: dict[str, Mode] = {
     **{"csp": Mode.CSP, "csv": Mode.CSV, "cst": Mode.CST},
     **{"pp": Mode.PP, "pv": Mode.PV},  # the drive makes the trajectory
@@ -33,8 +33,12 @@ MODES: dict[str, Mode] = {
 
 def axis_sources(subs: Iterable[AxisSource]) -> list[tuple[SubDevice, int]]:
     """(SubDevice, slot) of every axis; a SubDevice alone stands for all of its slots."""
+    if not isinstance(subs, Iterable):
+        raise TypeError(f"Drives takes a list of SubDevices, such as subs.drives; not {subs!r}")
     sources: list[tuple[SubDevice, int]] = []
     for source in subs:
+        if not isinstance(source, tuple) and not hasattr(source, "slots"):
+            raise TypeError(f"an axis is a SubDevice or (SubDevice, slot), not {source!r}")
         if isinstance(source, tuple):
             sources.append(source)
         else:
@@ -160,8 +164,8 @@ def mode_of(name: str) -> Mode:
 
 def cycles_between(name: str, divider: int) -> int:
     """`divider` as a number of cycles."""
-    if not isinstance(divider, int) or not 1 <= divider <= EVERY_MAX:
-        raise ValueError(f"{name}={divider!r}: a whole number of cycles, 1 to {EVERY_MAX}")
+    if not isinstance(divider, int) or not 1 <= divider <= DIVIDER_MAX:
+        raise ValueError(f"{name}={divider!r}: a whole number of cycles, 1 to {DIVIDER_MAX}")
     return divider
 
 

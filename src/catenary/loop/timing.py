@@ -39,6 +39,8 @@ class Timing(Mapping[str, Mapping[str, float]]):
         self.scheduling = scheduling  # of the cycle thread; "virtual time"
 
     def __getitem__(self, phase: str) -> Mapping[str, float]:
+        if phase not in self._phases:
+            raise KeyError(f"no phase {phase!r} in these cycles; there are: {', '.join(self)}")
         return self._phases[phase]
 
     def __iter__(self) -> Iterator[str]:
