@@ -13,7 +13,9 @@ Names load when they are used: `import catenary` costs nothing and imports no Nu
 would keep a process from entering a network namespace.
 """
 
-TYPE_CHECKING = False  # of `typing`, which takes longer to import than all of this
+# False. Importing it from `typing` takes longer than all of this; Jedi would believe a plain False
+# and complete nothing.
+TYPE_CHECKING = not __name__
 
 if TYPE_CHECKING:
     from catenary import control, drive, errors, realtime, record, share, types, virtual

@@ -40,4 +40,4 @@ def test_all_of_it_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 def test_rates_are_numbers(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit, match="2"):
         main(["bench", "table", "tocabi", "--rates", "4000,x"])
-    assert "'x' is no number" in capsys.readouterr().err
+    assert "'x' is not a number" in capsys.readouterr().err

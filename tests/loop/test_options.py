@@ -48,7 +48,7 @@ def test_a_reference_clock_is_a_device() -> None:
 def test_a_group_of_options_has_its_class(arm: cat.Drives) -> None:
     with pytest.raises(TypeError, match=r"stop=None: must be a cat.StopPolicy\(\.\.\.\)"):
         cat.Loop(arm, stop=None)  # type: ignore[arg-type]
-    with pytest.raises(TypeError, match=r"clocks='main': must be a cat.ClockOptions"):
+    with pytest.raises(TypeError, match=r"clocks='main': must be a cat"):
         cat.Loop(arm, clocks="main")  # type: ignore[arg-type]
 
 
@@ -62,9 +62,9 @@ def test_a_loop_takes_requests(main: cat.MainDevice) -> None:
 
 def test_a_request_takes_devices(main: cat.MainDevice) -> None:
     servo = main.subs.drives[0]
-    with pytest.raises(TypeError, match="Drives takes a list of SubDevices, such as subs.drives"):
+    with pytest.raises(TypeError, match="Drives takes a list of SubDevices"):
         cat.Drives(servo, counts_per_turn=2**20)  # type: ignore[arg-type]
-    with pytest.raises(TypeError, match="an axis is a SubDevice or .* not 2"):
+    with pytest.raises(TypeError, match=r"an axis is a SubDevice or .* not 2"):
         cat.Drives([2], counts_per_turn=2**20)  # type: ignore[list-item]
     with pytest.raises(TypeError, match="Outputs takes SubDevices, such as"):
         cat.Outputs([main.subs[1]])  # type: ignore[arg-type]

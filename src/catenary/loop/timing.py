@@ -40,7 +40,8 @@ class Timing(Mapping[str, Mapping[str, float]]):
 
     def __getitem__(self, phase: str) -> Mapping[str, float]:
         if phase not in self._phases:
-            raise KeyError(f"no phase {phase!r} in these cycles; there are: {', '.join(self)}")
+            known = ", ".join(self) or "none"
+            raise KeyError(f"no phase {phase!r} in these cycles; there are: {known}")
         return self._phases[phase]
 
     def __iter__(self) -> Iterator[str]:
