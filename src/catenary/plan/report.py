@@ -141,7 +141,8 @@ def _sync(sync: SyncPlan) -> str:
     mode = f", OpMode {sync.op_mode!r}" * bool(sync.op_mode)
     return (
         f"SYNC0 every {sync.cycle_ns / 1e3:g} us{hidden}, "
-        f"{sync.shift_ns / 1e3:+g} us after the common SYNC0 time{second}, AssignActivate 0x{sync.assign_activate:04X}{mode}"
+        f"{sync.shift_ns / 1e3:+g} us after the common SYNC0 time{second}, "
+        f"AssignActivate 0x{sync.assign_activate:04X}{mode}"
     )
 
 
