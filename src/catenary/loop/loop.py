@@ -23,7 +23,7 @@ from catenary.loop.devices import DeviceWish, by_network
 from catenary.loop.laws.law import Law, LawFunction
 from catenary.loop.laws.law import law as made_law
 from catenary.loop.laws.run import LawRun, Numbers
-from catenary.loop.moves import Awaited, wait_for_move
+from catenary.loop.moves import Awaited, check_awaited, wait_for_move
 from catenary.loop.network import ENDING, TROUBLE, Network, Settings, leave_method
 from catenary.loop.networks import (
     NetworksIteration,
@@ -277,8 +277,10 @@ class Loop:
 
         Raises:
             MoveError: The move took too long, was replaced, or its axis was stopped.
+            TypeError: It is not a move.
             DriveError: A drive is in fault or was stopped; other errors of the iteration likewise.
         """
+        check_awaited(move)
         if self._background is None:
             wait_for_move(iter(self), move, timeout)
         else:

@@ -27,6 +27,15 @@ class Awaited(Protocol):
     def timeout_error(self, timeout: float) -> MoveError: ...
 
 
+def check_awaited(move: object) -> None:
+    """Raise TypeError for what is not a move, such as a time."""
+    if not hasattr(move, "timeout_error"):
+        raise TypeError(
+            f"wait takes a move, such as arm.move_to(0.5); not {move!r}. To let time pass, iterate "
+            "the loop, or in the background use time.sleep"
+        )
+
+
 def wait_for_move(cycles: Iterator[Cycle], move: Awaited, timeout: float | None) -> None:
     """Iterate until a move is done. See `Loop.wait`."""
     limit = move.patience if timeout is None else timeout
