@@ -27,6 +27,7 @@ def arm(main: cat.MainDevice) -> cat.Drives:
     [
         (lambda: cat.StopPolicy(lost_limit=0), "lost_limit=0: must be a whole number, at least 1"),
         (lambda: cat.StopPolicy(lost_limit=2.5), "lost_limit=2.5"),  # type: ignore[arg-type]
+        (lambda: cat.StopPolicy(lost_limit=math.inf), "lost_limit=inf"),  # type: ignore[arg-type]
         (lambda: cat.StopPolicy(handover=-1.0), "handover must be positive and finite"),
         (lambda: cat.StopPolicy(stop_deadline=math.inf), "stop_deadline=inf s"),
         (lambda: cat.StopPolicy(stop_deadline=-2.0), "stop_deadline=-2.0 s"),
@@ -73,7 +74,7 @@ def test_a_request_takes_devices(main: cat.MainDevice) -> None:
 
 
 def test_wait_takes_a_move(arm: cat.Drives) -> None:
-    with cat.Loop(arm) as loop, pytest.raises(TypeError, match="wait takes a move.* not 5"):
+    with cat.Loop(arm) as loop, pytest.raises(TypeError, match=r"wait takes a move.* not 5"):
         loop.wait(5)  # type: ignore[arg-type]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Literal
 
 from catenary.bus import SubDevice
@@ -167,7 +168,7 @@ class ClockOptions:
 
 def check_count(name: str, value: int, least: int) -> None:
     """Raise ValueError unless a value is an integer and at least `least`."""
-    if value != int(value) or value < least:
+    if not isinstance(value, Integral) or value < least:
         raise ValueError(f"{name}={value}: must be a whole number, at least {least}")
 
 
