@@ -73,11 +73,6 @@ def test_a_request_takes_devices(main: cat.MainDevice) -> None:
         cat.ProcessData(main.subs)  # type: ignore[arg-type]
 
 
-def test_wait_takes_a_move(arm: cat.Drives) -> None:
-    with cat.Loop(arm) as loop, pytest.raises(TypeError, match=r"wait takes a move.* not 5"):
-        loop.wait(5)  # type: ignore[arg-type]
-
-
 def test_a_phase_that_did_not_occur_is_named(arm: cat.Drives) -> None:
     with cat.Loop(arm) as loop:
         next(loop)

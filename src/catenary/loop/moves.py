@@ -27,13 +27,10 @@ class Awaited(Protocol):
     def timeout_error(self, timeout: float) -> MoveError: ...
 
 
-def check_awaited(move: object) -> None:
-    """Raise TypeError for what is not a move, such as a time."""
-    if not hasattr(move, "timeout_error"):
-        raise TypeError(
-            f"wait takes a move, such as arm.move_to(0.5); not {move!r}. To let time pass, iterate "
-            "the loop, or in the background use time.sleep"
-        )
+def require_move(move: object) -> None:
+    """Raise TypeError for anything that is not a move."""
+    if not hasattr(move, "patience"):
+        raise TypeError(f"loop.wait() takes a move, such as arm.move_to() returns, not {move!r}")
 
 
 def wait_for_move(cycles: Iterator[Cycle], move: Awaited, timeout: float | None) -> None:
@@ -42,8 +39,9 @@ def wait_for_move(cycles: Iterator[Cycle], move: Awaited, timeout: float | None)
     begun: float | None = None
     while not move.done:
         cycle = next(cycles)
-        begun = cycle.time if begun is None else begun
-        if not move.done and cycle.time - begun > limit:
+        now = max(each.time for each in cycle.networks)  # that of a dead one may stand still
+        begun = now if begun is None else begun
+        if not move.done and now - begun > limit:
             raise stopped_late(move, limit)
     if move.error is not None:
         raise move.error
