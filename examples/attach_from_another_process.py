@@ -6,11 +6,12 @@ python examples/attach_from_another_process.py arm    # with yours: cat.Share("a
 
 import multiprocessing
 import sys
+from multiprocessing.synchronize import Event
 
 import catenary as cat
 
 
-def move(name, started):
+def move(name: str, started: Event) -> None:
     """The loop: two axes in virtual time; other processes may command them."""
     with cat.MainDevice(cat.Segment([cat.virtual.Servo(), cat.virtual.Servo()])) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=2.0)
@@ -20,10 +21,11 @@ def move(name, started):
                 next(loop)
 
 
-def read_and_command(name):
+def read_and_command(name: str) -> None:
     with cat.attach(name) as arm, arm.lease(axes=[0], for_=30.0) as command:
-        while arm.wait(timeout=10.0) and (now := arm.read())["position"][0] < 0.1:
-            command.send(position=now["commanded_position"][:1] + 1e-4)
+        while arm.wait(timeout=10.0) and arm.read()["position"][0] < 0.1:
+            command.send(position=arm.read()["commanded_position"][:1] + 1e-4)
+        now = arm.read()
         print(f"cycle {now['number']}: {arm.layout.axes[0]} at {now['position'][0]:.3f} rad")
         rows, lost = arm.rows(after=now["number"] - 100)
         print(f"{len(rows)} cycles, {lost} lost, fastest {rows['velocity'][:, 0].max():.2f} rad/s")
@@ -31,10 +33,11 @@ def read_and_command(name):
 
 if __name__ == "__main__":
     if len(sys.argv) > 1:
-        sys.exit(read_and_command(sys.argv[1]))
-    started = multiprocessing.Event()
-    robot = multiprocessing.Process(target=move, args=("example", started), daemon=True)
-    robot.start()
-    started.wait(60.0)
-    read_and_command("example")
-    robot.join()
+        read_and_command(sys.argv[1])
+    else:
+        started = multiprocessing.Event()
+        robot = multiprocessing.Process(target=move, args=("example", started), daemon=True)
+        robot.start()
+        started.wait(60.0)
+        read_and_command("example")
+        robot.join()

@@ -2,6 +2,9 @@
 
 import sys
 from collections.abc import Callable
+from functools import partial
+
+import numpy as np
 
 import catenary as cat
 
@@ -39,10 +42,10 @@ if __name__ == "__main__":
                     queue.add("home", goal.copy)
                     for axis in range(len(arm)):
                         queue.add(
-                            f"axis {axis}", lambda i=axis: goal.__setitem__(i, goal[i] + 1e-3)
+                            f"axis {axis}", partial(goal.__setitem__, axis, goal[axis] + 1e-3)
                         )
                     queue.execute()  # all axes begin in the same cycle
                 arm.target.position[:] = goal
                 if cycle.number == 200:
                     break
-            print("moved by", (arm.actual.position - queue.read("home")).round(4))
+            print("moved by", (arm.actual.position - np.asarray(queue.read("home"))).round(4))

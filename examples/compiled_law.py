@@ -4,12 +4,13 @@ Needs Numba: pip install 'catenary[law]'. The gains can be changed while it runs
 """
 
 import sys
+from typing import Any
 
 import catenary as cat
 
 
-@cat.law
-def pd(actual, target, memory, time, parameters):  # plain Python here, compiled on the robot
+@cat.law  # plain Python here, compiled on the robot
+def pd(actual: Any, target: Any, memory: Any, time: float, parameters: Any) -> bool:
     for i in range(actual.n):
         error = memory[i] - actual.position[i]
         target.torque[i] = parameters[0] * error - parameters[1] * actual.velocity[i]
@@ -21,7 +22,7 @@ with cat.MainDevice(sys.argv[1] if len(sys.argv) > 1 else "virtual") as main:
     with cat.Loop(arm, period=1e-3, laws=[pd]) as loop:  # compiled before the devices go to OP
         goal = arm.actual.position + 0.5  # [rad]
         run = loop.start(pd, memory=goal, parameters=[4.0, 0.2])  # N·m/rad, N·m/(rad/s)
-        for cycle in loop:  # only to watch: the law needs nobody
+        for cycle in loop:  # only to watch: the law goes on by itself
             if cycle.number == 1000:
                 run.parameters = [8.0, 0.4]  # both at once
             if not run.running:

@@ -20,7 +20,7 @@ with MasterBase(target, period=PERIOD_NS * 1e-9) as master:
         master.ecat_init_slave(servo)
     master.ecat_activate_domain()
     master.ecat_activate_master()
-    in_python, goals = [], {}
+    in_python, goals = [], dict[SlaveServo, int]()
     for cycle in range(CYCLES):
         master.wait()
         master.ecat_master_receive()

@@ -19,7 +19,7 @@ from benchmarks.soak.faults import Incident, draw
 from benchmarks.soak.objects import Objects
 from benchmarks.soak.setting import Setting
 from benchmarks.soak.witness import CLOCK_BOUND, OP, Phase, Violation, Witness
-from catenary.bus.event import AxisStopped, DeviceHeld, DeviceReplaced
+from catenary.bus.event_types import AxisStopped, DeviceHeld, DeviceReplaced
 from catenary.bus.sub_device import SubDevice
 from catenary.errors import CatenaryError
 from catenary.model.device import Identity

@@ -13,7 +13,9 @@ Names load when they are used: `import catenary` costs nothing and imports no Nu
 would keep a process from entering a network namespace.
 """
 
-TYPE_CHECKING = False  # of `typing`, which takes longer to import than all of this
+# False. Importing it from `typing` takes longer than all of this; Jedi would believe a plain False
+# and complete nothing.
+TYPE_CHECKING = not __name__
 
 if TYPE_CHECKING:
     from catenary import control, drive, errors, realtime, record, share, types, virtual
@@ -117,7 +119,11 @@ def __getattr__(name: str) -> object:
     if name == "events":
         return import_module("catenary.bus.event_types")
     if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        from difflib import get_close_matches
+
+        near = get_close_matches(name, __all__, n=1)
+        guess = f"; did you mean {near[0]!r}?" if near and not name.startswith("_") else ""
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}{guess}", name=name)
     return getattr(import_module(_HOMES[name]), name)
 
 

@@ -153,9 +153,13 @@ def test_plot_says_what_is_wrong(recording: Path, capsys: pytest.CaptureFixture[
     status, _, err = call(f"plot {recording} --axis elbow", capsys)
     assert status == 1
     assert err == "catenary: cell-1 has no axis 'elbow'\n  hint: it has joint0, joint1\n"
+    status, _, err = call(f"plot {recording} --start 99", capsys)
+    assert status == 2
+    assert err.startswith(f"catenary: {recording} has no cycles in that time")
+    assert not recording.with_suffix(".png").exists()
     recording.write_text("text")
     status, _, err = call(f"plot {recording}", capsys)
-    assert (status, "is no MCAP file" in err) == (1, True)
+    assert (status, "is not an MCAP file" in err) == (1, True)
 
 
 def test_without_matplotlib_the_extra_is_named(

@@ -121,6 +121,12 @@ def test_an_alias_that_another_device_will_have_is_refused_too(
         ("state virtual OP -p 6", 2, "the segment has 6"),
         ("reg read virtual 6 AL_STATUS", 2, "the segment has 6"),
         ("reg read virtual 2 alstatis", 2, "near it: AL status"),
+        ("reg read virtual 2 alstatis", 2, "or give its address"),
+        (
+            "reg read virtual 2 UNKNOWN",
+            2,
+            "FMMU 0 to 15; SyncManager 0 to 15; SyncManager 0 to 15 status;",
+        ),
         ("reg read virtual 2 0x0131", 2, "say how many bytes"),
         ("reg read virtual 2 013A", 2, "write 0x013A"),
         ("reg read virtual 2 AL_STATUS 4", 2, "has 2 bytes, not 4"),
@@ -149,9 +155,9 @@ def test_mistakes_name_the_thing(
     [
         ("state virtual RUN", "invalid state 'RUN': INIT, PRE-OP, BOOT, SAFE-OP, OP"),
         ("reg read virtual 2", "the following arguments are required: ADDRESS"),
-        ("reg read virtual two AL_STATUS", "'two' is no number"),
+        ("reg read virtual two AL_STATUS", "'two' is not a number"),
         ("alias virtual 2 100000", "alias 100000 is outside 0 to 65535"),
-        ("alias virtual 2 abc", "'abc' is no number"),
+        ("alias virtual 2 abc", "'abc' is not a number"),
     ],
 )
 def test_a_wrong_command_line_says_where_the_help_is(

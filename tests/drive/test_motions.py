@@ -9,7 +9,7 @@ from catenary.drive.port import AxisPort, Steps
 from catenary.drive.profile import Rates
 from catenary.drive.units import AxisUnits
 from catenary.errors import MoveError, SdoAbort
-from catenary.plan.wish import WishTables
+from catenary.plan.request import WishTables
 from catenary.wire.cia402 import Mode
 from tests.core.rig import axis
 from tests.drive.fakes import views_of

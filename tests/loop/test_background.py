@@ -22,7 +22,7 @@ import pytest
 
 import catenary as cat
 from catenary.errors import CatenaryError, DriveError, LoopError, MoveError
-from catenary.loop.running import Running
+from catenary.loop.session import Running
 from catenary.realtime import VirtualClock
 from catenary.types import SINT
 from catenary.virtual import Segment, Servo

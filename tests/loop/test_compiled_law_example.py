@@ -20,7 +20,7 @@ def test_it_arrives() -> None:
     assert len(errors) == 3
     assert all(abs(error) < 0.01 for error in errors)
     assert lines[-3] == "5004 cycles: 0 late, 0 uncommitted, 0 underrun, 0 lost"
-    assert lines[-1] == "No cycle was late, uncommitted, empty or lost."
+    assert lines[-1] == "No cycle was late, uncommitted, underrun or lost."
 
 
 def test_it_is_short() -> None:

@@ -12,11 +12,11 @@ import catenary as cat
 from catenary.bus import MainDevice
 from catenary.core import CYCLE_STOPPED
 from catenary.drive import Drives, ProcessData
-from catenary.loop.running import Running
 from catenary.loop.safe_outputs import confirm_safe
+from catenary.loop.session import Running
 from catenary.loop.signals import SignalGuard
 from catenary.plan.cycle import ExecutionMode
-from catenary.plan.wish import Views
+from catenary.plan.request import Views
 from catenary.realtime import VirtualClock
 from catenary.virtual import Coupler, Segment, Servo
 from catenary.virtual.faults import power_cycle

@@ -38,7 +38,7 @@ def test_the_table_shows_every_figure_the_counts_and_the_verdict() -> None:
     assert head.split() == ["[us]", "mean", "max", "min", "sd", "p50", "p99", "p99.9"]
     assert row.split() == ["lateness", "5.25", "9.00", "4.00", "0.50", "5.00", "8.00", "8.90"]
     assert counts == "10 cycles: 0 late, 0 uncommitted, 0 underrun, 0 lost"
-    assert verdict == "No cycle was late, uncommitted, empty or lost."
+    assert verdict == "No cycle was late, uncommitted, underrun or lost."
 
 
 def test_each_kind_has_a_line_of_its_own() -> None:

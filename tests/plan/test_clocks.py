@@ -347,7 +347,7 @@ def test_all_start_at_a_common_beat_far_enough_ahead() -> None:
 
 def test_it_prints() -> None:
     text = str(planned(cell(), 2, 3))
-    assert "reference clock: device 0 (Coupler); the wake-up follows it" in text
-    assert "SYNC0 every 1000 us, +0 us to the beat, AssignActivate 0x0300" in text
-    assert "us before the beat: 200 us until the frames" in text
+    assert "reference clock: device 0 (Coupler); the cycle start follows it" in text
+    assert "SYNC0 every 1000 us, +0 us after the common SYNC0 time, AssignActivate 0x0300" in text
+    assert "us before SYNC0: margin 200 us" in text
     assert "time constant 100 ms, at most 1000 ppm of the period" in text

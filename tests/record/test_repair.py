@@ -215,7 +215,7 @@ def test_what_is_no_recording_is_refused(tmp_path: Path, content: bytes) -> None
 def test_repair_does_not_touch_what_is_no_mcap_file(tmp_path: Path) -> None:
     path = tmp_path / "thesis.txt"
     path.write_text("three years of work")
-    with pytest.raises(RecordingError, match="is no MCAP file"):
+    with pytest.raises(RecordingError, match="is not an MCAP file"):
         repair(path)
     assert path.read_text() == "three years of work"
 

@@ -103,7 +103,7 @@ def test_the_plan_shows_the_op_mode() -> None:
     with cell_with(*EL3702, by_sync1=True) as cell:
         drives = cell.drives(dc=cat.DistributedClock(op_mode="dcsync4"))
         text = str(cell.main.plan(drives, period=1e-3))
-        assert "SYNC0 every 250 us, -10 us to the beat, SYNC1 750 us later" in text
+        assert "SYNC0 every 250 us, -10 us after the common SYNC0 time, SYNC1 750 us later" in text
         assert "AssignActivate 0x0730, OpMode 'DcSync4'" in text
 
 

@@ -238,7 +238,7 @@ def test_what_several_networks_cannot_have(body: Body) -> None:
         cat.Loop(upper, lower, execution="inline")
     with pytest.raises(ValueError, match="quorum"):
         cat.Loop(upper, lower, scheduling=cat.Scheduling(quorum=3))
-    with pytest.raises(ValueError, match="one wish with devices of several"):
+    with pytest.raises(ValueError, match="one request with devices of several"):
         both = [body.upper_main.subs[1], body.lower_main.subs[2]]
         cat.Loop(cat.Drives(both, counts_per_turn=2**20, velocity_limit=100.0))
 

@@ -16,8 +16,21 @@ def test_every_public_name_is_there(name: str) -> None:
 
 
 def test_an_unknown_name_is_an_attribute_error() -> None:
-    with pytest.raises(AttributeError, match="Drivez"):
+    with pytest.raises(AttributeError, match="'Drivez'; did you mean 'Drives'"):
         _ = cat.Drivez
+
+
+def test_editors_complete_the_names() -> None:
+    jedi = pytest.importorskip("jedi", reason="pip install jedi")
+    code = 'import catenary as cat\ncat.MainDevice("eth0").'
+    names = {each.name for each in jedi.Script(code).complete(2, len(code.splitlines()[1]))}
+    assert {"scan", "plan", "passive_scan"} <= names
+
+
+def test_a_target_is_a_name_or_a_segment() -> None:
+    for wrong in (0, None, cat.Segment):
+        with pytest.raises(TypeError, match='a target is a name such as "eth0", or a Segment'):
+            cat.MainDevice(wrong)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

@@ -90,6 +90,7 @@ class MainDevice:
 
     @property
     def is_open(self) -> bool:
+        """True while the link is open."""
         return self._link is not None
 
     @property
@@ -185,15 +186,21 @@ class MainDevice:
             self._callbacks.close()
 
     def on_event(self, callback: Callback) -> None:
-        """Lets `callback(event)` be called for every event from now on, beside `events`: in a
-        thread of its own, which may read and write objects; in virtual time in the thread that
-        spends the time, between two steps. What it raises is logged."""
+        """Call `callback(event)` for every event from now on, in addition to `events`.
+
+        It runs in a thread of its own, which may read and write objects; in virtual time in the
+        thread that spends the time, between two steps. Its exceptions are logged.
+        """
         self._callbacks.add(callback)
 
     def mark(self, message: str, *, time: float | None = None) -> None:
-        """Put a `Marker` among the events, and so into what is shared and recorded. Never waits;
-        any thread may call it. `time` [s]: when it was, on the link's clock (`time.monotonic()` on
-        a NIC), which other threads know, too; None: now."""
+        """Put a `Marker` among the events. It is shared and recorded like them. Never waits; any
+        thread may call it.
+
+        Args:
+            message: text of the marker.
+            time: [s] on the link's clock (`time.monotonic()` on a NIC). None: now.
+        """
         when = self.link.now() * 1e-9 if time is None else float(time)
         self.events.put(event_types.Marker(when, None, message))
 
@@ -210,13 +217,20 @@ class MainDevice:
         """Find all devices and bring them to PRE-OP. The handles of devices that are still
         there stay the same objects.
 
-        `expected`: by position, an identity or (vendor, product); None: whatever it is.
-        A device that cannot be read or brought there does not keep the others from it. `strict`:
-        its error is raised then, with those of further ones as notes, and `subs` has all handles;
-        else it is in `SubDevice.error`, and raised when the device is used.
+        A device that cannot be read or brought to PRE-OP does not stop the others. Devices that a
+        killed program left in SAFE-OP or OP are reset; `notes` names them.
 
-        Raises LinkError if another master refreshes the outputs of a device, unless `force`.
-        Devices that a killed program left in SAFE-OP or OP are reset; `notes` names them.
+        Args:
+            expected: by position, an identity or (vendor, product); None: any device.
+            strict: raise the error of a device, with those of further devices as notes. `subs` has
+                all handles then, too. False: it is in `SubDevice.error`, and is raised when the
+                device is used.
+
+        Raises:
+            LinkError: another master refreshes the outputs of a device, unless `force`.
+            NoDeviceError: no device answers.
+            IdentityError: a device is not the expected one.
+            SegmentError: the number of devices is not the expected one.
         """
         subs, self.notes = self.master.scan()
         self.subs = SubDevices(subs)
@@ -276,10 +290,21 @@ class MainDevice:
         optional: Collection[int] = (),
         watchdog: float | None = None,
     ) -> Plan:
-        """The plan that fulfils the wishes, from what the devices have mapped now. In PRE-OP;
-        nothing is written. MappingError names an object that cannot be. `watchdog` as of `Loop`.
+        """Return the plan for these requests, from the mapping that the devices have now. Print it.
 
-        For more to choose: `read_mappings`, then `catenary.plan.make_plan`.
+        The devices must be in PRE-OP. Nothing is written. For further options use `read_mappings`,
+        then `catenary.plan.make_plan`.
+
+        Args:
+            wishes: `Drives`, `Inputs`, `Outputs` and other process-data requests.
+            period: of the cycle [s].
+            execution: "threaded" or "inline", as for `Loop`.
+            receive_mode: "poll", "wait" or "busy", as `Scheduling.receive`.
+            optional: positions of devices that may be absent.
+            watchdog: as for `Loop` [s].
+
+        Raises:
+            MappingError: a device cannot map an object.
         """
         from catenary.plan.planner import make_plan
 

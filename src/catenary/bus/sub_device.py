@@ -19,7 +19,10 @@ if TYPE_CHECKING:
 
 
 class SubDevice:
-    """Owns what is known of one device. Attributes never cause traffic; calls with a verb do."""
+    """Handle of one device, such as `main.scan()[2]`. It stays valid across scans.
+
+    Attributes never cause traffic; calls with a verb do. `sub.sdo` reads and writes its objects.
+    """
 
     def __init__(
         self, main: MainDevice, description: DeviceDescription, channel: MailboxChannel | None
@@ -34,10 +37,12 @@ class SubDevice:
 
     @property
     def position(self) -> int:
+        """Place on the cable; 0 is the first device."""
         return self.description.position
 
     @property
     def name(self) -> str:
+        """Name in its SII, such as "EL2004"; empty if there is none."""
         return self.description.name
 
     @property
@@ -47,6 +52,7 @@ class SubDevice:
 
     @property
     def identity(self) -> Identity:
+        """Vendor, product, revision and serial number."""
         return self.description.identity
 
     @property
@@ -56,7 +62,7 @@ class SubDevice:
 
     @property
     def is_drive(self) -> bool:
-        """Whether it has CiA 402 axes."""
+        """True if it has CiA 402 axes."""
         return self.description.is_drive
 
     @property
@@ -71,12 +77,13 @@ class SubDevice:
 
     @property
     def emergencies(self) -> tuple[Emergency, ...]:
-        """The last emergencies it sent, whoever read them; oldest first."""
+        """The last emergencies that it sent; oldest first."""
         heard = self.channel.emergencies if self.channel is not None else ()
         return tuple(each.emergency for each in heard)
 
     @property
     def station(self) -> Station:
+        """Station address, with position and name for messages."""
         return Station(self.position, self.description.station_address, self.name)
 
     def read_state(self) -> DeviceState:

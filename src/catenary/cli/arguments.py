@@ -23,7 +23,7 @@ def number(text: str) -> int:
         return int(text, 0)
     except ValueError:
         raise argparse.ArgumentTypeError(
-            f"{text!r} is no number (decimal, or hexadecimal as 0x1F)"
+            f"{text!r} is not a number (decimal, or hexadecimal as 0x1F)"
         ) from None
 
 
@@ -80,7 +80,7 @@ def _positive_time(text: str, unit: str) -> float:
     try:
         value = float(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number of {unit}") from None
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of {unit}") from None
     if not 0.0 < value < 1e6:
         raise argparse.ArgumentTypeError(f"{text} {unit} is not between 0 and a million")
     return value
@@ -102,7 +102,7 @@ def seconds(text: str) -> float:
     try:
         value = float(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number of seconds") from None
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds") from None
     if not 0.0 <= value < 1e9:
         raise argparse.ArgumentTypeError(f"{text} s is not between 0 and a thousand million")
     return value

@@ -52,6 +52,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     open_file = read_csv if Path(arguments.file).suffix.lower() == ".csv" else read
     recording = open_file(arguments.file, start=arguments.start, end=arguments.end)
+    if not len(recording):
+        raise UsageError(f"{arguments.file} has no cycles in that time", hint="see --start, --end")
     plot(
         recording,
         output,

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
 from catenary.cli.arguments import number, positive_number
@@ -110,7 +112,7 @@ def run_write(arguments: argparse.Namespace) -> int:
 
 def place(text: str, size: int | None) -> tuple[int, int | None, AnyRegister | None]:
     """Address, size (None: unknown) and the register that is meant, where one is known."""
-    from catenary.wire.register_names import at_address, by_name, names
+    from catenary.wire.register_names import at_address, by_name, names, near
 
     if text[:1].isdigit():
         try:
@@ -122,10 +124,24 @@ def place(text: str, size: int | None) -> tuple[int, int | None, AnyRegister | N
     try:
         register = by_name(text)
     except ValueError as error:
-        raise UsageError(str(error), hint=f"names: {', '.join(names())}") from error
+        hint = "or give its address, such as 0x0130"
+        if not near(text):
+            hint = f"names: {'; '.join(numbered(names()))}"
+        raise UsageError(str(error), hint=hint) from error
     if size not in (None, register.size):
         raise UsageError(f"{register} has {register.size} bytes, not {size}", hint="leave SIZE out")
     return register.address, register.size, register
+
+
+def numbered(names: Iterable[str]) -> Iterator[str]:
+    """Yield names in their order; "FMMU 0" to "FMMU 15" as one: "FMMU 0 to 15"."""
+    families: dict[str, list[str]] = {}
+    for name in names:
+        families.setdefault(re.sub(r" \d+(?= |$)", " #", name), []).append(name)
+    for family, members in families.items():
+        numbers = [int(each) for name in members for each in re.findall(r" (\d+)(?= |$)", name)]
+        several = len(members) > 1
+        yield family.replace("#", f"{min(numbers)} to {max(numbers)}") if several else members[0]
 
 
 def value_bytes(text: str, size: int | None, address: int) -> bytes:

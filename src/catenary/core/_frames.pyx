@@ -65,7 +65,7 @@ cdef enum:
     HEADER = CAT_DATAGRAM_HEADER
     CYCLE_INDICES = 0x80       # indices from here on belong to the acyclic queue
     DRAIN_MAX = 256            # frames taken in one collect: a flood cannot delay the cycle
-    EVERY_MAX = 10000
+    DIVIDER_MAX = 10000
     MISSED_MAX = 1000000000
     NUMBER_SIZE = 4            # of the data of a cycle number
 
@@ -531,7 +531,7 @@ cdef class Frames:
               f"frame {number}: {len(template)} bytes, must be {CAT_FRAME_MIN} to {CAT_FRAME_MAX}")
         check(template[12:14] == b"\x88\xa4", f"frame {number}: EtherType is not 0x88A4")
         check(len(frame.datagrams) > 0, f"frame {number}: no datagrams")
-        check(1 <= frame.divider <= EVERY_MAX and 0 <= frame.phase < frame.divider,
+        check(1 <= frame.divider <= DIVIDER_MAX and 0 <= frame.phase < frame.divider,
               f"frame {number}: divider {frame.divider}, phase {frame.phase}")
         check(number > 0 or frame.divider == 1, "frame 0 goes out in every cycle")
         payload = int.from_bytes(template[14:16], "little")

@@ -11,6 +11,7 @@ import numpy as np
 
 from catenary.demo.plot import Bucket, Line, histogram, line_plot
 from catenary.demo.result import PHASES, Device, Result
+from catenary.demo.text import longer
 from catenary.figures import FIGURES, heading
 from catenary.loop.verdict import COUNTED
 
@@ -21,7 +22,7 @@ SHOWN_POINTS = 400  # of each line
 HEADINGS = {"in_controller": "in controller", "round_trip": "round trip"}
 MEANING = {
     "period": "from one wake-up to the next",
-    "lateness": "woken after the planned instant",
+    "lateness": "cycle start → wake-up",
     "receive": "woken → inputs usable",
     "process": "the Python body of the loop",
     "send": "body done → frame sent",
@@ -132,7 +133,7 @@ def motion(result: Result) -> str:
         f"<figure>{error_plot}<figcaption><b>Tracking error</b>: actual position minus the "
         f"set-point that had reached the drive. The transport delay is "
         f"{result.transport_delay * 1e3:g} ms: from writing a set-point to reading the first "
-        f"position that it has moved. {key(result)}</figcaption></figure>"
+        f"position that it has moved{longer(result)}. {key(result)}</figcaption></figure>"
     )
 
 

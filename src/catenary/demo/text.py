@@ -26,9 +26,15 @@ def closing_lines(result: Result) -> str:
         f"  tracking error {error['rms'] * 1e3:.2f} mrad rms, {error['max'] * 1e3:.2f} mrad max, "
         "against the set-point that had reached the drive\n"
         f"  transport delay {result.transport_delay * 1e3:g} ms, from writing a set-point to "
-        "reading the first position that it has moved\n"
+        f"reading the first position that it has moved{longer(result)}\n"
         f"  scheduling {result.scheduling}; link {result.link}"
     )
+
+
+def longer(result: Result) -> str:
+    """Return a note on set-points that came late: they are part of the tracking error."""
+    late = result.timing.counters.get("uncommitted", 0)
+    return f"; longer in {late} uncommitted cycles" if late else ""
 
 
 class ProgressBar:

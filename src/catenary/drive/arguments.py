@@ -13,8 +13,8 @@ from catenary.drive.channel import Channel, ChannelSpec, make_channel
 from catenary.drive.objects import NAMED_COLUMNS, WRITTEN_OBJECTS, AxisObject
 from catenary.model.device import mapped_entries
 from catenary.plan.cycle import NumberKind
+from catenary.plan.request import DistributedClock, ObjectReference, WrittenPdo
 from catenary.plan.start_up_object import StartUp
-from catenary.plan.wish import DistributedClock, ObjectReference, WrittenPdo
 from catenary.wire.cia402 import Mode
 
 AxisSource: TypeAlias = SubDevice | tuple[SubDevice, int]
@@ -24,7 +24,7 @@ ColumnSpec: TypeAlias = ChannelSpec | AxisObject
 Columns: TypeAlias = Sequence[str | tuple[str, ColumnSpec]] | Mapping[str, ColumnSpec]
 
 STATUSWORD = 0x6041
-EVERY_MAX = 10_000  # cycles: beyond, ask by SDO
+DIVIDER_MAX = 10_000  # cycles: beyond, ask by SDO
 MODES: dict[str, Mode] = {
     **{"csp": Mode.CSP, "csv": Mode.CSV, "cst": Mode.CST},
     **{"pp": Mode.PP, "pv": Mode.PV},  # the drive makes the trajectory
@@ -34,8 +34,12 @@ MODES: dict[str, Mode] = {
 
 def axis_sources(subs: Iterable[AxisSource]) -> list[tuple[SubDevice, int]]:
     """(SubDevice, slot) of every axis; a SubDevice alone stands for all of its slots."""
+    if not isinstance(subs, Iterable):
+        raise TypeError(f"Drives takes a list of SubDevices, such as subs.drives; not {subs!r}")
     sources: list[tuple[SubDevice, int]] = []
     for source in subs:
+        if not isinstance(source, tuple) and not hasattr(source, "slots"):
+            raise TypeError(f"an axis is a SubDevice or (SubDevice, slot), not {source!r}")
         if isinstance(source, tuple):
             sources.append(source)
         else:
@@ -177,8 +181,8 @@ def mode_of(name: str) -> Mode:
 
 def cycles_between(name: str, divider: int) -> int:
     """`divider` as a number of cycles."""
-    if not isinstance(divider, int) or not 1 <= divider <= EVERY_MAX:
-        raise ValueError(f"{name}={divider!r}: a whole number of cycles, 1 to {EVERY_MAX}")
+    if not isinstance(divider, int) or not 1 <= divider <= DIVIDER_MAX:
+        raise ValueError(f"{name}={divider!r}: a whole number of cycles, 1 to {DIVIDER_MAX}")
     return divider
 
 

@@ -255,6 +255,7 @@ class Drives(Request):
 
     @property
     def names(self) -> tuple[str, ...]:
+        """Name of each axis: in errors, events and logs."""
         return tuple(axis.name for axis in self._axes)
 
     @property

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from catenary.drive.motions import HALT, OWN_BITS
 from catenary.drive.port import AxisPort, Complaint, Steps
 from catenary.errors import CatenaryError, MoveError
-from catenary.plan.wish import Mover
+from catenary.plan.request import Mover
 from catenary.wire.cia402 import Mode
 
 Outcome: TypeAlias = Literal["reached", "stopped", "replaced", "failed"]
@@ -139,7 +139,7 @@ class Moves:
             return part.port.position if part.mode == Mode.PP else None
         return part.goal
 
-    # plan.wish.Mover
+    # plan.request.Mover
 
     def step(self, now: float) -> None:
         """Compute one step of each axis that moves, at the time of the cycle [s]."""

@@ -50,8 +50,8 @@ class Clocks:
 
     @property
     def locked(self) -> bool:
-        """Whether all differences and the phase of the instants are within the bound, as far as the
-        reference clock is heard: never while some are behind the cut of a ring."""
+        """True if all differences and the phase of the cycle starts are within the bound. Never
+        while devices are cut off from the reference clock by a ring that is open."""
         return bool(self._clock.figures()["locked"]) and self._cut is None
 
     @property
@@ -81,7 +81,7 @@ class Clocks:
 
     @property
     def phase_error(self) -> float:
-        """How late the instants are in the reference's time [s]; where the reference follows the
+        """Lateness of the cycle starts in the reference's time [s]; if the reference follows the
         MainDevice, how far it is ahead. A mean over some 16 cycles."""
         return self._clock.figures()["mean_error"] * NS
 
@@ -153,7 +153,7 @@ class Clocks:
         state = "locked" if self.locked else "not locked"
         lines = [
             f"clocks {state} within {self.bound * 1e6:g} us; reference: {self.reference.station}",
-            f"phase of the instants {self.phase_error * 1e6:+.3f} us, at most "
+            f"phase of the cycle starts {self.phase_error * 1e6:+.3f} us, at most "
             f"{self.largest_phase_error * 1e6:.3f} us; rate {self.rate * 1e6:+.2f} ppm",
         ]
         largest = self.largest_differences
@@ -197,7 +197,9 @@ class Clocks:
             return f"{self.reference.station}, the reference clock, does not answer"
         sub, difference = self._worst()
         if sub is self.reference:
-            return f"the instants are {difference * 1e6:+.3f} us off the reference clock's phase"
+            return (
+                f"the cycle starts are {difference * 1e6:+.3f} us off the reference clock's phase"
+            )
         if difference == float("inf"):
             return f"{sub.station} has not told its difference"
         return f"{sub.station} is {difference * 1e6:+.3f} us off {self.reference.station}"

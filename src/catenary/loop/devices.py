@@ -1,4 +1,4 @@
-"""From wishes to the one MainDevice they are about."""
+"""From requests to their MainDevices."""
 
 from __future__ import annotations
 
@@ -8,9 +8,12 @@ from typing import Protocol
 from catenary.bus import MainDevice, SubDevice
 from catenary.plan.request import Wish
 
+REQUESTS = "Drives, Inputs, Outputs or ProcessData"
+PARTS = ("subs", "pdos", "tables", "bind")  # of a DeviceWish
+
 
 class DeviceWish(Wish, Protocol):
-    """A wish that knows whom it is about."""
+    """A request that names its devices."""
 
     @property
     def subs(self) -> Sequence[SubDevice]: ...
@@ -26,14 +29,21 @@ def by_network(wishes: Sequence[DeviceWish]) -> list[tuple[MainDevice, list[Devi
     """The wishes of each MainDevice, in the order of its first one."""
     networks: dict[int, tuple[MainDevice, list[DeviceWish]]] = {}
     for wish in wishes:
+        check_request(wish)
         mains = {id(sub.main): sub.main for sub in wish.subs}
         if len(mains) > 1:
             raise ValueError(
-                "one wish with devices of several MainDevices: make one for each, and give the "
+                "one request with devices of several MainDevices: make one for each, and give the "
                 "Loop both"
             )
         for key, main in mains.items():
             networks.setdefault(key, (main, []))[1].append(wish)
     if not networks:
-        raise ValueError("a Loop needs a wish: Drives, Inputs or Outputs")
+        raise ValueError(f"a Loop needs a process-data request: {REQUESTS}")
     return list(networks.values())
+
+
+def check_request(request: object) -> None:
+    """Raise TypeError for what is not a process-data request, such as a SubDevice."""
+    if isinstance(request, type) or not all(hasattr(request, name) for name in PARTS):
+        raise TypeError(f"a Loop takes process-data requests ({REQUESTS}), not {request!r}")

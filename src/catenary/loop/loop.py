@@ -33,7 +33,7 @@ from catenary.loop.networks import (
     leave_all,
     share_time,
 )
-from catenary.loop.options import ClockOptions, Scheduling, StopPolicy, one_of
+from catenary.loop.options import ClockOptions, Scheduling, StopPolicy, check_groups, one_of
 from catenary.loop.publishing import one_sink_each
 from catenary.loop.session import Session, take_down
 from catenary.loop.signals import SignalGuard
@@ -101,6 +101,7 @@ class Loop:
         log_axes: bool = False,
     ) -> None:
         one_of("execution", execution, ("threaded", "inline"))
+        check_groups(stop, scheduling, clocks)
         period_in_ns(period)
         if scheduling.busy_wait >= period:
             raise ValueError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Literal
 
 from catenary.bus import SubDevice
@@ -63,6 +64,11 @@ class StopPolicy:
             raise ValueError(
                 f"late_limit={self.late_limit} s: must be 0 (never) or a positive time"
             )
+        if not 0 < self.handover < math.inf:
+            raise ValueError(f"handover must be positive and finite [s], not {self.handover}")
+        if not 0 <= self.stop_deadline < math.inf:
+            raise ValueError(f"stop_deadline={self.stop_deadline} s: must be 0 or a positive time")
+        check_count("lost_limit", self.lost_limit, 1)
         if self.command_timeout is not None and not 0 < self.command_timeout < math.inf:
             raise ValueError(
                 f"command_timeout={self.command_timeout} s: must be positive and finite"
@@ -125,6 +131,8 @@ class Scheduling:
             raise ValueError(
                 f"collect_deadline={self.collect_deadline}: must be a share of the period, 0 to 1"
             )
+        if self.quorum is not None:
+            check_count("quorum", self.quorum, 1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -151,6 +159,28 @@ class ClockOptions:
 
     def __post_init__(self) -> None:
         one_of("lead", self.lead, (None, "reference", "main"))
+        if self.reference is not None and not isinstance(self.reference, SubDevice):
+            raise TypeError(f"reference={self.reference!r}: must be a SubDevice, such as subs[0]")
+        if self.margin is not None and not 0 <= self.margin < math.inf:
+            raise ValueError(f"margin={self.margin} s: must be 0 or a positive time")
+        check_count("burst", self.burst, 0)
+
+
+def check_count(name: str, value: int, least: int) -> None:
+    """Raise ValueError unless a value is an integer and at least `least`."""
+    if not isinstance(value, Integral) or value < least:
+        raise ValueError(f"{name}={value}: must be a whole number, at least {least}")
+
+
+def check_groups(stop: StopPolicy, scheduling: Scheduling, clocks: ClockOptions) -> None:
+    """Raise TypeError for a group of options that is something else."""
+    for name, value, kind in (
+        ("stop", stop, StopPolicy),
+        ("scheduling", scheduling, Scheduling),
+        ("clocks", clocks, ClockOptions),
+    ):
+        if not isinstance(value, kind):
+            raise TypeError(f"{name}={value!r}: must be a cat.{kind.__name__}(...)")
 
 
 def one_of(name: str, value: object, allowed: tuple[object, ...]) -> None:

@@ -39,6 +39,9 @@ class Timing(Mapping[str, Mapping[str, float]]):
         self.scheduling = scheduling  # of the cycle thread; "virtual time"
 
     def __getitem__(self, phase: str) -> Mapping[str, float]:
+        if phase not in self._phases:
+            known = ", ".join(self) or "none"
+            raise KeyError(f"no phase {phase!r} in these cycles; there are: {known}")
         return self._phases[phase]
 
     def __iter__(self) -> Iterator[str]:

@@ -89,7 +89,7 @@ def _interpreter(timing: Timing) -> Iterator[str]:
 
 
 def _nothing(timing: Timing) -> str:
-    text = "No cycle was late, uncommitted, empty or lost."
+    text = "No cycle was late, uncommitted, underrun or lost."
     worst = _worst(timing, "lateness")
     if timing.is_virtual or worst < LATE_SHARE * timing.period:
         return text

@@ -140,21 +140,22 @@ def _sync(sync: SyncPlan) -> str:
     hidden = "" if Activation.SYNC0 in sync.activation else " (not shown to the device)"
     mode = f", OpMode {sync.op_mode!r}" * bool(sync.op_mode)
     return (
-        f"SYNC0 every {sync.cycle_ns / 1e3:g} us{hidden}, {sync.shift_ns / 1e3:+g} us to the beat"
-        f"{second}, AssignActivate 0x{sync.assign_activate:04X}{mode}"
+        f"SYNC0 every {sync.cycle_ns / 1e3:g} us{hidden}, "
+        f"{sync.shift_ns / 1e3:+g} us after the common SYNC0 time{second}, "
+        f"AssignActivate 0x{sync.assign_activate:04X}{mode}"
     )
 
 
 def _clocks(clock: ClockPlan, period_ns: int, devices: Sequence[DevicePlan]) -> Iterator[str]:
     name = devices[clock.reference].name
     follows = {
-        "reference": "the wake-up follows it",
+        "reference": "the cycle start follows it",
         "main": "it follows the MainDevice",
     }[clock.follow]
     yield f"reference clock: device {clock.reference} ({name}); {follows}"
     yield (
-        f"    instants {(period_ns - clock.phase_ns) / 1e3:g} us before the beat: "
-        f"{clock.allowance_ns / 1e3:g} us until the frames, {clock.wire_ns / 1e3:g} us of frames"
+        f"    cycle starts {(period_ns - clock.phase_ns) / 1e3:g} us before SYNC0: "
+        f"margin {clock.allowance_ns / 1e3:g} us, {clock.wire_ns / 1e3:g} us of frames"
     )
     yield (
         f"    phase controller: time constant {period_ns / clock.bandwidth / 1e6:g} ms, at most "

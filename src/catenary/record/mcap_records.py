@@ -61,11 +61,11 @@ class ChunkMessage(NamedTuple):
 
 
 def places(stream: BinaryIO) -> Iterator[Place]:
-    """The whole records of the data section, in their order. RecordingError: no MCAP file."""
+    """The whole records of the data section, in their order. RecordingError: not an MCAP file."""
     size = os.fstat(stream.fileno()).st_size
     stream.seek(0)
     if stream.read(len(MAGIC)) != MAGIC:
-        raise RecordingError(f"{stream.name} is no MCAP file: it does not begin like one")
+        raise RecordingError(f"{stream.name} is not an MCAP file: wrong first bytes")
     at = len(MAGIC)
     while at + HEAD.size <= size:
         stream.seek(at)

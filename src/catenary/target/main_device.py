@@ -37,5 +37,14 @@ class MainDevice(bus.MainDevice):
 
 
 def source_of(target: str | LinkSource) -> LinkSource:
-    """Return the link source of a name, or the source itself."""
-    return parse(target) if isinstance(target, str) else target
+    """Return the link source of a name, or the source itself.
+
+    Raises:
+        ConfigurationError: The name is not one of a segment.
+        TypeError: It is neither a name nor a link source.
+    """
+    if isinstance(target, str):
+        return parse(target)
+    if isinstance(target, type) or not hasattr(target, "open_link"):
+        raise TypeError(f'a target is a name such as "eth0", or a Segment; not {target!r}')
+    return target

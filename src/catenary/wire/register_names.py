@@ -42,9 +42,15 @@ def by_name(name: str) -> AnyRegister:
     found = known.get(_key(name))
     if found is not None:
         return found
-    near = [known[key] for key in get_close_matches(_key(name), known, n=3, cutoff=0.6)]
-    guesses = ", ".join(dict.fromkeys(each.name for each in near))
+    guesses = ", ".join(near(name))
     raise ValueError(f"no register {name!r}" + (f"; near it: {guesses}" if guesses else ""))
+
+
+def near(name: str) -> tuple[str, ...]:
+    """Return the names of registers that are like a name; the nearest first."""
+    known = _by_key()
+    found = get_close_matches(_key(name), known, n=3, cutoff=0.6)
+    return tuple(dict.fromkeys(known[key].name for key in found))
 
 
 def at_address(address: int, size: int | None = None) -> AnyRegister | None:
