@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 import shlex
 import subprocess
+import tomllib
 from pathlib import Path
 
 import pytest
 
+import catenary
 from catenary.cli.main import make_parser
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -41,6 +43,12 @@ def test_commands_of_issue_templates_parse(template: Path) -> None:
     for call in calls:
         make_parser().parse_args(shlex.split(call.partition(" > ")[0]))
     assert calls
+
+
+def test_the_version_is_the_same_everywhere() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert catenary.__version__ == project["version"]
+    assert f"\n## {catenary.__version__} (" in (ROOT / "CHANGELOG.md").read_text()
 
 
 def test_every_scenario_has_a_row_and_every_row_a_scenario() -> None:
