@@ -6,7 +6,7 @@ from dataclasses import replace
 from random import Random
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from catenary.core import Clock, PhaseController
@@ -34,10 +34,14 @@ ERRORS = st.none() | st.one_of(st.integers(-2000, 2000), st.integers(-PERIOD // 
 
 
 @given(st.lists(st.tuples(ERRORS, st.integers(1, 20)), max_size=60))
+@example([(125_001, 19), (16, 1), (None, 45)])  # the rest is 1 - 2e-16 ns in one of them
 def test_as_its_twin_does(runs: list[tuple[int | None, int]]) -> None:
+    """The sums agree: the last digit of a float may move 1 ns into the next cycle."""
     compiled, twin = PhaseController(PLAN, PERIOD), Twin(PLAN, PERIOD)
+    ahead = 0
     for number, error in enumerate(error for error, count in runs for _ in range(count)):
-        assert compiled.step(error) == twin.step(error), number
+        ahead += compiled.step(error) - twin.step(error)
+        assert abs(ahead) <= 1, number
     assert compiled.jumps == twin.jumps
     assert compiled.drift == pytest.approx(twin.drift)
 

@@ -47,7 +47,7 @@ class Rig:
             period=PERIOD,
             measures_velocity=True,
             write=self.write,  # type: ignore[arg-type]
-            set_column=lambda name, value: False,
+            put_rate=lambda name, value: False,
         )
 
     def write(self, index: int, value: int) -> Answer:
@@ -187,7 +187,7 @@ def test_an_estimated_velocity_that_jumps_by_a_count_is_no_motion() -> None:
         period=PERIOD,
         measures_velocity=False,
         write=rig.write,  # type: ignore[arg-type]
-        set_column=lambda name, value: False,
+        put_rate=lambda name, value: False,
     )
     rig.views.actual_velocity[0] = 2 * 6.28  # two counts in a cycle
     assert coarse.at_rest

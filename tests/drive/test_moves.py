@@ -13,6 +13,7 @@ import pytest
 import catenary as cat
 from catenary.drive import Drives
 from catenary.drive.move import Move
+from catenary.drive.port import AxisPort
 from catenary.errors import ConfigurationError, DriveError, MoveError
 from catenary.loop import Loop, StopPolicy
 from catenary.virtual import Coupler, Segment, Servo, _segment
@@ -288,6 +289,25 @@ def test_leaving_the_loop_ends_the_moves() -> None:
     assert move.outcome == "failed"
     assert isinstance(move.error, MoveError)
     assert "was moving when the loop ended" in str(move.error)
+
+
+def test_an_interrupt_in_the_middle_of_a_step_ends_the_move(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with opened(Servo()) as (arm, loop):
+        move = arm.move_to(1.0)
+        loop_for(loop, 0.1)
+
+        def interrupted(port: AxisPort, motion: object) -> None:
+            raise KeyboardInterrupt
+
+        with monkeypatch.context() as patch:
+            patch.setattr(AxisPort, "command", interrupted)
+            with pytest.raises(KeyboardInterrupt):
+                next(loop)
+        loop_for(loop, 0.1)
+        assert move.outcome == "failed"
+        assert arm.actual.velocity[0] == pytest.approx(0.0, abs=0.01)
 
 
 def test_another_mode_ends_the_move() -> None:

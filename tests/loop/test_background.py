@@ -279,6 +279,32 @@ def test_an_update_in_which_the_loop_ends_raises_its_error(cell: Cell) -> None:
         update()
 
 
+def test_an_update_that_ends_while_the_loop_is_left_changes_nothing(cell: Cell) -> None:
+    """What leaving has requested stays: the restored targets would enable the axes again."""
+    entered, written = threading.Event(), threading.Event()
+    errors: list[str] = []
+
+    def update() -> None:
+        try:
+            with cell.loop.update():
+                entered.set()
+                written.wait(PATIENCE)
+        except RuntimeError as error:
+            errors.append(str(error))
+
+    thread = threading.Thread(target=update)
+    thread.start()
+    assert entered.wait(PATIENCE)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("catenary.loop.background.LEAVE_TIMEOUT", 0.01)
+        cell.loop.close()
+    goals = cell.loop._runnings[0].views.goal.tolist()
+    written.set()
+    thread.join(PATIENCE)
+    assert errors == ["the loop is closed: open it again, or use it in a with block"]
+    assert cell.loop._runnings[0].views.goal.tolist() == goals
+
+
 def test_a_with_block_raises_the_error_at_its_end() -> None:
     segment = Segment([Servo()])
 

@@ -74,7 +74,7 @@ def test_areas_of_two_wishes_lie_one_after_the_other() -> None:
     second = ImageArea("b", 0, 2, 1, 0, bytes(2))
     tables = [WishTables(output_areas=(first,)), WishTables(output_areas=(second,))]
     wishes = [Bound(), Bound()]
-    whole = bind_wishes(wishes, tables, buffers_of(tables))  # type: ignore[arg-type]
+    whole = bind_wishes(wishes, tables, buffers_of(tables), lambda: True)  # type: ignore[arg-type]
     assert [wish.views.output_bytes.tolist() for wish in wishes] == [[0, 1, 2], [3, 4]]
     assert whole.output_bytes.size == 5
     assert whole.input_bytes.size == 0

@@ -4,7 +4,7 @@ import catenary as cat
 main = cat.MainDevice("eth0")
 main.open()
 arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=2.0)
-loop = cat.Loop(arm, period=1e-3).open()
+loop = cat.Loop(arm, period=1e-3, log_axes=True).open()
 loop.run_in_background()  # a Python thread iterates; this cell returns
 
 # %% one consistent set of targets
@@ -16,7 +16,7 @@ print(arm.actual.position)
 
 # %% a move
 loop.wait(arm.move_to(0.0, velocity=0.3))
-print(arm.actual.position, len(loop.log))
+plot = loop.log.to_pandas().filter(like="shoulder").plot()
 
 # %% the end
 loop.close()  # also at interpreter exit

@@ -23,11 +23,16 @@ def drives(names: Mapping[str, object], name: str) -> Drives:
     return found
 
 
-def test_notebook(run_program: RunProgram) -> None:
-    segment = Segment([Servo(), Servo(), Servo()])
+def test_notebook(run_program: RunProgram, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pandas")
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    segment = Segment([Servo(name=name) for name in ("shoulder", "elbow", "wrist")])
     names = run_program("notebook", segment)
     assert drives(names, "arm").actual.position == pytest.approx([0.0] * 3, abs=2e-3)
     assert [segment[k].state & 0x0F for k in range(3)] == [1, 1, 1]
+    labels = [line.get_label() for line in names["plot"].get_lines()]  # type: ignore[attr-defined]
+    assert "shoulder.actual.position" in labels
+    assert not any("elbow" in label for label in labels)
 
 
 def test_notebook_velocity(run_program: RunProgram) -> None:

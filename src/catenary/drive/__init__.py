@@ -4,6 +4,7 @@ from catenary.drive.channel import Channel
 from catenary.drive.drives import Drives
 from catenary.drive.homing import HomingMethod
 from catenary.drive.io import Inputs, Outputs
+from catenary.drive.move import Move
 from catenary.drive.process_data import ProcessData
 from catenary.drive.recovery import Phase, Recovery, Stop
 from catenary.plan.start_up_object import StartUp
@@ -15,6 +16,7 @@ __all__ = [
     "Drives",
     "HomingMethod",
     "Inputs",
+    "Move",
     "Outputs",
     "Phase",
     "ProcessData",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -30,20 +29,20 @@ from catenary.drive.arguments import (
     written_pdos,
 )
 from catenary.drive.axis import MEASURED, Axis, column_bank
-from catenary.drive.homing import HomingMethod, home_axis, stop_homing
+from catenary.drive.homing import HomingMethod
 from catenary.drive.limits import LimitOptions
 from catenary.drive.motions import HALT
-from catenary.drive.move import Move, Moves, Part
+from catenary.drive.move import Move, Moves
 from catenary.drive.move_request import (
     RateOptions,
     Values,
-    default_acceleration,
+    make_homing_part,
     make_parts,
-    require_enabled,
     values_of,
 )
-from catenary.drive.objects import ACTUAL_VELOCITY, PROFILE_OBJECTS
-from catenary.drive.port import AxisPort
+from catenary.drive.objects import ACTUAL_VELOCITY
+from catenary.drive.port import AxisPort, PutRate
+from catenary.drive.rates import RateColumns
 from catenary.drive.request import Request
 from catenary.drive.state_machine import Goal
 from catenary.drive.units import AxisUnits, one_each, per_axis
@@ -53,7 +52,7 @@ from catenary.plan.start_up_object import StartUp
 from catenary.plan.stop_reason import StopReason
 from catenary.plan.wish import DistributedClock, ImageLayout, PdoWish, Views, WishTables
 from catenary.types import UDINT
-from catenary.wire.cia402 import IN_FAULT, Mode, State
+from catenary.wire.cia402 import IN_FAULT, State
 
 V = TypeVar("V")
 PerAxis: TypeAlias = V | Sequence[V]
@@ -231,7 +230,7 @@ class Drives(Request):
         self._actual = AxisValues("actual")
         self._target = AxisValues("target")
         self._views: Views | None = None
-        self._mapped_rates: tuple[tuple[str, int], ...] = ()  # object and axis
+        self._rates: RateColumns | None = None
         self._measures_velocity: list[bool] = []
         self._ports: tuple[AxisPort, ...] = ()
         self._moves: Moves | None = None
@@ -402,17 +401,7 @@ class Drives(Request):
         """
         chosen = self._numbers(axes)
         moves = self._moving()
-        parts: dict[int, Part] = {}
-        for axis in chosen:
-            port = self._ports[axis]
-            if Mode.HM not in self._axes[axis].modes:
-                raise ValueError(f"{port.name}: make Drives with other_modes=['hm']")
-            before = port.requested_mode
-            if before == Mode.HM:
-                raise ValueError(f"{port.name}: is homing already; wait, or use move.stop()")
-            require_enabled(port)
-            stop = partial(stop_homing, port, before)
-            parts[axis] = Part(port, math.nan, home_axis(port, before), stop)
+        parts = {i: make_homing_part(self._axes[i], self._ports[i]) for i in chosen}
         return moves.begin(parts, HOMING_PATIENCE)
 
     def _move(self, chosen: Sequence[int], goals: Sequence[float], rates: RateOptions) -> Move:
@@ -465,14 +454,7 @@ class Drives(Request):
         """Return the axes in their order; columns by name, then by axis: a name is one array."""
         self._is_read = False  # the next plan reads again
         self._units = np.array([layout.sync_unit(axis.device) for axis in self._axes], np.intp)
-        # Rates of profiles that are mapped anyway follow the columns that were asked for.
-        self._mapped_rates = tuple(
-            (name, i)
-            for name, wanted in PROFILE_OBJECTS.items()
-            if name not in self._columns
-            for i, axis in enumerate(self._axes)
-            if axis.uses_profile and axis.maps(wanted, layout)
-        )
+        self._rates = RateColumns(self._axes, self._columns, layout)
         self._measures_velocity = [axis.maps(ACTUAL_VELOCITY, layout) for axis in self._axes]
         return WishTables(
             axes=tuple(axis.plan(layout) for axis in self._axes),
@@ -483,10 +465,7 @@ class Drives(Request):
                     if wanted.output
                     for axis in self._axes
                 ),
-                *(
-                    self._axes[i].column(name, PROFILE_OBJECTS[name], layout)
-                    for name, i in self._mapped_rates
-                ),
+                *self._rates.columns,
             ),
             input_columns=tuple(
                 axis.column(name, wanted, layout)
@@ -514,11 +493,15 @@ class Drives(Request):
             views.mode_target,
             self._slices(views.output_reals, views.output_integers, output=True),
         )
+        rates = self._rates
+        assert rates is not None  # the tables are made before they are bound
+        rates.bind(self.target, views.output_reals)
         self._moves = Moves(views.movers)
-        self._ports = tuple(self._port(views, i, axis) for i, axis in enumerate(self._axes))
-        self._preset_columns()
+        self._ports = tuple(
+            self._port(views, i, axis, partial(rates.put, i)) for i, axis in enumerate(self._axes)
+        )
 
-    def _port(self, views: Views, index: int, axis: Axis) -> AxisPort:
+    def _port(self, views: Views, index: int, axis: Axis, put_rate: PutRate) -> AxisPort:
         """Return what moves read and write of an axis."""
         sdo, period = self._subs[index].sdo, self._period_ns * 1e-9
 
@@ -534,31 +517,8 @@ class Drives(Request):
             period=period,
             measures_velocity=self._measures_velocity[index],
             write=write,
-            set_column=partial(self._set_column, index),
+            put_rate=put_rate,
         )
-
-    def _set_column(self, index: int, name: str, value: float) -> bool:
-        """Write one axis' value of a column. Return False if the column does not exist."""
-        if name in self._columns:
-            self._target[name][index] = value
-        elif (name, index) in self._mapped_rates:
-            rank = self._mapped_rates.index((name, index))
-            reals = self._bound().output_reals
-            reals[len(reals) - len(self._mapped_rates) + rank] = value
-        else:
-            return False
-        return True
-
-    def _preset_columns(self) -> None:
-        """Rates and torque limits that are mapped begin with the limits: at 0 no drive moves."""
-        for index, axis in enumerate(self._axes):
-            velocity, torque = axis.bounds.velocity.value, axis.bounds.torque.value
-            acceleration = default_acceleration(axis) or axis.bounds.acceleration.value
-            for name in PROFILE_OBJECTS:
-                value = velocity if name == "profile_velocity" else acceleration
-                self._set_column(index, name, value or 2**31 * abs(axis.units.velocity_scale))
-            if "max_torque" in self._columns:
-                self._set_column(index, "max_torque", torque or 1000 * abs(axis.units.torque_scale))
 
     def _slices(self, reals: Array, integers: Array, *, output: bool) -> dict[str, Array]:
         """Each column's part of its bank's array."""

@@ -149,7 +149,7 @@ def _write_rates(port: AxisPort, rates: Rates) -> Steps:
     values = (rates.velocity, rates.acceleration, rates.acceleration)
     for (name, place), value in zip(PROFILE_OBJECTS.items(), values, strict=True):
         raw = max(1, round(value / abs(port.units.velocity_scale)))
-        if port.set_column(name, value) or port.written.get(name) == raw:
+        if port.put_rate(name, value) or port.written.get(name) == raw:
             continue
         answer = port.write_object(place.index, raw)
         while not answer.done:

@@ -43,13 +43,13 @@ class Move:
     def __init__(self, parts: Sequence[Part], owner: Moves, patience: float) -> None:
         self._parts = tuple(parts)
         self._owner = owner
-        self._finished = threading.Event()
+        self._done = False
         self.patience = patience  # [s] default of `loop.wait(move)`
 
     @property
     def done(self) -> bool:
         """True once every axis has arrived, or has ended otherwise: see `outcome`."""
-        return self._finished.is_set()
+        return self._done
 
     @property
     def outcome(self) -> Outcome | None:
@@ -92,7 +92,7 @@ class Move:
     def finish_if_over(self) -> None:
         """Become done if no axis moves any more."""
         if all(part.outcome is not None for part in self._parts):
-            self._finished.set()
+            self._done = True
 
     def __repr__(self) -> str:
         return f"<Move of {', '.join(self.axes)}: {self.outcome or 'moving'}>"
@@ -188,6 +188,9 @@ class Moves:
             self._finish(axis, "stopped" if part.is_stopping else "reached", None)
         except CatenaryError as error:
             self._finish(axis, "failed", error)
+        except BaseException:  # an interrupt: the motion has ended in the middle
+            self._fail(axis, part, Complaint("was interrupted", "start the move again", part.goal))
+            raise
 
     def _fail(self, axis: int, part: Part, complaint: Complaint) -> None:
         error = part.port.error(complaint)

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from catenary.drive.axis import Axis
+from catenary.drive.homing import home_axis, stop_homing
 from catenary.drive.limits import BRAKE_TIME
 from catenary.drive.motions import move_cyclic, move_profile, stop_cyclic, stop_profile
 from catenary.drive.move import Part
@@ -72,6 +73,22 @@ def make_parts(
         for port, goal, rate in zip(ports, goals, rates, strict=True)
     )
     return parts, PATIENCE[0] * longest + PATIENCE[1]
+
+
+def make_homing_part(axis: Axis, port: AxisPort) -> Part:
+    """Return the search of an axis for its home.
+
+    Raises:
+        ValueError: The axis was made without "hm", or is homing already.
+        DriveError: The axis is not enabled.
+    """
+    if Mode.HM not in axis.modes:
+        raise ValueError(f"{axis.name}: make Drives with other_modes=['hm']")
+    before = port.requested_mode
+    if before == Mode.HM:
+        raise ValueError(f"{axis.name}: is homing already; wait, or use move.stop()")
+    require_enabled(port)
+    return Part(port, math.nan, home_axis(port, before), lambda: stop_homing(port, before))
 
 
 def require_enabled(port: AxisPort) -> None:

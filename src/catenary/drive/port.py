@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Steps: TypeAlias = Generator[None, None, None]  # one step before each commit
 WriteObject: TypeAlias = "Callable[[int, int], Pending[None]]"  # (object of slot 0, value)
-SetColumn: TypeAlias = Callable[[str, float], bool]  # False: the axis has no such column
+PutRate: TypeAlias = Callable[[str, float], bool]  # False: not in the process data
 
 FOLLOWED = 1  # axis_flags
 GOAL_SHIFT = 6
@@ -40,7 +40,7 @@ class AxisPort:
         period: float,
         measures_velocity: bool,
         write: WriteObject,
-        set_column: SetColumn,
+        put_rate: PutRate,
     ) -> None:
         self._views = views
         self._index = index
@@ -52,7 +52,7 @@ class AxisPort:
         self._standstill = max(units.defaults.standstill, jump)
         self.period = period  # [s] of the loop
         self.write_object = write
-        self.set_column = set_column
+        self.put_rate = put_rate
         self.now = 0.0  # [s] time of the cycle
         self.motion: Motion | None = None  # commanded last by a profile of ours
         self.handshake = False  # a set-point of PP is being handed over

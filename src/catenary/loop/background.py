@@ -24,6 +24,7 @@ from catenary.loop.running import Running
 from catenary.loop.signals import SignalGuard
 
 END_TIMEOUT = 30.0  # [s] and some periods: to leave a loop after an error takes some seconds
+LEAVE_TIMEOUT = 1.0  # [s] for an update that is being written when the loop is left
 UPDATE_TIMEOUT = 5.0  # [s] for which another thread may be inside `update`
 BEHIND = 0.1  # [s] of virtual time that is not made up for
 LOOK = 0.5  # [s] between two looks of a waiting call, at most
@@ -77,9 +78,10 @@ class Background:
 
     def end(self) -> None:
         """End the thread and wait for it. No effect in the thread itself, or in a forked child."""
-        self._ended.set()
-        is_own = threading.current_thread() is self._thread
-        if is_own or self._thread.ident is None or self._process != os.getpid():
+        if self._process != os.getpid():
+            return
+        self._end_updates()
+        if threading.current_thread() is self._thread or self._thread.ident is None:
             return
         self._thread.join(END_TIMEOUT + 8e-9 * self._runnings[0].plan.cycle.period_ns)
         if self._thread.is_alive():
@@ -128,7 +130,7 @@ class Background:
             complete = True
         finally:
             for engine, targets in zip(engines, before, strict=True):
-                if not complete:
+                if not complete and not self._ended.is_set():  # else they are those of leaving
                     engine.blocks()[1][:] = targets
                 engine.end_update(complete)
 
@@ -172,6 +174,15 @@ class Background:
     def _require_alive(self) -> None:
         self.raise_error()
         self._runnings[0].require_open()
+        if self._ended.is_set():
+            raise RuntimeError("the loop is closed, or is being left")
+
+    def _end_updates(self) -> None:
+        """Refuse further updates, and give the one that is being written a second to end: what is
+        written later must not meet the targets of leaving."""
+        self._ended.set()
+        if self._updating != threading.get_ident() and self._commit.acquire(timeout=LEAVE_TIMEOUT):
+            self._commit.release()
 
     def _iterate(self) -> None:
         for running in self._runnings:

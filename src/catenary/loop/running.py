@@ -321,10 +321,9 @@ class Running:
         if self._left:
             return []
         self._left = True
-        for mover in list(self.views.movers):
-            mover.end()
         self.make_outputs_safe()
         steps: tuple[Callable[[SignalGuard], None], ...] = (
+            self._end_moves,
             self._stop_axes,
             self._confirm_safe_outputs,
             self._stop_cycle,
@@ -347,6 +346,10 @@ class Running:
     def _confirm_safe_outputs(self, guard: SignalGuard) -> None:
         if self._opened:
             confirm_safe(self.plan.cycle, self.views, self.cycle, guard)
+
+    def _end_moves(self, guard: SignalGuard) -> None:
+        for mover in list(self.views.movers):
+            mover.end()
 
     def _stop_axes(self, guard: SignalGuard) -> None:
         """Quick stop as each drive's 0x605A says, exchanged until all stand."""
