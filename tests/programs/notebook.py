@@ -1,8 +1,7 @@
 # %% connect
 import catenary as cat
 
-main = cat.MainDevice("eth0")
-main.open()
+main = cat.MainDevice("eth0").open()
 arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=2.0)
 loop = cat.Loop(arm, period=1e-3, log_axes=True).open()
 loop.run_in_background()  # a Python thread iterates; this cell returns

@@ -3,8 +3,7 @@ import time
 
 import catenary as cat
 
-main = cat.MainDevice("eth0")
-main.open()
+main = cat.MainDevice("eth0").open()
 belt = cat.Drives(main.scan().drives, mode="csv", counts_per_turn=2**20, velocity_limit=2.0)
 loop = cat.Loop(belt, period=1e-3).open()
 loop.run_in_background()

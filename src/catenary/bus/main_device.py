@@ -102,15 +102,17 @@ class MainDevice:
         """Frames sent and lost outside the loop."""
         return self.runner.counts
 
-    def open(self) -> None:
-        """Open the link. Nothing is sent. A network interface is listened to for 0.1 s.
+    def open(self) -> Self:
+        """Open the link and return the MainDevice. Nothing is sent.
+
+        A network interface is listened to for 0.1 s. No effect if it is open.
 
         Raises:
             LinkError: it cannot be used; or another master is live on it, unless `force`.
         """
         self.forget()
         if self._link is not None:
-            return
+            return self
         link = self._source.open_link()
         try:
             self._ownership = Ownership(link, force=self._force)
@@ -122,6 +124,7 @@ class MainDevice:
         self._callbacks.in_thread = not lives_in_virtual_time(link)
         self._blocking = BlockingRunner(link)
         forget_in_child(self)
+        return self
 
     def forget(self) -> None:
         """Let go of the parent's link and devices in a forked child. Sends nothing. No effect in
@@ -414,8 +417,7 @@ class MainDevice:
                 check_identity(sub.description, Identity(*(*wanted, 0, 0)[:4]))
 
     def __enter__(self) -> Self:
-        self.open()
-        return self
+        return self.open()
 
     def __exit__(self, *exc_info: object) -> None:
         self.close()
