@@ -87,6 +87,11 @@ def test_golden_bytes():
     assert UNICODE_STRING.encode("µ") == b"\xb5\x00"
 
 
+def test_text_is_not_a_truth_value():
+    with pytest.raises(TypeError, match="BOOL: 'false' is text; use True or False"):
+        BOOL.encode("false")
+
+
 @pytest.mark.parametrize("entry", INTEGERS, ids=str)
 @settings(max_examples=20)
 @given(data=st.data())

@@ -60,6 +60,8 @@ class Boolean(DataType[bool]):
     """One bit; a byte when it travels alone, where anything but zero is true."""
 
     def encode(self, value: bool) -> bytes:
+        if isinstance(value, str | bytes):  # "false" is true in Python
+            raise TypeError(f"{self.name}: {value!r} is text; use True or False")
         return b"\x01" if value else b"\x00"
 
     def decode(self, data: bytes) -> bool:

@@ -36,6 +36,13 @@ def test_init_writes_a_file_that_check_finds_equal(
     ]
 
 
+def test_check_takes_a_file_of_any_suffix(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write_small(tmp_path).rename(tmp_path / "cell.cfg")
+    assert call(capsys, "check", path)[0] == 0
+
+
 def test_init_names_the_lines_to_fill_in(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -46,6 +53,9 @@ def test_init_names_the_lines_to_fill_in(
         n for n, line in enumerate(path.read_text().splitlines(), 1) if "counts_per_turn" in line
     )
     assert f"{path}:{number}: FILL IN" in out
+    status, _, err = call(capsys, "check", path)
+    assert status == 2
+    assert 'remove the "#" from the lines marked FILL IN' in err
 
 
 def test_init_does_not_overwrite(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -107,6 +107,27 @@ def test_an_update_begun_before_an_axis_was_enabled_does_not_move_it() -> None:
     assert b.target_position[0] == 0.0
 
 
+@pytest.mark.parametrize("complete", [True, False])
+def test_what_such_an_update_wrote_is_not_committed_later(complete: bool) -> None:
+    b = bench(axis(0, mode=CSP), drives=[ScriptedDrive()])
+    b.engine.background = True
+    b.ask(GOAL_ENABLED)
+    b.engine.next()
+    b.engine.begin_update()
+    b.target_position[0] = 0.05
+    for _ in range(12):
+        b.engine.keep_targets()
+        b.engine.next()
+    b.engine.end_update(complete)
+    sent = []
+    for _ in range(20):  # as the iteration does, which may not wait for a cycle before
+        b.engine.commit_targets()
+        b.engine.next()
+        sent.append(b.drives[0].target_position)
+    assert set(sent) == {0}
+    assert b.target_position[0] == 0.0
+
+
 def test_repeating_an_update_does_not_renew_it() -> None:
     b = in_background(CSV, deceleration=100.0)
     b.target_velocity[0] = 1.0

@@ -44,6 +44,8 @@ def test_booleans_are_booleans() -> None:
     channel = Channel(0x7000, 1, types.BOOL)
     assert channel.decode(1) is True
     assert channel.encode(True) == 1
+    assert channel.encode(0) == 0
+    assert Channel(0x7000, 1, types.BOOL, 5.0).encode(5.0) == 1
     assert channel.bank is Bank.BIT
 
 
@@ -67,7 +69,7 @@ def test_what_does_not_fit_is_refused(
 def test_mistakes_in_a_channel_name_it() -> None:
     with pytest.raises(TypeError, match=r"inputs\['force'\]: \(index, subindex, type.*not 5"):
         make_channel("inputs", "force", 5)  # type: ignore[arg-type]
-    with pytest.raises(TypeError, match=r"inputs\['x'\]: 0x6000:01: .* not a type of numbers"):
+    with pytest.raises(TypeError, match=r"inputs\['x'\]: 0x6000:01: VISIBLE_STRING is not a type"):
         make_channel("inputs", "x", (0x6000, 1, types.VISIBLE_STRING))  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="an index has 16 bits"):
         make_channel("inputs", "x", (0x16000, 1, types.INT))

@@ -12,6 +12,7 @@ from catenary.bus import MainDevice
 from catenary.drive import Channel, Drives
 from catenary.drive.arguments import named_columns
 from catenary.drive.objects import NAMED_COLUMNS
+from catenary.errors import ConfigurationError
 from catenary.virtual import Coupler, Segment
 from tests.force_sensor import TunedServo
 
@@ -78,3 +79,42 @@ def test_names_alone_and_pairs() -> None:
         named_columns(["folowing"])
     with pytest.raises(TypeError, match=r"columns\['heat'\]: \(index, subindex, type"):
         named_columns({"heat": (0x2020, 0)})  # type: ignore[dict-item]
+
+
+@pytest.mark.parametrize(
+    ("index", "kind", "what"),
+    [
+        (0x6040, types.UINT, "controlword"),
+        (0x607A, types.DINT, "target_position"),
+        (0x60FF, types.DINT, "target_velocity"),
+        (0x6071, types.INT, "target_torque"),
+        (0x6060, types.SINT, "mode_target"),
+    ],
+)
+def test_what_the_axis_writes_cannot_be_a_column(
+    main: MainDevice, index: int, kind: types.Integer, what: str
+) -> None:
+    arm = Drives(
+        main.subs.drives,
+        other_modes=["csv", "cst"],
+        counts_per_turn=2**20,
+        velocity_limit=1.0,
+        torque_limit=1.0,
+        columns={"mine": (index, 0, kind)},
+    )
+    with pytest.raises(ConfigurationError, match=rf"\.mine' is the {what} that the axis itself"):
+        main.plan(arm)
+
+
+def test_the_velocity_offset_is_a_column(main: MainDevice) -> None:
+    """The core writes 0x60B1 only while it replaces the set-points."""
+    arm = Drives(
+        main.subs.drives,
+        counts_per_turn=2**20,
+        velocity_limit=1.0,
+        columns={"offset": (0x60B1, 0, types.DINT)},
+    )
+    with cat.Loop(arm) as loop:
+        arm.target["offset"] = 5
+        next(loop)
+        assert arm.target["offset"].tolist() == [5]

@@ -130,5 +130,5 @@ def test_numbers_that_are_no_pdos_are_refused() -> None:
 
 def test_no_device_at_all_is_another_mistake() -> None:
     """A group of which nobody has the alias is empty."""
-    with pytest.raises(ValueError, match="no device is given whose output process data"):
+    with pytest.raises(ValueError, match="outputs: no device given"):
         Outputs()

@@ -10,6 +10,7 @@ from catenary.drive.profile import Rates
 from catenary.drive.units import AxisUnits
 from catenary.errors import MoveError, SdoAbort
 from catenary.plan.wish import WishTables
+from catenary.wire.cia402 import Mode
 from tests.core.rig import axis
 from tests.drive.fakes import views_of
 
@@ -107,7 +108,7 @@ def test_a_rate_that_the_drive_refuses_ends_the_move_before_it_begins() -> None:
     rig = Rig(refused={0x6081: 0x06090030})
     with pytest.raises(SdoAbort):
         rig.run(move_profile(rig.port, 1.0, RATES), 3)
-    assert rig.bits == 0
+    assert rig.bits == HALT  # a move before may still go on
 
 
 def test_a_set_point_that_is_not_acknowledged() -> None:
@@ -115,6 +116,7 @@ def test_a_set_point_that_is_not_acknowledged() -> None:
     with pytest.raises(MoveError, match=r"left did not acknowledge the set-point .*bit 12") as e:
         rig.run(move_profile(rig.port, 1.0, RATES), 1100)
     assert e.value.remaining == 1.0
+    assert rig.bits & HALT  # the drive may be on its way
 
 
 def test_a_drive_that_does_not_accept_another_set_point() -> None:
@@ -122,7 +124,7 @@ def test_a_drive_that_does_not_accept_another_set_point() -> None:
     rig.views.statusword[0] = ACKNOWLEDGED
     with pytest.raises(MoveError, match="left did not accept another set-point"):
         rig.run(move_profile(rig.port, 1.0, RATES), 1100)
-    assert rig.bits == 0
+    assert rig.bits == HALT
 
 
 def test_a_target_that_is_never_reached() -> None:
@@ -134,9 +136,10 @@ def test_a_target_that_is_never_reached() -> None:
     rig.views.statusword[0] = 0
     with pytest.raises(MoveError, match=r"did not show target reached \(statusword bit 10\)"):
         rig.run(steps, 10_000)
+    assert rig.bits == HALT
 
 
-def test_halt_ends_together_with_the_set_point_that_holds() -> None:
+def test_halt_ends_when_the_set_point_that_holds_is_acknowledged() -> None:
     rig = Rig()
     rig.views.actual_velocity[0] = 1.0
     steps = stop_profile(rig.port)
@@ -148,8 +151,36 @@ def test_halt_ends_together_with_the_set_point_that_holds() -> None:
         rig.run(steps, 1)
         if rig.bits != HALT:
             break
-    assert rig.bits == NEW_SET_POINT | AT_ONCE
+    assert rig.bits == NEW_SET_POINT | AT_ONCE | HALT
     assert rig.views.target_position[0] == 0.4
+    rig.views.statusword[0] = ACKNOWLEDGED
+    rig.run(steps, 1)
+    assert rig.bits == 0
+
+
+def test_a_drive_that_does_not_acknowledge_the_stop_stays_halted() -> None:
+    rig = Rig()
+    steps = stop_profile(rig.port)
+    for _ in range(1000):
+        rig.run(steps, 1)
+        assert rig.bits & HALT  # else it would go on to its old goal
+    with pytest.raises(MoveError, match="did not acknowledge"):
+        rig.run(steps, 1000)
+    assert rig.bits & HALT
+
+
+@pytest.mark.parametrize(
+    ("acknowledged", "target", "start"), [(0.4, 0.4, 0.4), (0.4, 5.0, 0.39), (None, 0.4, 0.39)]
+)
+def test_a_target_that_a_drive_in_pp_does_not_know_is_no_start(
+    acknowledged: float | None, target: float, start: float
+) -> None:
+    rig = Rig()
+    rig.views.mode_target[0] = Mode.PP
+    rig.views.actual_position[0] = 0.39
+    rig.port.handed_over = acknowledged
+    rig.views.target_position[0] = target
+    assert rig.port.rest == start
 
 
 def test_an_axis_that_does_not_stop() -> None:

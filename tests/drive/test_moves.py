@@ -14,6 +14,7 @@ import catenary as cat
 from catenary.drive import Drives
 from catenary.drive.move import Move
 from catenary.drive.port import AxisPort
+from catenary.drive.profile import Motion
 from catenary.errors import ConfigurationError, DriveError, MoveError
 from catenary.loop import Loop, StopPolicy
 from catenary.virtual import Coupler, Segment, Servo, _segment
@@ -188,6 +189,116 @@ def test_late_iterations_do_not_slow_a_move_down() -> None:
                 cycle.spend(5e-3)
         assert cycle.time == pytest.approx(1.22, abs=0.02)
         assert arm.actual.position[0] == pytest.approx(1.0, abs=1e-3)
+
+
+def test_after_a_long_pause_a_move_goes_on_at_its_own_velocity() -> None:
+    with opened(Servo(), stop=StopPolicy(late_limit=0)) as (arm, loop):
+        move = arm.move_to(0.5, velocity=0.1)
+        loop_for(loop, 1.0).spend(3.0)
+        velocities = trace(loop, move, lambda: arm.actual.velocity.item(0))
+        assert max(velocities) < 0.5  # the limit is 2 rad/s
+        assert move.outcome == "reached"
+        assert arm.actual.position[0] == pytest.approx(0.5, abs=1e-3)
+
+
+def test_a_move_with_too_little_acceleration_to_stop_before_a_limit() -> None:
+    with opened(Servo(), position_max=1.0) as (arm, loop):
+        fast = arm.move_to(0.9, velocity=2.0, acceleration=8.0)
+        loop_for(loop, 0.4)
+        with pytest.raises(ValueError, match=r"0\.5 rad/s² stops it from .* rad, beyond posit"):
+            arm.move_to(0.5, acceleration=0.5)
+        loop.wait(fast)
+        loop.wait(arm.move_to(0.5, acceleration=0.5))
+
+
+def test_a_written_target_is_no_start_of_a_move_in_pp() -> None:
+    with opened(Servo(), mode="pp") as (arm, loop):
+        arm.target.position[:] = 0.5  # it has no effect
+        loop_for(loop, 0.1)
+        loop.wait(arm.move_by(0.1))
+        assert arm.actual.position[0] == pytest.approx(0.1, abs=1e-3)
+        loop.wait(arm.move_by(0.1))
+        assert arm.actual.position[0] == pytest.approx(0.2, abs=1e-3)
+
+
+@pytest.mark.parametrize("mode", ["csp", "pp"])
+def test_a_goal_that_was_given_up_is_no_start(mode: str) -> None:
+    with opened(Servo(), mode=mode) as (arm, loop):
+        move = arm.move_to(2.0, velocity=0.5)
+        loop_for(loop, 1.0)
+        move.stop()
+        for _ in range(2):  # requested, and begun
+            start = arm.actual.position.item(0)
+            arm.move_by(0.1).stop()
+            next(loop)
+        loop.wait(arm.move_by(0.1))
+        assert arm.actual.position[0] == pytest.approx(start + 0.1, abs=0.02)
+
+
+def test_a_stop_may_be_requested_in_the_middle_of_a_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    with opened(Servo()) as (arm, loop):
+        move = arm.move_to(1.0)
+        loop_for(loop, 0.1)
+        command = AxisPort.command
+
+        def signal_handler(port: AxisPort, motion: Motion) -> None:
+            move.stop()
+            command(port, motion)
+
+        monkeypatch.setattr(AxisPort, "command", signal_handler)
+        loop.wait(move)
+        assert move.outcome == "stopped"
+
+
+def test_axes_by_their_numbers() -> None:
+    with opened(Servo(), Servo(), Servo()) as (arm, loop):
+        loop.wait(arm.move_to(0.1, axes=(0, 2)))
+        assert arm.actual.position == pytest.approx([0.1, 0.0, 0.1], abs=1e-3)
+        arm.disable((0, 1))
+        loop_for(loop, 0.1)
+        arm.enable(arm.faults)  # none
+        loop_for(loop, 0.1)
+        assert arm.enabled.tolist() == [False, False, True]
+        with pytest.raises(ValueError, match="no axis to move"):
+            arm.move_to(0.1, axes=[])
+        with pytest.raises(ValueError, match="no axis to move"):
+            arm.home([])
+        for axes in (5, "left", [0.5]):
+            with pytest.raises(IndexError, match="give numbers of the axes: 0: 1 Catenary"):
+                arm.move_to(0.1, axes=axes)  # type: ignore[arg-type]
+
+
+# ---- with a stream
+
+
+def test_no_move_while_a_stream_sets_the_targets() -> None:
+    with opened(Servo()) as (arm, loop):
+        stream = loop.stream(100)
+        stream.write(np.zeros((50, 1)))
+        next(loop)
+        with pytest.raises(DriveError, match="cannot move: a law or a stream sets its targets"):
+            arm.move_to(0.5)
+        stream.close()
+        next(loop)
+        move = arm.move_to(0.1)
+        with pytest.raises(RuntimeError, match="a stream cannot begin during a move"):
+            loop.stream(100)
+        loop.wait(move)
+        loop.stream(100)
+
+
+def test_a_law_that_begins_after_the_request_ends_the_move() -> None:
+    pytest.importorskip("numba")
+
+    def hold(time: float) -> bool:
+        return False
+
+    with opened(Servo()) as (arm, loop):
+        loop.start(cat.law(hold))
+        move = arm.move_to(0.5)
+        with pytest.raises(MoveError, match="a law or a stream sets its targets now"):
+            loop.wait(move)
+        assert arm.actual.position[0] == pytest.approx(0.0, abs=1e-3)
 
 
 # ---- what cannot be
@@ -501,9 +612,10 @@ def test_a_linear_axis_is_in_metres_and_newtons() -> None:
         assert "force 60 N (option)" in text
 
 
-def loop_for(loop: Loop, seconds: float) -> None:
+def loop_for(loop: Loop, seconds: float) -> cat.Cycle:
     begun: float | None = None
     for cycle in loop:
         begun = cycle.time if begun is None else begun
         if cycle.time - begun >= seconds:
-            return
+            return cycle
+    raise AssertionError("the iteration ended")

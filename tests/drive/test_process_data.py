@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
 import catenary as cat
 from catenary import types
 from catenary.bus import MainDevice
-from catenary.drive import Channel, Drives, Inputs, Outputs, ProcessData
+from catenary.drive import Channel, Drives, Inputs, Outputs, ProcessData, StartUp
 from catenary.errors import ConfigurationError, MappingError
 from catenary.virtual import Coupler, DigitalOutputs, Segment
 from tests.force_sensor import ForceSensor, TunedServo
@@ -173,6 +174,54 @@ def test_mistakes_are_told_before_anything_is_sent(cell: Cell) -> None:
         ProcessData(sub, outputs={}, safe=b"\x01")
     with pytest.raises(ConfigurationError, match=r"safe has 2 bytes, the outputs .* have 3"):
         cell.main.plan(ProcessData(sub, safe=b"\x01\x02"))
+
+
+def test_arguments_of_another_kind_are_named(cell: Cell) -> None:
+    sub = cell.main.subs[SENSOR]
+    wrong: Any = cell.main.subs  # type checkers refuse all of these, too
+    with pytest.raises(TypeError, match=r"ProcessData takes SubDevices.*not <\d SubDevices"):
+        ProcessData(wrong)
+    for wrong in ([1], 3):
+        with pytest.raises(TypeError, match=r"safe: \{name: value\}, or the bytes of all outputs"):
+            ProcessData(sub, safe=wrong)
+    wrong = [(0x6000, 1, types.REAL)]
+    with pytest.raises(TypeError, match=r"inputs: \{name: \(index, subindex, type\)\}, not \[\("):
+        ProcessData(sub, inputs=wrong)
+    for wrong in ({"0x1A00": ["x"]}, 0x1A00):
+        with pytest.raises(TypeError, match=r"pdos: PDOs by their numbers, \[0x1A00\]"):
+            ProcessData(sub, pdos=wrong)
+    for wrong in ([(0x2010, 0, 1)], {(0x2010, 0): 1}, StartUp(0x2010, 0, 1)):
+        for request in (ProcessData, Outputs):
+            with pytest.raises(TypeError, match=r"start_up: a list, \[StartUp\(index"):
+                request(sub, start_up=wrong)
+
+
+def test_a_device_list_is_not_a_device(cell: Cell) -> None:
+    subs: Any = cell.main.subs
+    with pytest.raises(TypeError, match=r"Inputs takes SubDevices, such as subs\[1\]"):
+        Inputs(subs)
+
+
+def test_names_can_be_iterated(cell: Cell) -> None:
+    raw, outputs = ProcessData(cell.main.subs[SENSOR]), Outputs(cell.main.subs[SENSOR])
+    assert tuple(raw) == raw.names
+    assert "Lamp" in raw
+    assert "Lmp" not in raw
+    assert tuple(outputs) == outputs.names
+    number: Any = 0
+    with pytest.raises(TypeError, match="a name is text, not 0"):
+        _ = raw[number]
+
+
+def test_text_is_not_a_truth_value(cell: Cell) -> None:
+    text: Any = "off"
+    with pytest.raises(TypeError, match=r"safe\['Tare'\] = 'off': BOOL: 'off' is text"):
+        ProcessData(cell.main.subs[SENSOR], safe={"Tare": text})
+    raw = ProcessData(cell.main.subs[SENSOR])
+    with cat.Loop(raw):
+        with pytest.raises(TypeError, match=r"'Tare' = 'off': BOOL: 'off' is text"):
+            raw["Tare"] = text
+        assert raw["Tare"] is False
 
 
 def test_values_that_cannot_be(cell: Cell) -> None:

@@ -22,6 +22,7 @@ import pytest
 
 import catenary as cat
 from catenary.errors import CatenaryError, DriveError, LoopError, MoveError
+from catenary.loop.running import Running
 from catenary.realtime import VirtualClock
 from catenary.types import SINT
 from catenary.virtual import Segment, Servo
@@ -625,3 +626,59 @@ def test_csp_holds_while_the_program_keeps_the_interpreter() -> None:
     assert arm.stopped == (None,)
     loop.close()
     main.close()
+
+
+def test_each_thread_that_closes_the_loop_returns_when_the_axes_stand() -> None:
+    cell = Cell("csp", servos=1)
+    cell.loop.run_in_background()
+    cell.arm.move_to(20.0, velocity=2.0)
+    until(lambda: cell.arm.actual.velocity[0] > 1.9)
+    left: list[str] = []
+
+    def close() -> None:
+        cell.loop.close()
+        left.append(cell.segment[0].drive_state())
+
+    threads = [threading.Thread(target=close) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(left) == 4
+    assert "OPERATION ENABLED" not in left
+    cell.main.close()
+
+
+def test_a_loop_that_cannot_run_in_the_background_keeps_its_late_limits(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def failing() -> Iterator[None]:
+        raise LoopError("no new cycle for 1 s")
+        yield
+
+    cell = Cell("csp", servos=1)
+    with monkeypatch.context() as patch:
+        patch.setattr(cat.Loop, "_iterating", lambda self: failing())
+        with pytest.raises(LoopError, match="no new cycle"):
+            cell.loop.run_in_background()
+    assert not cell.loop._opened.engine.background
+    with pytest.raises(RuntimeError, match="needs run_in_background"):
+        cell.loop.update()
+    cell.loop.close()
+    cell.main.close()
+
+
+def test_an_exit_in_the_thread_stops_the_axes(monkeypatch: pytest.MonkeyPatch) -> None:
+    cell = Cell("csp", servos=1)
+
+    def leave(self: Running, flags: int, *, faults: bool) -> None:
+        raise SystemExit(1)
+
+    monkeypatch.setattr(Running, "judge", leave)
+    cell.loop.run_in_background()
+    cell.segment[0].inject_fault(0x2310)
+    until(lambda: cell.loop.error is not None)
+    with pytest.raises(LoopError, match=r"was ended by SystemExit\(1\)"):
+        cell.loop.close()
+    assert cell.segment[0].drive_state() != "OPERATION ENABLED"
+    cell.main.close()

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
 import catenary as cat
 from catenary.bus import MainDevice
+from catenary.core import CYCLE_STOPPED
 from catenary.drive import Drives, ProcessData
 from catenary.loop.running import Running
+from catenary.loop.safe_outputs import confirm_safe
 from catenary.loop.signals import SignalGuard
 from catenary.plan.cycle import ExecutionMode
+from catenary.plan.wish import Views
 from catenary.realtime import VirtualClock
 from catenary.virtual import Coupler, Segment, Servo
 from catenary.virtual.faults import power_cycle
@@ -130,6 +135,39 @@ def test_a_device_that_is_gone_is_named(cell: Cell) -> None:
         run(cell, pull, safe={"Lamp": 7})
     notes = "\n".join(caught.value.__notes__)
     assert "device 2 Force sensor: did not confirm the safe values" in notes
+
+
+def test_a_device_gets_them_while_another_one_of_its_unit_is_silent() -> None:
+    ours, other = ForceSensor(), ForceSensor()
+    segment = Segment([Coupler(), ours, other])
+    with MainDevice(segment) as main:
+        main.scan()
+        data = ProcessData(main.subs[1], safe={"Lamp": 7})
+        rest = ProcessData(main.subs[2], outputs={})
+
+        def run_until_it_is_silent() -> None:
+            with cat.Loop(data, rest) as loop:
+                data["Lamp"] = 50
+                segment.inject(power_cycle(2, at=0.0, for_=60.0))
+                for _ in loop:
+                    pass
+
+        with pytest.raises(cat.WorkingCounterError) as caught:
+            run_until_it_is_silent()
+        assert ours.lamp == 7
+    assert "even if another one of its sync unit is silent" in "\n".join(caught.value.__notes__)
+
+
+def test_devices_that_are_not_required_confirm_nothing_after_the_cycle_has_ended(
+    cell: Cell,
+) -> None:
+    with cell.main as main:
+        main.scan()
+        data = ProcessData(main.subs[SENSOR], required=False)
+        plan = main.plan(data).cycle
+    views = cast(Views, SimpleNamespace(unit_valid=[0] * len(plan.sync_units)))
+    guard = cast(SignalGuard, SimpleNamespace(hurry=False))
+    confirm_safe(plan, views, lambda: CYCLE_STOPPED, guard)
 
 
 def test_a_device_that_is_not_required_may_be_gone(cell: Cell) -> None:

@@ -67,6 +67,8 @@ def paths(value: Any, path: KeyPath = ()) -> Iterator[KeyPath]:
         (("device", 1), 15),
         (("device", 1, "identity", "vendor"), 18),
         (("device", 1, "start_up", 1, "object"), 22),
+        (("drives",), 24),
+        (("drives", "arm é"), 24),
         (("drives", "arm é", "clock"), 24),
         (("drives", "arm é", "clock", "end"), 28),
     ],

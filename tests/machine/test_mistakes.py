@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from catenary.errors import MachineFileError
-from catenary.machine import read_machine
+from catenary.machine import Machine, read_machine
 from tests.machine.files import SMALL, write_small
 
 
@@ -353,6 +353,21 @@ MISTAKES: dict[str, tuple[str, ...]] = {
         "clocks.reference",
         'did you mean "coupler"',
     ),
+    "op_mode of a device that no role uses": (
+        "product = 0x10001 }",
+        'product = 0x10001 }\nop_mode = "DC Sync0"',
+        "device[0].op_mode",
+        r'no role uses the device "coupler"(?s:.*)\[process_data\.NAME\]',
+        "op_mode",
+    ),
+    "table that is not there": ("[drives.arm]", "[drive.arm]", "drive", 'did you mean "drives"'),
+    "drives without a name": (
+        "[drives.arm]",
+        "[drives]",
+        "drives.axes",
+        r"expected a table, found a list(?s:.*)has a name of yours: \[drives\.NAME\]",
+        'axes = ["j1"',
+    ),
     "lead that is not there": (
         'lead = "reference"',
         'lead = "master"',
@@ -460,3 +475,17 @@ def test_deep_nesting_is_refused(tmp_path: Path) -> None:
     path.write_text("format = " + "[" * 100_000)
     with pytest.raises(MachineFileError, match="not TOML"):
         read_machine(path)
+
+
+@pytest.mark.parametrize(
+    ("target", "message"),
+    [
+        ("et h0", "invalid target 'et h0'"),
+        ("virtual:", "invalid target 'virtual:'"),
+        ("virtual:nothing.toml", r"nothing\.toml: No such file"),
+    ],
+)
+def test_a_target_that_cannot_be_has_its_line(target: str, message: str, tmp_path: Path) -> None:
+    path = write_small(tmp_path, SMALL.replace("virtual:line.toml", target))
+    with pytest.raises(MachineFileError, match=rf"machine\.toml:2: target: .*{message}"):
+        Machine(path)

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from catenary import types
 from catenary.cli.init import read_encoders
 from catenary.errors import MachineFileError
 from catenary.machine import Machine, read_machine
+from catenary.machine.channels import make_channels
 from catenary.machine.text import FILL_IN, machine_text
+from catenary.model.device import Assignment, Entry, Pdo
 from catenary.target import MainDevice
 from catenary.virtual import (
     AnalogInputs,
@@ -21,6 +25,7 @@ from catenary.virtual import (
     Servo,
 )
 from catenary.virtual.devices import Device
+from tests.plan.devices import demo
 
 
 def written(devices: list[Device]) -> str:
@@ -122,3 +127,35 @@ def test_devices_without_a_name_are_named_by_their_numbers() -> None:
 
 def test_a_target_with_quotes_is_escaped() -> None:
     assert tomllib.loads(machine_text([], 'a"b\\', {}))["target"] == 'a"b\\'
+
+
+def test_one_name_for_an_input_and_an_output_becomes_two() -> None:
+    value = Entry(0x6000, 1, 16, "Value", types.UINT.index)
+    device = replace(
+        demo()[1],
+        outputs=(Assignment(0, (Pdo(0x1600, (value,), 0, name="Set"),)),),
+        inputs=(Assignment(1, (Pdo(0x1A00, (value,), 1, name="Read"),)),),
+    )
+    table = tomllib.loads(machine_text([device], "eth0", {}))["process_data"]
+    [found] = table.values()
+    assert list(found["outputs"]) == ["set_value"]
+    assert list(found["inputs"]) == ["read_value"]
+
+
+@pytest.mark.parametrize("bits", range(1, 65))
+def test_numbers_of_any_length_can_be_read_again(bits: int, tmp_path: Path) -> None:
+    entries = (
+        Entry(0x6000, 1, bits, "unknown", 0),
+        Entry(0x6000, 2, bits, "signed", types.INT.index),
+        Entry(0x6000, 3, bits, "text", types.VISIBLE_STRING.index),
+    )
+    inputs = (Assignment(1, (Pdo(0x1A00, entries, 1),)),)
+    path = tmp_path / "machine.toml"
+    path.write_text(machine_text([replace(demo()[1], inputs=inputs)], "eth0", {}))
+    file = read_machine(path)
+    [role] = file.tables.process_data
+    given = file.tables.process_data[role].inputs
+    assert isinstance(given, dict)
+    device = replace(demo()[1], inputs=inputs, input_pdos=inputs[0].pdos)
+    made = make_channels(file, ("process_data", role, "inputs"), given, device)
+    assert [channel.bit_length for channel in made.values()] == [bits, bits, bits]

@@ -20,6 +20,7 @@ from catenary.machine.units import Dimension, to_si
         ("1e-3 s", "time", 1e-3),
         ("90 rpm", "velocity", 3 * math.pi),
         ("90 deg/s", "velocity", math.pi / 2),
+        ("90 °/s", "velocity", math.pi / 2),
         ("inf rad/s", "velocity", math.inf),
         ("400 deg/s2", "acceleration", math.radians(400)),
         ("400 deg/s²", "acceleration", math.radians(400)),

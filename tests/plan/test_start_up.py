@@ -106,6 +106,22 @@ def test_a_value_of_another_kind_names_the_object() -> None:
         StartUp(0x2000, 0, 5, type=types.VISIBLE_STRING)
     with pytest.raises(ValueError, match="an index has 16 bits"):
         StartUp(0x16065, 0, b"")
+    with pytest.raises(TypeError, match="index and subindex are numbers, not '0x6065' and 0"):
+        StartUp("0x6065", 0, 5)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match=r"0x6065:00: 'UDINT' is not a type of catenary\.types"):
+        StartUp(0x6065, 0, 5, type="UDINT")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("index", [0x1600, 0x17FF, 0x1A00, 0x1BFF, 0x1C12, 0x1C13])
+@pytest.mark.parametrize("before_mapping", [True, False])
+def test_the_mapping_cannot_be_changed_behind_the_plan(index: int, before_mapping: bool) -> None:
+    with pytest.raises(ValueError, match=rf"0x{index:04X}:00 is part of the PDO mapping.*pdos="):
+        StartUp(index, 0, b"\x00", before_mapping=before_mapping)
+
+
+def test_objects_next_to_the_mapping_are_free() -> None:
+    assert StartUp(0x1800, 6, b"\x00").index == 0x1800
+    assert StartUp(0x1C32, 1, b"\x02").index == 0x1C32
 
 
 def test_a_device_without_objects_cannot_have_any() -> None:

@@ -56,7 +56,7 @@ def test_a_file_that_is_not_there_is_named() -> None:
 
 @pytest.mark.parametrize("target", ["", " ", "virtual:", "eth0:1", "a b", "dev/eth0"])
 def test_what_is_no_target(target: str) -> None:
-    with pytest.raises(ConfigurationError, match="is no target"):
+    with pytest.raises(ConfigurationError, match="invalid target"):
         parse(target)
 
 

@@ -41,7 +41,7 @@ def test_the_suffix_decides() -> None:
 
 @pytest.mark.parametrize("target", ["other.toml", "", " ", "two words", "virtual:"])
 def test_what_is_not_a_target(target: str, tmp_path: Path) -> None:
-    with pytest.raises(ConfigurationError, match=r"target|is not|directory"):
+    with pytest.raises(ConfigurationError, match=r"target|is not"):
         parse(named(tmp_path, target))
 
 

@@ -164,7 +164,7 @@ def _write(channel: MailboxChannel, device: DeviceDescription, plan: DevicePlan)
 def _channel(sub: SubDevice) -> MailboxChannel:
     if sub.channel is None:
         raise ConfigurationError(
-            f"{sub.station} has no mailbox for its start-up list",
-            hint="do not wish for SDO downloads to this device",
+            f"{sub.station} has no mailbox for its start-up objects",
+            hint="request no SDO downloads for this device",
         )
     return sub.channel

@@ -51,12 +51,13 @@ def run(arguments: argparse.Namespace) -> int:
 def compare_with_segment(file: str, target: str | None) -> Sequence[Comparison]:
     """Return the comparisons of a file with its segment, or with that of another target."""
     from catenary.machine import compare, read_machine
-    from catenary.target import MainDevice
+    from catenary.target import MainDevice, source_of
 
-    expected = read_machine(file).tables.device
-    with MainDevice(file if target is None else target, force=True) as main:
+    expected = read_machine(file)
+    source = expected.source() if target is None else source_of(target)
+    with MainDevice(source, force=True) as main:
         note_other_masters(main)
-        return compare(expected, main.passive_scan())
+        return compare(expected.tables.device, main.passive_scan())
 
 
 def as_table(found: Sequence[Comparison]) -> str:

@@ -57,6 +57,10 @@ class Engine:
         """Commits the target buffers for the next `next`, where that has a thread of its own to
         wait for: with several engines all commit before the first one is waited for."""
 
+    @property
+    def led(self) -> bool:
+        """True if a law that has begun, or a stream, sets the targets."""
+
     def keep_targets(self) -> None:
         """Let the next `next` commit nothing."""
 

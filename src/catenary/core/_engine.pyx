@@ -378,6 +378,10 @@ cdef class Engine:
         self.h.target[PRIVATE].header.background = value
         self.h.target[PRIVATE].header.updated = 0
 
+    @property
+    def led(self):
+        return self.is_led()
+
     def begin_update(self):
         self.writing = True
         self.writing_since = self.h.actual[PRIVATE].header.number
@@ -389,6 +393,8 @@ cdef class Engine:
                 header.updated = max(self.e.cycle.number, <uint64_t>1)
             self.commit_targets()
         self.writing = False
+        if self.law is None and self.stream is None:  # as `follow` did not meanwhile
+            axes_follow(&self.axes.c, &self.h.actual[PRIVATE], &self.h.target[PRIVATE])
 
     @property
     def origin(self):

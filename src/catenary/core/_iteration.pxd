@@ -19,4 +19,4 @@ cdef class Iteration:
     cdef int al_status
     cdef public object commit_lock
     cdef int commit_if_free(self) except -1
-    cdef int step_movers(self) except -1
+    cpdef int step_movers(self) except -1

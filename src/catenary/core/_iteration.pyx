@@ -103,7 +103,7 @@ cdef class Iteration:
             self.commit_lock.release()
         return 0
 
-    cdef int step_movers(self) except -1:
+    cpdef int step_movers(self) except -1:
         cdef double now
         if not self.movers:
             return 0

@@ -13,6 +13,7 @@ from catenary.drive.channel import Channel, ChannelSpec, make_channel
 from catenary.drive.objects import NAMED_COLUMNS, WRITTEN_OBJECTS, AxisObject
 from catenary.model.device import mapped_entries
 from catenary.plan.cycle import NumberKind
+from catenary.plan.start_up_object import StartUp
 from catenary.plan.wish import DistributedClock, ObjectReference, WrittenPdo
 from catenary.wire.cia402 import Mode
 
@@ -121,8 +122,13 @@ def written_pdos(
         named: What its entries may name.
 
     Raises:
+        TypeError: It is neither a list of numbers, nor a mapping of numbers to entries.
         ValueError: An index is not one of a PDO, or a name is unknown.
     """
+    if not isinstance(pdos, Iterable) or not all(isinstance(index, int) for index in pdos):
+        raise TypeError(
+            f"pdos: PDOs by their numbers, [0x1A00], or {{0x1A00: entries}}, not {pdos!r}"
+        )
     for index in pdos:
         if not 0x1600 <= index < 0x1C00:
             raise ValueError(
@@ -149,6 +155,17 @@ def _written_entry(
         raise ValueError(f"pdos: 0x{pdo:04X} names {entry!r}; names here: {known}{guess}")
     found = named[entry]
     return ObjectReference(found.index, found.subindex, found.bit_length)
+
+
+def start_up_list(objects: Sequence[StartUp]) -> tuple[StartUp, ...]:
+    """Return the start-up objects of `start_up=`.
+
+    Raises:
+        TypeError: It is not a list of StartUp objects.
+    """
+    if isinstance(objects, StartUp) or not all(isinstance(each, StartUp) for each in objects):
+        raise TypeError(f"start_up: a list, [StartUp(index, subindex, value)], not {objects!r}")
+    return tuple(objects)
 
 
 def mode_of(name: str) -> Mode:

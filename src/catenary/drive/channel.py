@@ -48,8 +48,9 @@ class Channel:
         if not 0 < self.index <= 0xFFFF or not 0 <= self.subindex <= 0xFF:
             raise ValueError(f"{self.place}: an index has 16 bits, a subindex 8")
         if not isinstance(self.type, Boolean | Integer | Real):
+            shown = str(self.type) if isinstance(self.type, DataType) else repr(self.type)
             raise TypeError(
-                f"{self.place}: {self.type!r} is not a type of numbers; use BOOL, an integer or a "
+                f"{self.place}: {shown} is not a type of numbers; use BOOL, an integer or a "
                 "REAL of catenary.types"
             )
         if self.scale is not None and not (math.isfinite(self.scale) and self.scale != 0):
@@ -101,7 +102,7 @@ class Channel:
         """
         number = value if self.scale is None else value / self.scale
         if isinstance(self.type, Boolean):
-            return int(bool(number))
+            return self.type.encode(bool(number) if self.scale else value)[0]  # type: ignore[arg-type]
         if isinstance(self.type, Real):
             if not math.isfinite(number):
                 raise ValueError(f"{value} is not finite")
@@ -133,7 +134,14 @@ def make_channel(option: str, name: str, spec: ChannelSpec) -> Channel:
 
 
 def make_channels(option: str, specs: Mapping[str, ChannelSpec]) -> dict[str, Channel]:
-    """Return the channels of an option by name."""
+    """Return the channels of an option by name.
+
+    Raises:
+        TypeError: The option is not a mapping, or one of its values is not a channel.
+        ValueError: A number is out of range.
+    """
+    if not isinstance(specs, Mapping):
+        raise TypeError(f"{option}: {{name: (index, subindex, type)}}, not {specs!r}")
     return {name: make_channel(option, name, spec) for name, spec in specs.items()}
 
 

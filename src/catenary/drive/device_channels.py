@@ -42,8 +42,8 @@ def mapped_channels(
     devices = list(devices)
     if not devices:
         raise ValueError(
-            f"no device is given whose {direction.name.lower()} process data are meant: was one "
-            "found? main.subs shows all; a group is empty where no device has its alias"
+            f"{direction.noun}: no device given; main.subs shows those that were found. A group is "
+            "empty if no device has its alias"
         )
     found = [
         (device, pdo, entry)

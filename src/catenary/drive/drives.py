@@ -25,6 +25,7 @@ from catenary.drive.arguments import (
     known,
     mode_of,
     named_columns,
+    start_up_list,
     warn_of_default_velocity,
     written_pdos,
 )
@@ -210,7 +211,7 @@ class Drives(Request):
                 required=required,
                 homing=home,
                 pdos=written,
-                objects=tuple(start_up),
+                objects=start_up_list(start_up),
             )
             for (sub, slot), name, first, unit, limits, home in zip(
                 sources,
@@ -322,8 +323,9 @@ class Drives(Request):
             if wanted not in self._axes[axis].modes:
                 raise ValueError(f"{self.names[axis]}: make Drives with other_modes=[{mode!r}]")
         views = self._of_open_loop("switch()")
-        views.mode_target[axes] = wanted
-        views.controlword_bits[axes] &= ~HALT & 0xFFFF
+        chosen = self._numbers(axes)
+        views.mode_target[chosen] = wanted
+        views.controlword_bits[chosen] &= ~HALT & 0xFFFF
 
     # Moves: the loop must be iterated meanwhile, by loop.wait(move) or by your own `for`.
 
@@ -358,7 +360,7 @@ class Drives(Request):
             DriveError: An axis is not enabled.
             ConfigurationError: `jerk` is given and ruckig is not installed.
         """
-        chosen = self._numbers(axes)
+        chosen = self._movable(axes)
         goals = values_of("position", position, len(chosen))
         return self._move(chosen, goals, RateOptions(velocity, acceleration, jerk))
 
@@ -375,11 +377,11 @@ class Drives(Request):
 
         See `move_to` for the other arguments, the result and the errors.
         """
-        chosen = self._numbers(axes)
+        chosen = self._movable(axes)
         moves = self._moving()
         starts = [moves.goal(axis) for axis in chosen]
         goals = [
-            step + (self._ports[axis].target if start is None else start)
+            step + (self._ports[axis].rest if start is None else start)
             for axis, start, step in zip(
                 chosen, starts, values_of("distance", distance, len(chosen)), strict=True
             )
@@ -399,7 +401,7 @@ class Drives(Request):
             ValueError: The drives were made without "hm", or an axis is homing already.
             DriveError: An axis is not enabled.
         """
-        chosen = self._numbers(axes)
+        chosen = self._movable(axes)
         moves = self._moving()
         parts = {i: make_homing_part(self._axes[i], self._ports[i]) for i in chosen}
         return moves.begin(parts, HOMING_PATIENCE)
@@ -411,9 +413,23 @@ class Drives(Request):
         return moves.begin(dict(zip(chosen, parts, strict=True)), patience)
 
     def _numbers(self, axes: Axes) -> list[int]:
-        """Return the numbers of chosen axes."""
-        numbers: list[int] = np.atleast_1d(np.arange(len(self))[axes]).tolist()
+        """Return the numbers of chosen axes. IndexError for a number without an axis."""
+        wanted = axes if isinstance(axes, slice) else np.asarray(axes)
+        if not isinstance(wanted, slice) and wanted.size == 0:
+            return []
+        try:
+            numbers: list[int] = np.atleast_1d(np.arange(len(self))[wanted]).tolist()
+        except IndexError:
+            known = ", ".join(f"{i}: {name}" for i, name in enumerate(self.names))
+            raise IndexError(f"axes={axes!r}: give numbers of the axes: {known}") from None
         return numbers
+
+    def _movable(self, axes: Axes) -> list[int]:
+        """Return the numbers of chosen axes. ValueError if there are none."""
+        chosen = self._numbers(axes)
+        if not chosen:
+            raise ValueError(f"axes={axes!r}: no axis to move")
+        return chosen
 
     def _moving(self) -> Moves:
         self._of_open_loop("a move")
@@ -535,8 +551,9 @@ class Drives(Request):
 
     def _request(self, call: str, goal: Goal, axes: Axes) -> None:
         views = self._of_open_loop(f"{call}()")
-        views.goal[axes] = goal
-        views.request[axes] += 1  # a goal that dropped comes back only by a new request
+        chosen = self._numbers(axes)
+        views.goal[chosen] = goal
+        views.request[chosen] += 1  # a goal that dropped comes back only by a new request
 
     def _of_open_loop(self, call: str) -> Views:
         """Return the views for a request; RuntimeError if no cycle would send it."""

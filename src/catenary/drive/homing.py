@@ -12,6 +12,7 @@ from catenary.types import DINT, SINT, UDINT
 from catenary.wire.cia402 import Control, Mode, Object, Status
 
 START = int(Control.MODE_4)
+HALT = int(Control.HALT)
 ATTAINED = int(Status.MODE_12 | Status.TARGET_REACHED)
 FAILED = int(Status.MODE_13)
 ANSWER_CYCLES = 10  # until the statusword can be the answer to a controlword
@@ -78,6 +79,7 @@ def home_axis(port: AxisPort, before: int) -> Steps:
     port.request_mode(Mode.HM)
     try:
         yield from _await_mode(port, Mode.HM)
+        port.clear_bits(HALT)  # of a move in PP that has failed
         port.set_bits(START)
         for count in itertools.count():
             yield

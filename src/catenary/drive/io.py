@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Generic, TypeVar, overload
 
 import numpy.typing as npt
 
 from catenary.bus import SubDevice
-from catenary.drive.arguments import PdoList, clock_wish, cycles_between, written_pdos
+from catenary.drive.arguments import (
+    PdoList,
+    clock_wish,
+    cycles_between,
+    start_up_list,
+    written_pdos,
+)
 from catenary.drive.channel import ChannelSpec, make_channels
 from catenary.drive.device_channels import (
     chosen_channels,
@@ -86,7 +92,7 @@ class Channels(Request):
         self._required = required
         self._divider = cycles_between("divider", divider)
         self._clock = clock_wish(dc)
-        self._start_up = tuple(start_up)
+        self._start_up = start_up_list(start_up)
         self._units: list[int] = []
         self._arrays: dict[Bank, Reals | Integers | Bytes] | None = None
         self._unit_valid: Bytes | None = None
@@ -111,6 +117,10 @@ class Channels(Request):
     def names(self) -> tuple[str, ...]:
         """Of all channels, in the order of the process data."""
         return tuple(channel.name for channel in self._channels)
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names."""
+        return iter(self.names)
 
     def __getitem__(self, name: str) -> float | int:
         """The channel's value: 0 or 1, the raw integer, or the float where it has a scale."""

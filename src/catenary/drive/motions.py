@@ -7,12 +7,15 @@ Bit 5 makes a set-point count at once. Each level is held until the drive has an
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from catenary.drive.objects import PROFILE_OBJECTS
 from catenary.drive.port import AxisPort, Complaint, Steps, await_condition
 from catenary.drive.profile import Motion, Profile, Rates, make_profile, make_stop
-from catenary.errors import SdoAbort
+from catenary.errors import CatenaryError, SdoAbort
 from catenary.wire.cia402 import Control, Object, Status
 
+LATE = 0.05  # [s] without iterations, after which a profile begins again: late limit of CSP
 SETTLE = 0.02  # [s] a set-point of CSP stays at the goal: the lag of a drive's position loop
 ANSWER_TIMEOUT = 1.0  # [s] for an acknowledge of the drive
 ANSWER_EXCHANGES = 4  # until the statusword can be the answer to a controlword
@@ -40,27 +43,40 @@ def first_motion(port: AxisPort) -> Motion:
     """
     if port.motion is not None:
         return port.motion
-    return Motion(port.target, 0.0 if port.at_rest else port.velocity)
+    return Motion(port.target, _velocity(port))
 
 
 def move_cyclic(port: AxisPort, goal: float, rates: Rates) -> Steps:
     """Command our profile to `goal`, as a function of the time of the cycle."""
     slower = rates._replace(velocity=rates.velocity * CRUISE)
-    profile = make_profile(first_motion(port), goal, slower)
-    yield from _command(port, profile, SETTLE)
+    yield from _command(port, lambda start: make_profile(start, goal, slower), SETTLE)
 
 
 def stop_cyclic(port: AxisPort, rates: Rates) -> Steps:
     """Decelerate to rest and hold."""
-    yield from _command(port, make_stop(first_motion(port), rates), 0.0)
+    yield from _command(port, lambda start: make_stop(start, rates), 0.0)
 
 
-def _command(port: AxisPort, profile: Profile, settle: float) -> Steps:
+def _command(port: AxisPort, make: Callable[[Motion], Profile], settle: float) -> Steps:
+    """Command a profile.
+
+    In a long pause of the iteration the core stops the axis. Then a new profile begins there: one
+    that had gone on would have the axis catch up, faster than the move allows.
+    """
+    profile = make(first_motion(port))
     begun = port.now - port.period  # a set-point counts one cycle later
     while port.now - begun < profile.duration + settle:
         port.command(profile.at(port.now - begun))
+        last = port.now
         yield
+        if port.now - last > max(LATE, 2 * port.period):
+            profile = make(Motion(port.position, _velocity(port)))
+            begun = port.now - port.period
     port.command(Motion(profile.goal))
+
+
+def _velocity(port: AxisPort) -> float:
+    return 0.0 if port.at_rest else port.velocity
 
 
 # ---- PP
@@ -70,24 +86,28 @@ def move_profile(port: AxisPort, goal: float, rates: Rates) -> Steps:
     """Hand a set-point to the drive, and wait until it has reached it."""
     way = make_profile(Motion(port.position, port.velocity), goal, rates._replace(jerk=None))
     patience = SLACK[0] * way.duration + SLACK[1]
-    yield from _write_rates(port, rates)
-    yield from _hand_over(port, goal)
-    yield from await_condition(
-        port,
-        lambda: port.has_bits(REACHED),
-        patience,
-        Complaint(
-            f"did not show target reached (statusword bit 10) within {patience:.3g} s",
-            "see its position window 0x6067, its limits 0x607D and 0x607F, and its state",
-            goal,
-        ),
+    try:
+        yield from _write_rates(port, rates)
+        yield from _hand_over(port, goal)
+        yield from _await_goal(port, goal, patience)
+    except CatenaryError:
+        port.set_bits(HALT)  # the drive may be on its way, to this goal or to the one before
+        raise
+
+
+def _await_goal(port: AxisPort, goal: float, patience: float) -> Steps:
+    complaint = Complaint(
+        f"did not show target reached (statusword bit 10) within {patience:.3g} s",
+        "see its position window 0x6067, its limits 0x607D and 0x607F, and its state",
+        goal,
     )
+    yield from await_condition(port, lambda: port.has_bits(REACHED), patience, complaint)
 
 
 def stop_profile(port: AxisPort) -> Steps:
     """Halt (bit 8, the ramp of 0x605D), then hold the position at which the axis stopped.
 
-    Halt ends with the new set-point: without it the drive would go on to the old one.
+    Halt ends when the new set-point is acknowledged: before, the drive would go on to the old one.
     """
     port.clear_bits(NEW_SET_POINT | AT_ONCE)
     port.set_bits(HALT)
@@ -102,13 +122,14 @@ def _hand_over(port: AxisPort, position: float) -> Steps:
         port.clear_bits(NEW_SET_POINT)
         yield from _pause(port, ANSWER_EXCHANGES * port.exchange)
     yield from _await_acknowledge(port, False, position)
-    port.clear_bits(HALT)
     port.set_target(position)
+    port.handed_over = None
     port.set_bits(NEW_SET_POINT | AT_ONCE)
     port.handshake = True
     yield
     yield from _await_acknowledge(port, True, position)
-    port.clear_bits(NEW_SET_POINT | AT_ONCE)
+    port.handed_over = position
+    port.clear_bits(NEW_SET_POINT | AT_ONCE | HALT)
     yield from _await_acknowledge(port, False, position)
     port.handshake = False
 

@@ -14,6 +14,7 @@ from catenary.drive.motions import HALT, OWN_BITS
 from catenary.drive.port import AxisPort, Complaint, Steps
 from catenary.errors import CatenaryError, MoveError
 from catenary.plan.wish import Mover
+from catenary.wire.cia402 import Mode
 
 Outcome: TypeAlias = Literal["reached", "stopped", "replaced", "failed"]
 
@@ -29,6 +30,7 @@ class Part:
     steps: Steps
     stop: Callable[[], Steps]  # what brings the axis to rest
     mode: int | None = None  # the axis must keep it; None: the motion changes it
+    stop_requested: bool = False
     is_stopping: bool = False
     outcome: Outcome | None = None
     error: CatenaryError | None = None
@@ -40,9 +42,8 @@ class Move:
     The loop must be iterated while it moves: `loop.wait(move)` does it, or your own `for`.
     """
 
-    def __init__(self, parts: Sequence[Part], owner: Moves, patience: float) -> None:
+    def __init__(self, parts: Sequence[Part], patience: float) -> None:
         self._parts = tuple(parts)
-        self._owner = owner
         self._done = False
         self.patience = patience  # [s] default of `loop.wait(move)`
 
@@ -81,7 +82,8 @@ class Move:
         In CSP by the acceleration of the move, in PP by the drive's halt (0x605D), in homing the
         search ends.
         """
-        self._owner.stop(self._parts)
+        for part in self._parts:  # the next step does it: no lock, so that a signal handler may ask
+            part.stop_requested = True
 
     def timeout_error(self, timeout: float) -> MoveError:
         """Return the error of a move that is not done after `timeout` [s]."""
@@ -117,29 +119,25 @@ class Moves:
             patience: Default timeout of a wait [s].
         """
         with self._lock:
-            move = Move(tuple(parts.values()), self, patience)
-            for axis, part in parts.items():
-                if axis in self._active:
-                    self._replace(axis)
-                self._active[axis] = (part, move)
+            move = Move(tuple(parts.values()), patience)
+            replaced = {axis: self._active[axis] for axis in parts if axis in self._active}
             if self not in self._movers:
                 self._movers.append(self)
+            # At once: an interrupt must leave neither half a move nor a motion without a move.
+            self._active.update({axis: (part, move) for axis, part in parts.items()})
+            for part, old in replaced.values():
+                _replace(part, old)
         return move
 
     def goal(self, axis: int) -> float | None:
-        """Return the goal of an axis that moves; None if it does not."""
+        """Return the position from which `move_by` counts while an axis moves; None: its target."""
         with self._lock:
             part, _ = self._active.get(axis, (None, None))
-            return None if part is None or part.is_stopping else part.goal
-
-    def stop(self, parts: Sequence[Part]) -> None:
-        """Bring the axes of a move to rest."""
-        with self._lock:
-            for part in parts:
-                if part.outcome is None and not part.is_stopping:
-                    part.is_stopping = True
-                    part.steps.close()
-                    part.steps = part.stop()
+        if part is None:
+            return None
+        if part.stop_requested:  # in PP the target is still the goal that was given up
+            return part.port.position if part.mode == Mode.PP else None
+        return part.goal
 
     # plan.wish.Mover
 
@@ -176,12 +174,19 @@ class Moves:
             hint = "see Drives.state and Drives.stopped; reset and enable the axis, then move again"
         elif part.mode is not None and part.port.requested_mode != part.mode:
             cause, hint = "its mode was changed", "wait for a move before Drives.switch()"
+        elif part.port.is_led:
+            cause = "a law or a stream sets its targets now"
+            hint = "wait for a move before you start a law"
         else:
             return False
         self._fail(axis, part, Complaint(f"ended its move: {cause}", hint, part.goal))
         return True
 
     def _advance(self, axis: int, part: Part) -> None:
+        if part.stop_requested and not part.is_stopping:
+            part.steps.close()
+            part.steps = part.stop()
+            part.is_stopping = True
         try:
             next(part.steps)
         except StopIteration:
@@ -207,16 +212,16 @@ class Moves:
         part.port.clear_bits(OWN_BITS & ~HALT)
         move.finish_if_over()
 
-    def _replace(self, axis: int) -> None:
-        """End a motion for the next one, which goes on from it."""
-        part, move = self._active.pop(axis)
-        part.steps.close()
-        part.port.clear_bits(OWN_BITS & ~HALT)
-        part.outcome = "replaced"
-        hint = "wait for a move before the next one, or look at move.outcome"
-        part.error = part.port.error(Complaint("got another move", hint, part.goal))
-        move.finish_if_over()
-
     def _leave_if_idle(self) -> None:
         if not self._active and self in self._movers:
             self._movers.remove(self)
+
+
+def _replace(part: Part, move: Move) -> None:
+    """End a motion for the next one, which goes on from it."""
+    part.steps.close()
+    part.port.clear_bits(OWN_BITS & ~HALT)
+    part.outcome = "replaced"
+    hint = "wait for a move before the next one, or look at move.outcome"
+    part.error = part.port.error(Complaint("got another move", hint, part.goal))
+    move.finish_if_over()

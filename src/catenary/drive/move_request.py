@@ -13,10 +13,16 @@ import numpy.typing as npt
 from catenary.drive.axis import Axis
 from catenary.drive.homing import home_axis, stop_homing
 from catenary.drive.limits import BRAKE_TIME
-from catenary.drive.motions import move_cyclic, move_profile, stop_cyclic, stop_profile
+from catenary.drive.motions import (
+    first_motion,
+    move_cyclic,
+    move_profile,
+    stop_cyclic,
+    stop_profile,
+)
 from catenary.drive.move import Part
 from catenary.drive.port import AxisPort
-from catenary.drive.profile import Motion, Rates, load_ruckig, make_profile
+from catenary.drive.profile import Motion, Rates, load_ruckig, make_profile, make_stop
 from catenary.errors import DriveError
 from catenary.wire.cia402 import Mode
 
@@ -92,7 +98,12 @@ def make_homing_part(axis: Axis, port: AxisPort) -> Part:
 
 
 def require_enabled(port: AxisPort) -> None:
-    """Raise DriveError if an axis does not follow its targets."""
+    """Raise DriveError if an axis does not follow its targets, or those of a law."""
+    if port.is_led:
+        raise DriveError(
+            f"{port.name} cannot move: a law or a stream sets its targets",
+            hint="end it first: run.stop() of what loop.start() returned, stream.close()",
+        )
     if not port.followed or port.stop_cause() is not None:
         raise DriveError(
             f"{port.name} cannot move: it is not enabled ({port.state_text()})",
@@ -130,20 +141,40 @@ def _part(axis: Axis, port: AxisPort, goal: float, rates: Rates) -> Part:
             )
         steps = move_profile(port, goal, rates)
         return Part(port, goal, steps, lambda: stop_profile(port), mode=mode)
+    _check_rest(axis, port, rates)
     steps = move_cyclic(port, goal, rates)
     return Part(port, goal, steps, lambda: stop_cyclic(port, rates), mode=mode)
 
 
 def _check_goal(axis: Axis, goal: float) -> None:
+    beyond = _beyond(axis, goal)
+    if beyond is not None:
+        raise ValueError(f"{axis.name}: goal {goal:.6g} {axis.units.names.position} is {beyond}")
+
+
+def _check_rest(axis: Axis, port: AxisPort, rates: Rates) -> None:
+    """Raise ValueError if an axis in motion cannot stop before a position limit."""
+    motion = first_motion(port)
+    rest = make_stop(motion, rates).goal
+    beyond = _beyond(axis, rest)
+    if beyond is not None and (rest - motion.position) * motion.velocity > 0:
+        names = axis.units.names
+        raise ValueError(
+            f"{axis.name}: acceleration {rates.acceleration:.6g} {names.acceleration} stops it "
+            f"from {motion.velocity:.4g} {names.velocity} at {rest:.6g} {names.position}, {beyond}"
+        )
+
+
+def _beyond(axis: Axis, position: float) -> str | None:
+    """Return the position limit that is exceeded, as text; None if there is none."""
     bounds, unit = axis.bounds, axis.units.names.position
     for name, limit, sign in (
         ("position_min", bounds.position_min.value, -1.0),
         ("position_max", bounds.position_max.value, 1.0),
     ):
-        if limit is not None and sign * (goal - limit) > SLACK * max(1.0, abs(limit)):
-            raise ValueError(
-                f"{axis.name}: goal {goal:.6g} {unit} is beyond {name} {limit:.6g} {unit}"
-            )
+        if limit is not None and sign * (position - limit) > SLACK * max(1.0, abs(limit)):
+            return f"beyond {name} {limit:.6g} {unit}"
+    return None
 
 
 def _rates(axes: Sequence[Axis], options: RateOptions) -> list[Rates]:

@@ -56,6 +56,7 @@ class AxisPort:
         self.now = 0.0  # [s] time of the cycle
         self.motion: Motion | None = None  # commanded last by a profile of ours
         self.handshake = False  # a set-point of PP is being handed over
+        self.handed_over: float | None = None  # the last set-point that PP acknowledged
         self.written: dict[str, int] = {}  # profile objects as written by SDO
 
     @property
@@ -81,6 +82,14 @@ class AxisPort:
     @property
     def target(self) -> float:
         return self._views.target_position.item(self._index)
+
+    @property
+    def rest(self) -> float:
+        """Position from which the axis moves on: its target. In PP one that the drive does not know
+        is not meant: then its actual position."""
+        if self.requested_mode == Mode.PP and self.target != self.handed_over:
+            return self.position
+        return self.target
 
     @property
     def followed(self) -> bool:
@@ -112,6 +121,11 @@ class AxisPort:
     def has_bits(self, bits: int) -> bool:
         """True if the drive shows all of these bits in its statusword."""
         return self.status & bits == bits
+
+    @property
+    def is_led(self) -> bool:
+        """True if a law or a stream sets the targets."""
+        return self._views.is_led()
 
     def stop_cause(self) -> str | None:
         """Return why the axis cannot go on with a move; None if it can."""

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 
 from catenary.bus import SubDevice
-from catenary.drive.arguments import PdoList, clock_wish, cycles_between, written_pdos
+from catenary.drive.arguments import (
+    PdoList,
+    clock_wish,
+    cycles_between,
+    start_up_list,
+    written_pdos,
+)
 from catenary.drive.channel import Channel, ChannelSpec, make_channels
 from catenary.drive.device_channels import (
     NamedChannel,
@@ -54,7 +60,8 @@ class ProcessData(Request):
         pdos: PDOs instead of a search: `[0x1A01]`, or with their entries, by name or as (index,
             subindex, bits): `{0x1A00: ["force", "status"]}`.
         safe: Values of outputs by name, or the bytes of all outputs. They are sent when the loop
-            ends, for whatever reason. Outputs without a safe value become 0.
+            ends, for whatever reason. Outputs without a safe value become 0. Then the device leaves
+            OP, and decides by itself what its outputs do.
         start_up: Objects that are written to the device before SAFE-OP.
         divider: Cycles of the loop between two exchanges.
         required: False: the loop continues without the device; see `present`.
@@ -93,9 +100,9 @@ class ProcessData(Request):
         }
         unnamed = [direction for direction, channels in named.items() if channels is None]
         self._channels |= _mapped_channels(sub, unnamed, self._pdos, known)
-        self._safe = safe
+        self._safe = bytes(safe) if isinstance(safe, bytearray | memoryview) else safe
         self._check_safe()
-        self._start_up = tuple(start_up)
+        self._start_up = start_up_list(start_up)
         self._divider = cycles_between("divider", divider)
         self._required = required
         self._clock = clock_wish(dc)
@@ -128,6 +135,10 @@ class ProcessData(Request):
         if self._unit_valid is None:
             raise RuntimeError("nothing is exchanged before a Loop is open")
         return bool(self._unit_valid[self._unit])
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names."""
+        return iter(self.names)
 
     def __getitem__(self, name: str) -> float | int:
         """Return a value by name: a bool, an integer, or a float where it is REAL or has a scale.
@@ -206,6 +217,10 @@ class ProcessData(Request):
             raise ValueError("safe: this request writes no outputs (outputs={})")
         if isinstance(self._safe, bytes):
             return
+        if not isinstance(self._safe, Mapping):
+            raise TypeError(
+                f"safe: {{name: value}}, or the bytes of all outputs, not {self._safe!r}"
+            )
         channels = {each.name: each.channel for each in self._channels[Direction.OUTPUT]}
         for name, value in self._safe.items():
             if name not in channels:
@@ -247,6 +262,10 @@ class ProcessData(Request):
             return found
         if name in self.names:
             raise RuntimeError(f"{name!r} has no value before a Loop is open")
+        if not isinstance(name, str):
+            raise TypeError(
+                f"{self!r}: a name is text, not {name!r}; `inputs` and `outputs` are bytes"
+            )
         raise KeyError(f"{self!r}: {_unknown(name, self.names)}")
 
 

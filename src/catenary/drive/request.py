@@ -13,6 +13,10 @@ class Request:
     """Owns the devices of a process-data request. Unknown attributes fail with the nearest name."""
 
     def __init__(self, subs: Sequence[SubDevice]) -> None:
+        for sub in subs:
+            if not hasattr(sub, "position"):
+                kind = type(self).__name__
+                raise TypeError(f"{kind} takes SubDevices, such as subs[1]; not {sub!r}")
         self._subs = tuple(subs)
 
     def __getattr__(self, name: str) -> NoReturn:

@@ -121,7 +121,7 @@ def _interpolation(
     wanted = interpolation_time(period_ns)
     if wanted is None:
         raise ConfigurationError(
-            f"{axis.name}: a period of {period_ns / 1e3:g} us cannot be said in 0x{index:04X} "
+            f"{axis.name}: 0x{index:04X} cannot represent a period of {period_ns / 1e3:g} us "
             "(1 to 255 times a power of ten)",
             hint="choose a period such as 1 ms, 500 us, 250 us or 125 us",
         )

@@ -69,11 +69,11 @@ class Background:
             )
         for running in self._runnings:
             running.refuse_powered_torque("run_in_background")
+        next(self._iteration)  # the first one commits nothing: it must not meet an update
         for running in self._runnings:
             running.engine.background = True
             running.end_background = self.end
         self._iteration.commit_lock = self._commit
-        next(self._iteration)  # the first one commits nothing: it must not meet an update
         self._thread.start()
 
     def end(self) -> None:
@@ -113,6 +113,7 @@ class Background:
             with self._written_targets():
                 yield
                 self._require_alive()  # else it would seem that they are sent
+                self._iteration.step_movers()  # moving axes keep the targets of their moves
         finally:
             self._updating = 0
             self._commit.release()
@@ -121,9 +122,9 @@ class Background:
     def _written_targets(self) -> Iterator[None]:
         """Commit what the block writes; nothing of it if the block raises."""
         engines = [running.engine for running in self._runnings]
-        before = [bytes(engine.blocks()[1]) for engine in engines]
         for engine in engines:
             engine.begin_update()
+        before = [bytes(engine.blocks()[1]) for engine in engines]
         complete = False
         try:
             yield
@@ -194,6 +195,8 @@ class Background:
                 self._pace.keep(self._ended)
         except Exception as error:  # a thread has no caller: the next call raises it
             self._fail(error)
+        except BaseException as end:  # SystemExit: the axes must not go on without the thread
+            self._fail(LoopError(f"the thread that iterates the loop was ended by {end!r}"))
         finally:
             self._ended.set()
             self._tell_cycle()

@@ -19,7 +19,7 @@ COLUMN_BUFFERS: dict[tuple[bool, Bank], str] = {
     (True, Bank.BIT): "output_bits",
 }
 PART_BUFFERS = (*COLUMN_BUFFERS.values(), "input_bytes", "output_bytes")
-OTHERS = (*PART_BUFFERS, "unit_valid", "movers", "is_open")
+OTHERS = (*PART_BUFFERS, "unit_valid", "movers", "is_open", "is_led")
 AXIS_BUFFERS = tuple(each.name for each in fields(Views) if each.name not in OTHERS)
 
 
@@ -28,10 +28,11 @@ def bind_wishes(
     tables: Sequence[WishTables],
     buffers: Mapping[str, memoryview],
     is_open: Callable[[], bool],
+    is_led: Callable[[], bool] = lambda: False,
 ) -> Views:
     """Bind every wish to its part of the buffers, in the order of the plan. Return the whole.
 
-    `is_open` returns True while the loop runs.
+    `is_open` returns True while the loop runs, `is_led` while a law or a stream sets the targets.
     """
     arrays = {name: np.asarray(buffers[name]) for name in (*AXIS_BUFFERS, *PART_BUFFERS)}
     unit_valid = np.asarray(buffers["unit_valid"])
@@ -41,11 +42,13 @@ def bind_wishes(
         sizes = dict.fromkeys(AXIS_BUFFERS, len(table.axes)) | part_sizes(table)
         starts = {name: used.get(name, used["axes"]) for name in sizes}
         parts = {name: arrays[name][starts[name] :][: sizes[name]] for name in sizes}
-        wish.bind(Views(**parts, unit_valid=unit_valid, movers=movers, is_open=is_open))
+        wish.bind(
+            Views(**parts, unit_valid=unit_valid, movers=movers, is_open=is_open, is_led=is_led)
+        )
         used["axes"] += len(table.axes)
         for name in PART_BUFFERS:
             used[name] += sizes[name]
-    return Views(**arrays, unit_valid=unit_valid, movers=movers, is_open=is_open)
+    return Views(**arrays, unit_valid=unit_valid, movers=movers, is_open=is_open, is_led=is_led)
 
 
 def part_sizes(table: WishTables) -> dict[str, int]:

@@ -152,7 +152,7 @@ def drive_error(axes: Sequence[AxisTrouble], what: str, log: Log | None) -> Driv
     faulty = any(axis.state in IN_FAULT for axis in axes)
     hint = (
         "remove the cause, then open a new Loop: it resets the fault. To stay in this one, use "
-        "Loop(raise_faults=False) and Drives.enable()"
+        "StopPolicy(raise_faults=False) and Drives.enable()"
         if faulty
         else "check its main supply, safe torque off and the enable input"
     )

@@ -6,6 +6,7 @@ Leaving, for whatever reason, stops the drives natively before the states go dow
 
 from __future__ import annotations
 
+import threading
 import warnings
 import weakref
 from collections.abc import Iterator, Sequence
@@ -23,7 +24,7 @@ from catenary.loop.devices import DeviceWish, by_network
 from catenary.loop.laws.law import Law, LawFunction
 from catenary.loop.laws.law import law as made_law
 from catenary.loop.laws.run import LawRun, Numbers
-from catenary.loop.moves import Awaited, wait_for_move
+from catenary.loop.moves import Awaited, require_move, wait_for_move
 from catenary.loop.network import ENDING, TROUBLE, Network, Settings, leave_method
 from catenary.loop.networks import (
     NetworksIteration,
@@ -44,6 +45,7 @@ from catenary.plan.sink import Sink
 from catenary.wire.al import State
 
 LOG_LIMIT = 2**24  # cycles: a gigabyte
+LEAVE_TIMEOUT = 60.0  # [s] for another thread that leaves the loop
 
 
 class Loop:
@@ -135,6 +137,7 @@ class Loop:
         self._faults = stop.raise_faults
         leaving = (Loop.close, Loop.__exit__, Loop._leave, leave_open_loop)
         self._guard = SignalGuard(tuple(each.__code__ for each in leaving))
+        self._leaving = threading.RLock()
         self._iteration: Iteration | NetworksIteration | None = None
         self._background: Background | None = None
         self._finalizer: weakref.finalize[..., Loop] | None = None
@@ -220,9 +223,13 @@ class Loop:
             if self._background.is_alive:
                 return
         iteration = self._iterating()
-        background = Background(self._runnings, iteration, self._guard)
-        background.start()
-        self._background = background
+        self._background = Background(self._runnings, iteration, self._guard)
+        try:
+            self._background.start()
+        except BaseException:
+            if not self._background.is_alive:
+                self._background = None
+            raise
 
     def update(self) -> AbstractContextManager[None]:
         """Return a context in which a program writes one consistent set of targets and requests.
@@ -277,7 +284,9 @@ class Loop:
         Raises:
             MoveError: The move took too long, was replaced, or its axis was stopped.
             DriveError: A drive is in fault or was stopped; other errors of the iteration likewise.
+            TypeError: `move` is not a move.
         """
+        require_move(move)
         if self._background is None:
             wait_for_move(iter(self), move, timeout)
         else:
@@ -458,9 +467,14 @@ class Loop:
 
         Raises:
             ValueError: there are several.
+            RuntimeError: axes move.
         """
         if len(self._networks) > 1:
             raise ValueError(f"{what} belongs to one network: make a Loop for it")
+        if self._opened.views.movers:
+            raise RuntimeError(
+                f"{what} cannot begin during a move: loop.wait(move), or move.stop() and wait"
+            )
         return self._opened
 
     @property
@@ -487,7 +501,11 @@ class Loop:
             running.tell_end(error)
 
     def _leave(self) -> list[Exception]:
-        """Stop every network that answers, whatever happens to the others. Return the problems."""
+        """Stop every network that answers, whatever happens to the others. Return the problems.
+
+        A second thread waits for the first: when it goes on, nothing moves any more.
+        """
+        is_ours = self._leaving.acquire(timeout=LEAVE_TIMEOUT)
         try:
             problems = leave_all(self._runnings, self._guard)
             for network in self._networks:
@@ -497,6 +515,8 @@ class Loop:
             self._guard.restore()
             if self._finalizer is not None:
                 self._finalizer.detach()
+            if is_ours:
+                self._leaving.release()
         return problems
 
 

@@ -27,14 +27,21 @@ class Awaited(Protocol):
     def timeout_error(self, timeout: float) -> MoveError: ...
 
 
+def require_move(move: object) -> None:
+    """Raise TypeError for anything that is not a move."""
+    if not hasattr(move, "patience"):
+        raise TypeError(f"loop.wait() takes a move, such as arm.move_to() returns, not {move!r}")
+
+
 def wait_for_move(cycles: Iterator[Cycle], move: Awaited, timeout: float | None) -> None:
     """Iterate until a move is done. See `Loop.wait`."""
     limit = move.patience if timeout is None else timeout
     begun: float | None = None
     while not move.done:
         cycle = next(cycles)
-        begun = cycle.time if begun is None else begun
-        if not move.done and cycle.time - begun > limit:
+        now = max(each.time for each in cycle.networks)  # that of a dead one may stand still
+        begun = now if begun is None else begun
+        if not move.done and now - begun > limit:
             raise stopped_late(move, limit)
     if move.error is not None:
         raise move.error

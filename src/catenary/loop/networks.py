@@ -90,12 +90,12 @@ class NetworksIteration:
             for one in self._runnings:
                 one.engine.zero_ns = self._runnings[0].engine.zero_ns
         else:
-            self._commit_if_free(self._cycle)
+            self._commit_if_free()
             flags = [one.engine.next() for one in self._runnings]
         self._judge(self._cycle, flags)
         return self._cycle
 
-    def _commit_if_free(self, cycle: NetworksCycle) -> None:
+    def _commit_if_free(self) -> None:
         """Commit, unless another thread is writing the targets."""
         lock = self.commit_lock
         if lock is not None and not lock.acquire(blocking=False):
@@ -103,13 +103,20 @@ class NetworksIteration:
                 one.engine.keep_targets()
             return
         try:
-            for one, its in zip(self._runnings, cycle.networks, strict=True):
-                for mover in list(one.views.movers):
-                    mover.step(its.time)
+            self.step_movers()
+            for one in self._runnings:
                 one.engine.commit_targets()
         finally:
             if lock is not None:
                 lock.release()
+
+    def step_movers(self) -> None:
+        """Write the targets of axes that move."""
+        if self._cycle is None:
+            return
+        for one, its in zip(self._runnings, self._cycle.networks, strict=True):
+            for mover in list(one.views.movers):
+                mover.step(its.time)
 
     def _judge(self, cycle: NetworksCycle, flags: Sequence[int]) -> None:
         """Raise what ends the loop: too few networks, or trouble in one that is alive."""

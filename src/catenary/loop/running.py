@@ -76,7 +76,13 @@ class Running:
         self.plan = plan
         self.exchange: Exchange = exchange(self)
         self.engine = self.exchange.make_engine()
-        self.views = bind_wishes(wishes, plan.tables, self.engine.buffers, lambda: self.is_open)
+        self.views = bind_wishes(
+            wishes,
+            plan.tables,
+            self.engine.buffers,
+            is_open=lambda: self.is_open,
+            is_led=lambda: self.engine.led,
+        )
         self._axis_watch = AxisWatch(self.views, plan.cycle.axes)
         self.stop = stop
         self.laws = LawRunner(self.engine, plan)

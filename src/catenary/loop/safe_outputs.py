@@ -38,18 +38,21 @@ def confirm_safe(
     """
     if not plan.output_areas:
         return
-    missing = units = {area.sync_unit for area in plan.output_areas}
+    units = {area.sync_unit for area in plan.output_areas}
+    missing = required = {unit for unit in units if not plan.sync_units[unit].optional}
     turn = max(plan.sync_units[unit].divider for unit in units) + 2  # one may have been sent
     for done in range(max(TIMEOUT_NS // plan.period_ns, EXCHANGES * turn)):
         if cycle() & (CYCLE_STOPPED | CYCLE_NONE):
+            missing = required
             break
-        missing = {
-            unit for unit in units if not (views.unit_valid[unit] or plan.sync_units[unit].optional)
-        }
+        missing = {unit for unit in required if not views.unit_valid[unit]}
         if done + 1 >= turn and (not missing or guard.hurry):
             return
+    if not missing:
+        return
     names = ", ".join(f"device {a.name}" for a in plan.output_areas if a.sync_unit in missing)
     raise LoopError(
         f"{names}: did not confirm the safe values of the outputs",
-        hint="the outputs have what the device does without a MainDevice: see its watchdog",
+        hint="a device that answers has received them, even if another one of its sync unit is "
+        "silent; a silent device does what its watchdog says",
     )

@@ -22,7 +22,7 @@ ADVICE: dict[StopReason, str] = {
     ),
     StopReason.HANDOVER: (
         "start the next law or write torques in time, change to CSP before the law ends, "
-        "or give Loop(handover=...) a longer time [s]"
+        "or give StopPolicy(handover=...) a longer time [s]"
     ),
     StopReason.REFUSED: (
         "look for NaN or a jump in the targets: begin at the commanded position and move by "

@@ -22,10 +22,12 @@ _WORDS: Mapping[str, str] = {
     **{"object": "a table", "array": "a list", "str": "text", "int": "a whole number"},
     **{"float": "a number", "bool": "true or false"},
 }
+ROLES = ("drives", "process_data")  # tables of tables
 _HINTS: Mapping[str, str] = {
     "identity": "identity = { vendor = 0x2, product = 0x44C2C52 }; `catenary init` writes it",
     "format": 'write format = "catenary-machine/1" at the top of the file',
-    "counts_per_turn": "counts of the motor's encoder per turn, from the drive's manual",
+    "counts_per_turn": "counts of the motor's encoder per turn, from the drive's manual; after "
+    '`catenary init`, remove the "#" from the lines marked FILL IN',
 }
 
 
@@ -54,7 +56,9 @@ def explain(error: msgspec.ValidationError, content: Mapping[str, object]) -> Ex
         r"`([^`]*)`", lambda kinds: _in_words(kinds[1]), message.partition(", got")[0]
     )
     text = f"{expected[0].lower()}{expected[1:]}, found {_shown(found)}{_described(path)}"
-    return Explanation(path, text)
+    is_role = len(path) == 2 and path[0] in ROLES
+    hint = f"the header of the table has a name of yours: [{path[0]}.NAME]" if is_role else ""
+    return Explanation(path, text, hint)
 
 
 def _message(text: str) -> str:

@@ -11,12 +11,13 @@ from typing import Any, cast
 import msgspec
 from msgspec import UNSET
 
-from catenary.errors import MachineFileError
+from catenary.errors import ConfigurationError, MachineFileError
+from catenary.link import LinkSource
 from catenary.machine.explanation import explain, quantities
 from catenary.machine.lines import KeyPath, key_lines, line_of
 from catenary.machine.schema import FORMAT, MachineTables, Table
 from catenary.machine.units import Dimension, to_si
-from catenary.target.toml_file import TomlFile, read_toml, target_of
+from catenary.target import TomlFile, parse, read_toml, target_of
 
 
 class MachineFile:
@@ -38,14 +39,17 @@ class MachineFile:
             found = explain(error, file.content)
             raise self.error(found.path, found.message, hint=found.hint) from None
 
-    @property
-    def target(self) -> str:
-        """Name of the segment.
+    def source(self) -> LinkSource:
+        """Return the link source of `target`.
 
         Raises:
-            MachineFileError: The file names none.
+            MachineFileError: The file names none, or one that cannot be.
         """
-        return target_of(self._toml)
+        target = target_of(self._toml)
+        try:
+            return parse(target)
+        except ConfigurationError as error:
+            raise self.error(("target",), error.message, hint=error.hint) from error
 
     def error(self, path: KeyPath, message: str, *, hint: str = "") -> MachineFileError:
         """Return the error for a key."""

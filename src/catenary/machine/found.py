@@ -35,8 +35,8 @@ def raise_differences(file: MachineFile, found: Sequence[Comparison]) -> None:
     """Raise the first difference between file and segment; the others are its notes.
 
     Raises:
-        IdentityError: A device is not the one in the file.
-        SegmentError: A required device is missing, or an alias is there twice.
+        IdentityError: A device is not the one in the file, or two devices have its alias.
+        SegmentError: A required device is missing.
     """
     errors = [_error(file, each) for each in found if each.verdict in ("different", "missing")]
     if errors:

@@ -66,7 +66,7 @@ class _Scanner:
             path += (name,)
             if number == len(names) - 1 and is_array:
                 self._elements[path] = self._elements.get(path, 0) + 1
-                self._lines.setdefault(path, line)
+            self._lines.setdefault(path, line)  # a table that exists by this header alone, too
             if path in self._elements:
                 path += (self._elements[path] - 1,)
         self._at += 2 if is_array else 1

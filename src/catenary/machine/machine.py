@@ -47,7 +47,7 @@ class Machine:
 
     Raises:
         MachineFileError: The file cannot be read, or is wrong; the error names line and key.
-        IdentityError: On entering: a device is not the one in the file.
+        IdentityError: On entering: a device is not the one in the file, or two have its alias.
         SegmentError: On entering: a required device is missing.
     """
 
@@ -56,7 +56,7 @@ class Machine:
     ) -> None:
         self._file = read_machine(path)
         refuse_unsupported(self._file)
-        source = source_of(self._file.target if target is None else target)
+        source = self._file.source() if target is None else source_of(target)
         self._segment = segment_of(source)
         self._main = MainDevice(source, force=force)
         self._has_own_master = isinstance(source, MasterSource)

@@ -41,6 +41,7 @@ def check_references(file: MachineFile) -> None:
         _check_lists(file, name, table)
     for name, data in file.tables.process_data.items():
         _check_process_data(file, ("process_data", name), data)
+    _check_op_modes(file)
     reference = file.tables.clocks.reference
     if reference is not UNSET:
         check_device(file, ("clocks", "reference"), reference)
@@ -159,6 +160,19 @@ def _check_process_data(file: MachineFile, path: KeyPath, table: ProcessDataTabl
             if name not in known:
                 text = f'"{name}" is not an input or output{nearest(name, known)}'
                 raise file.error((*path, "pdos", pdo, number), text)
+
+
+def _check_op_modes(file: MachineFile) -> None:
+    """Check that every `op_mode` has a role that obeys it."""
+    used = {table.device for table in file.tables.process_data.values()}
+    used |= {axis.device for role in file.tables.drives for axis in axis_addresses(file, role)}
+    for number, device in enumerate(file.tables.device):
+        if device.op_mode is not UNSET and device.name not in used:
+            raise file.error(
+                ("device", number, "op_mode"),
+                f'op_mode has no effect: no role uses the device "{device.name}"',
+                hint=f'add [process_data.NAME] with device = "{device.name}", or remove op_mode',
+            )
 
 
 def pdo_index(file: MachineFile, path: KeyPath, text: str) -> int:

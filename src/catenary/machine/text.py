@@ -8,9 +8,13 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from catenary.machine.schema import FORMAT
 from catenary.model.device import DeviceDescription, Direction, Entry
-from catenary.types import by_index
+from catenary.types import BOOL, by_index
 
 FILL_IN = "FILL IN"
+UNSIGNED = {  # by length in bits
+    **{8: "USINT", 16: "UINT", 24: "UINT24", 32: "UDINT"},
+    **{40: "UINT40", 48: "UINT48", 56: "UINT56", 64: "ULINT"},
+}
 ENCODER = (0x608F, 1), (0x608F, 2)  # counts of the encoder, turns of the motor
 _HEAD = """\
 # Written by `catenary init`. Check it against the segment: catenary check FILE
@@ -110,8 +114,8 @@ def _counts(counts: Sequence[float | None]) -> str:
 
 
 def _process_data(name: str, device: DeviceDescription) -> str:
-    outputs = dict(_channels(device, Direction.OUTPUT))
-    inputs = dict(_channels(device, Direction.INPUT))
+    channels = _channels(device)
+    outputs, inputs = channels[Direction.OUTPUT], channels[Direction.INPUT]
     if not outputs and not inputs:
         return ""
     text = f'\n[process_data.{name}]\ndevice = "{name}"\n'
@@ -125,36 +129,52 @@ def _process_data(name: str, device: DeviceDescription) -> str:
     return text
 
 
-def _channels(device: DeviceDescription, direction: Direction) -> Iterator[tuple[str, str]]:
-    """Yield name and object of each number that is mapped now; of a repeated object the first."""
-    entries: dict[tuple[int, int], tuple[Entry, str]] = {}
+def _channels(device: DeviceDescription) -> dict[Direction, dict[str, str]]:
+    """Return name and object of each number that is mapped now. A name is given once."""
+    found = [
+        (direction, entry, pdo)
+        for direction in (Direction.OUTPUT, Direction.INPUT)
+        for entry, pdo in _entries(device, direction)
+    ]
+    short = [entry.name for _, entry, _ in found]
+    unique = len(set(short)) == len(short)
+    names = _unique(
+        [_slug(e.name if unique else f"{pdo} {e.name}", "value") for _, e, pdo in found]
+    )
+    channels: dict[Direction, dict[str, str]] = {direction: {} for direction in Direction}
+    for name, (direction, entry, _) in zip(names, found, strict=True):
+        place = f'"0x{entry.index:04X}:{entry.subindex:02X}"'
+        kind = _type_name(entry)
+        channels[direction][name] = f'{{ object = {place}, type = "{kind}" }}' if kind else place
+    return channels
+
+
+def _entries(device: DeviceDescription, direction: Direction) -> Iterator[tuple[Entry, str]]:
+    """Yield the numbers that are mapped, with the names of their PDOs; of a repeated object the
+    first."""
+    seen = set()
     for assignment in device.assignments(direction):
         for pdo in assignment.pdos:
             for entry in pdo.entries:
-                if entry.index and 1 <= entry.bit_length <= 64:
-                    entries.setdefault((entry.index, entry.subindex), (entry, pdo.name))
-    short = [entry.name for entry, _ in entries.values()]
-    unique = len(set(short)) == len(short)
-    names = _unique(
-        [_slug(e.name if unique else f"{pdo} {e.name}", "value") for e, pdo in entries.values()]
-    )
-    for name, (entry, _) in zip(names, entries.values(), strict=True):
-        place = f'"0x{entry.index:04X}:{entry.subindex:02X}"'
-        kind = _type_name(entry)
-        yield name, place if kind == "BOOL" else f'{{ object = {place}, type = "{kind}" }}'
+                place = (entry.index, entry.subindex)
+                if entry.index and 1 <= entry.bit_length <= 64 and place not in seen:
+                    seen.add(place)
+                    yield entry, pdo.name
 
 
 def _type_name(entry: Entry) -> str:
-    """Return the type of an entry; without a usable one, an unsigned integer of its length."""
+    """Return the type of an entry; without a usable one, an unsigned integer of its length.
+
+    Empty for BOOL, and for lengths without a type: the device's PDO has them.
+    """
     try:
         kind = by_index(entry.data_type)
         if kind.bit_length == entry.bit_length:
-            return kind.name
+            return "" if kind is BOOL else kind.name
     except ValueError:
         pass
     bits = entry.bit_length
-    names = {1: "BOOL", 8: "USINT", 16: "UINT", 32: "UDINT", 64: "ULINT"}
-    return names.get(bits, f"BIT{bits}" if bits < 8 else f"UINT{bits}")
+    return UNSIGNED.get(bits, f"BIT{bits}" if 1 < bits < 8 else "")
 
 
 def _names(devices: Sequence[DeviceDescription]) -> list[str]:

@@ -46,9 +46,9 @@ QUANTITIES: Final[Mapping[Dimension, tuple[str, str]]] = {
     "length": ("length", "length"),
     "force": ("force", "force"),
 }
-_CHARACTERS = str.maketrans({"µ": "u", "μ": "u", "²": "2", "*": "·"})
+_CHARACTERS = str.maketrans({"µ": "u", "μ": "u", "²": "2", "*": "·", "°": "deg"})
 SPELLINGS: Final[Mapping[str, str]] = {  # other spellings of a unit
-    **{"°": "deg", "rev": "turn", "sec": "s", "min-1": "rpm", "1/min": "rpm", "rev/s": "turn/s"},
+    **{"rev": "turn", "sec": "s", "min-1": "rpm", "1/min": "rpm", "rev/s": "turn/s"},
     **{"Nm": "N·m", "mNm": "mN·m", "kNm": "kN·m", "Nm/s": "N·m/s"},
 }
 _TEXT = re.compile(r"\s*([-+]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?inf)\s*(.*?)\s*")

@@ -196,7 +196,7 @@ def _existing(devices: Sequence[DeviceDescription], position: int) -> DeviceDesc
 
 def _check_follower(device: DeviceDescription, reference: DeviceDescription | None) -> None:
     if not device.clock_bits:
-        raise _no_clock(device, "dc= was wished for it")
+        raise _no_clock(device, "dc= was requested")
     if reference is not None and device.position < reference.position:
         raise ConfigurationError(
             f"{device} lies before {reference}, the reference clock: frames pass it before they "
@@ -206,9 +206,10 @@ def _check_follower(device: DeviceDescription, reference: DeviceDescription | No
 
 
 def _no_clock(device: DeviceDescription, why: str) -> ConfigurationError:
-    what = "only stamps receive times" if device.controller.supports_clocks else "has none"
+    only = device.controller.supports_clocks
+    what = "it only stamps receive times" if only else "it has no distributed clock"
     return ConfigurationError(
-        f"{device}: {why}, but as a distributed clock it {what}",
+        f"{device}: {why}, but {what}",
         hint="leave dc= out for this device, or look for a variant of it with distributed clocks",
     )
 

@@ -234,7 +234,7 @@ def _asked(
     for position in asked:
         if position not in range(len(devices)):
             raise ConfigurationError(
-                f"a wish names device {position}; the segment has {len(devices)} devices",
+                f"a request names device {position}; the segment has {len(devices)} devices",
                 hint="scan again, or correct the position",
             )
     return asked

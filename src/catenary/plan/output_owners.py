@@ -1,4 +1,5 @@
-"""Each byte of the outputs belongs to one request: two that write it are an error."""
+"""Each byte of the outputs belongs to one request: two that write it are an error. What the core
+writes for an axis cannot be a column, too: it would bypass enabling and all limits."""
 
 from __future__ import annotations
 
@@ -15,6 +16,7 @@ AXIS_OUTPUTS = (
     *("controlword", "mode_target", "target_position", "target_velocity", "target_torque"),
     "velocity_offset",
 )
+SHARED = "velocity_offset"  # a column of the application; the core writes it during a fallback
 
 
 class Owned(NamedTuple):
@@ -23,6 +25,7 @@ class Owned(NamedTuple):
     request: int  # its rank
     what: str
     bytes: range
+    by_axis: bool = False  # by the core, for an axis
 
 
 def check_owners(
@@ -31,10 +34,10 @@ def check_owners(
     tables: Sequence[WishTables],
     layout: Layout,
 ) -> None:
-    """Check that no byte of the outputs is written by two requests.
+    """Check that no byte of the outputs is written by two requests, or by an axis and a column.
 
     Raises:
-        ConfigurationError: Names both requests and the byte.
+        ConfigurationError: Names both writers and the byte.
     """
     owners: dict[int, Owned] = {}
     for rank, table in enumerate(tables):
@@ -43,12 +46,14 @@ def check_owners(
                 other = owners.setdefault(byte, owned)
                 if other.request != rank:
                     raise _conflict(devices, wishes, layout, other, owned, byte)
+                if other.by_axis and not owned.by_axis and other.what != SHARED:
+                    raise _column_of_axis(wishes, other, owned)
 
 
 def _owned(rank: int, table: WishTables) -> Iterator[Owned]:
     for axis in table.axes:
         for name, number in _axis_outputs(axis):
-            yield Owned(rank, name, _bytes(number))
+            yield Owned(rank, name, _bytes(number), by_axis=True)
     for column in table.output_columns:
         yield Owned(rank, column.name, _bytes(column.number))
     for area in table.output_areas:
@@ -65,6 +70,15 @@ def _axis_outputs(axis: AxisPlan) -> Iterator[tuple[str, Number]]:
 def _bytes(number: Number) -> range:
     last = number.bit_offset + number.bit_length - 1
     return range(number.bit_offset // 8, last // 8 + 1)
+
+
+def _column_of_axis(wishes: Sequence[Wish], axis: Owned, column: Owned) -> ConfigurationError:
+    return ConfigurationError(
+        f"{wishes[axis.request]!r}: column {column.what!r} is the {axis.what} that the axis itself "
+        "writes",
+        hint="write arm.target.position, velocity, torque or mode; they are limited and enabled "
+        "without a jump",
+    )
 
 
 def _conflict(

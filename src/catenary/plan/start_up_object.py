@@ -7,6 +7,9 @@ from typing import cast
 
 from catenary.types import DataType, Scalar, Value
 
+# ETG.1000.6 §5.6.7.4: RxPDOs, TxPDOs, and their assignment to SyncManagers
+MAPPING_OBJECTS = (range(0x1600, 0x1800), range(0x1A00, 0x1C00), range(0x1C10, 0x1C30))
+
 
 @dataclass(frozen=True, slots=True)
 class StartUp:
@@ -23,7 +26,8 @@ class StartUp:
         verify: Read it back and compare. Objects that can only be written are not read.
 
     Raises:
-        ValueError: The index, the subindex or the value is out of range.
+        ValueError: The index, the subindex or the value is out of range, or the object belongs to
+            the PDO mapping.
         TypeError: The value does not agree with the type.
     """
 
@@ -36,10 +40,27 @@ class StartUp:
     verify: bool = True
 
     def __post_init__(self) -> None:
+        if isinstance(self.index, str) or isinstance(self.subindex, str):
+            raise TypeError(
+                f"start-up object: index and subindex are numbers, not {self.index!r} and "
+                f"{self.subindex!r}"
+            )
         if not 0 <= self.index <= 0xFFFF or not 0 <= self.subindex <= 0xFF:
             raise ValueError(f"start-up object {self.place}: an index has 16 bits, a subindex 8")
-        if self.type is not None:
-            self.encode(self.type)
+        if any(self.index in objects for objects in MAPPING_OBJECTS):
+            # Unknown to the plan, other bytes would reach the controlword and the targets.
+            raise ValueError(
+                f"start-up object {self.place} is part of the PDO mapping; write the mapping with "
+                "pdos= of the request"
+            )
+        if self.type is None:
+            return
+        if not isinstance(self.type, DataType):
+            raise TypeError(
+                f"start-up object {self.place}: {self.type!r} is not a type of catenary.types, "
+                "such as types.UDINT"
+            )
+        self.encode(self.type)
 
     @property
     def place(self) -> str:

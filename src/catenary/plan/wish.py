@@ -215,6 +215,8 @@ class Views:
     movers: list[Mover] = field(default_factory=list)  # of the whole loop, while they move
     # Whether the loop runs: afterwards requests reach nothing
     is_open: Callable[[], bool] = lambda: True
+    # Whether a law or a stream sets the targets
+    is_led: Callable[[], bool] = lambda: False
 
 
 class Wish(Protocol):

@@ -33,7 +33,7 @@ def parse(target: str) -> LinkSource:
         return _kernel_master(target, rest)
     if not kind or colon or any(letter.isspace() or letter == "/" for letter in kind):
         raise ConfigurationError(
-            f"{target!r} is no target",
+            f"invalid target {target!r}",
             hint="give a network interface (eth0), two (eth0,eth1), virtual, virtual:FILE.toml, "
             "virtual-realtime, igh:0, or a machine file (machine.toml)",
         )
@@ -54,7 +54,7 @@ def _ring(target: str) -> LinkSource:
     names = target.split(",")
     if len(names) != 2 or names[0].strip() == names[1].strip():
         raise ConfigurationError(
-            f"{target!r} is no ring", hint="give two different network interfaces: eth0,eth1"
+            f"{target!r} is not a ring", hint="give two different network interfaces: eth0,eth1"
         )
     first, second = (parse(name) for name in names)
     if not isinstance(first, Interface) or not isinstance(second, Interface):

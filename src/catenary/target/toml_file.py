@@ -60,8 +60,8 @@ def target_of(file: TomlFile) -> str:
     if not isinstance(target, str) or not target.strip():
         fault = 'key "target" is missing' if target is None else f"target = {target!r} is not text"
         raise _unreadable(file.path, fault, hint='write target = "eth0" at the top of the file')
-    kind, colon, name = target.strip().partition(":")
-    if kind in VIRTUAL and colon:
+    kind, _, name = target.strip().partition(":")
+    if kind in VIRTUAL and name:
         return f"{kind}:{file.path.parent / name}"
     if is_machine_file(target):
         raise _unreadable(
