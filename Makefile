@@ -29,7 +29,7 @@ ifeq ($(wildcard $(VENV)/.built)$(filter clean,$(MAKECMDGOALS)),)
   endif
 endif
 
-.PHONY: demo cobot rtlab test lint build clean
+.PHONY: demo cobot rtlab test lint hooks build clean
 
 demo: $(VENV)/.built
 	@$(VENV)/bin/catenary demo
@@ -48,6 +48,9 @@ lint: $(VENV)/.with-lint
 	@$(VENV)/bin/ruff format --check $(wildcard $(CHECKED))
 	@$(VENV)/bin/mypy
 	@$(VENV)/bin/lint-imports --no-logo
+
+hooks: $(VENV)/.with-lint
+	@$(VENV)/bin/pre-commit install
 
 build: $(VENV)/.with-test
 
