@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from catenary import bus
+from catenary.bus.master import MasterOwner
 from catenary.errors import ConfigurationError, LoopError, SegmentError
 from catenary.igh.address import place
 from catenary.igh.configure import Configuration, DeviceConfiguration
@@ -14,7 +15,7 @@ from catenary.igh.reservation import Reservation
 class KernelAccess:
     """Owns the handles of an activated kernel master."""
 
-    def __init__(self, main: bus.MainDevice) -> None:
+    def __init__(self, main: MasterOwner) -> None:
         self.main = main
         self.active: Configuration | None = None  # None: the master is not activated
 

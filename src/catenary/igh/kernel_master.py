@@ -21,8 +21,8 @@ from catenary.model.device import DeviceDescription, Direction, mapped_entries
 from catenary.wire.al import AlState
 
 if TYPE_CHECKING:  # plan needs NumPy, a scan does not
-    from catenary.bus import MainDevice
     from catenary.bus.diagnosis import Diagnosis
+    from catenary.bus.master import MasterOwner
     from catenary.bus.states import Outcome
     from catenary.plan.planner import Plan
     from catenary.plan.request import PdoWish, Wish
@@ -40,14 +40,14 @@ class KernelMaster:
     `Loop` exchanges the process images. Closing the MainDevice gives the master back.
     """
 
-    def __init__(self, main: MainDevice) -> None:
+    def __init__(self, main: MasterOwner) -> None:
         self.main = main
         self._kernel = KernelAccess(main)
-        self._carrier: KernelCarrier | None = None
+        self.carrier: KernelCarrier | None = None
 
     def forget(self) -> None:
         """Let go of the parent's master in a forked child."""
-        carrier, self._carrier, self.main.carrier = self._carrier, None, None
+        carrier, self.carrier = self.carrier, None
         if carrier is not None:
             carrier.end()
 
@@ -62,7 +62,6 @@ class KernelMaster:
         Raises:
             NoDeviceError: there are none.
         """
-        self.main.require_no_loop()
         count = self.reservation.device_count()
         self.reservation.wait_preop()
         found = [describe(self.reservation, position) for position in range(count)]
@@ -104,10 +103,9 @@ class KernelMaster:
             found[position] = {place: data for place, data in read.items() if data}
         return found
 
-    def configure(self, plan: Plan) -> None:
+    def configure(self, plan: Plan, epoch_ns: int) -> tuple[int | None, ...]:
         """Tells the master the plan and activates it: from here on it waits for cycles."""
-        self.main.require_no_loop()
-        if self._carrier is not None:
+        if self.carrier is not None:
             raise ConfigurationError(
                 f"{self.reservation.name} is activated already: nothing can be configured any more",
                 hint="leave the loop that runs, or main.leave()",
@@ -119,12 +117,12 @@ class KernelMaster:
             self._keep_sync_types(sub, device)
         found = [sub.description for sub in self.main.subs]
         try:
-            configuration = configure(self.reservation, plan, found, self.main.clock_epoch_ns)
+            configuration = configure(self.reservation, plan, found, epoch_ns)
         except BaseException as error:
             self._undo(error)
             raise
-        self._carrier = KernelCarrier(self._kernel, configuration)
-        self.main.carrier = self._carrier
+        self.carrier = KernelCarrier(self._kernel, configuration)
+        return ()
 
     def _keep_sync_types(self, sub: bus.SubDevice, plan: DevicePlan) -> None:
         """Read how a device keeps time, before SYNC0 is written to it. Without clocks, write back
@@ -151,7 +149,7 @@ class KernelMaster:
             CatenaryError: A device that was synchronised to SYNC0 does not reach PRE-OP, or refuses
                 its former type; further ones as notes.
         """
-        carrier, self._carrier, self.main.carrier = self._carrier, None, None
+        carrier, self.carrier = self.carrier, None
         if carrier is None:
             return
         carrier.end()

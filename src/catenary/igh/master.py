@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from catenary.bus import MainDevice
+from catenary.bus.master import MasterOwner
 from catenary.igh._ecrt import KernelTime
 from catenary.igh.kernel_master import KernelMaster
 from catenary.igh.library import Library
@@ -35,6 +35,6 @@ class Master:
         """Reserves the master. LinkError says what is in the way, and how to mend it."""
         return Reservation(Library(self._library), self.index, KernelTime(self._virtual_time))
 
-    def make_master(self, main: MainDevice) -> KernelMaster:
+    def make_master(self, main: MasterOwner) -> KernelMaster:
         """Return what brings the devices of a MainDevice up and down."""
         return KernelMaster(main)

@@ -9,6 +9,7 @@ from typing import NoReturn, TypeVar
 
 from catenary import bus
 from catenary.bus import ListType
+from catenary.bus.sub_device import DeviceOwner
 from catenary.errors import ConfigurationError, MailboxError, RegisterError
 from catenary.igh import abi
 from catenary.igh.configure import REGISTER_SIZE, REQUEST_SIZE, DeviceConfiguration
@@ -34,7 +35,7 @@ class SubDevice(bus.SubDevice):
     """Owns what is known of one device of the kernel master."""
 
     def __init__(
-        self, main: bus.MainDevice, kernel: KernelAccess, description: DeviceDescription
+        self, main: DeviceOwner, kernel: KernelAccess, description: DeviceDescription
     ) -> None:
         super().__init__(main, description, None)
         self.sdo: Sdo = Sdo(self)

@@ -26,7 +26,7 @@ def by_network(wishes: Sequence[DeviceWish]) -> list[tuple[MainDevice, list[Devi
     """The wishes of each MainDevice, in the order of its first one."""
     networks: dict[int, tuple[MainDevice, list[DeviceWish]]] = {}
     for wish in wishes:
-        mains = {id(sub.main): sub.main for sub in wish.subs}
+        mains = {id(sub.main): _main_of(sub) for sub in wish.subs}
         if len(mains) > 1:
             raise ValueError(
                 "one wish with devices of several MainDevices: make one for each, and give the "
@@ -37,3 +37,10 @@ def by_network(wishes: Sequence[DeviceWish]) -> list[tuple[MainDevice, list[Devi
     if not networks:
         raise ValueError("a Loop needs a wish: Drives, Inputs or Outputs")
     return list(networks.values())
+
+
+def _main_of(sub: SubDevice) -> MainDevice:
+    """Return the MainDevice of a device, with all that a loop needs of it."""
+    if not isinstance(sub.main, MainDevice):
+        raise TypeError(f"{sub.station} belongs to a {type(sub.main).__name__}, not a MainDevice")
+    return sub.main
