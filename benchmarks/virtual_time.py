@@ -13,7 +13,7 @@ import catenary as cat
 from catenary.bench.loop import write
 from catenary.bench.report import machine
 from catenary.bench.segment import COUNTS_PER_TURN, make_segment
-from catenary.virtual import Segment, Servo
+from catenary.virtual import Segment, Servo, read_segment
 
 ExecutionMode = Literal["inline", "threaded"]
 
@@ -25,9 +25,7 @@ def measure(*, drives: int, seconds: float, file: Path | None, config: Path | No
     """`config`: a segment's file instead of so many drives."""
 
     def segment() -> Segment:
-        return (
-            make_segment(drives, clock="virtual") if config is None else Segment.from_toml(config)
-        )
+        return make_segment(drives, clock="virtual") if config is None else read_segment(config)
 
     found: dict[str, float] = {
         execution: run(segment(), seconds, execution) for execution in EXECUTION_MODES

@@ -48,7 +48,7 @@ def read_layers() -> Layers:
         if contract["type"] == "layers":
             for number, names in enumerate(contract["layers"]):
                 level.update({name.strip(" ()"): number for name in names.split("|")})
-        else:
+        elif contract["type"] == "forbidden":
             forbidden |= {
                 (source.removeprefix("catenary."), target.removeprefix("catenary."))
                 for source in contract["source_modules"]

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from catenary.cli import scan
+from catenary.cli import console, scan
 from catenary.cli.failure import describe
 from catenary.cli.main import main, make_parser
 from catenary.errors import LinkError
@@ -154,8 +154,11 @@ def test_a_bug_is_called_one(capsys: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.parametrize("failing_scan", [KeyboardInterrupt()], indirect=True)
 @pytest.mark.usefixtures("failing_scan")
-def test_ctrl_c_is_quiet_and_130(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["scan", "eth0"]) == 130
+def test_ctrl_c_is_quiet_and_130(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["catenary", "scan", "eth0"])
+    assert console.main() == 130
     assert capsys.readouterr() == ("", "")
 
 

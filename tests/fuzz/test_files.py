@@ -27,7 +27,7 @@ from catenary.share.events import decode_event
 from catenary.share.layout import HEADER, MAGIC, VERSION, decode_head, encode_head, make_layout
 from catenary.share.process import this_process
 from catenary.share.reader import Reader
-from catenary.virtual import Segment
+from catenary.virtual import read_segment
 from catenary.virtual.configuration import SegmentFile
 from catenary.wire.pcapng import Direction, Packet, encode_header, encode_packet
 from catenary.wire.sii_check import objections
@@ -95,7 +95,7 @@ def test_a_segment(folder: Path, devices: list[Any], faults: list[Any], loss: An
     parts = [f"link_loss_detection = {toml(loss)}"] * (loss is not None)
     parts += [f"device = {toml(devices)}", f"fault = {toml(faults)}"]
     path.write_text("\n".join(parts))
-    with_error(lambda: Segment.from_toml(path), ConfigurationError)
+    with_error(lambda: read_segment(path), ConfigurationError)
 
 
 EXTREMES = (-1, 65536, 2**63 - 1, 1e300, float("nan"), [2**40, 0])
@@ -108,7 +108,7 @@ def test_every_field_of_a_device_out_of_range(folder: Path, kind: str) -> None:
     for field in names_of("device")[kind]:
         for value in EXTREMES:
             path.write_text(f"device = [{toml({'kind': kind, field: value})}]")
-            with_error(lambda: Segment.from_toml(path), ConfigurationError)
+            with_error(lambda: read_segment(path), ConfigurationError)
 
 
 @pytest.mark.parametrize("kind", sorted(names_of("fault")))
@@ -123,7 +123,7 @@ def test_every_field_of_a_fault_out_of_range(folder: Path, kind: str) -> None:
             fault = toml({**needed, "kind": kind, field: value})
             devices = '[{kind = "servo"}, {kind = "servo"}]'
             path.write_text(f"device = {devices}\nfault = [{fault}]")
-            with_error(lambda: Segment.from_toml(path), ConfigurationError)
+            with_error(lambda: read_segment(path), ConfigurationError)
 
 
 TASK = st.dictionaries(
@@ -141,7 +141,7 @@ def test_tasks(folder: Path, tasks: list[Any]) -> None:
 @pytest.mark.parametrize(
     "content", [b"\xff\xfe", b"a = " + b"[" * 5000, b"a = 1" + b"0" * 5000, b"\0", b"= = ="]
 )
-@pytest.mark.parametrize("reading", [Segment.from_toml, read_demands])
+@pytest.mark.parametrize("reading", [read_segment, read_demands])
 def test_what_is_no_toml(folder: Path, content: bytes, reading: Callable[[Path], object]) -> None:
     path = folder / "none.toml"
     path.write_bytes(content)

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 from typing import cast
 
 from catenary.igh.describe import describe
-from catenary.igh.master import Reservation
+from catenary.igh.reservation import Reservation
 
 
 def test_control_characters_are_no_part_of_a_name() -> None:

@@ -10,12 +10,12 @@ import sys
 import threading
 from types import FrameType
 
-from catenary.virtual import Segment, Server
+from catenary.virtual import Server, read_segment
 from catenary.virtual.faults import cut, join
 
 
 def main(path: str, first: str, second: str, one: str, other: str) -> None:
-    segment = Segment.from_toml(path, clock="monotonic", ring=True)
+    segment = read_segment(path, clock="monotonic", ring=True)
     between = int(one), int(other)
     asked_to_end = threading.Event()
 

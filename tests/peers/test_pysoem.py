@@ -18,7 +18,7 @@ import pytest
 
 from catenary.realtime import private_network
 from catenary.realtime.child import Child, start_python
-from catenary.virtual import Segment
+from catenary.virtual import read_segment
 from catenary.virtual.description import VENDOR_ID, Description
 from catenary.virtual.devices.application import BLOB_BYTES
 from tests.peers.conftest import serving
@@ -74,7 +74,7 @@ def again(devices: int, count: int = 5) -> Callable[[Callable[P, None]], Callabl
 
 @pytest.fixture
 def devices(line: Path) -> list[Description]:
-    return [device.description() for device in Segment.from_toml(line)]
+    return [device.description() for device in read_segment(line)]
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 import catenary as cat
 from catenary.link import FaultInjector
-from catenary.virtual import Joint, Plant, Segment, Servo
+from catenary.virtual import Joint, Plant, Segment, Servo, read_segment
 
 COBOT = Path(__file__).resolve().parents[2] / "examples" / "cobot"
 COUNTS = 131072
@@ -53,7 +53,7 @@ class ArmCell:
 @contextmanager
 def arm_cell(*, start: list[float], **joint: object) -> Iterator[ArmCell]:
     """The example's arm at `start` [rad], `joint` said of all its joints."""
-    example = Segment.from_toml(COBOT / "segment.toml")
+    example = read_segment(COBOT / "segment.toml")
     assert example.plant is not None
     servos = [servo for servo in example if isinstance(servo, Servo)]
     joints = [

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from catenary.errors import ConfigurationError
-from catenary.virtual import AnalogInputs, Crystal, Segment, Servo
+from catenary.virtual import AnalogInputs, Crystal, Servo, read_segment
 
 GOOD = """
 [[device]]
@@ -33,7 +33,7 @@ channels = 4
 def test_a_segment_is_read(tmp_path: Path) -> None:
     path = tmp_path / "cell.toml"
     path.write_text(GOOD)
-    segment = Segment.from_toml(path)
+    segment = read_segment(path)
     assert [device.kind for device in segment] == ["coupler", "servo", "analog_inputs"]
     servo, analog = segment[1], segment[2]
     assert isinstance(servo, Servo)
@@ -69,13 +69,13 @@ def test_errors_name_the_file_and_the_field(tmp_path: Path, text: str, says: str
     path = tmp_path / "cell.toml"
     path.write_text(text)
     with pytest.raises(ConfigurationError, match=says) as caught:
-        Segment.from_toml(path)
+        read_segment(path)
     assert "cell.toml" in caught.value.message
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError, match="No such file"):
-        Segment.from_toml(tmp_path / "none.toml")
+        read_segment(tmp_path / "none.toml")
 
 
 FAULTS = """
@@ -125,7 +125,7 @@ with = {kind = "servo", serial = 7}
 def test_faults_and_wiring_are_read(tmp_path: Path) -> None:
     path = tmp_path / "cell.toml"
     path.write_text(FAULTS)
-    segment = Segment.from_toml(path)
+    segment = read_segment(path)
     assert segment.ring
     assert [event.fault.kind for event in segment.fault_log] == ["refuse_state"]
     with segment.open_link() as link:
@@ -160,7 +160,7 @@ def test_errors_of_faults_name_the_field(tmp_path: Path, text: str, says: str) -
     path = tmp_path / "cell.toml"
     path.write_text(f'[[device]]\nkind = "coupler"\n\n[[fault]]\n{text}')
     with pytest.raises(ConfigurationError, match=says) as caught:
-        Segment.from_toml(path)
+        read_segment(path)
     assert "cell.toml" in str(caught.value)
 
 
@@ -176,4 +176,4 @@ def test_errors_of_wiring_name_the_field(tmp_path: Path, text: str, says: str) -
     path = tmp_path / "cell.toml"
     path.write_text(f'[[device]]\nkind = "coupler"\n\n[[device]]\n{text}')
     with pytest.raises(ConfigurationError, match=says):
-        Segment.from_toml(path)
+        read_segment(path)

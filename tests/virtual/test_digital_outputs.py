@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import catenary as cat
-from catenary.virtual import Coupler, Crystal, DigitalOutputs, Segment, Servo
+from catenary.virtual import Coupler, Crystal, DigitalOutputs, Segment, Servo, read_segment
 
 PERIOD = 1e-3
 
@@ -50,7 +50,7 @@ def test_a_file_can_ask_for_the_clock(tmp_path: Path) -> None:
     file = tmp_path / "line.toml"
     text = '[[device]]\nkind = "digital_outputs"\nbits = 2\ndc = true\ncrystal.ppm = 30.0\n'
     file.write_text(text)
-    [lamp] = Segment.from_toml(file)
+    [lamp] = read_segment(file)
     assert isinstance(lamp, DigitalOutputs)
     assert (lamp.dc, lamp.crystal.ppm) == (True, 30.0)
 

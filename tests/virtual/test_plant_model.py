@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from catenary.errors import ConfigurationError
-from catenary.virtual import DigitalOutputs, Joint, Plant, Segment, Servo
+from catenary.virtual import DigitalOutputs, Joint, Plant, Segment, Servo, read_segment
 from tests.virtual.plants import DOUBLE, GRAVITY, PENDULUM, URDF, Time, frictionless, model
 
 COBOT = Path(__file__).resolve().parents[2] / "examples" / "cobot"
@@ -219,7 +219,7 @@ axes = 2
 
 def test_a_plant_is_read_from_a_segments_file(tmp_path: Path) -> None:
     model(tmp_path, DOUBLE)
-    segment = Segment.from_toml(model(tmp_path, GOOD, "cell.toml"))
+    segment = read_segment(model(tmp_path, GOOD, "cell.toml"))
     assert segment.plant is not None
     assert (segment.plant.step, segment.plant.path) == (500e-6, tmp_path / "arm.xml")
     assert segment.plant.joints == (
@@ -243,7 +243,7 @@ def test_a_plants_table_that_is_wrong(tmp_path: Path, change: tuple[str, str], s
     model(tmp_path, DOUBLE)
     path = model(tmp_path, GOOD.replace(*change), "cell.toml")
     with pytest.raises(ConfigurationError, match=says):
-        Segment.from_toml(path)
+        read_segment(path)
 
 
 # -- robots ------------------------------------------------------------------------------------
@@ -251,7 +251,7 @@ def test_a_plants_table_that_is_wrong(tmp_path: Path, change: tuple[str, str], s
 
 def test_the_examples_arm_has_the_limits_of_an_indy7() -> None:
     """Of its joint_limits.yaml: N·m, degrees a second, degrees."""
-    segment = Segment.from_toml(COBOT / "segment.toml")
+    segment = read_segment(COBOT / "segment.toml")
     assert segment.plant is not None
     efforts = [431.97, 431.97, 197.23, 79.79, 79.79, 79.79]
     speeds, ranges = [150.0] * 3 + [180.0] * 3, [175.0] * 5 + [215.0]

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 import catenary as cat
 from catenary.realtime import VirtualClock
-from catenary.virtual import Crystal, Plant, Segment, Servo
+from catenary.virtual import Crystal, Plant, Segment, Servo, read_segment
 
 COBOT = Path(__file__).resolve().parents[2] / "examples" / "cobot"
 GEARS = {"gear_ratio": [121.0] * 3 + [101.0] * 3, "direction": [1, 1, -1, 1, -1, 1]}
@@ -18,7 +18,7 @@ Values = npt.NDArray[np.float64]
 
 
 def example() -> Segment:
-    return Segment.from_toml(COBOT / "segment.toml")
+    return read_segment(COBOT / "segment.toml")
 
 
 def sway(segment: Segment, **options: object) -> tuple[Values, Values]:

@@ -7,6 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from catenary.bus import event_types
+from catenary.bus.master import MasterOwner
 from catenary.bus.runner import BlockingRunner
 from catenary.bus.sdo import Objects, read_each
 from catenary.bus.segment_scan import ScannedDevice, find, oddities, with_places
@@ -28,7 +29,6 @@ from catenary.wire.al import STATE_MASK, AlState
 
 if TYPE_CHECKING:  # plan needs NumPy, a scan does not
     from catenary.bus.diagnosis import Diagnosis
-    from catenary.bus.main_device import MainDevice
     from catenary.bus.states import Outcome
     from catenary.plan.planner import Plan
     from catenary.plan.request import Wish
@@ -37,7 +37,8 @@ if TYPE_CHECKING:  # plan needs NumPy, a scan does not
 class FrameMaster:
     """Owns the conversations of one MainDevice with its devices. Implements `bus.Master`."""
 
-    def __init__(self, main: MainDevice, *, force: bool) -> None:
+    def __init__(self, main: MasterOwner, *, force: bool) -> None:
+        self.carrier = None
         self._main = main
         self._force = force
 
@@ -138,17 +139,16 @@ class FrameMaster:
     def read_objects(self, wanted: Mapping[int, Sequence[tuple[int, int]]]) -> dict[int, Objects]:
         """Read objects of several devices, all devices at the same time."""
         positions, subs = list(wanted), self._main.subs
-        found = self._main.runner.run_all([read_each(subs[k], wanted[k]) for k in positions])
+        found = self._main.runner.run_all([read_each(subs[k].sdo, wanted[k]) for k in positions])
         return dict(zip(positions, found, strict=True))
 
-    def configure(self, plan: Plan) -> None:
+    def configure(self, plan: Plan, epoch_ns: int) -> tuple[int | None, ...]:
         """Configure every device as planned and bring all to SAFE-OP."""
         from catenary.bus.bring_up import bring_to_safe_op
 
         main = self._main
-        epoch_ns, ring = main.clock_epoch_ns, ring_of(main.link)
-        measured = bring_to_safe_op(main.runner, main.subs, plan, epoch_ns, ring)
-        main.clock_delays_ns = measured.delays_ns if measured is not None else ()
+        measured = bring_to_safe_op(main.runner, main.subs, plan, epoch_ns, ring_of(main.link))
+        return measured.delays_ns if measured is not None else ()
 
     def leave(self, timeout: float) -> None:
         """Bring all devices to SAFE-OP, then to PRE-OP."""

@@ -63,7 +63,6 @@ class MainDevice:
         self.notes: tuple[str, ...] = ()  # what the last scan found odd
         self.clock_delays_ns: tuple[int | None, ...] = ()  # behind the first clock, by position
         self.clock_epoch_ns = 0  # system time of the clocks less the link's
-        self.carrier: Carrier | None = None  # who exchanges the images; None: our own frames
         self.events = events = Events()  # what happened: iterate, or get(timeout=)
         self._callbacks = callbacks = Callbacks()
         events.listen(lambda each: callbacks.tell(events.stamped(each)))
@@ -97,6 +96,11 @@ class MainDevice:
     def has_loop(self) -> bool:
         """True while a loop runs on it."""
         return self._attached is not None
+
+    @property
+    def carrier(self) -> Carrier | None:
+        """Who exchanges the images; None: our own frames."""
+        return self.master.carrier
 
     @property
     def counts(self) -> FrameCounts:
@@ -232,6 +236,7 @@ class MainDevice:
             IdentityError: a device is not the expected one.
             SegmentError: the number of devices is not the expected one.
         """
+        self.require_no_loop()
         subs, self.notes = self.master.scan()
         self.subs = SubDevices(subs)
         self._note_further_errors()
@@ -329,8 +334,9 @@ class MainDevice:
 
     def configure(self, plan: Plan) -> None:
         """Configure every device as planned and bring all to SAFE-OP."""
+        self.require_no_loop()
         self.clock_epoch_ns = self._epoch_ns()
-        self.master.configure(plan)
+        self.clock_delays_ns = self.master.configure(plan, self.clock_epoch_ns)
 
     def leave(self, *, timeout: float = LEAVE_TIMEOUT) -> None:
         """End operation: bring all devices to PRE-OP. StateError names one that stays up.

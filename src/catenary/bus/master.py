@@ -5,17 +5,36 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
+from catenary.bus.event_queue import Events
+from catenary.bus.external_master import Carrier
+from catenary.bus.runner import BlockingRunner
 from catenary.bus.sdo import Objects
-from catenary.bus.sub_device import SubDevice
+from catenary.bus.sub_device import DeviceOwner, SubDevice
+from catenary.link import Link
 from catenary.model.device import DeviceDescription
 from catenary.wire.al import AlState
 
 if TYPE_CHECKING:  # plan needs NumPy, a scan does not
     from catenary.bus.diagnosis import Diagnosis
-    from catenary.bus.main_device import MainDevice
     from catenary.bus.states import Outcome
     from catenary.plan.planner import Plan
     from catenary.plan.request import Wish
+
+
+class MasterOwner(DeviceOwner, Protocol):
+    """The MainDevice of a master. `MainDevice` documents the properties."""
+
+    @property
+    def link(self) -> Link: ...
+
+    @property
+    def runner(self) -> BlockingRunner: ...
+
+    @property
+    def has_loop(self) -> bool: ...
+
+    @property
+    def events(self) -> Events: ...
 
 
 class Master(Protocol):
@@ -24,6 +43,10 @@ class Master(Protocol):
     `MainDevice` documents what the calls do. A master that cannot do one raises
     ConfigurationError.
     """
+
+    @property
+    def carrier(self) -> Carrier | None:
+        """What exchanges the process images, once configured; None: our own frames."""
 
     def scan(self) -> tuple[Sequence[SubDevice], tuple[str, ...]]:
         """Return the handles of all devices, in PRE-OP, and notes."""
@@ -44,7 +67,15 @@ class Master(Protocol):
         self, wanted: Mapping[int, Sequence[tuple[int, int]]]
     ) -> dict[int, Objects]: ...
 
-    def configure(self, plan: Plan) -> None: ...
+    def configure(self, plan: Plan, epoch_ns: int) -> tuple[int | None, ...]:
+        """Bring all devices to SAFE-OP.
+
+        Args:
+            epoch_ns: System time of the clocks less the link's.
+
+        Returns:
+            By position, the delay behind the first clock [ns]; empty if it was not measured.
+        """
 
     def leave(self, timeout: float) -> None:
         """End operation: bring all devices to PRE-OP within `timeout` [s] for each state."""
@@ -60,4 +91,4 @@ class Master(Protocol):
 class MasterSource(Protocol):
     """A link source that brings a master of its own."""
 
-    def make_master(self, main: MainDevice) -> Master: ...
+    def make_master(self, main: MasterOwner) -> Master: ...

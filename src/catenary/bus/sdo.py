@@ -4,26 +4,51 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, TypeAlias, TypeVar, overload
+from typing import Protocol, TypeAlias, TypeVar, overload
 
 from catenary.bus.pending import Pending
-from catenary.errors import MailboxError, SdoAbort
+from catenary.errors import CatenaryError, MailboxError, SdoAbort
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel
 from catenary.procedure.sdo import UPLOAD_LIMIT, UPLOAD_TIMEOUT, download, upload
 from catenary.procedure.sdo_information import DescribedObject, describe_object, list_objects
-from catenary.procedure.station import within
+from catenary.procedure.station import Station, within
 from catenary.types import DataType
 from catenary.wire.sdo_information import ListType, ObjectDescription
-
-if TYPE_CHECKING:
-    from catenary.bus.sub_device import SubDevice
 
 T = TypeVar("T")
 
 EACH_TIMEOUT = 60.0  # [s] for all objects of one device that are read before a loop
 
 Objects: TypeAlias = dict[tuple[int, int], bytes]  # by index and subindex
+
+
+class Conversations(Protocol):
+    """What runs procedures: a `MainDevice`."""
+
+    def converse(self, procedure: Procedure[T]) -> T:
+        """Run a procedure, alone or next to the running loop."""
+        ...
+
+    def request(self, procedure: Procedure[T]) -> Pending[T]:
+        """Start a procedure next to the running loop."""
+        ...
+
+
+class ObjectOwner(Protocol):
+    """The device that an object dictionary belongs to: a `SubDevice`."""
+
+    @property
+    def main(self) -> Conversations: ...
+
+    @property
+    def station(self) -> Station: ...
+
+    @property
+    def channel(self) -> MailboxChannel | None: ...
+
+    @property
+    def error(self) -> CatenaryError | None: ...
 
 
 class Sdo:
@@ -36,7 +61,7 @@ class Sdo:
     `subindex` 1 or 0 on (the latter takes 16 bits then): see `types.Array` and `types.Record`.
     """
 
-    def __init__(self, sub: SubDevice) -> None:
+    def __init__(self, sub: ObjectOwner) -> None:
         self._sub = sub
         self.notes: tuple[str, ...] = ()  # what was missing in the last `list`
 
@@ -218,10 +243,10 @@ class Sdo:
         return channel
 
 
-def read_each(sub: SubDevice, places: Sequence[tuple[int, int]]) -> Procedure[Objects]:
+def read_each(sdo: Sdo, places: Sequence[tuple[int, int]]) -> Procedure[Objects]:
     """Read objects one after the other. Objects that the device refuses are left out."""
-    reading = _read_each(sub.sdo._channel(), places)
-    return (yield from within(EACH_TIMEOUT, sub.station, reading, "its settings were"))
+    reading = _read_each(sdo._channel(), places)
+    return (yield from within(EACH_TIMEOUT, sdo._sub.station, reading, "its settings were"))
 
 
 def _read_each(channel: MailboxChannel, places: Sequence[tuple[int, int]]) -> Procedure[Objects]:

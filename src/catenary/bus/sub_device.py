@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Protocol
 
 from catenary.bus.pdo_table import PdoTable
-from catenary.bus.sdo import Sdo
+from catenary.bus.sdo import Conversations, Objects, Sdo
 from catenary.errors import CatenaryError
 from catenary.model.device import DeviceDescription, Identity
 from catenary.procedure.al_state import DeviceState, read_state
@@ -14,8 +15,23 @@ from catenary.procedure.station import Station
 from catenary.wire.al import AlState
 from catenary.wire.coe import Emergency
 
-if TYPE_CHECKING:
-    from catenary.bus.main_device import MainDevice
+if TYPE_CHECKING:  # plan needs NumPy, a scan does not
+    from catenary.bus.states import Outcome
+
+
+class DeviceOwner(Conversations, Protocol):
+    """The MainDevice of a device, as `SubDevice.main`. `MainDevice` documents the calls."""
+
+    @property
+    def subs(self) -> Sequence[SubDevice]: ...
+
+    def request_states(
+        self, subs: Sequence[SubDevice], positions: Sequence[int], state: AlState
+    ) -> Mapping[int, Outcome]: ...
+
+    def read_objects(
+        self, wanted: Mapping[int, Sequence[tuple[int, int]]]
+    ) -> Mapping[int, Objects]: ...
 
 
 class SubDevice:
@@ -25,7 +41,7 @@ class SubDevice:
     """
 
     def __init__(
-        self, main: MainDevice, description: DeviceDescription, channel: MailboxChannel | None
+        self, main: DeviceOwner, description: DeviceDescription, channel: MailboxChannel | None
     ) -> None:
         self.main = main
         self.description = description

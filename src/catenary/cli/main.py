@@ -26,7 +26,6 @@ from catenary.cli import (
     state,
     virtual,
 )
-from catenary.cli.console import INTERRUPTED
 from catenary.cli.failure import USAGE, report, silence_stdout
 
 VIRTUAL_TIME = "virtual time: the segment's own clock, not this machine's"
@@ -99,8 +98,6 @@ def main(
     debug = "--debug" in given  # before or after the command
     try:
         return run([word for word in given if word != "--debug"], parser())
-    except KeyboardInterrupt:
-        return INTERRUPTED
     except BrokenPipeError:
         return silence_stdout()
     except Exception as error:

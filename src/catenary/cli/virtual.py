@@ -52,7 +52,7 @@ def add_parser(commands: Commands) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from catenary.virtual import FaultEvent, Segment, demo_segment, serve
+    from catenary.virtual import FaultEvent, demo_segment, read_segment, serve
 
     if arguments.priority is not None:
         _raise_priority(arguments.interface, arguments.priority)
@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.config is None:
         segment = demo_segment(clock="monotonic", ring=ring)
     else:
-        segment = Segment.from_toml(arguments.config, clock="monotonic", ring=ring)
+        segment = read_segment(arguments.config, clock="monotonic", ring=ring)
     interfaces = f"{arguments.interface} and {arguments.ring}" if ring else arguments.interface
 
     def say() -> None:

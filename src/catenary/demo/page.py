@@ -13,7 +13,7 @@ from catenary.demo.plot import Bucket, Line, histogram, line_plot
 from catenary.demo.result import PHASES, Device, Result
 from catenary.demo.text import longer
 from catenary.figures import FIGURES, heading
-from catenary.loop.verdict import COUNTED
+from catenary.loop.timing import COUNTED
 
 STYLE = Path(__file__).with_name("page.css")
 STYLES = ("a", "b", "c")

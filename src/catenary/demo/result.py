@@ -11,8 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from catenary.figures import FIGURES
-from catenary.loop.timing import Timing
-from catenary.loop.verdict import COUNTED
+from catenary.loop.timing import COUNTED, Timing
 
 Reals = npt.NDArray[np.float64]
 Figures = Mapping[str, float]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from catenary.doctor.check import Check, failed, passed, skipped, warned
 from catenary.doctor.machine import Machine
 from catenary.realtime import Task, Tasks, session
-from catenary.realtime.job import Running
+from catenary.realtime.running_task import Running
 from catenary.realtime.statistics import Figure
 from catenary.realtime.tasks import may_have
 

@@ -18,7 +18,8 @@ from catenary.types import DINT, INT, UDINT, UINT, DataType
 from catenary.wire.cia402 import SLOT_OFFSET, Object
 
 if TYPE_CHECKING:
-    from catenary.bus import MainDevice, SubDevice
+    from catenary.bus import SubDevice
+    from catenary.bus.sub_device import DeviceOwner
 
 MOTOR_SPEED_RANGE = (60, 200_000)  # [rpm]: beyond, the drive counts 0x6080 in another unit
 POSITION_EXTREMES = (-(2**31), 2**31 - 1)
@@ -125,7 +126,7 @@ def read_settings(places: Sequence[tuple[SubDevice, int]]) -> list[DriveSettings
         The settings in this order. An object that the device refuses, or that has another size,
         is None.
     """
-    wanted: dict[MainDevice, dict[int, list[tuple[int, int]]]] = {}
+    wanted: dict[DeviceOwner, dict[int, list[tuple[int, int]]]] = {}
     for sub, slot in places:
         objects = [(index + SLOT_OFFSET * slot, subindex) for _, index, subindex, _ in OBJECTS]
         wanted.setdefault(sub.main, {}).setdefault(sub.position, []).extend(objects)

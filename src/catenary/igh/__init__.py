@@ -2,7 +2,8 @@
 
 from catenary.igh.kernel_master import KernelMaster
 from catenary.igh.library import Library
-from catenary.igh.master import Master, Reservation
+from catenary.igh.master import Master
+from catenary.igh.reservation import Reservation
 from catenary.igh.sub_device import SubDevice
 
 __all__ = ["KernelMaster", "Library", "Master", "Reservation", "SubDevice"]

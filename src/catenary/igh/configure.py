@@ -10,7 +10,7 @@ from catenary.errors import SdoAbort
 from catenary.igh import abi
 from catenary.igh._ecrt import Exchange
 from catenary.igh.address import Address, addresses
-from catenary.igh.master import Reservation
+from catenary.igh.reservation import Reservation
 from catenary.model.device import DeviceDescription, Direction, Pdo
 from catenary.plan.clocks import SyncPlan
 from catenary.plan.cycle import ClockPlan

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from catenary.errors import MailboxError, SdoAbort
 from catenary.igh import abi
 from catenary.igh.failures import NoMailboxError
-from catenary.igh.master import Reservation
+from catenary.igh.reservation import Reservation
 from catenary.model.describe import assignments
 from catenary.model.device import (
     DeviceDescription,

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import struct
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
-from catenary.bus.event_types import LinkLost, LinkRestored
+from catenary.bus.event_types import LinkLost, LinkRestored, emergency
 from catenary.errors import (
     CatenaryError,
     IdentityError,
@@ -18,29 +18,28 @@ from catenary.errors import (
 from catenary.igh import abi
 from catenary.igh.clock import KernelClock
 from catenary.igh.configure import Configuration
+from catenary.igh.kernel_access import KernelAccess
 from catenary.igh.kernel_log import KernelLog
 from catenary.igh.sub_device import SubDevice
 from catenary.procedure.al_status_poll import Answer
 from catenary.procedure.exchange import Procedure, after
 from catenary.wire.al import AlState, status_code
+from catenary.wire.coe import Emergency
 from catenary.wire.register import AL_STATUS_CODE, SYSTEM_TIME_DIFFERENCE
-
-if TYPE_CHECKING:
-    from catenary.igh.kernel_master import KernelMaster
 
 OP_TIMEOUT = 20.0  # [s]: the master configures one device after the other
 LOOK = 0.005  # [s] between two looks
 CODE_TIMEOUT, CODE_LOOK = 0.5, 0.010  # [s]: how long, how often a device in error is asked why
-EMERGENCY_SIZE = 8
 INVALID_SYNC = 0x0030  # AL status code
 SYNC_TYPE = 0x1C32, 1  # object and subindex
 LINKS = 2  # the main one and the backup
+_EMERGENCY = struct.Struct("<HB5s")
 
 
 class KernelCarrier:
     """Owns an activated configuration. Fulfils `bus.Carrier`."""
 
-    def __init__(self, kernel: KernelMaster, configuration: Configuration) -> None:
+    def __init__(self, kernel: KernelAccess, configuration: Configuration) -> None:
         self.configuration = configuration
         self._kernel = kernel
         self._library = kernel.reservation.library
@@ -49,6 +48,7 @@ class KernelCarrier:
         clock = configuration.clock
         self._clock = None if clock is None else KernelClock(configuration.exchange, clock)
         self._kernel_log = KernelLog()
+        kernel.active = configuration
 
     @property
     def image(self) -> object:
@@ -61,6 +61,7 @@ class KernelCarrier:
 
     def end(self) -> None:
         """No call is made any more."""
+        self._kernel.active = None
         self.configuration.exchange.end()
         self._kernel_log.close()
 
@@ -109,13 +110,13 @@ class KernelCarrier:
 
     def listen(self) -> Procedure[None]:
         """Emergencies of all devices, links of both interfaces."""
-        target = ctypes.create_string_buffer(EMERGENCY_SIZE)
+        target = ctypes.create_string_buffer(_EMERGENCY.size)
         for device in self.configuration.devices:
             while (
                 self._library.ecrt_slave_config_emerg_pop(device.config, ctypes.addressof(target))
                 == 0
             ):
-                self._kernel.hear(device.position, target.raw)
+                self._hear(device.position, target.raw)
         self._look_at_links()
         yield from self._read_difference()
 
@@ -135,6 +136,15 @@ class KernelCarrier:
         sub = self._kernel.subs[position]
         assert isinstance(sub, SubDevice)  # as every scan of a kernel master makes them
         return sub
+
+    def _hear(self, position: int, message: bytes) -> None:
+        """An emergency that the master kept for a device, 8 bytes."""
+        sub = self._kernel.subs[position]
+        heard = Emergency(*_EMERGENCY.unpack(message))
+        if isinstance(sub, SubDevice):
+            sub.hear(heard)
+        now = self._kernel.main.link.now() * 1e-9
+        self._kernel.main.events.put(emergency(now, sub, heard))
 
     def _look_at_links(self) -> None:
         handle = self._kernel.reservation.handle

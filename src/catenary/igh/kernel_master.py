@@ -2,36 +2,27 @@
 
 from __future__ import annotations
 
-import struct
 import warnings
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, NoReturn
 
 from catenary import bus
-from catenary.bus import SubDevices, event_types
-from catenary.errors import (
-    CatenaryError,
-    ConfigurationError,
-    LoopError,
-    NoDeviceError,
-    SegmentError,
-)
-from catenary.igh.address import place
-from catenary.igh.configure import Configuration, DeviceConfiguration, configure
+from catenary.errors import CatenaryError, ConfigurationError, NoDeviceError
+from catenary.igh.configure import Configuration, configure
 from catenary.igh.describe import describe, object_information, read_if_there
+from catenary.igh.kernel_access import KernelAccess
 from catenary.igh.kernel_cycle import KernelCarrier
-from catenary.igh.master import Reservation
+from catenary.igh.reservation import Reservation
 from catenary.igh.sub_device import SubDevice
 from catenary.igh.sync_types import read_types, write_types
 from catenary.igh.topology import check_delays
 from catenary.model.device import DeviceDescription, Direction, mapped_entries
 from catenary.wire.al import AlState
-from catenary.wire.coe import Emergency
 
 if TYPE_CHECKING:  # plan needs NumPy, a scan does not
-    from catenary.bus import MainDevice
     from catenary.bus.diagnosis import Diagnosis
+    from catenary.bus.master import MasterOwner
     from catenary.bus.states import Outcome
     from catenary.plan.planner import Plan
     from catenary.plan.request import PdoWish, Wish
@@ -40,7 +31,6 @@ if TYPE_CHECKING:  # plan needs NumPy, a scan does not
 # [s] An INIT request to a device that fails at that moment may be lost: the master repeats it after
 # 5 s (ec_fsm_change_timeout_ms in IgH's master/fsm_change.c). Seen at every second stop.
 RESTORE_PATIENCE = 6.0
-_EMERGENCY = struct.Struct("<HB5s")
 
 
 class KernelMaster:
@@ -50,32 +40,21 @@ class KernelMaster:
     `Loop` exchanges the process images. Closing the MainDevice gives the master back.
     """
 
-    def __init__(self, main: MainDevice) -> None:
+    def __init__(self, main: MasterOwner) -> None:
         self.main = main
-        self._kernel: KernelCarrier | None = None
+        self._kernel = KernelAccess(main)
+        self.carrier: KernelCarrier | None = None
 
     def forget(self) -> None:
         """Let go of the parent's master in a forked child."""
-        if self._kernel is not None:
-            self._kernel.end()
-            self._kernel = self.main.carrier = None
-
-    @property
-    def subs(self) -> SubDevices:
-        """Handles of the devices, by position."""
-        return self.main.subs
+        carrier, self.carrier = self.carrier, None
+        if carrier is not None:
+            carrier.end()
 
     @property
     def reservation(self) -> Reservation:
         """The reserved master."""
-        link = self.main.link
-        assert isinstance(link, Reservation)
-        return link
-
-    @property
-    def cycling(self) -> bool:
-        """True while a loop runs: requests are answered in operation only."""
-        return self.main.has_loop
+        return self._kernel.reservation
 
     def scan(self) -> tuple[Sequence[SubDevice], tuple[str, ...]]:
         """Return the devices that the master has found. It has brought them to PRE-OP.
@@ -83,7 +62,6 @@ class KernelMaster:
         Raises:
             NoDeviceError: there are none.
         """
-        self.main.require_no_loop()
         count = self.reservation.device_count()
         self.reservation.wait_preop()
         found = [describe(self.reservation, position) for position in range(count)]
@@ -102,7 +80,7 @@ class KernelMaster:
         from catenary.plan.planner import gather_wishes
 
         asked = gather_wishes(wishes, period_ns)
-        for sub in self.subs:
+        for sub in self.main.subs:
             renewed = describe(self.reservation, sub.position)
             _check_same(sub.description, renewed)
             objects = [
@@ -119,33 +97,32 @@ class KernelMaster:
         found: dict[int, dict[tuple[int, int], bytes]] = {}
         for position, places in wanted.items():
             read = {
-                place: read_if_there(self.reservation, self.place_of(position), *place)
+                place: read_if_there(self.reservation, self._kernel.place_of(position), *place)
                 for place in places
             }
             found[position] = {place: data for place, data in read.items() if data}
         return found
 
-    def configure(self, plan: Plan) -> None:
+    def configure(self, plan: Plan, epoch_ns: int) -> tuple[int | None, ...]:
         """Tells the master the plan and activates it: from here on it waits for cycles."""
-        self.main.require_no_loop()
-        if self._kernel is not None:
+        if self.carrier is not None:
             raise ConfigurationError(
                 f"{self.reservation.name} is activated already: nothing can be configured any more",
                 hint="leave the loop that runs, or main.leave()",
             )
-        infos = [self.reservation.slave(sub.position) for sub in self.subs]
+        infos = [self.reservation.slave(sub.position) for sub in self.main.subs]
         if plan.cycle.clock is not None:
             check_delays(infos)
-        for sub, device in zip(self.subs, plan.devices, strict=True):
+        for sub, device in zip(self.main.subs, plan.devices, strict=True):
             self._keep_sync_types(sub, device)
-        found = [sub.description for sub in self.subs]
+        found = [sub.description for sub in self.main.subs]
         try:
-            configuration = configure(self.reservation, plan, found, self.main.clock_epoch_ns)
+            configuration = configure(self.reservation, plan, found, epoch_ns)
         except BaseException as error:
             self._undo(error)
             raise
-        self._kernel = KernelCarrier(self, configuration)
-        self.main.carrier = self._kernel
+        self.carrier = KernelCarrier(self._kernel, configuration)
+        return ()
 
     def _keep_sync_types(self, sub: bus.SubDevice, plan: DevicePlan) -> None:
         """Read how a device keeps time, before SYNC0 is written to it. Without clocks, write back
@@ -172,14 +149,14 @@ class KernelMaster:
             CatenaryError: A device that was synchronised to SYNC0 does not reach PRE-OP, or refuses
                 its former type; further ones as notes.
         """
-        kernel, self._kernel, self.main.carrier = self._kernel, None, None
-        if kernel is None:
+        carrier, self.carrier = self.carrier, None
+        if carrier is None:
             return
-        kernel.end()
+        carrier.end()
         what = f"deactivating master {self.reservation.index}"
         self.reservation.ask("ecrt_master_deactivate", what=what)
         self.reservation.beside.end()
-        if any(sub.sync_types for sub in self.subs):
+        if any(sub.sync_types for sub in self.main.subs):
             self.reservation.wait_preop(RESTORE_PATIENCE)
         else:
             self.reservation.wait_preop()
@@ -192,7 +169,7 @@ class KernelMaster:
     def _settle(self) -> list[CatenaryError]:
         """Read all states and restore all synchronisation types; return what went wrong."""
         problems = []
-        for sub in self.subs:
+        for sub in self.main.subs:
             try:
                 self._restore_sync_types(sub)
             except CatenaryError as problem:
@@ -216,53 +193,12 @@ class KernelMaster:
         except CatenaryError as problem:  # the master must be given back all the same
             warnings.warn(str(problem), RuntimeWarning, stacklevel=4)
 
-    def configuration_of(self, position: int) -> DeviceConfiguration | None:
-        """The master's handles for a device; None: it is not activated."""
-        return None if self._kernel is None else self._kernel.configuration.devices[position]
-
-    def place_of(self, position: int) -> int:
-        """Where a device is now: in operation one that has an alias, or is behind one, may have
-        been plugged in elsewhere. SegmentError where it is nowhere."""
-        device = self.configuration_of(position)
-        if device is None or not device.address.alias:
-            return position
-        found = place(device.address, self.reservation.aliases())
-        if found is None:
-            raise SegmentError(
-                f"{self.subs[position].station} is nowhere on the segment: no device has the alias "
-                f"{device.address.alias} that leads to it",
-                hint="ethercat slaves shows the aliases; plug it in again",
-            )
-        return found
-
-    def refuse_blocking(self, position: int) -> None:
-        """ConfigurationError where a call would wait for ever: an activated master answers through
-        the frames of its application, and nobody sends them."""
-        if self._kernel is not None and not self.cycling:
-            raise ConfigurationError(
-                f"device {position}: the master is activated, and answers only while cycles flow",
-                hint="read and write objects before it is activated, or in a Loop",
-            )
-
-    def same_configuration(self, device: DeviceConfiguration) -> None:
-        """LoopError where the handles are gone: the loop has ended meanwhile."""
-        if self.configuration_of(device.position) is not device:
-            raise LoopError("the loop has ended before the device answered", hint="ask again")
-
     @property
     def configuration(self) -> Configuration:
         """What runs. RuntimeError before a loop is open."""
-        if self._kernel is None:
+        if self._kernel.active is None:
             raise RuntimeError("the master is not activated: with Loop(...) as loop:")
-        return self._kernel.configuration
-
-    def hear(self, position: int, message: bytes) -> None:
-        """An emergency that the master kept for a device, 8 bytes."""
-        sub = self.subs[position]
-        heard = Emergency(*_EMERGENCY.unpack(message))
-        if isinstance(sub, SubDevice):
-            sub.hear(heard)
-        self.main.events.put(event_types.emergency(self.main.link.now() * 1e-9, sub, heard))
+        return self._kernel.active
 
     # What the master keeps to itself
 
@@ -290,9 +226,9 @@ class KernelMaster:
 
     def _handle(self, description: DeviceDescription) -> SubDevice:
         position = description.position
-        known = self.subs[position] if position < len(self.subs) else None
+        known = self.main.subs[position] if position < len(self.main.subs) else None
         if not isinstance(known, SubDevice) or known.identity != description.identity:
-            return SubDevice(self.main, self, description)
+            return SubDevice(self.main, self._kernel, description)
         known.description = description
         return known
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 import ctypes
 from collections import deque
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NoReturn, TypeVar
+from typing import NoReturn, TypeVar
 
 from catenary import bus
 from catenary.bus import ListType
+from catenary.bus.sub_device import DeviceOwner
 from catenary.errors import ConfigurationError, MailboxError, RegisterError
 from catenary.igh import abi
 from catenary.igh.configure import REGISTER_SIZE, REQUEST_SIZE, DeviceConfiguration
+from catenary.igh.kernel_access import KernelAccess
 from catenary.model.device import DeviceDescription
 from catenary.procedure.al_state import DeviceState
 from catenary.procedure.exchange import Procedure, after
@@ -20,9 +22,6 @@ from catenary.types import DataType
 from catenary.wire.al import AlState
 from catenary.wire.coe import Emergency
 from catenary.wire.sdo_information import ObjectDescription
-
-if TYPE_CHECKING:
-    from catenary.igh.kernel_master import KernelMaster
 
 T = TypeVar("T")
 V = TypeVar("V")
@@ -36,7 +35,7 @@ class SubDevice(bus.SubDevice):
     """Owns what is known of one device of the kernel master."""
 
     def __init__(
-        self, main: bus.MainDevice, kernel: KernelMaster, description: DeviceDescription
+        self, main: DeviceOwner, kernel: KernelAccess, description: DeviceDescription
     ) -> None:
         super().__init__(main, description, None)
         self.sdo: Sdo = Sdo(self)

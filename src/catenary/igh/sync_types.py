@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 from catenary.errors import CatenaryError, StateError
 from catenary.igh.describe import read_if_there
-from catenary.igh.master import Reservation
+from catenary.igh.reservation import Reservation
 from catenary.plan.clocks import SYNC_OBJECTS
 from catenary.procedure.al_state import DeviceState
 from catenary.wire.al import AlState

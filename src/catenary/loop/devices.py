@@ -30,7 +30,7 @@ def by_network(wishes: Sequence[DeviceWish]) -> list[tuple[MainDevice, list[Devi
     networks: dict[int, tuple[MainDevice, list[DeviceWish]]] = {}
     for wish in wishes:
         check_request(wish)
-        mains = {id(sub.main): sub.main for sub in wish.subs}
+        mains = {id(sub.main): _main_of(sub) for sub in wish.subs}
         if len(mains) > 1:
             raise ValueError(
                 "one request with devices of several MainDevices: make one for each, and give the "
@@ -47,3 +47,10 @@ def check_request(request: object) -> None:
     """Raise TypeError for what is not a process-data request, such as a SubDevice."""
     if isinstance(request, type) or not all(hasattr(request, name) for name in PARTS):
         raise TypeError(f"a Loop takes process-data requests ({REQUESTS}), not {request!r}")
+
+
+def _main_of(sub: SubDevice) -> MainDevice:
+    """Return the MainDevice of a device, with all that a loop needs of it."""
+    if not isinstance(sub.main, MainDevice):
+        raise TypeError(f"{sub.station} belongs to a {type(sub.main).__name__}, not a MainDevice")
+    return sub.main

@@ -1,35 +1,13 @@
-"""How a session exchanges its frames: the protocol, and frames of our own."""
+"""How a session exchanges its frames."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from catenary.bus import CycleClock, Pending
 from catenary.core import Engine
 from catenary.errors import CatenaryError
-from catenary.link import ring_of
-from catenary.loop.cycle_errors import (
-    forgetful_error,
-    silence_error,
-    state_error,
-    tight_period,
-)
-from catenary.loop.device_watch import Attendance, Watch
-from catenary.loop.error_watch import ErrorWatch
-from catenary.loop.frame_watch import FrameWatch
-from catenary.model.break_location import judge_silence
-from catenary.model.device import Direction
-from catenary.procedure.al_state import request_state
-from catenary.procedure.al_status_poll import survey
-from catenary.procedure.process_data_check import probe_inputs
-from catenary.procedure.sdo import upload
-from catenary.types import UINT
-from catenary.wire.al import AlState
-from catenary.wire.cia402 import SLOT_OFFSET, Object
-
-if TYPE_CHECKING:
-    from catenary.loop.session import Session
+from catenary.loop.device_watch import Attendance
 
 
 class Exchange(Protocol):
@@ -59,122 +37,3 @@ class Exchange(Protocol):
 
     def error_code(self, axis: int) -> int | None:
         """Return object 0x603F of an axis; None if the drive does not answer."""
-
-
-class FrameExchange:
-    """Owns the watches of a session that sends its own frames. Implements `Exchange`."""
-
-    def __init__(self, session: Session) -> None:
-        self._session = session
-        self._stations = [sub.station for sub in session.main.subs]
-
-    def make_engine(self) -> Engine:
-        """Return the engine of the session's plan."""
-        return Engine(self._session.plan.cycle, self._session.main.link.capsule)
-
-    def cycle_clock(self) -> CycleClock:
-        """Return the engine's clock."""
-        clock = self._session.engine.clock
-        assert clock is not None  # a plan with clocks makes an engine with clocks
-        clock.set_epoch(self._session.main.clock_epoch_ns)
-        return clock
-
-    def attend(self) -> None:
-        """Make the watches over devices, error counters and repeated frames."""
-        session = self._session
-        engine, put = session.engine, session.main.events.put
-
-        def now() -> float:
-            return engine.now() * 1e-9
-
-        self.watch: Attendance = Watch(
-            session.main,
-            session.plan,
-            disturbed=lambda: engine.disturbed,
-            submit=session.service.runner.submit,
-            now=now,
-            rejoin=None if session.clocks is None else session.clocks.rejoin,
-            cables_seen=session.announce_clocks,
-            on_return=session.stop.on_return,
-            on_replacement=session.stop.on_replacement,
-        )
-        self.errors = ErrorWatch(session.main, now=now)
-        self.frames = FrameWatch(self._repeated_frames, put=put, now=now)
-
-    def _repeated_frames(self) -> int:
-        """Frames so far that came back more than once, or that a ring could not assign."""
-        ring = ring_of(self._session.main.link)
-        unassigned = 0 if ring is None else ring.counts["alien"]
-        return self._session.engine.counters["repeated"] + unassigned
-
-    def bring_to_op(self) -> list[Pending[None]]:
-        """Bring all devices to OP together, once the clocks are settled."""
-        session = self._session
-        session.settle()
-        if session.clocks is not None:
-            session.clocks.settle(session.raise_ended)
-        session.service.converse(
-            *(request_state(station, AlState.OP) for station in self._stations)
-        )
-        for sub in session.main.subs:
-            sub.state = AlState.OP
-        watches = (self.watch, self.errors, self.frames)
-        return [session.service.runner.submit(watch.run()) for watch in watches]
-
-    def silence_error(self) -> CatenaryError:
-        """Ask all devices, and judge where the silence begins."""
-        session, converse = self._session, self._session.service.converse
-        lost, log = session.engine.lost_in_row, session.log()
-        suspects = session.suspects()
-        session.stop_axes_at_once()  # what still answers need not wait for the questions
-        [answers] = converse(survey(self._stations))
-        [noise] = converse(self.errors.look())
-        silent = [answer.station.position for answer in answers if answer.word is None]
-        silence = judge_silence(self.errors.topology, self.errors.names, silent)
-        [mute] = converse(probe_inputs(self._input_areas(suspects)))
-        cycle = session.plan.cycle
-        tight = tight_period(cycle.wire_ns, cycle.period_ns)
-        findings = silence or noise
-        return silence_error(answers, suspects, lost, log, findings, mute=mute, tight=tight)
-
-    def _input_areas(self, positions: Sequence[int]) -> dict[int, tuple[int, int]]:
-        """Where the inputs of some devices lie, as far as they have some."""
-        return {
-            position: (fmmu.logical_start, fmmu.length)
-            for position in positions
-            for fmmu in self._session.plan.devices[position].layout.fmmus
-            if fmmu.direction is Direction.INPUT
-        }
-
-    def raise_astray(self) -> None:
-        """Raise StateError if a required device is out of OP.
-
-        A device that twice does not answer under its address, while others do, has lost the
-        address.
-        """
-        session = self._session
-        log = session.log()
-        for look in range(2):
-            [answers] = session.service.converse(survey(self._stations))
-            needed = [a for a in answers if self.watch.requires(a.station.position)]
-            error = state_error(needed, log, session.main.other_masters)
-            if error is not None:
-                raise error
-            silent = [answer for answer in needed if answer.word is None]
-            if not silent or len(silent) == len(answers) or session.engine.al_status == AlState.OP:
-                return
-            if look:
-                raise forgetful_error(silent, session.engine.al_status, log)
-
-    def error_code(self, axis: int) -> int | None:
-        """Object 0x603F of the axis; None where the drive does not tell."""
-        plan = self._session.plan.cycle.axes[axis]
-        channel = self._session.main.subs[plan.device].channel
-        if channel is None:
-            return None
-        index = Object.ERROR_CODE + SLOT_OFFSET * plan.slot
-        try:
-            [data] = self._session.service.converse(upload(channel, index, 0))
-            return UINT.decode(data)
-        except CatenaryError:
-            return None  # a drive in trouble may not talk; the error says that the code is unknown

@@ -18,8 +18,8 @@ from catenary.core import (
 from catenary.log import Log
 from catenary.loop.clocks import Clocks
 from catenary.loop.devices import DeviceWish
-from catenary.loop.exchange import FrameExchange
 from catenary.loop.external_cycle import CarriedExchange, carried
+from catenary.loop.frame_exchange import FrameExchange
 from catenary.loop.laws.law import Law
 from catenary.loop.options import ClockOptions, Scheduling, StopPolicy
 from catenary.loop.session import Session

@@ -34,7 +34,7 @@ from catenary.loop.cycle_errors import (
     AxisTrouble,
     drive_error,
 )
-from catenary.loop.exchange import Exchange, FrameExchange
+from catenary.loop.exchange import Exchange
 from catenary.loop.interpreter import switch_interval
 from catenary.loop.laws.runner import LawRunner
 from catenary.loop.log_rows import read_log
@@ -69,7 +69,7 @@ class Session:
         *,
         abandon: Callable[[], object],
         stop: StopPolicy,
-        exchange: Callable[[Session], Exchange] = FrameExchange,
+        exchange: Callable[[Session], Exchange],
     ) -> None:
         self.main = main
         self.plan = plan

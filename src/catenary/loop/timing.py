@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Mapping
 
 from catenary import notebook
 from catenary.figures import FIGURES, heading
-from catenary.loop.verdict import counts, verdict
 
 NAME, FIGURE = 14, 11  # widths of a table
+COUNTED = ("late", "uncommitted", "underrun", "lost")
+BUSY_SHARE = 0.5  # of the switch interval: a wait this long shows a second busy thread
+LATE_SHARE = 0.1  # of the period: a wake-up that late is worth a sentence
+VIRTUAL = "virtual time: the segment's own clock, not this machine's"
 
 
 class Timing(Mapping[str, Mapping[str, float]]):
@@ -77,3 +81,106 @@ class Timing(Mapping[str, Mapping[str, float]]):
             [phase, *(f"{figures[name] * 1e6:.2f}" for name in FIGURES)]
             for phase, figures in self._phases.items()
         ]
+
+
+def counts(counters: Mapping[str, int]) -> str:
+    """Return the counters: "5000 cycles: 12 late, 0 uncommitted, 0 underrun, 0 lost"."""
+    each = ", ".join(f"{counters.get(name, 0)} {name}" for name in COUNTED)
+    return f"{counters.get('cycles', 0)} cycles: {each}"
+
+
+def verdict(timing: Timing) -> Iterator[str]:
+    """Yield one line for each kind of trouble; one line if there is none."""
+    if timing.is_virtual:
+        yield VIRTUAL
+    lines = [*_late(timing), *_uncommitted(timing), *_underrun(timing), *_lost(timing)]
+    yield from lines
+    yield from _interpreter(timing)
+    if not lines:
+        yield _nothing(timing)
+
+
+def _late(timing: Timing) -> Iterator[str]:
+    """Cycle starts that were skipped."""
+    if not timing.counters.get("late"):
+        return
+    text = f"{_of_all(timing, 'late')} late (skipped), the worst by {_most(timing, 'lateness')}"
+    if timing.is_virtual:
+        yield f"{text}: the body or a task used the virtual time"
+    elif _worst(timing, "process") > timing.period:
+        yield f"{text}: {_long_body(timing)}"
+    elif timing.scheduling.startswith("SCHED_OTHER"):
+        yield f"{text}: the cycle has no real-time priority; see `catenary doctor`"
+    else:
+        yield f"{text}: another process or an interrupt uses this CPU; see `catenary doctor`"
+
+
+def _uncommitted(timing: Timing) -> Iterator[str]:
+    """Cycles that repeated the targets of the one before."""
+    if not timing.counters.get("uncommitted"):
+        return
+    text = f"{_of_all(timing, 'uncommitted')} uncommitted: the program wrote no new targets in time"
+    if _worst(timing, "process") > timing.period:
+        yield f"{text}; {_long_body(timing)}"
+    else:
+        yield (
+            f"{text}; look for waits between two iterations, and for other processes "
+            "(`catenary doctor`); loop.stream() writes ahead"
+        )
+
+
+def _underrun(timing: Timing) -> Iterator[str]:
+    """Cycles for which the stream was empty."""
+    if timing.counters.get("underrun"):
+        yield (
+            f"{_of_all(timing, 'underrun')} underrun: the stream was empty; keep more rows in it, "
+            "or close it when the motion is complete"
+        )
+
+
+def _lost(timing: Timing) -> Iterator[str]:
+    """Cycles without all answers."""
+    if timing.counters.get("lost"):
+        yield (
+            f"{_of_all(timing, 'lost')} lost: frames did not come back, or a device did not answer;"
+            " `catenary diag TARGET` names the cable or the device"
+        )
+
+
+def _interpreter(timing: Timing) -> Iterator[str]:
+    waits = timing.get("interpreter", {}).get("p99", 0.0)
+    if waits >= BUSY_SHARE * sys.getswitchinterval():
+        yield (
+            f"Another Python thread keeps the interpreter for up to {waits * 1e6:.0f} us (p99): "
+            "end it, run it in a process, or shorten its turns: Scheduling(switch_interval=20e-6)."
+        )
+
+
+def _nothing(timing: Timing) -> str:
+    text = "No cycle was late, uncommitted, underrun or lost."
+    worst = _worst(timing, "lateness")
+    if timing.is_virtual or worst < LATE_SHARE * timing.period:
+        return text
+    return (
+        f"{text} The latest wake-up was {worst * 1e6:.0f} us after its cycle start: "
+        "`catenary doctor` shows what delays it."
+    )
+
+
+def _long_body(timing: Timing) -> str:
+    return (
+        f"the body took up to {_most(timing, 'process')} of a period of "
+        f"{timing.period * 1e6:.0f} us; move slow work into another thread or a law"
+    )
+
+
+def _of_all(timing: Timing, name: str) -> str:
+    return f"{timing.counters[name]} of {timing.counters['cycles']} cycles"
+
+
+def _most(timing: Timing, phase: str) -> str:
+    return f"{_worst(timing, phase) * 1e6:.0f} us"
+
+
+def _worst(timing: Timing, phase: str) -> float:
+    return timing.get(phase, {}).get("max", 0.0)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from catenary.bus import MainDevice
 from catenary.igh import KernelMaster, abi
@@ -13,10 +12,8 @@ from catenary.model.device import Direction
 from catenary.plan.cycle import Number
 from catenary.plan.numbers import Which
 from catenary.plan.planner import Plan
+from catenary.pyigh.request import Wish
 from catenary.pyigh.slaves import Cell, RawObject, SlaveBase
-
-if TYPE_CHECKING:
-    from catenary.pyigh.master import Wish
 
 WORDS = {
     (8, False): ctypes.c_uint8,

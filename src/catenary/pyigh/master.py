@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol, Self
 
 from catenary import bus, igh
-from catenary.bus import SubDevice
 from catenary.errors import ConfigurationError
 from catenary.link import LinkSource
-from catenary.plan.request import ImageLayout, PdoWish, Views, WishTables
 from catenary.pyigh.kernel import KernelSteps
 from catenary.pyigh.own import OwnSteps
-from catenary.pyigh.slaves import SlaveBase, columns_of, pdos_of
+from catenary.pyigh.request import Wish
+from catenary.pyigh.slaves import SlaveBase
 from catenary.target import MainDevice
 
 
@@ -183,29 +181,3 @@ class MasterBase:
                 "the master is active: nothing can be configured any more",
                 hint="close it and begin again",
             )
-
-
-class Wish:
-    """All slaves as one wish (`plan.request.Wish`)."""
-
-    def __init__(self, main: bus.MainDevice, slaves: Sequence[SlaveBase]) -> None:
-        self.main = main
-        self._slaves = slaves
-        self.tables_made = WishTables()
-        self.layout: ImageLayout | None = None
-        self.views: Views | None = None
-
-    @property
-    def subs(self) -> Sequence[SubDevice]:
-        return [self.main.subs[slave.position] for slave in self._slaves]
-
-    def pdos(self, period_ns: int) -> Mapping[int, PdoWish]:
-        return pdos_of(self._slaves)
-
-    def tables(self, layout: ImageLayout) -> WishTables:
-        self.layout = layout
-        self.tables_made = columns_of(self._slaves, layout)
-        return self.tables_made
-
-    def bind(self, views: Views) -> None:
-        self.views = views

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from catenary.loop import Loop
 from catenary.model.device import Direction
 from catenary.plan.request import Integers
+from catenary.pyigh.request import Wish
 from catenary.pyigh.slaves import Cell, SlaveBase
 from catenary.wire.al import AlState
-
-if TYPE_CHECKING:
-    from catenary.pyigh.master import Wish
 
 
 class ArrayCell(NamedTuple):

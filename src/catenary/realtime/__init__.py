@@ -20,8 +20,9 @@ if TYPE_CHECKING:
     from catenary.realtime.analysis_file import read_demands
     from catenary.realtime.clock import Participant, VirtualClock
     from catenary.realtime.exchange import Queue, Silence, Value
-    from catenary.realtime.job import Job, Running
+    from catenary.realtime.job import Job
     from catenary.realtime.preparation import Session, session
+    from catenary.realtime.running_task import Running
     from catenary.realtime.statistics import Statistics
     from catenary.realtime.task import Task
     from catenary.realtime.tasks import Tasks
@@ -49,10 +50,10 @@ __all__ = [
 
 _HOMES = {
     "Demand": "analysis",
-    "Job": "running",
+    "Job": "job",
     "Participant": "clock",
     "Queue": "exchange",
-    "Running": "running",
+    "Running": "running_task",
     "Session": "preparation",
     "Signal": "trigger",
     "Silence": "exchange",

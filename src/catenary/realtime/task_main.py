@@ -18,8 +18,8 @@ from catenary.errors import CatenaryError, RealtimeError
 from catenary.realtime import libc
 from catenary.realtime._stack import touch_stack
 from catenary.realtime._task import ENDED, FAILED, STARTED, Block, Releases
-from catenary.realtime.job import Running
 from catenary.realtime.preparation import SET_CAPABILITIES, Session
+from catenary.realtime.running_task import Running
 from catenary.realtime.scheduling import Scheduling, refusal, what_scheduling
 from catenary.realtime.task import Task
 from catenary.realtime.task_memory import Place

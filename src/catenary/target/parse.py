@@ -81,10 +81,10 @@ def named_target(target: str) -> str:
 
 
 def _virtual(path: str, *, realtime: bool) -> LinkSource:
-    from catenary.virtual import Segment, demo_segment  # a NIC needs none of it
+    from catenary.virtual import demo_segment, read_segment  # a NIC needs none of it
 
     clock: Literal["virtual", "monotonic"] = "monotonic" if realtime else "virtual"
-    segment = Segment.from_toml(path, clock=clock) if path else demo_segment(clock=clock)
+    segment = read_segment(path, clock=clock) if path else demo_segment(clock=clock)
     return Ring(segment.first, segment.second) if segment.ring else segment
 
 

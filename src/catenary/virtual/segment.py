@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Literal, NamedTuple, Protocol, runtime_checkable
 
 from catenary.virtual._segment import Core
@@ -118,16 +117,6 @@ class Segment:
         self._links: dict[bool, SegmentLink] = {}
         for fault in faults:
             self.inject(fault)
-
-    @classmethod
-    def from_toml(
-        cls, path: str | Path, *, clock: ClockKind = "virtual", ring: bool = False
-    ) -> Segment:
-        """Reads the segment from a file; ConfigurationError names the file and the field.
-        `ring`: it is one, whether the file says so or not."""
-        from catenary.virtual.configuration import read_segment
-
-        return read_segment(path, clock=clock, ring=ring)
 
     def __len__(self) -> int:
         return len(self._devices)

@@ -1,0 +1,35 @@
+"""The slaves of a program as one request for process data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from catenary.bus import MainDevice, SubDevice
+from catenary.plan.request import ImageLayout, PdoWish, Views, WishTables
+from catenary.pyigh.slaves import SlaveBase, columns_of, pdos_of
+
+
+class Wish:
+    """All slaves as one wish (`plan.request.Wish`)."""
+
+    def __init__(self, main: MainDevice, slaves: Sequence[SlaveBase]) -> None:
+        self.main = main
+        self._slaves = slaves
+        self.tables_made = WishTables()
+        self.layout: ImageLayout | None = None
+        self.views: Views | None = None
+
+    @property
+    def subs(self) -> Sequence[SubDevice]:
+        return [self.main.subs[slave.position] for slave in self._slaves]
+
+    def pdos(self, period_ns: int) -> Mapping[int, PdoWish]:
+        return pdos_of(self._slaves)
+
+    def tables(self, layout: ImageLayout) -> WishTables:
+        self.layout = layout
+        self.tables_made = columns_of(self._slaves, layout)
+        return self.tables_made
+
+    def bind(self, views: Views) -> None:
+        self.views = views
