@@ -112,7 +112,7 @@ def _completed(entry: Entry, name: str, data_type: int) -> Entry:
 
 
 def _with_pdo(device: DeviceDescription, direction: Direction, named: Pdo) -> DeviceDescription:
-    """Return the description with one PDO replaced, wherever it occurs."""
+    """Return the description with all occurrences of one PDO replaced."""
 
     def renamed(pdos: Iterable[Pdo]) -> tuple[Pdo, ...]:
         return tuple(named if pdo.index == named.index else pdo for pdo in pdos)

@@ -135,9 +135,9 @@ def _too_slow(
 ) -> MailboxError:
     index, subindex = place
     return MailboxError(
-        f"{channel.station}: SDO 0x{index:04X}:{subindex:02X}: {received} of {size} bytes within "
-        f"{timeout:g} s",
-        hint="if the device is known to be slow, read with a longer timeout",
+        f"{channel.station}: SDO 0x{index:04X}:{subindex:02X}: received {received} of {size} bytes "
+        f"within {timeout:g} s",
+        hint="if the device is slow, read with a longer timeout",
     )
 
 

@@ -53,7 +53,7 @@ class AlControl:
     """AL control (0x0120): the state that the MainDevice requests."""
 
     state: AlState
-    acknowledge: bool = False  # of a pending error
+    acknowledge: bool = False  # acknowledge a pending error
     request_identification: bool = False  # explicit device identification, ETG.1020 §22
 
     @property
@@ -100,7 +100,7 @@ class AlStatus:
 
 
 def states_in(word: int) -> frozenset[AlState]:
-    """Return the states that the OR of many AL status words can contain. BOOT is INIT | PRE-OP."""
+    """Return the states that the OR of many AL status words can contain. BOOT = INIT | PRE-OP."""
     return frozenset(state for state in AlState if word & state == state)
 
 

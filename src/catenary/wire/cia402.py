@@ -77,12 +77,12 @@ class Control(IntFlag):
 
     SWITCH_ON = 1 << 0
     ENABLE_VOLTAGE = 1 << 1
-    QUICK_STOP = 1 << 2  # 0: stop quickly
+    QUICK_STOP = 1 << 2  # 0: quick stop
     ENABLE_OPERATION = 1 << 3
     MODE_4 = 1 << 4  # PP: new set-point; HM: start homing
     MODE_5 = 1 << 5  # PP: change set immediately
     MODE_6 = 1 << 6
-    FAULT_RESET = 1 << 7  # at its rising edge
+    FAULT_RESET = 1 << 7  # a rising edge resets the fault
     HALT = 1 << 8
     MODE_9 = 1 << 9
     RESERVED_10 = 1 << 10

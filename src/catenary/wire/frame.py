@@ -16,7 +16,7 @@ from catenary.wire.datagram import OVERHEAD, Datagram, decode_datagram
 
 ETHERTYPE = 0x88A4
 BROADCAST = b"\xff" * 6
-DEFAULT_SOURCE = b"\x10\x10\x10\x10\x10\x10"  # locally unassigned, bit 1 of byte 0 clear
+DEFAULT_SOURCE = b"\x10\x10\x10\x10\x10\x10"  # bit 1 of byte 0, which controllers set, is clear
 ETHERNET_HEADER_SIZE = 14
 ETHERCAT_HEADER_SIZE = 2
 HEADER_SIZE = ETHERNET_HEADER_SIZE + ETHERCAT_HEADER_SIZE

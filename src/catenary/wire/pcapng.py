@@ -94,7 +94,9 @@ def encode_packet(packet: Packet) -> bytes:
     if not 0 <= packet.time_ns < 1 << 64:
         raise ValueError(f"pcapng: time {packet.time_ns} ns is not in 0 to 2**64 - 1")
     if packet.interface or not len(packet.data) <= original < 1 << 32:
-        raise ValueError(f"pcapng: interface {packet.interface}, original length {original}")
+        raise ValueError(
+            f"pcapng: invalid interface {packet.interface} or original length {original}"
+        )
     high, low = packet.time_ns >> 32, packet.time_ns & 0xFFFF_FFFF
     body = struct.pack("<IIIII", 0, high, low, len(packet.data), original) + _pad(packet.data)
     if packet.comment:

@@ -27,7 +27,7 @@ _INDEXED = (
 
 
 def names() -> tuple[str, ...]:
-    """Return the names of all registers, by address."""
+    """Return the names of all registers, ordered by address."""
     known = sorted(_by_key().values(), key=lambda each: (each.address, each.size))
     return tuple(dict.fromkeys(each.name for each in known))
 

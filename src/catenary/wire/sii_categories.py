@@ -219,7 +219,7 @@ def decode_sync_managers(data: bytes) -> tuple[SyncManagerEntry, ...]:
 
 @dataclass(frozen=True, slots=True)
 class PdoEntry:
-    """One object in a PDO. Index 0: a gap."""
+    """One object in a PDO. Index 0 marks a gap."""
 
     index: int
     subindex: int
