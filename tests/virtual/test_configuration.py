@@ -168,7 +168,7 @@ def test_errors_of_faults_name_the_field(tmp_path: Path, text: str, says: str) -
     ("text", "says"),
     [
         ('kind = "servo"\nbehind = [0, 3]', "device 0 has no port 3"),
-        ('kind = "servo"\nbehind = [1, 1]', "can hang behind one of 0 to 0"),
+        ('kind = "servo"\nbehind = [1, 1]', "must be behind one of 0 to 0"),
         ('kind = "junction"\nport_count = 5', "port_count"),
     ],
 )
