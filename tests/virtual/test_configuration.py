@@ -51,7 +51,7 @@ def test_a_segment_is_read(tmp_path: Path) -> None:
         ('[[device]]\nkind = "servo"\naxis = 2', "axis"),
         ('[[device]]\nkind = "motor"', "motor"),
         ('[[device]]\nkind = "servo"\naxes = "two"', r"device\[0\].axes"),
-        ('[[device]]\nkind = "servo"\naxes = 9', "1 to 8 axes"),
+        ('[[device]]\nkind = "servo"\naxes = 9', "axes must be 1 to 8"),
         ('[[device]]\nkind = "digital_outputs"\nbits = 17', "1 to 16 bits"),
         ('[[device]]\nkind = "servo"\ninertia = -1.0', "inertia"),
         ('[[device]]\nkind = "servo"\ncrystal = { ppm = 900.0 }', "at most 500 ppm"),

@@ -155,7 +155,8 @@ class Servo(AppliedDevice):
             clock_bits: Width of its clock.
             lrw: True if the device supports LRW.
             sync_missed_limit: Number of consecutive SYNC0 pulses without new outputs that is an
-                error. quirks: Differences of the drive from the profile.
+                error.
+            quirks: Differences of the drive from the profile.
             mapping_quirks: Quirks of its PDOs.
             mailbox_quirks: Quirks of its mailbox.
             sii_quirks: Quirks of its SII.
