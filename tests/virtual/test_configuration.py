@@ -146,7 +146,7 @@ def test_faults_and_wiring_are_read(tmp_path: Path) -> None:
     [
         ('kind = "explode"', "explode"),
         ('kind = "power_cycle"', "device"),
-        ('kind = "power_cycle"\ndevice = 1', r"fault\[0\].*there is no device 1"),
+        ('kind = "power_cycle"\ndevice = 1', r"fault\[0\].*device 1 does not exist"),
         ('kind = "power_cycle"\ndevice = 0\nfor = -1.0', "for must be above 0"),
         ('kind = "power_cycle"\ndevice = 0\nfor_ = 1.0', "for_"),
         ('kind = "cut"\nbetween = [0, 2]', "not neighbours"),

@@ -140,7 +140,7 @@ cdef struct axes_t:
     area_t *input_areas
     area_t *output_areas
     double period              # [s]
-    uint64_t number            # number of the cycle whose inputs were read or whose outputs are computed
+    uint64_t number            # cycle that read the inputs, or for which outputs are computed
     uint32_t lost_limit        # this and the following limits in cycles; 0: off
     uint32_t late_limit_position
     uint32_t late_limit_velocity

@@ -41,7 +41,7 @@ cdef struct clock_t:
     int64_t bound_asked
     follower_t *followers
     uint32_t follower_count
-    uint32_t turn              # follower whose difference is read next
+    uint32_t turn              # follower to read next
     uint32_t outside           # number of followers outside the bound
     uint8_t *time_header       # header of the FRMW
     uint8_t *main_header       # header of the FPWR; NULL: none
@@ -52,7 +52,7 @@ cdef struct clock_t:
     uint32_t payload           # time in that frame, for devices without a reference before them
     int64_t time               # last time of the reference
     int64_t time_sent          # when the frame that read it left
-    uint32_t asked             # follower whose difference is being read; PROBED: the reference's time
+    uint32_t asked             # follower being read; PROBED: the reference's time
     uint8_t awaited            # the last frame sent was not evaluated yet
     uint8_t sampled            # the reference answered in this cycle
     uint8_t holding            # the reference is lost: the core continues its time

@@ -140,7 +140,7 @@ cdef inline int64_t expected_time(const clock_t *k, int64_t now) noexcept nogil:
 
 
 cdef void ask(clock_t *k) noexcept nogil:
-    """Select the follower whose difference the frame reads; sometimes a lost reference's time."""
+    """Select the follower that the frame reads; sometimes a lost reference instead."""
     if k.holding and k.silent % PROBE_EVERY == 0:
         k.asked = PROBED
         put16(k.watch_header + ADP, k.reference)

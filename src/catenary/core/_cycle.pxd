@@ -92,7 +92,7 @@ cdef struct cycle_t:
     bint kept                  # a commit of the application waits for the end of a law
     uint64_t lost
     uint64_t late
-    uint64_t missed_sync       # number of cycles whose frames left later than sync_margin
+    uint64_t missed_sync       # number of cycles that sent frames later than sync_margin
     uint64_t uncommitted
     uint64_t underruns         # number of cycles that found the stream empty
     uint64_t begun             # number of wake-ups since the start; the first has no period

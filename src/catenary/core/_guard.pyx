@@ -132,7 +132,7 @@ cdef void take_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noex
             if is_commanded(x, a.mode):
                 a.armed = 1
             elif quantity_of(a.mode) == TORQUE:
-                a.armed = 0  # this torque is no longer valid
+                a.armed = 0  # this torque is not valid any more
         if a.armed or quantity_of(a.mode) == POSITION:
             a.climbing_cycles += 1
         if a.climbing_cycles > x.climbing_limit:

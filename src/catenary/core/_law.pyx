@@ -70,7 +70,7 @@ cdef inline void give(exchange_t *numbers, const double *values) noexcept nogil:
 
 
 cdef inline bint take(exchange_t *numbers, double *values) noexcept nogil:
-    """Take the newest numbers; return False if there are none."""
+    """Take the newest numbers; return False if nothing is new."""
     if numbers.count == 0 or not cat_triple_take(&numbers.triple):
         return False
     memcpy(values, numbers.slots[numbers.triple.front], numbers.count * sizeof(double))
@@ -96,7 +96,7 @@ cdef void law_end(law_t *law, uint32_t status, uint64_t number) noexcept nogil:
 
 
 cdef int first_not_finite(const axes_t *axes, const target_t *target) noexcept nogil:
-    """Return the first axis whose set-point is NaN or infinite; -1: none."""
+    """Return the first axis with a set-point that is NaN or infinite; -1: none."""
     cdef uint32_t i
     cdef double value
     for i in range(axes.axis_count):

@@ -7,7 +7,7 @@ KILO, MEGA = 1024, 1024 * 1024
 
 
 cdef void *memory_take(cat_memory *memory, size_t count, size_t size) except NULL:
-    """Return `count` zeroed elements of `size` bytes. Raise MemoryError if there is no room."""
+    """Return `count` zeroed elements of `size` bytes. Raise MemoryError if memory is exhausted."""
     cdef void *part = cat_memory_take(memory, count, size)
     if part == NULL:
         raise MemoryError(f"{count * size} bytes for the cycle")

@@ -5,7 +5,7 @@ from catenary.core._memory cimport cat_memory
 
 cdef struct stream_t:
     double *rows               # position, velocity, torque of all axes, row after row
-    uint64_t *seen             # per row: the cycle whose actual values its writer had read
+    uint64_t *seen             # per row: newest cycle of which its writer had read the actual values
     uint32_t axes
     uint32_t capacity          # number of rows
     uint64_t written           # number of rows written so far; the writer's

@@ -9,8 +9,7 @@
 #include <time.h>
 #include <unistd.h>
 
-/* Sleep while *word == value, at most timeout_ns. Return 0: woken or changed; -ETIMEDOUT; -EINTR.
- * */
+/* Sleep while *word == value, at most timeout_ns. Return 0: woken or changed; -ETIMEDOUT; -EINTR. */
 static inline int cat_futex_wait(uint32_t *word, uint32_t value, int64_t timeout_ns) {
     struct timespec timeout = {timeout_ns / 1000000000, timeout_ns % 1000000000};
     if (syscall(SYS_futex, word, FUTEX_WAIT_PRIVATE, value, &timeout, 0, 0) == 0) return 0;

@@ -51,8 +51,7 @@ typedef struct cat_law_numbers {
     int64_t parameter_count;
 } cat_law_numbers;
 
-/* `time` [s] since the first step. Must not block. Returns CAT_LAW_GOES_ON, _FINISHED or _RAISED.
- * */
+/* `time` [s] since the first step. Must not block. Returns CAT_LAW_GOES_ON, _FINISHED or _RAISED. */
 typedef int (*cat_law_step)(const void *actual, void *target, double *memory, int64_t memory_count,
                             const double *parameters, int64_t parameter_count, double time);
 

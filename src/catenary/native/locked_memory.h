@@ -102,8 +102,7 @@ static inline void cat_touch(void *start, size_t size) {
 }
 
 /* Give every page of a chunk a frame of its own, also after a fork. Linux before 4.14 refuses to
- * wipe and copies instead: the child is safe without it (`forget`), the parent's cycle is slower.
- * */
+ * wipe and copies instead: the child is safe without it (`forget`), the parent's cycle is slower. */
 static inline void cat_chunk_touch(cat_chunk *chunk) {
 #ifndef __SANITIZE_ADDRESS__
     madvise(chunk, chunk->size, MADV_WIPEONFORK);

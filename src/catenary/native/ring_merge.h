@@ -30,8 +30,7 @@ static inline uint32_t cat_datagram_size(const uint8_t *frame, uint32_t at, uint
     return at + size <= end ? size : 0;
 }
 
-/* Return the end of the datagrams according to the EtherCAT header; 0: beyond the frame's length.
- * */
+/* Return the end of the datagrams according to the EtherCAT header; 0: beyond the frame's length. */
 static inline uint32_t cat_datagrams_end(const uint8_t *frame, uint32_t length) {
     if (length < CAT_MERGE_HEADER) return 0;
     uint32_t end = CAT_MERGE_HEADER + (cat_word(frame + 14) & 0x7FFu);
@@ -79,8 +78,7 @@ static inline int cat_ring_merge(uint8_t *frame, uint32_t length, const uint8_t 
     return 0;
 }
 
-/* Return 1 if all bytes are zero. Such a FRMW carries no time and would write zeros to all devices.
- * */
+/* Return 1 if all bytes are zero. Such a FRMW carries no time and would write zeros to all devices. */
 static inline int cat_is_zero(const uint8_t *data, uint32_t size) {
     for (uint32_t i = 0; i < size; i++)
         if (data[i]) return 0;

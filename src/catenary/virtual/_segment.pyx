@@ -297,7 +297,7 @@ cdef class Core:
         return when
 
     def output_image(self, int position, int n):
-        """Return the last complete outputs without taking them; empty if there are none."""
+        """Return the last complete outputs without taking them; empty before the first ones."""
         cdef controller *c = self._at(position)
         cdef sync_manager *sm = self._sync_manager_at(position, n)
         if not (sm.enabled and sm.written) or sm.mailbox:

@@ -63,7 +63,7 @@ class Description:
     product_code: int
     serial: int
     alias: int
-    emulation: bool  # AL status follows AL control; there is no microcontroller
+    emulation: bool  # AL status follows AL control, without a microcontroller
     pdi_type: int
     mailbox: MailboxDefault | None
     sync_managers: tuple[SyncManagerDefault, ...]

@@ -53,7 +53,7 @@ static void model_step_free(controller *c) {
     model_inputs(c);
 }
 
-/* The pulses have stopped: the device is no longer synchronised. */
+/* The pulses have stopped: end the synchronisation of the device. */
 static void pulses_lost(controller *c) {
     synchronous_cycle *d = &c->synchronous;
     if (!d->seen || c->segment->now - d->last <= (int64_t)(d->limit + 1) * d->cycle)

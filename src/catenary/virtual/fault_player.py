@@ -37,7 +37,7 @@ class FaultEvent(NamedTuple):
 
     time: float
     fault: f.Fault
-    what: Literal["begins", "ends", "misses"]  # misses: its target is no longer there
+    what: Literal["begins", "ends", "misses"]  # misses: its target has disappeared
 
 
 class Loss(NamedTuple):
@@ -159,7 +159,7 @@ class FaultPlayer:
     def _check_place(self, name: str, position: int | None) -> None:
         if position is not None and position >= len(self._devices):
             last = len(self._devices) - 1
-            raise ValueError(f"{name}: there is no device {position}; the last one is {last}")
+            raise ValueError(f"{name}: device {position} does not exist; the last one is {last}")
 
     def _check_kind(self, fault: f.Fault) -> None:
         match fault:
@@ -263,7 +263,7 @@ class FaultPlayer:
         device = self._applied(fault.device)
         application = device.application
         if not self._core.powered(fault.device):
-            return None  # without power there is no application to inject into
+            return None  # a device without power has lost its application
         match fault:
             case f.MailboxSilent():
                 application.mailbox.silence(True)

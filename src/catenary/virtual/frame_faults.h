@@ -69,8 +69,7 @@ static void frame_garble(cat_segment *s, uint8_t *frame, uint32_t length, int of
     frame[14 + bit / 8] ^= (uint8_t)(1u << (bit & 7));
 }
 
-/* Count bad bits: at the port where they arrived, and at all later controllers as forwarded errors.
- * */
+/* Count bad bits: at the port where they arrived, and at all later controllers as forwarded errors. */
 static void frame_corrupted(cat_segment *s, const route *r, const arrival *where) {
     for (const arrival *a = where; a < r->arrivals + r->arrival_count; a++) {
         if (a->device < 0)

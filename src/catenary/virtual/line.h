@@ -155,8 +155,7 @@ static void queue_twice(segment_end *e, const queued_frame *first) {
     queue_put(e);
 }
 
-/* Process a frame of `length` in `q` that starts at q->sent; queue it for its return, or lose it.
- * */
+/* Process a frame of `length` in `q` that starts at q->sent; queue it for its return, or lose it. */
 static void line_take(cat_segment *s, queued_frame *q, const route *r) {
     fate fate = s->fault_count ? fate_of(s, r) : NO_FATE;
     s->passage = q->sent;

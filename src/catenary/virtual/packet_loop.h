@@ -127,7 +127,7 @@ static int packet_answer(cat_segment *s, const int *fds, int from, int64_t max_a
     return 1;
 }
 
-/* Send frames whose delay has passed; return 0 or -errno. *next: time of the next one. */
+/* Send frames after their delay; return 0 or -errno. *next: time of the next one. */
 static int packets_due(cat_segment *s, const int *fds, int64_t *next) {
     *next = NEVER;
     for (int n = 0; n <= s->ring; n++) {

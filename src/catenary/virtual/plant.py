@@ -84,7 +84,7 @@ class Joint(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Plant:
-    """Owns a MuJoCo model whose joints are driven by the servos of one segment.
+    """Owns a MuJoCo model with joints that the servos of one segment drive.
 
     Args:
         path: An MJCF or URDF file.

@@ -16,8 +16,7 @@ static int controller_make(controller *c, uint32_t ram, uint32_t sii_words, int 
     return c->memory && c->sii.image && c->slots && c->axes;
 }
 
-/* Forget what is lost without power: all but the device's properties, EEPROM, crystal and shafts.
- * */
+/* Forget what is lost without power: all but the device's properties, EEPROM, crystal and shafts. */
 static void controller_forget(controller *c) {
     memset(c->memory, 0, c->memory_size);
     memset(c->slots, 0, (size_t)c->slot_count * sizeof *c->slots);

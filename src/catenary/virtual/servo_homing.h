@@ -46,8 +46,7 @@ static void homing_command(servo_axis *a, const int64_t *slots) {
     a->homing_asked = (uint8_t)asked;
 }
 
-/* Return the torque of mode 6: towards the stop at 0x6099:01 with the ramp of 0x609A, or standing.
- * */
+/* Return the torque of mode 6: towards the stop at 0x6099:01 with the ramp of 0x609A, or standing. */
 static double homing_drive(servo_axis *a, const int64_t *slots, double limit, double dt) {
     double speed = 0, step = larger(1e-3, (double)slots[SLOT_HOMING_ACCELERATION] * a->radian_per_velocity) * dt;
     if (a->homing == HOMING_SEARCHES) {

@@ -8,8 +8,7 @@
  * once, so that 0x098E and 0x098F read 0.
  *
  * Frames can write any value into these times. They are counted modulo 2^64. The distance to a
- * pulse is their difference, limited to SYNC_HORIZON. A pending pulse is less than 2^63 ns ahead.
- * */
+ * pulse is their difference, limited to SYNC_HORIZON. A pending pulse is less than 2^63 ns ahead. */
 #ifndef CATENARY_VIRTUAL_SYNC_UNIT_H
 #define CATENARY_VIRTUAL_SYNC_UNIT_H
 
@@ -97,8 +96,7 @@ static void sync_activation_written(controller *c, int64_t when) {
     sync_schedule(c);
 }
 
-/* Handle a jump of the local system time: pulses it jumped over come after the clock has wrapped.
- * */
+/* Handle a jump of the local system time: pulses it jumped over come after the clock has wrapped. */
 static void sync_time_jumped(controller *c, int64_t when) {
     sync_unit *u = &c->sync;
     uint64_t now = (uint64_t)dc_system_time(c, when);
@@ -109,7 +107,7 @@ static void sync_time_jumped(controller *c, int64_t when) {
     sync_schedule(c);
 }
 
-/* SYNC1 follows a SYNC0 after its cycle time, and starts again with the first SYNC0 after it. */
+/* Emit SYNC1. It follows a SYNC0 by its cycle time; the next SYNC0 starts this time again. */
 static int sync_pulse1(controller *c) {
     int shown = c->memory[REG_SYNC_ACTIVATION] & SYNC_PULSE_1;
     c->memory[REG_SYNC_ACTIVATION_STATUS] &= (uint8_t)~SYNC_PENDING_1;

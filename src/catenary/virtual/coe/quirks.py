@@ -28,11 +28,11 @@ class MailboxQuirks(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     # sent; IgH then gives up after one second (fsm_coe.c, EC_FSM_COE_DICT_TIMEOUT).
     object_list: Literal["complete", "missing", "promised"] = "complete"
 
-    # Objects in the list whose description is too short to be valid. IgH (fsm_coe.c,
+    # Objects in the list with a description that is too short to be valid. IgH (fsm_coe.c,
     # dict_desc_response) then ends the whole dictionary with "Invalid data size".
     malformed_descriptions: tuple[int, ...] = ()
 
-    # Objects whose description is never sent. No report is known.
+    # Objects with a description that is never sent. No report is known.
     missing_descriptions: tuple[int, ...] = ()
 
     # Answer to every request. "unsupported": mailbox error 2, as if the SII listed CoE by mistake.

@@ -329,7 +329,7 @@ class Application:
             self._core.map_process_data(self._position, n == 2, n if entries else -1, entries)
 
     def slot_entry(self, name: str, data_type: int, bits: int, slot: int, access: int) -> Entry:
-        """Return a dictionary entry whose value is a slot of the model.
+        """Return a dictionary entry with a slot of the model as its value.
 
         Args:
             name: Name of the entry.
