@@ -6,13 +6,10 @@
  *
  * Theory of operation
  *   A guard belongs to one thread that calls laws (the runner). `under_way` is the number of its
- * call. A
- *   monitor is a thread that watches one guard. Every 5 ms it compares the processor time of the
- * runner
- *   with that at which it first saw the call. Beyond `limit` it stores the number in `condemned`
- * and
- *   sends the runner a signal. The handler leaves the call by siglongjmp if it is still the same
- * call.
+ *   call. A monitor is a thread that watches one guard. Every 5 ms it compares the processor time of
+ *   the runner with that at which it first saw the call. Beyond `limit` it stores the number in
+ *   `condemned` and sends the runner a signal. The handler leaves the call by siglongjmp if it is
+ *   still the same call.
  *   Signals that arrive late or in another thread have no effect.
  *
  * state of a monitor (futex word)
