@@ -57,7 +57,7 @@ cdef struct axis_t:
     uint8_t state
     int8_t mode_shown
     uint16_t status
-    uint32_t invalid_in_row    # number of exchanges of its unit
+    uint32_t invalid_in_row    # number of invalid exchanges of its unit in a row
     int64_t read_at            # cycle start of its last valid inputs [ns]
     uint32_t still_cycles      # number of cycles in a row at rest
     uint64_t last_raw
@@ -89,10 +89,10 @@ cdef struct axis_t:
     uint32_t climbing_cycles   # cycles since the request, while not followed
     uint32_t waiting_cycles    # cycles while powered, to be enabled, and not followed
     uint32_t mute_cycles       # cycles in which only bit 12 is missing; stays at the limit
-    uint32_t gap_cycles        # cycles since bit 12, once set, is missing
+    uint32_t gap_cycles        # cycles since bit 12 was lost
     uint32_t stop_cycles       # cycles under power since the stop
     uint32_t late_cycles       # cycles in a row without an accepted set-point, hand-overs excluded
-    uint32_t refused_cycles    # those of late_cycles in which the target was refused
+    uint32_t refused_cycles    # those of late_cycles with a refused target
     uint32_t beyond_cycles     # cycles in a row outside a position limit and leaving
     # set-points: the last accepted one of CSP, and the return to the set-points
     double setpoint            # [rad]

@@ -17,8 +17,8 @@ cdef struct phase_t:
     int64_t period
     int64_t step               # errors larger than this are not drift
     uint32_t state
-    uint32_t hold              # number of samples from before the last step
-    uint32_t rejected          # samples in a row; at the maximum while a jump is corrected
+    uint32_t hold              # number of coming samples without an effect of the last step
+    uint32_t rejected          # rejected samples in a row; at the maximum while a jump is corrected
     uint64_t ignored           # number of samples ignored
     uint64_t jumps             # number of jumps of the reference clock
 

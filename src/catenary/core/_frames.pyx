@@ -97,7 +97,7 @@ cdef inline uint16_t counter_of(const datagram_t *d, const uint8_t *frame) noexc
 
 
 cdef inline uint32_t number_in(const frame_t *frame, const uint8_t *bytes) noexcept nogil:
-    """The cycle number in a frame that has one, in the byte order of this machine."""
+    """Return the cycle number of a frame that has one, in the byte order of this machine."""
     cdef uint32_t number
     memcpy(&number, bytes + frame.number_offset, NUMBER_SIZE)
     return number

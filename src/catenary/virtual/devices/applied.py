@@ -99,7 +99,7 @@ class AppliedDevice(Device):
 
     @mailbox_silent.setter
     def mailbox_silent(self, silent: bool) -> None:
-        """True if the device ignores its mailbox: SM0 stays full and SM1 stays empty."""
+        """Stop or resume the mailbox; while it is stopped, SM0 stays full and SM1 stays empty."""
         self.application.mailbox.silence(silent)
 
     def delay_mailbox(self, seconds: float) -> None:
