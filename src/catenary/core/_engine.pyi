@@ -92,8 +92,10 @@ class Engine:
 
     @property
     def origin(self) -> int:
-        """First cycle start [ns]; 0 before `start`. `start(origin_ns)` of another engine uses its
-        grid."""
+        """First cycle start [ns]; 0 before `start`.
+
+        Pass it to `start` of another engine, to put both on the same grid.
+        """
 
     def take_turns(self) -> None:
         """Allow cycles to begin at any time within the period: several engines in one thread."""
