@@ -4,9 +4,9 @@
 Theory of operation
     One service thread pushes whole frames into `out` and pops returned ones from `back`. Both are
     rings for one producer and one consumer (native/packet_ring.h). After each cycle `lane_send` sends
-    at most four frames, as far as their wire time fits into the part of the period that the plan
-    leaves (plan/frames.py) and that has not passed. The first frame is always sent, so that
-    a conversation never starves. Frames with an index from 0x80 on return through `lane_received`.
+    at most four frames. Their wire time must fit into the part of the period that the plan leaves
+    (plan/frames.py) and that has not passed. The first frame is always sent, so that a
+    conversation never starves. Frames with an index from 0x80 on return through `lane_received`.
     The cycle never waits for the service thread.
 
 Waking

@@ -86,8 +86,8 @@ static inline int cat_is_zero(const uint8_t *data, uint32_t size) {
 }
 
 /* Make the second copy: datagrams that must not be sent twice become NOPs. These are datagrams with
- * a position, which would count from the other end, and those that read at one device and write at
- * all others, if their data is zero. Other FRMW data is the expected time of the reference clock:
+ * a position, which would count from the other end. So are those that read at one device and write
+ * at all others, if their data is zero. Other FRMW data is the expected time of the reference clock:
  * the second copy addresses no device with it, and so steers the clocks beyond a break. */
 static inline void cat_ring_second(uint8_t *frame, uint32_t length) {
     uint32_t end = cat_datagrams_end(frame, length);
