@@ -169,7 +169,7 @@ class Background:
     def _refuse_inside_update(self, call: str) -> None:
         if self._updating == threading.get_ident():
             raise RuntimeError(
-                f"loop.{call}() inside `with loop.update():`, which commits at its end: leave it first"
+                f"loop.{call}() inside `with loop.update():`, which commits at its end: leave it"
             )
 
     def _require_alive(self) -> None:

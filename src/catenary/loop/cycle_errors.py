@@ -105,13 +105,10 @@ def state_error(
     return error
 
 
-return f"another EtherCAT master is live: {'; '.join(other_masters)}; end it"
-
-
 def _suspicion(answer: Answer, other_masters: Sequence[str]) -> str:
     """Return evidence of another master. A device that leaves OP by itself gives a reason."""
     if other_masters:
-        return f"another EtherCAT master is active: {'; '.join(other_masters)}; stop it"
+        return f"another EtherCAT master is live: {'; '.join(other_masters)}; end it"
     if answer.code or (answer.word or 0) & ERROR_FLAG:
         return ""
     return (
