@@ -38,7 +38,7 @@ class Diagnosis:
         return "\n".join(map(str, self.findings))
 
     def __bool__(self) -> bool:
-        """True if a fault was found."""
+        """Return True if a fault was found."""
         return bool(self.findings)
 
 

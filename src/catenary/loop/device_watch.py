@@ -40,7 +40,7 @@ from catenary.wire.al import ERROR_FLAG, STATE_MASK, AlState
 Submit = Callable[[Procedure[None]], Pending[None]]
 
 LOOK = 0.010  # [s] between two reads of the core's flag, and between two surveys
-STRANGERS_MAX = 16  # additional devices beyond the scanned ones that are told apart
+STRANGERS_MAX = 16  # further devices beyond the scanned ones that are distinguished
 FAILURES_MAX = 3  # attempts to bring a device back each time it returns
 
 
