@@ -9,12 +9,12 @@
             for cycle in loop:
                 arm.target.position[:] = home + 0.1 * math.sin(cycle.time)
 
-Names load when they are used: `import catenary` costs nothing and imports no NumPy, whose threads
+Names load when they are used. `import catenary` is fast and does not import NumPy, whose threads
 would keep a process from entering a network namespace.
 """
 
-# False. Importing it from `typing` takes longer than all of this; Jedi would believe a plain False
-# and complete nothing.
+# False. Importing it from `typing` takes longer than this whole module. Jedi would believe a plain
+# False and complete nothing.
 TYPE_CHECKING = not __name__
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ __all__ = [
 
 _MODULES = ("control", "drive", "errors", "realtime", "record", "share", "types", "virtual")
 _DRIVE = ("DistributedClock", "Drives", "Inputs", "Outputs", "ProcessData", "StartUp")
-_ERRORS = (  # that a loop raises; the others are in catenary.errors
+_ERRORS = (  # errors that a loop raises; the others are in catenary.errors
     "CatenaryError",
     "ClockError",
     "DriveError",

@@ -1,7 +1,7 @@
-"""The statistics of a time, in the order in which every table shows them."""
+"""Statistics of a time, in the order of the columns of every table."""
 
 FIGURES = ("mean", "max", "min", "sd", "p50", "p99", "p999")
-HEADINGS = {"p999": "p99.9"}  # where it differs from the name
+HEADINGS = {"p999": "p99.9"}  # differs from the name
 
 
 def heading(figure: str) -> str:

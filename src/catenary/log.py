@@ -18,7 +18,7 @@ Rows: TypeAlias = npt.NDArray[np.void]
 TIME = "time"
 INDEX = "time [s]"
 AXIS_POSITION = ".actual.position"
-CHUNK = 4096  # rows that are written at once
+CHUNK = 4096  # rows per write
 
 
 class Log:
@@ -34,12 +34,12 @@ class Log:
 
     @property
     def dtype(self) -> np.dtype[np.void]:
-        """The fields: `log.dtype.names`."""
+        """Fields: `log.dtype.names`."""
         return self._rows.dtype
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """Names of the axes that are logged; empty without `log_axes`."""
+        """Names of the logged axes; empty without `log_axes`."""
         names = self._rows.dtype.names or ()
         return tuple(n.removesuffix(AXIS_POSITION) for n in names if n.endswith(AXIS_POSITION))
 
@@ -69,8 +69,8 @@ class Log:
         """Return a field by its name, shape (cycles,); one cycle by its place; or a part as a Log.
 
         Raises:
-            ValueError: there is no such field.
-            IndexError: there is no such cycle.
+            ValueError: The field does not exist.
+            IndexError: The cycle does not exist.
         """
         found = self._rows[key]
         if isinstance(key, str) or not isinstance(found, np.ndarray):
@@ -109,11 +109,12 @@ class Log:
         return pandas.DataFrame({name: self._rows[name] for name in names}, index=index)
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
-        """Write a CSV file with the names of the fields in its first line. An unknown value is
-        `nan`. `catenary plot FILE.csv` draws it.
+        """Write a CSV file with the names of the fields in its first line.
+
+        An unknown value is `nan`. `catenary plot FILE.csv` draws the file.
 
         Raises:
-            OSError: the file cannot be written.
+            OSError: The file cannot be written.
         """
         with open(path, "w", newline="") as file:
             writer = csv.writer(file)

@@ -1,4 +1,4 @@
-"""Tables and text as HTML, for `_repr_html_`: what a notebook shows."""
+"""Tables and text as HTML, for `_repr_html_` in notebooks."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def lines(text: Iterable[str]) -> str:
-    """Return a paragraph with one line of text below the other."""
+    """Return a paragraph with each text on a separate line."""
     return f"<p>{'<br>'.join(map(escape, text))}</p>"
 
 
 def preformatted(text: str) -> str:
-    """Return text in columns as it is."""
+    """Return text as HTML with its columns preserved."""
     return f"<pre>{escape(text)}</pre>"

@@ -18,7 +18,7 @@ def test_two_ports_that_are_swapped_are_told(ask: Callable[[cat.MainDevice], obj
     segment = Segment([Coupler(), Servo()], ring=True)
     with (
         cat.MainDevice(segment.second, segment.first) as main,
-        pytest.raises(SegmentError, match="wrong way round") as caught,
+        pytest.raises(SegmentError, match="wrong direction") as caught,
     ):
         ask(main)
     assert "swap the two cables" in caught.value.hint

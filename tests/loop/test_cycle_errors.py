@@ -47,7 +47,7 @@ def test_who_left_op_is_told_with_the_reason() -> None:
 def test_a_state_left_without_a_reason_suspects_a_second_master() -> None:
     error = state_error([Answer(SERVO, AlState.PRE_OP)], LOG)
     assert error is not None
-    assert "look for a second master" in error.hint
+    assert "check for a second master" in error.hint
 
 
 def test_a_second_master_that_is_seen_is_named() -> None:

@@ -137,7 +137,7 @@ def test_without_a_folder_there_is_a_warning_and_no_cache(
         assert make_cache(law) is None
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    with pytest.warns(RuntimeWarning, match="not kept"):
+    with pytest.warns(RuntimeWarning, match="not cached"):
         assert make_cache(law) is None
 
 

@@ -95,7 +95,7 @@ def test_watched_while_it_runs_parameters_changed_all_at_once() -> None:
         assert run.overruns == 0
         with pytest.raises(ValueError, match="1 numbers, not 2"):
             run.parameters = [1.0, 2.0]
-        with pytest.raises(ValueError, match="row of numbers"):
+        with pytest.raises(ValueError, match="one-dimensional"):
             run.memory = np.zeros((5, 1))
 
 

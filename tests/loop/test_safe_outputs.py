@@ -155,7 +155,7 @@ def test_a_device_gets_them_while_another_one_of_its_unit_is_silent() -> None:
         with pytest.raises(cat.WorkingCounterError) as caught:
             run_until_it_is_silent()
         assert ours.lamp == 7
-    assert "even if another one of its sync unit is silent" in "\n".join(caught.value.__notes__)
+    assert "even if another device of its sync unit is silent" in "\n".join(caught.value.__notes__)
 
 
 def test_devices_that_are_not_required_confirm_nothing_after_the_cycle_has_ended(

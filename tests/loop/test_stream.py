@@ -72,6 +72,6 @@ def test_what_is_no_row_is_refused(opened) -> None:
         stream.write([1.0, float("nan")])
     with pytest.raises(ValueError, match="none"):
         stream.write()
-    with pytest.raises(ValueError, match="as many rows"):
+    with pytest.raises(ValueError, match="same number of rows"):
         stream.write(np.zeros((2, 2)), velocity=np.zeros((3, 2)))
     assert stream.write([0.0, 0.0]) == 1

@@ -141,7 +141,7 @@ def test_a_clock_that_only_stamps() -> None:
 
 def test_two_wishes_for_one_clock() -> None:
     one, other = wishing(2), wishing(2, clock=DistributedClock(shift=1e-4))
-    with pytest.raises(ConfigurationError, match="device 2: two wishes"):
+    with pytest.raises(ConfigurationError, match="device 2: two requests"):
         make_plan(cell(), [one, other])
     assert make_plan(cell(), [one, one, Asking({2: PdoWish()})]).devices[2].sync is not None
 

@@ -253,7 +253,7 @@ def test_one_whose_eeprom_cannot_be_read_is_not_taken_for_the_one_before(
     events = run(cell, swap(TOOL, with_=Servo(name="tool", serial=99), at=0.1))
     assert len(asked) > 3  # at every look again
     [held] = [e for e in events if isinstance(e, event_types.DeviceHeld)]
-    assert "does not say what it is" in held.reason
+    assert "identity of the device in its place cannot be read" in held.reason
     assert ("DeviceReturned", TOOL) not in kinds(events)
     assert cell.states[TOOL] & 0x0F < PRE_OP
 

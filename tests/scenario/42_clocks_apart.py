@@ -45,7 +45,7 @@ def test_a_bound_is_positive(within: float) -> None:
     with (
         clocked_cell(1) as cell,
         cat.Loop(cell.drives(dc=True), period=1e-3) as loop,
-        pytest.raises(ValueError, match="a bound is positive"),
+        pytest.raises(ValueError, match="must be positive"),
     ):
         loop.wait_locked(within=within)
 

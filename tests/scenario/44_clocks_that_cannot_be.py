@@ -46,7 +46,7 @@ def test_two_wishes_that_disagree(cell: Cell) -> None:
         dc=cat.DistributedClock(shift=1e-4),
     )
     other = cat.Inputs(cell.subs[2], dc=True)
-    with pytest.raises(ConfigurationError, match=r"device 2: two wishes"):
+    with pytest.raises(ConfigurationError, match=r"device 2: two requests"):
         enter(cell, one, other)
 
 

@@ -1,4 +1,4 @@
-"""From PRE-OP to SAFE-OP: mappings read for a plan, a plan written to its devices."""
+"""From PRE-OP to SAFE-OP: read mappings for a plan, and write the plan to the devices."""
 
 from __future__ import annotations
 
@@ -37,15 +37,23 @@ from catenary.procedure.station import within
 from catenary.procedure.sync import bring_together, read_types, stop, write_types
 from catenary.wire.al import AlState
 
-READ_TIMEOUT = 60.0  # [s] for what a plan needs of one device: hundreds of slow SDOs
-WRITE_TIMEOUT = 60.0  # [s] for the objects that a plan writes to one device, and reads again
+READ_TIMEOUT = 60.0  # [s] to read one device for a plan: hundreds of slow SDOs
+WRITE_TIMEOUT = 60.0  # [s] to write and verify the objects of one device
 
 
 def describe_mappings(
     runner: BlockingRunner, subs: Sequence[SubDevice], wishes: Sequence[Wish], period_ns: int
 ) -> None:
-    """Renews the descriptions of all devices with CoE: what is mapped now, and what the
-    dictionary says of the objects wished for that are not."""
+    """Update the descriptions of all CoE devices: the mapping, and the requested objects.
+
+    Objects that are requested but not mapped are read from the dictionaries.
+
+    Args:
+        runner: Runner of the procedures.
+        subs: Devices of the segment.
+        wishes: Process-data requests.
+        period_ns: Period of the cycle.
+    """
     asked = gather_wishes(wishes, period_ns)
     with_coe = [sub for sub in subs if sub.description.coe]
     found = runner.run_all([_renewed(sub, asked.get(sub.position)) for sub in with_coe])
@@ -60,9 +68,24 @@ def bring_to_safe_op(
     epoch_ns: int = 0,
     ring: RingLink | None = None,
 ) -> ClockMeasurement | None:
-    """Writes every device's part of the plan, brings the clocks together, then asks for SAFE-OP;
-    all at once. `epoch_ns`: the system time less the link's; `ring`: what the devices are on, if it
-    is one. Returns what was measured of the clocks, if there are any to bring together."""
+    """Write the plan to all devices, synchronise their clocks, and request SAFE-OP.
+
+    All devices are handled at the same time.
+
+    Args:
+        runner: Runner of the procedures.
+        subs: Devices of the segment.
+        plan: Plan to write.
+        epoch_ns: System time minus link time.
+        ring: Ring link of the segment; None: a line.
+
+    Returns:
+        Measurement of the clocks; None if the plan has no clocks.
+
+    Raises:
+        SegmentError: The number of devices is not that of the plan.
+        IdentityError: A device is not the planned one.
+    """
     if len(subs) != len(plan.devices):
         raise SegmentError(
             f"the plan is for {len(plan.devices)} devices, the segment has {len(subs)}",
@@ -90,8 +113,10 @@ def bring_to_safe_op(
 
 
 def _renewed(sub: SubDevice, wish: PdoWish | None) -> Procedure[DeviceDescription]:
-    """Return the description as it is now. A device that no request names keeps the one of the scan
-    if it does not answer."""
+    """Return the present description.
+
+    If a device that no request names does not answer, return its description from the scan.
+    """
     reading = within(READ_TIMEOUT, sub.station, _describe(sub, wish or PdoWish()))
     try:
         return (yield from reading)

@@ -1,5 +1,4 @@
-"""A diagnosis of the whole segment: what all devices have counted, who is silent, who complains,
-and what that means."""
+"""Diagnosis of the whole segment: error counters, silent devices, AL errors, and their causes."""
 
 from __future__ import annotations
 
@@ -21,8 +20,11 @@ from catenary.wire.error_counters import ErrorCounters
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """What was found. `counters`: by position, of the span of time that was judged, None where
-    nobody answered; `totals`: since power-up. `str()` says it in words."""
+    """Result of a diagnosis; `str()` describes it.
+
+    `counters`: by position, the counts in the judged time span; None for a silent device.
+    `totals`: by position, the counts since power-up.
+    """
 
     findings: tuple[Finding, ...]
     counters: tuple[ErrorCounters | None, ...]
@@ -36,7 +38,7 @@ class Diagnosis:
         return "\n".join(map(str, self.findings))
 
     def __bool__(self) -> bool:
-        """Whether a fault was found."""
+        """Return True if a fault was found."""
         return bool(self.findings)
 
 
@@ -47,9 +49,14 @@ def diagnose(
     lost_frames: int = 0,
     ring: bool = False,
 ) -> Procedure[Diagnosis]:
-    """Asks all devices in shared frames and judges. `since`: an earlier diagnosis, after which is
-    counted; else all that was counted since the power-up. Nobody's silence is an error.
-    `lost_frames`: that did not come back whole in the same time."""
+    """Read all devices in shared frames, and judge. A missing reply is not an error.
+
+    Args:
+        subs: Devices to read.
+        since: Earlier diagnosis that starts the judged time span; None: power-up.
+        lost_frames: Number of frames lost or damaged in the same time.
+        ring: True if the segment is a ring.
+    """
     stations = [sub.station for sub in subs]
     totals = yield from read_error_counters(stations)
     answers = yield from survey(stations)
@@ -77,7 +84,7 @@ def _wiring(topology: Topology) -> list[Finding]:
 
 
 def _complaints(names: Names, answers: Sequence[Answer]) -> list[Finding]:
-    """Devices in a state with an error."""
+    """Return a finding for each device in a state with an error."""
     found = []
     for answer in answers:
         if answer.word is None or not answer.word & ERROR_FLAG:

@@ -1,4 +1,4 @@
-"""Whole EEPROMs, in parts: they take seconds, so somebody may want to see how far it is."""
+"""Reading and writing of whole EEPROMs in parts, with progress reports."""
 
 from __future__ import annotations
 
@@ -14,26 +14,38 @@ from catenary.procedure.station import Station
 from catenary.wire.sii import CHECKSUM_WORD, CONFIGURATION_WORDS
 
 T = TypeVar("T")
-Progress: TypeAlias = Callable[[int, int], None]  # words done, of how many
+Progress: TypeAlias = Callable[[int, int], None]  # words done, words in total
 
 WORDS_READ = 256  # between two reports
 WORDS_WRITTEN = 16
 
 
 class Conversing(Protocol):
-    """A MainDevice, as far as it is needed."""
+    """Part of a MainDevice that this module needs."""
 
     def converse(self, procedure: Procedure[T]) -> T: ...
 
 
 def silent(done: int, total: int) -> None:
-    """Reports nothing."""
+    """Ignore the progress.
+
+    Args:
+        done: Number of words done.
+        total: Number of words in total.
+    """
 
 
 def read_eeprom(
     main: Conversing, station: Station, size: int, *, progress: Progress = silent
 ) -> bytes:
-    """The first `size` bytes, as they are."""
+    """Return the first `size` bytes of an EEPROM.
+
+    Args:
+        main: MainDevice of the device.
+        station: Device.
+        size: Number of bytes.
+        progress: Called with (words done, words in total).
+    """
     total = size // 2
     data = b""
     for first in range(0, total, WORDS_READ):
@@ -46,8 +58,17 @@ def read_eeprom(
 def write_eeprom(
     main: Conversing, station: Station, wanted: Sequence[Change], *, progress: Progress = silent
 ) -> None:
-    """Writes words in their order, each read back. EepromError says how far it got, and what the
-    device is now."""
+    """Write words in order, and read each back.
+
+    Args:
+        main: MainDevice of the device.
+        station: Device.
+        wanted: Words to write.
+        progress: Called with (words done, words in total).
+
+    Raises:
+        EepromError: A write failed. The message names the progress and the resulting state.
+    """
     for first in range(0, len(wanted), WORDS_WRITTEN):
         part = wanted[first : first + WORDS_WRITTEN]
         try:
@@ -63,14 +84,19 @@ def write_eeprom(
 
 
 def aftermath(wanted: Sequence[Change], done: int, begun: int) -> str:
-    """What a device is after a write that broke off: `done` words are written, and perhaps some of
-    those up to `begun`."""
+    """Return the state of a device after an interrupted write, as text.
+
+    Args:
+        wanted: Words to write.
+        done: Number of words that are written.
+        begun: Number of words that may be written.
+    """
     touched = any(each.word < CONFIGURATION_WORDS for each in wanted[:begun])
     sealed = all(each.word != CHECKSUM_WORD for each in wanted[done:])
-    how = f"of {len(wanted)} words {done} are written, perhaps a few more"
+    how = f"{done} of {len(wanted)} words are written, perhaps a few more"
     if touched and not sealed:
         return (
-            f"{how}, and the checksum may not fit: after its next power-up the controller may not "
-            "load its configuration, but its EEPROM can be written"
+            f"{how}, and the checksum may be wrong: after the next power-up the controller may not "
+            "load its configuration, but its EEPROM can still be written"
         )
     return f"{how}: it starts as before, but its description is a mixture of old and new"

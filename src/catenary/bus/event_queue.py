@@ -1,4 +1,4 @@
-"""The events of a segment: a bounded queue for those who ask, callbacks for those who wait."""
+"""Events of a segment: a bounded queue for polling, and callbacks."""
 
 from __future__ import annotations
 
@@ -17,51 +17,51 @@ from catenary.bus.thread_priority import step_behind
 if TYPE_CHECKING:
     import logging
 
-CAPACITY = 1000  # events kept for nobody
-CLOSE_TIMEOUT = 1.0  # [s] for a callback that is under way
+CAPACITY = 1000  # events that are kept until they are fetched
+CLOSE_TIMEOUT = 1.0  # [s] for a running callback
 
 Callback = Callable[[Event], object]
 
 
 class LoopClock:
-    """Owns the zero of event times of one loop: the cycle start of its first iteration."""
+    """Owns the zero of a loop's event times: the cycle start of its first iteration."""
 
     def __init__(self, zero_ns: Callable[[], int]) -> None:
-        self._zero_ns = zero_ns  # on the link's clock; 0: no iteration yet
+        self._zero_ns = zero_ns  # returns the link's clock time; 0: no iteration yet
 
     def stamped(self, event: Event) -> Event:
-        """Return the event with its time on the clock of `cycle.time`, if there is a zero."""
+        """Return the event with its time on the clock of `cycle.time`, once there is a zero."""
         zero = self._zero_ns()
         return replace(event, time=event.time - zero * 1e-9) if zero else event
 
     def freeze(self) -> None:
-        """Keep the zero, and let go of the loop."""
+        """Keep the zero, and release the loop."""
         zero = self._zero_ns()
         self._zero_ns = lambda: zero
 
 
 class Events:
-    """Owns the events that nobody has fetched yet; any thread may put and get.
+    """Owns the events that were not fetched yet; any thread may put and get.
 
-        for event in main.events:                 # what is pending; never waits
+        for event in main.events:                 # the pending events; never waits
             print(event)
         event = main.events.get(timeout=1.0)      # the next one, or None
 
-    Where nobody fetches, the oldest are dropped beyond `capacity`, and counted in `dropped`.
-    Events are put with times of the link's clock. Those of a loop are fetched with times of
-    `cycle.time`: those of its start-up are negative.
+    If events are not fetched, the oldest beyond `capacity` are dropped and counted in `dropped`.
+    Events are put with times of the link's clock. Events of a loop are fetched with times on the
+    clock of `cycle.time`, which are negative during start-up.
     """
 
     def __init__(self, capacity: int = CAPACITY) -> None:
         self.dropped = 0
         self._pending: deque[tuple[Event, LoopClock | None]] = deque()
-        self._clock: LoopClock | None = None  # of the loop that is open
+        self._clock: LoopClock | None = None  # of the open loop
         self._capacity = capacity
         self._changed = threading.Condition()
         self._listeners: tuple[Callable[[Event], None], ...] = ()
 
     def put(self, event: Event) -> None:
-        """Add one, with a time of the link's clock. Never waits."""
+        """Add an event with a time of the link's clock. Never waits."""
         with self._changed:
             if len(self._pending) >= self._capacity:
                 self._pending.popleft()
@@ -73,8 +73,11 @@ class Events:
             listener(event)
 
     def get(self, timeout: float = 0.0) -> Event | None:
-        """Takes the oldest, after waiting for one at most `timeout` [s, of the machine's clock,
-        also where the segment lives in virtual time]; None: none came."""
+        """Remove and return the oldest event; None if no event arrives within `timeout`.
+
+        Args:
+            timeout: Longest wait [s], on the machine's clock even in virtual time.
+        """
         deadline = time.monotonic() + timeout
         with self._changed:
             while not self._pending:
@@ -85,34 +88,39 @@ class Events:
             return _stamped(*self._pending.popleft())
 
     def __iter__(self) -> Iterator[Event]:
-        """Takes what is pending, oldest first."""
+        """Remove and yield the pending events, oldest first."""
         while self._pending:
             try:
                 yield _stamped(*self._pending.popleft())
-            except IndexError:  # another thread was quicker
+            except IndexError:  # another thread was faster
                 return
 
     def __len__(self) -> int:
         return len(self._pending)
 
     def begin_loop(self, zero_ns: Callable[[], int]) -> None:
-        """Count times from the first iteration of a loop. `zero_ns`: returns its cycle start on
-        the link's clock; 0 before it."""
+        """Count times from the first iteration of a loop.
+
+        Args:
+            zero_ns: Returns the cycle start of that iteration on the link's clock; 0 before it.
+        """
         self._clock = LoopClock(zero_ns)
 
     def end_loop(self) -> None:
-        """Count times on the link's clock again. Events of the loop keep theirs."""
+        """Count times on the link's clock again. Events of the loop keep the loop's clock."""
         if self._clock is not None:
             self._clock.freeze()
             self._clock = None
 
     def stamped(self, event: Event) -> Event:
-        """Return an event of now with its time on the clock of `cycle.time`, in a loop."""
+        """Return a current event with its time on the clock of `cycle.time`, if a loop runs."""
         return _stamped(event, self._clock)
 
     def listen(self, listener: Callable[[Event], None]) -> Callable[[], None]:
-        """Call `listener` with every event, in the thread that puts it, until the function that is
-        returned is called. Times are of the link's clock."""
+        """Call `listener` with every event until the returned function is called.
+
+        The call is in the thread that puts the event. Times are of the link's clock.
+        """
         with self._changed:
             self._listeners = (*self._listeners, listener)
 
@@ -130,15 +138,15 @@ def _stamped(event: Event, clock: LoopClock | None) -> Event:
 class Callbacks:
     """Owns the callbacks of a MainDevice and, in real time, the thread that calls them.
 
-    In virtual time `deliver` calls them, in the thread that spends the time: the same order in
-    every run. What a callback raises is logged, and the others are called all the same.
+    In virtual time, `deliver` calls them in the thread that advances the time: the order is the
+    same in every run. An exception of a callback is logged; the other callbacks still run.
     """
 
     def __init__(self, capacity: int = CAPACITY) -> None:
         self.in_thread = True
-        self.dropped = 0  # events that slow callbacks have not been told
+        self.dropped = 0  # events that were dropped because callbacks were slow
         self._callbacks: list[Callback] = []
-        self._untold: queue.Queue[Event | None] = queue.Queue(capacity)  # None: the end
+        self._untold: queue.Queue[Event | None] = queue.Queue(capacity)  # None: end of the thread
         self._lock = threading.Lock()
         self._thread: threading.Thread | None = None
         self._delivering = False
@@ -147,7 +155,7 @@ class Callbacks:
         self._callbacks.append(callback)
 
     def tell(self, event: Event) -> None:
-        """Lets all be called with the event, soon. Never waits for them."""
+        """Queue an event for all callbacks. Never waits for them."""
         if not self._callbacks:
             return
         with self._lock:
@@ -159,7 +167,7 @@ class Callbacks:
                 self._thread.start()
 
     def deliver(self) -> None:
-        """Calls them with what is pending, unless a thread does; harmless inside a callback."""
+        """Call the callbacks with the pending events, unless a thread does or a callback runs."""
         if not self._callbacks or self.in_thread or self._delivering:
             return
         self._delivering = True
@@ -170,7 +178,7 @@ class Callbacks:
             self._delivering = False
 
     def close(self) -> None:
-        """Ends the thread behind what is pending; waits a moment for a slow callback."""
+        """End the thread after the pending events; wait at most CLOSE_TIMEOUT for it."""
         self.deliver()
         with self._lock:
             thread, self._thread = self._thread, None
@@ -186,7 +194,7 @@ class Callbacks:
                 return
             except queue.Full:
                 self.dropped += 1
-                with contextlib.suppress(queue.Empty):  # the thread was quicker
+                with contextlib.suppress(queue.Empty):  # the thread was faster
                     self._untold.get_nowait()
 
     def _serve(self) -> None:
@@ -200,11 +208,11 @@ class Callbacks:
         for callback in tuple(self._callbacks):
             try:
                 callback(event)
-            except Exception:  # a user's mistake must not end the service of the others
+            except Exception:  # an error in one callback must not stop the others
                 _logger().exception("%r raised at the event %s", callback, event)
 
 
 def _logger() -> logging.Logger:
-    import logging  # only a mistake needs it
+    import logging  # only needed after an error
 
     return logging.getLogger("catenary")

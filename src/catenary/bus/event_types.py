@@ -1,9 +1,9 @@
-"""What can happen on a segment beside the cycle, as frozen values.
+"""Events of a segment outside of the cyclic data, as frozen values.
 
-`time` [s] is on the clock of `cycle.time` while a loop is open: it counts from the first iteration,
-and is negative for events of the start-up. Without a loop, or before the first iteration, it is the
-link's clock (`time.monotonic()` on a NIC). `sub` is the device that the event is about, None if it
-is about the segment. `message` has all of it in words. The rest is for programs:
+`time` [s] is on the clock of `cycle.time` while a loop is open: it counts from the first iteration
+and is negative during start-up. Without a loop, or before the first iteration, it is on the link's
+clock (`time.monotonic()` on a NIC). `sub` is the device of the event, or None for an event of the
+segment. `message` describes the event as text. The other fields are for programs:
 
     for event in main.events:
         match event:
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something happened."""
+    """Base class of all events."""
 
     time: float
     sub: SubDevice | None
@@ -40,31 +40,31 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Emergency(Event):
-    """A device reports a fault, or with error code 0 that it is gone: ETG.1000.6 §5.6.4."""
+    """Fault reported by a device, or its end with error code 0: ETG.1000.6 §5.6.4."""
 
     error_code: int
     error_register: int  # object 0x1001
-    data: bytes  # 5 bytes: its maker's
+    data: bytes  # 5 bytes, manufacturer-specific
 
     @property
     def text(self) -> str:
-        """What the error code means, by IEC 61800-7-201 and CiA 301."""
+        """Meaning of the error code by IEC 61800-7-201 and CiA 301."""
         return error_text(self.error_code)
 
 
 @dataclass(frozen=True, slots=True)
 class DeviceLost(Event):
-    """A device does not answer any more."""
+    """Loss of a device: it does not answer any more."""
 
 
 @dataclass(frozen=True, slots=True)
 class DeviceReturned(Event):
-    """A device that was lost answers again; the same one, by its identity."""
+    """Return of a lost device: the same one, by its identity."""
 
 
 @dataclass(frozen=True, slots=True)
 class DeviceReplaced(Event):
-    """Another device stands where one was lost."""
+    """Another device in the place of a lost one."""
 
     expected: Identity
     found: Identity
@@ -72,15 +72,15 @@ class DeviceReplaced(Event):
 
 @dataclass(frozen=True, slots=True)
 class DeviceHeld(Event):
-    """A device that returned is not let into OP: by policy, or because bringing it there failed."""
+    """Device that returned but is not brought to OP: by policy, or because this failed."""
 
-    state: int  # AL state it is held in
+    state: int  # AL state in which it is held
     reason: str
 
 
 @dataclass(frozen=True, slots=True)
 class StateLost(Event):
-    """A device left the state it was brought to, without being asked."""
+    """Unrequested change of a device to another state."""
 
     expected: int  # AL state
     state: int
@@ -89,31 +89,37 @@ class StateLost(Event):
 
 @dataclass(frozen=True, slots=True)
 class LinkLost(Event):
-    """A cable does not carry any more. `between`: the positions at its ends; None: the
-    MainDevice."""
+    """Cable that does not carry any more.
+
+    `between`: positions of the devices at its ends; None: the MainDevice.
+    """
 
     between: tuple[int | None, int | None]
 
 
 @dataclass(frozen=True, slots=True)
 class LinkRestored(Event):
-    """A cable carries again."""
+    """Cable that carries again."""
 
     between: tuple[int | None, int | None]
 
 
 @dataclass(frozen=True, slots=True)
 class FaultFound(Event):
-    """The error counters point at a cable, a device or its supply; frames may still come through.
-    `sub`: the device, or the one behind the cable."""
+    """Fault of a cable, a device or its supply, by the error counters; frames may still pass.
+
+    `sub`: the device, or the device after the cable.
+    """
 
     finding: Finding
 
 
 @dataclass(frozen=True, slots=True)
 class DuplicateFrames(Event):
-    """Many cyclic frames came back more than once: suspect a loop in the wiring or a second
-    sender. `sub` is None."""
+    """Many cyclic frames that returned more than once; `sub` is None.
+
+    Suspect a loop in the wiring or a second sender.
+    """
 
     count: int  # of such frames in `interval`
     interval: float  # [s]
@@ -121,7 +127,7 @@ class DuplicateFrames(Event):
 
 @dataclass(frozen=True, slots=True)
 class ClockUnlocked(Event):
-    """A device's clock left the bound it was held in."""
+    """Distributed clocks that left their bound. `sub`: the device with the largest difference."""
 
     difference: float  # from the reference clock [s]
     bound: float  # [s]
@@ -129,15 +135,15 @@ class ClockUnlocked(Event):
 
 @dataclass(frozen=True, slots=True)
 class ClockLocked(Event):
-    """A device's clock is within the bound; `sub` None: all are."""
+    """Distributed clocks that are within their bound; `sub` is None: all are."""
 
-    difference: float  # from the reference clock, the largest where it is about all [s]
+    difference: float  # from the reference clock [s]; of all clocks the largest
     bound: float  # [s]
 
 
 @dataclass(frozen=True, slots=True)
 class AxisStopped(Event):
-    """The core stopped an axis, without a request of the application."""
+    """Stop of an axis by the core, without a request of the application."""
 
     axis: str
     reason: StopReason
@@ -146,24 +152,30 @@ class AxisStopped(Event):
 
 @dataclass(frozen=True, slots=True)
 class ModeRefused(Event):
-    """A drive did not change to a requested mode; the axis continues in its former mode."""
+    """Mode change that a drive refused; the axis continues in its former mode."""
 
     axis: str
-    mode: int  # mode of operation 0x6060 that was requested
+    mode: int  # requested mode of operation (0x6060)
 
 
 @dataclass(frozen=True, slots=True)
 class Marker(Event):
-    """The application marks an instant, to be found again among the cycles: `MainDevice.mark`."""
+    """Mark that the application set with `MainDevice.mark`, to be found among the cycles."""
 
 
 def emergency(time: float, sub: SubDevice, message: coe.Emergency) -> Emergency:
-    """The event for a device's emergency message."""
+    """Return the event for a device's emergency message.
+
+    Args:
+        time: Time of the message on the link's clock [s].
+        sub: Device that sent it.
+        message: Decoded message.
+    """
     code, register = message.error_code, message.error_register
     what = (
         f"emergency 0x{code:04X} ({error_text(code)}), error register 0x{register:02X}"
         if code
-        else "emergency gone (error code 0)"
+        else "emergency cleared (error code 0)"
     )
     rest = f", data {message.data.hex(' ')}" if any(message.data) else ""
     return Emergency(time, sub, f"{sub.station}: {what}{rest}", code, register, message.data)

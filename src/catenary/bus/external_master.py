@@ -1,4 +1,4 @@
-"""Carrier: another master that exchanges the process images in our place."""
+"""Interface to another master that exchanges the process images (a carrier)."""
 
 from __future__ import annotations
 
@@ -10,41 +10,46 @@ from catenary.procedure.exchange import Procedure
 
 
 class CycleClock(Protocol):
-    """What a cycle knows of distributed clocks: `core.Clock`, or another master's."""
+    """View of a cycle on the distributed clocks: `core.Clock`, or that of another master."""
 
     def figures(self) -> dict[str, float]:
-        """Times in ns: see `core.Clock`."""
+        """Return the figures [ns]: see `core.Clock`."""
 
     def differences(self) -> list[tuple[float, int, int, int]]:
-        """Per follower: mean, last, largest magnitude [ns], reads."""
+        """Return mean, last, largest magnitude [ns] and number of reads of each follower."""
 
     def keep_within(self, bound_ns: int) -> None:
-        """The bound of differences and phase from now on."""
+        """Set the bound of differences and phase."""
 
     def reset_figures(self) -> None:
-        """Forgets the largest magnitudes."""
+        """Reset the largest magnitudes."""
 
     @property
     def changes(self) -> int:
-        """How often the clocks came together or apart."""
+        """Number of changes between locked and unlocked."""
 
 
 class Carrier(Protocol):
-    """What a loop needs of it once it is configured. Its procedures wait, and ask for no frames."""
+    """Interface of a configured master to a loop. Its procedures wait, but request no frames."""
 
     @property
     def image(self) -> object:
-        """A capsule "catenary.image", of this configuration."""
+        """Capsule "catenary.image" of this configuration."""
 
     @property
     def clock(self) -> CycleClock | None:
-        """What it knows of the clocks; None: there are none in this configuration."""
+        """View of the distributed clocks; None if the configuration has none."""
 
     def bring_to_op(self, positions: Sequence[int]) -> Procedure[None]:
-        """Until these devices are in OP, cycles flowing meanwhile. StateError, IdentityError."""
+        """Wait while cycles flow until these devices are in OP.
+
+        Raises:
+            StateError: A device does not reach OP.
+            IdentityError: A device is not the planned one.
+        """
 
     def survey(self) -> Procedure[list[Answer]]:
-        """Who answers, and from which state."""
+        """Return the answers of all devices, with their states."""
 
     def listen(self) -> Procedure[None]:
-        """Takes what devices and cables have to say, and tells it as events: once."""
+        """Fetch pending reports of devices and cables once, and put them as events."""

@@ -1,4 +1,4 @@
-"""FrameMaster: brings the devices of a segment up and down by frames of our own."""
+"""FrameMaster: brings the devices of a segment up and down by its own frames."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:  # plan needs NumPy, a scan does not
 
 
 class FrameMaster:
-    """Owns the conversations of one MainDevice with its devices. Implements `bus.Master`."""
+    """Owns the procedures of one MainDevice on its devices. Implements `bus.Master`."""
 
     def __init__(self, main: MasterOwner, *, force: bool) -> None:
         self.carrier = None
@@ -43,10 +43,10 @@ class FrameMaster:
         self._force = force
 
     def forget(self) -> None:
-        """Do nothing: a forked child keeps no more than the link, which the MainDevice drops."""
+        """Do nothing: a forked child only holds the link, which the MainDevice releases."""
 
     def scan(self) -> tuple[Sequence[SubDevice], tuple[str, ...]]:
-        """Reset all devices, bring them to PRE-OP and read what they are."""
+        """Reset all devices, bring them to PRE-OP and read their descriptions."""
         main, runner = self._main, self._main.runner
         runner.flush()
         device_count, states = runner.run(count())
@@ -90,14 +90,14 @@ class FrameMaster:
             raise LinkError(
                 f"another EtherCAT master is live on {self._main.link.name}: it refreshes the "
                 f"outputs of {', '.join(f'device {position}' for position in refreshed)} (0x0440)",
-                hint="a scan would reset devices that may be in motion. End that master, perhaps "
-                "one at the other end of the line; pass force=True (--force) to scan anyway",
+                hint="a scan would reset devices that may be in motion. End that master, which "
+                "may be at the other end of the line; pass force=True (--force) to scan anyway",
             )
 
     def _addressed(
         self, runner: BlockingRunner, device_count: int
     ) -> tuple[Sequence[StationRegisters], tuple[str, ...]]:
-        """Every device's registers, once it has its station address; what is odd about a ring."""
+        """Return the registers of the addressed devices, and notes on a ring."""
         ring = ring_of(self._main.link)
         if ring is None:
             return runner.run(assign(range(device_count))), ()

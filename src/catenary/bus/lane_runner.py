@@ -1,7 +1,7 @@
-"""Runs procedures beside a running cycle, through the acyclic lane of the core.
+"""Runner of procedures while a cycle runs, through the acyclic queue of the core.
 
-`step` moves everything on by at most one exchange; whoever runs the loop calls it, at most once a
-cycle: a service thread, or in virtual time the loop itself. Other threads submit and wait.
+`step` advances every procedure by at most one exchange. It is called at most once per cycle: by a
+service thread, or in virtual time by the loop. Other threads submit procedures and wait.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from catenary.wire.frame import decode_frame
 T = TypeVar("T")
 
 NEVER_NS = 1 << 62
-FRAMES_PER_STEP = 4  # what a cycle carries besides its own frames
+FRAMES_PER_STEP = 4  # acyclic frames per cycle
 
 
 class Lane(Protocol):
-    """The lane's end in Python: `core.Engine` has it."""
+    """Python side of the acyclic queue, as `core.Engine` has it."""
 
     def lane_push(self, frame: bytes) -> bool: ...
     def lane_pop(self) -> bytes | None: ...
@@ -43,7 +43,7 @@ class _Turn:
 
 @dataclass(slots=True)
 class _Item:
-    """One request on its way."""
+    """One request and its place in a step."""
 
     turn: _Turn
     rank: int
@@ -59,10 +59,10 @@ class _UnderWay:
 
 
 class LaneRunner:
-    """Owns the procedures beside one cycle. One thread steps; `submit` and `run` are for any.
+    """Owns the procedures that run during one cycle. Only one thread may call `step`.
 
-    `grain_ns`: a pause that ends within it has ended: frames go out with the next cycle only, so a
-    pause much shorter than the period passes while they wait for it.
+    Any thread may call `submit` and `run`. `grain_ns`: a pause that ends within this time counts as
+    ended. Frames only go out with the next cycle, so short pauses pass while they wait.
     """
 
     def __init__(
@@ -74,13 +74,13 @@ class LaneRunner:
         grain_ns: int = 0,
     ) -> None:
         self.counts = FrameCounts()
-        self.asked = threading.Event()  # something was submitted since this was cleared
+        self.asked = threading.Event()  # set when a procedure was submitted
         self._lane = lane
         self._timeout_ns = round(frame_timeout * 1e9)
         self._attempts = attempts
         self._grain_ns = grain_ns
         self._indices = indices()
-        self._lock = threading.Lock()  # of the two below
+        self._lock = threading.Lock()  # for the two variables below
         self._submitted: deque[Pending[Any]] = deque()
         self._closed = False
         self._owner = threading.get_ident()
@@ -89,11 +89,11 @@ class LaneRunner:
         self._under_way: dict[int, _UnderWay] = {}
 
     def adopt(self) -> None:
-        """The thread that calls this is the loop's: it must not wait for itself."""
+        """Make the calling thread the loop's thread, which must not wait for results."""
         self._owner = threading.get_ident()
 
     def submit(self, procedure: Procedure[T]) -> Pending[T]:
-        """Lets a procedure begin at the next step."""
+        """Queue a procedure; it begins at the next step."""
         pending = Pending(Task(procedure))
         with self._lock:
             if self._closed:
@@ -104,13 +104,17 @@ class LaneRunner:
         return pending
 
     def run(self, procedure: Procedure[T]) -> T:
-        """Waits for the result, in another thread than the loop's. RuntimeError in the loop's
-        own: it would wait for itself."""
+        """Run a procedure and return its result; call it in another thread than the loop's.
+
+        Raises:
+            RuntimeError: The caller is the loop's thread, which would deadlock.
+            LoopError: The loop has ended.
+        """
         if threading.get_ident() == self._owner:
             procedure.close()
             raise RuntimeError(
                 "a blocking call inside the loop's own thread would stop the loop: use "
-                "sub.sdo.request() and look at its `done`, make the call from another thread, or "
+                "sub.sdo.request() and poll its `done`, or make the call in another thread or "
                 "before the loop"
             )
         pending = self.submit(procedure)
@@ -119,25 +123,24 @@ class LaneRunner:
 
     @property
     def busy(self) -> bool:
-        """Whether anything is asked: there are steps to come."""
+        """True if procedures are active or submitted."""
         return bool(self._active or self._submitted)
 
     @property
     def due(self) -> bool:
-        """Whether anything waits for a step now: a frame to be sent or on its way, the end of a
-        pause. What sleeps does not."""
+        """True if a step has work now: a frame to send or to receive, or the end of a pause."""
         return self.next_due_ns <= self._lane.now()
 
     @property
     def next_due_ns(self) -> int:
-        """When a step is due next [ns, the lane's clock]; 0: now."""
+        """Time of the next step with work [ns, the queue's clock]; 0: now."""
         if self._submitted or self._under_way or self._outbox:
             return 0
         wakes = [pending.task.wake_ns or 0 for pending in self._active]
         return min(wakes, default=NEVER_NS) - self._grain_ns
 
     def step(self) -> None:
-        """One exchange of everything that is under way."""
+        """Advance all procedures by one exchange."""
         now = self._lane.now()
         self._receive(now)
         self._expire(now)
@@ -147,7 +150,7 @@ class LaneRunner:
         self._send(now)
 
     def close(self) -> None:
-        """Ends all procedures where they stand; their callers get LoopError."""
+        """End all procedures; their callers get LoopError."""
         with self._lock:
             self._closed = True
             left = [*self._active, *self._submitted]
@@ -245,5 +248,5 @@ class LaneRunner:
 
 def _ended() -> LoopError:
     return LoopError(
-        "the loop has ended before the device answered", hint="ask again, outside the loop"
+        "the loop has ended before the device answered", hint="repeat the call outside the loop"
     )

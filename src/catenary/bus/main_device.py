@@ -42,7 +42,7 @@ if TYPE_CHECKING:  # plan needs NumPy, a scan does not
 T = TypeVar("T")
 
 EPOCH_2000_NS = 946_684_800_000_000_000  # 2000-01-01 in Unix time
-LEAVE_TIMEOUT = 0.5  # [s] for each state on the way down: nobody waits long for a broken segment
+LEAVE_TIMEOUT = 0.5  # [s] for each state on the way down; short for a broken segment
 
 
 class MainDevice:
@@ -52,28 +52,28 @@ class MainDevice:
             for sub in main.scan():
                 print(sub.position, sub.name, sub.identity)
 
-    Leaving the block brings all devices to INIT, whatever happened in it.
+    Leaving the block always brings all devices to INIT.
 
-    It is the only one on its network interfaces: opening is refused while another master is live.
-    `force=True` opens it anyway. A forked child cannot use it, and leaves its devices alone.
+    It is the only MainDevice on its network interfaces: opening fails while another master is live,
+    unless `force=True`. A forked child cannot use it, and leaves its devices alone.
     """
 
     def __init__(self, source: LinkSource, *, force: bool = False) -> None:
         self.subs = SubDevices()
-        self.notes: tuple[str, ...] = ()  # what the last scan found odd
-        self.clock_delays_ns: tuple[int | None, ...] = ()  # behind the first clock, by position
-        self.clock_epoch_ns = 0  # system time of the clocks less the link's
-        self.events = events = Events()  # what happened: iterate, or get(timeout=)
+        self.notes: tuple[str, ...] = ()  # oddities that the last scan found
+        self.clock_delays_ns: tuple[int | None, ...] = ()  # to the first clock, by position
+        self.clock_epoch_ns = 0  # system time of the clocks minus link time
+        self.events = events = Events()  # iterate, or get(timeout=)
         self._callbacks = callbacks = Callbacks()
         events.listen(lambda each: callbacks.tell(events.stamped(each)))
         self._source = source
         self._force = force
         self._ownership: Ownership | None = None
-        self._process = 0  # the one that has opened it
+        self._process = 0  # identifier of the process that has opened it
         self._link: Link | None = None
         self._blocking: BlockingRunner | None = None
         self._attached: Runner | None = None
-        self._leave_loop: Callable[[], object] | None = None  # ends the loop that runs
+        self._leave_loop: Callable[[], object] | None = None  # ends the running loop
         self.master: Master = (
             source.make_master(self)
             if isinstance(source, MasterSource)
@@ -94,12 +94,12 @@ class MainDevice:
 
     @property
     def has_loop(self) -> bool:
-        """True while a loop runs on it."""
+        """True while a loop runs on this MainDevice."""
         return self._attached is not None
 
     @property
     def carrier(self) -> Carrier | None:
-        """Who exchanges the images; None: our own frames."""
+        """Master that exchanges the images; None: our own frames."""
         return self.master.carrier
 
     @property
@@ -110,10 +110,10 @@ class MainDevice:
     def open(self) -> Self:
         """Open the link and return the MainDevice. Nothing is sent.
 
-        A network interface is listened to for 0.1 s. No effect if it is open.
+        Opening listens on a network interface for 0.1 s. No effect if it is open.
 
         Raises:
-            LinkError: it cannot be used; or another master is live on it, unless `force`.
+            LinkError: The link cannot be used, or another master is live on it, unless `force`.
         """
         self.forget()
         if self._link is not None:
@@ -132,8 +132,10 @@ class MainDevice:
         return self
 
     def forget(self) -> None:
-        """Let go of the parent's link and devices in a forked child. Sends nothing. No effect in
-        the process that opened it."""
+        """Release the parent's link and devices in a forked child. Sends nothing.
+
+        No effect in the process that opened it.
+        """
         if not self._is_inherited:
             return
         self.master.forget()
@@ -150,14 +152,16 @@ class MainDevice:
         if self._is_inherited:
             return RuntimeError(
                 f"the MainDevice was opened by process {self._process}: a forked child cannot use "
-                "it; read in the parent, or open a MainDevice of its own when the parent is done"
+                "it; read in the parent, or open a new MainDevice when the parent is done"
             )
         return RuntimeError("the MainDevice is not open: use it in a with block")
 
     @property
     def other_masters(self) -> tuple[str, ...]:
-        """Evidence of another master on the network interfaces, as text: found when it was opened
-        with `force`, or by its packet socket now."""
+        """Evidence of another master on the network interfaces, as text.
+
+        It was found at opening with `force`, or is found now by its packet socket.
+        """
         if self._link is None or self._ownership is None:
             return ()
         return self._ownership.others or other_sockets(self._link)
@@ -172,9 +176,9 @@ class MainDevice:
             return
         try:
             if self._leave_loop is not None:
-                self._leave_loop()  # a loop that was left open must not go on without its link
+                self._leave_loop()  # an open loop must not continue without its link
             if self.subs:
-                with contextlib.suppress(CatenaryError):  # the segment may be gone, so we go too
+                with contextlib.suppress(CatenaryError):  # the segment may be unreachable
                     self._detach()
                     self.master.close(LEAVE_TIMEOUT)
         finally:
@@ -185,31 +189,32 @@ class MainDevice:
         try:
             link.close()
         finally:
-            if self._ownership is not None:  # last: the next owner finds no socket of ours
+            if self._ownership is not None:  # last: the next owner must not find our socket
                 self._ownership.release()
             self._callbacks.close()
 
     def on_event(self, callback: Callback) -> None:
         """Call `callback(event)` for every event from now on, in addition to `events`.
 
-        It runs in a thread of its own, which may read and write objects; in virtual time in the
-        thread that spends the time, between two steps. Its exceptions are logged.
+        It runs in a separate thread, which may read and write objects. In virtual time it runs in
+        the thread that advances the time, between two steps. Its exceptions are logged.
         """
         self._callbacks.add(callback)
 
     def mark(self, message: str, *, time: float | None = None) -> None:
-        """Put a `Marker` among the events. It is shared and recorded like them. Never waits; any
-        thread may call it.
+        """Put a `Marker` event, which is shared and recorded like all events.
+
+        Never waits; any thread may call it.
 
         Args:
-            message: text of the marker.
-            time: [s] on the link's clock (`time.monotonic()` on a NIC). None: now.
+            message: Text of the marker.
+            time: Time on the link's clock (`time.monotonic()` on a NIC) [s]. None: now.
         """
         when = self.link.now() * 1e-9 if time is None else float(time)
         self.events.put(event_types.Marker(when, None, message))
 
     def deliver_events(self) -> None:
-        """In virtual time: calls the callbacks with what has happened. Else a thread does."""
+        """Call the callbacks with pending events, in virtual time; otherwise a thread does."""
         self._callbacks.deliver()
 
     def scan(
@@ -218,23 +223,26 @@ class MainDevice:
         expected: Sequence[Identity | tuple[int, int] | None] | None = None,
         strict: bool = True,
     ) -> SubDevices:
-        """Find all devices and bring them to PRE-OP. The handles of devices that are still
-        there stay the same objects.
+        """Find all devices and bring them to PRE-OP.
 
-        A device that cannot be read or brought to PRE-OP does not stop the others. Devices that a
-        killed program left in SAFE-OP or OP are reset; `notes` names them.
+        Devices that are still there keep their handles. A device that cannot be read or brought to
+        PRE-OP does not affect the others. Devices that a killed program left in SAFE-OP or OP are
+        reset; `notes` names them.
 
         Args:
-            expected: by position, an identity or (vendor, product); None: any device.
-            strict: raise the error of a device, with those of further devices as notes. `subs` has
-                all handles then, too. False: it is in `SubDevice.error`, and is raised when the
-                device is used.
+            expected: By position, an identity or (vendor, product); None: any device.
+            strict: True: raise the error of a device, with those of further devices as notes;
+                `subs` has all handles nevertheless. False: store it in `SubDevice.error`, and raise
+                it when the device is used.
+
+        Returns:
+            All devices, by position.
 
         Raises:
-            LinkError: another master refreshes the outputs of a device, unless `force`.
-            NoDeviceError: no device answers.
-            IdentityError: a device is not the expected one.
-            SegmentError: the number of devices is not the expected one.
+            LinkError: Another master refreshes the outputs of a device, unless `force`.
+            NoDeviceError: No device answers.
+            IdentityError: A device is not the expected one.
+            SegmentError: The number of devices is not the expected one.
         """
         self.require_no_loop()
         subs, self.notes = self.master.scan()
@@ -250,10 +258,10 @@ class MainDevice:
     def passive_scan(self, *, names: bool = True) -> SubDevices:
         """Read the devices without changing a state or mapping, for diagnosis.
 
-        `subs` stays as it is, and `close` leaves these devices in their states.
+        `subs` does not change, and `close` leaves these devices in their states.
 
         Args:
-            names: also read the EEPROMs. Without them a device has neither name nor identity.
+            names: Also read the EEPROMs. Otherwise a device has neither name nor identity.
         """
         found = self.master.passive_scan(names=names)
         return SubDevices([SubDevice(self, each, None) for each in found])
@@ -263,8 +271,13 @@ class MainDevice:
     ) -> dict[int, Outcome]:
         """Bring devices of a `passive_scan` to a state and leave them there. Not while a loop runs.
 
+        Args:
+            subs: All devices of the passive scan.
+            positions: Positions of the devices to change.
+            state: Requested state.
+
         Returns:
-            By position, the state that was reached, or the error.
+            By position, the reached state or the error.
         """
         return self.master.request_states([sub.description for sub in subs], positions, state)
 
@@ -275,13 +288,15 @@ class MainDevice:
         subs: Sequence[SubDevice] | None = None,
         lost_frames: int = 0,
     ) -> Diagnosis:
-        """Read the error counters and states of all devices and judge where a fault is: cable,
-        device or power. Takes one frame or a few; also while a loop runs, from any other thread.
+        """Read the error counters and states of all devices, and judge where a fault is.
+
+        The fault is in a cable, a device or the power supply. The call takes a few frames. While a
+        loop runs, call it from another thread.
 
         Args:
-            since: count from this earlier diagnosis; None: from the power-up of the devices.
-            subs: those of a `passive_scan`; None: those of the last `scan`.
-            lost_frames: number that the caller did not get back whole in the same time.
+            since: Earlier diagnosis that starts the count; None: power-up of the devices.
+            subs: Devices of a `passive_scan`; None: those of the last `scan`.
+            lost_frames: Number of frames that the caller lost or got back damaged in that time.
         """
         chosen = self.subs if subs is None else subs
         return self.master.diagnose(chosen, since=since, lost_frames=lost_frames)
@@ -295,21 +310,21 @@ class MainDevice:
         optional: Collection[int] = (),
         watchdog: float | None = None,
     ) -> Plan:
-        """Return the plan for these requests, from the mapping that the devices have now. Print it.
+        """Return the plan for these requests, from the present mapping of the devices. Print it.
 
         The devices must be in PRE-OP. Nothing is written. For further options use `read_mappings`,
         then `catenary.plan.make_plan`.
 
         Args:
             wishes: `Drives`, `Inputs`, `Outputs` and other process-data requests.
-            period: of the cycle [s].
+            period: Period of the cycle [s].
             execution: "threaded" or "inline", as for `Loop`.
             receive_mode: "poll", "wait" or "busy", as `Scheduling.receive`.
-            optional: positions of devices that may be absent.
-            watchdog: as for `Loop` [s].
+            optional: Positions of devices that may be absent.
+            watchdog: Watchdog time as for `Loop` [s].
 
         Raises:
-            MappingError: a device cannot map an object.
+            MappingError: A device cannot map an object.
         """
         from catenary.plan.planner import make_plan
 
@@ -325,8 +340,15 @@ class MainDevice:
         )
 
     def read_mappings(self, *wishes: Wish, period: float = 1e-3) -> None:
-        """Update the descriptions: what is mapped, and what the dictionaries say of wanted objects
-        that are not. Raises the error of a device that is not in PRE-OP."""
+        """Update the descriptions of the devices: mappings, and requested objects.
+
+        Args:
+            *wishes: Process-data requests.
+            period: Period of the cycle [s].
+
+        Raises:
+            CatenaryError: A device is not in PRE-OP; this is its error from the scan.
+        """
         self._raise_errors()
         from catenary.plan.planner import period_in_ns
 
@@ -339,10 +361,13 @@ class MainDevice:
         self.clock_delays_ns = self.master.configure(plan, self.clock_epoch_ns)
 
     def leave(self, *, timeout: float = LEAVE_TIMEOUT) -> None:
-        """End operation: bring all devices to PRE-OP. StateError names one that stays up.
+        """End operation: bring all devices to PRE-OP.
 
         Args:
-            timeout: for each state on the way down [s]. The kernel master uses its own.
+            timeout: Time for each state on the way down [s]. The kernel master uses its own.
+
+        Raises:
+            StateError: A device does not leave its state.
         """
         self._detach()
         self.master.leave(timeout)
@@ -351,28 +376,27 @@ class MainDevice:
         """Read objects of several devices before a loop.
 
         Args:
-            wanted: (index, subindex) by position.
+            wanted: (index, subindex) of the objects, by position.
 
         Returns:
-            By position, the bytes of each object that the device did not refuse.
+            By position, the bytes of each object; refused objects are omitted.
         """
         return self.master.read_objects(wanted)
 
     def converse(self, procedure: Procedure[T]) -> T:
-        """Runs a procedure, alone or beside the running loop."""
+        """Run a procedure and return its result, alone or through the acyclic queue of a loop."""
         while True:
             runner = self._any_runner
             try:
                 return runner.run(procedure)
             except LinkLent:
-                continue  # a loop has begun in another thread: beside it, then
+                continue  # a loop has begun in another thread: use its queue
             finally:
                 if self._attached is None:
                     self.deliver_events()
 
     def request(self, procedure: Procedure[T]) -> Pending[T]:
-        """Lets a procedure go on beside the running loop. Without one it has ended when this
-        returns."""
+        """Start a procedure in the acyclic queue of a loop; without a loop, run it to its end."""
         while True:
             runner = self._any_runner
             with contextlib.suppress(LinkLent):
@@ -388,8 +412,14 @@ class MainDevice:
 
     @contextlib.contextmanager
     def attached(self, runner: Runner, leave: Callable[[], object] | None = None) -> Iterator[None]:
-        """While a loop runs: conversations go through its runner, scans are refused. Waits for
-        those that other threads have under way: the link is the loop's alone."""
+        """While a loop runs, pass procedures to its runner and refuse scans.
+
+        Waits for procedures of other threads, because the loop needs the link for itself.
+
+        Args:
+            runner: Runner of the loop.
+            leave: Ends the loop.
+        """
         self.require_no_loop()
         blocking = self.runner
         self._attached, self._leave_loop = runner, leave
@@ -406,21 +436,21 @@ class MainDevice:
 
     @property
     def _any_runner(self) -> Runner:
-        """That of the running loop, or our own."""
+        """The runner of the running loop, or our own."""
         if self._is_inherited:
             raise self._not_open()
         return self._attached or self.runner
 
     @property
     def runner(self) -> BlockingRunner:
-        """What runs conversations while no loop does. RuntimeError while a loop runs."""
+        """Runner of procedures without a loop. RuntimeError while a loop runs."""
         if self._blocking is None or self._is_inherited:
             raise self._not_open()
         self.require_no_loop()
         return self._blocking
 
     def _raise_errors(self) -> None:
-        """The first error that the scan has met."""
+        """Raise the first error of the scan."""
         for sub in self.subs:
             if sub.error is not None:
                 raise sub.error
@@ -431,8 +461,10 @@ class MainDevice:
             errors[0].add_note(f"also: {other}")
 
     def _epoch_ns(self) -> int:
-        """From the link's time to EtherCAT's, which counts from 2000 (ETG.1000.4 §6.8); in virtual
-        time there is no date, so that runs repeat."""
+        """Return EtherCAT time, which counts from 2000 (ETG.1000.4 §6.8), minus link time.
+
+        In virtual time it is 0, so that runs are repeatable.
+        """
         if lives_in_virtual_time(self.link):
             return 0
         return time.time_ns() - EPOCH_2000_NS - self.link.now()
@@ -441,7 +473,7 @@ class MainDevice:
         if len(expected) != len(self.subs):
             raise SegmentError(
                 f"{len(expected)} devices expected, {len(self.subs)} found",
-                hint="look for a device without power or a loose cable",
+                hint="check for a device without power or a loose cable",
             )
         for sub, wanted in zip(self.subs, expected, strict=True):
             if wanted is not None:

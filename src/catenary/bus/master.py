@@ -1,4 +1,4 @@
-"""Master: what brings the devices of a MainDevice up and down."""
+"""Interface to a master, which brings the devices of a MainDevice up and down."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:  # plan needs NumPy, a scan does not
 
 
 class MasterOwner(DeviceOwner, Protocol):
-    """The MainDevice of a master. `MainDevice` documents the properties."""
+    """MainDevice of a master. `MainDevice` documents the properties."""
 
     @property
     def link(self) -> Link: ...
@@ -40,13 +40,12 @@ class MasterOwner(DeviceOwner, Protocol):
 class Master(Protocol):
     """Frames of our own (`bus.FrameMaster`), or the kernel master (`igh.KernelMaster`).
 
-    `MainDevice` documents what the calls do. A master that cannot do one raises
-    ConfigurationError.
+    `MainDevice` documents the calls. A master without a call raises ConfigurationError.
     """
 
     @property
     def carrier(self) -> Carrier | None:
-        """What exchanges the process images, once configured; None: our own frames."""
+        """Master that exchanges the process images, once configured; None: our own frames."""
 
     def scan(self) -> tuple[Sequence[SubDevice], tuple[str, ...]]:
         """Return the handles of all devices, in PRE-OP, and notes."""
@@ -71,24 +70,25 @@ class Master(Protocol):
         """Bring all devices to SAFE-OP.
 
         Args:
-            epoch_ns: System time of the clocks less the link's.
+            plan: Plan to write.
+            epoch_ns: System time of the clocks minus link time.
 
         Returns:
-            By position, the delay behind the first clock [ns]; empty if it was not measured.
+            By position, the delay after the first clock [ns]; empty if it was not measured.
         """
 
     def leave(self, timeout: float) -> None:
         """End operation: bring all devices to PRE-OP within `timeout` [s] for each state."""
 
     def close(self, timeout: float) -> None:
-        """Prepare for the link to close: bring all devices down as far as the master can."""
+        """Bring all devices down as far as the master can, before the link closes."""
 
     def forget(self) -> None:
-        """Let go of what belongs to the parent, in a forked child."""
+        """Release the parent's resources in a forked child."""
 
 
 @runtime_checkable
 class MasterSource(Protocol):
-    """A link source that brings a master of its own."""
+    """Link source that makes its own master."""
 
     def make_master(self, main: MasterOwner) -> Master: ...

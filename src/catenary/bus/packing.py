@@ -1,7 +1,7 @@
-"""Requests of many procedures → few frames, and the frames back → replies.
+"""Packing of procedures' requests into few frames, and unpacking of the replies.
 
-Requests keep their order, so what one procedure asks in a step happens in that order on the wire.
-All datagrams of a frame carry the frame's index, from the half that belongs to procedures.
+Requests keep their order, so the requests of one procedure in a step are processed in that order.
+All datagrams of a frame carry the frame's index, from the half reserved for procedures.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from catenary.wire.datagram import OVERHEAD, Datagram, EcatCommand
 from catenary.wire.frame import MAXIMUM_DATA, MAXIMUM_PAYLOAD, Frame, encode_frame
 
 INDEX_FIRST, INDEX_LAST = 0x80, 0xFF  # 0x00 to 0x7F belong to the cycle
-_COUNTED_ADDRESS = frozenset(  # their ADP counts up on the way
+_COUNTED_ADDRESS = frozenset(  # every device increments their ADP
     (
         EcatCommand.APRD,
         EcatCommand.APWR,
@@ -29,7 +29,7 @@ _COUNTED_ADDRESS = frozenset(  # their ADP counts up on the way
 
 @dataclass(frozen=True, slots=True)
 class Parcel:
-    """One frame of procedures' requests."""
+    """One frame with requests of procedures."""
 
     index: int
     frame: bytes
@@ -37,19 +37,23 @@ class Parcel:
 
 
 def indices() -> Iterator[int]:
-    """The indices of procedures' frames, round and round."""
+    """Yield the indices of procedures' frames endlessly."""
     while True:
         yield from range(INDEX_FIRST, INDEX_LAST + 1)
 
 
 def batches(requests: Sequence[Request]) -> list[list[int]]:
-    """Ranks of the requests that share a frame, in order. ValueError if one fits no frame."""
+    """Return the ranks of the requests that share a frame, in order.
+
+    Raises:
+        ValueError: A request is too long for a frame.
+    """
     found: list[list[int]] = []
     room = 0
     for rank, request in enumerate(requests):
         if len(request.data) > MAXIMUM_DATA:
             raise ValueError(
-                f"a datagram of {len(request.data)} bytes fits no frame: at most {MAXIMUM_DATA}"
+                f"datagram of {len(request.data)} bytes is too long: at most {MAXIMUM_DATA} bytes"
             )
         size = OVERHEAD + len(request.data)
         if size > room or request.alone:
@@ -66,7 +70,13 @@ def make_parcel(requests: Sequence[Request], index: int) -> Parcel:
 
 
 def replies_of(parcel: Parcel, frame: Frame, time_ns: int) -> list[Reply] | None:
-    """What the frame brought back; None if it is not this parcel."""
+    """Return the replies of a frame; None if it is not the frame of this parcel.
+
+    Args:
+        parcel: Frame that was sent.
+        frame: Frame that was received.
+        time_ns: Time of reception.
+    """
     if len(frame.datagrams) != len(parcel.requests):
         return None
     for datagram, request in zip(frame.datagrams, parcel.requests, strict=True):

@@ -1,4 +1,4 @@
-"""Devices as they are: what diagnosis looks at."""
+"""Passive scan for diagnostics: it changes no state."""
 
 from __future__ import annotations
 
@@ -22,7 +22,13 @@ from catenary.procedure.stations import StationRegisters, count, read_registers
 def passive_scan(
     runner: BlockingRunner, ring: RingLink | None, names: bool
 ) -> tuple[DeviceDescription, ...]:
-    """All devices in the order of their positions, with their parents."""
+    """Return all devices by position, with their parents.
+
+    Args:
+        runner: Runner of the procedures.
+        ring: Ring link; None: a line.
+        names: True to read the EEPROMs too.
+    """
     runner.flush()
     device_count = runner.run(count()).devices
     if ring is not None:
@@ -39,7 +45,7 @@ def passive_scan(
 def _visit_from_both_ends(
     runner: BlockingRunner, ring: RingLink, device_count: int
 ) -> tuple[StationRegisters, ...]:
-    """As `assign_from_both_ends`: behind the cut devices count from the second end's cut on."""
+    """Read registers as `assign_from_both_ends`: after the cut, positions count from there."""
     near = ring.state.first_devices
     with routed(ring, "first"):
         found = runner.run(read_addresses(near))
@@ -54,7 +60,7 @@ def _visit_from_both_ends(
 
 
 def _named(registers: StationRegisters) -> Procedure[DeviceDescription]:
-    """Return the device with the content of its EEPROM; if it cannot be read, with a note why."""
+    """Return the device with its EEPROM content; if that is unreadable, with a note."""
     station = Station(registers.position, registers.station_address)
     try:
         reading = within(READ_TIMEOUT, station, read_image(station))

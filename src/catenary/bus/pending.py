@@ -1,4 +1,4 @@
-"""Pending: an answer that is still to come, to be looked at from inside a loop."""
+"""Pending: the future result of a procedure, to be polled inside a loop."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ T = TypeVar("T")
 
 
 class Pending(Generic[T]):
-    """Owns one conversation that was asked for and goes on beside the loop.
+    """Owns one procedure that runs while the loop runs.
 
         answer = sub.sdo.request(0x6064, type=DINT)
         for cycle in loop:
             if answer.done:
                 print(answer.result())
 
-    Looking never waits and causes no traffic.
+    Polling never waits and causes no traffic.
     """
 
     def __init__(self, task: Task[T]) -> None:
@@ -29,7 +29,7 @@ class Pending(Generic[T]):
 
     @property
     def done(self) -> bool:
-        """Whether there is a result, an error, or nobody wants either any more."""
+        """True if there is a result or an error, or the procedure was cancelled."""
         return self._cancelled or self._finished.is_set()
 
     @property
@@ -38,29 +38,34 @@ class Pending(Generic[T]):
 
     @property
     def error(self) -> BaseException | None:
-        """Why there is no result; None: there is, or not yet."""
+        """Error of the procedure; None if it has not ended, or has ended without one."""
         return self.task.error if self._finished.is_set() and not self._cancelled else None
 
     def result(self) -> T:
-        """The answer, once `done`; raises what went wrong instead. RuntimeError before, and of a
-        request that was cancelled."""
+        """Return the result, once `done`, or raise the error of the procedure.
+
+        Raises:
+            RuntimeError: The procedure has not ended, or was cancelled.
+        """
         if self._cancelled:
             raise RuntimeError("the request was cancelled")
         if not self._finished.is_set():
-            raise RuntimeError("no answer yet: look at `done` first")
+            raise RuntimeError("no answer yet: check `done` first")
         return self.task.result()
 
     def cancel(self) -> None:
-        """Nobody wants the answer any more. What has not begun never will; a transfer under way
-        goes on to its end unseen, since a device must not be left in the middle of one."""
+        """Discard the result. A procedure that has not begun never begins.
+
+        A transfer under way continues to its end, because a device must not be left within one.
+        """
         self._cancelled = not self._finished.is_set()
 
     def wait(self) -> None:
-        """Until it has ended, on another thread than the loop's."""
-        self._finished.wait()  # the procedure's own deadlines, or the runner's close(), end this
+        """Wait for the end, in another thread than the loop's."""
+        self._finished.wait()  # ended by the procedure's deadlines or by the runner's close()
 
     def finish(self, error: CatenaryError | None = None) -> None:
-        """For the runner: the task has ended, or ends here with an error."""
+        """Mark the procedure as ended, or end it with an error. For the runner."""
         if error is not None and not self.task.done:
             self.task.cancel()
             self.task.error = error

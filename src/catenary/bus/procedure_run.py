@@ -1,4 +1,4 @@
-"""Task: owns one procedure while it runs, whichever runner steps it."""
+"""Task: a running procedure, independent of its runner."""
 
 from __future__ import annotations
 
@@ -10,32 +10,37 @@ T = TypeVar("T")
 
 
 class Task(Generic[T]):
-    """Owns a procedure: what it waits for, and how it ended."""
+    """Owns a procedure: its pending requests or pause, and its result."""
 
     def __init__(self, procedure: Procedure[T]) -> None:
         self._procedure = procedure
-        self.requests: list[Request] = []  # of this step; empty: none to send
-        self.wake_ns: int | None = None  # sleeping until then
+        self.requests: list[Request] = []  # of this step; may be empty
+        self.wake_ns: int | None = None  # end of the pause; None: no pause
         self.done = False
         self.error: BaseException | None = None
         self._result: T | None = None
 
     def start(self, now_ns: int) -> None:
-        """Runs to the first step."""
+        """Run the procedure to its first step."""
         self._advance(None, now_ns)
 
     def resume(self, replies: list[Reply], now_ns: int) -> None:
-        """Hands over the replies of the last step (none after a pause) and runs to the next."""
+        """Pass the replies of the last step (none after a pause), and run to the next step.
+
+        Args:
+            replies: Replies in the order of the requests.
+            now_ns: Time of the link's clock.
+        """
         self._advance(replies, now_ns)
 
     def cancel(self) -> None:
-        """Ends it where it stands; its `finally` clauses run, without the network."""
+        """End the procedure. Its `finally` clauses run, without the network."""
         if not self.done:
             self.done = True
             self._procedure.close()
 
     def result(self) -> T:
-        """What it returned; raises what it raised."""
+        """Return the result of the procedure, or raise its error."""
         if self.error is not None:
             raise self.error
         return cast(T, self._result)
@@ -46,7 +51,7 @@ class Task(Generic[T]):
             step = next(self._procedure) if replies is None else self._procedure.send(replies)
         except StopIteration as stop:
             self.done, self._result = True, stop.value
-        except Exception as error:  # the procedure's verdict: its caller gets it from result()
+        except Exception as error:  # result() raises it in the caller of the procedure
             self.done, self.error = True, error
         else:
             if isinstance(step, After):

@@ -1,4 +1,4 @@
-"""A ring as the MainDevice sees it: where it is cut, and devices addressed from both ends."""
+"""Cuts of a ring, and addressing of its devices from both ends."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class HasState(Protocol):
 
 
 class Cuts(NamedTuple):
-    """Which cables of a ring do not carry, and whom nothing reaches for that reason."""
+    """Cables of a ring that do not carry, and the devices that are unreachable therefore."""
 
     cables: tuple[Ends, ...]
     island: tuple[int, ...]  # positions
@@ -43,7 +43,7 @@ class Cuts(NamedTuple):
 
 
 def named(cable: Ends) -> str:
-    """A cable by what is at its ends."""
+    """Return a cable as text, by its ends."""
     first, second = cable
     if first is None:
         return f"the first port and device {second}"
@@ -53,15 +53,25 @@ def named(cable: Ends) -> str:
 
 
 def find_cuts(state: RingState, device_count: int) -> Cuts | None:
-    """Where a ring of so many devices is cut, by how many are reached from each end; None: it is
-    not known. One cable carries nothing: a cut; two or more: those between are an island."""
+    """Return the cuts of a ring, by the numbers of devices that each end reaches.
+
+    If the ends reach all devices together, one cable is cut. Otherwise the devices between two
+    cuts are an island.
+
+    Args:
+        state: State of the ring.
+        device_count: Number of devices in the ring.
+
+    Returns:
+        The cuts; None if they are unknown.
+    """
     if state.shape is Shape.CLOSED:
         return Cuts((), ())
     if state.shape not in (Shape.CUT, Shape.FIRST_ONLY, Shape.SECOND_ONLY):
         return None
     first, second = state.first_devices, state.second_devices
     if first + second > device_count:
-        return None  # counted in different moments
+        return None  # the counts are from different moments
     upper = first - 1 if first else None
     lower = device_count - second if second else None
     if first + second == device_count:
@@ -71,11 +81,13 @@ def find_cuts(state: RingState, device_count: int) -> Cuts | None:
 
 
 def check_direction(state: RingState) -> None:
-    """SegmentError where the two ports are swapped: what is sent on the first passes all devices
-    from behind, where nobody processes it."""
+    """Raise SegmentError if the two ports are swapped.
+
+    Frames of the first port would then pass all devices in the unprocessed direction.
+    """
     if state.shape is Shape.CLOSED and state.second_devices and not state.first_devices:
         raise SegmentError(
-            "the ring is wired the wrong way round: its devices are entered from the second port",
+            "the ring is wired in the wrong direction: frames enter from the second port",
             hint="swap the two cables at the MainDevice, or the names of its ports",
         )
 
@@ -83,9 +95,17 @@ def check_direction(state: RingState) -> None:
 def assign_from_both_ends(
     runner: BlockingRunner, ring: RingLink, device_count: int
 ) -> Sequence[StationRegisters]:
-    """Station addresses by position. Where the ring is cut, those behind the cut are reached from
-    the second end: what comes from there passes them all unprocessed, turns round at the cut, and
-    is processed on its way back, by the device at the cut first."""
+    """Give the devices their station addresses; return their registers by position.
+
+    In an open ring, the devices after the cut are reached from the second end. A frame from there
+    passes them unprocessed, turns at the cut, and is processed on its way back. The device at the
+    cut is therefore the first one.
+
+    Args:
+        runner: Runner of the procedures.
+        ring: Ring link.
+        device_count: Number of devices in the ring.
+    """
     state = ring.state
     check_direction(state)
     if state.shape is not Shape.CUT and state.shape is not Shape.SECOND_ONLY:
@@ -100,9 +120,20 @@ def assign_from_both_ends(
 def end_for_clocks(
     runner: BlockingRunner, ring: RingLink, devices: Sequence[DeviceDescription]
 ) -> RingEnd | None:
-    """The port to close while delays are measured; None: the ring is cut right there, and a line
-    already. ClockError where it is cut elsewhere: frames from two ends bring no common time."""
-    device_count = runner.run(count()).devices  # renews the state
+    """Return the port to close while delays are measured.
+
+    Args:
+        runner: Runner of the procedures.
+        ring: Ring link.
+        devices: Descriptions of the devices.
+
+    Returns:
+        The port; None if the ring is already open at that port.
+
+    Raises:
+        ClockError: The ring is cut elsewhere: its two parts have no common time.
+    """
+    device_count = runner.run(count()).devices  # updates the state
     topology = make_topology([device.open_ports for device in devices], ring=True)
     state = ring.state
     if state.shape is not Shape.CLOSED:
@@ -110,21 +141,26 @@ def end_for_clocks(
             return topology.second_end
         cuts = find_cuts(state, device_count)
         raise ClockError(
-            f"clocks: {cuts or 'the ring is cut'}; who is behind it has no common time with those "
-            "before it",
-            hint="mend the cable and scan again, or leave dc= out",
+            f"clocks: {cuts or 'the ring is cut'}; devices after the cut have no common time with "
+            "those before it",
+            hint="repair the cable and scan again, or omit dc=",
         )
     if topology.second_end is None or topology.contradictions:
         raise ClockError(
-            "clocks: the ring was cut when it was scanned, and is closed now",
-            hint="scan again: the ports tell where its second end is",
+            "clocks: the ring was cut during the scan, and is closed now",
+            hint="scan again, to find the port of its second end",
         )
     return topology.second_end
 
 
 @contextmanager
 def routed(ring: RingLink, route: str) -> Iterator[None]:
-    """Frames go out on one link only: positions count from there."""
+    """Send frames on one link only within the block: positions count from there.
+
+    Args:
+        ring: Ring link.
+        route: "first" or "second".
+    """
     before, ring.route = ring.route, route
     try:
         yield

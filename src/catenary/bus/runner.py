@@ -1,8 +1,8 @@
-"""Runs procedures over a link, before and after the loop: all at once, in shared frames.
+"""Runner of procedures without a loop: all procedures at once, in shared frames.
 
-In rounds: everything that procedures ask for now goes out in as few frames as it takes; when all
-of them are back or given up, the procedures go on. A lost datagram is sent again only if its
-procedure said that this is harmless. Every wait has a deadline on the link's clock.
+It works in rounds. All pending requests go out in as few frames as possible; when all frames are
+back or lost, the procedures continue. A lost datagram is only repeated if its procedure marked the
+request as repeatable. Every wait has a deadline on the link's clock.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ T = TypeVar("T")
 
 FRAME_TIMEOUT = 0.05  # [s]; a frame takes microseconds, a busy machine's scheduler much longer
 ATTEMPTS = 4  # of a repeatable request
-GRID_NS = 50_000  # of the ends of pauses: who wakes at almost the same time shares frames
-WINDOW = 16  # frames under way at once: less than any receive ring holds
+GRID_NS = 50_000  # pauses end on this grid, so that procedures share frames
+WINDOW = 16  # frames under way at once; less than the capacity of any receive ring
 
 
 class Runner(Protocol):
-    """Runs procedures: to their end, or so that one can look at them."""
+    """Interface to run a procedure to its end, or to start it and poll the result."""
 
     def run(self, procedure: Procedure[T]) -> T: ...
 
@@ -39,18 +39,18 @@ class Runner(Protocol):
 
 @dataclass(slots=True)
 class FrameCounts:
-    """Owns the counts of one runner's frames."""
+    """Owns the frame counts of one runner."""
 
     sent: int = 0
     datagrams: int = 0
     lost: int = 0
-    stale: int = 0  # EtherCAT, but no answer to anything under way
+    stale: int = 0  # EtherCAT frames that answer no pending request
     alien: int = 0  # other traffic
     malformed: int = 0
 
 
 class LinkLent(RuntimeError):
-    """A loop has taken the link meanwhile: its runner is to be asked. Nothing was sent."""
+    """A loop has taken the link meanwhile: use the loop's runner. Nothing was sent."""
 
 
 class BlockingRunner:
@@ -68,11 +68,11 @@ class BlockingRunner:
         self._lent = False
 
     def run(self, procedure: Procedure[T]) -> T:
-        """Runs one to its end."""
+        """Run a procedure to its end, and return its result."""
         return self.run_all([procedure])[0]
 
     def submit(self, procedure: Procedure[T]) -> Pending[T]:
-        """The same: nobody else would step it, so it has ended when this returns."""
+        """Run a procedure to its end, and return it as Pending."""
         pending = Pending(Task(procedure))
         with self._mine():
             try:
@@ -83,8 +83,11 @@ class BlockingRunner:
         return pending
 
     def run_all(self, procedures: Sequence[Procedure[T]]) -> list[T]:
-        """Runs all at once. When some fail, the others are finished first; then the first error
-        is raised, with the rest as its notes."""
+        """Run procedures at once, and return their results.
+
+        If some fail, the others are finished first. Then the first error is raised, with the other
+        errors as notes.
+        """
         with self._mine():
             tasks = [Task(procedure) for procedure in procedures]
             try:
@@ -100,12 +103,12 @@ class BlockingRunner:
         return [task.result() for task in tasks]
 
     def lend(self) -> None:
-        """The link is a loop's from here on: waits for whoever talks now, refuses others."""
+        """Give the link to a loop: wait for running procedures, and refuse others."""
         with self._lock:
             self._lent = True
 
     def take_back(self) -> None:
-        """The loop has given the link back."""
+        """Take the link back from a loop."""
         self._lent = False
 
     @contextlib.contextmanager
@@ -116,7 +119,7 @@ class BlockingRunner:
             yield
 
     def flush(self) -> None:
-        """Throws away what has been received before."""
+        """Discard frames that were received earlier."""
         while self._link.receive() is not None:
             self.counts.stale += 1
 
@@ -154,7 +157,7 @@ class BlockingRunner:
             start = end
 
     def _exchange(self, requests: Sequence[Request]) -> list[Reply]:
-        """All replies; lost ones are repeated where that is harmless."""
+        """Return all replies; repeat lost requests if they are repeatable."""
         replies: dict[int, Reply] = {}
         ranks = list(range(len(requests)))
         for _ in range(self._attempts):
@@ -181,15 +184,15 @@ class BlockingRunner:
     def _collect(
         self, under_way: dict[int, tuple[Parcel, list[int]]], replies: dict[int, Reply]
     ) -> None:
-        """Takes the frames of one window back, until a deadline."""
+        """Receive the frames of one window, until a deadline."""
         deadline = self._link.now() + self._timeout_ns
-        while under_way and self._link.now() < deadline:  # also under a flood of alien frames
+        while under_way and self._link.now() < deadline:  # bounded under a flood of alien frames
             raw = self._link.receive()
             if raw is not None:
                 self._take(raw, under_way, replies)
             else:
                 self._link.wait_until(deadline, True)
-        for _ in range(WINDOW):  # what came while this process did not run is not lost
+        for _ in range(WINDOW):  # frames that arrived while this process did not run
             raw = self._link.receive() if under_way else None
             if raw is None:
                 break

@@ -1,4 +1,4 @@
-"""Sdo: the object dictionary of one device, before the loop, beside it and inside it."""
+"""Sdo: access to the object dictionary of one device, before and during a loop."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from catenary.wire.sdo_information import ListType, ObjectDescription
 
 T = TypeVar("T")
 
-EACH_TIMEOUT = 60.0  # [s] for all objects of one device that are read before a loop
+EACH_TIMEOUT = 60.0  # [s] to read all objects of one device before a loop
 
 Objects: TypeAlias = dict[tuple[int, int], bytes]  # by index and subindex
 
 
 class Conversations(Protocol):
-    """What runs procedures: a `MainDevice`."""
+    """Interface to run procedures, as a `MainDevice` has it."""
 
     def converse(self, procedure: Procedure[T]) -> T:
-        """Run a procedure, alone or next to the running loop."""
+        """Run a procedure, alone or while a loop runs."""
         ...
 
     def request(self, procedure: Procedure[T]) -> Pending[T]:
-        """Start a procedure next to the running loop."""
+        """Start a procedure while a loop runs."""
         ...
 
 
@@ -52,18 +52,21 @@ class ObjectOwner(Protocol):
 
 
 class Sdo:
-    """Owns the way to the object dictionary of one device: `sub.sdo.read(0x1018, 1, type=UDINT)`.
+    """Owns the access to the object dictionary of one device.
 
-    `read` and `write` wait for the answer; while a loop runs they may be called from any thread but
-    the one that iterates, where `request` and `request_write` ask without waiting.
+    Example: `sub.sdo.read(0x1018, 1, type=UDINT)`.
 
-    `type`: of `catenary.types`; without one, bytes. `complete`: all subindices at once, from
-    `subindex` 1 or 0 on (the latter takes 16 bits then): see `types.Array` and `types.Record`.
+    `read` and `write` wait for the answer. While a loop runs, any thread except the iterating one
+    may call them. The iterating thread uses `request` and `request_write`, which do not wait.
+
+    `type` is a type of `catenary.types`; without it, values are bytes. `complete` transfers all
+    subindices at once, from `subindex` 0 or 1 on; subindex 0 then has 16 bits. See `types.Array`
+    and `types.Record`.
     """
 
     def __init__(self, sub: ObjectOwner) -> None:
         self._sub = sub
-        self.notes: tuple[str, ...] = ()  # what was missing in the last `list`
+        self.notes: tuple[str, ...] = ()  # gaps of the last `list`
 
     @overload
     def read(
@@ -96,9 +99,12 @@ class Sdo:
         limit: int = UPLOAD_LIMIT,
         timeout: float = UPLOAD_TIMEOUT,
     ) -> T | bytes:
-        """Read an object: bytes, or with a `type` its value.
+        """Read an object: bytes, or its value if a `type` is given.
 
         Args:
+            index: Index of the object.
+            subindex: Subindex of the object.
+            type: Type of the value; None: bytes.
             complete: Read all subindices from `subindex` on.
             limit: Largest size [bytes].
             timeout: Deadline of a transfer in several segments [s].
@@ -128,7 +134,18 @@ class Sdo:
         type: DataType[T] | None = None,
         complete: bool = False,
     ) -> None:
-        """Writes an object: bytes, or with a `type` a value. SdoAbort if the device refuses."""
+        """Write an object: bytes, or a value if a `type` is given.
+
+        Args:
+            index: Index of the object.
+            subindex: Subindex of the object.
+            value: Bytes, or a value of the type.
+            type: Type of the value.
+            complete: Write all subindices from `subindex` on.
+
+        Raises:
+            SdoAbort: The device refuses.
+        """
         self._sub.main.converse(self._download(index, subindex, value, type, complete))
 
     @overload
@@ -162,8 +179,10 @@ class Sdo:
         limit: int = UPLOAD_LIMIT,
         timeout: float = UPLOAD_TIMEOUT,
     ) -> Pending[T] | Pending[bytes]:
-        """As `read`, without waiting: look at `done`, then take `result()`. Where no loop runs, the
-        answer is there already."""
+        """Read an object without waiting: poll `done`, then call `result()`.
+
+        Arguments as for `read`. Without a loop, the answer is there at once.
+        """
         asked = self._upload(index, subindex, complete, limit, timeout)
         if type is None:
             return self._sub.main.request(asked)
@@ -186,15 +205,18 @@ class Sdo:
         type: DataType[T] | None = None,
         complete: bool = False,
     ) -> Pending[None]:
-        """As `write`, without waiting: once `done`, `result()` raises what went wrong."""
+        """Write an object without waiting: once `done`, `result()` raises the error, if any.
+
+        Arguments as for `write`.
+        """
         return self._sub.main.request(self._download(index, subindex, value, type, complete))
 
     def list(self, kind: ListType = ListType.ALL) -> tuple[ObjectDescription, ...]:
         """Read the objects of a kind, by index, as the device describes them (SDO information).
 
-        One question is asked for each object. Of an object that the device lists and does not
-        describe, only the index is known: its `object_code` is 0. `notes` names these objects, and
-        what is missing of a list that was cut short.
+        The device is queried once per object. If the device lists an object without describing it,
+        only the index is known, and `object_code` is 0. `notes` names these objects, and the
+        missing part of a truncated list.
 
         Raises:
             SdoAbort: The device refuses the list.
@@ -205,8 +227,10 @@ class Sdo:
         return found
 
     def describe(self, index: int) -> DescribedObject:
-        """Read one object with its entries: types, lengths, access, names, and notes about entries
-        that the device does not describe."""
+        """Read one object with its entries: types, lengths, access and names.
+
+        Notes name the entries that the device does not describe.
+        """
         return self._sub.main.converse(describe_object(self._channel(index), index))
 
     def _upload(
@@ -237,14 +261,19 @@ class Sdo:
         if channel is None or not channel.layout.coe:
             what = "has no mailbox" if channel is None else "does not speak CoE"
             raise MailboxError(
-                f"{self._sub.station} {what}: object 0x{index:04X}:{subindex:02X} is out of reach",
+                f"{self._sub.station} {what}: cannot access object 0x{index:04X}:{subindex:02X}",
                 hint="couplers and simple terminals have no object dictionary",
             )
         return channel
 
 
 def read_each(sdo: Sdo, places: Sequence[tuple[int, int]]) -> Procedure[Objects]:
-    """Read objects one after the other. Objects that the device refuses are left out."""
+    """Read objects one after the other. Refused objects are omitted.
+
+    Args:
+        sdo: Access to the device.
+        places: (index, subindex) of each object.
+    """
     reading = _read_each(sdo._channel(), places)
     return (yield from within(EACH_TIMEOUT, sdo._sub.station, reading, "its settings were"))
 

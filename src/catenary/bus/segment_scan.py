@@ -1,4 +1,4 @@
-"""The scan of one device, from power-up to PRE-OP, as one procedure."""
+"""Scan of one device, from power-up to PRE-OP, as one procedure."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from catenary.procedure.stations import StationRegisters
 from catenary.wire.al import AlState
 
 READ_TIMEOUT = 30.0  # [s] for the registers and the SII of one device
-BRING_UP_TIMEOUT = 30.0  # [s] from there to PRE-OP, the profile included
+BRING_UP_TIMEOUT = 30.0  # [s] from there to PRE-OP, including the profile
 
 
 class ScannedDevice(NamedTuple):
@@ -36,14 +36,14 @@ class ScannedDevice(NamedTuple):
 
 
 def find(registers: StationRegisters) -> Procedure[ScannedDevice]:
-    """Bring one device to PRE-OP, or return its error: the other devices are not affected."""
+    """Bring one device to PRE-OP, or return its error: other devices are not affected."""
     device = unread(registers)
     station = Station(registers.position, registers.station_address)  # its name is not known yet
     try:
         device = yield from within(READ_TIMEOUT, station, identify(registers))
         station = station_of(device)
         return (yield from within(BRING_UP_TIMEOUT, station, bring_to_pre_op(device)))
-    except (DecodeError, ValueError) as error:  # of a decoder: it does not know the device
+    except (DecodeError, ValueError) as error:  # a decoder does not know the device
         return ScannedDevice(device, error=_unreadable(station, error))
     except CatenaryError as error:
         return ScannedDevice(device, error=error)
@@ -52,7 +52,7 @@ def find(registers: StationRegisters) -> Procedure[ScannedDevice]:
 def _unreadable(station: Station, error: Exception) -> SegmentError:
     return SegmentError(
         f"{station}: its data cannot be used: {error}",
-        hint="its EEPROM or its firmware is at fault; please report it",
+        hint="its EEPROM or its firmware is faulty; please report it",
     )
 
 
@@ -80,13 +80,13 @@ def bring_to_pre_op(device: DeviceDescription) -> Procedure[ScannedDevice]:
 
 
 def unread(registers: StationRegisters) -> DeviceDescription:
-    """What its registers alone say."""
+    """Return the description of a device from its registers alone."""
     device = described(registers, b"")
     return replace(device, notes=())
 
 
 def identify(registers: StationRegisters) -> Procedure[DeviceDescription]:
-    """What registers and SII say."""
+    """Return the description of a device from its registers and SII."""
     station = Station(registers.position, registers.station_address)
     return described(registers, (yield from read_image(station)))
 
@@ -104,7 +104,7 @@ def described(registers: StationRegisters, image: bytes) -> DeviceDescription:
 
 
 def with_places(devices: Sequence[DeviceDescription]) -> tuple[DeviceDescription, ...]:
-    """The devices with their parents."""
+    """Return the devices with their parents."""
     places = tree([device.open_ports for device in devices])
     return tuple(
         replace(device, parent=place.parent, parent_port=place.parent_port)
@@ -113,13 +113,26 @@ def with_places(devices: Sequence[DeviceDescription]) -> tuple[DeviceDescription
 
 
 def oddities(devices: Sequence[DeviceDescription], *, ring: bool) -> tuple[str, ...]:
-    """What contradicts itself in the wiring (of a ring its cuts say it), and in the EEPROMs."""
+    """Return contradictions of the wiring (except in a ring) and of the EEPROMs, as text.
+
+    Args:
+        devices: Descriptions of the devices.
+        ring: True if the devices form a ring; its cuts are reported elsewhere.
+    """
     wiring = () if ring else make_topology([device.open_ports for device in devices]).contradictions
     return (*wiring, *(f"{device}: {note}" for device in devices for note in device.notes))
 
 
 def check_identity(device: DeviceDescription, expected: Identity) -> None:
-    """IdentityError unless it is the same product. Revision and serial number may differ."""
+    """Check that a device is the same product; revision and serial number may differ.
+
+    Args:
+        device: Device that was found.
+        expected: Identity to compare with.
+
+    Raises:
+        IdentityError: It is another product.
+    """
     if device.identity.same_kind(expected):
         return
     raise IdentityError(

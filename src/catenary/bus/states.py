@@ -1,4 +1,4 @@
-"""Single devices brought to a state and left there, outside a loop."""
+"""State requests for single devices outside a loop."""
 
 from __future__ import annotations
 
@@ -25,11 +25,19 @@ def request_states(
     positions: Iterable[int],
     target: AlState,
 ) -> dict[int, Outcome]:
-    """Brings the devices at `positions` to a state: where each is then, or why it is not there.
-    One that fails does not keep the others from it.
+    """Bring devices to a state; a failed device does not affect the others.
 
-    For SAFE-OP a device gets the mapping it has, as if all devices took part; OP is asked for
+    For SAFE-OP, a device gets its present mapping, as if all devices took part. OP is requested
     without process data, which devices with outputs refuse.
+
+    Args:
+        runner: Runner of the procedures.
+        devices: All devices of the segment.
+        positions: Positions of the devices to change.
+        target: Requested state.
+
+    Returns:
+        By position, the reached state or the error.
     """
     chosen = {position: devices[position] for position in positions}
     if target in (AlState.INIT, AlState.PRE_OP, AlState.BOOT):
@@ -48,7 +56,7 @@ def _below_safe_op(runner: BlockingRunner, chosen: Mapping[int, DeviceDescriptio
 def _configure(
     runner: BlockingRunner, devices: Sequence[DeviceDescription], positions: Iterable[int]
 ) -> dict[int, CatenaryError]:
-    """Brings devices to SAFE-OP, from INIT on; the errors of those that failed."""
+    """Bring devices to SAFE-OP, beginning at INIT; return the errors of failed ones."""
     started = {p: restart(_station(devices[p]), devices[p]) for p in positions}
     ready, failed = _parted(_run(runner, started))
     plan = make_plan([ready.get(device.position, device) for device in devices])
@@ -62,7 +70,7 @@ def _configure(
 def _run(
     runner: BlockingRunner, procedures: Mapping[int, Procedure[T]]
 ) -> dict[int, T | CatenaryError]:
-    """All at once; an error is a result."""
+    """Run procedures at once; an error is a result."""
     outcomes = runner.run_all([_attempt(each) for each in procedures.values()])
     return dict(zip(procedures, outcomes, strict=True))
 

@@ -1,4 +1,4 @@
-"""SubDevice: the handle of one device, valid across scans while its identity agrees."""
+"""SubDevice: the handle of one device, valid across scans while its identity is the same."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class SubDevice:
         self.description = description
         self.channel = channel  # None: it has no mailbox
         self.state: AlState | None = None  # last known; None: unknown
-        self.error: CatenaryError | None = None  # why the last scan could not bring it to PRE-OP
+        self.error: CatenaryError | None = None  # of the last scan, if it did not reach PRE-OP
         self.sync_types: dict[int, bytes] = {}  # 0x1C32:01, 0x1C33:01 before a loop with clocks
         self.sdo = Sdo(self)
 
@@ -63,7 +63,7 @@ class SubDevice:
 
     @property
     def order(self) -> str:
-        """The manufacturer's order code; empty where its SII has none."""
+        """Order code of the manufacturer; empty if the SII has none."""
         return self.description.order
 
     @property
@@ -73,7 +73,7 @@ class SubDevice:
 
     @property
     def alias(self) -> int:
-        """Station alias, 0: none."""
+        """Station alias; 0 if the device has none."""
         return self.description.alias
 
     @property
@@ -83,17 +83,17 @@ class SubDevice:
 
     @property
     def slots(self) -> tuple[int, ...]:
-        """Its CiA 402 axes: the objects of slot k lie 0x800·k above those of slot 0."""
+        """Slots of its CiA 402 axes: the objects of slot k are 0x800·k above those of slot 0."""
         return self.description.slots
 
     @property
     def pdos(self) -> PdoTable:
-        """The mapping as of the last scan or plan: PDO, object, name, type and bit offset."""
+        """Mapping as of the last scan or plan: PDO, object, name, type and bit offset."""
         return PdoTable(self.description)
 
     @property
     def emergencies(self) -> tuple[Emergency, ...]:
-        """The last emergencies that it sent; oldest first."""
+        """Last emergencies that the device sent, oldest first."""
         heard = self.channel.emergencies if self.channel is not None else ()
         return tuple(each.emergency for each in heard)
 

@@ -1,19 +1,21 @@
-"""The scheduling of threads that work beside the cycle."""
+"""Scheduling of threads that work while a cycle runs."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 
-BEHIND = 1  # SCHED_FIFO: the last of all real-time threads
+BEHIND = 1  # lowest SCHED_FIFO priority
 
 
 def step_behind() -> None:
-    """A thread inherits the scheduling of who starts it: in a real-time program the calling one has
-    the priority of the loop, and would keep it from its instants. It goes behind all real-time
-    threads, but stays one: no ordinary program is to stop it while it has the interpreter, which
-    an inline loop needs."""
+    """Run the calling thread at the lowest SCHED_FIFO priority, if it inherited a real-time one.
+
+    A thread inherits the scheduling of its creator. In a real-time program that is the loop's
+    priority, which would delay cycle starts. The thread stays a real-time thread, because ordinary
+    programs must not preempt it while it holds the interpreter: an inline loop needs that.
+    """
     policy = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK
     if policy in (os.SCHED_FIFO, os.SCHED_RR):
-        with contextlib.suppress(OSError):  # a filter forbids it: then all is as it was
+        with contextlib.suppress(OSError):  # forbidden by a filter: the scheduling is unchanged
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(BEHIND))

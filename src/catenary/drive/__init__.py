@@ -1,4 +1,4 @@
-"""CiA 402 axes and I/O as wishes: objects, units, arrays."""
+"""CiA 402 axes and I/O as process-data requests: objects, units, arrays."""
 
 from catenary.drive.channel import Channel
 from catenary.drive.drives import Drives

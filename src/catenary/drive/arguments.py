@@ -1,4 +1,4 @@
-"""What an application may write in `Drives(...)`, checked before anything is sent."""
+"""Checks of the arguments of `Drives(...)`, before anything is sent."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from catenary.plan.start_up_object import StartUp
 from catenary.wire.cia402 import Mode
 
 AxisSource: TypeAlias = SubDevice | tuple[SubDevice, int]
-PdoEntry: TypeAlias = tuple[int, int, int] | str  # (index, subindex, bits), or a channel's name
+PdoEntry: TypeAlias = tuple[int, int, int] | str  # (index, subindex, bits), or a channel name
 PdoList: TypeAlias = Sequence[int] | Mapping[int, Sequence[PdoEntry]]
 ColumnSpec: TypeAlias = ChannelSpec | AxisObject
 Columns: TypeAlias = Sequence[str | tuple[str, ColumnSpec]] | Mapping[str, ColumnSpec]
 
 STATUSWORD = 0x6041
-DIVIDER_MAX = 10_000  # cycles: beyond, ask by SDO
+DIVIDER_MAX = 10_000  # cycles: use SDO for slower exchanges
 MODES: dict[str, Mode] = {
     **{"csp": Mode.CSP, "csv": Mode.CSV, "cst": Mode.CST},
     **{"pp": Mode.PP, "pv": Mode.PV},  # the drive makes the trajectory
@@ -110,7 +110,7 @@ def warn_of_default_velocity(axes: Sequence[Axis]) -> None:
 
 
 def clock_wish(dc: DistributedClock | bool) -> DistributedClock | None:
-    """What `dc=` asks for."""
+    """Return the clock request of `dc=`."""
     if isinstance(dc, bool):
         return DistributedClock() if dc else None
     return dc
@@ -180,7 +180,7 @@ def mode_of(name: str) -> Mode:
 
 
 def cycles_between(name: str, divider: int) -> int:
-    """`divider` as a number of cycles."""
+    """Return `divider` as a number of cycles."""
     if not isinstance(divider, int) or not 1 <= divider <= DIVIDER_MAX:
         raise ValueError(f"{name}={divider!r}: a whole number of cycles, 1 to {DIVIDER_MAX}")
     return divider

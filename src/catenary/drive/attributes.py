@@ -1,4 +1,4 @@
-"""Errors for attributes that do not exist: a misspelt name must not pass in silence."""
+"""Errors for attributes that do not exist: a misspelt name must fail."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One CiA 402 axis as a wish: which objects it exchanges, and their places as an AxisPlan."""
+"""Process-data request of one CiA 402 axis: its objects, and their places as an AxisPlan."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Axis:
     units: AxisUnits
     options: LimitOptions
     measured: tuple[str, ...] = tuple(MEASURED)
-    measured_required: bool = False  # else what the drive cannot map reads NaN
+    measured_required: bool = False  # else a quantity that the drive cannot map reads NaN
     columns: Mapping[str, AxisObject] = field(default_factory=dict)
     divider: int = 1  # cycles between two exchanges
     required: bool = True  # the cycle is not good without its device
@@ -56,17 +56,17 @@ class Axis:
     settings: DriveSettings = field(default_factory=DriveSettings)  # of the drive; read in PRE-OP
 
     def index(self, base: int) -> int:
-        """The number of slot 0's object `base` in this slot."""
+        """Return the index of slot 0's object `base` in this slot."""
         return base + SLOT_OFFSET * self.slot
 
     @property
     def uses_torque(self) -> bool:
-        """Whether anything asked for is a torque."""
+        """True if a requested object is a torque."""
         return "torque" in self.measured or self.needs_torque
 
     @property
     def needs_torque(self) -> bool:
-        """Whether the axis is of no use without its torque in N·m."""
+        """True if the axis requires its torque in N·m."""
         return (
             ("torque" in self.measured and self.measured_required)
             or Mode.CST in self.modes
@@ -93,7 +93,7 @@ class Axis:
         )
 
     def pdo_wish(self, start_up: tuple[tuple[int, int, bytes], ...] = ()) -> PdoWish:
-        """Everything the axis exchanges every cycle."""
+        """Objects that the axis exchanges in every cycle."""
         wanted = [
             objects.CONTROLWORD,
             objects.MODE_TARGET,
@@ -124,7 +124,7 @@ class Axis:
 
     @property
     def uses_profile(self) -> bool:
-        """True if the drive makes trajectories in one of the modes."""
+        """True if the drive computes trajectories in one of the modes."""
         return not {Mode.PP, Mode.PV}.isdisjoint(self.modes)
 
     @property
@@ -133,9 +133,11 @@ class Axis:
         return self.options.on_loss == "csp_hold"
 
     def _optional(self) -> set[AxisObject]:
-        """Objects that a drive may lack: velocity and torque, unless asked for by name; the mode,
-        which the start-up list sets, where it never changes; and the rates of profiles, which are
-        written by SDO then."""
+        """Objects that a drive may lack.
+
+        These are: velocity and torque, unless requested by name; the mode, if it never changes,
+        because the start-up list sets it; the rates of profiles, which are then written by SDO.
+        """
         optional = set() if self.measured_required else {MEASURED["velocity"], MEASURED["torque"]}
         if len(self.modes) == 1 and not self.holds_on_loss:
             optional |= {objects.MODE_TARGET, objects.MODE_ACTUAL}
@@ -192,11 +194,11 @@ class Axis:
         return self._place(layout, wanted)
 
     def maps(self, wanted: AxisObject, layout: ImageLayout) -> bool:
-        """True if an object is in the process data."""
+        """Return True if an object is in the process data."""
         return self._place(layout, wanted) is not None
 
     def column(self, name: str, wanted: AxisObject, layout: ImageLayout) -> Column:
-        """The named column, with its place."""
+        """Return the named column with its place."""
         return Column(
             name=f"{self.name}.{name}",
             number=self._required(layout, wanted),
@@ -234,16 +236,16 @@ class Axis:
 
 
 def column_bank(wanted: AxisObject) -> Bank:
-    """Where a column of this object lives: SI values are float64, raw ones int64."""
+    """Return the bank of an object's column: float64 for SI values, int64 for raw ones."""
     is_float = wanted.unit is not Unit.RAW or wanted.real or wanted.scale is not None
     return Bank.REAL if is_float else Bank.INTEGER
 
 
-EXPONENTS = (-3, -6, -4, -5, -2, -1, 0, -7, -8, -9)  # ms and us first: some drives know no other
+EXPONENTS = (-3, -6, -4, -5, -2, -1, 0, -7, -8, -9)  # ms and us first: some drives need them
 
 
 def interpolation_time(period_ns: int) -> tuple[int, int] | None:
-    """0x60C2 for a period: (value, exponent) with value · 10^exponent s; None: not expressible.
+    """Return 0x60C2 for a period: (value, exponent) with value · 10^exponent s; None: impossible.
 
     1 ms is 1·10⁻³, 250 us is 250·10⁻⁶.
     """

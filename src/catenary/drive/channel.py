@@ -28,7 +28,7 @@ class Channel:
         subindex: 0 to 0xFF.
         type: Of `catenary.types`: BOOL, an integer or a REAL of 1 to 64 bits.
         scale: Value = raw number · scale, a float. None: the raw number.
-        unit: Of the value, for people.
+        unit: Unit of the value, for display.
         output: For `Drives(columns=...)` only: True if the column is written.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Channels of devices: those that are mapped, with their names, and those that are chosen."""
+"""Channels of devices: mapped ones with their names, and chosen ones."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from catenary.plan.request import ImageLayout, WrittenPdo
 
 
 class NamedChannel(NamedTuple):
-    """A channel of one device and the name it goes by."""
+    """Channel of one device, and its name."""
 
     name: str
     device: int
     channel: Channel
-    which: Which = ANY  # where the device maps the object more than once
+    which: Which = ANY  # selects one place if the device maps the object several times
 
 
 def chosen_channels(sub: SubDevice, named: Mapping[str, Channel]) -> tuple[NamedChannel, ...]:
@@ -38,7 +38,11 @@ def chosen_channels(sub: SubDevice, named: Mapping[str, Channel]) -> tuple[Named
 def mapped_channels(
     devices: Iterable[DeviceDescription], direction: Direction, scale: Mapping[str, float]
 ) -> tuple[NamedChannel, ...]:
-    """All channels of the devices, each with a name of its own. ValueError: there are none."""
+    """Return all channels of the devices with unique names.
+
+    Raises:
+        ValueError: The devices have no channels.
+    """
     devices = list(devices)
     if not devices:
         raise ValueError(
@@ -68,7 +72,7 @@ def place_entries(
     found: Sequence[tuple[DeviceDescription, Pdo, Entry]],
     scale: Mapping[str, float],
 ) -> tuple[NamedChannel, ...]:
-    """Return mapped entries as channels. One that is mapped twice keeps its own place."""
+    """Return mapped entries as channels. An entry that is mapped twice keeps its own place."""
     alike: Counter[tuple[int, int, int, int, int]] = Counter()
     made = []
     for name, (device, pdo, entry) in zip(names, found, strict=True):
@@ -96,7 +100,7 @@ def with_written(
 
 
 def number_entries(assignment: Assignment) -> list[tuple[Pdo, Entry]]:
-    """Return all entries with their PDOs, without gaps and without what no number can hold."""
+    """Return all entries with their PDOs, without gaps and entries that no number can hold."""
     return [
         (pdo, entry)
         for pdo in assignment.pdos
@@ -106,7 +110,7 @@ def number_entries(assignment: Assignment) -> list[tuple[Pdo, Entry]]:
 
 
 def unique_names(parts: list[tuple[str, str, str]]) -> list[str]:
-    """A name for each (entry, PDO, position): as short as tells them apart, then numbered.
+    """Return a short unique name for each (entry, PDO, position), numbered if necessary.
 
     Terminals call every channel's entry "Output" and tell them apart by their PDO, "Channel 3".
     """

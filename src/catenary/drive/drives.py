@@ -275,7 +275,7 @@ class Drives(Request):
 
     @property
     def limited(self) -> npt.NDArray[np.bool_]:
-        """(n,) whose set-points the core had to limit in the last cycle."""
+        """(n,) True for each axis whose set-points the core limited in the last cycle."""
         return (self._bound().axis_flags & 2).astype(np.bool_)
 
     @property
@@ -286,16 +286,16 @@ class Drives(Request):
 
     @property
     def present(self) -> npt.NDArray[np.bool_]:
-        """(n,) whose devices answered in their last exchange."""
+        """(n,) True for each axis whose device answered in its last exchange."""
         return self._bound().unit_valid[self._units].astype(np.bool_)
 
     @property
     def faults(self) -> tuple[int, ...]:
-        """The numbers of the axes that are in fault."""
+        """Numbers of the axes in fault."""
         states = self._bound().axis_state.tolist()
         return tuple(i for i, state in enumerate(states) if state in IN_FAULT)
 
-    # What follows is committed with the targets, by the next `next(loop)`.
+    # The next `next(loop)` commits the following requests together with the targets.
 
     def enable(self, axes: Axes = ALL) -> None:
         """Request that axes be enabled. Each starts from its actual position."""
@@ -328,7 +328,7 @@ class Drives(Request):
         views.mode_target[chosen] = wanted
         views.controlword_bits[chosen] &= ~HALT & 0xFFFF
 
-    # Moves: the loop must be iterated meanwhile, by loop.wait(move) or by your own `for`.
+    # Moves: iterate the loop meanwhile, by loop.wait(move) or by your own `for`.
 
     def move_to(
         self,
@@ -342,19 +342,20 @@ class Drives(Request):
         """Start to move axes to a position, each as fast as the limits allow; they rest there.
 
         In CSP the loop computes the motion and writes `target.position` of these axes: a trapezoid
-        of the velocity, or with limited jerk. In PP the drive makes it. A move replaces the one
-        that an axis is in, and goes on from its velocity. The axes do not arrive together.
+        of the velocity, or with limited jerk. In PP the drive computes it. A move replaces the
+        present move of an axis, and continues from its velocity. The axes do not arrive together.
 
         Args:
-            position: goal, one or one for each of `axes` [rad], [m].
-            velocity: [rad/s], [m/s]; None: `velocity_limit`.
-            acceleration: [rad/s²], [m/s²], to brake, too; None: `acceleration_limit`, else
-                `velocity_limit` / 0.25 s.
-            jerk: [rad/s³], [m/s³]; None: a trapezoid. Needs `pip install 'catenary[traj]'`.
-            axes: numbers of the axes.
+            position: Goal, one or one for each of `axes` [rad], [m].
+            velocity: Largest velocity [rad/s], [m/s]; None: `velocity_limit`.
+            acceleration: Acceleration and deceleration [rad/s²], [m/s²]; None:
+                `acceleration_limit`, else `velocity_limit` / 0.25 s.
+            jerk: Largest jerk [rad/s³], [m/s³]; None: a trapezoid. Needs
+                `pip install 'catenary[traj]'`.
+            axes: Numbers of the axes.
 
         Returns:
-            A handle for `loop.wait`, or to look at `done`.
+            A handle for `loop.wait`, or to poll its `done`.
 
         Raises:
             ValueError: A goal or rate is beyond a limit, or the mode is neither CSP nor PP.
@@ -376,7 +377,15 @@ class Drives(Request):
     ) -> Move:
         """Start to move axes by a distance from their goals, or from their targets at rest.
 
-        See `move_to` for the other arguments, the result and the errors.
+        Args:
+            distance: Distance, one or one for each of `axes` [rad], [m].
+            velocity: Largest velocity: see `move_to`.
+            acceleration: Acceleration and deceleration: see `move_to`.
+            jerk: Largest jerk: see `move_to`.
+            axes: Numbers of the axes.
+
+        Returns:
+            A handle, and errors, as of `move_to`.
         """
         chosen = self._movable(axes)
         moves = self._moving()
@@ -390,13 +399,13 @@ class Drives(Request):
         return self._move(chosen, goals, RateOptions(velocity, acceleration, jerk))
 
     def home(self, axes: Axes = ALL) -> Move:
-        """Let enabled axes find their homes themselves (mode 6, "hm" in `other_modes`).
+        """Let enabled axes find their homes by themselves (mode 6, "hm" in `other_modes`).
 
-        Then they hold in the mode that they had, with positions counted from the new zero.
+        Afterwards they hold in their former mode, with positions counted from the new zero.
 
         Returns:
-            A handle, as of `move_to`. Its error names an axis that reports a homing error or drops
-            out.
+            A handle, as of `move_to`. Its error names an axis that reports a homing error or is
+            no longer enabled.
 
         Raises:
             ValueError: The drives were made without "hm", or an axis is homing already.
@@ -426,7 +435,7 @@ class Drives(Request):
         return numbers
 
     def _movable(self, axes: Axes) -> list[int]:
-        """Return the numbers of chosen axes. ValueError if there are none."""
+        """Return the numbers of chosen axes. ValueError if the choice is empty."""
         chosen = self._numbers(axes)
         if not chosen:
             raise ValueError(f"axes={axes!r}: no axis to move")
@@ -469,7 +478,7 @@ class Drives(Request):
 
     def tables(self, layout: ImageLayout) -> WishTables:
         """Return the axes in their order; columns by name, then by axis: a name is one array."""
-        self._is_read = False  # the next plan reads again
+        self._is_read = False  # the next plan reads the settings again
         self._units = np.array([layout.sync_unit(axis.device) for axis in self._axes], np.intp)
         self._rates = RateColumns(self._axes, self._columns, layout)
         self._measures_velocity = [axis.maps(ACTUAL_VELOCITY, layout) for axis in self._axes]
@@ -494,7 +503,7 @@ class Drives(Request):
         )
 
     def bind(self, views: Views) -> None:
-        """Receives the arrays of the loop that opens."""
+        """Receive the arrays of the loop that opens."""
         self._views = views
         self.actual.bind(
             views.actual_position,
@@ -519,7 +528,7 @@ class Drives(Request):
         )
 
     def _port(self, views: Views, index: int, axis: Axis, put_rate: PutRate) -> AxisPort:
-        """Return what moves read and write of an axis."""
+        """Return the interface of an axis that moves use."""
         sdo, period = self._subs[index].sdo, self._period_ns * 1e-9
 
         def write(place: int, value: int) -> Pending[None]:
@@ -538,7 +547,7 @@ class Drives(Request):
         )
 
     def _slices(self, reals: Array, integers: Array, *, output: bool) -> dict[str, Array]:
-        """Each column's part of its bank's array."""
+        """Return each column's part of its bank's array."""
         used = {Bank.REAL: 0, Bank.INTEGER: 0}
         slices: dict[str, Array] = {}
         for name, wanted in self._columns.items():
@@ -554,7 +563,7 @@ class Drives(Request):
         views = self._of_open_loop(f"{call}()")
         chosen = self._numbers(axes)
         views.goal[chosen] = goal
-        views.request[chosen] += 1  # a goal that dropped comes back only by a new request
+        views.request[chosen] += 1  # a dropped requested state returns only by a new request
 
     def _of_open_loop(self, call: str) -> Views:
         """Return the views for a request; RuntimeError if no cycle would send it."""
@@ -572,7 +581,7 @@ class Drives(Request):
 
 
 def joined(first: PdoWish, second: PdoWish) -> PdoWish:
-    """The wishes of two axes of one device."""
+    """Return the combined requests of two axes of one device."""
     return replace(
         first,
         outputs=first.outputs + second.outputs,

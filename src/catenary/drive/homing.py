@@ -15,20 +15,19 @@ START = int(Control.MODE_4)
 HALT = int(Control.HALT)
 ATTAINED = int(Status.MODE_12 | Status.TARGET_REACHED)
 FAILED = int(Status.MODE_13)
-ANSWER_CYCLES = 10  # until the statusword can be the answer to a controlword
+ANSWER_CYCLES = 10  # until the statusword can reflect a controlword
 MODE_TIMEOUT = 5.0  # [s] to change the mode
 
 
 @dataclass(frozen=True, slots=True)
 class HomingMethod:
-    """How an axis finds its home, written to the drive when the loop opens; None: as the drive has
-    it.
+    """Homing settings of an axis, written to the drive when the loop opens; None: unchanged.
 
-    `method`: 0x6098 as the drive's manual says: 37, the present position is home; 1 to 34, by
-    switches and index pulses; negative ones are the manufacturer's, hard stops among them. `speed`
+    `method`: 0x6098 by the drive's manual. 37: the present position is home. 1 to 34: by switches
+    and index pulses. Negative: specific to the manufacturer, for example hard stops. `speed`
     [rad/s] at the joint towards the switch or stop (0x6099:01), `slow` [rad/s] towards zero
-    (0x6099:02), `acceleration` [rad/s²] (0x609A). `offset` [rad] from home to zero (0x607C): the
-    profile has it that the axis shows -offset at home; some drives show +offset.
+    (0x6099:02), `acceleration` [rad/s²] (0x609A). `offset` [rad] from home to zero (0x607C): by
+    the profile, the axis shows -offset at home; some drives show +offset.
     """
 
     method: int | None = None
@@ -52,7 +51,7 @@ class HomingMethod:
         return None if self.offset is None else round(self.offset / units.position_scale)
 
     def downloads(self, units: AxisUnits, base: int) -> tuple[tuple[int, int, bytes], ...]:
-        """(index, subindex, data) of what is given; `base`: of the axis' slot."""
+        """Return (index, subindex, data) of the given settings; `base`: of the axis' slot."""
         found: list[tuple[int, int, bytes]] = []
         if self.method is not None:
             found.append((Object.HOMING_METHOD + base, 0, SINT.encode(self.method)))
@@ -79,7 +78,7 @@ def home_axis(port: AxisPort, before: int) -> Steps:
     port.request_mode(Mode.HM)
     try:
         yield from _await_mode(port, Mode.HM)
-        port.clear_bits(HALT)  # of a move in PP that has failed
+        port.clear_bits(HALT)  # set by a failed move in PP
         port.set_bits(START)
         for count in itertools.count():
             yield
@@ -103,7 +102,7 @@ def leave_homing(port: AxisPort, mode: int) -> None:
 
 
 def stop_homing(port: AxisPort, mode: int) -> Steps:
-    """Wait until the drive works in the mode that it had before."""
+    """Wait until the drive works in its former mode."""
     leave_homing(port, mode)
     yield
     yield from _await_mode(port, mode)

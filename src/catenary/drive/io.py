@@ -1,4 +1,4 @@
-"""Inputs and Outputs: any SubDevice's process data as named columns, single bits included."""
+"""Inputs and Outputs: process data of any SubDevice as named columns, including single bits."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ A = TypeVar("A", Reals, Integers, Bytes)
 
 
 class BankArray(Generic[A]):
-    """The array of a bank, as an attribute of Inputs and Outputs. Assigning writes its elements."""
+    """Array of a bank, as an attribute of Inputs and Outputs. Assigning writes its elements."""
 
     def __init__(self, bank: Bank) -> None:
         self._bank = bank
@@ -63,7 +63,7 @@ class BankArray(Generic[A]):
 
 
 class Channels(Request):
-    """The process data of some devices in one direction, as a request."""
+    """Process data of some devices in one direction, as a request."""
 
     direction: Direction
 
@@ -115,7 +115,7 @@ class Channels(Request):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of all channels, in the order of the process data."""
+        """Names of all channels, in the order of the process data."""
         return tuple(channel.name for channel in self._channels)
 
     def __iter__(self) -> Iterator[str]:
@@ -123,13 +123,13 @@ class Channels(Request):
         return iter(self.names)
 
     def __getitem__(self, name: str) -> float | int:
-        """The channel's value: 0 or 1, the raw integer, or the float where it has a scale."""
+        """Return the channel's value: 0 or 1, the raw integer, or a float if it has a scale."""
         array, place = self._place(name)
         value: float | int = array.item(place)
         return value
 
     def pdos(self, period_ns: int) -> Mapping[int, PdoWish]:
-        """Request the channels, or `pdos`: without either nothing changes on the device."""
+        """Request the channels, or `pdos`; without both, the mapping of the device is unchanged."""
         wishes: dict[int, PdoWish] = {}
         for sub in self.subs:
             mine = tuple(c.channel.reference() for c in self._channels if c.device == sub.position)
@@ -146,7 +146,7 @@ class Channels(Request):
         return wishes
 
     def tables(self, layout: ImageLayout) -> WishTables:
-        """One column per channel."""
+        """Return one column per channel."""
         columns = tuple(column(channel, layout, self.direction) for channel in self._channels)
         self._units = [layout.sync_unit(sub.position) for sub in self.subs]
         if self.direction is Direction.OUTPUT:
@@ -155,7 +155,7 @@ class Channels(Request):
 
     @property
     def present(self) -> tuple[bool, ...]:
-        """Which of the SubDevices answered in their last exchange."""
+        """True for each SubDevice that answered in its last exchange."""
         if self._unit_valid is None:
             raise RuntimeError("nothing is exchanged before a Loop is open")
         return tuple(bool(self._unit_valid[unit]) for unit in self._units)
@@ -181,30 +181,35 @@ class Channels(Request):
 
 
 class Inputs(Channels):
-    """The inputs of SubDevices: `.bits` (uint8), `.integers` (int64) and `.reals` (float64), each
-    in the order of the process data, or one by name: `buttons["Input 1"]`.
+    """Inputs of SubDevices: `.bits` (uint8), `.integers` (int64) and `.reals` (float64).
 
-    Without `channels`, those that are mapped, by the names of the SII or the dictionary. With it,
-    chosen objects of one device: `Inputs(sub, channels={"force": (0x6000, 1, types.REAL)})`, each
-    a `Channel` or (index, subindex, type[, scale]); they are mapped if they are not yet.
+    Each array is in the order of the process data. Single channels have names:
+    `buttons["Input 1"]`.
+
+    Without `channels`, these are the mapped channels, with names from the SII or the dictionary.
+    With it, they are chosen objects of one device:
+    `Inputs(sub, channels={"force": (0x6000, 1, types.REAL)})`, each a `Channel` or
+    (index, subindex, type[, scale]); they are mapped if necessary.
     `scale` turns raw numbers into floats: `Inputs(sub, scale={"Value": 10 / 0x7FFF})`.
-    `required=False`: the loop goes on without a device that vanishes; its channels keep their last
-    values, `present` tells. `divider`: exchanged every so many cycles of the loop.
-    `dc`: distributed clocks, as for `Drives`. `pdos`: these PDOs instead of those assigned now.
+    `required=False`: the loop continues without a lost device; its channels keep their last
+    values, see `present`. `divider`: cycles of the loop between two exchanges.
+    `dc`: distributed clocks, as for `Drives`. `pdos`: PDOs instead of the assigned ones.
     `start_up`: objects that are written to each device before SAFE-OP.
     """
 
     direction = Direction.INPUT
 
     def bind(self, views: Views) -> None:
-        """Receives the arrays of the loop that opens."""
+        """Receive the arrays of the loop that opens."""
         self._bind(views.input_reals, views.input_integers, views.input_bits, views.unit_valid)
 
 
 class Outputs(Channels):
-    """The outputs of SubDevices, all 0 at the start: write `.bits[:]`, `.integers[:]`, `.reals[:]`,
-    or one by name: `lamps["Output 1"] = 1`. The options are those of `Inputs`.
-    What is out of its range is cut, and `cycle.limited` says so."""
+    """Outputs of SubDevices, all 0 at the start: write `.bits[:]`, `.integers[:]`, `.reals[:]`.
+
+    Single channels have names: `lamps["Output 1"] = 1`. The options are those of `Inputs`. A value
+    out of range is clamped, and `cycle.limited` is True.
+    """
 
     direction = Direction.OUTPUT
 
@@ -213,5 +218,5 @@ class Outputs(Channels):
         array[place] = value
 
     def bind(self, views: Views) -> None:
-        """Receives the arrays of the loop that opens."""
+        """Receive the arrays of the loop that opens."""
         self._bind(views.output_reals, views.output_integers, views.output_bits, views.unit_valid)

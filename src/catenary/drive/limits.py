@@ -12,8 +12,8 @@ from catenary.errors import ConfigurationError
 from catenary.plan.cycle import AxisLimits, OnLoss
 from catenary.wire.cia402 import Mode
 
-BRAKE_TIME = 0.25  # [s] from velocity_limit to standstill, where nothing states a deceleration
-BRAKE_TIMES = (1e-3, 2.5)  # [s]: outside, the unit of 0x6085 is another one
+BRAKE_TIME = 0.25  # [s] from velocity_limit to standstill, without a known deceleration
+BRAKE_TIMES = (1e-3, 2.5)  # [s]: outside of it, 0x6085 probably has another unit
 REACTIONS: tuple[OnLoss, ...] = ("quick_stop", "disable", "csp_hold")
 POSITIVE = (
     "velocity_limit",
@@ -80,13 +80,13 @@ class LimitOptions:
             raise ValueError(f"{name}: position_min {low} is not below position_max {high}")
 
     def lacks_velocity(self, modes: Sequence[Mode]) -> bool:
-        """True if the default velocity limit of CSP and PP applies."""
+        """Return True if the default velocity limit of CSP and PP applies."""
         return self.velocity_limit is None and not {Mode.CSP, Mode.PP}.isdisjoint(modes)
 
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """A value and its source, for the plan report. None: no limit."""
+    """Value and its source, for the plan report. None: no limit."""
 
     value: float | None
     source: str = "none"
@@ -108,7 +108,7 @@ class AxisBounds:
 
     @property
     def limits(self) -> AxisLimits:
-        """The limits for the core."""
+        """Limits for the core."""
         return AxisLimits(
             self.position_min.value,
             self.position_max.value,
@@ -179,7 +179,7 @@ def _tightest(
 
 
 def _positions(options: LimitOptions, own: OwnLimits) -> tuple[Chosen, Chosen]:
-    """Return the tighter ends. Limits of the drive that contradict the options do not count."""
+    """Return the tighter ends. Limits of the drive that contradict the options are ignored."""
     low = _tightest(options.position_min, own.position_min, "0x607D of the drive", max)
     high = _tightest(options.position_max, own.position_max, "0x607D of the drive", min)
     if low.value is None or high.value is None or low.value < high.value:

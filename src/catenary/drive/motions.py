@@ -2,7 +2,7 @@
 
 PP is the set-point handshake of IEC 61800-7-201 / CiA 402-2: bit 4 of the controlword rises, bit 12
 of the statusword acknowledges, bit 4 falls, bit 12 falls; bit 10 shows that the target is reached.
-Bit 5 makes a set-point count at once. Each level is held until the drive has answered it.
+Bit 5 makes a set-point take effect at once. Each level is held until the drive has answered it.
 """
 
 from __future__ import annotations
@@ -60,8 +60,8 @@ def stop_cyclic(port: AxisPort, rates: Rates) -> Steps:
 def _command(port: AxisPort, make: Callable[[Motion], Profile], settle: float) -> Steps:
     """Command a profile.
 
-    In a long pause of the iteration the core stops the axis. Then a new profile begins there: one
-    that had gone on would have the axis catch up, faster than the move allows.
+    In a long pause of the iteration the core stops the axis. Then a new profile begins there.
+    Otherwise the axis would catch up with the old one, faster than the move allows.
     """
     profile = make(first_motion(port))
     begun = port.now - port.period  # a set-point counts one cycle later
@@ -117,7 +117,7 @@ def stop_profile(port: AxisPort) -> Steps:
 
 
 def _hand_over(port: AxisPort, position: float) -> Steps:
-    """One set-point, which counts at once."""
+    """Hand over one set-point, which takes effect at once."""
     if port.handshake:  # of the move before: the drive must see bit 4 fall
         port.clear_bits(NEW_SET_POINT)
         yield from _pause(port, ANSWER_EXCHANGES * port.exchange)
@@ -135,7 +135,7 @@ def _hand_over(port: AxisPort, position: float) -> Steps:
 
 
 def _await_acknowledge(port: AxisPort, shown: bool, goal: float) -> Steps:
-    """Wait until bit 12 is shown, or is shown no longer."""
+    """Wait until bit 12 is set, or is cleared."""
     what = "acknowledge the set-point" if shown else "accept another set-point"
     complaint = Complaint(
         f"did not {what} (statusword bit 12) within {ANSWER_TIMEOUT:g} s",

@@ -1,4 +1,4 @@
-"""Moves: motions of some axes that were requested, stepped before each commit of the loop."""
+"""Moves: requested motions of some axes, stepped before each commit of the loop."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Part:
     port: AxisPort
     goal: float  # NaN in homing
     steps: Steps
-    stop: Callable[[], Steps]  # what brings the axis to rest
+    stop: Callable[[], Steps]  # brings the axis to rest
     mode: int | None = None  # the axis must keep it; None: the motion changes it
     stop_requested: bool = False
     is_stopping: bool = False
@@ -54,26 +54,29 @@ class Move:
 
     @property
     def outcome(self) -> Outcome | None:
-        """End of the move: "reached" its goal, "stopped" by `stop`, "replaced" by another move
-        of one of its axes, "failed" (see `error`). The worst of its axes counts. None: not done."""
+        """End of the move; None while it is not done. The worst end of its axes counts.
+
+        "reached": its goal. "stopped": by `stop`. "replaced": by another move of one of its axes.
+        "failed": see `error`.
+        """
         if not self.done:
             return None
         return next(each for each in WORST if any(part.outcome == each for part in self._parts))
 
     @property
     def error(self) -> CatenaryError | None:
-        """Reason why the goal was not reached: of a move that failed or was replaced."""
+        """Error of a move that failed or was replaced; else None."""
         errors = [part.error for part in self._parts if part.error is not None]
         return errors[0] if self.done and errors else None
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """Names of the axes that move."""
+        """Names of the moving axes."""
         return tuple(part.port.name for part in self._parts)
 
     @property
     def remaining(self) -> npt.NDArray[np.float64]:
-        """(k,) goal minus actual position of the axes that move [rad], [m]; NaN in homing."""
+        """(k,) goal minus actual position of the moving axes [rad], [m]; NaN in homing."""
         return np.array([part.goal - part.port.position for part in self._parts])
 
     def stop(self) -> None:
@@ -82,7 +85,7 @@ class Move:
         In CSP by the acceleration of the move, in PP by the drive's halt (0x605D), in homing the
         search ends.
         """
-        for part in self._parts:  # the next step does it: no lock, so that a signal handler may ask
+        for part in self._parts:  # without a lock, so that a signal handler may call it
             part.stop_requested = True
 
     def timeout_error(self, timeout: float) -> MoveError:
@@ -135,14 +138,14 @@ class Moves:
             part, _ = self._active.get(axis, (None, None))
         if part is None:
             return None
-        if part.stop_requested:  # in PP the target is still the goal that was given up
+        if part.stop_requested:  # in PP the target is still the abandoned goal
             return part.port.position if part.mode == Mode.PP else None
         return part.goal
 
     # plan.request.Mover
 
     def step(self, now: float) -> None:
-        """Compute one step of each axis that moves, at the time of the cycle [s]."""
+        """Compute one step of each moving axis, at the time of the cycle [s]."""
         with self._lock:
             for axis, (part, _) in list(self._active.items()):
                 part.port.now = now
@@ -168,7 +171,7 @@ class Moves:
     # One axis
 
     def _check(self, axis: int, part: Part) -> bool:
-        """End the motion of an axis that cannot go on with it. Return True if so."""
+        """End the motion of an axis that cannot continue it. Return True if so."""
         cause = part.port.stop_cause()
         if cause is not None:
             hint = "see Drives.state and Drives.stopped; reset and enable the axis, then move again"
@@ -205,7 +208,7 @@ class Moves:
         self._finish(axis, "failed", error)
 
     def _finish(self, axis: int, outcome: Outcome, error: CatenaryError | None) -> None:
-        """The axis ends its move. After an error of a handshake it stays halted."""
+        """End the move of the axis. After a handshake error it stays halted."""
         part, move = self._active.pop(axis)
         part.outcome, part.error = outcome, error
         part.port.motion = None
@@ -218,7 +221,7 @@ class Moves:
 
 
 def _replace(part: Part, move: Move) -> None:
-    """End a motion for the next one, which goes on from it."""
+    """End a motion whose successor continues from it."""
     part.steps.close()
     part.port.clear_bits(OWN_BITS & ~HALT)
     part.outcome = "replaced"

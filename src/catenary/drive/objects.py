@@ -1,4 +1,4 @@
-"""The CiA 402-2 objects an axis exchanges: number, width and what one count means.
+"""CiA 402-2 objects that an axis exchanges: index, width and scale.
 
 Slot k of a device has them at index + SLOT_OFFSET · k (ETG.6010 §5.1).
 """
@@ -13,7 +13,7 @@ from catenary.wire.cia402 import SLOT_OFFSET, Object
 
 
 class Unit(Enum):
-    """Which scale of the axis an object uses; RAW: none, an integer column."""
+    """Scale of the axis that an object uses; RAW: none, an integer column."""
 
     POSITION = "position"
     DISTANCE = "distance"  # a difference of positions: without the axis' offset
@@ -66,7 +66,7 @@ PROFILE_OBJECTS: dict[str, AxisObject] = {
     "profile_deceleration": AxisObject(Object.PROFILE_DECELERATION, 0, 32, False, Unit.SPEED, True),
 }
 
-# Columns that can be asked for by name, in the order of their numbers.
+# Columns that can be requested by name, in the order of their numbers.
 NAMED_COLUMNS: dict[str, AxisObject] = {
     "error_code": AxisObject(Object.ERROR_CODE, 0, 16, False, Unit.RAW, False),
     "position_demand": POSITION_DEMAND,

@@ -1,4 +1,4 @@
-"""One axis as a move sees it: its values of this cycle, and what the next commit sends to it."""
+"""Interface of moves to one axis: its values of this cycle, and the data of the next commit."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ PutRate: TypeAlias = Callable[[str, float], bool]  # False: not in the process d
 
 FOLLOWED = 1  # axis_flags
 GOAL_SHIFT = 6
-JUMPS = 3  # counts per exchange of an estimated velocity that are no motion
+JUMPS = 3  # counts per exchange of an estimated velocity that are not motion
 
 
 class AxisPort:
-    """Owns what a move writes to one axis: its target, its mode and its bits of the controlword."""
+    """Owns the data that a move writes to one axis: target, mode, and bits of the controlword."""
 
     def __init__(
         self,
@@ -54,10 +54,10 @@ class AxisPort:
         self.write_object = write
         self.put_rate = put_rate
         self.now = 0.0  # [s] time of the cycle
-        self.motion: Motion | None = None  # commanded last by a profile of ours
+        self.motion: Motion | None = None  # last command of a profile of ours
         self.handshake = False  # a set-point of PP is being handed over
         self.handed_over: float | None = None  # the last set-point that PP acknowledged
-        self.written: dict[str, int] = {}  # profile objects as written by SDO
+        self.written: dict[str, int] = {}  # profile objects that were written by SDO
 
     @property
     def status(self) -> int:
@@ -85,8 +85,10 @@ class AxisPort:
 
     @property
     def rest(self) -> float:
-        """Position from which the axis moves on: its target. In PP one that the drive does not know
-        is not meant: then its actual position."""
+        """Position from which the axis moves on: its target.
+
+        In PP, a target that the drive has not received is ignored: then the actual position.
+        """
         if self.requested_mode == Mode.PP and self.target != self.handed_over:
             return self.position
         return self.target
@@ -98,7 +100,7 @@ class AxisPort:
 
     @property
     def at_rest(self) -> bool:
-        """True if the velocity is below the standstill, or cannot be told from it."""
+        """True if the velocity is below the standstill, or too small to be measured."""
         return not abs(self.velocity) > self._standstill
 
     def set_target(self, position: float) -> None:
@@ -119,7 +121,7 @@ class AxisPort:
         self._views.controlword_bits[self._index] &= ~bits & 0xFFFF
 
     def has_bits(self, bits: int) -> bool:
-        """True if the drive shows all of these bits in its statusword."""
+        """Return True if the statusword of the drive has all of these bits."""
         return self.status & bits == bits
 
     @property
@@ -128,7 +130,7 @@ class AxisPort:
         return self._views.is_led()
 
     def stop_cause(self) -> str | None:
-        """Return why the axis cannot go on with a move; None if it can."""
+        """Return the reason why the axis cannot continue a move; None if it can."""
         views, i = self._views, self._index
         if views.axis_state.item(i) in IN_FAULT:
             return "the drive is in fault"

@@ -1,4 +1,4 @@
-"""ProcessData: the inputs and outputs of one device, whatever it is: as bytes, and by name."""
+"""ProcessData: inputs and outputs of one device of any kind, as bytes and by name."""
 
 from __future__ import annotations
 

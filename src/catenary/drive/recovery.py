@@ -1,4 +1,4 @@
-"""Recovery: drives are stopped for a reason, and led back once it is gone."""
+"""Recovery: stop drives while a stop condition holds, and enable them again afterwards."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import Protocol
 from catenary.drive.drives import Drives
 from catenary.errors import DriveError
 
-RESET_PERIOD = 0.1  # [s]: a reset is an edge of the controlword, so it is taken back in between
+RESET_PERIOD = 0.1  # [s]: a reset is an edge of the controlword, so it is cleared in between
 
 
 class Phase(IntEnum):
-    """Where the drives are between a stop and the next."""
+    """Phase of the drives between one stop and the next."""
 
     STARTING = 0  # not all are enabled yet
     RUNNING = 1
@@ -32,7 +32,7 @@ class CycleNow(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """What stopped the drives, and when: number and time [s] of the cycle whose frame told them."""
+    """Reason of a stop, and the number and time [s] of the cycle that sent it."""
 
     number: int
     time: float
@@ -40,7 +40,7 @@ class Stop:
 
 
 class Recovery:
-    """Owns the way of some drives from a stop back into motion: one `step` in every cycle.
+    """Owns the recovery of some drives from a stop: call `step` once in every cycle.
 
         recovery = cat.drive.Recovery(arm)
         with cat.Loop(arm, stop=cat.StopPolicy(raise_faults=False)) as loop:
@@ -48,9 +48,10 @@ class Recovery:
                 if recovery.step(cycle, why_stop(arm)) == cat.drive.Phase.RUNNING:
                     arm.target.position[:] = ...
 
-    A reason is a quick stop of all, in this cycle's frame. Faults are reset as long as the reason
-    lasts; `after` seconds without one all are enabled again. `DriveError`: they cannot be, within
-    `patience` [s]. `stops`: all so far; `just_stopped`: the last step was one.
+    With a reason, all drives are stopped quickly in this cycle's frame, and faults are reset while
+    the reason holds. After `after` seconds without one, all are enabled again. `DriveError` if this
+    takes longer than `patience` [s]. `stops`: all stops so far; `just_stopped`: True if the last
+    step was one.
     """
 
     def __init__(self, drives: Drives, *, after: float = 1.0, patience: float = 5.0) -> None:
@@ -62,13 +63,18 @@ class Recovery:
         self._drives = drives
         self._after = after
         self._patience = patience
-        self._since: float | None = None  # [s] the last reason, or request to be enabled
+        self._since: float | None = None  # [s] time of the last reason or enable request
         self._next_reset = 0.0
         self._resetting = False
 
     def step(self, cycle: CycleNow, reason: str | None = None, *, ready: bool = True) -> Phase:
-        """The phase from now on. `reason`: why the drives must not move; None: they may. Where not
-        `ready`, they are kept in STARTING though enabled."""
+        """Stop or recover the drives, and return the new phase.
+
+        Args:
+            cycle: The cycle.
+            reason: Reason why the drives must not move; None if they may.
+            ready: False: keep the drives in STARTING although they are enabled.
+        """
         now, self.just_stopped = cycle.time, False
         since = self._since = now if self._since is None else self._since
         if reason and self.phase != Phase.STOPPED:

@@ -1,4 +1,4 @@
-"""Request: the base of all process-data requests. It has their devices, and checks attributes."""
+"""Request: base of all process-data requests; it owns their devices and checks attributes."""
 
 from __future__ import annotations
 

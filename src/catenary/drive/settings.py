@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from catenary.bus import SubDevice
     from catenary.bus.sub_device import DeviceOwner
 
-MOTOR_SPEED_RANGE = (60, 200_000)  # [rpm]: beyond, the drive counts 0x6080 in another unit
+MOTOR_SPEED_RANGE = (60, 200_000)  # [rpm]: outside of it, 0x6080 probably has another unit
 POSITION_EXTREMES = (-(2**31), 2**31 - 1)
 
 ABORT_CONNECTION = {
@@ -91,7 +91,7 @@ class DriveSettings:
 
 @dataclass(frozen=True, slots=True)
 class OwnLimits:
-    """Limits of the drive at the joint, in SI units; None where the drive has no plausible one."""
+    """Limits of the drive at the joint, in SI units; None without a plausible one."""
 
     position_min: float | None = None  # [rad]
     position_max: float | None = None  # [rad]
@@ -202,7 +202,7 @@ def _velocity_limit(settings: DriveSettings, units: AxisUnits) -> tuple[float | 
 
 
 def _is_plausible(raw: int | None, bits: int) -> TypeGuard[int]:
-    """True if a raw limit is set: neither 0 nor all ones."""
+    """Return True if a raw limit is set: neither 0 nor all ones."""
     return raw is not None and raw not in (0, 2**bits - 1, 2 ** (bits - 1) - 1)
 
 

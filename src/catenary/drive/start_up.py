@@ -17,7 +17,7 @@ OBJECT_MISSING = (0x06020000, 0x06090011)
 
 
 def with_rated_torque(axis: Axis, sub: SubDevice) -> Axis:
-    """The axis with the rated torque of 0x6076, unless the application gave it."""
+    """Return the axis with the rated torque of 0x6076, unless the application gave it."""
     if axis.units.rated_torque is not None or not axis.uses_torque:
         return axis
     index = axis.index(Object.MOTOR_RATED_TORQUE)
@@ -56,7 +56,7 @@ def with_settings(axes: Sequence[Axis], subs: Sequence[SubDevice]) -> tuple[Axis
 
 
 def _check_quick_stop(axis: Axis) -> None:
-    """Refuse CST where a quick stop is not known to decelerate, unless `on_loss=` is given."""
+    """Raise for CST if the quick stop may not decelerate, unless `on_loss=` is given."""
     if Mode.CST not in axis.modes or axis.options.on_loss is not None or axis.settings.brakes:
         return
     index, code = axis.index(Object.QUICK_STOP_OPTION), axis.settings.quick_stop
@@ -71,14 +71,13 @@ def _check_quick_stop(axis: Axis) -> None:
 
 
 def downloads(axis: Axis, sub: SubDevice, period_ns: int) -> tuple[tuple[int, int, bytes], ...]:
-    """0x6060 and 0x60C2, for drives that do not map the mode and for the period; what homing
-    needs."""
+    """Return the start-up objects: 0x6060 if the mode is not mapped, 0x60C2, homing settings."""
     found = _mode(axis, sub) + _interpolation(axis, sub, period_ns) + _ramps(axis)
     return found + (axis.homing.downloads(axis.units, axis.index(0)) if axis.homing else ())
 
 
 def _mode(axis: Axis, sub: SubDevice) -> tuple[tuple[int, int, bytes], ...]:
-    """The first mode. Nothing where the drive has no such object or agrees already."""
+    """Return the first mode; empty if the drive has no such object or has the mode already."""
     index = axis.index(Object.MODE_OF_OPERATION)
     try:
         found = sub.sdo.read(index, 0, type=SINT)
@@ -92,7 +91,7 @@ def _mode(axis: Axis, sub: SubDevice) -> tuple[tuple[int, int, bytes], ...]:
 
 
 def _ramps(axis: Axis) -> tuple[tuple[int, int, bytes], ...]:
-    """0x6083 and 0x6084 of the profile modes, as far as the application limits them."""
+    """Return 0x6083 and 0x6084 of the profile modes, if the application limits them."""
     if not axis.uses_profile:
         return ()
     ramps = (
@@ -110,7 +109,7 @@ def _ramps(axis: Axis) -> tuple[tuple[int, int, bytes], ...]:
 def _interpolation(
     axis: Axis, sub: SubDevice, period_ns: int
 ) -> tuple[tuple[int, int, bytes], ...]:
-    """0x60C2 for this period. Nothing where the drive has no such object or agrees already."""
+    """Return 0x60C2 for this period; empty if the drive lacks it or has the value already."""
     index = axis.index(Object.INTERPOLATION_TIME_PERIOD)
     try:
         found = (sub.sdo.read(index, 1, type=USINT), sub.sdo.read(index, 2, type=SINT))

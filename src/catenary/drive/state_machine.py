@@ -1,7 +1,7 @@
 """The CiA 402 step in plain Python: the twin of `core/_cia402.pyx`, tested on the same tables.
 
-IEC 61800-7-201 §6, the MainDevice's side only; the virtual servo's machine is written apart from
-this one, so that they judge each other.
+IEC 61800-7-201 §6, the MainDevice's side only. The state machine of the virtual servo is separate
+code, so that the two test each other.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from catenary.wire.cia402 import (
 
 
 class Goal(IntEnum):
-    """What an axis is to become; the core's numbers."""
+    """Requested state of an axis, with the numbers of the core."""
 
     DISABLED = 0
     ENABLED = 1
@@ -30,8 +30,8 @@ class Goal(IntEnum):
     RESET = 3  # disabled, and a fault is acknowledged
 
 
-# (state, goal): the command that leads there. What is not listed: DISABLE_VOLTAGE, which waits in
-# a state the drive leaves by itself (0, 14), leaves a quick stop (12) and clears bit 7 in a fault.
+# (state, goal): the command that leads there. All others: DISABLE_VOLTAGE, which waits in a state
+# that the drive leaves by itself (0, 14), leaves a quick stop (12) and clears bit 7 in a fault.
 TOWARDS: dict[tuple[AxisState, Goal], Controlword] = {
     (AxisState.READY_TO_SWITCH_ON, Goal.DISABLED): SHUTDOWN,  # stays
     (AxisState.SWITCHED_ON, Goal.DISABLED): SHUTDOWN,  # transition 6
@@ -53,10 +53,15 @@ TOWARDS: dict[tuple[AxisState, Goal], Controlword] = {
 
 
 def controlword_towards(state: AxisState | None, goal: Goal, previous: int) -> int:
-    """The command bits (0 to 3 and 7) that lead from `state` towards `goal`.
+    """Return the command bits (0 to 3 and 7) that lead from `state` towards `goal`.
 
-    `previous`: the controlword sent last. A fault is reset by a rising edge of bit 7, so the
-    commands of a drive that was enabled are cleared first.
+    A fault is reset by a rising edge of bit 7, so the commands of an enabled drive are cleared
+    first.
+
+    Args:
+        state: Present state of the drive.
+        goal: Requested state.
+        previous: Controlword that was sent last.
     """
     if state is None:
         return DISABLE_VOLTAGE.value

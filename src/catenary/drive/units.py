@@ -1,9 +1,9 @@
-"""From a drive's raw numbers to SI units and back: one axis, seen at the joint (after the gear).
+"""Conversion of a drive's raw numbers to SI units at the joint, after the gear, and back.
 
 A rotary axis has rad, rad/s and N·m. A linear axis (`metres_per_turn`) has m, m/s and N.
 
-CiA 402-2 §8 (factor group) leaves the units to the drive; what most deliver and what is assumed
-unless said otherwise: position in encoder counts, velocity in counts per second, torque in
+CiA 402-2 §8 (factor group) leaves the units to the drive. Most drives use the following units,
+which are the defaults: position in encoder counts, velocity in counts per second, torque in
 thousandths of the rated torque 0x6076 (mN·m).
 """
 
@@ -53,14 +53,14 @@ LINEAR_DEFAULTS = AxisDefaults(0.1, 0.005, 0.005, 0.4)
 
 @dataclass(frozen=True, slots=True)
 class AxisUnits:
-    """What one raw count of an axis means at the joint.
+    """Scales of an axis: one raw count in units of the joint.
 
     `counts_per_turn`: of the motor's encoder. `gear_ratio`: motor turns per joint turn.
-    `direction`: +1, or -1 where the joint turns against the motor. `offset` [rad]: the joint's
-    position when the drive says 0. `velocity_unit` [rad/s of the motor]: of one raw count; None:
-    one position count per second. `rated_torque` [N·m at the motor]: None until read from 0x6076.
-    `metres_per_turn`: travel per turn of the gear's output side; None: a rotary axis. With it the
-    offset is in m.
+    `direction`: +1, or -1 if the joint turns against the motor. `offset` [rad]: position of the
+    joint at the drive's 0. `velocity_unit` [rad/s of the motor]: one raw count; None: one position
+    count per second. `rated_torque` [N·m at the motor]: None until read from 0x6076.
+    `metres_per_turn`: travel per turn of the gear's output side; None: a rotary axis. For a linear
+    axis, the offset is in m.
     """
 
     counts_per_turn: float
@@ -124,7 +124,7 @@ class AxisUnits:
         return self.direction * self.rated_torque / self.per_motor_radian / 1000.0
 
     def apply(self, number: Number, unit: Unit) -> Number:
-        """`number` with this axis' scale for `unit`; RAW: as it is."""
+        """Return `number` with this axis' scale for `unit`; RAW: unchanged."""
         match unit:
             case Unit.POSITION:
                 return replace(number, scale=self.position_scale, offset=self.offset)
@@ -143,12 +143,12 @@ class AxisUnits:
 
 
 def per_axis(name: str, value: V | Sequence[V], n: int) -> tuple[V, ...]:
-    """One value for all of n axes, or one for each."""
+    """Return one value for each of n axes, from one value or from n values."""
     return one_each(name, value, n) if isinstance(value, Sequence) else (value,) * n
 
 
 def one_each(name: str, values: Sequence[V], n: int) -> tuple[V, ...]:
-    """As many values as axes."""
+    """Check the number of values."""
     if len(values) != n:
         raise ValueError(f"{name} has {len(values)} values for {n} axes")
     return tuple(values)

@@ -1,4 +1,4 @@
-"""The arrays of a wish: bound to the loop's private buffers when it opens."""
+"""Arrays of a process-data request, bound to the loop's private buffers when it opens."""
 
 from __future__ import annotations
 
@@ -15,8 +15,11 @@ Array = npt.NDArray[np.float64] | npt.NDArray[np.int64]
 
 
 class AxisValues:
-    """The quantities of n axes, one array each. They stay the same objects as long as the loop is
-    open: read them, write into targets with `[:] =`, keep a value with `.copy()`."""
+    """Quantities of n axes, one array each.
+
+    The arrays stay the same objects while the loop is open: read them, write into targets with
+    `[:] =`, keep a value with `.copy()`.
+    """
 
     __slots__ = ("_columns", "_owner", "mode", "position", "torque", "velocity")
 
@@ -39,7 +42,7 @@ class AxisValues:
         mode: Modes,
         columns: Mapping[str, Array],
     ) -> None:
-        """Receives the arrays of the loop that opens."""
+        """Receive the arrays of the loop that opens."""
         object.__setattr__(self, "position", position)
         object.__setattr__(self, "velocity", velocity)
         object.__setattr__(self, "torque", torque)
@@ -47,7 +50,7 @@ class AxisValues:
         object.__setattr__(self, "_columns", columns)
 
     def __getitem__(self, name: str) -> Array:
-        """The column `name`, (n,): SI float64, or raw int64 for words of bits."""
+        """Return the column `name`, (n,): SI float64, or raw int64 for words of bits."""
         if not hasattr(self, "_columns"):
             raise RuntimeError(f"{self._owner}[{name!r}] has no values before a Loop is open")
         try:

@@ -1,4 +1,4 @@
-"""The cyclic loop: from wishes to `for cycle in loop`, and safely back; laws that run in it."""
+"""The cyclic loop: from process-data requests to `for cycle in loop`, and control laws."""
 
 from catenary.core import Cycle
 from catenary.loop.laws.law import Law, law

@@ -1,4 +1,4 @@
-"""The conversations beside a running cycle, and who steps them."""
+"""Execution of the acyclic queue while a cycle runs."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from catenary.procedure.exchange import Procedure
 
 T = TypeVar("T")
 
-BUSY_NS = 1_000_000  # between two steps, at most, while something is asked
-IDLE = 0.010  # [s] between two looks at what nobody asks for
+BUSY_NS = 1_000_000  # longest time between two steps while a procedure is pending
+IDLE = 0.010  # [s] between two looks at the mailboxes while no procedure is pending
 
 
 class Service:
-    """Owns the lane of an engine and, in real time, the thread that steps it.
+    """Owns the acyclic queue of an engine and, in real time, the thread that steps it.
 
-    In virtual time nobody else may run: the caller steps, between two cycles.
+    In virtual time there is no such thread: the caller steps the queue between two cycles.
     """
 
     def __init__(self, main: MainDevice, engine: Engine, plan: Plan) -> None:
         self.runner = LaneRunner(engine, grain_ns=plan.cycle.period_ns // 2)
         self._watch = MailboxWatch(plan, main.subs, _mailbox_words(engine, plan), self.runner)
-        self.cycle: Callable[[], int] = partial(engine.run, 1)  # one, with whoever shares the time
+        self.cycle: Callable[[], int] = partial(engine.run, 1)  # replaced when networks share time
         self._main = main
         self._engine = engine
-        self._quiet_until = 0  # [ns], in virtual time: nothing is due before
+        self._quiet_until = 0  # [ns] in virtual time: no work is due before this time
         self._ended = threading.Event()
         self._failure: Exception | None = None
         self._thread: threading.Thread | None = None
@@ -46,12 +46,14 @@ class Service:
 
     @property
     def beside(self) -> Callable[[], None] | None:
-        """What the thread that iterates does before every cycle; None: nothing, a thread does."""
+        """Work for the iterating thread before every cycle; None if a thread does it."""
         return self.step if self._thread is None else None
 
     def step(self) -> None:
-        """In virtual time: what the thread of real time does between two cycles. Mostly that is
-        nothing, and then it takes next to no time."""
+        """Do the work of the service thread between two cycles, in virtual time.
+
+        Usually no work is due, and the call returns at once.
+        """
         now = self._engine.now()
         if now >= self._quiet_until or self.runner.asked.is_set() or self._watch.sees_mail:
             self.runner.asked.clear()
@@ -63,19 +65,30 @@ class Service:
         self._main.deliver_events()
 
     def converse(self, *procedures: Procedure[T]) -> list[T]:
-        """Runs conversations beside the cycle, all at once, from the thread that iterates: it
-        keeps cycling without an application until the last one is answered."""
+        """Run procedures concurrently, and cycle without an application until all have ended.
+
+        Call this in the thread that iterates.
+
+        Args:
+            *procedures: Procedures to submit to the acyclic queue.
+
+        Returns:
+            Result of each procedure, in order.
+
+        Raises:
+            LoopError: The service thread has ended.
+        """
         tasks = [self.runner.submit(procedure) for procedure in procedures]
         while not all(task.done for task in tasks):
             self.cycle()
             if self._thread is None:
                 self.step()
             elif not self._thread.is_alive():
-                raise LoopError("the conversations beside the cycle have ended") from self._failure
+                raise LoopError("the thread of the acyclic queue has ended") from self._failure
         return [task.result() for task in tasks]
 
     def end(self) -> None:
-        """Ends the thread; conversations left over get LoopError."""
+        """End the thread. Pending procedures fail with LoopError."""
         self._ended.set()
         self.runner.asked.set()
         if self._thread is not None and self._thread.is_alive():
@@ -93,13 +106,13 @@ class Service:
                     self._engine.lane_wait(BUSY_NS)
                 else:
                     self.runner.asked.wait(IDLE)
-        except Exception as failure:  # told by the next conversation: a thread has no caller
+        except Exception as failure:  # a thread has no caller: the next `converse` reports it
             self._failure = failure
             self.runner.close()
 
 
 def _mailbox_words(engine: Engine, plan: Plan) -> Sequence[int]:
-    """The last of the input integers."""
+    """Return the mailbox words: the last input integers."""
     integers = engine.buffers["input_integers"]
     words: Sequence[int] = integers[len(integers) - len(plan.mailboxes.columns) :]
     return words

@@ -1,4 +1,4 @@
-"""Axes that the core stopped, and modes that drives refused: what is new since the last look."""
+"""Changes since the last call: axes that the core stopped, and modes that drives refused."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class RefusedMode(NamedTuple):
 
 
 class AxisWatch:
-    """Owns the stops and refused modes that were announced already."""
+    """Owns the stops and refused modes that were already announced."""
 
     def __init__(self, views: Views, axes: Sequence[AxisPlan]) -> None:
         self._views = views
@@ -75,8 +75,8 @@ class AxisWatch:
         """Return the refused changes of mode since the last call.
 
         Args:
-            explained: True if a new stop explains the call. Otherwise flags that were seen before
-                are new occurrences: the application asked again between two calls.
+            explained: True if a new stop explains the call. False: flags that were already reported
+                count as new, because the application repeated the request.
         """
         flagged = (self._views.axis_flags & AXIS_MODE_REFUSED) != 0
         new = flagged & ~self._refused

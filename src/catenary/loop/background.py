@@ -1,11 +1,11 @@
 """A Python thread that iterates an open loop while the program does something else.
 
-Theory of operation. The thread commits the targets in every cycle, under a lock that `update` also
-takes: while a program writes its targets, nothing is committed. The thread never waits for that
-lock. The native core judges how long the targets of the last update count (core/_setpoints.pyx), so
-a program that keeps the interpreter cannot keep an axis moving. An error of the loop ends the
-thread, which leaves the loop; the next call of the program raises the error. In virtual time the
-thread keeps to the wall clock, which nothing else does.
+Theory of operation. The thread commits the targets in every cycle under a lock. `update` takes the
+same lock, so nothing is committed while a program writes its targets. The thread never waits for
+the lock. The native core limits the time for which the targets of the last update count
+(core/_setpoints.pyx), so a program that blocks the interpreter cannot keep an axis moving. An error
+of the loop ends the thread, which leaves the loop. The next call of the program raises the error.
+In virtual time, the thread also keeps pace with the wall clock.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from catenary.loop.networks import VIRTUAL, NetworksIteration, leave_all
 from catenary.loop.session import Session
 from catenary.loop.signals import SignalGuard
 
-END_TIMEOUT = 30.0  # [s] and some periods: to leave a loop after an error takes some seconds
-LEAVE_TIMEOUT = 1.0  # [s] for an update that is being written when the loop is left
-UPDATE_TIMEOUT = 5.0  # [s] for which another thread may be inside `update`
-BEHIND = 0.1  # [s] of virtual time that is not made up for
-LOOK = 0.5  # [s] between two looks of a waiting call, at most
+END_TIMEOUT = 30.0  # [s] plus some periods: leaving a loop after an error takes some seconds
+LEAVE_TIMEOUT = 1.0  # [s] for an update in progress when the loop is left
+UPDATE_TIMEOUT = 5.0  # [s] for which another thread may stay inside `update`
+BEHIND = 0.1  # [s] of lag behind the wall clock that is dropped instead of caught up
+LOOK = 0.5  # [s] longest time between two checks of a waiting call
 
 
 class Background:
     """Owns the thread that iterates an open loop, and the lock under which targets are committed.
 
-    `error`: what ended the loop; None: nothing yet, or it was closed.
+    `error`: the error that ended the loop; None if there is none.
     """
 
     def __init__(
@@ -47,10 +47,10 @@ class Background:
         self._iteration = iteration
         self._guard = guard
         self._commit = threading.Lock()
-        self._updating = 0  # the thread that is inside `update`
+        self._updating = 0  # identifier of the thread inside `update`
         self._cycled = threading.Condition()
         self._ended = threading.Event()
-        self._told = False  # the error was raised
+        self._told = False  # True after the error was raised
         self._pace = _Pace(runnings[0])
         self._process = os.getpid()
         self._thread = threading.Thread(target=self._iterate, name="catenary loop", daemon=True)
@@ -59,17 +59,17 @@ class Background:
         """Start the thread.
 
         Raises:
-            ValueError: an inline loop exchanges its frames in the thread of the program.
-            LoopError: an axis is powered in CST, and nothing updates its torque.
+            ValueError: The loop is inline and exchanges its frames in the thread of the program.
+            LoopError: An axis is powered in CST and has no torque set-points.
         """
         if self._runnings[0].plan.cycle.execution == "inline":
             raise ValueError(
-                "run_in_background needs a threaded loop: in an inline one, frames would wait for "
-                "whatever else Python computes"
+                "run_in_background needs a threaded loop: the frames of an inline loop would be "
+                "delayed by all other Python code"
             )
         for running in self._runnings:
             running.refuse_powered_torque("run_in_background")
-        next(self._iteration)  # the first one commits nothing: it must not meet an update
+        next(self._iteration)  # the first call commits nothing: it must not coincide with an update
         for running in self._runnings:
             running.engine.background = True
             running.end_background = self.end
@@ -93,13 +93,13 @@ class Background:
         return self._thread.is_alive() and not self._ended.is_set()
 
     def raise_error(self) -> None:
-        """Raise what ended the loop."""
+        """Raise the error that ended the loop, if any."""
         if self.error is not None:
             self._told = True
             raise self.error
 
     def untold_error(self) -> Exception | None:
-        """Return what ended the loop, unless a call has raised it."""
+        """Return the error that ended the loop, unless a call has already raised it."""
         error = None if self._told else self.error
         self._told = True
         return error
@@ -112,7 +112,7 @@ class Background:
             self._require_alive()
             with self._written_targets():
                 yield
-                self._require_alive()  # else it would seem that they are sent
+                self._require_alive()  # otherwise the targets would appear to be sent
                 self._iteration.step_movers()  # moving axes keep the targets of their moves
         finally:
             self._updating = 0
@@ -120,7 +120,7 @@ class Background:
 
     @contextmanager
     def _written_targets(self) -> Iterator[None]:
-        """Commit what the block writes; nothing of it if the block raises."""
+        """Commit the writes of the block; discard all of them if the block raises."""
         engines = [running.engine for running in self._runnings]
         for engine in engines:
             engine.begin_update()
@@ -131,7 +131,7 @@ class Background:
             complete = True
         finally:
             for engine, targets in zip(engines, before, strict=True):
-                if not complete and not self._ended.is_set():  # else they are those of leaving
+                if not complete and not self._ended.is_set():  # if ended: keep the leaving targets
                     engine.blocks()[1][:] = targets
                 engine.end_update(complete)
 
@@ -140,7 +140,7 @@ class Background:
         self._refuse_inside_update("wait")
         if threading.current_thread() is self._thread:
             raise RuntimeError(
-                "loop.wait() in the thread that iterates the loop would wait for itself"
+                "loop.wait() was called in the thread that iterates the loop: it would deadlock"
             )
         limit = move.patience if timeout is None else timeout
         end = time.monotonic() + limit
@@ -151,7 +151,7 @@ class Background:
                     raise stopped_late(move, limit)
                 self._cycled.wait(LOOK)
             if move.error is not None and self._thread.is_alive():
-                self._cycled.wait(LOOK)  # it may be a consequence of what ends the loop now
+                self._cycled.wait(LOOK)  # the loop may be ending: prefer the original error
         if move.error is not None:
             self.raise_error()
             raise move.error
@@ -162,25 +162,27 @@ class Background:
         if not self._commit.acquire(timeout=UPDATE_TIMEOUT):
             raise LoopError(
                 f"another thread has been inside loop.update() for {UPDATE_TIMEOUT:g} s",
-                hint="compute and wait before `with loop.update():`, and only write targets in it",
+                hint="compute and wait before `with loop.update():`; inside it, only write targets",
             )
         self._updating = threading.get_ident()
 
     def _refuse_inside_update(self, call: str) -> None:
         if self._updating == threading.get_ident():
             raise RuntimeError(
-                f"loop.{call}() inside `with loop.update():`, which commits when it ends: leave it"
+                f"loop.{call}() inside `with loop.update():`, which commits at its end: leave it"
             )
 
     def _require_alive(self) -> None:
         self.raise_error()
         self._runnings[0].require_open()
         if self._ended.is_set():
-            raise RuntimeError("the loop is closed, or is being left")
+            raise RuntimeError("the loop is closed or being left")
 
     def _end_updates(self) -> None:
-        """Refuse further updates, and give the one that is being written a second to end: what is
-        written later must not meet the targets of leaving."""
+        """Refuse further updates, and wait at most a second for one in progress.
+
+        A later write must not replace the targets of leaving.
+        """
         self._ended.set()
         if self._updating != threading.get_ident() and self._commit.acquire(timeout=LEAVE_TIMEOUT):
             self._commit.release()
@@ -195,7 +197,7 @@ class Background:
                 self._pace.keep(self._ended)
         except Exception as error:  # a thread has no caller: the next call raises it
             self._fail(error)
-        except BaseException as end:  # SystemExit: the axes must not go on without the thread
+        except BaseException as end:  # SystemExit: the axes must not continue without the thread
             self._fail(LoopError(f"the thread that iterates the loop was ended by {end!r}"))
         finally:
             self._ended.set()
@@ -211,7 +213,7 @@ class Background:
             running.tell_end(error)
         self.error = error
         for problem in leave_all(self._runnings, self._guard):
-            error.add_note(f"on the way down: {problem}")
+            error.add_note(f"while leaving: {problem}")
 
 
 def program_ends() -> bool:
@@ -220,15 +222,15 @@ def program_ends() -> bool:
 
 
 class _Pace:
-    """Keeps virtual time to the wall clock."""
+    """Pace of virtual time, limited to the wall clock."""
 
     def __init__(self, running: Session) -> None:
         self._engine = running.engine
         self._is_virtual = running.engine.scheduling == VIRTUAL
-        self._offset: float | None = None  # [s] virtual time minus the wall clock's, at the start
+        self._offset: float | None = None  # [s] virtual time minus wall clock at the start
 
     def keep(self, ended: threading.Event) -> None:
-        """Wait until the wall clock is as late as virtual time; in real time no wait at all."""
+        """Wait until the wall clock reaches virtual time; a no-op in real time."""
         if not self._is_virtual:
             return
         offset = self._engine.now() * 1e-9 - time.monotonic()

@@ -1,4 +1,4 @@
-"""The engine's private buffers, cut into the views of each wish."""
+"""Private buffers of the engine, divided into one view per process-data request."""
 
 from __future__ import annotations
 
@@ -30,9 +30,17 @@ def bind_wishes(
     is_open: Callable[[], bool],
     is_led: Callable[[], bool] = lambda: False,
 ) -> Views:
-    """Bind every wish to its part of the buffers, in the order of the plan. Return the whole.
+    """Bind every request to its part of the buffers, in the order of the plan.
 
-    `is_open` returns True while the loop runs, `is_led` while a law or a stream sets the targets.
+    Args:
+        wishes: Process-data requests.
+        tables: Tables of the plan, one per request.
+        buffers: Private buffers of the engine by name.
+        is_open: Returns True while the loop runs.
+        is_led: Returns True while a law or a stream sets the targets.
+
+    Returns:
+        Views of the whole buffers.
     """
     arrays = {name: np.asarray(buffers[name]) for name in (*AXIS_BUFFERS, *PART_BUFFERS)}
     unit_valid = np.asarray(buffers["unit_valid"])

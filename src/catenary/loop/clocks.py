@@ -1,4 +1,4 @@
-"""The distributed clocks of a loop: how far apart they are, and whether within the bound."""
+"""Distributed clocks of a loop: differences, phase error, and the lock within a bound."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from catenary.procedure.exchange import Procedure
 from catenary.procedure.sync import rejoin
 
 NS = 1e-9
-SETTLE_TIMEOUT = 2.0  # [s] before OP is asked for: drives check their synchronisation on the way
-SILENT = 16  # cycles in a row without the reference: not a lost frame
+SETTLE_TIMEOUT = 2.0  # [s] before OP is requested: drives check their synchronisation
+SILENT = 16  # consecutive cycles without the reference: not just lost frames
 
 
 class Clocks:
-    """Owns the view of an open loop's distributed clocks; figures are of the last cycle.
+    """Owns the view of an open loop's distributed clocks; the values are those of the last cycle.
 
-    Print it for a table. All times in seconds.
+    Print it for a table. All times are in seconds.
     """
 
     def __init__(
@@ -38,37 +38,44 @@ class Clocks:
         self._engine = engine
         self._clock = clock
         self._plan = plan
-        self._cycle = cycle  # one without an application, of all who share the time
+        self._cycle = cycle  # runs one cycle of all networks, without an application
         self._ring = ring_of(main.link)
         self._announced = False
-        self._announcing = threading.Lock()  # who iterates, and who looks at a ring's cables
+        self._announcing = threading.Lock()  # the iterating thread and the ring watch announce
 
     @property
     def reference(self) -> SubDevice:
-        """The device whose clock all others follow."""
+        """The reference clock's device: all other clocks follow it."""
         return self._main.subs[self._plan.reference]
 
     @property
     def locked(self) -> bool:
-        """True if all differences and the phase of the cycle starts are within the bound. Never
-        while devices are cut off from the reference clock by a ring that is open."""
+        """True if all differences and the phase of the cycle starts are within the bound.
+
+        False while an open ring separates devices from the reference clock.
+        """
         return bool(self._clock.figures()["locked"]) and self._cut is None
 
     @property
     def bound(self) -> float:
-        """Of differences and phase [s]."""
+        """Bound of the differences and of the phase error [s]."""
         return self._clock.figures()["bound"] * NS
 
     @property
     def time(self) -> float:
-        """What the reference clock said last [s]: on a NIC since 2000-01-01, in virtual time since
-        the segment's start."""
+        """Last time that was read from the reference clock [s].
+
+        It counts from 2000-01-01 on a NIC, and from the start of the segment in virtual time.
+        """
         return self._clock.figures()["time"] * NS
 
     @property
     def differences(self) -> Mapping[int, float]:
-        """By position, what each clock is ahead of the reference (0x092C) [s]: a mean over the last
-        readings, one device's a cycle. NaN before the first."""
+        """Offset of each clock from the reference (0x092C) [s], by position; positive: ahead.
+
+        The values are means over the last readings; each cycle reads one device. NaN before the
+        first reading.
+        """
         return {
             position: mean * NS if reads else float("nan")
             for position, (mean, _, _, reads) in self._readings()
@@ -76,59 +83,79 @@ class Clocks:
 
     @property
     def largest_differences(self) -> Mapping[int, float]:
-        """By position, the largest single reading since the loop was entered or `reset` [s]."""
+        """Largest single reading by position since the loop was entered or `reset` [s]."""
         return {position: worst * NS for position, (_, _, worst, _) in self._readings()}
 
     @property
     def phase_error(self) -> float:
-        """Lateness of the cycle starts in the reference's time [s]; if the reference follows the
-        MainDevice, how far it is ahead. A mean over some 16 cycles."""
+        """Lateness of the cycle starts in the reference's time [s], a mean over about 16 cycles.
+
+        If the reference follows the MainDevice: the offset by which the reference is ahead.
+        """
         return self._clock.figures()["mean_error"] * NS
 
     @property
     def largest_phase_error(self) -> float:
-        """The largest of a single cycle since the loop was entered or `reset` [s]."""
+        """Largest phase error of a single cycle since the loop was entered or `reset` [s]."""
         return self._clock.figures()["worst_error"] * NS
 
     @property
     def rate(self) -> float:
-        """By which share the reference clock runs faster than the machine's, as the phase
-        controller found it; 0 where the reference follows."""
+        """Relative rate of the reference clock against the machine's clock; positive: faster.
+
+        The phase controller estimates it. It is 0 if the reference follows.
+        """
         return self._clock.figures()["rate"]
 
     @property
     def missed(self) -> int:
-        """Cycles without an answer of the reference clock."""
+        """Number of cycles without an answer of the reference clock."""
         return int(self._clock.figures()["missed"])
 
     @property
     def jumps(self) -> int:
-        """How often the reference clock has jumped by more than an eighth of a period."""
+        """Number of jumps of the reference clock by more than an eighth of a period."""
         return int(self._clock.figures()["jumps"])
 
     def reset(self) -> None:
-        """Forgets the largest figures so far."""
+        """Reset the largest values."""
         self._clock.reset_figures()
 
     def wait(self, within: float, timeout: float, check: Callable[[int], None]) -> None:
-        """See `Loop.wait_locked`; `check` raises for cycles in trouble."""
+        """Run cycles until the clocks are locked: see `Loop.wait_locked`.
+
+        Args:
+            within: Bound [s].
+            timeout: Longest wait [s].
+            check: Called with the flags of each cycle; raises for a cycle in trouble.
+
+        Raises:
+            ValueError: `within` is not positive.
+            ClockError: The clocks are not locked after `timeout`.
+        """
         if not within > 0:
-            raise ValueError(f"within={within} s: a bound is positive")
+            raise ValueError(f"within={within} s: must be positive")
         self._clock.keep_within(max(1, round(within * 1e9)))
         self._run_until_locked(timeout, check)
         if not self.locked:
             raise ClockError(
                 f"clocks not within {within * 1e6:g} us after {timeout:g} s: {self._trouble()}",
-                hint="a longer timeout, or a wider bound: print(loop.clocks) shows all of them",
+                hint="use a longer timeout or a wider bound; print(loop.clocks) shows all clocks",
             )
 
     def settle(self, check: Callable[[int], None]) -> None:
-        """Before OP: in phase, if that can be had soon."""
+        """Wait before OP until the clocks are locked, at most SETTLE_TIMEOUT."""
         self._run_until_locked(SETTLE_TIMEOUT, check)
 
     def rejoin(self, position: int, plan: DevicePlan) -> Procedure[None]:
-        """Sets the clock of a device that was switched off, and starts its SYNC signals, on its way
-        from PRE-OP to SAFE-OP. Nothing for one without a clock."""
+        """Set the clock and start the SYNC signals of a device that was switched off.
+
+        It runs between PRE-OP and SAFE-OP; a no-op for a device without a clock.
+
+        Args:
+            position: Position of the device.
+            plan: Plan of the device.
+        """
         devices = [sub.description for sub in self._main.subs]
         delay, nearest = (self._main.clock_delays_ns[p] for p in (position, self._plan.reference))
         if not devices[position].clock_bits or delay is None or nearest is None:
@@ -140,9 +167,9 @@ class Clocks:
         yield from rejoin(devices, position, plan.sync, peers, behind, epoch_ns)
 
     def announce(self) -> None:
-        """Puts an event where the clocks have come together or apart since the last one."""
+        """Put an event if the clocks have become locked or unlocked since the last one."""
         with self._announcing:
-            _ = self._clock.changes  # what follows tells of all of them
+            _ = self._clock.changes  # acknowledge: the event below covers all changes
             locked = self.locked
             if locked is self._announced:
                 return
@@ -169,21 +196,27 @@ class Clocks:
 
     def _run_until_locked(self, timeout: float, check: Callable[[int], None]) -> None:
         deadline = self._engine.now() + round(timeout * 1e9)
-        check(self._cycle())  # takes a new bound over
+        check(self._cycle())  # applies a new bound
         while not self.locked and self._engine.now() < deadline:
             check(self._cycle())
 
     def _worst(self) -> tuple[SubDevice, float]:
-        """Who is furthest off, and by how much [s]; the reference stands for the phase."""
+        """Return the clock with the largest offset, and the offset [s].
+
+        The reference clock has the phase error as its offset.
+        """
         found = {self._plan.reference: self.phase_error, **self.differences}
-        off = {p: float("inf") if d != d else d for p, d in found.items()}  # NaN: never read
+        off = {p: float("inf") if d != d else d for p, d in found.items()}  # NaN: not read yet
         position = max(off, key=lambda p: abs(off[p]))
         return self._main.subs[position], off[position]
 
     @property
     def _cut(self) -> int | None:
-        """The position in front of a ring's cut that parts the clocks; -1: the first cable. Behind
-        it they are led by the time that is expected of the reference: nobody compares the two."""
+        """Position before the cut that separates clocks in an open ring; -1: the first cable.
+
+        None without such a cut. Clocks after the cut follow the extrapolated time of the reference,
+        and their difference is not measured.
+        """
         if self._ring is None:
             return None
         cut, clocks = self._ring.state.cut_behind, (self._plan.reference, *self._plan.followers)
@@ -192,7 +225,7 @@ class Clocks:
     def _trouble(self) -> str:
         cut = self._cut
         if cut is not None:
-            return f"the ring is cut: from device {cut + 1} on none hears the reference clock"
+            return f"the ring is cut: devices from {cut + 1} on do not receive the reference clock"
         if self._silent:
             return f"{self.reference.station}, the reference clock, does not answer"
         sub, difference = self._worst()
@@ -201,7 +234,7 @@ class Clocks:
                 f"the cycle starts are {difference * 1e6:+.3f} us off the reference clock's phase"
             )
         if difference == float("inf"):
-            return f"{sub.station} has not told its difference"
+            return f"{sub.station} has not reported its difference"
         return f"{sub.station} is {difference * 1e6:+.3f} us off {self.reference.station}"
 
     @property

@@ -1,4 +1,4 @@
-"""From a cycle that went wrong to an error that names the device."""
+"""Errors for bad cycles, with the devices that caused them."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ def silence_error(
     """Return the error for `lost` bad cycles in a row.
 
     Args:
-        answers: of all devices to a read of their AL status.
-        suspects: devices of the units that failed.
-        lost: number of cycles.
-        log: the last cycles.
-        findings: places that silent devices or error counters point to.
-        mute: devices whose inputs are missing even in a frame of their own.
-        tight: hint that the period is perhaps too short; or empty.
+        answers: Answers of all devices to a read of the AL status.
+        suspects: Positions of the devices whose sync units failed.
+        lost: Number of bad cycles.
+        log: The last cycles.
+        findings: Faults that silent devices or error counters point to.
+        mute: Positions of devices whose inputs are missing even in a separate frame.
+        tight: Hint that the period may be too short; or empty.
     """
     silent = [answer.station for answer in answers if answer.word is None]
     others = [a for a in answers if a.station.position in suspects and a.word is not None]
@@ -42,23 +42,23 @@ def silence_error(
     elif silent:
         who = f"silent: {', '.join(map(str, silent))}"
         places = "; ".join(finding.where for finding in findings) or "the cable before it"
-        hint = f"look at {places}"
+        hint = f"check {places}"
     elif stray:
         who = f"not in OP: {'; '.join(map(described, stray))}"
-        hint = "a device that was switched off and on again must be brought up again"
+        hint = "a device that was switched off and on again must be brought to OP again"
     elif mute:
         named = ", ".join(str(a.station) for a in answers if a.station.position in mute)
         who = f"in OP, but without process data: {named}"
         hint = (
-            "its FMMU or SyncManager was switched off: by another program on this segment, or by "
-            "itself; read its registers, catenary reg read"
+            "its FMMU or SyncManager was switched off by another program on this segment or by "
+            "the device itself; read its registers with `catenary reg read`"
         )
     else:
-        who = f"all devices answer to single reads; affected: devices {listed(suspects)}"
+        who = f"all devices answer single reads; affected: devices {listed(suspects)}"
         who += "".join(f"; {each.where}: {each.evidence}" for each in findings)
         hint = tight or (
-            "frames are lost, corrupted or late on the way: check cables and other traffic on the "
-            "port; where the segment is a program on a busy machine, allow it more cycles with "
+            "frames are lost, corrupted or late: check the cables and other traffic on the "
+            "port; if the segment is a program on a busy machine, allow more lost cycles with "
             "StopPolicy(lost_limit=...)"
         )
     return WorkingCounterError(
@@ -79,8 +79,13 @@ def tight_period(wire_ns: int, period_ns: int) -> str:
 def state_error(
     answers: Sequence[Answer], log: Log | None, other_masters: Sequence[str] = ()
 ) -> StateError | None:
-    """Return the error for devices that left OP; None if all are there. `other_masters`: evidence
-    of another master, as text."""
+    """Return the error for devices that left OP; None if all are in OP.
+
+    Args:
+        answers: Answers of the devices to a read of the AL status.
+        log: The last cycles.
+        other_masters: Evidence of another master, as text.
+    """
     astray = [answer for answer in answers if is_astray(answer)]
     if not astray:
         return None
@@ -101,31 +106,38 @@ def state_error(
 
 
 def _suspicion(answer: Answer, other_masters: Sequence[str]) -> str:
-    """Return what points to another master; a device that leaves OP by itself gives a reason."""
+    """Return evidence of another master. A device that leaves OP by itself gives a reason."""
     if other_masters:
         return f"another EtherCAT master is live: {'; '.join(other_masters)}; end it"
     if answer.code or (answer.word or 0) & ERROR_FLAG:
         return ""
     return (
-        "it gives no reason, so its state was probably requested: look for a second master on this "
-        "line, or in another container; a device that was switched off and on shows INIT, too"
+        "it gives no reason, so its state was probably requested: check for a second master on "
+        "this line or in another container; a device that was switched off and on also shows INIT"
     )
 
 
 def forgetful_error(silent: Sequence[Answer], al_status: int, log: Log | None) -> StateError:
-    """The error for devices that lost their addresses while all frames come back: they were off for
-    a moment. `al_status`: the OR of all states."""
+    """Return the error for devices that lost their addresses while all frames return.
+
+    Such a device was switched off for a moment.
+
+    Args:
+        silent: Answers of the devices that do not answer to their addresses.
+        al_status: OR of the AL states of all devices.
+        log: The last cycles.
+    """
     first = silent[0]
     error = StateError(
-        f"{first.station} does not answer to its address any more, while not all that answer are "
-        f"in OP (AL status 0x{al_status:02X}, all together)",
+        f"{first.station} does not answer to its address any more, and not all other devices are "
+        f"in OP (OR of all AL status values: 0x{al_status:02X})",
         position=first.station.position,
         requested=int(AlState.OP),
         actual=int(AlState.INIT),
         code=0,
         log=log,
-        hint="it was switched off and on for less time than the loop endures lost frames, or "
-        "exchanged: look at its supply; a new scan() and Loop bring it up again",
+        hint="it was replaced, or switched off and on in less time than the loop tolerates lost "
+        "frames: check its supply; a new scan() and Loop bring it up again",
     )
     for other in silent[1:]:
         error.add_note(f"also: {other.station}")
@@ -133,7 +145,7 @@ def forgetful_error(silent: Sequence[Answer], al_status: int, log: Log | None) -
 
 
 class AxisTrouble(NamedTuple):
-    """One axis and what it says about itself."""
+    """State and error code of one axis in trouble."""
 
     name: str
     state: AxisState | None
@@ -147,24 +159,30 @@ class AxisTrouble(NamedTuple):
 
 
 def drive_error(axes: Sequence[AxisTrouble], what: str, log: Log | None) -> DriveError:
-    """The error for axes of which `what` is to be said: "in fault", "cannot be enabled"."""
+    """Return the error for axes in trouble.
+
+    Args:
+        axes: Names, states and error codes.
+        what: Fact to report: "in fault", "cannot be enabled".
+        log: The last cycles.
+    """
     faulty = any(axis.state in IN_FAULT for axis in axes)
     hint = (
-        "remove the cause, then open a new Loop: it resets the fault. To stay in this one, use "
+        "remove the cause, then open a new Loop: it resets the fault. To keep this loop open, use "
         "StopPolicy(raise_faults=False) and Drives.enable()"
         if faulty
-        else "check its main supply, safe torque off and the enable input"
+        else "check the main supply, safe torque off and the enable input of the drive"
     )
     return DriveError(f"{what}: {'; '.join(map(str, axes))}", log=log, hint=hint)
 
 
 def is_astray(answer: Answer) -> bool:
-    """Answers, but not from OP."""
+    """Return True if a device answers and is not in OP."""
     return answer.word is not None and answer.word & (STATE_MASK | ERROR_FLAG) != AlState.OP
 
 
 def described(answer: Answer) -> str:
-    """The device, its state and its reason."""
+    """Return the device, its state and its reason as text."""
     assert answer.word is not None
     try:
         state = str(AlState(answer.word & STATE_MASK))

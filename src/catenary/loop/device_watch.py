@@ -1,9 +1,9 @@
-"""The watch over the devices of a running loop: who is gone, who is astray, who comes back.
+"""Watch over the devices of a running loop: it tracks lost, faulted and returning devices.
 
-One endless conversation in the acyclic lane. While the cycle finds everybody in OP it only looks at
-a flag of the core; else it asks everybody, tells what it finds as events, and leads devices that
-are not required back to OP. What befalls a required device ends the loop (docs/safety.md); here it
-is only told.
+The watch is one endless procedure in the acyclic queue. While the cycle finds all devices in OP, it
+only reads a flag of the core. Otherwise it queries all devices, reports changes as events, and
+brings optional devices back to OP. The failure of a required device ends the loop (docs/safety.md);
+the watch only reports it.
 """
 
 from __future__ import annotations
@@ -39,13 +39,13 @@ from catenary.wire.al import ERROR_FLAG, STATE_MASK, AlState
 
 Submit = Callable[[Procedure[None]], Pending[None]]
 
-LOOK = 0.010  # [s] between two looks at the core's flag, and between two surveys
-STRANGERS_MAX = 16  # devices more than were scanned that are still told apart
-FAILURES_MAX = 3  # tries to bring a device back in one presence
+LOOK = 0.010  # [s] between two reads of the core's flag, and between two surveys
+STRANGERS_MAX = 16  # further devices beyond the scanned ones that are distinguished
+FAILURES_MAX = 3  # attempts to bring a device back each time it returns
 
 
 class Attendance(Protocol):
-    """Who watches over the devices of a running loop."""
+    """Watch over the devices of a running loop."""
 
     @property
     def excuses(self) -> bool: ...
@@ -55,33 +55,35 @@ class Attendance(Protocol):
 
 
 class Standing(Enum):
-    """How a device stands to the loop."""
+    """State of a device as the watch sees it."""
 
     RUNNING = "running"
     LOST = "lost"  # does not answer
     ASTRAY = "astray"  # answers, out of OP, its station address kept
-    RETURNING = "returning"  # a conversation leads it back
+    RETURNING = "returning"  # a procedure is bringing it back to OP
     HELD = "held"  # waits for `release`
 
 
 @dataclass(slots=True)
 class Charge:
-    """Owns what the watch knows of one device."""
+    """Owns the watch's state of one device."""
 
     sub: SubDevice
     plan: DevicePlan
     required: bool
-    identity: Identity  # of the device that belongs there: the planned one, or one let in since
+    identity: Identity  # of the expected device: the planned one or an accepted replacement
     standing: Standing = Standing.RUNNING
     task: Pending[None] | None = None
     failures: int = 0
-    unread: int = 0  # times that somebody in its place did not say who it is
+    unread: int = 0  # attempts in which the identity of the device in its place was unreadable
     released: bool = False
 
 
 def required_positions(plan: Plan) -> frozenset[int]:
-    """Return the devices without which the loop ends: all but the optional ones. If everything that
-    is exchanged is optional, this is empty: a coupler before optional devices is not required."""
+    """Return the positions of the required devices: all but the optional ones.
+
+    Empty if all exchanged devices are optional: a coupler before them is not required either.
+    """
     units = plan.cycle.sync_units
     if units and all(unit.optional for unit in units):
         return frozenset()
@@ -90,7 +92,7 @@ def required_positions(plan: Plan) -> frozenset[int]:
 
 
 class Watch:
-    """Owns the standing of every device of one network."""
+    """Owns the state of every device of one network."""
 
     def __init__(
         self,
@@ -123,11 +125,11 @@ class Watch:
         self._ring = (
             None if ring is None else RingWatch(ring, len(self._charges), tell=self._tell, now=now)
         )
-        self._unsettled = False  # somebody is not running, as of the last look
+        self._unsettled = False  # True if a device was not running at the last look
         self._strangers: set[tuple[int, Identity]] = set()
 
     def run(self) -> Procedure[None]:
-        """Goes on until it is cancelled."""
+        """Watch until cancelled."""
         while True:
             if self._ring is not None:
                 self._ring.look()
@@ -139,8 +141,11 @@ class Watch:
 
     @property
     def excuses(self) -> bool:
-        """Whether somebody out of OP is no reason to end the loop: as far as is known, all of them
-        are devices that are not required. Known at the next look, after `LOOK` at most."""
+        """True if the loop may continue although a device is out of OP.
+
+        This holds if, as of the last look, only optional devices are lost or out of OP. The value
+        lags by at most `LOOK`.
+        """
         return not self._all_required and all(
             charge.standing not in (Standing.ASTRAY, Standing.LOST)
             for charge in self._charges
@@ -148,11 +153,11 @@ class Watch:
         )
 
     def requires(self, position: int) -> bool:
-        """Whether the loop ends without this device."""
+        """Return True if the loop ends without this device."""
         return self._charges[position].required
 
     def release(self, sub: SubDevice) -> None:
-        """Lets a device that is held go to OP."""
+        """Allow a held device to go to OP."""
         charge = self._charges[sub.position]
         charge.released, charge.failures = True, 0
 
@@ -175,7 +180,12 @@ class Watch:
         return (charge for charge in self._charges if not charge.required)
 
     def _judge(self, charge: Charge, answer: Answer) -> None:
-        """What one answer means for a device."""
+        """Update the state of a device from one answer.
+
+        Args:
+            charge: Device.
+            answer: Its answer to a read of the AL status.
+        """
         task = charge.task
         if charge.standing is Standing.RETURNING and task is not None:
             if not task.done:
@@ -185,7 +195,7 @@ class Watch:
             self._lose(charge)
         elif answer.word & (STATE_MASK | ERROR_FLAG) == AlState.OP:
             if charge.standing is Standing.LOST and not self._lets_in(charge):
-                self._welcome(charge)  # out of OP, which it has never left
+                self._welcome(charge)  # hold it: it has never left OP
             elif charge.standing is not Standing.HELD:
                 self._is_back(charge)
         elif charge.standing is Standing.RUNNING:
@@ -197,7 +207,7 @@ class Watch:
                 StateLost(self._now(), charge.sub, message, int(AlState.OP), state, answer.code)
             )
         elif charge.standing is Standing.LOST:
-            # The cable was pulled, not the plug: it kept its address and stopped by its watchdog.
+            # Only the cable was pulled: the device kept its address, and its watchdog stopped it.
             self._welcome(charge)
 
     def _lose(self, charge: Charge) -> None:
@@ -219,7 +229,7 @@ class Watch:
         self._tell(DeviceReturned(self._now(), charge.sub, message))
 
     def _conclude(self, charge: Charge, task: Pending[None]) -> None:
-        """A conversation that should have led a device back has ended."""
+        """Evaluate a procedure that has ended and was to bring a device back."""
         charge.task = None
         charge.standing = Standing.ASTRAY
         if task.error is None:
@@ -243,7 +253,7 @@ class Watch:
     # Coming back
 
     def _look_for_returned(self) -> Procedure[None]:
-        """Devices without an address, or with one of elsewhere, in places of ours that are free."""
+        """Find returned devices: without a valid address, in free places of the network."""
         present = yield from restore.look_around(len(self._charges) + STRANGERS_MAX)
         known = [charge.plan.station_address for charge in self._charges]
         free = vacancies([presence.station_address for presence in present], known)
@@ -262,7 +272,7 @@ class Watch:
     def _recognise(
         self, presence: restore.Presence, lost: Sequence[Charge]
     ) -> Procedure[Charge | None]:
-        """Gives a device the address of the place it belongs to, if it belongs to one."""
+        """Give a device the address of its place; return None if it has no place here."""
         found: Identity | None = None
         for charge in lost:
             if charge.sub.alias and charge.sub.alias != presence.alias:
@@ -275,7 +285,7 @@ class Watch:
                 elif found.same_kind(charge.plan.identity):
                     yield from restore.give_address(presence, station)
             except CatenaryError as error:
-                # Gone again, or it does not say who it is: it must not answer for the one before.
+                # Lost again, or its identity is unreadable: it must not answer for the former one.
                 yield from restore.forget_address(presence)
                 self._note_unread(charge, error)
                 return None
@@ -289,36 +299,36 @@ class Watch:
         return None
 
     def _note_unread(self, charge: Charge, error: CatenaryError) -> None:
-        """Tells once of somebody who has failed to say who it is as often as is forgiven."""
+        """Report once that the identity of a device was unreadable FAILURES_MAX times."""
         charge.unread += 1
         if charge.unread == FAILURES_MAX:
-            reason = f"who is there now does not say what it is: {error.message}"
+            reason = f"the identity of the device in its place cannot be read: {error.message}"
             message = f"{charge.sub.station} is held: {reason}"
             self._tell(DeviceHeld(self._now(), charge.sub, message, 0, reason))
 
     def _exchanged(
         self, charge: Charge, presence: restore.Presence, found: Identity
     ) -> Procedure[Charge | None]:
-        """The same product with another serial number."""
+        """Handle a replacement: the same product with another serial number."""
         self._tell_replaced(charge, presence, found)
         if self._on_replacement == "restore" or charge.released:
-            charge.identity = found  # its own place from now on
+            charge.identity = found  # the place now belongs to this device
             self._strangers = {each for each in self._strangers if each[0] != charge.plan.position}
             return charge
         yield from restore.forget_address(presence)
         return None
 
     def _tell_replaced(self, charge: Charge, presence: restore.Presence, found: Identity) -> None:
-        """Once for each device that stands in a place that is not its own."""
+        """Put the event once for each device in a place that is not its own."""
         if (charge.plan.position, found) in self._strangers:
             return
         self._strangers.add((charge.plan.position, found))
         expected = charge.identity
-        message = f"{charge.sub.station}: another device is there: {found} instead of {expected}"
+        message = f"{charge.sub.station} was replaced: found {found} instead of {expected}"
         self._tell(DeviceReplaced(self._now(), charge.sub, message, expected, found))
 
     def _welcome(self, charge: Charge) -> None:
-        """A device that was lost has its address (again)."""
+        """Bring back or hold a device that was lost and has its address again."""
         charge.unread = 0
         self._tell_returned(charge)
         if self._lets_in(charge):
@@ -331,7 +341,7 @@ class Watch:
         return self._on_return == "restore" or charge.released or charge.required
 
     def _back_to_op(self, charge: Charge) -> Procedure[None]:
-        """It kept its configuration, mostly: its error is acknowledged. Else all from INIT."""
+        """Acknowledge the error; the configuration is usually intact. On failure, start at INIT."""
         if charge.failures == 0:
             yield from request_state(charge.sub.station, AlState.OP)
         else:
@@ -347,7 +357,7 @@ class Watch:
         yield from request_state(sub.station, AlState.OP)
 
     def _waiting(self, charge: Charge) -> Procedure[Any]:
-        """To PRE-OP, and no further."""
+        """Bring the device to PRE-OP, and hold it there."""
         yield from restore.bring_to_pre_op(charge.sub.station, charge.sub.channel)
         charge.sub.state = AlState.PRE_OP
         self._hold(charge, 'on_return="hold"')

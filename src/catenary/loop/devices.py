@@ -1,4 +1,4 @@
-"""From requests to their MainDevices."""
+"""MainDevices of process-data requests."""
 
 from __future__ import annotations
 
@@ -20,21 +20,25 @@ class DeviceWish(Wish, Protocol):
 
 
 def main_device_of(wishes: Sequence[DeviceWish]) -> MainDevice:
-    """The MainDevice that all wishes share."""
+    """Return the MainDevice that all requests share."""
     [(main, _)] = by_network(wishes)
     return main
 
 
 def by_network(wishes: Sequence[DeviceWish]) -> list[tuple[MainDevice, list[DeviceWish]]]:
-    """The wishes of each MainDevice, in the order of its first one."""
+    """Return the requests of each MainDevice, in the order of first use.
+
+    Raises:
+        ValueError: There is no request, or one names devices of several MainDevices.
+    """
     networks: dict[int, tuple[MainDevice, list[DeviceWish]]] = {}
     for wish in wishes:
         check_request(wish)
         mains = {id(sub.main): _main_of(sub) for sub in wish.subs}
         if len(mains) > 1:
             raise ValueError(
-                "one request with devices of several MainDevices: make one for each, and give the "
-                "Loop both"
+                "a request names devices of several MainDevices: make one request for each, and "
+                "pass both to the Loop"
             )
         for key, main in mains.items():
             networks.setdefault(key, (main, []))[1].append(wish)
@@ -44,13 +48,13 @@ def by_network(wishes: Sequence[DeviceWish]) -> list[tuple[MainDevice, list[Devi
 
 
 def check_request(request: object) -> None:
-    """Raise TypeError for what is not a process-data request, such as a SubDevice."""
+    """Raise TypeError for an object that is not a process-data request, such as a SubDevice."""
     if isinstance(request, type) or not all(hasattr(request, name) for name in PARTS):
         raise TypeError(f"a Loop takes process-data requests ({REQUESTS}), not {request!r}")
 
 
 def _main_of(sub: SubDevice) -> MainDevice:
-    """Return the MainDevice of a device, with all that a loop needs of it."""
+    """Return the MainDevice of a device; raise TypeError for another kind of master."""
     if not isinstance(sub.main, MainDevice):
         raise TypeError(f"{sub.station} belongs to a {type(sub.main).__name__}, not a MainDevice")
     return sub.main

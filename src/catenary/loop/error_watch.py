@@ -1,7 +1,7 @@
-"""The watch over the cables of a running loop: error counters, asked for once a second.
+"""Watch over the error counters of a running loop, which are read once per second.
 
-One endless conversation in the acyclic lane, a frame for every 46 devices a second. What the
-counters say of a cable, a device or its supply becomes an event, once a minute while it goes on.
+It runs as an endless procedure in the acyclic queue and sends one frame per 46 devices and second.
+A finding about a cable, a device or its supply becomes an event, repeated at most once per minute.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from catenary.model.topology import make_topology
 from catenary.procedure.error_counters import Totals, counted_since, read_error_counters
 from catenary.procedure.exchange import Procedure, after
 
-PERIOD = 1.0  # [s] between two looks
-SILENCE = 60.0  # [s] before the same place is named again
+PERIOD = 1.0  # [s] between two readings
+SILENCE = 60.0  # [s] before the same place is reported again
 
 
 class ErrorWatch:
-    """Owns the counters as they were seen last, and what has been told."""
+    """Owns the last reading of the counters and the times of the reported findings."""
 
     def __init__(self, main: MainDevice, now: Callable[[], float]) -> None:
         self._subs = main.subs
         self._tell = main.events.put
         self._now = now
         self._last: Totals = ()
-        self._told: dict[str, float] = {}  # place → when [s]
+        self._told: dict[str, float] = {}  # place → time of its last event [s]
         self.topology = make_topology(
             [sub.description.open_ports for sub in self._subs],
             ring=ring_of(main.link) is not None,
@@ -38,18 +38,20 @@ class ErrorWatch:
         self.names = Names(tuple(sub.name for sub in self._subs))
 
     def run(self) -> Procedure[None]:
-        """Goes on until it is cancelled."""
+        """Read the counters once per period until cancelled."""
         while True:
             for finding in (yield from self.look()):
                 self._report(finding)
             yield after(PERIOD)
 
     def look(self) -> Procedure[Sequence[Finding]]:
-        """What the counters say of the time since the last look; of the first nothing: what was
-        counted before the loop began is `main.diagnose()`'s."""
+        """Return the findings since the last reading; none at the first reading.
+
+        `main.diagnose()` covers the counts from before the loop.
+        """
         try:
             totals = yield from read_error_counters([sub.station for sub in self._subs])
-        except CatenaryError:  # frames are lost just now, or two answer to one address
+        except CatenaryError:  # frames are being lost, or two devices have the same address
             return ()
         before, self._last = self._last, totals
         if not before or totals == before:

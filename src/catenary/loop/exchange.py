@@ -1,4 +1,4 @@
-"""How a session exchanges its frames."""
+"""Protocol for the exchange of a session's frames."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from catenary.loop.device_watch import Attendance
 
 
 class Exchange(Protocol):
-    """Frames of our own (`FrameExchange`), or another master's (`CarriedExchange`)."""
+    """Exchange of frames of our own (`FrameExchange`) or of another master (`CarriedExchange`)."""
 
     @property
     def watch(self) -> Attendance:
@@ -21,7 +21,7 @@ class Exchange(Protocol):
         """Return the engine of the session's plan."""
 
     def cycle_clock(self) -> CycleClock:
-        """Return what the cycle knows of the distributed clocks of the plan."""
+        """Return the engine's view of the distributed clocks of the plan."""
 
     def attend(self) -> None:
         """Make the watches that run while the loop is open."""
@@ -30,7 +30,7 @@ class Exchange(Protocol):
         """Bring the devices from SAFE-OP to OP while cycles flow; return the watches that run."""
 
     def silence_error(self) -> CatenaryError:
-        """Return the error for cycles without answers, after asking the devices."""
+        """Query the devices, and return the error for cycles without answers."""
 
     def raise_astray(self) -> None:
         """Raise StateError if a required device is out of OP."""

@@ -1,4 +1,4 @@
-"""A loop whose images another master exchanges (`bus.Carrier`): that one leads the devices."""
+"""Loop whose frames another master exchanges (`bus.Carrier`) and whose devices it controls."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ from catenary.wire.cia402 import SLOT_OFFSET, Object
 
 
 class CarriedExchange:
-    """Owns the watch of a session whose frames another master sends. Implements `Exchange`."""
+    """Owns the watch of a session on another master's frames. Implements `Exchange`."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
 
     def make_engine(self) -> Engine:
-        cycle = replace(self._session.plan.cycle, clock=None)  # which the carrier keeps
+        cycle = replace(self._session.plan.cycle, clock=None)  # the carrier keeps the clocks
         return Engine(cycle, self._session.main.link.capsule, self._carrier.image)
 
     def cycle_clock(self) -> CycleClock:
         clock = self._carrier.clock
-        assert clock is not None  # it was configured by this plan
+        assert clock is not None  # `configure` has made it
         return clock
 
     def attend(self) -> None:
@@ -56,7 +56,7 @@ class CarriedExchange:
         return carrier
 
     def bring_to_op(self) -> list[Pending[None]]:
-        """The carrier leads the devices while cycles flow; until then none must answer."""
+        """Let the carrier bring the devices to OP while cycles flow."""
         required = [
             sub.position for sub in self._session.main.subs if self.watch.requires(sub.position)
         ]
@@ -67,7 +67,7 @@ class CarriedExchange:
         return [self._session.service.runner.submit(self.watch.run())]
 
     def silence_error(self) -> CatenaryError:
-        """Ask the carrier for all devices."""
+        """Query all devices through the carrier, and return the error."""
         session = self._session
         lost, log, suspects = session.engine.lost_in_row, session.log(), session.suspects()
         session.stop_axes_at_once()
@@ -94,11 +94,11 @@ class CarriedExchange:
                     self._session.service.step()
             return answer.result()
         except CatenaryError:
-            return None  # a drive in trouble may not talk; the error says that the code is unknown
+            return None  # a drive in trouble may not answer: the error then shows no code
 
 
 class CarriedWatch:
-    """Owns the last standing of every device, and tells when it changes."""
+    """Owns the last state of every device, and puts an event for each change."""
 
     def __init__(
         self,
@@ -108,7 +108,7 @@ class CarriedWatch:
         optional: set[int],
         announce: Callable[[], None],
     ) -> None:
-        self._announce = announce  # whether the clocks have come together or apart
+        self._announce = announce  # puts an event if the clocks were locked or unlocked
         self._main = main
         self._carrier = carrier
         self._engine = engine
@@ -116,7 +116,7 @@ class CarriedWatch:
         self._answers: Sequence[Answer] = ()
 
     def run(self) -> Procedure[None]:
-        """Goes on until it is cancelled."""
+        """Watch until cancelled."""
         while True:
             yield from self._carrier.listen()
             self._announce()
@@ -128,16 +128,16 @@ class CarriedWatch:
 
     @property
     def excuses(self) -> bool:
-        """Whether only devices are out of OP that are not required, as of the last look."""
+        """True if all devices that are out of OP are optional, as of the last look."""
         required = (a for a in self._answers if self.requires(a.station.position))
         return bool(self._optional) and not any(is_astray(answer) for answer in required)
 
     def requires(self, position: int) -> bool:
-        """Whether the loop ends without this device."""
+        """Return True if the loop ends without this device."""
         return position not in self._optional
 
     def release(self, sub: SubDevice) -> None:
-        """The carrier holds nobody: it leads devices back by itself."""
+        """Raise ValueError: the carrier holds no device, it brings devices back itself."""
         raise ValueError(f"{sub.station} is not held: the kernel master leads devices back itself")
 
     def _tell(self, answers: Sequence[Answer]) -> None:
@@ -163,15 +163,15 @@ class CarriedWatch:
 
 
 def carried(plan: Plan) -> Plan:
-    """Return the plan without the frames, which the carrier makes.
+    """Return the plan without its frames, which the carrier makes.
 
     Raises:
-        ConfigurationError: The plan asks for frames that the carrier does not make.
+        ConfigurationError: The plan needs frames that the carrier does not make.
     """
     kinds = {datagram.kind for frame in plan.cycle.frames for datagram in frame.datagrams}
     if DatagramKind.CYCLE_NUMBER in kinds:
         raise ConfigurationError(
             "exact_matching=True: another master makes the frames on this network",
-            hint="leave the option out, or open the network interface itself",
+            hint="omit the option, or open the network interface directly",
         )
     return replace(plan, cycle=replace(plan.cycle, frames=()))

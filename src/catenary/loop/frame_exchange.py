@@ -1,4 +1,4 @@
-"""How a session exchanges frames of our own."""
+"""Exchange of a session's own frames."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class FrameExchange:
         self.frames = FrameWatch(self._repeated_frames, put=put, now=now)
 
     def _repeated_frames(self) -> int:
-        """Frames so far that came back more than once, or that a ring could not assign."""
+        """Return the number of frames that returned repeatedly, or that a ring could not assign."""
         ring = ring_of(self._session.main.link)
         unassigned = 0 if ring is None else ring.counts["alien"]
         return self._session.engine.counters["repeated"] + unassigned
@@ -90,11 +90,11 @@ class FrameExchange:
         return [session.service.runner.submit(watch.run()) for watch in watches]
 
     def silence_error(self) -> CatenaryError:
-        """Ask all devices, and judge where the silence begins."""
+        """Query all devices, and return the error with the place where the silence begins."""
         session, converse = self._session, self._session.service.converse
         lost, log = session.engine.lost_in_row, session.log()
         suspects = session.suspects()
-        session.stop_axes_at_once()  # what still answers need not wait for the questions
+        session.stop_axes_at_once()  # before the queries, for the devices that still answer
         [answers] = converse(survey(self._stations))
         [noise] = converse(self.errors.look())
         silent = [answer.station.position for answer in answers if answer.word is None]
@@ -106,7 +106,7 @@ class FrameExchange:
         return silence_error(answers, suspects, lost, log, findings, mute=mute, tight=tight)
 
     def _input_areas(self, positions: Sequence[int]) -> dict[int, tuple[int, int]]:
-        """Where the inputs of some devices lie, as far as they have some."""
+        """Return the logical areas of the devices' inputs: position → (start, length)."""
         return {
             position: (fmmu.logical_start, fmmu.length)
             for position in positions
@@ -117,7 +117,7 @@ class FrameExchange:
     def raise_astray(self) -> None:
         """Raise StateError if a required device is out of OP.
 
-        A device that twice does not answer under its address, while others do, has lost the
+        A device that does not answer at its address twice, while others do, has lost the
         address.
         """
         session = self._session
@@ -135,7 +135,7 @@ class FrameExchange:
                 raise forgetful_error(silent, session.engine.al_status, log)
 
     def error_code(self, axis: int) -> int | None:
-        """Object 0x603F of the axis; None where the drive does not tell."""
+        """Return object 0x603F of the axis; None if the drive does not answer."""
         plan = self._session.plan.cycle.axes[axis]
         channel = self._session.main.subs[plan.device].channel
         if channel is None:
@@ -145,4 +145,4 @@ class FrameExchange:
             [data] = self._session.service.converse(upload(channel, index, 0))
             return UINT.decode(data)
         except CatenaryError:
-            return None  # a drive in trouble may not talk; the error says that the code is unknown
+            return None  # a drive in trouble may not answer: the error then shows no code

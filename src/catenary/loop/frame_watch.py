@@ -1,8 +1,8 @@
 """The watch over duplicate frames of a running loop, from counters of the core and of a ring.
 
-A frame that comes back a second time, in its cycle or later, is counted as repeated. Single ones
-occur when a switch or a NIC repeats a frame. Many of them show a loop in the wiring or a second
-sender. Late frames are not counted here: they come back once.
+A frame that returns a second time, in its cycle or later, is counted as repeated. Single ones occur
+when a switch or a NIC repeats a frame. Many of them indicate a loop in the wiring or a second
+sender. Late frames are not counted here, because they return once.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ SILENCE = 60.0  # [s] between two events
 
 
 class FrameWatch:
-    """Owner of the last reading of the counters and of the time of the last event."""
+    """Owns the last reading of the counters and the time of the last event."""
 
     def __init__(
         self,

@@ -1,7 +1,7 @@
 """The interpreter's switch interval while inline loops are open.
 
-A thread that wants the interpreter waits for the switch interval, 5 ms in CPython, before the
-thread that holds it must release it. A second busy Python thread delays an inline loop that long.
+A thread that needs the interpreter waits for the switch interval (5 ms in CPython). Then the thread
+that holds the interpreter must release it. A busy second thread delays an inline loop as long.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from contextlib import contextmanager
 
 HALF_A_MICROSECOND = 0.5e-6  # CPython keeps whole microseconds and truncates the rest
 
-_lock = threading.Lock()  # of the two below
+_lock = threading.Lock()  # for the two variables below
 _wanted: list[float] = []
 _before = 0.0
 
 
 @contextmanager
 def switch_interval(seconds: float) -> Iterator[None]:
-    """Set the switch interval [s]; the shortest of nested ones counts, the last one restores it."""
+    """Set the switch interval [s]: the shortest of nested ones; the last exit restores it."""
     global _before
     with _lock:
         if not _wanted:

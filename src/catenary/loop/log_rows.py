@@ -1,4 +1,4 @@
-"""From the records of the core to a Log: names, the time of `cycle.time`."""
+"""Conversion of the core's records to a Log with names and the time of `cycle.time`."""
 
 from __future__ import annotations
 
@@ -17,8 +17,14 @@ TIME_FORMAT = "<f8"
 
 
 def read_log(engine: Engine, plan: CyclePlan) -> Log:
-    """Return the last cycles, oldest first. `time` counts from the first iteration; before it,
-    from the first cycle."""
+    """Return the last cycles, oldest first.
+
+    `time` counts from the first iteration; before it, from the first cycle.
+
+    Args:
+        engine: Engine with the records.
+        plan: Plan of the cycle.
+    """
     dtype = log_dtype(axis_names(plan.axes) if plan.log_axes else ())
     record_size = dtype.itemsize - np.dtype(TIME_FORMAT).itemsize
     records = np.frombuffer(engine.log(), np.uint8).reshape(-1, record_size)
@@ -51,7 +57,7 @@ def log_dtype(axes: Sequence[str]) -> np.dtype[np.void]:
 
 
 def axis_names(axes: Sequence[AxisPlan]) -> list[str]:
-    """Return the name of each axis; with its position if several have the same one."""
+    """Return the name of each axis; with the device's position if names are ambiguous."""
     short = [axis.name.removeprefix(f"{axis.device} ") for axis in axes]
     often = Counter(short)
     return [axis.name if often[name] > 1 else name for axis, name in zip(axes, short, strict=True)]

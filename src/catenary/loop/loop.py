@@ -1,7 +1,7 @@
-"""Loop: requests become a plan, the plan a cycle that runs, the cycle `for cycle in loop`.
+"""Loop: it plans the requests, brings the devices to OP, and runs the cycle.
 
-Entering ends with the drives enabled and holding, or with everything safe and a specific error.
-Leaving, for whatever reason, stops the drives natively before the states go down.
+Entering ends with the drives enabled and holding, or in a safe state with a specific error.
+Leaving always stops the drives natively before the states go down.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ from catenary.plan.planner import Plan, period_in_ns
 from catenary.plan.sink import Sink
 from catenary.wire.al import AlState
 
-LOG_LIMIT = 2**24  # cycles: a gigabyte
-LEAVE_TIMEOUT = 60.0  # [s] for another thread that leaves the loop
+LOG_LIMIT = 2**24  # cycles, about a gigabyte
+LEAVE_TIMEOUT = 60.0  # [s] to wait for another thread that leaves the loop
 
 
 class Loop:
@@ -55,32 +55,32 @@ class Loop:
             for cycle in loop:
                 ...
 
-    Requests on several MainDevices run as several networks in one schedule (docs/networks.md):
-    threaded only, with a thread for each. `cycle.networks[i]` and `loop.networks[i]` have what
-    belongs to one network; the properties of the loop itself are those of the first.
+    Requests on several MainDevices run as several networks in one schedule (docs/networks.md). Such
+    a loop is threaded, with a thread for each network. `cycle.networks[i]` and `loop.networks[i]`
+    belong to one network; the properties of the loop itself are those of the first.
 
     Args:
         requests: `Drives`, `Inputs`, `Outputs` and other process-data requests.
-        period: of the cycle [s].
+        period: Period of the cycle [s].
         execution: "threaded": a native thread exchanges the frames and Python follows. "inline":
             the thread that iterates exchanges the frames itself.
-        enable: drives are enabled on entry.
-        watchdog: of the devices' outputs [s]; 0: off; None: 0.1 s, in CST the longer of 10 ms and
-            five exchanges.
-        cpu: CPU of the native thread; several networks: one for each. None: unchanged; several
-            networks: the last CPUs, where there are more than networks.
+        enable: True to enable the drives on entry.
+        watchdog: Watchdog time of the devices' outputs [s]; 0: off; None: 0.1 s, in CST the longer
+            of 10 ms and five exchanges.
+        cpu: CPU of the native thread; several networks: one for each. None: unchanged; with several
+            networks the last CPUs, if there are more CPUs than networks.
         priority: SCHED_FIFO priority of the native thread; None: unchanged.
-        log: number of cycles that the log, and that of an error, reaches back.
-        laws: compiled on entry, before the devices go to OP. Others are compiled when started.
-        sink: receives every cycle, for example a `Share` for other processes. Several networks:
+        log: Number of cycles in the log and in the log of an error.
+        laws: Laws to compile on entry, before OP. Other laws are compiled when they are started.
+        sink: Receiver of every cycle, for example a `Share` for other processes. Several networks:
             one for each.
-        stop: limits that stop axes or end the loop.
-        scheduling: how the loop waits for time and frames.
-        clocks: how distributed clocks are kept.
-        log_axes: the log has the values of every axis, too (docs/recording.md).
+        stop: Limits that stop axes or end the loop.
+        scheduling: Waiting for time and frames.
+        clocks: Synchronisation of the distributed clocks.
+        log_axes: True to log the values of every axis too (docs/recording.md).
 
     Raises:
-        ValueError: an option is impossible, or a request names devices of several MainDevices.
+        ValueError: An option is impossible, or a request names devices of several MainDevices.
     """
 
     def __init__(
@@ -165,7 +165,7 @@ class Loop:
                     running.enable()
             for running in runnings:
                 running.reset_figures()
-            return self  # inside: a signal may come at this line too
+            return self  # inside `try`: a signal may arrive at this line too
         except BaseException as error:
             self._report_end(error)
             for problem in self._leave():
@@ -190,16 +190,16 @@ class Loop:
             raise problems[0]
 
     def open(self) -> Loop:
-        """Enter without a `with` block, for a notebook or a server. Return the loop.
+        """Enter without a `with` block, for a notebook or a server; return the loop.
 
-        `close` leaves it; so do the end of the program and the MainDevice's `close`.
+        `close` leaves it. The end of the program and the MainDevice's `close` leave it too.
         """
         return self.__enter__()
 
     def close(self) -> None:
         """Leave the loop: stop the axes, then the cycle. A no-op if it is closed.
 
-        Raises an error that ended the loop in the background, unless another call has raised it.
+        Raises the error that ended the loop in the background, unless another call has raised it.
         """
         if not self._runnings:
             return
@@ -210,14 +210,15 @@ class Loop:
     def run_in_background(self) -> None:
         """Let a Python thread iterate the loop from now on, and return at once.
 
-        The thread commits the targets in every cycle: write them in `with loop.update():`. An
-        error of the loop stops the axes and closes the loop; the next `update`, `wait` or `close`
-        raises it. Interrupting the program (Ctrl-C) does not stop the loop; `close` and the end of
-        the program do. In virtual time the thread keeps to the wall clock. A no-op if it runs.
+        The thread commits the targets in every cycle: write them in `with loop.update():`. An error
+        of the loop stops the axes and closes the loop; the next `update`, `wait` or `close` raises
+        it. Interrupting the program (Ctrl-C) does not stop the loop. `close` and the end of the
+        program do. In virtual time, the thread keeps pace with the wall clock. No effect if the
+        loop already runs in the background.
 
         Raises:
-            ValueError: the loop is inline.
-            LoopError: an axis is powered in CST.
+            ValueError: The loop is inline.
+            LoopError: An axis is powered in CST.
         """
         if self._background is not None:
             self._background.raise_error()
@@ -235,13 +236,13 @@ class Loop:
     def update(self) -> AbstractContextManager[None]:
         """Return a context in which a program writes one consistent set of targets and requests.
 
-        While the loop runs in the background, all of the set is committed when the block ends; none
-        of it if the block raises. In CSV and CST it counts for `StopPolicy.command_timeout`: then
-        CSV decelerates, and CST is stopped.
+        While the loop runs in the background, the whole set is committed when the block ends. If
+        the block raises, nothing is committed. In CSV and CST the set is valid for
+        `StopPolicy.command_timeout`; afterwards, CSV decelerates and CST is stopped.
 
         Raises:
-            RuntimeError: the loop does not run in the background: `next(loop)` commits.
-            CatenaryError: what ended the loop in the background.
+            RuntimeError: The loop does not run in the background: `next(loop)` commits.
+            CatenaryError: The error that ended the loop in the background.
         """
         if self._background is None:
             raise RuntimeError(
@@ -256,7 +257,7 @@ class Loop:
         return None if self._background is None else self._background.error
 
     def __iter__(self) -> Iterator[Cycle]:
-        """Iterating again continues where the last iteration ended."""
+        """Return the iterator; a second iteration continues where the last one ended."""
         return self._iterating()
 
     def _iterating(self) -> Iteration | NetworksIteration:
@@ -273,18 +274,17 @@ class Loop:
     def wait(self, move: Awaited, timeout: float | None = None) -> None:
         """Iterate until a move is done: `loop.wait(arm.move_to(0.5), timeout=10.0)`.
 
-        While the loop runs in the background, only wait; in any thread.
-
-        It returns when the axes have reached their goals, or after `move.stop()` are at rest.
+        While the loop runs in the background, only wait; any thread may call it. It returns when
+        the axes have reached their goals, or are at rest after `move.stop()`.
 
         Args:
-            move: what `arm.move_to`, `arm.move_by` or `arm.home` returned.
-            timeout: [s]; the move is stopped then. None: twice the expected duration plus 10 s, in
-                homing 60 s.
+            move: Result of `arm.move_to`, `arm.move_by` or `arm.home`.
+            timeout: Time after which the move is stopped [s]. None: twice the expected duration
+                plus 10 s; for homing 60 s.
 
         Raises:
-            MoveError: The move took too long, was replaced, or its axis was stopped.
-            DriveError: A drive is in fault or was stopped; other errors of the iteration likewise.
+            MoveError: The move took too long or was replaced, or its axis was stopped.
+            DriveError: A drive is in fault or was stopped. The iteration can raise other errors.
             TypeError: `move` is not a move.
         """
         require_move(move)
@@ -316,19 +316,23 @@ class Loop:
         overruns: int = 3,
     ) -> LawRun:
         """Start a compiled law. From the next cycle on, it computes the set-points in the cycle
-        thread; the loop can be iterated meanwhile, to watch.
+        thread; you can iterate the loop meanwhile, to watch.
 
         Args:
-            law: function or compiled law; it begins from what is commanded.
-            memory: its state, float64, at most 4096 numbers.
-            parameters: of the application, float64, at most 4096 numbers.
-            budget: of one step [s]; None: 0.4 periods; 0: no check. The frames need the rest.
-            overruns: number of steps in a row over the budget that end the law.
+            law: Function or compiled law; it begins from the commanded set-points.
+            memory: Initial state, float64, at most 4096 numbers.
+            parameters: Values from the application, float64, at most 4096 numbers.
+            budget: Longest time of one step [s]; None: 0.4 periods; 0: no check. The frames need
+                the remainder of the period.
+            overruns: Number of consecutive steps over the budget that end the law.
+
+        Returns:
+            Handle of the running law.
 
         Raises:
-            LawError: the law cannot be compiled. The iteration raises it for an exception, a
-                target that is NaN or infinite, overruns, and a step that never returns.
-            ValueError: the budget leaves too little of the period for the frames.
+            LawError: The law cannot be compiled. The iteration raises it for an exception, a NaN or
+                infinite target, overruns, and a step that does not return.
+            ValueError: The budget leaves too little of the period for the frames.
         """
         return self._only("a law").laws.start(made_law(law), memory, parameters, budget, overruns)
 
@@ -342,11 +346,23 @@ class Loop:
         overruns: int = 3,
         compiled: bool = True,
     ) -> Numbers:
-        """Run a law to its end and return its memory; the axes hold then. Arguments: see `start`.
+        """Run a law to its end and return its memory; then the axes hold.
 
         Args:
-            compiled: False: run it as Python, in the thread of the caller. This is slow and gives
+            law: Function or compiled law: see `start`.
+            memory: Initial state: see `start`.
+            parameters: Values from the application: see `start`.
+            budget: Longest time of one step [s]: see `start`.
+            overruns: Number of consecutive steps over the budget: see `start`.
+            compiled: False: run it as Python, in the thread of the caller. This is slow, but gives
                 Python's errors: use it to find mistakes.
+
+        Returns:
+            Memory of the law after its last step.
+
+        Raises:
+            LawError: The law cannot be compiled, or failed: see `start`.
+            ValueError: An argument is impossible.
         """
         self._require_foreground()
         running = self._only("a law")
@@ -373,32 +389,35 @@ class Loop:
         return kept
 
     def stream(self, capacity: int = 1000) -> Stream:
-        """Return a `Stream`: up to `capacity` rows of set-points, one per cycle, that a slower
-        thread fills in advance."""
+        """Return a `Stream`, which a slower thread fills with set-points in advance.
+
+        Args:
+            capacity: Number of rows that the stream can hold; one row is one cycle.
+        """
         self._only("a stream")
         return self._networks[0].stream(capacity)
 
     def restore(self, sub: SubDevice) -> None:
         """Let a held device (event DeviceHeld or DeviceReplaced) go to OP while the cycle runs.
 
-        Returns at once: see `sub.state` and the events.
+        The call returns at once: see `sub.state` and the events.
 
         Raises:
-            ValueError: a device of another loop.
+            ValueError: The device belongs to another loop.
         """
         for running in self._runnings:
             if running.main is sub.main:
                 return running.watch.release(sub)
-        raise ValueError(f"{sub.station} is no device of this loop: it is on another MainDevice")
+        raise ValueError(f"{sub.station} is not in this loop: it is on another MainDevice")
 
     @property
     def networks(self) -> tuple[Network, ...]:
-        """Plan, timing, clocks and log of each network: one per MainDevice."""
+        """Plan, timing, clocks and log of each network; one network per MainDevice."""
         return self._networks
 
     @property
     def plan(self) -> Plan:
-        """The plan that runs: print it."""
+        """Plan of the first network: print it."""
         return self._networks[0].plan
 
     @property
@@ -408,7 +427,7 @@ class Loop:
 
     @property
     def clocks(self) -> Clocks:
-        """The distributed clocks: print it. RuntimeError if no request has `dc=`."""
+        """Distributed clocks: print it. RuntimeError if no request has `dc=`."""
         return self._networks[0].clocks
 
     @property
@@ -418,25 +437,29 @@ class Loop:
 
     @property
     def log(self) -> Log:
-        """The last cycles (1000, or `log`), oldest first: an array, a pandas table, a CSV file."""
+        """The last cycles (1000, or `log`), oldest first; see `Log`."""
         return self._networks[0].log
 
     def histogram(self, phase: str) -> list[tuple[float, float, int]]:
-        """Return (lower [s], upper [s], count) of every bucket of a phase of `timing` that is not
-        empty."""
+        """Return (lower [s], upper [s], count) of every non-empty bucket of a phase of `timing`."""
         return self._networks[0].histogram(phase)
 
     def wait_locked(self, within: float = 1e-6, timeout: float = 5.0) -> None:
         """Run cycles, axes holding, until the clocks are locked.
 
-        They are locked when every clock differs by at most `within` [s] from the reference clock
-        and the cycle starts are in phase with it. The bound stays in force: leaving it is a
+        They are locked when every clock differs by at most `within` from the reference clock and
+        the cycle starts are in phase with it. The bound remains in force: leaving it puts a
         `ClockUnlocked` event, returning a `ClockLocked` event. Several networks are awaited one
         after the other.
 
+        Args:
+            within: Bound of the differences and of the phase [s].
+            timeout: Longest wait for each network [s].
+
         Raises:
-            ClockError: after `timeout` [s], for each network.
-            LoopError: an axis is powered in CST, whose torque would become stale meanwhile.
+            ClockError: The clocks are not locked after `timeout`.
+            LoopError: An axis is powered in CST; its torque would become stale meanwhile.
+            RuntimeError: No request has `dc=`.
         """
         self._require_foreground()
         with_clocks = [n for n in self._networks if n.running and n.running.clocks is not None]
@@ -448,7 +471,7 @@ class Loop:
             network.wait_locked(within, timeout)
 
     def _require_foreground(self) -> None:
-        """Raise RuntimeError for a call that iterates if a thread does, or the loop is closed."""
+        """Raise RuntimeError if a thread iterates the loop already, or the loop is closed."""
         if self._background is not None and self._background.is_alive:
             raise RuntimeError(
                 "the loop runs in the background, where a thread iterates it: write targets in "
@@ -457,21 +480,21 @@ class Loop:
         self._opened.require_open()
 
     def _advance(self, flags: int) -> None:
-        """Do what belongs to each cycle that no iteration runs, and raise its error, if any."""
+        """Do the work that belongs to a cycle without an iteration, and raise its error, if any."""
         running = self._opened
         if running.service.beside is not None:
             running.service.step()
         self._networks[0].check(flags)
 
     def _only(self, what: str) -> Session:
-        """Return what runs of the one network.
+        """Return the session of the only network.
 
         Raises:
-            ValueError: there are several.
-            RuntimeError: axes move.
+            ValueError: The loop has several networks.
+            RuntimeError: Axes are moving.
         """
         if len(self._networks) > 1:
-            raise ValueError(f"{what} belongs to one network: make a Loop for it")
+            raise ValueError(f"{what} works on one network: make a separate Loop for that network")
         if self._opened.views.movers:
             raise RuntimeError(
                 f"{what} cannot begin during a move: loop.wait(move), or move.stop() and wait"
@@ -480,7 +503,7 @@ class Loop:
 
     @property
     def _runnings(self) -> list[Session]:
-        """What runs of each network."""
+        """Sessions of the networks that are prepared."""
         return [network.running for network in self._networks if network.running is not None]
 
     @property
@@ -488,7 +511,7 @@ class Loop:
         return self._networks[0].session
 
     def _abandon(self) -> None:
-        """The MainDevice is being closed while the loop is open."""
+        """Leave the loop because the MainDevice is being closed."""
         for problem in self._leave():
             warnings.warn(f"the loop was left open: {problem}", RuntimeWarning, stacklevel=2)
 
@@ -497,14 +520,14 @@ class Loop:
         self._finalizer = weakref.finalize(self, leave_open_loop, runnings, self._guard)
 
     def _report_end(self, error: BaseException) -> None:
-        """Tell those that read along why the loop ends."""
+        """Report the error that ends the loop to the sinks."""
         for running in self._runnings:
             running.tell_end(error)
 
     def _leave(self) -> list[Exception]:
-        """Stop every network that answers, whatever happens to the others. Return the problems.
+        """Stop every network that answers, whatever happens to the others; return the problems.
 
-        A second thread waits for the first: when it goes on, nothing moves any more.
+        A second thread waits for the first: when it continues, nothing moves any more.
         """
         is_ours = self._leaving.acquire(timeout=LEAVE_TIMEOUT)
         try:
@@ -522,26 +545,41 @@ class Loop:
 
 
 def refuse_for_several(execution: ExecutionMode, laws: Sequence[Law | LawFunction]) -> None:
-    """Raise ValueError for what only one network can have."""
+    """Raise ValueError for options that only one network can have."""
     if execution != "threaded":
         raise ValueError(
-            'several networks need execution="threaded": a thread that iterates cannot keep the '
-            "cycle starts of more than one"
+            'several networks need execution="threaded": a thread that iterates can only keep the '
+            "cycle starts of one"
         )
     if laws:
-        raise ValueError("laws belong to one network: make a Loop for it")
+        raise ValueError("laws work on one network: make a separate Loop for that network")
 
 
 def checked_quorum(quorum: int | None, count: int) -> int:
-    """Return how many networks must be good. ValueError if there are not as many."""
+    """Return the number of networks that must be good.
+
+    Args:
+        quorum: Requested number; None: all.
+        count: Number of networks.
+
+    Raises:
+        ValueError: There are fewer networks.
+    """
     if quorum is not None and not 1 <= quorum <= count:
         raise ValueError(f"quorum={quorum}: must be 1 to the number of networks, {count}")
     return count if quorum is None else quorum
 
 
 def leave_open_loop(runnings: Sequence[Session], guard: SignalGuard) -> None:
-    """Stop the axes of a loop that nothing refers to any more, then warn: a warning may be an
-    error. A loop in the background may stay open until the program ends."""
+    """Stop the axes of a loop that is no longer referenced, then warn if it was left open.
+
+    A loop in the background may stay open until the program ends. The warning is last because it
+    may be turned into an error.
+
+    Args:
+        runnings: Sessions of the loop.
+        guard: Signal handlers of the loop.
+    """
     if not any(running.is_open for running in runnings):
         return
     for running in runnings:

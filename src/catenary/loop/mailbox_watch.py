@@ -1,8 +1,8 @@
-"""Who has something to say beside the cycle: emergencies, late answers.
+"""Detection of mailbox messages that devices send unasked: emergencies and late answers.
 
-A bit of every mailbox rides in the cycle, where the device has an FMMU to spare: a look at it costs
-nothing (plan/mailboxes.py). All others, and now and then these too, are asked by their register,
-one device at a time.
+If a device has a spare FMMU, the full bit of its mailbox is part of the cyclic data and costs no
+extra frame (plan/mailboxes.py). The other devices are polled by register, one device at a time. If
+all devices have such a bit, they are still polled, but less often.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from catenary.plan.planner import Plan
 from catenary.procedure.exchange import Procedure
 from catenary.procedure.mailbox import MailboxChannel, drain, exclusively
 
-ASK_NS = 10_000_000  # between two registers, where some device shows no bit
-TRUST_NS = 100_000_000  # where all do
+ASK_NS = 10_000_000  # between two polls if a device has no bit in the cyclic data
+TRUST_NS = 100_000_000  # between two polls if all devices have one
 
 NEVER_NS = 1 << 62
 
 
 class MailboxWatch:
-    """Owns the looks into mailboxes while a loop runs. Whoever steps the lane calls `look`.
+    """Owns the checks of mailboxes while a loop runs. The thread that steps the queue calls `look`.
 
-    `words`: the last integers of the loop's private buffer of inputs, one bit per device; they
-    change as the loop is iterated.
+    `words`: last integers of the loop's private input buffer, one bit per device; they change as
+    the loop is iterated.
     """
 
     def __init__(
@@ -46,17 +46,21 @@ class MailboxWatch:
 
     @property
     def sees_mail(self) -> bool:
-        """Whether some mailbox was full in this cycle, or is being read."""
+        """True if a mailbox was full in this cycle, or is being read."""
         return bool(self._reading) or any(self._words)
 
     @property
     def next_look_ns(self) -> int:
-        """When a mailbox is to be asked next [ns]."""
+        """Time of the next poll [ns]."""
         return self._due_ns if self._asked else NEVER_NS
 
     def look(self, now_ns: int, cycle: int) -> None:
-        """Lets every mailbox be read that was full in this cycle, unless somebody talks to the
-        device anyway."""
+        """Start reading every full mailbox, except those that other procedures are using.
+
+        Args:
+            now_ns: Time of the link's clock.
+            cycle: Number of the cycle.
+        """
         if self._reading:
             self._note_ends(cycle)
         for rank, word in enumerate(self._words):
@@ -70,7 +74,7 @@ class MailboxWatch:
     def _note_ends(self, cycle: int) -> None:
         for position in [p for p, reading in self._reading.items() if reading.done]:
             del self._reading[position]
-            self._read_in[position] = cycle  # its bit in this cycle may be older
+            self._read_in[position] = cycle  # the bit of this cycle may be older than the read
 
     def _read_full(self, first: int, word: int, cycle: int) -> None:
         for rank in range(first, first + word.bit_length()):
@@ -88,4 +92,4 @@ def _emptied(channel: MailboxChannel) -> Procedure[None]:
     try:
         yield from exclusively(channel, drain(channel, lambda _: None))
     except CatenaryError:
-        return  # it is silent, or talks nonsense: whoever asks it something will be told
+        return  # silent or malformed: the next procedure on this mailbox reports it

@@ -1,4 +1,4 @@
-"""Waiting for a move: a motion that goes on while the loop is iterated."""
+"""Waiting for a move that continues while the loop is iterated."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ def require_move(move: object) -> None:
 
 
 def wait_for_move(cycles: Iterator[Cycle], move: Awaited, timeout: float | None) -> None:
-    """Iterate until a move is done. See `Loop.wait`."""
+    """Iterate until a move is done: see `Loop.wait`."""
     limit = move.patience if timeout is None else timeout
     begun: float | None = None
     while not move.done:
         cycle = next(cycles)
-        now = max(each.time for each in cycle.networks)  # that of a dead one may stand still
+        now = max(each.time for each in cycle.networks)  # the time of a dead network may stop
         begun = now if begun is None else begun
         if not move.done and now - begun > limit:
             raise stopped_late(move, limit)

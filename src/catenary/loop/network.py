@@ -36,7 +36,7 @@ TROUBLE = ENDING | CYCLE_CLOCKS
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """Options of a loop that are the same for all of its networks."""
+    """Options of a loop that all of its networks share."""
 
     period: float
     execution: ExecutionMode
@@ -71,7 +71,7 @@ class Network:
 
     @property
     def plan(self) -> Plan:
-        """The plan that runs: print it."""
+        """Plan of the network: print it."""
         return self.session.plan
 
     @property
@@ -81,7 +81,7 @@ class Network:
 
     @property
     def clocks(self) -> Clocks:
-        """The distributed clocks: print it. RuntimeError if no request has `dc=`."""
+        """Distributed clocks: print it. RuntimeError if no request has `dc=`."""
         clocks = self.session.clocks
         if clocks is None:
             raise RuntimeError("no distributed clocks in this loop: Drives(..., dc=True)")
@@ -94,12 +94,11 @@ class Network:
 
     @property
     def log(self) -> Log:
-        """The last cycles, oldest first: an array, a pandas table, a CSV file."""
+        """The last cycles, oldest first; see `Log`."""
         return self.session.log()
 
     def histogram(self, phase: str) -> list[tuple[float, float, int]]:
-        """Return (lower [s], upper [s], count) of every bucket of a phase of `timing` that is not
-        empty."""
+        """Return (lower [s], upper [s], count) of every non-empty bucket of a phase of `timing`."""
         return self.session.engine.histogram_counts(phase)
 
     def stream(self, capacity: int = 1000) -> Stream:
@@ -109,7 +108,7 @@ class Network:
 
     @property
     def session(self) -> Session:
-        """Its engine and what belongs to it. RuntimeError before the loop is open."""
+        """Session of the network. RuntimeError before the loop is open."""
         if self.running is None:
             raise RuntimeError("the loop is not open: with Loop(...) as loop:")
         return self.running
@@ -118,7 +117,7 @@ class Network:
         """Bring all devices to SAFE-OP and compile all laws.
 
         Args:
-            abandon: leaves the loop when the MainDevice is closed.
+            abandon: Leaves the loop; called when the MainDevice is closed.
         """
         self.running = None
         plan = self._make_plan()
@@ -141,7 +140,7 @@ class Network:
         return running
 
     def _make_plan(self) -> Plan:
-        """Plan the requests. Nothing is written to the devices yet."""
+        """Return the plan of the requests. Nothing is written to the devices yet."""
         its = self._settings
         self.main.read_mappings(*self._requests, period=its.period)
         late_position, late_velocity, late_torque = its.stop.late_limits
@@ -179,13 +178,18 @@ class Network:
         )
 
     def check(self, flags: int) -> None:
-        """Raise the error of a cycle in trouble, if it is one."""
+        """Raise the error of a cycle in trouble, if any."""
         running = self.session
         if flags & TROUBLE or running.engine.al_status != AlState.OP:
             running.judge(flags, faults=self._settings.stop.raise_faults)
 
     def wait_locked(self, within: float, timeout: float) -> None:
-        """See `Loop.wait_locked`."""
+        """Wait until the clocks are locked: see `Loop.wait_locked`.
+
+        Args:
+            within: Bound [s].
+            timeout: Longest wait [s].
+        """
         running = self.session
 
         def advance(flags: int) -> None:
@@ -198,7 +202,7 @@ class Network:
 
 
 def leave_method(loop_leave: Callable[[], None]) -> Callable[[], object]:
-    """Return a call of a bound method that does not keep its object alive."""
+    """Return a function that calls a bound method without keeping its object alive."""
     method = weakref.WeakMethod(loop_leave)
 
     def call() -> None:

@@ -1,7 +1,7 @@
-"""Several networks in one loop: one schedule, an engine and a native thread for each.
+"""Several networks in one loop: a common schedule, and an engine and native thread for each.
 
-The cycle starts of all are those of the first. A network that has failed never holds the others:
-its own thread goes on asking, and its cycles are not good.
+All networks use the cycle starts of the first. A failed network never delays the others: its own
+thread continues to send, and its cycles are not good.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ VIRTUAL = "virtual time"
 
 
 class NetworksCycle(Cycle):
-    """One cycle of several networks. Number and time are those of the first."""
+    """One cycle of several networks. Its number and time are those of the first."""
 
     def __init__(self, runnings: Sequence[Session], quorum: int) -> None:
         super().__init__(runnings[0].engine)
         self._networks = tuple(Cycle(running.engine) for running in runnings)
-        self.alive = (True,) * len(runnings)  # whether each one's devices are in OP
+        self.alive = (True,) * len(runnings)  # True if the network's devices are in OP
         self._quorum = quorum
 
     @property
@@ -40,40 +40,42 @@ class NetworksCycle(Cycle):
 
     @property
     def ok(self) -> bool:
-        """True if as many networks as the quorum were good. A network whose devices are out of OP
-        is not good, even if it answers."""
+        """True if at least as many networks as the quorum were good.
+
+        A network with devices out of OP is not good, even if it answers.
+        """
         good = [n.ok and alive for n, alive in zip(self.networks, self.alive, strict=True)]
         return sum(good) >= self._quorum
 
     @property
     def lost(self) -> int:
-        """Cycles in a row that were not good, of the worst network."""
+        """Largest number of consecutive bad cycles of any network."""
         return max(network.lost for network in self.networks)
 
     @property
     def late(self) -> bool:
-        """True if cycles passed without Python, in any network."""
+        """True if any network had cycles that Python missed."""
         return any(network.late for network in self.networks)
 
     @property
     def limited(self) -> bool:
-        """True if a set-point was limited, in any network."""
+        """True if any network limited a set-point."""
         return any(network.limited for network in self.networks)
 
     @property
     def refused(self) -> bool:
-        """True if a set-point was refused, in any network."""
+        """True if any network refused a set-point."""
         return any(network.refused for network in self.networks)
 
 
 class NetworksIteration:
-    """Iterator that steps all networks once per `next` and yields their one NetworksCycle."""
+    """Iterator that steps all networks once per `next` and yields their common NetworksCycle."""
 
     def __init__(self, networks: Sequence[Network], quorum: int, *, faults: bool) -> None:
         self._runnings = [network.session for network in networks]
         self._quorum = quorum
         self._faults = faults
-        self._dead: set[int] = set()  # by identity: those that have failed and not returned
+        self._dead: set[int] = set()  # identities of the failed networks that have not returned
         self._cycle: NetworksCycle | None = None
         self.commit_lock: Lock | None = None  # see core.Iteration
 
@@ -111,7 +113,7 @@ class NetworksIteration:
                 lock.release()
 
     def step_movers(self) -> None:
-        """Write the targets of axes that move."""
+        """Write the targets of moving axes."""
         if self._cycle is None:
             return
         for one, its in zip(self._runnings, self._cycle.networks, strict=True):
@@ -119,7 +121,7 @@ class NetworksIteration:
                 mover.step(its.time)
 
     def _judge(self, cycle: NetworksCycle, flags: Sequence[int]) -> None:
-        """Raise what ends the loop: too few networks, or trouble in one that is alive."""
+        """Raise the error that ends the loop: too few networks, or trouble in a live one."""
         alive = [self._lives(one, mine) for one, mine in zip(self._runnings, flags, strict=True)]
         cycle.alive = tuple(alive)
         for one, mine, lives in zip(self._runnings, flags, alive, strict=True):
@@ -131,10 +133,10 @@ class NetworksIteration:
                 one.judge(mine, faults=self._faults)
 
     def _lives(self, one: Session, flags: int) -> bool:
-        """Return whether a network carries its devices.
+        """Return whether a network is alive.
 
-        A network that had failed and answers again counts once its devices are in OP: those that
-        their watchdogs stopped do not stop the other networks.
+        A failed network that answers again counts once its devices are in OP. Devices that were
+        stopped by their watchdogs thus do not stop the other networks.
         """
         if flags & NETWORK_TROUBLE:
             self._dead.add(id(one))
@@ -152,14 +154,14 @@ def share_time(runnings: Sequence[Session]) -> None:
     """In virtual time, let this thread run the cycles of all networks in turns.
 
     Raises:
-        ValueError: the networks have different clocks.
+        ValueError: The networks have different clocks.
     """
     virtual = [one.engine.scheduling == VIRTUAL for one in runnings]
     if not any(virtual):
         return
     if not all(virtual) or not _have_one_clock([one.main.link for one in runnings]):
         raise ValueError(
-            "the networks of one loop need one time: give their segments the same clock, "
+            "the networks of one loop need a common time: give their segments the same clock, "
             "Segment(..., clock=VirtualClock())"
         )
     for one in runnings:
@@ -167,7 +169,12 @@ def share_time(runnings: Sequence[Session]) -> None:
 
 
 def leave_all(runnings: Sequence[Session], guard: SignalGuard) -> list[Exception]:
-    """Stop every network that answers, whatever happens to the others. Return the problems."""
+    """Stop every network that answers, whatever happens to the others; return the problems.
+
+    Args:
+        runnings: Sessions of the loop.
+        guard: Shortens the waits at a second signal.
+    """
     problems: list[Exception] = []
     try:
         for running in runnings[:1]:  # one thread iterates all
@@ -182,7 +189,12 @@ def leave_all(runnings: Sequence[Session], guard: SignalGuard) -> list[Exception
 
 
 def brake(runnings: Sequence[Session], guard: SignalGuard) -> None:
-    """Stop all axes of all networks at once, in slices, until they stand or the deadline."""
+    """Stop all axes of all networks together; wait for standstill, or until the deadline.
+
+    Args:
+        runnings: Sessions of the loop.
+        guard: Ends the wait at a second signal.
+    """
     for one in runnings:
         one.make_outputs_safe()
     moving = [one for one in runnings if one.is_open and one.plan.cycle.axes]
@@ -196,15 +208,15 @@ def brake(runnings: Sequence[Session], guard: SignalGuard) -> None:
 
 
 def clocks_of_several(options: ClockOptions) -> ClockOptions:
-    """Return the options, checked: the clocks of several networks follow the MainDevice.
+    """Return the checked options: the clocks of several networks follow the MainDevice.
 
     Raises:
-        ValueError: `lead="reference"`.
+        ValueError: `lead` is "reference".
     """
     if options.lead == "reference":
         raise ValueError(
-            'several networks need lead="main": each reference clock would have its own cycle '
-            "starts, and one schedule has one"
+            'several networks need lead="main": every reference clock would require its own cycle '
+            "starts, but the networks share one schedule"
         )
     return replace(options, lead="main")
 
@@ -212,13 +224,19 @@ def clocks_of_several(options: ClockOptions) -> ClockOptions:
 def cpus_for(count: int, cpu: int | Sequence[int] | None) -> list[int | None]:
     """Return the CPU of each network's thread.
 
-    None: where there are more CPUs than networks, the last ones; else unchanged.
+    Args:
+        count: Number of networks.
+        cpu: Requested CPU or CPUs. None: the last ones, if there are more CPUs than networks; else
+            unchanged.
+
+    Raises:
+        ValueError: The number of CPUs is not the number of networks.
     """
     if isinstance(cpu, int):
         return [cpu] * count
     if cpu is not None:
         if len(cpu) != count:
-            raise ValueError(f"cpu: {len(cpu)} for {count} networks")
+            raise ValueError(f"cpu: {len(cpu)} CPUs for {count} networks; give one CPU for each")
         return list(cpu)
     allowed = sorted(os.sched_getaffinity(0))
     if len(allowed) <= count:
@@ -227,12 +245,12 @@ def cpus_for(count: int, cpu: int | Sequence[int] | None) -> list[int | None]:
 
 
 def _have_one_clock(links: Sequence[Link]) -> bool:
-    """Return whether time that passes on the first passes on all."""
+    """Return whether advancing the first clock advances all clocks."""
     first, *others = links
     later = max(link.now() for link in links) + 1000
     first.wait_until(later, False)
     for link in others:
-        link.wait_until(0, False)  # reads its clock
+        link.wait_until(0, False)  # updates its clock
     return all(link.now() >= later for link in others)
 
 
@@ -240,4 +258,4 @@ def _stands(running: Session) -> bool:
     try:
         return running.engine.run_until_stopped(STOP_SLICE_NS)
     except (CatenaryError, OSError):
-        return True  # its link is gone: nothing more can be done from here
+        return True  # the link failed: no further action is possible

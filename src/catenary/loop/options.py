@@ -1,4 +1,4 @@
-"""Options of a Loop, grouped: what stops it, how its thread is scheduled, how clocks are kept."""
+"""Grouped options of a Loop: stop conditions, scheduling and distributed clocks."""
 
 from __future__ import annotations
 
@@ -24,29 +24,29 @@ COMMAND_TIMEOUT_TORQUE = 0.020  # [s], CST
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StopPolicy:
-    """What stops axes or ends a loop, and what happens to devices that return.
+    """Conditions that stop axes or end a loop, and the handling of devices that return.
 
     Args:
-        late_limit: time without fresh set-points, then quick stop [s]. None: 50 ms in CSP and CSV,
-            10 ms in CST. 0: never; refused for axes that use CST.
-        handover: time for which CST keeps its torque after a law or stream ended, then quick stop
-            [s].
-        command_timeout: in the background, time for which the targets of an update count [s]; then
-            CSV decelerates and CST stops quickly. None: 0.2 s in CSV, 20 ms in CST. CSP holds
-            without limit.
-        stop_deadline: time for the axes to reach standstill when the loop is left [s].
-        lost_limit: cycles in a row without all answers, then WorkingCounterError.
-        raise_faults: a drive in fault, or one that left OPERATION_ENABLED by itself (STO), raises
-            DriveError; else see `Drives.faults` and `Drives.stopped`.
-        on_axis_stopped: the core stopped a required axis without a request: "raise" DriveError, or
-            only the "event" `AxisStopped`; see `Drives.stopped`.
-        on_return: a device that no request requires comes back: "restore" replays its start-up
-            objects and brings it to OP; "hold" keeps it in PRE-OP until `Loop.restore`.
-        on_replacement: the same for another device of the same product in its place. A held one is
-            not even brought to PRE-OP.
+        late_limit: Time without fresh set-points before a quick stop [s]. None: 50 ms in CSP and
+            CSV, 10 ms in CST. 0: never; refused for axes that use CST.
+        handover: Time for which CST keeps its torque after a law or stream ended, before a quick
+            stop [s].
+        command_timeout: In the background, time for which the targets of an update are valid [s].
+            After it, CSV decelerates and CST stops quickly. None: 0.2 s in CSV, 20 ms in CST. CSP
+            holds without limit.
+        stop_deadline: Time for the axes to reach standstill when the loop is left [s].
+        lost_limit: Number of consecutive bad cycles that raises WorkingCounterError.
+        raise_faults: True: raise DriveError if a drive is in fault or leaves OPERATION_ENABLED by
+            itself (STO). False: see `Drives.faults` and `Drives.stopped`.
+        on_axis_stopped: Reaction if the core stops a required axis without a request. "raise":
+            DriveError. "event": only the event `AxisStopped`; see `Drives.stopped`.
+        on_return: Reaction if an optional device returns. "restore": replay its start-up objects
+            and bring it to OP. "hold": keep it in PRE-OP until `Loop.restore`.
+        on_replacement: The same for another device of the same product in its place. A held
+            replacement is not even brought to PRE-OP.
 
     Raises:
-        ValueError: an option is impossible.
+        ValueError: An option is impossible.
     """
 
     late_limit: float | None = None
@@ -94,24 +94,24 @@ class StopPolicy:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scheduling:
-    """How a loop waits for time and frames.
+    """Waiting of a loop for time and frames.
 
     Args:
-        receive: how the cycle waits for its frames: "poll", "wait" or "busy". None: "wait" when
+        receive: Waiting of the cycle for its frames: "poll", "wait" or "busy". None: "wait" when
             threaded, "poll" when inline.
-        busy_wait: busy-wait before each cycle start instead of a plain sleep [s]. It costs as much
-            processor time.
-        switch_interval: of the interpreter while an inline loop is open in real time [s]. None:
-            unchanged; see `interpreter` in `Loop.timing`.
-        collect_deadline: threaded: share of the period in which frames may return. The budget of a
-            law shortens it.
-        exact_matching: every cyclic frame carries the cycle number in a NOP datagram. A frame that
-            a loop in the wiring or a second sender repeats is then never accepted as a current
-            one. Costs 16 bytes and 1.3 us of wire time per frame.
-        quorum: of several networks, how many must be good for a cycle to be good. None: all.
+        busy_wait: Time of a busy-wait before each cycle start [s]; the rest of the wait is a sleep.
+            It costs that much processor time per cycle.
+        switch_interval: Switch interval of the interpreter while an inline loop is open in real
+            time [s]. None: unchanged; see `interpreter` in `Loop.timing`.
+        collect_deadline: If threaded, share of the period in which frames may return. The budget of
+            a law shortens it.
+        exact_matching: True: every cyclic frame carries the cycle number in a NOP datagram. A frame
+            that a loop in the wiring or a second sender repeats is then never accepted as a current
+            one. This costs 16 bytes and 1.3 us of wire time per frame.
+        quorum: Number of networks that must be good for a cycle to be good. None: all.
 
     Raises:
-        ValueError: an option is impossible.
+        ValueError: An option is impossible.
     """
 
     receive: ReceiveMode | None = None
@@ -137,19 +137,19 @@ class Scheduling:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClockOptions:
-    """How distributed clocks are kept, for requests with `dc=`.
+    """Synchronisation of distributed clocks, for requests with `dc=`.
 
     Args:
-        lead: the clock that gives the time. "reference": the cycle start follows the reference
-            clock. "main": the reference clock follows the MainDevice. None: "reference"; with
-            several networks "main", the only possible one.
-        reference: device with the reference clock. None: the first that has a clock.
-        margin: latest time of the frames after the cycle start [s]. None: 20 % of the period when
+        lead: Clock that gives the time. "reference": the cycle start follows the reference clock.
+            "main": the reference clock follows the MainDevice. None: "reference"; with several
+            networks "main", the only possible value.
+        reference: Device with the reference clock. None: the first device with a clock.
+        margin: Latest time of the frames after the cycle start [s]. None: 20 % of the period when
             threaded and for laws, 50 % when inline.
-        burst: frames that bring the clocks together before the cycle begins.
+        burst: Number of frames that synchronise the clocks before the cycle begins.
 
     Raises:
-        ValueError: an option is impossible.
+        ValueError: An option is impossible.
     """
 
     lead: FollowedClock | None = None
@@ -167,13 +167,25 @@ class ClockOptions:
 
 
 def check_count(name: str, value: int, least: int) -> None:
-    """Raise ValueError unless a value is an integer and at least `least`."""
+    """Raise ValueError unless a value is an integer and at least `least`.
+
+    Args:
+        name: Name for the error message.
+        value: Value to check.
+        least: Smallest allowed value.
+    """
     if not isinstance(value, Integral) or value < least:
         raise ValueError(f"{name}={value}: must be a whole number, at least {least}")
 
 
 def check_groups(stop: StopPolicy, scheduling: Scheduling, clocks: ClockOptions) -> None:
-    """Raise TypeError for a group of options that is something else."""
+    """Raise TypeError if a group of options has the wrong type.
+
+    Args:
+        stop: Stop conditions.
+        scheduling: Scheduling options.
+        clocks: Clock options.
+    """
     for name, value, kind in (
         ("stop", stop, StopPolicy),
         ("scheduling", scheduling, Scheduling),
@@ -184,7 +196,13 @@ def check_groups(stop: StopPolicy, scheduling: Scheduling, clocks: ClockOptions)
 
 
 def one_of(name: str, value: object, allowed: tuple[object, ...]) -> None:
-    """Raise ValueError for a value that is not one of those allowed."""
+    """Raise ValueError for a value that is not allowed.
+
+    Args:
+        name: Name for the error message.
+        value: Value to check.
+        allowed: Allowed values.
+    """
     if value not in allowed:
         names = ", ".join(f'"{each}"' for each in allowed if each is not None)
         raise ValueError(f"{name}={value!r}: must be one of {names}")

@@ -1,5 +1,4 @@
-"""What a loop gives to a sink: the blocks of the core by names and units, and what happens beside
-the cycle."""
+"""Publishing of a loop to a sink: the blocks of the core with names and units, and the events."""
 
 from __future__ import annotations
 
@@ -28,7 +27,7 @@ EVENT_FIELDS = {field.name for field in fields(Event)}
 
 
 class Publisher:
-    """Owns a loop's side of its sink, from `open` to `close`."""
+    """Owns a loop's connection to its sink, from `open` to `close`."""
 
     def __init__(self, sink: Sink, main: MainDevice, engine: Engine, plan: Plan) -> None:
         self._sink = sink
@@ -44,11 +43,11 @@ class Publisher:
         self._forget: Callable[[], None] = main.events.listen(self._hear)
 
     def tell_end(self, error: BaseException) -> None:
-        """The error that ends the loop."""
+        """Publish the error that ends the loop."""
         self._tell(type(error).__name__, str(error), self._engine.now() * 1e-9, None, {})
 
     def close(self) -> None:
-        """After the engine was stopped."""
+        """Close the sink; call it after the engine has stopped."""
         if self._ended:
             return
         self._ended = True
@@ -77,7 +76,7 @@ class Publisher:
 
 
 def plain(value: object) -> object:
-    """As JSON has it: numbers and texts stay."""
+    """Return a value that JSON can represent; numbers and texts are unchanged."""
     if isinstance(value, bytes):
         return value.hex(" ")
     if isinstance(value, tuple):
@@ -86,7 +85,12 @@ def plain(value: object) -> object:
 
 
 def sink_layout(engine: Engine, plan: Plan) -> SinkLayout:
-    """What the loop gives in every cycle."""
+    """Return the layout of the data that the loop publishes in every cycle.
+
+    Args:
+        engine: Engine with the blocks.
+        plan: Plan of the loop.
+    """
     actual, target = engine.sink_fields()
     kinds = sorted({axis.linear for axis in plan.cycle.axes})  # linear axes after rotary ones
     own = [
@@ -115,7 +119,7 @@ def sink_layout(engine: Engine, plan: Plan) -> SinkLayout:
 
 
 def of_record() -> Iterator[SinkField]:
-    """The times and flags of the cycle."""
+    """Yield the times and flags of the cycle."""
     places = np.dtype(RECORD_FIELDS).fields
     assert places is not None
     for name, (kind, offset, *_) in places.items():
@@ -124,7 +128,13 @@ def of_record() -> Iterator[SinkField]:
 
 
 def of_block(block: Block, places: Places, kinds: Sequence[bool] = ()) -> Iterator[SinkField]:
-    """Yield what every loop has; arrays of no length are left out. `kinds`: see `unit_of`."""
+    """Yield the fields that every loop has; empty arrays are omitted.
+
+    Args:
+        block: Block of the core.
+        places: Fields of the block by name.
+        kinds: Kinds of axes: see `unit_of`.
+    """
     for name, (offset, code, count) in places.items():
         if name in LEFT_OUT or count == 0:
             continue
@@ -133,11 +143,11 @@ def of_block(block: Block, places: Places, kinds: Sequence[bool] = ()) -> Iterat
 
 
 def unit_of(name: str, kinds: Sequence[bool] = ()) -> str:
-    """Return the unit of a field: "rad", of linear axes "m", "rad or m" if there are both.
+    """Return the unit of a field: "rad"; for linear axes "m"; "rad or m" if both kinds occur.
 
     Args:
         name: Name of the field.
-        kinds: Kinds of axes that there are; True: linear.
+        kinds: Kinds of axes of the loop; True: linear.
     """
     if name.endswith("_ns"):
         return "ns"
@@ -148,7 +158,13 @@ def unit_of(name: str, kinds: Sequence[bool] = ()) -> str:
 def columns_of(
     block: Block, places: Places, columns: Iterable[Sequence[Column]]
 ) -> Iterator[tuple[SinkField, int]]:
-    """Every column with its device: a group as one array, a single one as a number."""
+    """Yield every column and its device: a group as one array, a single column as a number.
+
+    Args:
+        block: Block of the core.
+        places: Fields of the block by name.
+        columns: Columns of each request.
+    """
     used = dict.fromkeys(Bank, 0)
     for of_wish in columns:
         for (group, bank), members in groupby(of_wish, key=lambda c: (c.group, c.bank)):
@@ -164,7 +180,14 @@ def columns_of(
 def areas_of(
     block: Block, name: str, places: Places, areas: Iterable[ImageArea]
 ) -> Iterator[tuple[SinkField, int]]:
-    """The bytes of each area as one array, with its device."""
+    """Yield the bytes of each area as one array, and its device.
+
+    Args:
+        block: Block of the core.
+        name: Name of the field.
+        places: Fields of the block by name.
+        areas: Areas of the block.
+    """
     offset, code, _ = places["bytes"]
     for area in areas:
         yield SinkField(name, block, offset, code, area.size), area.device
@@ -174,7 +197,14 @@ def areas_of(
 def with_own_names(
     columns: Sequence[tuple[SinkField, int]], taken: set[str]
 ) -> Iterator[SinkField]:
-    """A name that several have gets its device with it, and a number where that is not enough."""
+    """Yield the columns with unique names.
+
+    A name that several columns share is extended by the device, then by a number if necessary.
+
+    Args:
+        columns: Columns and their devices.
+        taken: Names in use; it is extended.
+    """
     often = Counter(each.name for each, _ in columns)
     for each, device in columns:
         name = each.name
@@ -188,13 +218,21 @@ def with_own_names(
 
 
 def one_sink_each(sinks: Sink | Sequence[Sink] | None, networks: int) -> list[Sink | None]:
-    """The sink of every network. ValueError: not as many."""
+    """Return the sink of every network.
+
+    Args:
+        sinks: One sink, or one for each network.
+        networks: Number of networks.
+
+    Raises:
+        ValueError: The number of sinks is not the number of networks.
+    """
     if sinks is None:
         return [None] * networks
     given = list(sinks) if isinstance(sinks, Sequence) else [sinks]
     if len(given) != networks:
         raise ValueError(
-            f"sink: {len(given)} for {networks} networks; each needs one of its own: "
+            f"sink: {len(given)} for {networks} networks; give each network its own sink: "
             "sink=[cat.Share('upper'), cat.Share('lower')]"
         )
     return list(given)

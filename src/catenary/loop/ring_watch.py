@@ -1,4 +1,4 @@
-"""The watch over the cables of a ring: told by the counters of the two copies of every cycle."""
+"""Watch over the cables of a ring, by the counters of the two copies of every cycle."""
 
 from __future__ import annotations
 
@@ -9,8 +9,11 @@ from catenary.bus.ring import Cuts, Ends, HasState, find_cuts, named
 
 
 class RingWatch:
-    """Owns which cables of a ring have been told to be cut. A change is told at the second look
-    that finds it: while cables are pulled the copies are counted in different moments."""
+    """Owns the cables of a ring that were reported as cut.
+
+    A change is reported when two consecutive looks find it. While a cable is being pulled, the
+    counters of the copies are from different moments.
+    """
 
     def __init__(
         self,
@@ -28,7 +31,7 @@ class RingWatch:
         self._told: tuple[Ends, ...] = ()
 
     def look(self) -> None:
-        """Tells what has changed."""
+        """Put an event for each cable that has changed."""
         found = find_cuts(self._ring.state, self._device_count)
         settled = found == self._found
         self._found = found

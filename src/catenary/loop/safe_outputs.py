@@ -1,4 +1,4 @@
-"""Safe values of outputs when a loop ends: set at once, and exchanged before the states go down."""
+"""Safe values of outputs when a loop ends: set at once, exchanged before the states go down."""
 
 from __future__ import annotations
 
@@ -12,12 +12,17 @@ from catenary.loop.signals import SignalGuard
 from catenary.plan.cycle import CyclePlan
 from catenary.plan.request import Views
 
-TIMEOUT_NS = 100_000_000  # for an exchange with safe outputs, or so many exchanges:
+TIMEOUT_NS = 100_000_000  # for an exchange with safe outputs, or this number of exchanges:
 EXCHANGES = 5
 
 
 def make_safe(plan: CyclePlan, views: Views) -> None:
-    """Set the bytes of all areas to their safe values. The next cycle sends them."""
+    """Set the bytes of all areas to their safe values. The next cycle sends them.
+
+    Args:
+        plan: Plan of the cycle.
+        views: All private buffers.
+    """
     safe = b"".join(area.safe for area in plan.output_areas)
     views.output_bytes[:] = np.frombuffer(safe, np.uint8)
 
@@ -28,7 +33,7 @@ def confirm_safe(
     """Run cycles until the devices with safe outputs have received them.
 
     Args:
-        plan: Of the loop.
+        plan: Plan of the cycle.
         views: All private buffers.
         cycle: Runs a cycle and returns its flags.
         guard: Shortens the wait at a second signal.
@@ -40,7 +45,7 @@ def confirm_safe(
         return
     units = {area.sync_unit for area in plan.output_areas}
     missing = required = {unit for unit in units if not plan.sync_units[unit].optional}
-    turn = max(plan.sync_units[unit].divider for unit in units) + 2  # one may have been sent
+    turn = max(plan.sync_units[unit].divider for unit in units) + 2  # one may be under way
     for done in range(max(TIMEOUT_NS // plan.period_ns, EXCHANGES * turn)):
         if cycle() & (CYCLE_STOPPED | CYCLE_NONE):
             missing = required
@@ -53,6 +58,6 @@ def confirm_safe(
     names = ", ".join(f"device {a.name}" for a in plan.output_areas if a.sync_unit in missing)
     raise LoopError(
         f"{names}: did not confirm the safe values of the outputs",
-        hint="a device that answers has received them, even if another one of its sync unit is "
-        "silent; a silent device does what its watchdog says",
+        hint="a device that answers has received them, even if another device of its sync unit is "
+        "silent; the outputs of a silent device depend on its watchdog",
     )

@@ -1,4 +1,4 @@
-"""What an open loop owns: the engine, its arrays, and the conversations beside the cycle."""
+"""Session of an open loop: the engine, its arrays and the acyclic queue of one MainDevice."""
 
 from __future__ import annotations
 
@@ -52,10 +52,10 @@ from catenary.wire.al import AlState
 from catenary.wire.cia402 import IN_FAULT, AxisState, Mode, state_of
 
 FATAL = CYCLE_WORKING_COUNTER | CYCLE_STOPPED | CYCLE_NONE
-ENABLE_TIMEOUT_NS = 5_000_000_000  # mains contactors and brakes are slow, but not this slow
-ENABLE_CYCLES = 20  # where the period is long
-SETTLE_CYCLES = 50  # until the first cycle with all answers
-STOP_SLICE_NS = 20_000_000  # between looks at "hurry" while the drives brake
+ENABLE_TIMEOUT_NS = 5_000_000_000  # longer than slow mains contactors and brakes need
+ENABLE_CYCLES = 20  # at least, for long periods
+SETTLE_CYCLES = 50  # at most, until the first cycle with all answers
+STOP_SLICE_NS = 20_000_000  # between checks of "hurry" while the drives brake
 
 
 class Session:
@@ -95,34 +95,34 @@ class Session:
         self.switch_interval: float | None = None  # [s] of the interpreter, inline
         self._attached = ExitStack()
         self._opened = self._left = False
-        self._abandon = abandon  # leaves the loop, when the MainDevice is closed round it
+        self._abandon = abandon  # leaves the loop if the MainDevice is closed before it
         self._process = os.getpid()
         forget_in_child(self)
         self._companions: Sequence[Session] = ()
         self._watches: list[Pending[None]] = []
         self._publisher: Publisher | None = None
-        self._counted: Mapping[str, int] = {}  # by the engine, until the loop was entered
+        self._counted: Mapping[str, int] = {}  # counters of the engine when the loop was entered
         self.end_background: Callable[[], None] = _no_background  # the thread that iterates
         self.service.cycle = self.cycle
 
     # Opening
 
     def publish(self, sink: Sink) -> None:
-        """Gives every cycle to the sink, from the first one on."""
+        """Publish every cycle to the sink, from the first one on."""
         self._publisher = Publisher(sink, self.main, self.engine, self.plan)
 
     def tell_end(self, error: BaseException) -> None:
-        """Lets those who read along know why the loop ends."""
+        """Publish the error that ends the loop."""
         if self._publisher is not None:
             self._publisher.tell_end(error)
 
     def share_time(self, companions: Sequence[Session]) -> None:
-        """Networks whose cycles this thread must run as well, in virtual time."""
+        """Let this thread also run the cycles of other networks, in virtual time."""
         self._companions = companions
         self.engine.take_turns()
 
     def cycle(self) -> int:
-        """One cycle without an application, and one of each companion."""
+        """Run one cycle without an application, and one of each companion; return its flags."""
         flags = self.engine.run(1)
         for other in self._companions:
             if other.is_open:
@@ -132,12 +132,12 @@ class Session:
 
     @property
     def is_open(self) -> bool:
-        """True if its cycle runs, in this process."""
+        """True if the cycle runs, in this process."""
         return self._opened and not self._left and self._process == os.getpid()
 
     @property
     def in_background(self) -> bool:
-        """True if a thread of ours iterates, or did until the loop was left."""
+        """True if a background thread iterates, or did until the loop was left."""
         return self.end_background is not _no_background
 
     def require_open(self) -> None:
@@ -148,8 +148,11 @@ class Session:
             raise RuntimeError("the loop is closed: open it again, or use it in a with block")
 
     def open(self, origin_ns: int = 0) -> None:
-        """From SAFE-OP to OP: the cycle starts, and valid outputs flow while the states change.
-        `origin_ns`: an instant of the grid to keep to."""
+        """Start the cycle, and bring the devices from SAFE-OP to OP while valid outputs flow.
+
+        Args:
+            origin_ns: A cycle start of the schedule to follow; 0: a new schedule.
+        """
         self._attached.enter_context(self.main.attached(self.service.runner, self._abandon))
         inline = self.plan.cycle.execution == "inline" and self.engine.scheduling != "virtual time"
         if inline and self.switch_interval is not None:
@@ -162,10 +165,12 @@ class Session:
         self._watches = self.exchange.bring_to_op()
 
     def enable(self) -> None:
-        """Reset faults and enable all axes. Position axes hold when this returns; velocity and
-        torque axes wait for their first targets."""
+        """Reset faults and enable all axes.
+
+        Position axes hold when this returns; velocity and torque axes wait for their first targets.
+        """
         in_position = np.isin(self.views.mode_target, (Mode.CSP, Mode.PP))
-        if (~in_position & self._in_fault()).any():  # their targets would come too late
+        if (~in_position & self._in_fault()).any():  # enabling resets too late for their targets
             self._request(GOAL_RESET, ~in_position & self._in_fault())
             self._await(lambda: ~in_position & self._in_fault())
         self._request(GOAL_ENABLED, np.ones_like(in_position))
@@ -180,7 +185,7 @@ class Session:
         return np.isin(self.views.axis_state, [int(state) for state in IN_FAULT])
 
     def _await(self, waiting: Callable[[], npt.NDArray[np.bool_]]) -> None:
-        """Run cycles until no axis is waiting; DriveError names those that still are."""
+        """Run cycles until no axis is waiting; raise DriveError for axes that still wait."""
         patience = max(ENABLE_TIMEOUT_NS, ENABLE_CYCLES * self.plan.cycle.period_ns)
         deadline = self.engine.now() + patience
         while True:
@@ -204,13 +209,13 @@ class Session:
             return
         names = [self.plan.cycle.axes[i].name for i in np.flatnonzero(powered).tolist()]
         raise LoopError(
-            f"{call}: {', '.join(names)} powered in CST, and no torque set-points while it waits",
+            f"{call}: {', '.join(names)} powered in CST, but the call commits no torque set-points",
             log=self.log(),
-            hint="wait before the first torque is committed, disable the axes, or switch to CSP",
+            hint="call it before the first torque is committed, disable the axes, or switch to CSP",
         )
 
     def settle(self) -> None:
-        """Until all units answer: the first cycles of a new thread may find nobody."""
+        """Run cycles until all units answer. The first cycles of a thread may have no answers."""
         for _ in range(SETTLE_CYCLES):
             flags = self.cycle()
             self.raise_ended(flags)
@@ -221,7 +226,7 @@ class Session:
     # Session
 
     def reset_figures(self) -> None:
-        """Begin the timing and the figures of the clocks anew."""
+        """Restart the timing and the figures of the clocks."""
         self.engine.reset_histograms()
         if self.clocks is not None:
             self.clocks.reset()
@@ -235,7 +240,12 @@ class Session:
         return Timing(engine.histograms(), since, period=period, scheduling=engine.scheduling)
 
     def judge(self, flags: int, *, faults: bool) -> None:
-        """Announce what happened in a cycle in trouble, and raise its error, if it is one."""
+        """Announce the events of a cycle in trouble, and raise its error, if any.
+
+        Args:
+            flags: Flags of the cycle.
+            faults: True to raise DriveError for drives in fault or stopped by themselves.
+        """
         for mover in list(self.views.movers):
             mover.check()
         self.raise_ended(flags)
@@ -262,12 +272,13 @@ class Session:
         self._raise_stopped([s for s in stops if self.watch.requires(s.device)], faults=faults)
 
     def _announce_axes(self, *, explained: bool = False) -> list[StoppedAxis]:
-        """Put one event for each axis that the core stopped unasked and each refused mode.
+        """Put an event for each axis that the core stopped unasked and each refused mode.
 
         Args:
-            explained: True if no flag of a cycle asks for it: see `new_refusals`.
+            explained: True if no flag of a cycle caused the call: see `new_refusals`.
 
-        Returns the new stops.
+        Returns:
+            The new stops.
         """
         stops = self._axis_watch.new_stops()
         refusals = self._axis_watch.new_refusals(explained=explained or bool(stops))
@@ -300,26 +311,26 @@ class Session:
             raise LoopError("the cycle has ended: the link failed", log=self.log())
         if flags & CYCLE_NONE:
             raise LoopError(
-                "no new cycle for 1 s",
+                "cycle thread stalled: no cycle completed within 1 s",
                 log=self.log(),
                 hint="the native thread does not get the CPU: see loop.scheduling",
             )
 
     def log(self) -> Log:
-        """The last cycles, oldest first."""
+        """Return the last cycles, oldest first."""
         return read_log(self.engine, self.plan.cycle)
 
     # Leaving
 
     def forget(self) -> None:
-        """Let go of cycle, threads and devices in a forked child: they are the parent's."""
+        """Release the cycle, threads and devices in a forked child: they belong to the parent."""
         self._left = True
         self.engine.forget()
 
     def leave(self, guard: SignalGuard) -> list[Exception]:
-        """Stop the loop and return what went wrong. No step depends on the success of another.
+        """Stop the loop and return the problems. No step depends on the success of another.
 
-        No effect the second time, or in a forked child.
+        No effect on a second call, or in a forked child.
         """
         if self._process != os.getpid():
             self.forget()
@@ -339,7 +350,7 @@ class Session:
         for step in steps:
             try:
                 step(guard)
-            except Exception as problem:  # the next step matters more; all are told at the end
+            except Exception as problem:  # the next step matters more; all problems are returned
                 problems.append(problem)
         self.main.events.end_loop()
         return problems
@@ -357,7 +368,7 @@ class Session:
             mover.end()
 
     def _stop_axes(self, guard: SignalGuard) -> None:
-        """Quick stop as each drive's 0x605A says, exchanged until all stand."""
+        """Stop all axes quickly (the drive's 0x605A), and run cycles until they stand."""
         self.engine.stop_law()
         if not self.plan.cycle.axes:
             return
@@ -367,8 +378,7 @@ class Session:
                 return
 
     def stop_axes_at_once(self) -> None:
-        """All axes brake from the next cycle on. What the body has asked for and not committed yet
-        must not come after it."""
+        """Stop all axes from the next cycle on; replace requests that are not committed yet."""
         self.views.goal[:] = GOAL_QUICK_STOP
         self.views.request[:] += 1
         self.engine.quick_stop_all()
@@ -378,12 +388,12 @@ class Session:
             self.service.end()
         finally:
             self.engine.stop()
-            self._attached.close()  # from here on other threads use the link
+            self._attached.close()  # from here on, other threads may use the link
             if self._publisher is not None:
                 self._publisher.close()
 
     def _tell_of_watches(self, guard: SignalGuard) -> None:
-        """They are endless: one that has ended before the loop did so by its own fault."""
+        """Raise the error of a watch: watches are endless, so one that has ended has failed."""
         for watch in self._watches:
             if watch.error is not None and not isinstance(watch.error, LoopError):
                 raise watch.error
@@ -393,12 +403,12 @@ class Session:
             self.main.leave()
         except LinkError:
             if any(self.watch.requires(sub.position) for sub in self.main.subs):
-                raise  # else the loop has ended as it ran: without its devices
+                raise  # otherwise the loop ends without its optional devices, as it ran
 
     # Errors
 
     def suspects(self) -> list[int]:
-        """Return the positions of required devices whose unit did not answer last."""
+        """Return the positions of required devices in units without a last answer."""
         units = self.plan.cycle.sync_units
         valid = self.engine.buffers["unit_valid"].tolist()
         return [
@@ -409,7 +419,7 @@ class Session:
         ]
 
     def _drive_error(self, axes: Sequence[int], what: str) -> DriveError:
-        """The error for some axes, with what each drive says about it."""
+        """Return the error for some axes, with the state and error code of each drive."""
         log = self.log()
         states = [state_of(self.views.statusword.item(axis)) for axis in axes]
         self.stop_axes_at_once()
@@ -421,11 +431,11 @@ class Session:
 
 
 def _no_background() -> None:
-    """The program iterates the loop itself."""
+    """Do nothing: the program iterates the loop itself."""
 
 
 def take_down(main: MainDevice) -> list[Exception]:
-    """The way down of a loop that never began to cycle."""
+    """Bring down the devices of a loop that never started to cycle; return the problems."""
     try:
         main.leave()
     except CatenaryError as problem:

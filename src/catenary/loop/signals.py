@@ -1,9 +1,10 @@
-"""Ctrl-C, SIGTERM and SIGHUP while a loop is open: leaving is never cut short half-way.
+"""Ctrl-C, SIGTERM and SIGHUP while a loop is open: leaving is never interrupted.
 
-Only in the main thread, where Python delivers signals. Outside of leaving, Ctrl-C does what it did
-before. SIGTERM and SIGHUP (the terminal or the ssh connection is gone) raise SystemExit unless the
-application handles them. All end in the loop's `__exit__`. While the loop is being left none
-raises: each asks to hurry. A signal that is ignored stays ignored: `nohup` ignores SIGHUP.
+Handlers are only installed in the main thread, where Python delivers signals. Outside of leaving,
+Ctrl-C keeps its former effect. SIGTERM and SIGHUP (the terminal or the ssh connection closed) raise
+SystemExit unless the application handles them. All of them end in the loop's `__exit__`. While the
+loop is being left, a signal raises nothing and only shortens the waits. A signal that is ignored
+stays ignored: `nohup` ignores SIGHUP.
 """
 
 from __future__ import annotations
@@ -33,12 +34,12 @@ class SignalGuard:
         self.hurry = False
 
     def install(self) -> None:
-        """Take the signals over; a no-op outside the main thread, and where they are ours."""
+        """Install the signal handlers; a no-op outside the main thread or if they are installed."""
         if threading.current_thread() is not threading.main_thread():
             return
         for number in SIGNALS:
             before = signal.getsignal(number)
-            # None: not from Python, so not ours to give back. SIG_IGN: ignored on purpose.
+            # None: not set from Python, so it cannot be restored. SIG_IGN: ignored on purpose.
             if before is None or before is signal.SIG_IGN or before == self._handle:
                 continue
             self._before[number] = before
@@ -46,8 +47,10 @@ class SignalGuard:
         forget_in_child(self)
 
     def restore(self) -> None:
-        """Give the signals back. In another thread, where Python cannot do that, the handlers stay
-        and do what was done before them."""
+        """Restore the former handlers.
+
+        In another thread Python cannot do that: the handlers stay and call the former ones.
+        """
         if threading.current_thread() is not threading.main_thread():
             return
         while self._before:
@@ -68,7 +71,7 @@ class SignalGuard:
         elif number == signal.SIGINT:
             raise KeyboardInterrupt
         else:
-            raise SystemExit(128 + number)  # what a shell reports of a process ended by a signal
+            raise SystemExit(128 + number)  # the exit status of a shell after a signal
 
     def _is_leaving(self, frame: FrameType | None) -> bool:
         while frame is not None:

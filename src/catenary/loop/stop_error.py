@@ -1,4 +1,4 @@
-"""The error for axes that the core stopped: reason, cycle, what to do."""
+"""Error for axes that the core stopped: reason, cycle and next step."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ADVICE: dict[StopReason, str] = {
         "or give StopPolicy(handover=...) a longer time [s]"
     ),
     StopReason.REFUSED: (
-        "look for NaN or a jump in the targets: begin at the commanded position and move by "
+        "check for NaN or a jump in the targets: begin at the commanded position and move by "
         "small steps; Drives(step_limit=...) allows larger ones"
     ),
     StopReason.POSITION_LIMIT: (
@@ -33,7 +33,7 @@ ADVICE: dict[StopReason, str] = {
         "print(loop.plan)"
     ),
     StopReason.NOT_FOLLOWING: (
-        "look for an internal limit or a mode of the drive that ignores targets (statusword, "
+        "check for an internal limit or a mode of the drive that ignores targets (statusword, "
         "bits 11 and 12)"
     ),
     StopReason.MODE_CHANGE: "check that the drive supports the mode (0x6502, its manual)",
@@ -71,7 +71,7 @@ def stopped_error(stops: Sequence[StoppedAxis], cycle: CyclePlan, log: Log) -> D
 
 
 def _details(stop: StoppedAxis, cycle: CyclePlan, log: Log) -> str:
-    """Return the limit that was exceeded, and what was late; empty for other reasons."""
+    """Return the exceeded limit and the late source as text; empty for other reasons."""
     if stop.reason is StopReason.UNDERRUN:
         limit = _late_limit_ns(stop.mode, cycle) / 1e6
         return f" ({limit:g} ms in {mode_name(stop.mode)}), {_what_was_late(stop, log)}"
@@ -91,7 +91,7 @@ def _late_limit_ns(mode: int, cycle: CyclePlan) -> int:
 
 
 def _what_was_late(stop: StoppedAxis, log: Log) -> str:
-    """Return the source of set-points that was late, and for how many cycles."""
+    """Return the source of set-points that was late, and the number of cycles, as text."""
     before = log[log["number"] <= stop.cycle]
     if len(before) and before["flags"][-1] & CYCLE_DRY:
         return f"the stream was empty for {_trailing(before['flags'], CYCLE_DRY)} cycles"
@@ -100,6 +100,6 @@ def _what_was_late(stop: StoppedAxis, log: Log) -> str:
 
 
 def _trailing(flags: npt.NDArray[np.uint32], bit: int) -> int:
-    """Return how many of the last flags have the bit without a gap."""
+    """Return the number of flags at the end that have the bit without a gap."""
     without = np.flatnonzero((flags & bit) == 0)
     return len(flags) - (int(without[-1]) + 1 if len(without) else 0)

@@ -12,13 +12,13 @@ Rows = npt.ArrayLike
 
 
 class Stream:
-    """Set-points written ahead: one row per cycle, in the order written, taken by the cycle thread.
+    """Set-points written ahead, one row per cycle; the cycle thread takes them in order.
 
-    From the first row until `close`, the stream sets the targets; a law that runs at the same time
-    finds the row in its targets. An empty stream is an underrun: the axes fall back and are stopped
-    after the late limit. Meanwhile `cycle.dry` is True and `dry` counts the cycles; the next row
-    ends it. Any thread may write, but only one at a time. An axis that is enabled later follows the
-    rows written after that.
+    From the first row until `close`, the stream sets the targets. A law that runs at the same time
+    finds the row in its targets. An empty stream is an underrun: the axes fall back, and are
+    stopped after the late limit. Meanwhile `cycle.dry` is True and `dry` counts the cycles; the
+    next row ends the underrun. Any thread may write, but only one at a time. An axis that is
+    enabled later follows the rows written after that.
     """
 
     def __init__(self, engine: core.Engine, views: Views, capacity: int) -> None:
@@ -35,9 +35,19 @@ class Stream:
         velocity: Rows | None = None,
         torque: Rows | None = None,
     ) -> int:
-        """Rows of set-points, each (k, n) or (n,) for one row: [rad], [rad/s], [N·m]. What is left
-        out stays: positions as commanded now, velocity and torque zero. Returns how many rows found
-        room. ValueError: another shape, NaN or infinity."""
+        """Write rows of set-points, each (k, n), or (n,) for one row.
+
+        Args:
+            position: Positions [rad]; None: as commanded now.
+            velocity: Velocities [rad/s]; None: zero.
+            torque: Torques [N·m]; None: zero.
+
+        Returns:
+            Number of rows that were written; the remainder did not fit.
+
+        Raises:
+            ValueError: The shapes differ, or a value is NaN or infinite.
+        """
         rows = {
             name: self._checked(name, values)
             for name, values in (("position", position), ("velocity", velocity), ("torque", torque))
@@ -45,7 +55,9 @@ class Stream:
         }
         counts = {len(values) for values in rows.values()}
         if len(counts) != 1:
-            raise ValueError(f"as many rows of each quantity, not {sorted(counts) or 'none'}")
+            raise ValueError(
+                f"give the same number of rows of each quantity, not {sorted(counts) or 'none'}"
+            )
         [count] = counts
         block = np.zeros((count, 3, self._axes))
         block[:, 0] = self._views.target_position
@@ -57,29 +69,31 @@ class Stream:
     def _checked(self, name: str, values: Rows) -> npt.NDArray[np.float64]:
         array = np.atleast_2d(np.asarray(values, dtype=np.float64))
         if array.ndim != 2 or array.shape[1] != self._axes:
-            raise ValueError(f"{name}: rows of {self._axes} axes, not the shape {array.shape}")
+            raise ValueError(
+                f"{name}: must be rows of {self._axes} axes, not of shape {array.shape}"
+            )
         if not np.isfinite(array).all():
-            raise ValueError(f"{name}: NaN or infinity is no set-point")
+            raise ValueError(f"{name}: contains NaN or infinity; set-points must be finite")
         return array
 
     @property
     def waiting(self) -> int:
-        """Rows that wait."""
+        """Number of rows that were written and not yet taken."""
         return self._ring.waiting
 
     @property
     def taken(self) -> int:
-        """Rows whose instant has come."""
+        """Number of rows that the cycle thread has taken."""
         return self._ring.taken
 
     @property
     def free(self) -> int:
-        """Rows that find room now."""
+        """Number of rows that can be written now."""
         return self._ring.capacity - self._ring.waiting
 
     @property
     def dry(self) -> int:
-        """Cycles without a row, since the first one was taken."""
+        """Number of cycles without a row since the first one was taken."""
         return self._ring.dry
 
     def close(self) -> None:

@@ -61,8 +61,7 @@ class Timing(Mapping[str, Mapping[str, float]]):
 
     @property
     def verdict(self) -> str:
-        """Late, uncommitted, underrun and lost cycles in words, each with the next step. One line
-        each."""
+        """Late, uncommitted, underrun and lost cycles in words, one line each, with advice."""
         return "\n".join(verdict(self))
 
     def __str__(self) -> str:
@@ -101,7 +100,7 @@ def verdict(timing: Timing) -> Iterator[str]:
 
 
 def _late(timing: Timing) -> Iterator[str]:
-    """Cycle starts that were skipped."""
+    """Yield a line about skipped cycle starts, if any."""
     if not timing.counters.get("late"):
         return
     text = f"{_of_all(timing, 'late')} late (skipped), the worst by {_most(timing, 'lateness')}"
@@ -116,7 +115,7 @@ def _late(timing: Timing) -> Iterator[str]:
 
 
 def _uncommitted(timing: Timing) -> Iterator[str]:
-    """Cycles that repeated the targets of the one before."""
+    """Yield a line about cycles that repeated the targets of the previous one, if any."""
     if not timing.counters.get("uncommitted"):
         return
     text = f"{_of_all(timing, 'uncommitted')} uncommitted: the program wrote no new targets in time"
@@ -124,13 +123,13 @@ def _uncommitted(timing: Timing) -> Iterator[str]:
         yield f"{text}; {_long_body(timing)}"
     else:
         yield (
-            f"{text}; look for waits between two iterations, and for other processes "
+            f"{text}; check for waits between two iterations, and for other processes "
             "(`catenary doctor`); loop.stream() writes ahead"
         )
 
 
 def _underrun(timing: Timing) -> Iterator[str]:
-    """Cycles for which the stream was empty."""
+    """Yield a line about cycles with an empty stream, if any."""
     if timing.counters.get("underrun"):
         yield (
             f"{_of_all(timing, 'underrun')} underrun: the stream was empty; keep more rows in it, "
@@ -139,7 +138,7 @@ def _underrun(timing: Timing) -> Iterator[str]:
 
 
 def _lost(timing: Timing) -> Iterator[str]:
-    """Cycles without all answers."""
+    """Yield a line about cycles without all answers, if any."""
     if timing.counters.get("lost"):
         yield (
             f"{_of_all(timing, 'lost')} lost: frames did not come back, or a device did not answer;"

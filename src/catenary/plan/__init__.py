@@ -1,4 +1,4 @@
-"""Pure arithmetic: descriptions and wishes → the tables a cycle runs by.
+"""Pure arithmetic: device descriptions and process-data requests → the tables of a cycle.
 
 Names load when they are used: a scan needs parts of the plan, but not NumPy.
 """

@@ -1,12 +1,12 @@
-"""Which clocks run, who follows whom, when SYNC signals fire and where the frame sits before them.
+"""Choice of clocks, SYNC times, and the time of the cyclic frames before SYNC0.
 
-The beat: SYNC0 of all devices fires at multiples of the period of the reference clock's time, moved
-by each device's own shift. Frames leave so long before the beat that all devices have them by then:
+SYNC0 of all devices fires at multiples of the period in the reference clock's time, moved by the
+shift of each device. Frames leave early enough before the common SYNC0 time to reach all devices:
 
-    instant ──allowance── frames on the wire ──hops── beat (SYNC0, shift 0)
+    cycle start ──allowance── frames on the wire ──hops── SYNC0 (shift 0)
 
 ETG.1020 §"Distributed clocks"; registers 0x0980 to 0x09A7: ETG.1000.4 §6.8.5. Start times and
-alignment as SOEM's `ecx_dcsync01` and IgH's `ec_fsm_slave_config_state_dc_sync_check`.
+alignment follow SOEM's `ecx_dcsync01` and IgH's `ec_fsm_slave_config_state_dc_sync_check`.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ if TYPE_CHECKING:  # needs NumPy, a scan does not
     from catenary.plan.request import DistributedClock
 
 SYNC_BY_ECAT = 0x0300  # AssignActivate: cyclic operation and SYNC0, controlled by EtherCAT
-BURST = 15_000  # frames: ESC data sheet I §9.1.5; KickCAT sends as many, ethercrab 10 000
+BURST = 15_000  # frames: ESC data sheet I §9.1.5; KickCAT uses 15 000, ethercrab 10 000
 START_DELAY_NS = 100_000_000  # to the first SYNC pulse: as SOEM (`SyncDelay`) and IgH
 HOP_NS = 1000  # through a device and its cable: 0.3 µs by E-bus, up to 1 µs by Ethernet PHYs
-# What of the period is left between the instant and the frames: threaded, the wake-up's lateness;
-# inline and with a law, the calculation too, which comes before the frames.
+# Share of the period between the cycle start and the frames. Threaded: for the lateness of the
+# wake-up. Inline and with a law: also for the calculation, which precedes the frames.
 ALLOWANCE: dict[ExecutionMode, float] = {"threaded": 0.2, "inline": 0.5}
 
-# The phase controller (docs/clocks.md): a critically damped loop of this time constant, which
-# begins quick and slows down, and what it may do to the period.
+# Phase controller (docs/clocks.md): a critically damped loop with this time constant. It begins
+# faster and slows down. Its change of the period is limited.
 TIME_CONSTANT = 0.1  # [s]
-CYCLES_MIN = 16  # of a time constant, at least: the answer of a cycle comes one or two cycles later
-RATE_LIMIT = 1e-3  # of the period: a servo's interpolation sees no more
-DRIFT_LIMIT = 8e-4  # of the period, the part that stays: crystals 2 · 100 ppm, NTP slews by 500 ppm
-STEP_SHARE = 1 / 8  # of the period: a phase error beyond is no drift
+CYCLES_MIN = 16  # least cycles of a time constant: the response takes one or two cycles
+RATE_LIMIT = 1e-3  # of the period: the interpolation of a servo is not affected
+DRIFT_LIMIT = 8e-4  # of the period, permanent part: crystals 2 · 100 ppm, NTP slew 500 ppm
+STEP_SHARE = 1 / 8  # of the period: a larger phase error is a step, not drift
 BOUND_NS = 1000
 
 SYNC_TYPE_SYNC0, SYNC_TYPE_SYNC1 = 2, 3  # 0x1C32:01 and 0x1C33:01, ETG.1020 §"Synchronization"
@@ -50,12 +50,12 @@ REGISTER_END = 1 << 32  # of 0x09A0 and 0x09A4 [ns]
 
 @dataclass(frozen=True, slots=True)
 class SyncPlan:
-    """The SYNC unit of one device."""
+    """Settings of the SYNC unit of one device."""
 
     assign_activate: int  # registers 0x0980 (low byte) and 0x0981
     cycle_ns: int  # of SYNC0
-    sync1_ns: int  # SYNC1 so long after SYNC0
-    shift_ns: int  # of SYNC0 behind the beat
+    sync1_ns: int  # from SYNC0 to SYNC1
+    shift_ns: int  # of SYNC0 after the common SYNC0 time
     op_mode: str = ""  # name of the OpMode in the SII that it follows
 
     @property
@@ -64,12 +64,12 @@ class SyncPlan:
 
     @property
     def span_ns(self) -> int:
-        """After which the same signals come again: SYNC1 may come less often than SYNC0."""
+        """Time after which the signals repeat: SYNC1 may be less frequent than SYNC0."""
         return (self.sync1_ns // self.cycle_ns + 1) * self.cycle_ns
 
     @property
     def objects(self) -> tuple[tuple[int, int, bytes], ...]:
-        """What the application is told in PRE-OP: index, subindex, data."""
+        """Objects for the device's application in PRE-OP: index, subindex, data."""
         on_sync1 = Activation.SYNC1 in self.activation
         kind = struct.pack("<H", SYNC_TYPE_SYNC1 if on_sync1 else SYNC_TYPE_SYNC0)
         cycle = struct.pack("<I", self.span_ns)
@@ -82,11 +82,11 @@ class SyncPlan:
 
 @dataclass(frozen=True, slots=True)
 class ClockChoice:
-    """Who takes part, before the frames are made."""
+    """Devices that take part in the clock synchronisation."""
 
     reference: DeviceDescription
-    followers: tuple[DeviceDescription, ...]  # with a SYNC signal, the reference left out
-    listeners: int  # devices that count a broadcast of the time, the reference too
+    followers: tuple[DeviceDescription, ...]  # with a SYNC signal, without the reference
+    listeners: int  # devices that answer a broadcast of the time, with the reference
     follow: FollowedClock
 
 
@@ -96,10 +96,17 @@ def choose_clocks(
     follow: FollowedClock,
     reference: int | None = None,
 ) -> ClockChoice | None:
-    """The reference clock and who follows it; None where nobody wishes for clocks.
+    """Return the reference clock and its followers; None if no request needs clocks.
 
-    `reference`: a position; None: the first device with a system time, as every master does.
-    ConfigurationError for a device that has none, or that lies before its reference.
+    Args:
+        devices: All devices, by position.
+        wishes: Clock requests by position.
+        reference: Position of the reference clock; None: the first device with a system time, as
+            in other masters.
+        follow: "reference" or "main": see `ClockPlan`.
+
+    Raises:
+        ConfigurationError: A device has no suitable clock, or precedes its reference.
     """
     if not wishes:
         return None
@@ -109,7 +116,7 @@ def choose_clocks(
         chosen = _existing(devices, reference)
     for position in sorted(wishes):
         _check_follower(_existing(devices, position), chosen)
-    assert chosen is not None  # at least one wish has passed the check
+    assert chosen is not None  # at least one request has passed the check
     if not chosen.clock_bits:
         raise _no_clock(chosen, "it was given as the reference clock")
     return ClockChoice(
@@ -121,7 +128,13 @@ def choose_clocks(
 
 
 def make_sync(device: DeviceDescription, wish: DistributedClock, period_ns: int) -> SyncPlan:
-    """Return the SYNC unit of a device: as requested, else from the OpMode in its SII."""
+    """Return the SYNC unit settings of a device: as requested, else from the OpMode in its SII.
+
+    Args:
+        device: Device.
+        wish: Clock request.
+        period_ns: Period of the cycle.
+    """
     mode = _op_mode(device, wish)
     cycle_ns = _given(wish.sync0, mode.sync0_ns or _multiple(period_ns, mode.sync0_factor))
     assign = mode.assign_activate if wish.assign_activate is None else wish.assign_activate
@@ -147,9 +160,20 @@ def make_clock_plan(
     margin: float | None = None,
     burst: int = BURST,
 ) -> ClockPlan:
-    """Everything the cycle needs to know of clocks. `margin` [s]: between the instant and the
-    frames; None: by the execution mode. `burst`: frames of static drift compensation.
-    ConfigurationError where the frames do not fit into the period."""
+    """Return the clock settings of the cycle.
+
+    Args:
+        choice: Reference clock and followers.
+        frames: Frames of the cycle.
+        device_count: Number of devices on the segment.
+        period_ns: Period of the cycle.
+        execution: Execution mode of the loop.
+        margin: Time between the cycle start and the frames [s]; None: by the execution mode.
+        burst: Number of frames for static drift compensation.
+
+    Raises:
+        ConfigurationError: The frames do not fit into the period.
+    """
     if burst < 0:
         raise ConfigurationError(f"a burst of {burst} frames", hint="0 or more")
     wire_ns = sum(wire_time_ns(len(frame.template)) for frame in frames) + HOP_NS * device_count
@@ -158,7 +182,7 @@ def make_clock_plan(
         raise ConfigurationError(
             f"{wire_ns / 1e3:g} us of frames and {allowance_ns / 1e3:g} us before them do not fit "
             f"into a period of {period_ns / 1e3:g} us",
-            hint="a longer period, or a smaller margin before the frames",
+            hint="use a longer period, or a smaller margin before the frames",
         )
     cycles = max(TIME_CONSTANT * 1e9 / period_ns, CYCLES_MIN)
     return ClockPlan(
@@ -180,7 +204,14 @@ def make_clock_plan(
 
 
 def start_time_ns(now_ns: int, syncs: Sequence[SyncPlan]) -> int:
-    """The first beat: far enough ahead to tell everybody, and where all SYNC signals coincide."""
+    """Return the first SYNC0 time.
+
+    It is late enough to configure all devices before, and all SYNC signals coincide at it.
+
+    Args:
+        now_ns: Present time of the reference clock.
+        syncs: SYNC units of all devices.
+    """
     span = math.lcm(*(sync.span_ns for sync in syncs))
     return -(-(now_ns + START_DELAY_NS) // span) * span
 
@@ -201,7 +232,7 @@ def _check_follower(device: DeviceDescription, reference: DeviceDescription | No
         raise ConfigurationError(
             f"{device} lies before {reference}, the reference clock: frames pass it before they "
             "carry the time",
-            hint="take a reference clock that lies before all devices with dc=",
+            hint="choose a reference clock before all devices with dc=",
         )
 
 
@@ -210,12 +241,12 @@ def _no_clock(device: DeviceDescription, why: str) -> ConfigurationError:
     what = "it only stamps receive times" if only else "it has no distributed clock"
     return ConfigurationError(
         f"{device}: {why}, but {what}",
-        hint="leave dc= out for this device, or look for a variant of it with distributed clocks",
+        hint="omit dc= for this device, or look for a variant of it with distributed clocks",
     )
 
 
 def _op_mode(device: DeviceDescription, wish: DistributedClock) -> OpMode:
-    """Return the OpMode of that name; without a name the first one that starts a SYNC signal."""
+    """Return the OpMode with the requested name, or the first one that starts a SYNC signal."""
     if wish.op_mode is not None:
         return _named_mode(device, wish.op_mode)
     for starts in (_starts_sync0, _starts_sync):
@@ -240,8 +271,10 @@ def _named_mode(device: DeviceDescription, name: str) -> OpMode:
 def _check_sync(
     device: DeviceDescription, wish: DistributedClock, plan: SyncPlan, period_ns: int
 ) -> None:
-    """Raise ConfigurationError for impossible values. A value of the EEPROM is named as such,
-    because nothing in the program shows it."""
+    """Raise ConfigurationError for impossible values.
+
+    A value of the EEPROM is reported as such, because it is not visible in the program.
+    """
     eeprom = f"{device}: its EEPROM (OpMode {plan.op_mode!r})"
     if not _starts_sync(plan.assign_activate):
         own = wish.assign_activate is None
@@ -284,19 +317,19 @@ def _given(seconds: float | None, else_ns: int) -> int:
 
 
 def _starts_sync0(assign_activate: int) -> bool:
-    """True if SYNC0 runs. Modes without it have meaningless shifts (pollen_Orbita2d.bin: 1.9 s)."""
+    """Return True if SYNC0 runs. Shifts are meaningless otherwise (pollen_Orbita2d.bin: 1.9 s)."""
     return assign_activate & SYNC_BY_ECAT == SYNC_BY_ECAT
 
 
 def _starts_sync(assign_activate: int) -> bool:
-    """True if SYNC0 or SYNC1 runs. SYNC1 alone (0x0500): robert-burger/libethercat#21."""
+    """Return True if SYNC0 or SYNC1 runs. SYNC1 alone: 0x0500, robert-burger/libethercat#21."""
     signals = Activation(assign_activate >> 8)
     running = Activation.CYCLIC_OPERATION in signals
     return running and bool(signals & (Activation.SYNC0 | Activation.SYNC1))
 
 
 def _multiple(period_ns: int, factor: int) -> int:
-    """ETG.2000, Dc/OpMode/CycleTimeSync0@Factor: so many periods, or a part of one."""
+    """Return a multiple or an integer part of the period: ETG.2000, CycleTimeSync0@Factor."""
     if factor < 0:
         return period_ns // -factor
     return period_ns * (factor or 1)

@@ -1,4 +1,4 @@
-"""CyclePlan: everything the compiled core needs to run a cycle, as a frozen value.
+"""CyclePlan: all data that the compiled core needs to run a cycle, as a frozen value.
 
 Offsets count from the start of the process images: one image of outputs (MainDevice → SubDevices),
 one of inputs. Bits are numbered as on the wire: bit 0 of byte 0 first (little endian).
@@ -17,7 +17,7 @@ OnLoss = Literal["quick_stop", "disable", "csp_hold"]
 
 
 class NumberKind(IntEnum):
-    """How the bits of a value are read."""
+    """Interpretation of the bits of a value."""
 
     UNSIGNED = 0
     SIGNED = 1
@@ -26,7 +26,7 @@ class NumberKind(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """A value in a process image: where it sits and what one count of it means.
+    """Place of a value in a process image, and its scale.
 
     SI value = raw * scale + offset.
     """
@@ -39,7 +39,7 @@ class Number:
 
 
 class Bank(IntEnum):
-    """Which array a column lives in."""
+    """Array that contains a column."""
 
     REAL = 0  # float64, SI units
     INTEGER = 1  # int64, raw
@@ -48,8 +48,11 @@ class Bank(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """A named value of any mapped object, outside the axes. Its place in its bank's array is its
-    rank among the columns of the same bank and direction, in the order of the plan."""
+    """Named value of any mapped object, outside the axes.
+
+    Its index in its bank's array is its rank among the columns of the same bank and direction, in
+    the order of the plan.
+    """
 
     name: str
     number: Number
@@ -61,9 +64,9 @@ class Column:
 
 @dataclass(frozen=True, slots=True)
 class ImageArea:
-    """Bytes of an image that an application reads or writes as they are. Their place among the
-    private bytes follows from the sizes of the areas before it in the plan.
+    """Bytes of an image that an application reads or writes unchanged.
 
+    Their place among the private bytes follows from the sizes of the areas before it in the plan.
     `safe`: of outputs, the bytes that are sent when the loop ends; as long as the area.
     """
 
@@ -77,9 +80,9 @@ class ImageArea:
 
 class DatagramKind(IntEnum):
     PROCESS_DATA = 0
-    AL_STATUS = 1  # the BRD that rides in every cycle
+    AL_STATUS = 1  # the BRD of every cycle
     CLOCK = 2  # distributed clocks: FPWR our time, FRMW the reference's, FPRD a difference
-    CYCLE_NUMBER = 3  # a NOP that no device changes: makes the matching of the frame exact
+    CYCLE_NUMBER = 3  # a NOP that no device changes; makes the matching of the frame exact
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,35 +101,38 @@ class DatagramPlan:
     offset: int  # of its 10-byte header, from the start of the Ethernet frame
     length: int  # of its data
     expected_counter: int
-    sync_unit: int  # -1: belongs to none
+    sync_unit: int  # -1: none
     outputs: tuple[Copy, ...] = ()  # image → frame, before sending
     inputs: tuple[Copy, ...] = ()  # frame → image, after a valid return
 
 
 @dataclass(frozen=True, slots=True)
 class FramePlan:
-    """One frame of the cycle. `template` is the whole Ethernet frame with zeroed data; the core
-    patches the index of every datagram and the outputs."""
+    """One frame of the cycle.
+
+    `template` is the whole Ethernet frame with zeroed data. The core writes the index of every
+    datagram and the outputs into it.
+    """
 
     template: bytes
     datagrams: tuple[DatagramPlan, ...]
-    divider: int = 1  # goes out every so many cycles
-    phase: int = 0  # in those whose number is this, modulo `divider`
+    divider: int = 1  # cycles between two transmissions
+    phase: int = 0  # sent in cycles with this number modulo `divider`
 
 
 @dataclass(frozen=True, slots=True)
 class SyncUnit:
-    """The unit of validity: devices whose data is good or stale together."""
+    """Unit of validity: devices whose data is valid or stale together."""
 
     name: str
     devices: tuple[int, ...]  # positions
     optional: bool = False  # its loss does not make the cycle bad
-    divider: int = 1  # exchanged every so many cycles
+    divider: int = 1  # cycles between two exchanges
 
 
 @dataclass(frozen=True, slots=True)
 class AxisLimits:
-    """What the core enforces whatever the application writes. None: no limit."""
+    """Limits that the core enforces for all set-points. None: no limit."""
 
     position_min: float | None = None  # [rad]
     position_max: float | None = None  # [rad]
@@ -175,24 +181,25 @@ class AxisPlan:
 
 @dataclass(frozen=True, slots=True)
 class ClockPlan:
-    """How the cycle and the distributed clocks keep together (plan/clocks.py, docs/clocks.md).
+    """Synchronisation of the cycle and the distributed clocks (plan/clocks.py, docs/clocks.md).
 
-    `follow`: "reference", the instants follow the reference clock; "main", it follows the link's.
+    `follow`: "reference": the cycle starts follow the reference clock; "main": the reference clock
+    follows the link's clock.
     """
 
     follow: FollowedClock
     reference: int  # position
     reference_station: int
-    followers: tuple[int, ...]  # positions of those with SYNC signals, the reference left out
+    followers: tuple[int, ...]  # positions of devices with SYNC signals, without the reference
     stations: tuple[int, ...]  # the same, by station address
-    phase_ns: int  # of the instants in the reference's time, modulo the period
-    wire_ns: int  # the frames on the wire and through all devices
-    allowance_ns: int  # from the instant to the frames, at most
-    bandwidth: float  # of the phase controller, in the end [1 / cycle]
-    rate_limit_ns: float  # by which a period may differ, in all
-    drift_limit_ns: float  # and the part of it that stays
-    step_ns: int  # a phase error beyond is no drift
-    bound_ns: int  # of a difference to the reference, and of the phase
+    phase_ns: int  # of the cycle starts in the reference's time, modulo the period
+    wire_ns: int  # wire time of the frames, through all devices
+    allowance_ns: int  # from the cycle start to the frames, at most
+    bandwidth: float  # final bandwidth of the phase controller [1 / cycle]
+    rate_limit_ns: float  # largest total change of a period
+    drift_limit_ns: float  # permanent part of it
+    step_ns: int  # a larger phase error is a step, not drift
+    bound_ns: int  # of the differences to the reference, and of the phase
     burst: int = 15_000  # frames that carry the time before the cycle begins
 
 

@@ -1,4 +1,4 @@
-"""Units → the frames of a cycle, with templates and expected counters. ETG.1000.4 §5.4.
+"""Frames of a cycle from its units, with templates and expected counters. ETG.1000.4 §5.4.
 
 A device adds to a logical datagram's working counter: LRD 1, LWR 1, LRW 1 for a read and 2 for
 a write (ETG.1000.4 table 14), once per datagram however many FMMUs it has.
@@ -38,7 +38,7 @@ ACYCLIC_GUARD = 0.1  # of the period: free of acyclic frames, so that the next c
 
 @dataclass(frozen=True, slots=True)
 class _Piece:
-    """A datagram before it has a place in a frame. Offsets count from its data."""
+    """Datagram before it has a place in a frame. Offsets count from its data."""
 
     kind: DatagramKind
     command: EcatCommand
@@ -53,7 +53,7 @@ class _Piece:
 
     @property
     def turn(self) -> tuple[int, int]:
-        """The cycles in which it is sent."""
+        """Divider and phase of the cycles in which it is sent."""
         return self.divider, self.phase
 
     @property
@@ -122,7 +122,7 @@ def acyclic_wire_time_ns(cyclic_ns: int, period_ns: int) -> int:
         raise ConfigurationError(
             f"the cyclic frames take {cyclic_ns / 1e3:g} us at 100 Mbit/s, the period is "
             f"{period_ns / 1e3:g} us",
-            hint="a longer period, fewer objects, or some devices less often (divider=...)",
+            hint="use a longer period, fewer objects, or exchange devices less often (divider=...)",
         )
     return max(period_ns - cyclic_ns - round(ACYCLIC_GUARD * period_ns), 0)
 
@@ -168,7 +168,7 @@ def _check_count(frames: Sequence[FramePlan], exact_matching: bool) -> None:
 
 
 def _cycle_number(first: _Piece) -> _Piece:
-    """The last datagram of a frame: a NOP, which passes every device unchanged."""
+    """Return the last datagram of a frame: a NOP, which passes every device unchanged."""
     return _Piece(
         DatagramKind.CYCLE_NUMBER,
         EcatCommand.NOP,
@@ -189,11 +189,13 @@ def _al_status(device_count: int) -> _Piece:
 
 
 def _of_clocks(clocks: ClockChoice | None) -> list[_Piece]:
-    """Our time to the reference clock, if it follows us; its time to all others; and one device's
-    difference, another one's each cycle: the core turns the address.
+    """Return the datagrams of the clocks.
 
-    Four bytes of time are what the loop of a controller compares, and what IgH sends; a 32-bit
-    clock would refuse eight. A broadcast read of all differences would or sign-magnitude numbers.
+    They carry our time to the reference clock if it follows us, its time to all other clocks, and
+    the difference of one device. The core addresses another device in each cycle.
+
+    Times have four bytes: the loop of a controller compares four, IgH sends four, and a 32-bit
+    clock would refuse eight. A broadcast read of all differences would OR sign-magnitude numbers.
     """
     if clocks is None:
         return []
@@ -217,7 +219,7 @@ def _clock_piece(
 
 
 def _of_mailboxes(area: MailboxArea | None) -> list[_Piece]:
-    """Belongs to no sync unit: a cycle is good without it."""
+    """Return the datagram of the mailboxes. It has no sync unit: a cycle is good without it."""
     if area is None or not area.devices:
         return []
     inputs = (Copy(0, area.input_offset, area.size),)
@@ -280,8 +282,12 @@ def _of_unit(unit: UnitLayout, number: int) -> list[_Piece]:
 
 
 def _batches(pieces: Sequence[_Piece], room: int) -> list[list[_Piece]]:
-    """Return the pieces by frame. Each goes into the first frame of its cycles that has room for
-    it; `room` [bytes] is that of an empty frame."""
+    """Return the pieces by frame: each in the first frame of its cycles with enough room.
+
+    Args:
+        pieces: Datagrams in order.
+        room: Bytes in an empty frame.
+    """
     batches: list[list[_Piece]] = []
     for piece in pieces:
         for batch in batches:

@@ -1,16 +1,16 @@
-"""Where the process data sits: images, logical addresses, FMMUs, sync units. ETG.1000.4 §6.6.
+"""Places of the process data: images, logical addresses, FMMUs, sync units. ETG.1000.4 §6.6.
 
-- A unit is what one datagram carries (LRW; or LRD and LWR where a device has no LRW). A device
-  is never split over units or datagrams (docs/deviations.md): when one of two frames is lost, its
+- A unit is the content of one datagram (LRW; or LRD and LWR if a device has no LRW). A device is
+  never split over units or datagrams (docs/deviations.md): after the loss of one of two frames, its
   data would be of different cycles.
-- An optional device is a unit of its own, so its loss spoils no other. Devices that are exchanged
-  every few cycles share units with their like; the units of a divisor take turns, so that a cycle
-  carries as little as can be.
+- An optional device is a separate unit, so its loss does not affect others. Devices with the same
+  divider share units; the units of a divider take turns, so that a cycle carries as little as
+  possible.
 - Inside a unit: the outputs of its devices, then their inputs, both by position.
-- Every device starts at a byte of its own and fills whole bytes, also a terminal of four bits.
-  Sharing bytes by bit-wise FMMUs would save some bytes, but writes would need the neighbour's
-  bits, the ESC must have bit-wise FMMUs, and SOEM#958-like mismatches follow. IgH does likewise.
-- SyncManagers whose memory is adjacent share an FMMU: terminals have few of them.
+- Every device starts at a new byte and fills whole bytes, even a terminal of four bits. Sharing
+  bytes by bit-wise FMMUs would save some bytes. But writes would need the neighbour's bits, the ESC
+  would need bit-wise FMMUs, and mismatches as in SOEM#958 would follow. IgH does likewise.
+- SyncManagers with adjacent memory share an FMMU: terminals have few of them.
 - The control byte is the SII's, except for the watchdog trigger of outputs. It is set if and only
   if the watchdog is on: some SIIs have it clear, and Beckhoff's slave stack code answers 0x001F if
   the bit and the time contradict each other.
@@ -29,13 +29,13 @@ from catenary.wire.sync_manager import WATCHDOG_TRIGGER
 
 LOGICAL_BASE = 0x0001_0000
 LOGICAL_STRIDE = 0x0000_0800  # units start at multiples: no two share an FMMU's range
-UNIT_MAX = 1472  # bytes of a unit: a frame's 1486 less the 14 of the AL status datagram
+UNIT_MAX = 1472  # bytes of a unit: 1486 of a frame minus 14 of the AL status datagram
 EXACT_UNIT_MAX = UNIT_MAX - 16  # with a cycle number in each frame
 
 
 @dataclass(frozen=True, slots=True)
 class SyncManagerPlan:
-    """One SyncManager of process data as it will be written."""
+    """Planned configuration of one process-data SyncManager."""
 
     index: int
     direction: Direction
@@ -51,7 +51,7 @@ class SyncManagerPlan:
 
 @dataclass(frozen=True, slots=True)
 class FmmuPlan:
-    """Whole bytes of the logical address space onto physical memory."""
+    """Mapping of whole bytes of the logical address space to physical memory."""
 
     index: int
     direction: Direction
@@ -62,7 +62,7 @@ class FmmuPlan:
 
 @dataclass(frozen=True, slots=True)
 class MailboxFmmu:
-    """The FMMU that shows whether the device's mailbox is full: see mailboxes.py."""
+    """FMMU of the device's mailbox-full bit: see mailboxes.py."""
 
     index: int
     logical_bit: int  # from logical address 0
@@ -70,7 +70,7 @@ class MailboxFmmu:
 
 @dataclass(frozen=True, slots=True)
 class DeviceLayout:
-    """The place of one device's process data."""
+    """Place of one device's process data."""
 
     position: int
     sync_unit: int  # -1: has no process data
@@ -85,12 +85,12 @@ class DeviceLayout:
 
 @dataclass(frozen=True, slots=True)
 class UnitLayout:
-    """One datagram's worth of devices."""
+    """Devices that share one datagram."""
 
     name: str
     devices: tuple[int, ...]
     optional: bool
-    divider: int  # exchanged every so many cycles
+    divider: int  # cycles between two exchanges
     phase: int
     logical_read_write: bool
     logical_start: int
@@ -104,7 +104,7 @@ class UnitLayout:
 
 @dataclass(frozen=True, slots=True)
 class DeviceData:
-    """A device and the process data chosen for it."""
+    """Device and the process data chosen for it."""
 
     description: DeviceDescription
     outputs: tuple[Assignment, ...]
@@ -132,7 +132,7 @@ class DeviceData:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """All places. Fulfils `plan.request.ImageLayout`."""
+    """All places. Implements `plan.request.ImageLayout`."""
 
     units: tuple[UnitLayout, ...]
     devices: tuple[DeviceLayout, ...]
@@ -172,7 +172,7 @@ def make_layout(devices: Sequence[DeviceData], unit_max: int = UNIT_MAX) -> Layo
     places: dict[int, DeviceLayout] = {}
     output_offset = input_offset = 0
     logical_start = LOGICAL_BASE
-    turns: dict[int, int] = {}  # divisor → units that have it
+    turns: dict[int, int] = {}  # divider → number of its units
     for members in _grouped(devices, unit_max):
         number = len(units)
         divider = members[0].divider
@@ -323,7 +323,7 @@ def _fmmus(
     outputs_at: int,
     inputs_at: int,
 ) -> tuple[FmmuPlan, ...]:
-    """One per run of adjacent SyncManagers of a direction."""
+    """Return one FMMU per run of adjacent SyncManagers of a direction."""
     plans: list[FmmuPlan] = []
     next_logical = {Direction.OUTPUT: outputs_at, Direction.INPUT: inputs_at}
     for manager in managers:

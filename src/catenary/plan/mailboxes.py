@@ -1,11 +1,11 @@
-"""Whether a device has something to say, as a bit that rides in every cycle.
+"""Mailbox-full bits of the devices in the cyclic data.
 
-One bit per device: "mailbox full" of the status of SyncManager 1 (0x080D bit 3), by an FMMU that
-the process data leaves over. SOEM maps the whole byte into the group's inputs (ec_config.c),
-KickCAT a bit (bus.cc), TwinCAT by its "SyncM status" FMMU; IgH and others poll the register.
+One bit per device is mapped by a spare FMMU: "mailbox full" in the status of SyncManager 1 (0x080D
+bit 3). SOEM maps the whole byte into the group's inputs (ec_config.c), KickCAT a bit (bus.cc),
+TwinCAT uses its "SyncM status" FMMU; IgH and others poll the register.
 
-The bits have a datagram of their own: a register answers in every state, and in the datagram of the
-process data it would count for inputs that are not there.
+The bits have their own datagram. A register answers in every state; in the datagram of the process
+data it would count as inputs that are missing.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ WORD = 32  # bits of a column
 
 @dataclass(frozen=True, slots=True)
 class MailboxArea:
-    """The bits in the image of inputs: bit k is of `devices[k]`, by position."""
+    """Mailbox bits in the image of inputs: bit k belongs to `devices[k]`, by position."""
 
     devices: tuple[int, ...]
     input_offset: int  # bytes
@@ -32,12 +32,12 @@ class MailboxArea:
 
     @property
     def size(self) -> int:
-        """In bytes."""
+        """Size in bytes."""
         return (len(self.devices) + 7) // 8
 
     @property
     def columns(self) -> tuple[Column, ...]:
-        """32 devices each, in their order; as integers."""
+        """Integer columns of 32 devices each, in their order."""
         return tuple(
             Column(
                 "mailboxes",
@@ -57,7 +57,12 @@ class MailboxArea:
 def with_mailboxes(
     layout: Layout, devices: Sequence[DeviceDescription]
 ) -> tuple[Layout, MailboxArea]:
-    """The layout with an FMMU more for every device that has a mailbox and one to spare."""
+    """Return the layout with another FMMU for each device with a mailbox and a spare FMMU.
+
+    Args:
+        layout: Layout of the process data.
+        devices: All devices, by position.
+    """
     able = tuple(
         device.position for device in devices if _can_map(device, len(_fmmus(layout, device)))
     )

@@ -1,4 +1,4 @@
-"""Where mapped objects sit in a process image, bit by bit."""
+"""Places of mapped objects in a process image, in bits."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from catenary.types import Integer, Real, by_index
 
 
 class Which(NamedTuple):
-    """Selection of one place where an object is mapped more than once. 0: any."""
+    """Selection of one place of an object that is mapped several times. 0: any."""
 
     pdo: int = 0
     bit_length: int = 0
-    rank: int = 0  # among those that are alike
+    rank: int = 0  # among equal places
 
 
 ANY = Which()
@@ -29,8 +29,12 @@ class EntryPlace(NamedTuple):
 
 
 def entry_places(assignments: Sequence[Assignment], offset: int) -> Iterator[EntryPlace]:
-    """All entries, gaps too, of a device whose data begins at byte `offset`. Every SyncManager
-    begins at a byte of its own."""
+    """Yield all entries of a device, with gaps. Every SyncManager begins at a new byte.
+
+    Args:
+        assignments: SyncManagers and their PDOs.
+        offset: First byte of the device in the image.
+    """
     for assignment in assignments:
         bit = offset * 8
         for pdo in assignment.pdos:
@@ -79,7 +83,7 @@ def find_number(
 
 
 def number_kind(data_type: int) -> NumberKind:
-    """How an object of this CoE data type is read; unknown ones are unsigned."""
+    """Return the kind of a CoE data type; unknown types are unsigned."""
     try:
         kind = by_index(data_type)
     except ValueError:

@@ -1,5 +1,8 @@
-"""Each byte of the outputs belongs to one request: two that write it are an error. What the core
-writes for an axis cannot be a column, too: it would bypass enabling and all limits."""
+"""Owners of the output bytes: each byte belongs to one request.
+
+Two requests that write the same byte are an error. An object that the core writes for an axis
+cannot be a column too: it would bypass enabling and all limits.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Descriptions and wishes → a Plan: mapping, layout, frames, start-up lists. Pure."""
+"""Plan of a cycle from descriptions and requests: mapping, layout, frames, start-up lists."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ PERIOD_MIN, PERIOD_MAX = 1e-6, 1000.0  # [s]; the core's limits are wider
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What will run, for one network: `print(plan)` shows it; equal plans do the same.
+    """Complete configuration of one network: `print(plan)` shows it. Plans compare by value.
 
-    `tables[k]` are the axes and columns of the k-th wish; in `cycle` they follow one another, and
-    behind them the columns of the `mailboxes`.
+    `tables[k]` has the axes and columns of the k-th request. In `cycle` the tables follow one
+    another, and then come the columns of the `mailboxes`.
     """
 
     cycle: CyclePlan
@@ -93,26 +93,37 @@ def make_plan(
     """Return the plan that fulfils all requests.
 
     Args:
-        period: [s].
-        watchdog: of process data [s]; 0: off; None: 0.1 s, for devices in CST the longer of 10 ms
-            and five exchanges.
-        optional: positions without which the cycle is good, in addition to devices of requests that
-            do not require them. Devices without a request are required if any other one is.
-        collect_share: threaded, the part of the period in which frames may come back.
-        late_limit_position, late_limit_velocity, late_limit_torque: of CSP, CSV and CST [s].
-        handover, stop_deadline: [s].
-        command_timeout_velocity, command_timeout_torque: of CSV and CST in the background [s].
-        busy_wait: [s] before each cycle start.
-        log: number of cycles that are kept.
-        clock: clock that the others follow.
-        reference: position of the reference clock; None: the first there is.
-        margin: [s] between the cycle start and the frames; None: by the execution mode.
-        burst: frames that bring the clocks together before the cycle.
-        exact_matching: every frame carries the cycle number (plan/frames.py).
-        log_axes: the log keeps the values of the axes, too.
+        devices: Descriptions of all devices of the segment, by position.
+        wishes: Process-data requests.
+        period: Period of the cycle [s].
+        execution: "threaded" or "inline".
+        receive_mode: "poll", "wait" or "busy".
+        watchdog: Watchdog time of process data [s]; 0: off; None: 0.1 s, for devices in CST the
+            longer of 10 ms and five exchanges.
+        optional: Positions without which the cycle is good, in addition to the devices of optional
+            requests. Devices without a request are required if any other one is.
+        lost_limit: Number of consecutive bad cycles before WorkingCounterError.
+        late_limit_position: Late limit in CSP [s].
+        late_limit_velocity: Late limit in CSV [s].
+        late_limit_torque: Late limit in CST [s].
+        handover: Time for which CST keeps its torque after a law or stream ended [s].
+        command_timeout_velocity: Validity of an update in the background in CSV [s].
+        command_timeout_torque: Validity of an update in the background in CST [s].
+        stop_deadline: Longest time from quick stop to standstill [s].
+        busy_wait: Time of a busy-wait before each cycle start [s].
+        collect_share: If threaded, share of the period in which frames may return.
+        log: Number of cycles in the log.
+        clock: Clock that the others follow.
+        reference: Position of the reference clock; None: the first device with a clock.
+        margin: Time between the cycle start and the frames [s]; None: by the execution mode.
+        burst: Number of frames that synchronise the clocks before the cycle begins.
+        exact_matching: True: every frame carries the cycle number (plan/frames.py).
+        cpu: CPU of the native thread; None: unchanged.
+        priority: SCHED_FIFO priority of the native thread; None: unchanged.
+        log_axes: True: the log also has the values of the axes.
 
     Raises:
-        ConfigurationError: an object cannot be mapped, requests contradict each other, or the
+        ConfigurationError: An object cannot be mapped, requests contradict each other, or the
             frames do not fit into the period.
     """
     period_ns = period_in_ns(period)
@@ -206,7 +217,12 @@ def period_in_ns(period: float) -> int:
 
 
 def gather_wishes(wishes: Sequence[Wish], period_ns: int) -> dict[int, PdoWish]:
-    """What all wishes together ask of each device, by position."""
+    """Return the combined requests for each device, by position.
+
+    Args:
+        wishes: Process-data requests.
+        period_ns: Period of the cycle.
+    """
     gathered: dict[int, PdoWish] = {}
     for wish in wishes:
         for position, pdos in wish.pdos(period_ns).items():
@@ -245,7 +261,7 @@ def _one_clock(
 ) -> DistributedClock | None:
     if first is not None and second is not None and first != second:
         raise ConfigurationError(
-            f"device {position}: two wishes ask for different clocks: {first} and {second}",
+            f"device {position}: two requests need different clocks: {first} and {second}",
             hint="give both the same dc=",
         )
     return first if second is None else second
@@ -254,7 +270,7 @@ def _one_clock(
 def _one_mapping(
     position: int, first: tuple[WrittenPdo, ...], second: tuple[WrittenPdo, ...]
 ) -> tuple[WrittenPdo, ...]:
-    """Return the PDOs that two requests write down: per direction, one of them or both alike."""
+    """Return the PDOs that two requests write down: per direction, one of them or equal ones."""
     directions = {pdo.direction for pdo in first} & {pdo.direction for pdo in second}
     for direction in directions:
         if [p for p in first if p.direction is direction] != [
@@ -270,7 +286,7 @@ def _one_mapping(
 def _one_start_up(
     position: int, first: tuple[StartUp, ...], second: tuple[StartUp, ...]
 ) -> tuple[StartUp, ...]:
-    """Return the start-up objects of two requests. They may agree, not contradict each other."""
+    """Return the start-up objects of two requests. They must not contradict each other."""
     values = {(each.index, each.subindex): each for each in first}
     for each in second:
         other = values.get((each.index, each.subindex))
@@ -297,7 +313,7 @@ def _syncs(
 
 
 def _check_times(tables: Sequence[WishTables], late_limit_torque: float, handover: float) -> None:
-    """Raise ValueError for times that would leave an axis in CST under torque for ever."""
+    """Raise ValueError for times that would leave an axis in CST under torque indefinitely."""
     if not 0 < handover < math.inf:
         raise ValueError(f"handover must be positive and finite [s], not {handover}")
     if late_limit_torque:

@@ -1,4 +1,4 @@
-"""A plan as a table to read: devices, SyncManagers, FMMUs, entries, frames, watchdogs."""
+"""Plan as text: devices, SyncManagers, FMMUs, entries, frames and watchdogs."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def _devices(devices: Sequence[DevicePlan]) -> Iterator[str]:
 
 
 def _start_up(devices: Sequence[DevicePlan]) -> Iterator[str]:
-    """The SDO downloads in the order of writing, with old and new values."""
+    """Yield the SDO downloads in the order of writing, with old and new values."""
     if not any(device.downloads for device in devices):
         return
     yield "start-up: SDOs written in PRE-OP, in this order"
@@ -135,7 +135,7 @@ def _axes(cycle: CyclePlan, axes: Sequence[AxisReport]) -> Iterator[str]:
 
 
 def _sync(sync: SyncPlan) -> str:
-    """One device's SYNC signals, and what its application is told of them."""
+    """Return one device's SYNC signals and the related settings, as text."""
     second = f", SYNC1 {sync.sync1_ns / 1e3:g} us later" * (Activation.SYNC1 in sync.activation)
     hidden = "" if Activation.SYNC0 in sync.activation else " (not shown to the device)"
     mode = f", OpMode {sync.op_mode!r}" * bool(sync.op_mode)
@@ -182,7 +182,7 @@ def _frames(cycle: CyclePlan) -> Iterator[str]:
 
 
 def _wire_time(cycle: CyclePlan) -> str:
-    """The use of the wire in the busiest cycle."""
+    """Return the wire time of the busiest cycle, as text."""
     acyclic = f"up to {cycle.acyclic_ns / 1e3:g} us" if cycle.acyclic_ns else "one frame"
     return (
         f"wire time: {cycle.wire_ns / 1e3:g} us of {cycle.period_ns / 1e3:g} us for cyclic frames, "
@@ -191,7 +191,7 @@ def _wire_time(cycle: CyclePlan) -> str:
 
 
 def _exact_matching(frames: Sequence[FramePlan]) -> Iterator[str]:
-    """The cost of the cycle numbers. A frame below Ethernet's minimum is padded anyway."""
+    """Yield the cost of the cycle numbers. A frame below Ethernet's minimum is padded anyway."""
     sizes = [
         (HEADER_SIZE + sum(OVERHEAD + d.length for d in frame.datagrams), OVERHEAD + number.length)
         for frame in frames

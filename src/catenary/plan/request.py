@@ -1,6 +1,6 @@
-"""Wish: what an application asks of the devices, before it is known where the bytes will sit.
+"""Process-data requests (`Wish`): objects to exchange, before their places are known.
 
-`loop` and `drive` meet here: a Loop takes wishes and never asks what kind they are.
+`loop` and `drive` share this interface: a Loop takes requests of any kind.
 """
 
 from __future__ import annotations
@@ -33,8 +33,10 @@ SYNC_TIME_END = 4.29  # [s] the registers 0x09A0 and 0x09A4 have 32 bits [ns]
 
 @dataclass(frozen=True, slots=True)
 class ObjectReference:
-    """An entry of the object dictionary, to be mapped into the process data. One that is not
-    `required` is left out where the device cannot map it."""
+    """Entry of the object dictionary, to be mapped into the process data.
+
+    If it is not `required`, it is omitted if the device cannot map it.
+    """
 
     index: int
     subindex: int
@@ -49,7 +51,7 @@ class ObjectReference:
 
 @dataclass(frozen=True, slots=True)
 class WrittenPdo:
-    """A PDO that the application wrote down. `entries`: None: as the device has it."""
+    """PDO that the application wrote down. `entries`: None: as the device has it."""
 
     index: int
     entries: tuple[ObjectReference, ...] | None = None
@@ -63,19 +65,19 @@ class WrittenPdo:
 class DistributedClock:
     """Distributed clocks of a device: SYNC signals, in phase with those of all other devices.
 
-    What is None comes from an OpMode of the device's SII. Without a name this is the first one that
-    starts SYNC0, else the first one that starts SYNC1. If there is none: SYNC0 every period, no
+    Values of None come from an OpMode of the device's SII. Without a name this is the first one
+    that starts SYNC0, else the first one that starts SYNC1. Without any: SYNC0 every period, no
     shift, no SYNC1, 0x0300.
 
     Args:
-        op_mode: name of the OpMode, as in the ESI file; upper and lower case are the same.
-        sync0: period of SYNC0 [s], a multiple or a whole part of the loop's period.
-        sync1: time from SYNC0 to SYNC1 [s].
-        shift: time of SYNC0 after the common SYNC0 time [s]; negative: before. Less than a cycle.
-        assign_activate: registers 0x0980 and 0x0981, as in the ESI file; 0x0500: SYNC1 alone.
+        op_mode: Name of the OpMode, as in the ESI file; case is ignored.
+        sync0: Period of SYNC0 [s], a multiple or an integer part of the loop's period.
+        sync1: Time from SYNC0 to SYNC1 [s].
+        shift: Time of SYNC0 after the common SYNC0 time [s]; negative: before. Less than a cycle.
+        assign_activate: Registers 0x0980 and 0x0981, as in the ESI file; 0x0500: SYNC1 alone.
 
     Raises:
-        ValueError: a time is impossible.
+        ValueError: A time is impossible.
     """
 
     op_mode: str | None = None
@@ -95,7 +97,7 @@ class DistributedClock:
             raise ValueError(f"assign_activate={self.assign_activate}: a word, 0 to 0xFFFF")
 
     def __str__(self) -> str:
-        """The call that makes it, as a user writes it."""
+        """Return the call that makes it, as a user writes it."""
         given = [
             f"{name}={value!r}"
             for name, value in (
@@ -113,11 +115,11 @@ class DistributedClock:
 
 @dataclass(frozen=True, slots=True)
 class PdoWish:
-    """The objects one device must exchange every cycle. What is mapped already stays as it is;
-    the mapping is changed only where a wanted object is missing, or as `pdos` says.
+    """Objects that one device must exchange cyclically.
 
-    If several requests name a device, the smallest `divider` counts, and it is required if any of
-    them requires it.
+    An existing mapping is only changed if a requested object is missing, or by `pdos`. If several
+    requests name a device, the smallest `divider` counts. The device is required if any of them
+    requires it.
     """
 
     outputs: tuple[ObjectReference, ...] = ()  # MainDevice → device (RxPDO)
@@ -126,9 +128,9 @@ class PdoWish:
         tuple[int, int, bytes], ...
     ] = ()  # SDO downloads in PRE-OP: index, subindex, data
     clock: DistributedClock | None = None
-    divider: int = 1  # exchanged every so many cycles
-    required: bool = True  # the cycle is not good without it
-    pdos: tuple[WrittenPdo, ...] = ()  # exactly these, in directions that have any; else a search
+    divider: int = 1  # cycles between two exchanges
+    required: bool = True  # the cycle is only good with it
+    pdos: tuple[WrittenPdo, ...] = ()  # exactly these, in their directions; otherwise a search
     objects: tuple[StartUp, ...] = ()  # start-up objects of the application, in their order
 
     def written(self, direction: Direction) -> tuple[WrittenPdo, ...]:
@@ -137,7 +139,7 @@ class PdoWish:
 
 
 class ImageLayout(Protocol):
-    """The places of the mapped objects: of `which`, or else one of the same object."""
+    """Places of the mapped objects: `which` selects one of several places of an object."""
 
     def output(
         self, device: int, index: int, subindex: int, which: Which = ANY
@@ -152,7 +154,7 @@ class ImageLayout(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class WishTables:
-    """A wish as numbers. `axis_reports` has one entry per axis, or none."""
+    """Axes and columns of a request. `axis_reports` has one entry per axis, or none."""
 
     axes: tuple[AxisPlan, ...] = ()
     output_columns: tuple[Column, ...] = ()
@@ -169,17 +171,17 @@ class Mover(Protocol):
         """Write the targets of the next commit. `now`: time of the cycle [s]."""
 
     def check(self) -> None:
-        """Look at the axes after a cycle that brought trouble."""
+        """Check the axes after a cycle in trouble."""
 
     def end(self) -> None:
-        """The loop ends: nothing moves any more."""
+        """End the motion because the loop ends."""
 
 
 @dataclass(frozen=True, slots=True)
 class Views:
-    """The part of the loop's private buffers that belongs to one wish: views, not copies.
+    """Views of the part of the loop's private buffers that belongs to one request; no copies.
 
-    n axes; columns by bank. `actual_*` change only in `next(loop)`; `target_*` are read there.
+    n axes; columns by bank. `actual_*` only change in `next(loop)`, which also reads `target_*`.
     """
 
     actual_position: Reals  # (n,) [rad]
@@ -211,20 +213,20 @@ class Views:
     output_integers: Integers
     output_bits: Bytes
     output_bytes: Bytes
-    unit_valid: Bytes  # (units of the whole plan,) whether each one's last exchange was valid
-    movers: list[Mover] = field(default_factory=list)  # of the whole loop, while they move
-    # Whether the loop runs: afterwards requests reach nothing
+    unit_valid: Bytes  # (units of the whole plan,) 1 if the unit's last exchange was valid
+    movers: list[Mover] = field(default_factory=list)  # of the whole loop, during their motion
+    # Returns True while the loop runs; afterwards requests have no effect
     is_open: Callable[[], bool] = lambda: True
-    # Whether a law or a stream sets the targets
+    # Returns True while a law or a stream sets the targets
     is_led: Callable[[], bool] = lambda: False
 
 
 class Wish(Protocol):
     def pdos(self, period_ns: int) -> Mapping[int, PdoWish]:
-        """The objects wished for, by device position."""
+        """Return the requested objects by device position."""
 
     def tables(self, layout: ImageLayout) -> WishTables:
-        """The same as axes and columns, now that the layout is known."""
+        """Return the axes and columns of the request for a known layout."""
 
     def bind(self, views: Views) -> None:
-        """Receives its views when the loop opens."""
+        """Receive the views when the loop opens."""

@@ -1,5 +1,6 @@
-"""Sink: who is given every cycle of a loop, in whatever process it is read. `loop` and `share` meet
-here: a Loop gives to a sink and never asks what becomes of it.
+"""Sink: interface to a receiver of every cycle of a loop.
+
+`loop` and `share` share this interface: a Loop does not depend on the use of the data.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ class SinkField:
 
 @dataclass(frozen=True, slots=True)
 class SinkLayout:
-    """What a loop gives in every cycle."""
+    """Layout of the data that a loop publishes in every cycle."""
 
     period: float  # [s]
     axes: tuple[str, ...]  # names, in the order of the arrays that are per axis
@@ -34,13 +35,13 @@ class SinkLayout:
     record_size: int  # bytes of the blocks
     actual_size: int
     target_size: int
-    utc_offset_ns: int  # UTC less the link's clock, in which `scheduled_ns` counts
+    utc_offset_ns: int  # UTC minus the link's clock, the clock of `scheduled_ns`
     virtual_time: bool
 
 
 @dataclass(frozen=True, slots=True)
 class Incident:
-    """Something that happened beside the cycle."""
+    """Event outside of the cyclic data."""
 
     kind: str  # the name of an event's class ("DeviceLost") or of the error that ended the loop
     message: str
@@ -51,10 +52,10 @@ class Incident:
 
 class Sink(Protocol):
     def open(self, layout: SinkLayout) -> object:
-        """A capsule of native/sink.h made for the layout, once a loop has its plan."""
+        """Return a capsule of native/sink.h for the layout, once a loop has its plan."""
 
     def tell(self, incident: Incident) -> None:
-        """Something happened; from any thread but the cycle's."""
+        """Receive an incident; from any thread but the cycle's."""
 
     def close(self) -> None:
-        """The loop has ended: nothing more is given. Another `open` may follow."""
+        """End: the loop publishes nothing more. Another `open` may follow."""

@@ -1,4 +1,4 @@
-"""What is written to one device between PRE-OP and SAFE-OP: SDOs, then registers.
+"""Data that is written to one device between PRE-OP and SAFE-OP: SDOs, then registers.
 
 The order of the SDOs: start-up objects of the application with `before_mapping`, the mapping, our
 own objects, the other start-up objects of the application.
@@ -40,13 +40,13 @@ WATCHDOG_UNIT_NS = watchdog_unit_ns(WATCHDOG_DIVIDER)  # 100 µs
 
 @dataclass(frozen=True, slots=True)
 class Download:
-    """One SDO download. `entry`: what is being mapped by it, for the error that names it."""
+    """One SDO download. `entry`: the entry that it maps, for error messages."""
 
     index: int
     subindex: int
     data: bytes
     entry: Entry | None = None
-    optional: bool = False  # a device that has no such object, or one that is fixed, is left alone
+    optional: bool = False  # skipped if the device has no such object, or a fixed one
     verify: bool = False  # read back and compared, unless it can only be written
     text: str = ""  # the value that the application gave; empty: one of ours
 
@@ -58,7 +58,7 @@ class Download:
 
 @dataclass(frozen=True, slots=True)
 class DevicePlan:
-    """All that one device is told, and what it is expected to be."""
+    """Configuration of one device, and its expected identity."""
 
     position: int
     name: str
@@ -68,7 +68,7 @@ class DevicePlan:
     inputs: tuple[Assignment, ...]
     layout: DeviceLayout
     before_mapping: tuple[Download, ...]  # start-up objects of the application
-    mapping: tuple[Download, ...]  # empty: it stays as it is
+    mapping: tuple[Download, ...]  # empty: unchanged
     start_up: tuple[Download, ...]  # our objects, then those of the application
     mapping_changed: bool
     watchdog_ns: int  # of process data; 0: off
@@ -104,7 +104,13 @@ def make_device_plan(
     """Return the plan of one device.
 
     Args:
+        device: Description of the device.
+        outputs: Mapping of the outputs.
+        inputs: Mapping of the inputs.
+        layout: Place of its process data.
         start_up: Our own objects: index, subindex, data.
+        watchdog_ns: Watchdog time of the process data; 0: off.
+        sync: Settings of the SYNC unit; None: no SYNC signals.
         objects: Start-up objects of the application.
 
     Raises:
@@ -215,8 +221,12 @@ def restoring_downloads(device: DeviceDescription, plan: DevicePlan) -> tuple[Do
 
 
 def renewed(plan: DevicePlan, device: DeviceDescription) -> DevicePlan:
-    """The plan for a device that begins again: the mapping is written where what it has now
-    (`device`) differs."""
+    """Return the plan for a device that restarts; only differences of the mapping are written.
+
+    Args:
+        plan: Plan of the device.
+        device: Description with its present mapping.
+    """
     mappings = [_difference(device, each, plan.assignments(each)) for each in Direction]
     written = tuple(step for mapping in mappings for step in mapping_downloads(mapping))
     return replace(
@@ -246,7 +256,7 @@ def _difference(
 
 
 def mapping_downloads(mapping: Mapping) -> tuple[Download, ...]:
-    """The downloads that make a mapping so; none where it is the device's own."""
+    """Return the downloads that write a mapping; empty if the device has it already."""
     rewritten = {pdo.index for pdo in mapping.rewritten}
     downloads: list[Download] = []
     for assignment in mapping.assignments:

@@ -1,4 +1,4 @@
-"""What a person calls a segment, "eth0" or "virtual:cell.toml" → a MainDevice on it."""
+"""MainDevice by the name of a segment, such as "eth0" or "virtual:cell.toml"."""
 
 from catenary.target.main_device import MainDevice, source_of
 from catenary.target.parse import named_target, parse, segment_of

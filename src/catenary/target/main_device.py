@@ -8,20 +8,21 @@ from catenary.target.parse import parse
 
 
 class MainDevice(bus.MainDevice):
-    """MainDevice of one segment: `MainDevice("eth0")`, `MainDevice("virtual")`,
-    `MainDevice(Segment([...]))`; `MainDevice("eth0", "eth1")` for a ring between two ports;
-    `MainDevice("igh:0")` for the IgH kernel master (docs/igh.md).
+    """MainDevice of one segment: `MainDevice("eth0")`, `MainDevice("virtual")`.
+
+    Further forms: `MainDevice(Segment([...]))`; `MainDevice("eth0", "eth1")` for a ring between
+    two ports; `MainDevice("igh:0")` for the IgH kernel master (docs/igh.md).
 
         with cat.MainDevice("eth0") as main:
             for sub in main.scan():
                 print(sub.position, sub.name, sub.identity, sub.state)
 
-    Leaving the block brings all devices to INIT, whatever happened in it.
+    Leaving the block always brings all devices to INIT.
 
     Args:
-        target: name of a segment, or a link source.
-        second: the other end of a ring.
-        force: open an interface even if another master is live on it (docs/networks.md). It has no
+        target: Name of a segment, or a link source.
+        second: Second port of a ring.
+        force: Open an interface even if another master is live on it (docs/networks.md). It has no
             effect on the kernel master.
     """
 
@@ -40,8 +41,8 @@ def source_of(target: str | LinkSource) -> LinkSource:
     """Return the link source of a name, or the source itself.
 
     Raises:
-        ConfigurationError: The name is not one of a segment.
-        TypeError: It is neither a name nor a link source.
+        ConfigurationError: The name is invalid.
+        TypeError: The target is neither a name nor a link source.
     """
     if isinstance(target, str):
         return parse(target)

@@ -21,8 +21,11 @@ IGH = "igh"
 
 
 def parse(target: str) -> LinkSource:
-    """The link source a name stands for; nothing is opened yet. A virtual segment is a new one
-    each time. ConfigurationError for a name that cannot be."""
+    """Return the link source of a name; nothing is opened. Each call makes a new virtual segment.
+
+    Raises:
+        ConfigurationError: The name is invalid.
+    """
     target = named_target(target)
     kind, colon, rest = target.partition(":")
     if kind in (VIRTUAL, VIRTUAL_REALTIME) and (rest or not colon):

@@ -1,4 +1,4 @@
-"""TOML files that people write: reading them, with errors that name file and line."""
+"""Reading of TOML files, with errors that name file and line."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def target_of(file: TomlFile) -> str:
     A virtual segment's file counts from the folder of the machine file.
 
     Raises:
-        MachineFileError: It names none, or not a target.
+        MachineFileError: The file has no target, or an invalid one.
     """
     target = file.content.get("target")
     if not isinstance(target, str) or not target.strip():
@@ -73,7 +73,7 @@ def target_of(file: TomlFile) -> str:
 
 
 def is_machine_file(target: str) -> bool:
-    """True if a target is a machine file: it ends in .toml and is not `virtual:FILE.toml`."""
+    """Return True if a target is a machine file: *.toml, but not `virtual:FILE.toml`."""
     name = target.strip()
     kind, colon, _ = name.partition(":")
     return name.endswith(".toml") and not (colon and kind in VIRTUAL)

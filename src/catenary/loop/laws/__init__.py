@@ -1,1 +1,1 @@
-"""Control laws: plain Python functions, checked, compiled, tried on copies, run in the cycle."""
+"""Control laws: Python functions that are checked, compiled, tried, and run in the cycle."""

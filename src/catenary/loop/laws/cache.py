@@ -1,8 +1,8 @@
-"""The cache of compiled laws: Numba's format, in a folder that only this user can write.
+"""Cache of compiled laws in Numba's format, in a folder that only this user can write.
 
-Numba unpickles the files of its cache: a user who can write there runs code as the user of the law.
-Numba's own choice is `__pycache__` next to the source, which may belong to another user, be
-writable for a group, or be set by $NUMBA_CACHE_DIR. Ours is ~/.cache/catenary/laws (below
+Numba unpickles the files of its cache. A user who can write there can run code as the user of the
+law. Numba itself uses `__pycache__` next to the source. That folder may belong to another user, be
+writable for a group, or be set by $NUMBA_CACHE_DIR. Catenary uses ~/.cache/catenary/laws (below
 $XDG_CACHE_HOME if that is set), with mode 0700.
 """
 
@@ -27,9 +27,9 @@ OTHERS_WRITE = 0o022
 
 
 def make_cache(function: Callable[..., Any]) -> Any | None:
-    """Return Numba's cache of a function, with all that it depends on in the key.
+    """Return Numba's cache of a function, with all of its dependencies in the key.
 
-    None if its source is not a file, or, with a warning, if there is no private folder.
+    Return None if the source is not a file. Warn and return None if there is no private folder.
     """
     source = inspect.getfile(function)
     if not os.path.exists(source):  # typed at a prompt, or in a zip
@@ -38,8 +38,8 @@ def make_cache(function: Callable[..., Any]) -> Any | None:
         folder = private_folder(cache_folder())
     except (OSError, RuntimeError) as error:  # RuntimeError: no home
         warnings.warn(
-            f"compiled laws are not kept, each start compiles again: {error}. Only you and root "
-            "may own or write the folders of the cache; $XDG_CACHE_HOME names another place",
+            f"compiled laws are not cached, every start compiles them again: {error}. Only you and "
+            "root may own or write the folders of the cache; set $XDG_CACHE_HOME to another place",
             RuntimeWarning,
             stacklevel=2,
         )
@@ -48,23 +48,25 @@ def make_cache(function: Callable[..., Any]) -> Any | None:
 
 
 def cache_folder() -> Path:
-    """Return where compiled laws are kept."""
+    """Return the folder for compiled laws."""
     given = os.environ.get("XDG_CACHE_HOME", "")
     base = Path(given) if os.path.isabs(given) else Path.home() / ".cache"
     return base / "catenary" / "laws"
 
 
 def private_folder(folder: Path) -> Path:
-    """Create a folder that only this user can write, mode 0700. Returns it without links.
+    """Create a folder that only this user can write, mode 0700. Return it without links.
 
-    Raises OSError if that is not possible, or if another user could exchange the folder or a file
-    in it. The folders above count, too, up to the home, as in OpenSSH's StrictModes (misc.c,
+    The folders above it, up to the home, are checked too, as in OpenSSH's StrictModes (misc.c,
     safe_path). Each is checked before anything below it is created or changed, because root can
     have the HOME of another user (sudo).
+
+    Raises:
+        OSError: The folder cannot be created, or another user could replace it or a file in it.
     """
     folder = Path(os.path.abspath(folder))
     home = Path(os.path.expanduser("~"))
-    # In a user namespace, root is not the owner of these: user_namespaces(7), overflowuid.
+    # In a user namespace, root does not own these folders: user_namespaces(7), overflowuid.
     above_home = {*home.parents, *home.resolve().parents}
     for place in reversed(folder.parents):
         if place in above_home:
@@ -90,14 +92,14 @@ def private_folder(folder: Path) -> Path:
 
 
 def _create(place: Path) -> None:
-    """Create a folder if it is missing. Refuse a name that another user has put there."""
+    """Create a folder if it is missing; refuse one that another user has created."""
     if not os.path.lexists(place):
         place.mkdir(0o700, exist_ok=True)
     _refuse_foreign(place, place.lstat())  # of the link itself, if it is one
 
 
 def _refuse_writable(place: Path) -> None:
-    """Refuse a folder whose entries another user could exchange."""
+    """Refuse a folder whose entries another user could replace."""
     status = place.stat()
     _refuse_foreign(place, status)
     if status.st_mode & OTHERS_WRITE and not status.st_mode & stat.S_ISVTX:
@@ -110,7 +112,7 @@ def _refuse_foreign(place: Path, status: os.stat_result) -> None:
 
 
 def _cache_class(folder: Path) -> Any:
-    """Return Numba's cache with our folder and our key, instead of its own choice of a folder."""
+    """Return Numba's cache class with our folder and our key."""
     caching: Any = import_module("numba.core.caching")
 
     class Files(caching.CompileResultCacheImpl):  # type: ignore[misc]
@@ -127,7 +129,7 @@ def _cache_class(folder: Path) -> Any:
             )
 
     class LawCache(caching.FunctionCache):  # type: ignore[misc]
-        """The cache of one law. What cannot be read is compiled again."""
+        """Cache of one law. Unreadable entries are compiled again."""
 
         _impl_class = Files
 
@@ -138,27 +140,27 @@ def _cache_class(folder: Path) -> Any:
         def load_overload(self, signature: Any, target_context: Any) -> Any:
             try:
                 return super().load_overload(signature, target_context)
-            except Exception:  # what pickle raises for a file that a full disk has cut
+            except Exception:  # pickle raises any error for a file truncated by a full disk
                 with suppress(OSError):
                     self.flush()
                 return None
 
         def save_overload(self, signature: Any, data: Any) -> None:
-            with suppress(OSError):  # the disk is full: the law runs without
+            with suppress(OSError):  # disk full: the law runs uncached
                 super().save_overload(signature, data)
 
     return LawCache
 
 
 class _Place:
-    """Numba's locator: the folder of a function's files, and the source that they depend on."""
+    """Numba's locator: the folder of a function's files, and their source."""
 
     def __init__(self, folder: Path, source: str) -> None:
         self._folder = folder
-        self._py_file = os.path.abspath(source)  # Numba names it in warnings
+        self._py_file = os.path.abspath(source)  # appears in Numba's warnings
 
     def ensure_cache_path(self) -> None:
-        """`private_folder` has created it."""
+        """Do nothing: `private_folder` has created the folder."""
 
     def get_cache_path(self) -> str:
         return str(self._folder)

@@ -1,4 +1,4 @@
-"""What a law must not do in the real-time thread, found in its source before it is compiled."""
+"""Checks of a law's source for operations that the real-time thread does not allow."""
 
 from __future__ import annotations
 
@@ -12,9 +12,11 @@ from catenary.errors import LawError
 
 
 def check_source(function: Callable[..., Any]) -> None:
-    """LawError for the first `print`, object mode, or exception that nobody handles, with its line.
+    """Check the source of a law. A function without source (typed at a prompt) is not checked.
 
-    A function without source (typed at a prompt) is left to the compiler.
+    Raises:
+        LawError: The law calls `print`, uses object mode, or raises an exception that it does not
+            handle. The message names the first such line.
     """
     try:
         lines, first = inspect.getsourcelines(function)
@@ -31,19 +33,19 @@ def place(function: Callable[..., Any], line: int) -> str:
 
 
 def forbidden(tree: ast.AST, *, handled: bool) -> Iterator[tuple[ast.stmt | ast.expr, str, str]]:
-    """(node, what is wrong, hint), in the order of the source."""
+    """Yield each forbidden node with the problem and a hint, in the order of the source."""
     for node in ast.iter_child_nodes(tree):
         if isinstance(node, ast.Raise | ast.Assert) and not handled:
             word = "raise" if isinstance(node, ast.Raise) else "assert"
             yield (
                 node,
-                f"`{word}` that nobody handles",
+                f"`{word}` without a handler",
                 "return True to end the law, or write what is wrong into memory",
             )
         elif isinstance(node, ast.Call) and called(node) == "print":
-            yield node, "`print` takes the GIL", "write into memory and print that from Python"
+            yield node, "`print` takes the GIL", "write to memory and print it from Python"
         elif isinstance(node, ast.With) and any(map(is_object_mode, node.items)):
-            yield node, "object mode takes the GIL", "do that part in a Python task beside the law"
+            yield node, "object mode takes the GIL", "do that part in Python, outside the law"
         elif isinstance(node, ast.Try):
             inner = ast.Module(body=node.body, type_ignores=[])
             yield from forbidden(inner, handled=handled or bool(node.handlers))

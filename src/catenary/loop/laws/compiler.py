@@ -1,8 +1,8 @@
-"""A law and the records it works on → a native function (native/law.h), by Numba.
+"""Compilation of a law and its records to a native function (native/law.h), by Numba.
 
-The law is compiled with bounds checks; division by zero gives infinity as in NumPy. Round it sits a
-function of C's calling convention that turns whatever it raises into a status: measured 14 ns a
-call for a PD law on 12 axes.
+The law is compiled with bounds checks. Division by zero gives infinity, as in NumPy. A wrapper with
+C's calling convention turns any exception of the law into a status. Measured: 14 ns per call for a
+PD law on 12 axes.
 """
 
 from __future__ import annotations
@@ -47,38 +47,46 @@ def shell(actual_at, target_at, memory_at, memory_count, parameters_at, paramete
 
 @dataclass(frozen=True, slots=True)
 class CompiledLaw:
-    """Owns the machine code: keep it as long as the address is used."""
+    """Owns the machine code: keep the object while the address is in use."""
 
     address: int
     code: object
 
 
 def compile_law(law: Law, layout: LawLayout) -> CompiledLaw:
-    """Compile, or take from the cache (cache.py). LawError says what cannot be, and where."""
+    """Compile a law, or take it from the cache (cache.py).
+
+    Args:
+        law: Law to compile.
+        layout: Records that the law reads and writes.
+
+    Raises:
+        LawError: The law cannot be compiled; the message names the place.
+    """
     check_source(law.function)
     numba = _numba(law)
     inner = _inner(numba, law.function)
     try:
         returned = _returned(numba, law, inner, layout)
         shell = _shell(numba, law, inner, layout, returned)
-    except KeyError as error:  # Numba's way to say that a record has no such field
+    except KeyError as error:  # Numba raises it for an unknown field of a record
         raise LawError(
-            f"law {law}: `actual` or `target` has nothing named {error}",
+            f"law {law}: `actual` or `target` has no field {error}",
             hint=f"actual has {', '.join(layout.actual.names or ())}; "
             f"target has {', '.join(layout.target.names or ())}",
         ) from error
     except numba.core.errors.NumbaError as error:
         raise LawError(
             f"law {law} cannot be compiled: {_readable(error)}",
-            hint="laws are compiled by Numba: numbers, arrays and loops of numbers; "
-            "loop.run(..., compiled=False) runs it as Python",
+            hint="Numba compiles laws, so use only numbers, arrays and loops; "
+            "loop.run(..., compiled=False) runs the law as Python",
         ) from error
     return CompiledLaw(shell.address, (shell, inner))
 
 
 @contextmanager
 def counted_allocations() -> Iterator[Callable[[], int]]:
-    """Counts the arrays that compiled laws make while the block lasts."""
+    """Yield a function that counts the arrays compiled laws allocated since the block began."""
     runtime: Any = import_module("numba.core.runtime")
     runtime._nrt_python.memsys_enable_stats()
     try:
@@ -110,7 +118,7 @@ def _inner(numba: Any, function: Callable[..., Any]) -> Any:
 
 
 def _returned(numba: Any, law: Law, inner: Any, layout: LawLayout) -> str:
-    """What the law returns: "none" or "number"."""
+    """Return the kind of the law's result: "none" or "number"."""
     record = {name: numba.from_dtype(getattr(layout, name)) for name in ("actual", "target")}
     vector = numba.types.Array(numba.float64, 1, "C")
     enabled = numba.types.Array(numba.uint8, 1, "C")
@@ -133,7 +141,7 @@ def _returned(numba: Any, law: Law, inner: Any, layout: LawLayout) -> str:
         return "number"
     raise LawError(
         f"law {law} returns {returned}",
-        hint="a law returns True when it has finished, else False, or nothing at all",
+        hint="a law must return True when it has finished, else False or None",
     )
 
 
@@ -156,7 +164,7 @@ def _shell(numba: Any, law: Law, inner: Any, layout: LawLayout, returned: str) -
 
 
 def _readable(error: Exception) -> str:
-    """The first sentence of Numba's message, and the place it names."""
+    """Return the first sentences of Numba's message, and the place that it names."""
     text = re.sub(r"\x1b\[[0-9;]*m", "", str(error))
     said = [line.strip() for line in text.splitlines() if line.strip()]
     reasons = [line for line in said if not line.startswith(("Failed in", "During", "File", ">>>"))]

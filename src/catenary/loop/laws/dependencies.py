@@ -1,5 +1,8 @@
-"""What a law's machine code depends on beside its own file. Numba's cache looks at that file alone:
-a gain in another one, or a function of a library that has changed, would run as it was before."""
+"""Dependencies of a law's machine code outside of its own file.
+
+Numba's cache checks only that file. It would miss a changed gain in another file, or a changed
+function of a library.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +17,11 @@ CONSTANTS = (bool, int, float, complex, str, bytes, tuple)
 
 
 def dependencies(function: Callable[..., Any]) -> tuple[str, ...]:
-    """The values of the globals that a law and the functions it calls name, and the stamps of the
-    files these functions and modules are in: equal only where all of it is."""
+    """Return everything that the machine code of a law depends on, as comparable texts.
+
+    These are the values of the globals that the law and its callees use, and the stamps of the
+    files of these callees and of used modules.
+    """
     found: set[str] = set()
     waiting, seen = [function], {id(function)}
     while waiting:
@@ -35,7 +41,7 @@ def dependencies(function: Callable[..., Any]) -> tuple[str, ...]:
 
 
 def _named(function: Callable[..., Any]) -> Iterator[tuple[str, Any]]:
-    """What the names in a function's code stand for: globals, and what is asked of modules."""
+    """Yield the globals that a function uses, and the attributes it reads from modules."""
     code: CodeType = function.__code__
     names = set(_names(code))
     modules: list[ModuleType] = []
@@ -44,7 +50,7 @@ def _named(function: Callable[..., Any]) -> Iterator[tuple[str, Any]]:
         yield name, value
         if isinstance(value, ModuleType):
             modules.append(value)
-    for module in modules:  # grows: a module's modules
+    for module in modules:  # the list grows by submodules
         for name in names:
             value = getattr(module, name, None)
             if isinstance(value, ModuleType) and value not in modules:
@@ -60,7 +66,7 @@ def _names(code: CodeType) -> Iterator[str]:
 
 
 def _stamps(module: ModuleType) -> Iterator[str]:
-    """Of its file; of a package, of all files in its folder."""
+    """Yield the stamp of a module's file; for a package, of all files in its folder."""
     for folder in getattr(module, "__path__", ()):
         yield from map(_stamp, Path(folder).glob("*.py"))
     if getattr(module, "__file__", None):
@@ -71,5 +77,5 @@ def _stamp(path: Path) -> str:
     try:
         status = path.stat()
     except OSError:
-        return f"{path}: not there"  # typed at a prompt, or in a zip
+        return f"{path}: not there"  # source typed at a prompt or in a zip
     return f"{path}: {status.st_mtime_ns} {status.st_size}"

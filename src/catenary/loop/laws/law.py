@@ -1,4 +1,4 @@
-"""`@cat.law`: a control law, plain Python here, compiled on the robot."""
+"""Control laws: Python functions marked by `@cat.law`, compiled on the robot."""
 
 from __future__ import annotations
 
@@ -9,24 +9,30 @@ from typing import TypeAlias
 
 from catenary.errors import LawError
 
-LawFunction: TypeAlias = Callable[..., object]  # of the arguments that it names
+LawFunction: TypeAlias = Callable[..., object]  # its arguments are among ARGUMENTS
 
 ARGUMENTS = ("actual", "target", "memory", "time", "parameters", "enabled", "dt", "ok", "n")
-"""What a law may ask for, by name."""
+"""Names of the arguments that a law may have."""
 
 
 class Law:
-    """A function of the arguments it names, called once a cycle between the inputs and the outputs:
+    """Control law: a function that runs once per cycle, between the inputs and the outputs.
 
-    `actual`: n, ok, dt [s], and per axis position [rad], velocity [rad/s], torque [N·m], enabled;
-    `target`: position, velocity, torque per axis, to be written. Both: columns by name
-    (`actual["following_error"][i]`, `target["Output 1"] = 1`), or as the arrays reals, integers and
-    bits. `memory`: float64, the law's own, kept from cycle to cycle; `parameters`: float64, changed
-    by the application while it runs; `time` [s] since its first cycle; `enabled`, `dt`, `ok`, `n`:
-    as in `actual`. The axes are those of all Drives of the loop, in their order.
+    The function names the arguments that it needs:
 
-    It returns True (or a number other than 0) when it has finished, else False, 0 or nothing.
-    Calling it is calling the function: as Python, with all of Python's errors.
+        actual: n, ok, dt [s], and per axis position [rad], velocity [rad/s], torque [N·m], enabled.
+        target: position, velocity and torque per axis, which the law writes.
+        memory: State of the law, float64, kept from cycle to cycle.
+        parameters: Values from the application, float64; they may change while the law runs.
+        time: Time since the first cycle of the law [s].
+        enabled, dt, ok, n: The same as in `actual`.
+
+    `actual` and `target` also have columns by name (`actual["following_error"][i]`,
+    `target["Output 1"] = 1`), or all columns as the arrays reals, integers and bits. The axes are
+    those of all Drives of the loop, in order.
+
+    The law returns True or another non-zero number when it has finished, else False, 0 or None.
+    Calling a Law calls the function in Python, with all of Python's errors.
     """
 
     def __init__(self, function: LawFunction) -> None:
@@ -45,19 +51,24 @@ class Law:
 
 
 def law(function: LawFunction) -> Law:
-    """Makes a control law of a function: see `Law`. `loop.run(pd, memory=[...])` runs it."""
+    """Make a control law from a function: see `Law`. `loop.run(pd, memory=[...])` runs it."""
     return function if isinstance(function, Law) else Law(function)
 
 
 def arguments_of(function: LawFunction) -> tuple[str, ...]:
-    """The names the function asks for. TypeError: no function; LawError: a name no law has."""
+    """Return the names of the function's arguments.
+
+    Raises:
+        TypeError: The object is not a plain function.
+        LawError: A law cannot have one of the arguments.
+    """
     if not inspect.isfunction(function):
-        raise TypeError(f"a law is made of a plain function, not of {function!r}")
+        raise TypeError(f"a law must be a plain function, not {function!r}")
     parameters = inspect.signature(function).parameters.values()
     for parameter in parameters:
         if parameter.name not in ARGUMENTS or parameter.kind is not parameter.POSITIONAL_OR_KEYWORD:
             raise LawError(
-                f"law {function.__name__}: a law has no argument {str(parameter)!r}",
-                hint=f"name those it needs, of {', '.join(ARGUMENTS)}",
+                f"law {function.__name__}: invalid argument {str(parameter)!r}",
+                hint=f"use only arguments named {', '.join(ARGUMENTS)}",
             )
     return tuple(parameter.name for parameter in parameters)

@@ -1,4 +1,4 @@
-"""What a law sees: the blocks of the core as NumPy records, with the columns by their names."""
+"""NumPy records of a law: the blocks of the core, with their columns by name."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class LawLayout:
 
 
 def law_layout(engine: Engine, tables: Sequence[WishTables]) -> LawLayout:
-    """The records of a loop's law."""
+    """Return the records of a loop's law."""
     (actual, target), (inputs, outputs) = engine.law_fields(), engine.blocks()
     return LawLayout(
         record_type(actual, (table.input_columns for table in tables), len(inputs)),
@@ -35,7 +35,15 @@ def law_layout(engine: Engine, tables: Sequence[WishTables]) -> LawLayout:
 
 
 def record_type(fields: Fields, columns: Iterable[Sequence[Column]], size: int) -> RecordType:
-    """Fields of no length are left out; a column whose name is taken keeps to its bank's array."""
+    """Return the NumPy type of a block.
+
+    Empty fields are omitted. A column whose name is already in use is only in its bank's array.
+
+    Args:
+        fields: Fields of the block by name: (offset, format, count).
+        columns: Columns of each request.
+        size: Size of the block [bytes].
+    """
     all_fields = {**named(fields, columns), **fields}
     present = {name: field for name, field in all_fields.items() if field[2] != 0}
     return np.dtype(
@@ -53,7 +61,12 @@ def record_type(fields: Fields, columns: Iterable[Sequence[Column]], size: int) 
 def named(
     fields: Fields, columns: Iterable[Sequence[Column]]
 ) -> dict[str, tuple[int, str, int | None]]:
-    """Every column as a field of its own: a group as an array, a single one as a number."""
+    """Return every column as a field: a group as an array, a single column as a number.
+
+    Args:
+        fields: Fields of the block by name: (offset, format, count).
+        columns: Columns of each request.
+    """
     used = dict.fromkeys(Bank, 0)
     found: dict[str, tuple[int, str, int | None]] = {}
     twice: set[str] = set()
@@ -73,7 +86,12 @@ def named(
 
 
 def record_at(block: memoryview, layout: RecordType) -> np.record:
-    """The block as the record a law gets when it runs as Python: no copy."""
+    """Return the block as a record for a law that runs as Python; nothing is copied.
+
+    Args:
+        block: Block of the core.
+        layout: NumPy type of the block.
+    """
     array: npt.NDArray[np.void] = np.frombuffer(block, layout)
     record: np.record = array.view(np.recarray)[0]
     return record

@@ -1,4 +1,4 @@
-"""LawRun: a law while it runs, and what is said of one that failed."""
+"""Handle of a running law, and the error of a law that failed."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Numbers = npt.NDArray[np.float64]
 
 
 class LawRun:
-    """A law that runs in the cycle, natively. Made by `Loop.start` and `Loop.run`."""
+    """Law that runs natively in the cycle. Made by `Loop.start` and `Loop.run`."""
 
     def __init__(
         self,
@@ -36,8 +36,11 @@ class LawRun:
 
     @property
     def parameters(self) -> Numbers:
-        """A copy of what was given last. Assigning replaces all at once, before the next step;
-        ValueError for another number of numbers."""
+        """Copy of the last assigned parameters.
+
+        Assigning replaces all of them at once, before the next step. Raises ValueError if the
+        length differs.
+        """
         return self._parameters.copy()
 
     @parameters.setter
@@ -52,8 +55,11 @@ class LawRun:
 
     @property
     def memory(self) -> Numbers:
-        """A copy of the law's memory as its last step left it. Assigning replaces it, all at once,
-        before the next step; ValueError for another number of numbers."""
+        """Copy of the law's memory after its last step.
+
+        Assigning replaces all of it at once, before the next step. Raises ValueError if the length
+        differs.
+        """
         return np.array(self._native.memory)
 
     @memory.setter
@@ -66,40 +72,45 @@ class LawRun:
 
     @property
     def overruns(self) -> int:
-        """How many steps took longer than the budget."""
+        """Number of steps that took longer than the budget."""
         return self._native.figures["overruns"]
 
     @property
     def longest(self) -> float:
-        """[s] the longest step so far."""
+        """Longest step so far [s]."""
         return self._native.figures["longest_ns"] * 1e-9
 
     def stop(self) -> None:
-        """From the next cycle on the axes hold, and Python says the targets."""
+        """Stop the law. From the next cycle on, the axes hold and Python sets the targets."""
         if self.running:
             self._engine.stop_law()
 
     def error(
         self, axes: Sequence[str], log: Log | None, replay: Callable[[], str]
     ) -> LawError | None:
-        """Why it failed; None: it did not. `axes`: their names; `replay` runs its last step as
-        Python and tells what that raises."""
+        """Return the error of a law that failed; None if it did not fail.
+
+        Args:
+            axes: Names of the axes.
+            log: The last cycles.
+            replay: Runs the last step as Python, and returns the exception as text.
+        """
         reasons: dict[int, Callable[[], tuple[str, str]]] = {
             core.LAW_RAISED: lambda: (
                 f"raised an exception{replay()}",
-                "an index out of bounds, most likely: loop.run(..., compiled=False) shows the line",
+                "probably an index out of bounds: loop.run(..., compiled=False) shows the line",
             ),
             core.LAW_NEVER_RETURNED: lambda: (
                 "did not return",
-                "look for a loop whose end depends on the inputs",
+                "check for a loop whose end depends on the inputs",
             ),
             core.LAW_NOT_FINITE: lambda: (
                 f"left NaN or infinity in the target of {axes[self._native.axis]}",
-                "look for a division by zero, or an input that is NaN (a quantity the drive lacks)",
+                "check for a division by zero, or a NaN input (a quantity that the drive lacks)",
             ),
             core.LAW_OVERRUN: lambda: (
                 f"took longer than its budget too often, at most {self.longest * 1e6:.0f} us",
-                "make it shorter, or Loop.run(..., budget=..., overruns=...)",
+                "make it faster, or raise the limits: Loop.run(..., budget=..., overruns=...)",
             ),
         }
         if self._native.status not in reasons:
@@ -110,9 +121,17 @@ class LawRun:
 
 
 def numbers(name: str, values: Any) -> list[float]:
-    """A row of numbers as floats. ValueError for anything else."""
+    """Return a one-dimensional sequence of numbers as floats.
+
+    Args:
+        name: Name for the error message.
+        values: Sequence of numbers.
+
+    Raises:
+        ValueError: The values are not numbers, or not one-dimensional.
+    """
     array = np.asarray(values, dtype=np.float64)
     if array.ndim != 1:
-        raise ValueError(f"{name}: a row of numbers, not an array of shape {array.shape}")
+        raise ValueError(f"{name}: must be one-dimensional, not of shape {array.shape}")
     row: list[float] = array.tolist()
     return row

@@ -1,4 +1,4 @@
-"""The laws of an open loop: compiled, tried, started, run to their end, or run as Python."""
+"""Laws of an open loop: they are compiled, tried, started, and run natively or as Python."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from catenary.loop.laws.layout import law_layout, record_at
 from catenary.loop.laws.run import LawRun, Numbers, numbers
 from catenary.plan.planner import Plan
 
-SLICE_NS = 10_000_000  # between looks at signals while a law runs
-GUARD_ABOVE = 1  # the thread that watches a law has so much more priority
+SLICE_NS = 10_000_000  # between checks for signals while a law runs
+GUARD_ABOVE = 1  # priority of the guard thread above that of the cycle thread
 PRIORITY_MAX = 99
-BUDGET_SHARE = 0.4  # of the period: the frames need the rest
+BUDGET_SHARE = 0.4  # of the period: the frames need the remainder
 
 
 class LawRunner:
-    """Owns the compiled laws of a loop, and knows the one that runs."""
+    """Owns the compiled laws of a loop and the running law."""
 
     def __init__(self, engine: core.Engine, plan: Plan) -> None:
         self._engine = engine
@@ -38,7 +38,7 @@ class LawRunner:
         self._run: LawRun | None = None
 
     def compile(self, law: Law) -> CompiledLaw:
-        """Once for each law."""
+        """Compile a law once, and return the result."""
         if law not in self._compiled:
             self._compiled[law] = compile_law(law, self._layout)
         return self._compiled[law]
@@ -51,7 +51,19 @@ class LawRunner:
         budget: float | None,
         overruns: int,
     ) -> LawRun:
-        """Compile the law if necessary, try it on copies, and hand it to the cycle."""
+        """Compile the law if necessary, try it on copies, and start it in the cycle.
+
+        Args:
+            law: Law to start.
+            memory: Initial state, float64.
+            parameters: Values from the application, float64.
+            budget: Longest time of one step [s]; None: a share of the period; 0: no check.
+            overruns: Number of consecutive steps over the budget that end the law.
+
+        Raises:
+            LawError: The law cannot be compiled, or does not return.
+            ValueError: An argument is impossible.
+        """
         if budget is not None and not budget >= 0:
             raise ValueError(f"budget={budget} s: must not be negative")
         if overruns < 1:
@@ -75,31 +87,37 @@ class LawRunner:
     def _try(self, law: Law, native: core.Law) -> None:
         """Run steps on copies of the present values.
 
-        This maps the law's pages before its first cycle, and finds errors that occur in each step.
+        This maps the law's pages before its first cycle, and finds errors of every step.
         """
         actual, target = self._engine.blocks()
         with counted_allocations() as allocated:
             result = native.rehearse(bytes(actual), bytes(target))
             if allocated():
                 warnings.warn(
-                    f"law {law} allocates memory in every step (an expression on whole arrays, "
-                    "most likely), which takes long now and then: a loop over the axes does not",
+                    f"law {law} allocates memory in every step, probably by an expression on whole "
+                    "arrays; this is slow at times: use a loop over the axes",
                     stacklevel=4,
                 )
         if result == core.LAW_ABORTED:
             raise LawError(
                 f"law {law} did not return when it was tried on the present values",
-                hint="look for a loop whose end depends on the inputs",
+                hint="check for a loop whose end depends on the inputs",
             )
 
     def run(self, run: LawRun, trouble: int, judge: Callable[[int], None]) -> None:
-        """Waits for its end. `judge` raises for what happens meanwhile, the law's failure too."""
+        """Wait for the end of a law.
+
+        Args:
+            run: Handle of the running law.
+            trouble: Cycle flags that end a wait.
+            judge: Called with the flags; raises the error of a bad cycle or a failed law.
+        """
         while run.running:
             judge(self._engine.run_law(SLICE_NS, trouble))
         self.raise_failure(None)
 
     def raise_failure(self, log: Log | None) -> None:
-        """The error of the law that has failed, if one has."""
+        """Raise the error of the law if it has failed."""
         run = self._run
         error = run.error(self._axes, log, lambda: self._replay(run)) if run else None
         if error is not None:
@@ -107,7 +125,7 @@ class LawRunner:
             raise error
 
     def _replay(self, run: LawRun) -> str:
-        """The last step again, as Python on copies: what it raises."""
+        """Run the last step again as Python on copies; return its exception as text."""
         try:
             time = (run.steps - 1) * self._period_ns * 1e-9
             self._step(run.law, run.memory, run.parameters, time, copies=True)
@@ -119,7 +137,13 @@ class LawRunner:
     def python_step(
         self, law: Law, memory: Sequence[float] | Numbers, parameters: Sequence[float] | Numbers
     ) -> tuple[Callable[[float], bool], Numbers]:
-        """(one step as Python: its time → whether it has finished, its memory)."""
+        """Return one step as Python (time → True if finished), and its memory.
+
+        Args:
+            law: Law to run.
+            memory: Initial state.
+            parameters: Values from the application.
+        """
         kept = np.array(numbers("memory", memory))
         given = np.array(numbers("parameters", parameters))
         return lambda time: self._step(law, kept, given, time), kept
