@@ -121,7 +121,7 @@ def _is_outbound(each: _Seen, waiting: Sequence[_Seen], conclusive: frozenset[by
 
 
 def _came_back_uncounted(sent: _Seen, each: _Seen) -> bool:
-    """True if no device answered, but controllers passed the frame on."""
+    """Return True if no device answered, but controllers passed the frame on."""
     pairs = list(zip(sent.frame.datagrams, each.frame.datagrams, strict=True))
     if any(a.data != b.data or a.ado != b.ado for a, b in pairs):
         return False
