@@ -1,4 +1,4 @@
-"""Reads along in a loop of another process, and commands one of its axes for a while.
+"""Read the state of a loop in another process, and command one of its axes for a while.
 
 python examples/attach_from_another_process.py        # with a virtual arm in a process of its own
 python examples/attach_from_another_process.py arm    # with yours: cat.Share("arm"), share.apply
@@ -12,7 +12,7 @@ import catenary as cat
 
 
 def move(name: str, started: Event) -> None:
-    """The loop: two axes in virtual time; other processes may command them."""
+    """Run a loop of two axes in virtual time. Other processes may command them."""
     with cat.MainDevice(cat.Segment([cat.virtual.Servo(), cat.virtual.Servo()])) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=2.0)
         with cat.Share(name) as share, cat.Loop(arm, period=1e-3, sink=share) as loop:

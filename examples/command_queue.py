@@ -10,7 +10,7 @@ import catenary as cat
 
 
 class CommandQueue:
-    """Owns commands that wait; what they return is kept under their names until `clear`."""
+    """Owns pending commands, and their results by name until `clear`."""
 
     def __init__(self) -> None:
         self._waiting: list[tuple[str, Callable[[], object]]] = []
@@ -20,7 +20,7 @@ class CommandQueue:
         self._waiting.append((name, command))
 
     def execute(self) -> None:
-        """All of them between two `next(loop)`: the next one commits everything at once."""
+        """Run all commands between two `next(loop)`; the next one commits them together."""
         waiting, self._waiting = self._waiting, []
         self._results |= {name: command() for name, command in waiting}
 
@@ -44,7 +44,7 @@ if __name__ == "__main__":
                         queue.add(
                             f"axis {axis}", partial(goal.__setitem__, axis, goal[axis] + 1e-3)
                         )
-                    queue.execute()  # all axes begin in the same cycle
+                    queue.execute()  # all axes start in the same cycle
                 arm.target.position[:] = goal
                 if cycle.number == 200:
                     break

@@ -22,7 +22,7 @@ with cat.MainDevice(sys.argv[1] if len(sys.argv) > 1 else "virtual") as main:
     with cat.Loop(arm, period=1e-3, laws=[pd]) as loop:  # compiled before the devices go to OP
         goal = arm.actual.position + 0.5  # [rad]
         run = loop.start(pd, memory=goal, parameters=[4.0, 0.2])  # N·m/rad, N·m/(rad/s)
-        for cycle in loop:  # only to watch: the law goes on by itself
+        for cycle in loop:  # only to observe: the law runs by itself
             if cycle.number == 1000:
                 run.parameters = [8.0, 0.4]  # both at once
             if not run.running:

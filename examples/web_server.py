@@ -18,7 +18,7 @@ import catenary as cat
 
 
 class Axes(BaseHTTPRequestHandler):
-    """Answers one request, in a thread of its own."""
+    """Handler of one request, in its own thread."""
 
     def do_GET(self) -> None:
         states = [state and state.name for state in arm.state]
@@ -48,11 +48,11 @@ class Axes(BaseHTTPRequestHandler):
         self.wfile.write(json.dumps(content).encode())
 
     def log_message(self, format: str, *arguments: object) -> None:
-        """Nothing is printed for each request."""
+        """Print nothing for a request."""
 
 
 def ask(url: str) -> None:
-    """Move there and back, as a client would."""
+    """Move there and back, like a client."""
     for request in ({"position": [0.05, 0, 0]}, {"move_to": [0.3, 0, 0]}, {"move_to": [0, 0, 0]}):
         with urlopen(url, json.dumps(request).encode(), timeout=60) as answer:
             print(request, "→", answer.read().decode())

@@ -45,7 +45,7 @@ SILENCE, PATIENCE = 5, 3000  # cycles without news from a task, from the bus: st
 
 
 def dynamics(task, cost, state, torque, model, gravity):
-    """What the motion takes [N·m]: gravity, Coriolis, inertia, friction."""
+    """Return the torque of the motion [N·m]: gravity, Coriolis, inertia, friction."""
     friction, rotors = FRICTION.parameters.tolist(), ROTORS.parameters.tolist()  # faster as lists
     for _ in task:
         _, speed, acceleration, q, v = state.read()
@@ -57,7 +57,7 @@ def dynamics(task, cost, state, torque, model, gravity):
 
 
 def trajectory(task, cost, state, phase, rows, done, goals):
-    """Motions to the goals, one after the other, a few rows ahead of the main control."""
+    """Plan the motions to the goals, a few rows ahead of the main control."""
     motion, number = None, int(done.read())
     for _ in task:
         task.spend(cost)
@@ -70,11 +70,11 @@ def trajectory(task, cost, state, phase, rows, done, goals):
             sent += 1
         if motion and sent == len(motion) and not len(rows):
             motion, number = None, number + 1
-        done.write(number)  # also says: still here
+        done.write(number)  # also a sign of life
 
 
 def monitor(task, cost, name, key, key_at):
-    """What an operator sees; on virtual drives also who hits the key."""
+    """Print the operator's view; on virtual drives also press the key."""
     seen = 0
     with cat.attach(name, patience=task) as arm:
         for job in task:
@@ -89,7 +89,7 @@ def monitor(task, cost, name, key, key_at):
 
 
 def log(task, cost, name, path):
-    """Every cycle, into an MCAP file."""
+    """Record every cycle in an MCAP file."""
     with cat.attach(name, patience=task) as arm, record.Recorder(arm, path, force=True) as recorder:
         for _ in task:
             recorder.take()
@@ -97,14 +97,14 @@ def log(task, cost, name, path):
 
 
 def stop(task, cost, hit):
-    """Above all others, and asleep until the key is hit."""
+    """Wait for the key, at the highest priority."""
     for job in task:
         hit.write(job.release_ns)
         task.spend(cost)
 
 
 def why_stop(wanted, q, v, signs):
-    """What the arm must not go on with, these signs among it; None: nothing."""
+    """Return the reason for a stop, from these signs and others; None without one."""
     joints = list(zip(wanted, q, v, strict=True))
     signs["limit"] = any(
         abs(q) > REACH and q * v > 0.01 for _, q, v in joints
@@ -114,7 +114,7 @@ def why_stop(wanted, q, v, signs):
 
 
 def main_control(place, cost, period, target, share, state, torque, phase, rows, done, goals, hit):
-    """The bus, waited for when it is lost, and the cascades. What an `Outcome` is made of."""
+    """Run the bus and the cascades, and wait for a lost bus. Return the data of an `Outcome`."""
     parameters = GAINS.parameters.tolist()
     wanted = speed = nothing = np.zeros(JOINTS)
     handled = lost = 0
@@ -159,7 +159,7 @@ def main_control(place, cost, period, target, share, state, torque, phase, rows,
 def run(
     target, *, virtual, gravity, arm, folder, name="cobot", key_at=KEY_AT, goals=GOALS, stretch=1.0
 ):
-    """One run of the whole program, with gravity compensated or not."""
+    """Run the whole program once, with or without gravity compensation."""
     state, torque = realtime.Value("f8", (5, JOINTS)), realtime.Value("f8", JOINTS)
     rows, key = realtime.Queue("f8", (3, JOINTS), length=8), realtime.Signal()
     phase, done, hit = (realtime.Value("i8") for _ in range(3))
@@ -190,15 +190,15 @@ def run(
 
 if __name__ == "__main__":  # the tasks' processes import this file
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("target", nargs="?", help="a network interface; else virtual drives")
+    parser.add_argument("target", nargs="?", help="a network interface (virtual drives)")
     parser.add_argument("--realtime", action="store_true", help="on the machine's clock")
-    parser.add_argument("--headless", action="store_true", help="writes no plots")
+    parser.add_argument("--headless", action="store_true", help="write no plots")
     parser.add_argument("--short", action="store_true", help="one run, with gravity compensated")
-    parser.add_argument("--stretch", type=float, default=1.0, help="all periods so much longer")
+    parser.add_argument("--stretch", type=float, default=1.0, help="factor of all periods")
     parser.add_argument("--arm", default=str(HERE / "arm.xml"), help="MJCF or URDF of the arm")
     parser.add_argument("--segment", default=str(HERE / "segment.toml"), help="the virtual drives")
-    parser.add_argument("--name", default="cobot", help="of what it shares with other processes")
-    parser.add_argument("--out", type=Path, default=Path("out"), help="where files go")
+    parser.add_argument("--name", default="cobot", help="name of its share")
+    parser.add_argument("--out", type=Path, default=Path("out"), help="output folder")
     a = parser.parse_args()
     if a.target and not a.realtime:
         parser.error(f"{a.target} lives by the machine's clock: add --realtime")

@@ -14,7 +14,7 @@ from catenary.virtual import Joint, Plant, Segment, Servo
 
 PERIOD = 500e-6
 INERTIA, VISCOUS, COULOMB = 2.7e-4, 2e-3, 0.01  # of a finger with its motor: kg·m², SI
-PUSH = 0.1  # [N·m], what a hand gives
+PUSH = 0.1  # [N·m], torque of a hand
 
 seeking = control.Homing(2, velocity=-0.8, torque=0.08, travel=2.0)
 speed = control.Pid(2, 0.02, 0.5, limit=0.12)
@@ -54,7 +54,7 @@ def grip(actual, target, memory, parameters, time):
 
 
 def gripping(stiffness, closing=0.0):
-    """What `grip` goes by: [N·m/rad], [rad/s]."""
+    """Return the parameters of `grip` for a stiffness [N·m/rad] and a closing speed [rad/s]."""
     damping = 2 * sqrt(stiffness * INERTIA)
     finger = control.Impedance(2, stiffness, damping, INERTIA, VISCOUS, 100.0, COULOMB, 0.4)
     blocks = (finger, reference, outside, rubbing, collision)
@@ -62,7 +62,7 @@ def gripping(stiffness, closing=0.0):
 
 
 def seen_stiffness():
-    """Both fingers pushed by hand, and pushed harder: torque over displacement [N·m/rad]."""
+    """Push both fingers twice. Return torque over displacement [N·m/rad]."""
     places = []
     for push in (PUSH, 2 * PUSH, 0.0):
         for axis in range(2):
@@ -93,7 +93,7 @@ with cat.MainDevice(segment) as main:
             print(f"stiffness [N·m/rad]: {stiffness}, seen", *seen_stiffness().round(2))
         print("left by friction [mrad]:", *(1e3 * arm.actual.position).round(2))
 
-        plant.data.mocap_pos[0] = 0.0, 0.1, 0.0  # somebody holds something between the fingers
+        plant.data.mocap_pos[0] = 0.0, 0.1, 0.0  # put an object between the fingers
         run.parameters = gripping(4.0, closing=1.0)
         touched = next(cycle.time for cycle in loop if plant.data.ncon)
         felt = next(cycle.time for cycle in loop if run.memory[-2:].all())

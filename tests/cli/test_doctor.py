@@ -89,7 +89,7 @@ def test_a_cpu_there_is_none_of(capsys):
         (["--apply", "--undo"], "not allowed with"),
         (["--seconds", "-1"], "is not between"),
         (["--period", "1e-9"], "the shortest is 20 us"),
-        (["--priority", "100"], "priority 100 is not within 1 to 99"),
+        (["--priority", "100"], "priority 100 is outside 1 to 99"),
     ],
 )
 def test_usage(capsys, arguments, words):
@@ -101,7 +101,7 @@ def test_usage(capsys, arguments, words):
 
 def test_json_changes_nothing(capsys):
     assert main(["doctor", "--json", "--apply"]) == 2
-    assert "--json only looks" in capsys.readouterr().err
+    assert "--json cannot be combined" in capsys.readouterr().err
 
 
 def test_apply_lists_first_and_undo_takes_back(machine, capsys):

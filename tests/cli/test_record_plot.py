@@ -123,7 +123,7 @@ def test_repair(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
     )
     recording.write_bytes(recording.read_bytes()[:-7])
     status, out, _ = call(f"record --repair {recording}", capsys)
-    assert (status, out.split(";")[0]) == (0, f"{recording}: whole again, 1.199 s")
+    assert (status, out.split(";")[0]) == (0, f"{recording}: repaired, 1.199 s")
     recording.write_bytes(recording.read_bytes()[:-7])
     said = json.loads(call(f"record --repair {recording} --json", capsys)[1])
     assert said["seconds"] == pytest.approx(1.199)

@@ -92,7 +92,7 @@ def test_a_write_shows_what_differs_writes_it_and_reads_it_back(
     assert status == 0
     assert out.endswith("words written and read back; switch the device off and on\n")
     assert segment.core.sii_image(1) == path.read_bytes()
-    assert call(f"sii write eth9 1 {path}", capsys)[1].endswith("holds that already\n")
+    assert call(f"sii write eth9 1 {path}", capsys)[1].endswith("already has this content\n")
 
 
 def test_a_broken_checksum_is_named_and_can_be_repaired(
@@ -127,7 +127,7 @@ def test_another_products_image_needs_insisting(
     before = segment.core.sii_image(1)
     status, _, err = call(f"sii write eth9 1 {path}", capsys)
     assert status == 1
-    assert "the right POSITION? --force makes it another product" in err
+    assert "check POSITION; --force changes the device's identity" in err
     assert segment.core.sii_image(1) == before
     assert call(f"sii write eth9 1 {path} --force", capsys)[0] == 0
     assert segment.core.sii_image(1) == path.read_bytes()

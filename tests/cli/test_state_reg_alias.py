@@ -100,7 +100,7 @@ def test_an_alias_that_another_device_has_is_refused(
         file.write('[[device]]\nkind = "servo"\nalias = 7\n[[device]]\nkind = "servo"\n')
     status, _, err = call(f"alias virtual:{path} 1 7", capsys)
     assert status == 1
-    assert "alias 7 is that of device 0" in err
+    assert "already has the alias 7" in err
     assert call(f"alias virtual:{path} 1 7 --force", capsys)[0] == 0
 
 
@@ -112,7 +112,7 @@ def test_an_alias_that_another_device_will_have_is_refused_too(
     assert call("alias eth9 0 7", capsys)[0] == 0
     status, _, err = call("alias eth9 1 7", capsys)
     assert status == 1
-    assert "alias 7 is that of device 0" in err
+    assert "already has the alias 7" in err
 
 
 @pytest.mark.parametrize(
@@ -127,15 +127,15 @@ def test_an_alias_that_another_device_will_have_is_refused_too(
             2,
             "FMMU 0 to 15; SyncManager 0 to 15; SyncManager 0 to 15 status;",
         ),
-        ("reg read virtual 2 0x0131", 2, "say how many bytes"),
+        ("reg read virtual 2 0x0131", 2, "give the number of bytes"),
         ("reg read virtual 2 013A", 2, "write 0x013A"),
         ("reg read virtual 2 AL_STATUS 4", 2, "has 2 bytes, not 4"),
         ("reg read virtual 2 0xFFFF 2", 2, "outside 0x0000 to 0xFFFF"),
         ("reg read virtual 2 0xF000 8", 1, "0xF000 to 0xF007 cannot be read"),
         ("reg write virtual 2 AL_STATUS 4", 1, "0x0130 to 0x0131 cannot be written"),
         ("reg write virtual 2 watchdog-divider 100000", 2, "does not fit into 2 bytes"),
-        ("reg write virtual 2 0x0131 4", 2, "say --size"),
-        ("reg write virtual 2 0x0131 '4 xy'", 2, "no pairs of hexadecimal digits"),
+        ("reg write virtual 2 0x0131 4", 2, "add --size"),
+        ("reg write virtual 2 0x0131 '4 xy'", 2, "not a list of pairs of hexadecimal digits"),
         ("alias virtual 6 1", 2, "the segment has 6"),
     ],
 )

@@ -98,7 +98,7 @@ def test_page_is_well_formed_and_needs_nothing_from_elsewhere(result: Result) ->
     assert balance.open == []
     assert not re.search(r"https?:|url\(|<script|<link|@import", page)
     assert "A &amp; B &lt;coupler&gt;" in page
-    assert "it has moved; longer in 2 uncommitted cycles." in page
+    assert "it affects; longer in 2 uncommitted cycles." in page
     assert page.count("<svg") == 2 + len(PHASES)
 
 

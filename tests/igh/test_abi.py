@@ -154,14 +154,14 @@ def test_without_a_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.delenv("CATENARY_LIBETHERCAT", raising=False)
     with pytest.raises(LinkError, match=r"no libethercat on this machine(.|\n)*docs/igh\.md"):
         Library()
-    with pytest.raises(LinkError, match=r"cannot be loaded(.|\n)*look at the path"):
+    with pytest.raises(LinkError, match=r"cannot be loaded(.|\n)*check the path"):
         Library(tmp_path / "libethercat.so.1")
 
 
 def test_something_else_and_another_version(tmp_path: Path) -> None:
     empty = tmp_path / "empty.so"
     subprocess.run(["gcc", "-shared", "-xc", "/dev/null", "-o", empty], check=True)
-    with pytest.raises(LinkError, match="is no libethercat"):
+    with pytest.raises(LinkError, match="is not a libethercat"):
         Library(empty)
     other = build(tmp_path, "1.6.1", "-UVERSION_MAGIC", "-DVERSION_MAGIC=0x201")
     with pytest.raises(LinkError, match=r"libethercat 2\.1 \(version magic 0x0201\)"):

@@ -149,7 +149,7 @@ def test_a_cable_pulled_ends_the_loop(main: cat.MainDevice, double: Double) -> N
 
     with pytest.raises(cat.errors.WorkingCounterError, match="no device answers"):
         run()
-    assert any("main interface does not carry" in str(event) for event in main.events)
+    assert any("main interface lost its link" in str(event) for event in main.events)
 
 
 def test_a_device_that_need_not_be_there_comes_back(main: cat.MainDevice, double: Double) -> None:

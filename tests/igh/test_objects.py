@@ -115,7 +115,7 @@ def test_a_device_without_objects(main: cat.MainDevice, double: Double) -> None:
         },
         mailbox=None,
     )
-    with pytest.raises(MailboxError, match="does not speak CoE"):
+    with pytest.raises(MailboxError, match="does not support CoE"):
         sub.sdo.read(0x1018)
 
 
@@ -147,7 +147,7 @@ def test_an_activated_master_without_cycles_is_not_asked(
         lambda: main.subs[0].sdo.read(0x6076),
         lambda: main.subs[0].sdo.write(0x605A, 0, 6, type=UINT),
     ):
-        with pytest.raises(ConfigurationError, match="only while cycles flow"):
+        with pytest.raises(ConfigurationError, match="only while cycles run"):
             ask()
     assert double.calls() == []
 
@@ -189,7 +189,7 @@ def test_a_device_that_does_not_answer_holds_nobody_else_up(doubles: dict[str, P
             other.result()
             while not (stuck.done and behind.done):
                 next(loop)
-            with pytest.raises(MailboxError, match="the kernel has not come back"):
+            with pytest.raises(MailboxError, match="the kernel has not returned"):
                 stuck.result()
             with pytest.raises(MailboxError, match="is still busy with SDO 0x605A:00"):
                 behind.result()

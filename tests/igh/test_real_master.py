@@ -91,7 +91,7 @@ def test_nothing_can_be_configured_after_activation(subject: Subject, main: cat.
     main.configure(plan)
     with pytest.raises(ConfigurationError, match="activated already"):
         main.configure(plan)
-    with pytest.raises(ConfigurationError, match="only while cycles flow"):
+    with pytest.raises(ConfigurationError, match="only while cycles run"):
         talker(main).sdo.read(0x1018, 1)
     main.leave()
     assert talker(main).sdo.read(0x1018, 1, type=UDINT) == talker(main).identity.vendor

@@ -40,7 +40,7 @@ def test_a_killed_recorder_leaves_a_file_that_can_be_read(name: str, tmp_path: P
         command("record", "--repair", path), capture_output=True, text=True, timeout=DEADLINE
     )
     assert (repaired.returncode, repaired.stderr) == (0, "")
-    assert f"{path}: whole again" in repaired.stdout
+    assert f"{path}: repaired" in repaired.stdout
     with path.open("rb") as stream:
         summary = make_reader(stream, validate_crcs=True).get_summary()
     assert summary is not None

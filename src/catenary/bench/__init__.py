@@ -2,18 +2,18 @@
 
 Comparisons with other programs and with published figures are in `benchmarks/` of the repository.
 
-`enter_private_network` comes first: it may run the program again, which NumPy's threads would
-spoil. So nothing here imports anything before it is used.
+Call `enter_private_network` first. It may restart the program, which must not have threads (NumPy)
+at that time. Therefore all imports here are inside functions.
 """
 
 from __future__ import annotations
 
 
 def enter_private_network() -> None:
-    """Continue in a network namespace of its own.
+    """Continue this program in its own network namespace.
 
     Raises:
-        LinkError: this machine refuses one.
+        LinkError: This machine does not permit one.
     """
     from catenary.errors import LinkError
     from catenary.realtime import private_network
@@ -22,5 +22,5 @@ def enter_private_network() -> None:
     if isinstance(state, private_network.Refused):
         raise LinkError(
             f"the benchmark needs a private network: {state.reason}",
-            hint="run it as root; `catenary bench latency` needs none",
+            hint="run it as root, or use `catenary bench latency`, which needs no network",
         )

@@ -1,6 +1,6 @@
 """Job and Round: the input and the result of one peer in one round.
 
-Both travel in files between the process that runs the benchmark and the worker of one round.
+Files transfer both between the process that runs the benchmark and the worker of one round.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ PHASES = (
 
 For a cycle start d, a wake-up w and the time s at which the last cyclic send has returned:
 period = w - w of the previous cycle; lateness = w - d; receive = w → inputs usable;
-process = the body; send = its end → s; tail = s → the next wait begins; output_delay = s - d;
-input_age = s of the frame that returned the inputs → the body begins.
-In a native thread of ours: send = w → s, receive = last frame received → inputs usable.
+process = the body; send = its end → s; tail = s → start of the next wait; output_delay = s - d;
+input_age = s of the frame that returned the inputs → start of the body.
+In Catenary's native thread: send = w → s, receive = last frame received → inputs usable.
 """
 
 
@@ -55,7 +55,7 @@ class Job:
     priority: int | None  # SCHED_FIFO; None: unchanged
     counts_per_turn: float
     rated_torque: float  # of every drive [N·m]
-    spin: bool = False  # a Python thread spins beside the loop
+    spin: bool = False  # run a busy Python thread next to the loop
     storm: bool = False  # that thread also creates and collects garbage
     amplitude: float = 3.0  # of the sine [rad]
     stiffness: float = 0.5  # PD [N·m/rad]
@@ -69,7 +69,7 @@ class Job:
 
     @property
     def log(self) -> int:
-        """Length of a loop's log: all cycles of the round, and some that follow them."""
+        """Length of a loop's log: all cycles of the round, and some more."""
         return self.warm_up + self.cycles + 100
 
     @property
@@ -78,7 +78,7 @@ class Job:
 
     @property
     def counts_per_torque(self) -> float:
-        """0x6071 counts thousandths of the rated torque [1/(N·m)]."""
+        """Counts of 0x6071 (thousandths of the rated torque) per torque [1/(N·m)]."""
         return 1000.0 / self.rated_torque
 
 

@@ -1,4 +1,4 @@
-"""`catenary bench latency`: how late this machine wakes a thread, judged as by the doctor."""
+"""`catenary bench latency`: wake-up latency of a thread, with the verdict of `catenary doctor`."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ WIDTH = 100
 def measure(
     *, seconds: float, period: float, priority: int, cpu: int | None, file: Path | None
 ) -> bool:
-    """Print how late a thread wakes, and write it to `file` as JSON.
+    """Measure the wake-up latency of a thread, print it, and write it to `file` as JSON.
 
     Args:
-        seconds: of the measurement.
-        period: of the wake-ups [s].
-        priority: of the thread, SCHED_FIFO.
-        cpu: of the thread; None: the one that the doctor chooses for a loop.
-        file: of the figures.
+        seconds: Duration of the measurement [s].
+        period: Period of the wake-ups [s].
+        priority: SCHED_FIFO priority of the thread.
+        cpu: CPU of the thread; None: the one that `catenary doctor` selects for a loop.
+        file: File of the figures; None writes none.
 
     Returns:
         True unless the verdict is FAIL.
 
     Raises:
-        ValueError: no such CPU.
+        ValueError: The CPU does not exist.
     """
     here = this_machine(None, cpu=cpu, period=period, priority=priority)
     cpu = obtainable_cpu(here) if cpu is None else cpu

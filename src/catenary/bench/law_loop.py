@@ -47,7 +47,7 @@ def _measure(loop: cat.Loop, law: Any, home: Any, job: Job) -> Round:
         law,
         memory=home,
         parameters=[job.amplitude, job.stiffness, job.damping, NEVER],
-        budget=0,  # a step that takes long does not end the law: the peers continue too
+        budget=0,  # a long step does not end the law: the other peers continue, too
     )
     _sleep(loop, running, job.warm_up, job)
     first, cpu = running.steps, time.process_time_ns()

@@ -70,7 +70,7 @@ def measure(
     answers: Sequence[int],
     body: Callable[[float], None] | None = None,
 ) -> Round:
-    """Iterate the loop and return its figures. `body`: one that is running already."""
+    """Iterate the loop and return its figures. `body`: a body that is already running, or None."""
     body = body or body_of(arm, job)
     before, cpu, first, answered = loop.timing.counters, 0.0, 0, 0
     last_unmeasured, end = job.warm_up - 1, job.warm_up + job.cycles

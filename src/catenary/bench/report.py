@@ -88,7 +88,7 @@ def as_text(runs: Sequence[Run], ratios: Mapping[str, float]) -> str:
 
 
 def _headlines(runs: Sequence[Run]) -> str:
-    """Output delay, input age and CPU time: the three figures that describe an execution mode."""
+    """Return output delay, input age and CPU time: the main figures of an execution mode."""
     wide = FIGURE * len(FIGURES)
     groups = GAP.join(f"{title:>{wide}}" for title in HEADLINES.values())
     figures = GAP.join("".join(f"{name:>{FIGURE}}" for name in FIGURES) for _ in HEADLINES)
@@ -125,7 +125,10 @@ def _counters(runs: Sequence[Run]) -> str:
 
 
 def _ratios(ratios: Mapping[str, float]) -> str:
-    """One row per pair of peers, one column per phase. The keys of `ratios`: "phase: a / b"."""
+    """Return a table with a row per pair of peers and a column per phase.
+
+    The keys of `ratios` are "phase: a / b".
+    """
     keys = [key.split(": ", 1) for key in ratios]
     phases = list(dict.fromkeys(phase for phase, _ in keys))
     pairs = list(dict.fromkeys(pair for _, pair in keys))

@@ -1,5 +1,7 @@
-"""Runs peers in short rounds, one after the other (A B C B C A ...), each round in a fresh process:
-what the machine does meanwhile meets all of them alike, and none is always the first."""
+"""Short rounds of peers in turn (A B C B C A ...), each round in a new process.
+
+Disturbances of the machine therefore affect all peers alike, and no peer is always the first.
+"""
 
 from __future__ import annotations
 
@@ -14,21 +16,30 @@ from catenary.errors import CatenaryError
 from catenary.realtime.child import start_python
 
 WARM_UP_CYCLES = 200
-BRING_UP_SECONDS = 60.0  # at most, for bring-up and enabling in a round
+BRING_UP_SECONDS = 60.0  # longest bring-up and enabling in a round
 
-MOST_FAILED = 10  # rounds of one table that are begun anew
+MOST_FAILED = 10  # largest number of repeated rounds
 
 T = TypeVar("T")
 Progress = Callable[[str, int, int], None]  # peer, round, rounds
 
 
 class RoundError(CatenaryError):
-    """A peer could not do its round."""
+    """A peer could not complete its round."""
 
 
 def begin_anew(run: Callable[[], T], failed: list[str]) -> T:
-    """A machine that stops for longer than the devices' watchdog ends a round: it is done again,
-    and `failed` says why. RoundError: that has happened too often."""
+    """Run a round, and repeat it if it fails.
+
+    A round fails, for example, if the machine pauses for longer than the devices' watchdog.
+
+    Args:
+        run: The round.
+        failed: Receives the reasons of failed rounds.
+
+    Raises:
+        RoundError: Too many rounds have failed.
+    """
     while True:
         try:
             return run()
@@ -41,8 +52,17 @@ def begin_anew(run: Callable[[], T], failed: list[str]) -> T:
 def interleave(
     jobs: Sequence[Job], rounds: int, progress: Progress, failed: list[str] | None = None
 ) -> Mapping[str, list[Round]]:
-    """All rounds of every job, by the peer's name. With `failed` those that failed are done again,
-    and noted there."""
+    """Run all rounds of all jobs.
+
+    Args:
+        jobs: One job for each peer.
+        rounds: Number of rounds per job.
+        progress: Called before each round.
+        failed: Receives the reasons of failed rounds, which are repeated; None: do not repeat.
+
+    Returns:
+        The rounds by name of the peer.
+    """
     found: dict[str, list[Round]] = {job.peer: [] for job in jobs}
     with tempfile.TemporaryDirectory(prefix="catenary-bench-") as name:
         for number in range(rounds):
@@ -63,6 +83,6 @@ def run_round(job: Job, folder: Path) -> Round:
     with start_python(arguments) as worker:
         said = worker.read_line(seconds)
     if said != "done":
-        reason = said or f"it said nothing within {seconds:.0f} s"
+        reason = said or f"no result within {seconds:.0f} s"
         raise RoundError(f"the peer {job.peer} failed: {reason}")
     return read_round(result_path)

@@ -18,7 +18,7 @@ def as_text(file: Path) -> str:
     """Return the report of a file that `catenary bench loop --json` or `latency --json` wrote.
 
     Raises:
-        ValueError: another kind of file.
+        ValueError: The file is not a result of these commands.
     """
     try:
         figures = json.loads(file.read_text())

@@ -1,6 +1,8 @@
-"""The segment of the benchmarks: a coupler and drives, served on a network interface by a process
-of its own: `python -m catenary.bench.segment NIC SECOND DRIVES INPUTS AXES CPU`; SECOND is a ring's
-other end, or empty."""
+"""The segment of the benchmarks: a coupler and drives, served on a network interface.
+
+`python -m catenary.bench.segment NIC SECOND DRIVES INPUTS AXES CPU` is the process that serves it.
+SECOND is the interface of a ring's other end, or empty.
+"""
 
 from __future__ import annotations
 
@@ -22,22 +24,22 @@ START_SECONDS = 30.0
 COUNTS_PER_TURN = 2**20
 RATED_TORQUE = 2.0  # [N·m]
 PRIORITY = 80
-BELOW = 10  # the segment's priority is so much lower where it shares the only processor
-ANALOG_CHANNELS = 4  # of one input terminal
+BELOW = 10  # reduction of the segment's priority if it shares the only processor
+ANALOG_CHANNELS = 4  # per input terminal
 
 
 @dataclass(frozen=True, slots=True)
 class Served:
     interface: str  # of the MainDevice
     drives: tuple[int, ...]  # positions
-    second: str = ""  # of the MainDevice, where the segment is a ring
-    far: str = ""  # of the segment
-    pid: int = 0  # of the process that serves it
+    second: str = ""  # second interface of the MainDevice if the segment is a ring
+    far: str = ""  # interface of the segment
+    pid: int = 0  # process that serves the segment
 
 
 @dataclass(frozen=True, slots=True)
 class Processors:
-    """The segment has one, all masters the other; None: the machine has not two."""
+    """One processor for the segment and one for all masters; None if there is only one."""
 
     segment: int | None
     masters: int | None
@@ -58,8 +60,15 @@ def make_segment(
     clock: Literal["virtual", "monotonic"] | VirtualClock = "monotonic",
     ring: bool = False,
 ) -> Segment:
-    """A coupler, `drives` servos of `axes` axes each, and `inputs` terminals of analogue inputs:
-    bytes without axes."""
+    """Return a segment of a coupler, servos and analogue input terminals.
+
+    Args:
+        drives: Number of servos.
+        inputs: Number of input terminals, which add bytes without axes.
+        axes: Axes per servo.
+        clock: Clock of the segment.
+        ring: True for a ring.
+    """
     servos = [
         Servo(counts_per_turn=COUNTS_PER_TURN, rated_torque=RATED_TORQUE, axes=axes)
         for _ in range(drives)
@@ -70,8 +79,7 @@ def make_segment(
 
 @contextmanager
 def served(drives: int, inputs: int = 0, axes: int = 1, *, ring: bool = False) -> Iterator[Served]:
-    """The segment on one end of a pair of interfaces, for as long as the block lasts; a ring on two
-    pairs."""
+    """Serve the segment on one end of an interface pair during the block; a ring on two pairs."""
     cpu = processors().segment
     with ExitStack() as stack:
         ours, theirs = stack.enter_context(veth_pair())

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 class Setting:
     drives: int = 3
     rate: int = 1000  # [Hz]
-    seconds: float = 10.0  # of every peer
+    seconds: float = 10.0  # per peer
     body: str = "sine"  # or "pd"
     spin: bool = False  # a Python thread spins next to every loop
-    rounds: int | None = None  # of every peer; None: as many as keep a round below a second
-    busy_wait: float = 0.0  # [s] of our loops and of `c-busy` before each cycle start
+    rounds: int | None = None  # per peer; None: rounds of less than a second
+    busy_wait: float = 0.0  # [s] before each cycle start, of Catenary's loops and of `c-busy`
 
     def __str__(self) -> str:
         notes = [f"{self.drives} drives at {self.rate} Hz, body {self.body}"]

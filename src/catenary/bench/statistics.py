@@ -78,7 +78,7 @@ def columns_of(one: Round) -> dict[str, Values]:
     columns[IN_CONTROLLER] = columns["receive"] + columns["process"] + columns["send"]
     columns[WITH_TAIL] = columns[IN_CONTROLLER] + columns["tail"]
     columns[WAKE_TO_SENT] = columns["output_delay"] - columns["lateness"]
-    columns["period"] = columns["period"][1:]  # the first one began before the round
+    columns["period"] = columns["period"][1:]  # the first one started before the round
     return {name: values[~np.isnan(values)] for name, values in columns.items()}
 
 

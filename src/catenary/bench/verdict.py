@@ -1,4 +1,4 @@
-"""Verdicts on a loop: does this machine send its frames in time?"""
+"""Verdicts on a loop: whether this machine sends its frames in time."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
-"""One peer, once, in a process of its own: `python -m catenary.bench.worker JOB RESULT`.
+"""One round of one peer, in its own process: `python -m catenary.bench.worker JOB RESULT`.
 
-Every peer gets the same processor and scheduling here. A fresh process for every round lets all of
-them start from the same state, and keeps one peer's memory from another's timing."""
+Every peer gets the same processor and scheduling. With a new process for every round, all peers
+start from the same state, and the memory of one peer does not affect the timing of another.
+"""
 
 from __future__ import annotations
 
@@ -33,14 +34,16 @@ def main(arguments: Sequence[str]) -> None:
 def schedule(job: Job) -> Scheduling:
     if job.priority is None:
         return what_scheduling()
-    # Locked memory would only be asked of the Python peers: the C programs lock their own.
+    # This locks the memory of the Python peers; the C programs lock their own.
     return request_scheduling(priority=job.priority, lock_memory=True, cpu=job.cpu)
 
 
 @contextlib.contextmanager
 def spinning(job: Job) -> Iterator[None]:
-    """A Python thread that never rests, on the processor of the loop, with ordinary scheduling:
-    it is started before the main thread asks for more."""
+    """Run a busy Python thread on the processor of the loop during the block.
+
+    The thread has ordinary scheduling: it starts before the main thread requests a priority.
+    """
     stop = threading.Event()
 
     def spin() -> None:
@@ -61,7 +64,7 @@ def spinning(job: Job) -> Iterator[None]:
 
 
 def make_garbage() -> None:
-    """A thousand objects that know each other, and a full collection."""
+    """Create a thousand objects in reference cycles, and run a full garbage collection."""
     ring: list[object] = []
     ring.extend([ring] for _ in range(1000))
     del ring
@@ -72,6 +75,6 @@ if __name__ == "__main__":
     try:
         main(sys.argv[1:])
     except Exception as error:
-        # One line for whoever leads the benchmark; the traceback for whoever repairs the peer.
+        # One line for the process that runs the benchmark; the traceback for debugging the peer.
         print(f"{type(error).__name__}: {' '.join(str(error).split())}", flush=True)
         raise

@@ -26,15 +26,14 @@ def add_parser(commands: Commands) -> None:
         commands,
         "alias",
         help="show or write the station alias of a device",
-        description="Shows the station alias, by which a program finds a device wherever it is "
-        "plugged in. With VALUE: writes it into the EEPROM; the device takes it over when it is "
-        "switched off and on.",
+        description="Shows the station alias, by which a program finds a device at any position. "
+        "With VALUE: writes it into the EEPROM. The device uses it after its next power cycle.",
         example="catenary alias eth0 2\ncatenary alias eth0 2 10\ncatenary alias eth0 2 0",
     )
     add_target(parser)
     add_position(parser)
     parser.add_argument("value", metavar="VALUE", nargs="?", type=alias, help="1 to 65535; 0: none")
-    parser.add_argument("--force", action="store_true", help="though another device has it")
+    parser.add_argument("--force", action="store_true", help="even if another device has it")
     add_json(parser)
     parser.set_defaults(run=run)
 
@@ -74,7 +73,11 @@ def run(arguments: argparse.Namespace) -> int:
 def refuse_twins(
     main: MainDevice, devices: Sequence[SubDevice], device: SubDevice, value: int
 ) -> None:
-    """ConfigurationError where another device has the alias, now or after its next power-up."""
+    """Check that no other device has the alias, now or after its next power-up.
+
+    Raises:
+        ConfigurationError: Another device has it.
+    """
     from catenary.errors import ConfigurationError
     from catenary.procedure.alias import read_alias
     from catenary.procedure.sii_owner import with_eeprom
@@ -85,8 +88,8 @@ def refuse_twins(
         stored = main.converse(with_eeprom(other.station, read_alias(other.station)))
         if value in (other.alias, stored):
             raise ConfigurationError(
-                f"alias {value} is that of {other.station} already",
-                hint="take another, or --force when that one is to get a new alias too",
+                f"{other.station} already has the alias {value}",
+                hint="choose another alias, or use --force if that device gets a new alias, too",
             )
 
 

@@ -1,4 +1,4 @@
-"""Words of the command line as numbers. Numbers are decimal, or hexadecimal with 0x."""
+"""Conversion of command-line arguments. Numbers are decimal, or hexadecimal with 0x."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def position(text: str) -> int:
 
 
 def entry(text: str) -> Entry:
-    """`0x6041` or `0x1018:1`."""
+    """Return the entry for `0x6041` or `0x1018:1`."""
     index_text, _, subindex_text = text.partition(":")
     if index_text.isalnum() and not index_text.lower().startswith("0x"):
         raise argparse.ArgumentTypeError(
@@ -57,14 +57,14 @@ def positive_number(text: str) -> int:
 
 
 def positive_numbers(text: str) -> list[int]:
-    """`4000,8000`"""
+    """Return the numbers of a list such as `4000,8000`."""
     return [positive_number(each) for each in text.split(",")]
 
 
 def fifo_priority(text: str) -> int:
     value = number(text)
     if not 1 <= value <= 99:
-        raise argparse.ArgumentTypeError(f"SCHED_FIFO has priorities 1 to 99, not {text}")
+        raise argparse.ArgumentTypeError(f"priority {text} is outside 1 to 99 (SCHED_FIFO)")
     return value
 
 
@@ -82,19 +82,19 @@ def _positive_time(text: str, unit: str) -> float:
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is not a number of {unit}") from None
     if not 0.0 < value < 1e6:
-        raise argparse.ArgumentTypeError(f"{text} {unit} is not between 0 and a million")
+        raise argparse.ArgumentTypeError(f"{text} {unit} is not between 0 and 1e6")
     return value
 
 
 def result_file(text: str) -> Path:
-    """A file that is written in the end: what stands in the way is said before the work."""
+    """Return the path of a result file. Check before the measurement that it can be written."""
     path = Path(text)
-    if os.path.isdir(path):  # no error where the folder may not be looked into
+    if os.path.isdir(path):  # no error if the folder is not readable
         raise argparse.ArgumentTypeError(f"{text} is a folder")
     if not os.path.isdir(path.parent):
         raise argparse.ArgumentTypeError(f"there is no folder {path.parent}")
     if not os.access(path if os.path.exists(path) else path.parent, os.W_OK):
-        raise argparse.ArgumentTypeError(f"{text} may not be written")
+        raise argparse.ArgumentTypeError(f"{text} cannot be written: no permission")
     return path
 
 
@@ -104,5 +104,5 @@ def seconds(text: str) -> float:
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds") from None
     if not 0.0 <= value < 1e9:
-        raise argparse.ArgumentTypeError(f"{text} s is not between 0 and a thousand million")
+        raise argparse.ArgumentTypeError(f"{text} s is not between 0 and 1e9 s")
     return value

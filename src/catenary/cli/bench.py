@@ -32,9 +32,9 @@ def _add_loop(group: Commands) -> None:
     parser = add_command(
         group,
         "loop",
-        help="the cyclic exchange, phase by phase",
+        help="measure the phases of the cyclic exchange",
         description="Runs catenary-inline, catenary-threaded and catenary-law (where Numba is "
-        "installed) in short rounds, in turn, on virtual devices in a private network. Prints "
+        "installed) alternately in short rounds, on virtual devices in a private network. Prints "
         "output delay, input age and CPU time per cycle, then the phases.",
         example="catenary bench loop --seconds 10 --json loop.json\n"
         "catenary bench loop --drives 33 --rate 4000 --body pd\n"
@@ -48,21 +48,28 @@ def _add_latency(group: Commands) -> None:
     parser = add_command(
         group,
         "latency",
-        help="how late threads wake",
-        description="Wakes a thread again and again, as the latency check of `catenary doctor` "
-        "does, and judges the latest wake-up. Exit status 1 if the verdict is FAIL.",
+        help="measure the wake-up latency of threads",
+        description="Wakes a thread periodically, like the latency check of `catenary doctor`, "
+        "and judges the largest latency. Exit status 1 if the verdict is FAIL.",
         example="catenary bench latency --seconds 60 --json latency.json\n"
         "catenary bench latency --period 0.00025 --priority 90 --cpu 3",
     )
-    add_seconds(parser, 10.0, "of the measurement")
+    add_seconds(parser, 10.0, "duration of the measurement")
     parser.add_argument(
-        "--period", type=period, default=1e-3, metavar="S", help="of the wake-ups [s] (0.001)"
+        "--period", type=period, default=1e-3, metavar="S", help="wake-up period [s] (0.001)"
     )
     parser.add_argument(
-        "--priority", type=fifo_priority, default=80, metavar="P", help="of the thread (80)"
+        "--priority",
+        type=fifo_priority,
+        default=80,
+        metavar="P",
+        help="priority of the thread (80)",
     )
     parser.add_argument(
-        "--cpu", type=number, metavar="N", help="of the thread (the last isolated, else the last)"
+        "--cpu",
+        type=number,
+        metavar="N",
+        help="CPU of the thread (the last isolated, else the last)",
     )
     add_file(parser)
     parser.set_defaults(run=run_latency)
@@ -73,11 +80,10 @@ def _add_report(group: Commands) -> None:
         group,
         "report",
         help="print a saved result again",
-        description="Prints the figures in a JSON file of `loop` or `latency` again, with the "
-        "verdict.",
+        description="Prints the figures and the verdict from a JSON file of `loop` or `latency`.",
         example="catenary bench report loop.json",
     )
-    parser.add_argument("file", type=Path, metavar="FILE", help="a result")
+    parser.add_argument("file", type=Path, metavar="FILE", help="a result file")
     parser.set_defaults(run=run_report)
 
 

@@ -1,4 +1,4 @@
-"""Options that benchmarks share."""
+"""Options that several benchmarks share."""
 
 from __future__ import annotations
 
@@ -8,18 +8,24 @@ from catenary.cli.arguments import positive_number, positive_seconds, result_fil
 
 
 def add_file(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--json", type=result_file, metavar="FILE", help="write the figures there")
+    parser.add_argument(
+        "--json", type=result_file, metavar="FILE", help="write the figures to FILE"
+    )
 
 
 def add_drives(parser: argparse.ArgumentParser, default: int = 3) -> None:
     parser.add_argument(
-        "--drives", type=positive_number, default=default, metavar="N", help=f"so many ({default})"
+        "--drives",
+        type=positive_number,
+        default=default,
+        metavar="N",
+        help=f"number of drives ({default})",
     )
 
 
 def add_rate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--rate", type=positive_number, default=1000, metavar="HZ", help="of the loop (1000)"
+        "--rate", type=positive_number, default=1000, metavar="HZ", help="rate of the loop (1000)"
     )
 
 
@@ -37,18 +43,18 @@ def add_loop_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of the commands that measure the loop."""
     add_drives(parser)
     add_rate(parser)
-    add_seconds(parser, 10.0, "of every peer")
+    add_seconds(parser, 10.0, "duration per peer")
     parser.add_argument(
-        "--body", choices=("sine", "pd"), default="sine", help="what the user computes (sine)"
+        "--body", choices=("sine", "pd"), default="sine", help="computation in the loop body (sine)"
     )
     parser.add_argument(
-        "--spin", action="store_true", help="a Python thread spins beside every loop"
+        "--spin", action="store_true", help="run a busy Python thread next to every loop"
     )
     parser.add_argument(
         "--rounds",
         type=positive_number,
         metavar="N",
-        help="of every peer, each in a fresh process (so many that each takes 0.9 s at 1 kHz)",
+        help="rounds per peer, each in a new process (default: rounds of 0.9 s at 1 kHz)",
     )
     parser.add_argument(
         "--busy-wait",

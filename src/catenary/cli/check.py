@@ -1,4 +1,4 @@
-"""`catenary check machine.toml`: the devices of a machine file against those of the segment."""
+"""`catenary check machine.toml`: compare the devices of a machine file with the segment."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ def add_parser(commands: Commands) -> None:
         "check",
         help="compare a machine file with the segment",
         description="Compares addresses and identities of the devices with a machine file, "
-        "without changing a device. Exit status: 0 the same, 1 different, 2 file or segment "
-        "cannot be read.",
+        "without changing a device. Exit status: 0 if they match, 1 if they differ, 2 if the file "
+        "or the segment cannot be read.",
         example="catenary check machine.toml\ncatenary check machine.toml eth1 --json",
     )
     parser.add_argument("file", metavar="FILE", help="the machine file")
     parser.add_argument(
-        "target", metavar="TARGET", nargs="?", help="instead of the target in the file: eth0 ..."
+        "target", metavar="TARGET", nargs="?", help="replaces the target in the file: eth0 ..."
     )
     add_json(parser)
     parser.set_defaults(run=run)

@@ -1,10 +1,10 @@
-"""Entry point of the `catenary` command: imports all commands where Ctrl-C is handled already."""
+"""Entry point of the `catenary` command. It handles Ctrl-C even during the imports."""
 
 INTERRUPTED = 130  # 128 + SIGINT
 
 
 def main() -> int:
-    """Run the command of the process's arguments and return the exit status."""
+    """Run the command in the arguments of this process. Return the exit status."""
     try:
         from catenary.cli.main import main as run
 

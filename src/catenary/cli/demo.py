@@ -25,7 +25,9 @@ def add_parser(commands: Commands) -> None:
         "--out", type=Path, default=Path("out"), metavar="DIR", help="folder of the report (out)"
     )
     parser.add_argument(
-        "--in-process", action="store_true", help="no network: the segment in this process"
+        "--in-process",
+        action="store_true",
+        help="without a network: run the segment in this process",
     )
     parser.set_defaults(run=run)
 

@@ -1,4 +1,4 @@
-"""Devices of a segment for people and for programs."""
+"""Lists of the devices of a segment, as a table and as JSON."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`catenary diag TARGET`: names the cable or device at fault."""
+"""`catenary diag TARGET`: find the cable or device at fault."""
 
 from __future__ import annotations
 
@@ -27,18 +27,21 @@ def add_parser(commands: Commands) -> None:
     parser = add_command(
         commands,
         "diag",
-        help="name the cable or device at fault",
-        description="Reads the error counters of all devices and says which cable, device or "
-        f"supply is at fault. Counted is what happened {SINCE_POWER_UP}; switching on may count "
-        "too, so with --seconds only what happens now, while frames are sent to provoke it. "
-        "Exit status 1 when something is found.",
+        help="find the cable or device at fault",
+        description="Reads the error counters of all devices and reports the cable, device or "
+        f"supply at fault. The counters contain errors {SINCE_POWER_UP}, including those of "
+        "switching on. With --seconds, only new errors count, and frames are sent to provoke "
+        "them. Exit status 1 if a fault is found.",
         example="catenary diag eth0\ncatenary diag eth0 --seconds 10\ncatenary diag eth0 --clear",
     )
     add_target(parser)
     parser.add_argument(
-        "--seconds", metavar="N", type=positive_seconds, help="watch for so long; only what is new"
+        "--seconds",
+        metavar="N",
+        type=positive_seconds,
+        help="watch for N seconds; report new errors only",
     )
-    parser.add_argument("--clear", action="store_true", help="then set all counters to zero")
+    parser.add_argument("--clear", action="store_true", help="set all counters to zero afterwards")
     add_force(parser)
     add_json(parser)
     parser.set_defaults(run=run)
@@ -82,7 +85,7 @@ HEADINGS = ("pos", "port", "broken frames", "symbol errors", "forwarded", "lost 
 
 
 def counter_rows(found: Diagnosis) -> list[tuple[str, ...]]:
-    """The ports that have counted anything."""
+    """Return a row for each port with a counter that is not zero."""
     rows = []
     for position, errors in enumerate(found.counters):
         for port, count in enumerate(errors.ports if errors else ()):
@@ -132,7 +135,7 @@ def as_json(found: Diagnosis, seconds: float | None) -> str:
 
 
 def counters(errors: ErrorCounters) -> dict[str, object]:
-    """All counters of one device, for programs."""
+    """Return all counters of one device for JSON."""
     return {
         "ports": [
             {

@@ -1,4 +1,4 @@
-"""A device's object dictionary for people and for programs."""
+"""The object dictionary of a device, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -21,23 +21,27 @@ STATES = "PSO"  # PRE-OP, SAFE-OP, OP: bits 0 to 2 for reading, 3 to 5 for writi
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One entry, or a heading: an object of several entries."""
+    """An entry, or the heading of an object with several entries."""
 
     index: int
-    subindex: int | None  # None: the object
+    subindex: int | None  # None: heading
     name: str
     type: str
     bit_length: int
     access: Access
     value: Value | None = None
-    problem: str = ""  # why it has no value
+    problem: str = ""  # reason for a missing value
 
 
 def rows_of(device: SubDevice, notes: list[str], *, values: bool) -> Iterator[Row]:
-    """Yield the rows of all objects, asked for one after the other.
+    """Read all objects one after the other, and yield their rows.
 
-    An object that the device does not describe has a row that says so. `notes` receives what is
-    missing, and why.
+    An object that the device does not describe has a row with the reason.
+
+    Args:
+        device: The device to read.
+        notes: Receives notes about missing descriptions.
+        values: True to read the values of readable entries, too.
     """
     known = device.sdo.list()
     notes += device.sdo.notes
@@ -83,7 +87,7 @@ def _with_value(device: SubDevice, entry: EntryDescription, row: Row) -> Row:
         return replace(row, problem=error.message)
     try:
         return replace(row, value=by_index(entry.data_type).decode(data))
-    except (ValueError, CatenaryError):  # a maker's own type, or not as long as it says
+    except (ValueError, CatenaryError):  # a manufacturer's own type, or a wrong length
         return replace(row, value=data)
 
 
@@ -102,7 +106,7 @@ def type_name(data_type: int) -> str:
 
 
 def access_text(access: Access) -> str:
-    """As "rw", "rwP RT", "r"."""
+    """Return the access rights as text, such as "rw", "rwP RT" or "r"."""
     text = ""
     for letter, shift in (("r", 0), ("w", 3)):
         states = access >> shift & 0b111

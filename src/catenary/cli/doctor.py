@@ -1,4 +1,4 @@
-"""`catenary doctor [NIC]`: whether this machine is fit for a real-time loop, and what to type."""
+"""`catenary doctor [NIC]`: check that this machine is fit for a real-time loop."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from catenary.cli.arguments import number, positive_seconds
 from catenary.cli.failure import FAILED, UsageError
 from catenary.cli.parsers import Commands, add_command, add_json
 
-WIDTH = 100  # of the report, where the terminal is not narrower
+WIDTH = 100  # largest width of the report
 
 if TYPE_CHECKING:
     from catenary.doctor import Change, Examination
@@ -30,31 +30,43 @@ def add_parser(commands: Commands) -> None:
     parser = add_command(
         commands,
         "doctor",
-        help="whether this machine is fit for real time, and what to type",
-        description="Looks at the kernel, processors, clocks, permissions and a network card, and "
-        "measures how late threads wake up. Sends nothing and changes nothing without --apply. "
-        "Every check is explained in docs/doctor.md. Exit status 1: a check failed.",
+        help="check if this machine is fit for real time",
+        description="Checks the kernel, processors, clocks, permissions and a network card, and "
+        "measures the wake-up latency of threads. Shows the commands that solve a problem. Sends "
+        "nothing, and changes nothing without --apply. docs/doctor.md explains every check. Exit "
+        "status 1 if a check failed.",
         example=EXAMPLE,
     )
-    parser.add_argument("nic", metavar="NIC", nargs="?", help="the card of the segment: eth0")
     parser.add_argument(
-        "--seconds", type=seconds, default=3.0, help="of the latency test (default 3; 0: none)"
+        "nic", metavar="NIC", nargs="?", help="the network card of the segment: eth0"
     )
     parser.add_argument(
-        "--period", type=period, default=1e-3, metavar="SECONDS", help="of the loop (default 0.001)"
+        "--seconds",
+        type=seconds,
+        default=3.0,
+        help="duration of the latency test (default 3; 0: none)",
     )
     parser.add_argument(
-        "--priority", type=priority, default=80, help="of its thread, 1 to 99 (default 80)"
+        "--period",
+        type=period,
+        default=1e-3,
+        metavar="SECONDS",
+        help="period of the loop (default 0.001)",
     )
     parser.add_argument(
-        "--cpu", type=number, help="it is to run on (default: the last isolated one, else the last)"
+        "--priority", type=priority, default=80, help="priority of its thread, 1 to 99 (default 80)"
+    )
+    parser.add_argument(
+        "--cpu",
+        type=number,
+        help="CPU of its thread (default: the last isolated one, else the last)",
     )
     add_json(parser)
     doing = parser.add_mutually_exclusive_group()
     doing.add_argument(
-        "--apply", action="store_true", help="list what can be changed and undone; ask; change it"
+        "--apply", action="store_true", help="list reversible changes, ask, then apply them"
     )
-    doing.add_argument("--undo", action="store_true", help="take back what --apply changed")
+    doing.add_argument("--undo", action="store_true", help="undo the changes of --apply")
     parser.add_argument("--yes", action="store_true", help="with --apply: do not ask")
     parser.set_defaults(run=run)
 
@@ -63,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
     from catenary.doctor import as_json, as_text
 
     if arguments.json and (arguments.apply or arguments.undo):
-        raise UsageError("--json only looks: it goes with neither --apply nor --undo")
+        raise UsageError("--json cannot be combined with --apply or --undo")
     if arguments.undo:
         return undo()
     examination = look(arguments)
@@ -87,7 +99,7 @@ def look(arguments: argparse.Namespace) -> Examination:
         machine = this_machine(
             arguments.nic, cpu=arguments.cpu, period=arguments.period, priority=arguments.priority
         )
-    except LinkError as error:  # 1 is for checks that failed
+    except LinkError as error:  # exit status 1 is reserved for failed checks
         raise UsageError(error.message, hint=error.hint) from error
     except ValueError as error:
         raise UsageError(str(error)) from error
@@ -100,18 +112,18 @@ def look(arguments: argparse.Namespace) -> Examination:
 
 
 def apply(changes: tuple[Change, ...], *, ask: bool) -> int:
-    """The exit status: 1 where something was refused."""
+    """List the changes, ask, and apply them. Return the exit status: 1 if one was refused."""
     from catenary.doctor import MachineGround, change_lines, open_state
     from catenary.doctor import apply as make
 
     if not changes:
-        print("\nNothing to change that could be undone: the rest is yours to type.")
+        print("\nNo reversible changes to apply. Run the commands above yourself.")
         return 0
     ground = MachineGround()
-    print("\nTo be changed, until `catenary doctor --undo` or a reboot:")
+    print("\nChanges until `catenary doctor --undo` or a reboot:")
     print(*change_lines(changes, ground), sep="\n")
     if os.geteuid() != 0:
-        print("(Most of it takes root: sudo with this command's full path.)")
+        print("(Most changes need root: use sudo with the full path of this command.)")
     if ask and not agreed():
         print("Nothing was changed.")
         return 0
@@ -120,8 +132,10 @@ def apply(changes: tuple[Change, ...], *, ask: bool) -> int:
 
 def agreed() -> bool:
     if not sys.stdin.isatty():
-        raise UsageError("--apply asks first, and there is nobody to ask", hint="--apply --yes")
-    return input("Change them? [y/N] ").strip().lower() in ("y", "yes")
+        raise UsageError(
+            "--apply asks before changes, but stdin is not a terminal", hint="--apply --yes"
+        )
+    return input("Apply these changes? [y/N] ").strip().lower() in ("y", "yes")
 
 
 def undo() -> int:
@@ -130,7 +144,7 @@ def undo() -> int:
 
     state = open_state()
     if not state.load():
-        print(f"Nothing to undo: {state.path} notes no change since this machine was started.")
+        print(f"Nothing to undo: {state.path} contains no change since this machine was started.")
         return 0
     return tell(take_back(MachineGround(), state))
 
@@ -161,5 +175,5 @@ def period(text: str) -> float:
 def priority(text: str) -> int:
     value = number(text)
     if not 1 <= value <= 99:
-        raise argparse.ArgumentTypeError(f"priority {value} is not within 1 to 99")
+        raise argparse.ArgumentTypeError(f"priority {value} is outside 1 to 99")
     return value

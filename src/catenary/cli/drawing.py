@@ -1,4 +1,4 @@
-"""What a drawing of a segment shows, and the drawing as text."""
+"""The drawing of a segment: its content, and its form as text."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from catenary.wire.error_counters import ErrorCounters, PortErrors
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """One device. `delay_ns`: of its cable and the device before, one way; None: not known."""
+    """One device. `delay_ns`: one-way delay of its cable and the previous device, or None."""
 
     name: str
     alias: int
     state: str
     delay_ns: int | None
-    errors: ErrorCounters | None  # None: not asked, or no answer
+    errors: ErrorCounters | None  # None: no answer
 
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """A segment: its tree and what stands in it, by position."""
+    """The tree of a segment, and its devices by position."""
 
     target: str
     topology: Topology
@@ -33,7 +33,7 @@ HEADINGS = ("device", "cable from", "delay", "state", "alias", "errors")
 
 
 def as_text(drawing: Drawing) -> str:
-    """A line stays a column; a branch is indented, and the way on goes on below it."""
+    """Return the drawing as text. Devices in line form a column, and branches are indented."""
     rows = [
         (f"{indent}{position} {node.name}", _from(drawing, position), *_facts(node))
         for position, (indent, node) in enumerate(
@@ -45,7 +45,7 @@ def as_text(drawing: Drawing) -> str:
 
 
 def indents(topology: Topology) -> tuple[str, ...]:
-    """What stands before each device: `├─` begins a branch, `│ ` leads past one."""
+    """Return the indentation of each device: `├─` starts a branch, `│ ` continues past one."""
     found: list[str] = []
     depths: list[int] = []
     for position, place in enumerate(topology.places):
@@ -74,7 +74,7 @@ def _facts(node: Node) -> tuple[str, ...]:
 
 
 def error_text(errors: ErrorCounters | None) -> str:
-    """The counters that are not zero."""
+    """Return the counters that are not zero, as text."""
     if errors is None:
         return ""
     parts = [f"port {n}: {port_text(port)}" for n, port in enumerate(errors.ports) if port]
@@ -82,7 +82,7 @@ def error_text(errors: ErrorCounters | None) -> str:
 
 
 def inner_text(errors: ErrorCounters | None) -> str:
-    """What the device has counted inside, and not at its port 0 as well."""
+    """Return the counters of PDI and processing unit; the latter only if port 0 counted none."""
     if errors is None:
         return ""
     outside = errors.ports[0].invalid_frames or errors.ports[0].forwarded

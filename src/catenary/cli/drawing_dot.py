@@ -20,7 +20,7 @@ _GOOD, _BAD, _GREY = "#2f5d8a", "#c62828", "#777777"
 
 
 def as_dot(drawing: Drawing) -> str:
-    """One node a device with its open ports, one edge a cable; what has errors is red."""
+    """Return a Graphviz graph: a node per device, an edge per cable; red if it has errors."""
     lines = [*_HEAD, f"  main [shape=box, style=rounded, label={_quoted(drawing.target)}];"]
     for position, node in enumerate(drawing.nodes):
         lines.append(f"  d{position} [label={_label(drawing, position, node)}];")
@@ -30,7 +30,7 @@ def as_dot(drawing: Drawing) -> str:
 
 
 def _label(drawing: Drawing, position: int, node: Node) -> str:
-    """A table: port 0 at the left, the ports onwards at the right, in the order of the frame."""
+    """Return a node label: port 0 on the left, other ports on the right in frame order."""
     onwards = [port for port in PORT_ORDER if drawing.topology.ports[position][port]]
     rows = max(1, len(onwards))
     alias = f"alias {node.alias}" if node.alias else ""
@@ -41,7 +41,7 @@ def _label(drawing: Drawing, position: int, node: Node) -> str:
     left = _port(0, rows) if drawing.topology.ports[position][0] else ""
     body = f'<tr>{left}<td rowspan="{rows}">{name}</td>{first}</tr>'
     body += "".join(f"<tr>{port}</tr>" for port in others)
-    color = _BAD if inner or "ERROR" in node.state else _GOOD  # noise is its cables', below
+    color = _BAD if inner or "ERROR" in node.state else _GOOD  # cables show the port errors
     return (
         f'<<table border="1" color="{color}" cellborder="0" cellspacing="0" cellpadding="4">'
         f"{body}</table>>"

@@ -1,4 +1,4 @@
-"""From an exception to what a user reads, and to the exit status."""
+"""Messages and exit statuses for exceptions."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ FAILED = 1
 USAGE = 2
 BROKEN_PIPE = 141  # 128 + SIGPIPE
 FILE_HINTS: Mapping[type[OSError], str] = {
-    FileExistsError: "a folder is wanted, and there is a file of that name",
+    FileExistsError: "a folder is needed, but a file with that name exists",
     NotADirectoryError: "a part of the path is a file",
-    IsADirectoryError: "a file is wanted, and that is a folder",
-    PermissionError: "it is another user's: ls -l",
+    IsADirectoryError: "a file is needed, but this is a folder",
+    PermissionError: "it belongs to another user: ls -l",
 }
 
 
 class UsageError(Exception):
-    """The command line asks for what cannot be; found only while the command ran."""
+    """An invalid command line, detected after the parsing of the arguments."""
 
     def __init__(self, message: str, *, hint: str = "") -> None:
         super().__init__(message)
@@ -38,7 +38,7 @@ def report(error: Exception, program: str = "catenary") -> int:
 
 
 def describe(error: Exception) -> tuple[str, str]:
-    """What went wrong and what to do next, each on one line."""
+    """Return the message and the hint for an error, each on one line."""
     if isinstance(error, CatenaryError):
         return one_line(error.message), one_line(error.hint)
     if isinstance(error, UsageError):
@@ -48,27 +48,30 @@ def describe(error: Exception) -> tuple[str, str]:
     if isinstance(error, ValueError | OSError):
         return one_line(str(error)), ""
     if isinstance(error, ImportError) and (error.name or "").startswith("catenary."):
-        return one_line(str(error)), "its compiled part is of another version: make build"
+        return one_line(str(error)), "the compiled modules have another version: make build"
     kind = type(error).__name__
     return (
         f"internal error: {kind}: {one_line(str(error))}",
-        "--debug shows where; please report it",
+        "--debug shows the traceback; please report this error",
     )
 
 
 def one_line(text: str) -> str:
-    """Return the text on one line, characters of a device that are not printable escaped."""
+    """Return the text on one line, with unprintable characters escaped."""
     return escaped(" ".join(text.split()))
 
 
 def with_hint(error: CatenaryError) -> str:
-    """Return the message of an error that does not end the command, and its hint below."""
+    """Return message and hint of an error that does not end the command."""
     hint = f"\n  hint: {one_line(error.hint)}" if error.hint else ""
     return f"{one_line(error.message)}{hint}"
 
 
 def silence_stdout() -> int:
-    """Whoever read our output went away (`catenary scan | head -1`): nothing more is to be said,
-    and the interpreter must not say it while it flushes at exit."""
+    """Redirect stdout to /dev/null after its reader has closed (`catenary scan | head -1`).
+
+    This prevents an error message when the interpreter flushes stdout at exit. Return the exit
+    status.
+    """
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return BROKEN_PIPE

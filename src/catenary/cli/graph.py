@@ -1,4 +1,4 @@
-"""`catenary graph TARGET`: how the devices are wired."""
+"""`catenary graph TARGET`: draw the wiring of the devices."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ def add_parser(commands: Commands) -> None:
     parser = add_command(
         commands,
         "graph",
-        help="draw how the devices are wired",
-        description="Draws the tree of the segment: devices, ports, delays of the cables where "
-        "clocks measure them (one way, with the device before), states and error counters. "
-        "Exit status 1 where the ports contradict each other.",
+        help="draw the wiring of the devices",
+        description="Draws the tree of the segment: devices, ports, cable delays, states and "
+        "error counters. Devices with clocks measure the delays (one way, including the previous "
+        "device). Exit status 1 if the ports contradict each other.",
         example="catenary graph eth0\ncatenary graph eth0 --dot | dot -Tsvg -o segment.svg",
     )
     add_target(parser)
-    parser.add_argument("--dot", action="store_true", help="for Graphviz")
+    parser.add_argument("--dot", action="store_true", help="print a graph for Graphviz")
     parser.set_defaults(run=run)
 
 
@@ -46,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def draw(target: str, main: MainDevice, subs: Sequence[SubDevice]) -> Drawing:
-    """Asks for what is drawn."""
+    """Read counters, delays and states from the devices. Return the drawing."""
     from catenary.cli.drawing import Drawing, Node
     from catenary.model.cable_delay import cable_delays_ns
     from catenary.procedure.al_status_poll import survey
@@ -55,7 +55,7 @@ def draw(target: str, main: MainDevice, subs: Sequence[SubDevice]) -> Drawing:
     found = main.diagnose(subs=subs)
     times = main.converse(read_receive_times([sub.description for sub in subs]))
     answers = main.converse(survey([sub.station for sub in subs]))
-    closed = found.topology.second_end is not None  # a ring: two frames stamp, from both ends
+    closed = found.topology.second_end is not None  # ring: frames from both ends latch the times
     delays = cable_delays_ns(found.topology, [None if closed else each for each in times])
     nodes = tuple(
         Node(sub.name, sub.alias, _state(answer.word), delay, errors)

@@ -1,4 +1,4 @@
-"""`catenary init TARGET`: a machine file from the devices of a segment; its JSON schema."""
+"""`catenary init TARGET`: write a machine file from a segment, or print its JSON schema."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def add_parser(commands: Commands) -> None:
         help="write a machine file from the devices of a segment",
         description="Brings all devices to PRE-OP and writes machine.toml: devices with their "
         "identities, drives, process data by name. Lines marked FILL IN need your values. With "
-        "--schema: prints the JSON schema of such files, for editors.",
+        "--schema: prints the JSON schema of machine files, for editors.",
         example="catenary init eth0 -o machine.toml\ncatenary init --schema",
     )
     parser.add_argument(
@@ -39,7 +39,7 @@ def add_parser(commands: Commands) -> None:
         help="file to write (machine.toml)",
     )
     parser.add_argument("--force", action="store_true", help="overwrite the file")
-    parser.add_argument("--schema", action="store_true", help="print the JSON schema and end")
+    parser.add_argument("--schema", action="store_true", help="print the JSON schema and exit")
     parser.set_defaults(run=run)
 
 
@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def write(target: str, output: Path) -> int:
-    """Write the file and print what is left to do. Return the exit status."""
+    """Write the file and print the lines to fill in. Return the exit status."""
     from catenary.cli.failure import with_hint
     from catenary.machine.text import FILL_IN, machine_text
     from catenary.target import MainDevice
@@ -82,7 +82,7 @@ def write(target: str, output: Path) -> int:
 
 
 def read_encoders(devices: Sequence[SubDevice]) -> Mapping[tuple[int, int], float]:
-    """Return counts per turn by (position, slot), of the drives that report them (0x608F)."""
+    """Return the counts per turn by (position, slot) of drives that report them (0x608F)."""
     from catenary.errors import CatenaryError
     from catenary.machine.text import ENCODER
     from catenary.types import UDINT
@@ -97,14 +97,14 @@ def read_encoders(devices: Sequence[SubDevice]) -> Mapping[tuple[int, int], floa
                     for index, subindex in ENCODER
                 )
             except CatenaryError:
-                continue  # an optional object: the line stays without a value
+                continue  # an optional object: the line has no value
             if counts and turns:
                 found[device.position, slot] = counts / turns
     return found
 
 
 def seen_from(target: str, output: Path) -> str:
-    """Return the target as the file names it: a path counts from the folder of the file."""
+    """Return the target for the file: paths are relative to the folder of the file."""
     from catenary.target import named_target
     from catenary.target.toml_file import VIRTUAL
 

@@ -1,4 +1,4 @@
-"""`catenary`: reads the arguments, runs one command, turns every error into a line and a status."""
+"""`catenary`: parse the arguments, run one command, report an error in one line and a status."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ COMMANDS = (
 EPILOG = """\
 TARGET is one of
   eth0               a network interface; `ip link` lists them
-  eth0,eth1          two of them, where the segment is a ring between both
+  eth0,eth1          two interfaces, if the segment is a ring between them
   virtual            a virtual segment: coupler, outputs, three servos, outputs
-  virtual:FILE.toml  another one (docs/virtual.md)
+  virtual:FILE.toml  a virtual segment from a file (docs/virtual.md)
   virtual-realtime[:FILE.toml]  the same, on this machine's clock
-  machine.toml       the target that a machine file names (docs/machine.md)
-  igh:0              the IgH kernel master of that number (docs/igh.md): scan and sdo
+  machine.toml       the target in a machine file (docs/machine.md)
+  igh:0              the IgH kernel master 0 (docs/igh.md): scan and sdo
 
 example:
   catenary demo
@@ -53,14 +53,14 @@ example:
 
 
 class Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line and where the help is."""
+    """A parser that reports errors in one line, with a hint to its help."""
 
     def error(self, message: str) -> NoReturn:
         self.exit(USAGE, f"{self.prog}: {message}\n  hint: {self.prog} --help\n")
 
 
 class ShowVersion(argparse.Action):
-    """Looks the version up only when it is asked for: that takes longer than all the rest."""
+    """Print the version. It is looked up only on request, because that is slow."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         from importlib.metadata import version
@@ -109,7 +109,7 @@ def main(
 def note_virtual_time(target: str) -> None:
     """Print a note on stderr if the times of a command were not those of this machine."""
     if not target.startswith("virtual") and not target.endswith(".toml"):
-        return  # spares the import
+        return  # avoids the import
     from catenary.target.parse import in_virtual_time
 
     if in_virtual_time(target):
@@ -125,4 +125,4 @@ def run(arguments: Sequence[str], parser: argparse.ArgumentParser) -> int:
         note_virtual_time(getattr(parsed, "target", None) or "")
         return status
     finally:
-        sys.stdout.flush()  # here, where a reader that went away can still be handled
+        sys.stdout.flush()  # here, where a closed reader can still be handled

@@ -1,4 +1,4 @@
-"""What the parsers of all commands have in common."""
+"""Common parts of the parsers of all commands."""
 
 from __future__ import annotations
 
@@ -21,7 +21,18 @@ else:
 def add_command(
     commands: Commands, name: str, *, help: str, description: str, example: str
 ) -> argparse.ArgumentParser:
-    """`description`: its lines are filled, blank ones and those that are indented stay."""
+    """Add a command to the parser.
+
+    Args:
+        commands: The group that receives the command.
+        name: The name of the command.
+        help: One line for the list of commands.
+        description: Text for the help. Long lines are wrapped; indented lines are kept.
+        example: Command lines for the end of the help.
+
+    Returns:
+        The parser of the command.
+    """
     parser = commands.add_parser(
         name,
         help=help,
@@ -34,7 +45,7 @@ def add_command(
 
 
 def filled(text: str) -> str:
-    """As wide as the terminal, like what argparse writes itself."""
+    """Wrap the lines to the width of the terminal, like argparse."""
     width = shutil.get_terminal_size().columns - 2
     lines = text.splitlines()
     return "\n".join(line if line.startswith(" ") else textwrap.fill(line, width) for line in lines)
@@ -52,12 +63,12 @@ def add_target(parser: argparse.ArgumentParser) -> None:
 
 def add_force(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--force", action="store_true", help="though another master uses the interface"
+        "--force", action="store_true", help="even if another master uses the interface"
     )
 
 
 def note_other_masters(main: MainDevice) -> None:
-    """Print a note on stderr if another master drives the line that this command reads."""
+    """Print a note on stderr if another master uses the segment that this command reads."""
     for other in main.other_masters:
         print(f"note: {other}; this command only reads", file=sys.stderr)
 

@@ -1,4 +1,4 @@
-"""`catenary plot FILE`: a recording or a log as a picture or a page."""
+"""`catenary plot FILE`: draw a recording or a log."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ def add_parser(commands: Commands) -> None:
     parser = add_command(
         commands,
         "plot",
-        help="a recording or a log as a picture or a page",
+        help="draw a recording or a log as a picture or a page",
         description="Draws a recording (.mcap), or the log of a loop that to_csv wrote (.csv): "
         "position with its reference, tracking error and torque of every axis, histograms of the "
-        "timing, events as dashed lines. A page (.html) has the figures of every axis and the "
-        "events in words too. Needs catenary[log].",
+        "timing, events as dashed lines. A page (.html) also lists the figures of every axis and "
+        "the events. Needs catenary[log].",
         example="catenary plot arm.mcap\n"
         "catenary plot arm.mcap -o arm.html --degrees\n"
         "catenary plot run.csv\n"
@@ -29,16 +29,19 @@ def add_parser(commands: Commands) -> None:
     )
     parser.add_argument("file", metavar="FILE", help="the recording (.mcap), or a log (.csv)")
     parser.add_argument(
-        "-o", "--output", metavar="FILE", type=Path, help=f"{', '.join(KINDS)}; else FILE.png"
+        "-o", "--output", metavar="FILE", type=Path, help=f"{', '.join(KINDS)} (FILE.png)"
     )
-    parser.add_argument("--axis", metavar="NAME", action="append", help="only this one; repeatable")
-    parser.add_argument("--start", metavar="S", type=seconds, default=0.0, help="from second S on")
-    parser.add_argument("--end", metavar="S", type=seconds, default=math.inf, help="until second S")
+    parser.add_argument(
+        "--axis", metavar="NAME", action="append", help="draw only this axis; repeatable"
+    )
+    parser.add_argument("--start", metavar="S", type=seconds, default=0.0, help="start at second S")
+    parser.add_argument(
+        "--end", metavar="S", type=seconds, default=math.inf, help="end at second S"
+    )
     parser.add_argument(
         "--reference",
         metavar="FIELD",
-        help="what positions are compared with, such as target_position; else, in CSP, "
-        "commanded_position",
+        help="reference of the positions, such as target_position (in CSP: commanded_position)",
     )
     parser.add_argument("--degrees", action="store_true", help="angles in degrees, not radians")
     parser.set_defaults(run=run)
@@ -47,13 +50,15 @@ def add_parser(commands: Commands) -> None:
 def run(arguments: argparse.Namespace) -> int:
     output = arguments.output or Path(arguments.file).with_suffix(".png")
     if output.suffix.lower() not in KINDS:
-        raise UsageError(f"{output}: a plot is one of {', '.join(KINDS)}", hint="-o x.png")
+        raise UsageError(f"{output}: the name must end in {', '.join(KINDS)}", hint="-o x.png")
     from catenary.record import plot, read, read_csv
 
     open_file = read_csv if Path(arguments.file).suffix.lower() == ".csv" else read
     recording = open_file(arguments.file, start=arguments.start, end=arguments.end)
     if not len(recording):
-        raise UsageError(f"{arguments.file} has no cycles in that time", hint="see --start, --end")
+        raise UsageError(
+            f"{arguments.file} has no cycles in that time", hint="change --start or --end"
+        )
     plot(
         recording,
         output,

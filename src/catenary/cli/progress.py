@@ -1,4 +1,4 @@
-"""How far a long conversation is: one line on the terminal, nothing where nobody looks."""
+"""Progress of a long conversation, in one line of the terminal."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Self
 
 
 class Progress:
-    """Owns one line of stderr."""
+    """Owns one line of stderr. It prints nothing if stderr is not a terminal."""
 
     def __init__(self, verb: str) -> None:
         self._verb = verb

@@ -1,4 +1,4 @@
-"""`catenary realtime analyse FILE.toml`: whether tasks of fixed priority meet their deadlines."""
+"""`catenary realtime analyse FILE.toml`: response-time analysis of tasks with fixed priorities."""
 
 from __future__ import annotations
 
@@ -31,20 +31,21 @@ def add_parser(commands: Commands) -> None:
     group = add_command(
         commands,
         "realtime",
-        help="tasks with deadlines",
-        description="Tasks with fixed priorities.",
+        help="analyse tasks with deadlines",
+        description="Analyses tasks with fixed priorities.",
         example="catenary realtime analyse tasks.toml",
     ).add_subparsers(title="commands", metavar="COMMAND", required=True)
     parser = add_command(
         group,
         "analyse",
-        help="whether all deadlines hold",
+        help="check that all deadlines are met",
         description="Response-time analysis for fixed priorities. Each [[task]] has name, period "
-        "and execution, and may have deadline, blocking, jitter (seconds), priority (without any: "
-        "the shorter the deadline, the higher) and cpu. Exit status 1: a deadline can be missed.",
+        "and execution, and may have deadline, blocking, jitter (seconds), priority and cpu. "
+        "Without priorities, the shortest deadline has the highest one. Exit status 1 if a "
+        "deadline can be missed.",
         example=EXAMPLE,
     )
-    parser.add_argument("file", metavar="FILE.toml", help="the tasks")
+    parser.add_argument("file", metavar="FILE.toml", help="file of the tasks")
     add_json(parser)
     parser.set_defaults(run=run)
 
@@ -58,7 +59,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def as_json(verdict: Verdict) -> str:
-    """Times in seconds; a response of null has no bound, a hyperperiod of null is too long."""
+    """Return the verdict as JSON, with times in seconds.
+
+    A response of null is unbounded. A hyperperiod of null is too long to compute.
+    """
     import json
     from math import isfinite
 

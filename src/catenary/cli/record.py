@@ -1,4 +1,4 @@
-"""`catenary record SHARE FILE.mcap`: every cycle of a running loop into a file."""
+"""`catenary record SHARE FILE.mcap`: record every cycle of a running loop."""
 
 from __future__ import annotations
 
@@ -22,33 +22,31 @@ def add_parser(commands: Commands) -> None:
     parser = add_command(
         commands,
         "record",
-        help="every cycle of a running loop into a file",
-        description="Records what a loop shares (Loop(..., sink=cat.Share(NAME))): targets, "
+        help="record every cycle of a running loop",
+        description="Records the share of a loop (Loop(..., sink=cat.Share(NAME))): targets, "
         "actuals, timing and events of every cycle, as MCAP, which PlotJuggler and Foxglove open. "
-        "Begins with the oldest cycle that is still there; ends with the loop, or on Ctrl-C. "
-        "Needs catenary[log].",
+        "Starts with the oldest stored cycle; ends with the loop or on Ctrl-C. Needs "
+        "catenary[log].",
         example="catenary record arm arm.mcap\n"
         "catenary record arm arm.mcap --seconds 60\n"
         "catenary record arm crash.mcap --stale\n"
         "catenary record --repair arm.mcap\n"
         "catenary plot arm.mcap",
     )
-    parser.add_argument("share", metavar="SHARE", nargs="?", help="the name the loop shares under")
+    parser.add_argument("share", metavar="SHARE", nargs="?", help="the name of the loop's share")
     parser.add_argument("file", metavar="FILE.mcap", help="the file to write")
-    parser.add_argument("--seconds", metavar="N", type=positive_seconds, help="end after so long")
+    parser.add_argument("--seconds", metavar="N", type=positive_seconds, help="end after N seconds")
     parser.add_argument("--force", action="store_true", help="replace an existing file")
     parser.add_argument(
         "--stale",
         action="store_true",
-        help="also a share whose process has died: its last cycles, as far as it remembers them",
+        help="also accept a share whose process has died: record its last stored cycles",
     )
-    parser.add_argument(
-        "--uid", type=number, help="the user whose share it is (default: yours, or root's)"
-    )
+    parser.add_argument("--uid", type=number, help="owner of the share (default: you, or root)")
     parser.add_argument(
         "--repair",
         action="store_true",
-        help="make a file whole that was cut off because the recorder was killed; no SHARE",
+        help="repair a file whose recorder was killed; without SHARE",
     )
     add_json(parser)
     parser.set_defaults(run=run)
@@ -58,9 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.repair:
         return repair_file(arguments)
     if arguments.share is None:
-        raise UsageError(
-            "which share is to be recorded?", hint="catenary record SHARE FILE.mcap; see --help"
-        )
+        raise UsageError("SHARE is missing", hint="catenary record SHARE FILE.mcap; see --help")
     from catenary.record import Recorder
 
     with stopped_by_signals() as stop:
@@ -75,7 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 @contextmanager
 def stopped_by_signals() -> Iterator[threading.Event]:
-    """An event that SIGINT and SIGTERM set, so that the file is ended as it should be."""
+    """Set an event on SIGINT and SIGTERM, so that the recorder completes its file."""
     stop = threading.Event()
     kinds = (signal.SIGINT, signal.SIGTERM)
     before = [signal.signal(kind, lambda *_: stop.set()) for kind in kinds]
@@ -105,14 +101,14 @@ def as_json(recorder: Recorder) -> str:
 
 def repair_file(arguments: argparse.Namespace) -> int:
     if arguments.share is not None:
-        raise UsageError("--repair takes a file and no share", hint="see --help")
+        raise UsageError("--repair takes a file but no share", hint="see --help")
     from catenary.record import repair
 
     done = repair(arguments.file)
     if arguments.json:
         print(json.dumps({"dropped": done.dropped, "seconds": done.seconds}, indent=2))
     elif done.repaired:
-        print(f"{arguments.file}: whole again, {done.seconds:.3f} s; {done.dropped} bytes dropped")
+        print(f"{arguments.file}: repaired, {done.seconds:.3f} s; {done.dropped} bytes dropped")
     else:
         print(f"{arguments.file}: nothing to repair, {done.seconds:.3f} s")
     return 0

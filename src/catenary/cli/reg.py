@@ -1,4 +1,4 @@
-"""`catenary reg read|write`: registers and memory of a device, as they are."""
+"""`catenary reg read|write`: access registers and memory of a device."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from catenary.cli.parsers import (
 if TYPE_CHECKING:
     from catenary.wire.register_names import AnyRegister
 
-LARGEST = 1024  # bytes of one access: what fits a frame with room to spare
+LARGEST = 1024  # largest access [bytes]; it fits into one frame
 SHOWN_AS_NUMBER = (1, 2, 4, 8)
 DUMP_WIDTH = 16
 
@@ -33,16 +33,16 @@ def add_parser(commands: Commands) -> None:
         commands,
         "reg",
         help="read or write registers of a device",
-        description="Reads or writes registers and memory of a device. Its state stays as it is.",
+        description="Reads or writes registers and memory of a device. Its state does not change.",
         example="catenary reg read eth0 2 AL_STATUS\ncatenary reg write eth0 2 0x0310 0 --size 4",
     ).add_subparsers(title="commands", metavar="COMMAND", required=True)
     reading = add_command(
         group,
         "read",
         help="read a register",
-        description="Reads a register and says what it means. ADDRESS is a number or a name "
-        "(AL_STATUS, dl-status, fmmu0, 'SyncManager 2'); SIZE in bytes may be left out where a "
-        "register is known.",
+        description="Reads a register and explains its content. ADDRESS is a number or a name "
+        "(AL_STATUS, dl-status, fmmu0, 'SyncManager 2'). SIZE in bytes is optional for a known "
+        "register.",
         example="catenary reg read eth0 2 AL_STATUS\n"
         "catenary reg read eth0 2 0x0300 20\n"
         "catenary reg read virtual 2 fmmu0 --json",
@@ -63,7 +63,7 @@ def add_parser(commands: Commands) -> None:
     )
     _add_place(writing)
     writing.add_argument("value", metavar="VALUE", help="2498, 0x9C2 or '01 02 0a'")
-    writing.add_argument("--size", metavar="BYTES", type=positive_number, help="of a number")
+    writing.add_argument("--size", metavar="BYTES", type=positive_number, help="size of a number")
     add_force(writing)
     add_json(writing)
     writing.set_defaults(run=run_write)
@@ -83,7 +83,7 @@ def run_read(arguments: argparse.Namespace) -> int:
     address, size, register = place(arguments.address, arguments.size)
     if size is None:
         raise UsageError(
-            f"no register is known to begin at 0x{address:04X}", hint="say how many bytes: SIZE"
+            f"no known register starts at 0x{address:04X}", hint="give the number of bytes: SIZE"
         )
     _check(address, size)
     with MainDevice(arguments.target, force=True) as main:  # it only reads
@@ -111,7 +111,7 @@ def run_write(arguments: argparse.Namespace) -> int:
 
 
 def place(text: str, size: int | None) -> tuple[int, int | None, AnyRegister | None]:
-    """Address, size (None: unknown) and the register that is meant, where one is known."""
+    """Return address, size and register of an argument; size and register are None if unknown."""
     from catenary.wire.register_names import at_address, by_name, names, near
 
     if text[:1].isdigit():
@@ -129,12 +129,12 @@ def place(text: str, size: int | None) -> tuple[int, int | None, AnyRegister | N
             hint = f"names: {'; '.join(numbered(names()))}"
         raise UsageError(str(error), hint=hint) from error
     if size not in (None, register.size):
-        raise UsageError(f"{register} has {register.size} bytes, not {size}", hint="leave SIZE out")
+        raise UsageError(f"{register} has {register.size} bytes, not {size}", hint="omit the size")
     return register.address, register.size, register
 
 
 def numbered(names: Iterable[str]) -> Iterator[str]:
-    """Yield names in their order; "FMMU 0" to "FMMU 15" as one: "FMMU 0 to 15"."""
+    """Yield the names in their order. Combine "FMMU 0" ... "FMMU 15" into "FMMU 0 to 15"."""
     families: dict[str, list[str]] = {}
     for name in names:
         families.setdefault(re.sub(r" \d+(?= |$)", " #", name), []).append(name)
@@ -145,12 +145,12 @@ def numbered(names: Iterable[str]) -> Iterator[str]:
 
 
 def value_bytes(text: str, size: int | None, address: int) -> bytes:
-    """A number of `size` bytes, or the bytes themselves."""
+    """Return the bytes of a value: a number of `size` bytes, or pairs of hexadecimal digits."""
     if " " in text.strip():
         try:
             data = bytes.fromhex(text)
         except ValueError:
-            raise UsageError(f"{text!r} are no pairs of hexadecimal digits") from None
+            raise UsageError(f"{text!r} is not a list of pairs of hexadecimal digits") from None
         if size not in (None, len(data)):
             raise UsageError(f"{len(data)} bytes given for {size} at 0x{address:04X}")
         return data
@@ -160,8 +160,8 @@ def value_bytes(text: str, size: int | None, address: int) -> bytes:
         raise UsageError(str(error)) from error
     if size is None:
         raise UsageError(
-            f"no register is known to begin at 0x{address:04X}: how many bytes has {text}?",
-            hint="say --size BYTES, or give the bytes: '01 02'",
+            f"no known register starts at 0x{address:04X}: the size of {text} is unknown",
+            hint="add --size BYTES, or give the bytes: '01 02'",
         )
     try:
         return value.to_bytes(size, "little", signed=value < 0)
@@ -173,7 +173,7 @@ def _check(address: int, size: int) -> None:
     if not 0 <= address <= 0xFFFF or address + size > 0x10000:
         raise UsageError(f"0x{address:04X} + {size} bytes is outside 0x0000 to 0xFFFF")
     if size > LARGEST:
-        raise UsageError(f"{size} bytes at once are too many: at most {LARGEST}")
+        raise UsageError(f"{size} bytes exceed the largest access of {LARGEST} bytes")
 
 
 def _is_hex(text: str) -> bool:
@@ -181,7 +181,7 @@ def _is_hex(text: str) -> bool:
 
 
 def show(register: AnyRegister | None, data: bytes) -> str:
-    """What was read, for people."""
+    """Return the content of a register as text."""
     from catenary.wire.register_text import explain
 
     name = f"{register}:" if register else ""

@@ -1,4 +1,4 @@
-"""`catenary scan TARGET`: which devices are there."""
+"""`catenary scan TARGET`: list the devices of a segment."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`catenary sdo read|write|list`: a device's object dictionary."""
+"""`catenary sdo read|write|list`: access the object dictionary of a device."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from catenary.cli.text import escaped
 if TYPE_CHECKING:
     from catenary.types import DataType, Value
 
-NUMBER_SIZES = (1, 2, 4, 8)  # bytes that are most likely one number
+NUMBER_SIZES = (1, 2, 4, 8)  # sizes of numbers [bytes]
 
 
 def add_parser(commands: Commands) -> None:
@@ -33,7 +33,7 @@ def add_parser(commands: Commands) -> None:
         group,
         "read",
         help="read an object",
-        description="Reads one entry. Without --type: its bytes, and what they may mean.",
+        description="Reads one entry. Without --type: prints its bytes and a likely meaning.",
         example="catenary sdo read eth0 2 0x1018:1 --type UDINT\n"
         "catenary sdo read virtual 2 0x1008 --type STRING --json",
     )
@@ -59,8 +59,9 @@ def add_parser(commands: Commands) -> None:
         "list",
         help="list all objects",
         description="Lists the entries of a device's object dictionary as the device itself "
-        "describes them: index, type, access, name. Access: r and w, with the states where it is "
-        "not all (P: PRE-OP, S: SAFE-OP, O: OP); R, T: can be mapped into RxPDOs, TxPDOs.",
+        "describes them: index, type, access, name. Access: r and w, followed by the states if "
+        "it is limited to some (P: PRE-OP, S: SAFE-OP, O: OP); R, T: can be mapped into RxPDOs, "
+        "TxPDOs.",
         example="catenary sdo list eth0 2\ncatenary sdo list virtual 2 --values --json",
     )
     _add_device(listing)
@@ -135,7 +136,7 @@ def run_list(arguments: argparse.Namespace) -> int:
         if arguments.json:
             print(as_json(rows))
         else:
-            for line in as_lines(rows):  # as they come: a large dictionary takes seconds
+            for line in as_lines(rows):  # printed one by one: a large dictionary takes seconds
                 print(line)
     for note in notes:
         print(f"note: {one_line(note)}", file=sys.stderr)
@@ -159,14 +160,14 @@ def _data_type(name: str | None) -> DataType[Value] | None:
 
 
 def as_text(data: bytes, value: Value | None) -> str:
-    """Return what was read for people; control characters of a string are escaped."""
+    """Return the value as text, with the control characters of a string escaped."""
     if value is None:
         return explain(data)
     return escaped(value) if isinstance(value, str) else str(value)
 
 
 def explain(data: bytes) -> str:
-    """Bytes without a type: as hex, and as the number or text that they may be."""
+    """Return bytes of unknown type as hexadecimal digits, and as a likely number or text."""
     if len(data) in NUMBER_SIZES:
         number = int.from_bytes(data, "little")
         return f"{data.hex(' ')}  (0x{number:0{2 * len(data)}X}, {number})"

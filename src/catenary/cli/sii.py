@@ -1,4 +1,4 @@
-"""`catenary sii read|show|write`: the EEPROM of a device, or its image in a file."""
+"""`catenary sii read|show|write`: access the EEPROM of a device, or its image in a file."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def add_parser(commands: Commands) -> None:
         commands,
         "sii",
         help="read or write the EEPROM of a device",
-        description="Reads or writes the EEPROM (SII) in which a device keeps its identity, "
-        "mailbox and process data.",
+        description="Reads or writes the EEPROM (SII) of a device. It contains the identity, and "
+        "describes mailbox and process data.",
         example="catenary sii read eth0 2 --text\ncatenary sii show drive.bin\n"
         "catenary sii write eth0 2 drive.bin --dry-run",
     ).add_subparsers(title="commands", metavar="COMMAND", required=True)
@@ -37,24 +37,29 @@ def add_parser(commands: Commands) -> None:
         group,
         "read",
         help="read the whole EEPROM",
-        description="Reads the whole EEPROM, whatever is in it, and checks it. Without options it "
-        "is shown in hexadecimal.",
+        description="Reads the whole EEPROM, even with invalid content, and checks it. Without "
+        "options, prints it in hexadecimal.",
         example="catenary sii read eth0 2 -o drive.bin\ncatenary sii read eth0 2 --text",
     )
     add_target(reading)
     add_position(reading)
-    reading.add_argument("-o", "--output", metavar="FILE", help="store the bytes; - is stdout")
-    reading.add_argument("--text", action="store_true", help="say what it means")
     reading.add_argument(
-        "--bytes", metavar="N", type=positive_number, help="so many, instead of the size it claims"
+        "-o", "--output", metavar="FILE", help="write the bytes to FILE; - is stdout"
+    )
+    reading.add_argument("--text", action="store_true", help="print every field as text")
+    reading.add_argument(
+        "--bytes",
+        metavar="N",
+        type=positive_number,
+        help="read N bytes instead of the size in the EEPROM",
     )
     reading.set_defaults(run=run_read)
     showing = add_command(
         group,
         "show",
         help="show an image from a file",
-        description="Shows every field of an image, as `sii read` stores it, and checks it. No "
-        "device is needed. Exit status 1 when something is wrong with it.",
+        description="Shows every field of an image from `sii read -o`, and checks it. No device "
+        "is needed. Exit status 1 if the image is invalid.",
         example="catenary sii show drive.bin",
     )
     showing.add_argument("file", metavar="FILE", type=Path, help="the image, as its bytes")
@@ -64,8 +69,8 @@ def add_parser(commands: Commands) -> None:
         "write",
         help="write an image into the EEPROM",
         description="Checks FILE (length, checksum, categories, size of the EEPROM, identity), "
-        "shows what differs, writes the words that differ and reads them back. The device takes "
-        "them over when it is switched off and on.",
+        "shows the differences, writes the words that differ and reads them back. The device "
+        "uses them after its next power cycle.",
         example="catenary sii read eth0 2 -o before.bin\n"
         "catenary sii write eth0 2 drive.bin --dry-run\n"
         "catenary sii write eth0 2 drive.bin",
@@ -73,8 +78,10 @@ def add_parser(commands: Commands) -> None:
     add_target(writing)
     add_position(writing)
     writing.add_argument("file", metavar="FILE", type=Path, help="the image, as its bytes")
-    writing.add_argument("--dry-run", action="store_true", help="show what differs, write nothing")
-    writing.add_argument("--force", action="store_true", help="write though an objection allows it")
+    writing.add_argument(
+        "--dry-run", action="store_true", help="show the differences, write nothing"
+    )
+    writing.add_argument("--force", action="store_true", help="write despite a failed check")
     writing.set_defaults(run=run_write)
 
 
@@ -114,7 +121,7 @@ def run_show(arguments: argparse.Namespace) -> int:
 
 
 def deliver(arguments: argparse.Namespace, image: bytes) -> None:
-    """Into a file, as text, or as a dump."""
+    """Write the image to a file, or print it as text or as a dump."""
     if arguments.output == "-":
         sys.stdout.buffer.write(image)
     elif arguments.output is not None:
@@ -136,7 +143,7 @@ def as_text(image: bytes) -> list[str]:
 
 
 def dump(image: bytes) -> list[str]:
-    """In hexadecimal with texts; lines that repeat are left out, as hexdump does."""
+    """Return a hexadecimal dump with text. Repeated lines become "*", like in hexdump."""
     lines: list[str] = []
     before = None
     for start in range(0, len(image), DUMP_WIDTH):
@@ -180,7 +187,11 @@ def run_write(arguments: argparse.Namespace) -> int:
 
 
 def refuse_bad(image: bytes, arguments: argparse.Namespace) -> None:
-    """EepromError where the image is none."""
+    """Check that the image is valid.
+
+    Raises:
+        EepromError: It is not a valid image.
+    """
     from catenary.errors import EepromError
     from catenary.wire.sii_check import objections
 
@@ -188,27 +199,31 @@ def refuse_bad(image: bytes, arguments: argparse.Namespace) -> None:
         if each.insist and arguments.force:
             print(f"catenary: {arguments.file}: {each.text}: --force", file=sys.stderr)
             continue
-        more = "; --force writes it all the same" if each.insist else ""
+        more = "; --force writes it nevertheless" if each.insist else ""
         raise EepromError(f"{arguments.file}: {each.text}", hint=each.hint + more)
 
 
 def refuse_unfit(image: bytes, device: SubDevice, extent: Extent, force: bool) -> None:
-    """EepromError where the image is not for this device."""
+    """Check that the image fits the device.
+
+    Raises:
+        EepromError: The image is too large, or for another device.
+    """
     from catenary.cli.sii_text import tolerant
     from catenary.errors import EepromError
 
     if len(image) > extent.limit:
         raise EepromError(
-            f"{device.station}: the image has {len(image)} bytes, its controller addresses "
-            f"{extent.limit} of its EEPROM",
-            hint="it is an image for another device",
+            f"{device.station}: the image has {len(image)} bytes, but its controller can address "
+            f"only {extent.limit} bytes of EEPROM",
+            hint="use an image for this device",
         )
     if force:
         return
     if len(image) > extent.size and not extent.note:
         raise EepromError(
             f"{device.station}: the image has {len(image)} bytes, its EEPROM {extent.size}",
-            hint="an image for another device? --force if the size in its header is wrong",
+            hint="use an image for this device, or --force if the size in its EEPROM is wrong",
         )
     new, now = tolerant(image).header, device.identity
     if now.vendor and (new.vendor, new.product) != (now.vendor, now.product) and not extent.note:
@@ -216,17 +231,17 @@ def refuse_unfit(image: bytes, device: SubDevice, extent: Extent, force: bool) -
             f"{device.station}: the image is of vendor 0x{new.vendor:08X} product "
             f"0x{new.product:08X}, the device is vendor 0x{now.vendor:08X} product "
             f"0x{now.product:08X}",
-            hint="the right POSITION? --force makes it another product",
+            hint="check POSITION; --force changes the device's identity",
         )
 
 
 def report(device: SubDevice, old: bytes, new: bytes, words: int) -> list[str]:
-    """What will be different."""
+    """Return the differences between the present and the new content, as lines of text."""
     from catenary.cli.sii_text import differences, word_differences
     from catenary.errors import DecodeError
 
     if not words:
-        return [f"{device.station}: its EEPROM holds that already"]
+        return [f"{device.station}: its EEPROM already has this content"]
     lines = [f"{device.station}: {words} of {len(new) // 2} words differ"]
     try:
         return lines + differences(old, new)
@@ -235,7 +250,11 @@ def report(device: SubDevice, old: bytes, new: bytes, words: int) -> list[str]:
 
 
 def verify(main: MainDevice, device: SubDevice, image: bytes) -> None:
-    """Reads all of it once more. EepromError where it is not what was written."""
+    """Read the EEPROM again and compare it with the image.
+
+    Raises:
+        EepromError: A word differs from the image.
+    """
     from catenary.bus.eeprom import read_eeprom
     from catenary.cli.progress import Progress
     from catenary.errors import EepromError
@@ -248,5 +267,5 @@ def verify(main: MainDevice, device: SubDevice, image: bytes) -> None:
         raise EepromError(
             f"{device.station}: {len(wrong)} words read back differently, the first is "
             f"0x{wrong[0].word:04X}",
-            hint="write once more; a worn EEPROM must be replaced",
+            hint="write it again; if the error persists, the EEPROM is worn out",
         )

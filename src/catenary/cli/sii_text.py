@@ -1,7 +1,7 @@
-"""The image of an EEPROM in words, one fact a line: to be read, and to be compared.
+"""The image of an EEPROM as text, with one field per line.
 
-Every field of ETG.2010 has its line. Data without a name is shown as bytes. Two images with the
-same text therefore differ in filling at most.
+Every field of ETG.2010 has a line. Data without a name is shown as bytes. Two images with the same
+text therefore differ only in padding.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from catenary.wire.sii_categories import (
     SyncManagerUse,
 )
 
-ROW = 16  # bytes in a line
+ROW = 16  # bytes per line
 _KNOWN = frozenset(
     (
         CategoryType.STRINGS,
@@ -49,7 +49,11 @@ _KNOWN = frozenset(
 
 
 def tolerant(image: bytes) -> Sii:
-    """The image, whatever its checksum. DecodeError where more than that is wrong."""
+    """Decode an image without a check of its checksum.
+
+    Raises:
+        DecodeError: The image is invalid for another reason.
+    """
     start = 2 * CHECKSUM_WORD
     found = image[start : start + 2]
     sii = decode_sii(image[:start] + CHECKSUM_DISABLED.to_bytes(2, "little") + image[start + 2 :])
@@ -57,7 +61,7 @@ def tolerant(image: bytes) -> Sii:
 
 
 def text_lines(sii: Sii) -> list[str]:
-    """All that the image says."""
+    """Return all fields of the image as lines."""
     return [
         *_header(sii.header),
         *_order(sii.categories),
@@ -85,7 +89,7 @@ def differences(old: bytes, new: bytes) -> list[str]:
 
 
 def word_differences(old: bytes, new: bytes) -> list[str]:
-    """Yield the words that differ, by address."""
+    """Return the words that differ, by address."""
     return [
         f"word 0x{start // 2:04X}: {old[start : start + 2].hex(' ') or 'missing'} -> "
         f"{new[start : start + 2].hex(' ') or 'missing'}"
@@ -122,7 +126,7 @@ def _area(area: MailboxArea) -> str:
 
 
 def _flags(flags: IntFlag) -> str:
-    """Return the names of all bits that are set; bits without a name as a number."""
+    """Return the names of all set bits, and the unnamed bits as a number."""
     names = [str(each.name) for each in flags]
     rest = int(flags) & ~sum(int(each) for each in type(flags))
     return ", ".join([*names, f"0x{rest:X}"] if rest else names) or "none"
@@ -212,7 +216,7 @@ def _other(category: Category) -> Iterator[str]:
 
 
 def _rows(title: str, data: bytes) -> Iterator[str]:
-    """Yield bytes without a name; a run of one value is one line."""
+    """Yield unnamed bytes; one line if all have the same value."""
     if data and data == data[:1] * len(data):
         yield f"{title}: {len(data)} bytes of {data[:1].hex()}"
         return

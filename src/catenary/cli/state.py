@@ -1,4 +1,4 @@
-"""`catenary state TARGET [STATE]`: the EtherCAT states of devices, read or asked for."""
+"""`catenary state TARGET [STATE]`: show or change the EtherCAT states of devices."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ def add_parser(commands: Commands) -> None:
         commands,
         "state",
         help="show or change the states of devices",
-        description="Shows in which state each device is, and why. Nothing is changed by that. "
-        "With STATE: brings the devices there and leaves them there. OP is asked for without "
-        "process data, which a device with outputs refuses: a program's Loop brings it to OP.",
+        description="Shows the state and AL status code of each device, without changing it. With "
+        "STATE: brings the devices to this state and leaves them there. OP is requested without "
+        "process data, which devices with outputs refuse; use a Loop to bring them to OP.",
         example="catenary state eth0\n"
         "catenary state eth0 PREOP\n"
         "catenary state eth0 SAFEOP --position 2",
@@ -41,7 +41,7 @@ def add_parser(commands: Commands) -> None:
     add_target(parser)
     parser.add_argument("state", metavar="STATE", nargs="?", type=state_name, help=STATES)
     parser.add_argument(
-        "--position", "-p", metavar="N", type=position, help="this device alone; 0 is the first"
+        "--position", "-p", metavar="N", type=position, help="only this device; 0 is the first"
     )
     add_force(parser)
     add_json(parser)

@@ -1,4 +1,4 @@
-"""Columns of words; a word may be a device's own text."""
+"""Tables of words. Words may be text from devices and are escaped."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from catenary.cli.text import escaped
 
 
 def table(rows: Sequence[Sequence[str]]) -> str:
-    """Return the rows, each column as wide as its widest word."""
+    """Return the rows as aligned text."""
     rows = [[escaped(word) for word in row] for row in rows]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return "\n".join(

@@ -1,13 +1,13 @@
-"""Text of devices on a terminal: data, never control."""
+"""Escaping of device text for a terminal."""
 
 from __future__ import annotations
 
 
 def escaped(text: str) -> str:
-    r"""Return the text with every character escaped that is not printable: `"\x1b[2J"`.
+    r"""Return the text with unprintable characters escaped, such as `"\x1b[2J"`.
 
-    Device names, object names and strings come from EEPROMs and dictionaries. Their escape
-    sequences could clear the terminal, and a line break could imitate our own output.
+    Device names, object names and strings come from EEPROMs and dictionaries. Escape sequences in
+    them could clear the terminal, and a line break could imitate our own output.
     """
     return "".join(c if c.isprintable() else _escape(c) for c in text)
 

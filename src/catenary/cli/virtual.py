@@ -1,4 +1,4 @@
-"""`catenary virtual serve NIC`: a virtual segment that answers on a network interface."""
+"""`catenary virtual serve NIC`: serve a virtual segment on a network interface."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ def add_parser(commands: Commands) -> None:
     group = add_command(
         commands,
         "virtual",
-        help="a segment of virtual devices",
-        description="A virtual segment that any MainDevice can drive.",
+        help="serve a segment of virtual devices",
+        description="Serves a virtual segment that any MainDevice can use.",
         example="catenary virtual serve veth1 --config machine.toml",
     ).add_subparsers(title="commands", metavar="COMMAND", required=True)
     parser = add_command(
@@ -32,21 +32,21 @@ def add_parser(commands: Commands) -> None:
     parser.add_argument(
         "--ring",
         metavar="NIC2",
-        help="close the ring here: the second interface of the MainDevice's cable redundancy",
+        help="close the ring at NIC2: second interface for the cable redundancy of a MainDevice",
     )
     parser.add_argument("--config", metavar="FILE.toml", help="the devices of the segment")
     parser.add_argument(
         "--priority",
         type=fifo_priority,
         metavar="N",
-        help="run at SCHED_FIFO 1 to 99 with locked memory, so that no frame waits",
+        help="run at SCHED_FIFO priority N (1 to 99) with locked memory",
     )
     parser.add_argument(
         "--max-age",
         type=seconds,
         default=2e-3,
         metavar="S",
-        help="lose frames that waited longer, as a cable holds none (0.002)",
+        help="drop frames that waited longer: a cable does not store frames (0.002)",
     )
     parser.set_defaults(run=run)
 
@@ -82,7 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _raise_priority(interface: str, priority: int) -> None:
-    """Schedule this process, and the threads it starts, in real time."""
+    """Request real-time scheduling for this process and its later threads."""
     from catenary.errors import LinkError
     from catenary.interpreter import permission_advice
     from catenary.realtime.scheduling import request_scheduling

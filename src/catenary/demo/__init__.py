@@ -6,10 +6,15 @@ from pathlib import Path
 
 
 def run_demo(seconds: float, folder: Path, *, in_process: bool = False) -> None:
-    """Runs, prints, and writes `demo.json` and `demo.html` into `folder`.
+    """Run the demo, print its results, and write `demo.json` and `demo.html`.
 
-    Unless `in_process`, it may first run this program anew in a network namespace of its own:
-    nothing with threads (NumPy) may be imported before that.
+    Unless `in_process`, the program may first be restarted in its own network namespace. Modules
+    that start threads (NumPy) must not be imported before that.
+
+    Args:
+        seconds: Duration of the motion [s].
+        folder: Folder of the two files; it is created if necessary.
+        in_process: True to run the segment in this process, without a network.
     """
     from catenary.realtime import private_network
 

@@ -1,5 +1,8 @@
-"""Where the demo's segment lives: on a network interface, served by a process of its own
-(`python -m catenary.demo.ground NIC`), or in this process where the machine allows no more."""
+"""The demo's segment: on a network interface, or in this process.
+
+`python -m catenary.demo.ground NIC` is the process that serves it on an interface. The segment runs
+in this process if the machine does not permit a private network.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,7 @@ from catenary.realtime.private_network import veth_pair
 from catenary.virtual import demo_segment
 
 START_SECONDS = 20.0
-PRIORITY = 80  # as the loop: devices do not wait for their MainDevice
+PRIORITY = 80  # same as the loop: real devices do not wait for their MainDevice
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,12 +39,12 @@ def ground(refused: str | None) -> Iterator[Ground]:
         start_python(["-m", "catenary.demo.ground", theirs]) as server,
     ):
         if server.read_line(START_SECONDS) is None:
-            raise LinkError("the virtual segment did not start", hint="its own message is above")
+            raise LinkError("the virtual segment did not start", hint="see its message above")
         yield Ground(Interface(ours), "veth")
 
 
 def main(interface: str) -> None:
-    """The other process: the segment behind the other end of the cable."""
+    """Serve the segment in this process, on the other end of the interface pair."""
     serve_at_priority(demo_segment(clock="monotonic"), interface, PRIORITY)
 
 

@@ -13,15 +13,16 @@ from catenary.demo.text import ProgressBar
 
 PERIOD = 1e-3  # [s]
 COUNTS_PER_TURN = 2**20
-# The virtual devices share this machine: a pause of theirs is to be seen as lost cycles and
-# lateness in the figures, not to end the demo. A real machine keeps the defaults.
+# The demo uses generous limits so that it runs on any machine: the virtual devices share the
+# processors. Their pauses appear as lost and late cycles in the figures. Real machines keep the
+# defaults.
 LOST_LIMIT = 800  # cycles
-WATCHDOG = 1.0  # [s] of the devices
+WATCHDOG = 1.0  # [s], of the devices
 LATE_LIMIT = 0.5  # [s]
 AMPLITUDE = math.pi  # [rad]
 PULSATION = math.pi  # [rad/s]
 VELOCITY_LIMIT = 20.0  # [rad/s]: the sines reach 10
-FADE_IN = 1.0  # [s] in which the amplitude grows, so that the drives start from rest
+FADE_IN = 1.0  # [s]; the amplitude grows during this time, so that the drives start from rest
 
 
 def drives_of(subs: SubDevices) -> cat.Drives:
@@ -34,7 +35,7 @@ def drives_of(subs: SubDevices) -> cat.Drives:
 
 
 def follow(loop: cat.Loop, arm: cat.Drives, recording: Recording, progress: ProgressBar) -> None:
-    """Moves the drives for as long as the recording has room."""
+    """Move the drives until the recording is full."""
     home = arm.actual.position.copy()
     phases = np.arange(len(arm)) * (math.tau / len(arm))
     for cycle in loop:
@@ -48,8 +49,10 @@ def follow(loop: cat.Loop, arm: cat.Drives, recording: Recording, progress: Prog
 
 
 class Recording:
-    """Owns what was asked and what was measured, one row per cycle; made beforehand, so that
-    recording costs the loop two small copies."""
+    """Owns reference and actual positions [rad], one row per cycle.
+
+    The arrays are allocated in advance, so that recording a cycle takes only two small copies.
+    """
 
     def __init__(self, seconds: float, drives: int) -> None:
         rows = max(round(seconds / PERIOD), 1)
@@ -59,7 +62,13 @@ class Recording:
         self._used = 0
 
     def add(self, time: float, reference: np.ndarray, actual: np.ndarray) -> bool:
-        """False when this was the last row."""
+        """Add a row. Return False if it was the last free one.
+
+        Args:
+            time: Time of the cycle [s].
+            reference: Target positions, shape (drives,) [rad].
+            actual: Actual positions, shape (drives,) [rad].
+        """
         row = self._used
         self._time[row] = time
         self._reference[row] = reference

@@ -1,4 +1,4 @@
-"""demo.html: one self-contained page, readable in light and dark, with nothing to fetch."""
+"""demo.html: one self-contained page for light and dark mode, without external files."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SHOWN_SECONDS = 4.0  # of the motion, at its end
 SHOWN_POINTS = 400  # of each line
 HEADINGS = {"in_controller": "in controller", "round_trip": "round trip"}
 MEANING = {
-    "period": "from one wake-up to the next",
+    "period": "wake-up → next wake-up",
     "lateness": "cycle start → wake-up",
     "receive": "woken → inputs usable",
     "process": "the Python body of the loop",
@@ -133,7 +133,7 @@ def motion(result: Result) -> str:
         f"<figure>{error_plot}<figcaption><b>Tracking error</b>: actual position minus the "
         f"set-point that had reached the drive. The transport delay is "
         f"{result.transport_delay * 1e3:g} ms: from writing a set-point to reading the first "
-        f"position that it has moved{longer(result)}. {key(result)}</figcaption></figure>"
+        f"position that it affects{longer(result)}. {key(result)}</figcaption></figure>"
     )
 
 
@@ -173,8 +173,10 @@ def phase_figure(result: Result, phase: str) -> str:
 
 
 def drawn_range(buckets: Sequence[Bucket]) -> tuple[float, float]:
-    """All but the outermost thousandth at each end and a little room: one outlier must not flatten
-    the rest."""
+    """Return the drawn range of a histogram, with a margin.
+
+    It omits 0.1 % of the cycles at each end: a single outlier would compress the other bars.
+    """
     total = sum(count for *_, count in buckets)
     ranks = list(accumulate(count for *_, count in buckets))
     low = next(b[0] for b, rank in zip(buckets, ranks, strict=True) if rank > total * 0.001)

@@ -1,5 +1,7 @@
-"""Plots as inline SVG: no script, nothing from elsewhere. Colours come from the page's style sheet,
-by class, so that light and dark need one drawing."""
+"""Plots as inline SVG, without scripts or external files.
+
+Colours come from classes of the page's style sheet, so that one drawing serves light and dark mode.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,7 @@ LEFT, RIGHT, TOP, BOTTOM = 44.0, 14.0, 24.0, 22.0  # margins [px]
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """A drawing of so many pixels, of which the page shows one as about one."""
+    """Size of a drawing [px]. The page shows it at about this size."""
 
     width: float
     height: float
@@ -43,7 +45,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """One axis of a plot: from values to pixels. `decades`: logarithmic, for counts."""
+    """One axis of a plot, which maps values to pixels. `decades`: True for a logarithmic axis."""
 
     low: float
     high: float
@@ -70,13 +72,13 @@ class Axis:
 
 
 def nice_step(span: float) -> float:
-    """1, 2 or 5 times a power of ten, of which at least three fit into the span."""
+    """Return the largest 1, 2 or 5 times a power of ten that fits three times into the span."""
     power = 10.0 ** math.floor(math.log10(span / 3.0))
     return next(power * factor for factor in (10, 5, 2, 1) if power * factor <= span / 3.0)
 
 
 def line_plot(lines: Sequence[Line], *, x_unit: str, y_unit: str, title: str) -> str:
-    """Lines over a common axis."""
+    """Draw lines over a common axis."""
     ys = [value for line in lines for value in line.y]
     margin = max((max(ys) - min(ys)) * 0.06, 1e-9)
     x = Axis(lines[0].x[0], lines[0].x[-1], LEFT, WIDE.right)
@@ -93,8 +95,11 @@ def polyline(line: Line, x: Axis, y: Axis) -> str:
 
 
 def histogram(buckets: Sequence[Bucket], *, low: float, high: float, title: str) -> str:
-    """Counts over [us], the counts logarithmic so that a single late cycle is seen. What lies
-    outside of `low` to `high` is left to the caption."""
+    """Draw counts over time [us].
+
+    The counts are logarithmic, so that a single late cycle is visible. Buckets outside of `low` to
+    `high` are not drawn; the caption reports them.
+    """
     bars = rebin(inside(buckets, low, high), low, high, 48)
     x = Axis(low, high, LEFT, SMALL.right)
     tallest = max(count for *_, count in bars)
@@ -108,7 +113,7 @@ def inside(buckets: Sequence[Bucket], low: float, high: float) -> list[Bucket]:
 
 
 def rebin(buckets: Sequence[Bucket], low: float, high: float, count: int) -> list[Bucket]:
-    """Equal bars. A bucket that is wider than a bar is spread over all it covers."""
+    """Return bars of equal width. The count of a wide bucket is distributed over its bars."""
     width = (high - low) / count
     heights = [0.0] * count
     for lower, upper, amount in buckets:

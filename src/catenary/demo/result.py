@@ -1,4 +1,4 @@
-"""What the demo found out: one value, from which the text, demo.json and demo.html are made."""
+"""Result of the demo: the source of its text, demo.json and demo.html."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ Figures = Mapping[str, float]
 Bucket = tuple[float, float, int]  # lower, upper [s], count
 
 PHASES = ("period", "lateness", "receive", "process", "send", "in_controller", "tail")
-# A set-point that is written in one cycle is sent in the next one. The position that comes back in
-# the cycle after that is the first one that it has moved.
+# A set-point that is written in one cycle is sent in the next one. Its first effect on the position
+# is received one cycle later.
 TRANSPORT_CYCLES = 2
 
 
@@ -41,8 +41,11 @@ class Motion:
     actual: Reals  # (cycles, drives) [rad], measured when the reference was written
 
     def error(self, delay: float) -> Reals:
-        """Return actual position minus the reference of `delay` [s] before, shape (cycles, drives)
-        [rad]: the set-point that had reached the drive. NaN where there was none yet."""
+        """Return the tracking error, shape (cycles, drives) [rad].
+
+        It is the actual position minus the reference `delay` [s] earlier, which is the set-point
+        that had reached the drive. It is NaN before the first set-point arrives.
+        """
         if not len(self.time):
             return self.actual - self.reference
         sent = np.searchsorted(self.time, self.time - delay + 1e-9, side="right") - 1
@@ -62,7 +65,7 @@ class Result:
 
     @property
     def transport_delay(self) -> float:
-        """From writing a set-point to reading the first position that it has moved [s]."""
+        """Time from writing a set-point to reading the first position that it affects [s]."""
         return TRANSPORT_CYCLES * self.period
 
     @property

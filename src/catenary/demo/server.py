@@ -1,4 +1,4 @@
-"""The process that serves a segment to a demo or a benchmark: in real time where it may."""
+"""The process that serves a segment for a demo or a benchmark, in real time if permitted."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ def serve_at_priority(
 ) -> None:
     """Serve the segment at SCHED_FIFO, and print "ready" when it answers.
 
-    Where the machine refuses the priority, late frames are answered, too: the delay is the
-    machine's, and a demo has to run on any.
+    If the machine refuses the priority, late frames are answered, too. The machine causes the
+    delay, and a demo must run on any machine.
 
     Args:
-        segment: What answers.
-        interface: The network interface it answers on.
+        segment: The segment to serve.
+        interface: The network interface on which it answers.
         priority: SCHED_FIFO 1 to 99, for all threads of this process.
         second: The interface of a ring's other end.
         cpu: The processor of this process; None: any.

@@ -1,4 +1,4 @@
-"""The demo from beginning to end, as a user sees it."""
+"""The complete run of the demo, with its output."""
 
 from __future__ import annotations
 
@@ -22,7 +22,13 @@ from catenary.demo.text import ProgressBar, closing_lines, device_lines
 
 
 def show(seconds: float, folder: Path, *, refused: str | None) -> None:
-    """`refused`: why there are no real frames; None: there are."""
+    """Run the demo, print its results and write its files.
+
+    Args:
+        seconds: Duration of the motion [s].
+        folder: Folder of `demo.json` and `demo.html`.
+        refused: Reason for running without real frames; None with real frames.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     result = run(seconds, refused=refused)
     print(textwrap.indent(str(result.timing), "  "))

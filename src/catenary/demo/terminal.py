@@ -1,4 +1,4 @@
-"""A key that a person can hit while a program runs."""
+"""Reaction to the Enter key while a program runs."""
 
 from __future__ import annotations
 
@@ -12,10 +12,14 @@ from contextlib import contextmanager
 
 @contextmanager
 def on_enter(action: Callable[[], object], *, source: int | None = None) -> Iterator[bool]:
-    """Within the block Enter at the terminal calls `action()`, in a thread that sleeps until then.
+    """Call `action()` in a thread whenever Enter is pressed within the block.
 
-    `source`: a file descriptor to read lines from; None: standard input, if that is a terminal.
-    Yields whether anybody can: without a terminal nothing is read.
+    Args:
+        action: The function to call.
+        source: A file descriptor to read lines from; None: standard input, if it is a terminal.
+
+    Yields:
+        True if Enter is read; False without a terminal.
     """
     descriptor = terminal() if source is None else source
     if descriptor is None:
@@ -33,7 +37,7 @@ def on_enter(action: Callable[[], object], *, source: int | None = None) -> Iter
 
 
 def terminal() -> int | None:
-    """Standard input, where a person sits at it."""
+    """Return the descriptor of standard input; None if it is not a terminal."""
     return sys.stdin.fileno() if sys.stdin is not None and sys.stdin.isatty() else None
 
 
@@ -43,7 +47,7 @@ def _listen(descriptor: int, woken: int, action: Callable[[], object]) -> None:
         if woken in ready:
             return
         hit = os.read(descriptor, 256)
-        if not hit:  # hung up
+        if not hit:  # end of file
             return
         if b"\n" in hit:
             action()

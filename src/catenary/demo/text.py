@@ -26,19 +26,19 @@ def closing_lines(result: Result) -> str:
         f"  tracking error {error['rms'] * 1e3:.2f} mrad rms, {error['max'] * 1e3:.2f} mrad max, "
         "against the set-point that had reached the drive\n"
         f"  transport delay {result.transport_delay * 1e3:g} ms, from writing a set-point to "
-        f"reading the first position that it has moved{longer(result)}\n"
+        f"reading the first position that it affects{longer(result)}\n"
         f"  scheduling {result.scheduling}; link {result.link}"
     )
 
 
 def longer(result: Result) -> str:
-    """Return a note on set-points that came late: they are part of the tracking error."""
+    """Return a note on late set-points, which are part of the tracking error."""
     late = result.timing.counters.get("uncommitted", 0)
     return f"; longer in {late} uncommitted cycles" if late else ""
 
 
 class ProgressBar:
-    """Owns the last line of a terminal; on anything else it stays silent."""
+    """Owns the last line of a terminal. Without a terminal it prints nothing."""
 
     def __init__(self, seconds: float, stream: TextIO | None = None) -> None:
         self._seconds = seconds
@@ -46,7 +46,7 @@ class ProgressBar:
         self._next = 0.0 if self._stream.isatty() else float("inf")
 
     def show(self, elapsed: float) -> None:
-        """Cheap when there is nothing to redraw: called in every cycle."""
+        """Update the bar if `REDRAW_SECONDS` have passed. Cheap enough for every cycle."""
         if elapsed < self._next:
             return
         self._next = elapsed + REDRAW_SECONDS

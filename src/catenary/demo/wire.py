@@ -1,4 +1,4 @@
-"""A segment from a file, on a wire: served on one end of a pair of interfaces by another process.
+"""A segment from a file, served by another process on one end of a pair of interfaces.
 
 `python -m catenary.demo.wire NIC FILE` is that process.
 """
@@ -18,14 +18,16 @@ from catenary.realtime.private_network import Private, state, veth_pair
 from catenary.virtual import read_segment
 
 START_SECONDS = 20.0
-PRIORITY = 80  # as a loop: devices do not wait for their MainDevice
+PRIORITY = 80  # same as a loop: real devices do not wait for their MainDevice
 
 
 @contextmanager
 def on_a_wire(path: str | Path) -> Iterator[LinkSource]:
-    """The end of a cable to the virtual segment of a file, by the machine's clock: real frames
-    where the program runs in a private network (`python -m catenary.realtime.private_network
-    program.py`); else the segment in this process."""
+    """Yield a link to the virtual segment of a file, on the machine's clock.
+
+    In a private network (`python -m catenary.realtime.private_network program.py`), another process
+    serves the segment and the frames are real. Otherwise the segment runs in this process.
+    """
     if not isinstance(state(), Private):
         yield read_segment(path, clock="monotonic")
         return
@@ -34,7 +36,7 @@ def on_a_wire(path: str | Path) -> Iterator[LinkSource]:
         start_python(["-m", "catenary.demo.wire", theirs, str(path)]) as server,
     ):
         if server.read_line(START_SECONDS) is None:
-            raise LinkError("the virtual segment did not start", hint="its own message is above")
+            raise LinkError("the virtual segment did not start", hint="see its message above")
         yield Interface(ours)
 
 
@@ -42,8 +44,14 @@ def on_a_wire(path: str | Path) -> Iterator[LinkSource]:
 def program_target(
     segment: str | Path, interface: str | None = None, *, realtime: bool
 ) -> Iterator[LinkSource | str]:
-    """Where a program runs: on an interface; else on the virtual segment of a file, on a wire by
-    the machine's clock, or in virtual time, and then it is the file's path."""
+    """Yield the target of a program.
+
+    Args:
+        segment: File of a virtual segment, used without an interface.
+        interface: A network interface.
+        realtime: True to run the virtual segment on the machine's clock, see `on_a_wire`. False
+            yields the path of the file, for virtual time.
+    """
     if interface or not realtime:
         yield interface or str(segment)
         return

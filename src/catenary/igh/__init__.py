@@ -1,4 +1,4 @@
-"""The IgH EtherCAT master, a kernel module, in place of a link: `MainDevice("igh:0")`."""
+"""The IgH EtherCAT master, a kernel module, as a target: `MainDevice("igh:0")`."""
 
 from catenary.igh.kernel_master import KernelMaster
 from catenary.igh.library import Library

@@ -1,4 +1,4 @@
-"""The image table over libethercat, and the link that is nothing but its clock."""
+"""The image table over libethercat, and a link that provides only a clock."""
 
 from collections.abc import Sequence
 from typing import Literal, Protocol
@@ -6,7 +6,7 @@ from typing import Literal, Protocol
 from catenary.igh.library import Library
 
 class Unit(Protocol):
-    """A domain with what is copied: (offset in the domain, offset in the image, size)."""
+    """A domain and its copies: (offset in the domain, offset in the image, size) [bytes]."""
 
     @property
     def domain(self) -> int: ...
@@ -26,8 +26,11 @@ class Unit(Protocol):
     def optional(self) -> bool: ...
 
 class KernelTime:
-    """Owns the clock of a loop on the kernel master: CLOCK_MONOTONIC, moved where it follows the
-    reference clock; `virtual_time`: time passes only where it is waited for. Carries no frames."""
+    """Owns the clock of a loop on the kernel master; it carries no frames.
+
+    The clock is CLOCK_MONOTONIC, with an offset while it follows the reference clock. With
+    `virtual_time`, time advances only in `wait_until`.
+    """
 
     def __init__(self, virtual_time: bool = False) -> None: ...
     is_virtual: bool
@@ -39,8 +42,11 @@ class KernelTime:
     def wait_until(self, deadline_ns: int, wake_on_frame: bool) -> bool: ...
 
 class Exchange:
-    """Owns the images of one activated configuration. ValueError for a copy that leaves its domain
-    or image."""
+    """Owns the process images of one activated configuration.
+
+    Raises:
+        ValueError: A copy exceeds its domain or its image.
+    """
 
     def __init__(
         self,
@@ -60,17 +66,29 @@ class Exchange:
         rate_limit_ns: float,
         bound_ns: int,
     ) -> None:
-        """Whom the clocks follow, and how close counts as together. Before the first cycle."""
+        """Select the clock to follow and the limits of the control loop, before the first cycle.
+
+        Args:
+            follow: "reference" or "main"; None without distributed clocks.
+            period_ns: The period of the loop.
+            epoch_ns: Offset from the loop's clock to the application time.
+            bandwidth: Bandwidth of the control loop, per cycle.
+            rate_limit_ns: Largest correction per cycle.
+            bound_ns: Largest error and difference that count as locked.
+        """
 
     def clock_figures(self) -> dict[str, float]:
-        """As `core.Clock.figures`, as far as libethercat tells; spread, worst_spread: what all
-        devices together say of their difference [ns], at least the largest, below twice that."""
+        """Return the figures of `core.Clock.figures` that libethercat provides.
+
+        `spread` and `worst_spread` are bitwise ORs of the differences of all devices [ns]. The OR
+        is at least the largest difference, and less than twice that.
+        """
 
     def keep_within(self, bound_ns: int) -> None: ...
     def reset_clock_figures(self) -> None: ...
     @property
     def clock_changes(self) -> int:
-        """How often the clocks came together or apart."""
+        """Number of changes between locked and not locked."""
 
     @property
     def capsule(self) -> object: ...
@@ -79,4 +97,4 @@ class Exchange:
     def step(self) -> None: ...
     def steps(self, count: int) -> None: ...
     def end(self) -> None:
-        """The master's handles are about to go: no call is made any more."""
+        """Stop all calls into libethercat. The handles of the master become invalid after this."""

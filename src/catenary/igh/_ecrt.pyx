@@ -1,5 +1,5 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""The image table over libethercat (exchange.h), and the link that is nothing but its clock."""
+"""The image table over libethercat (exchange.h), and a link that provides only a clock."""
 
 from cpython.exc cimport PyErr_CheckSignals
 from cpython.pycapsule cimport (
@@ -126,7 +126,7 @@ CALLS = (
 CLOCKS = {None: IGH_NO_CLOCK, "reference": IGH_FOLLOW_REFERENCE, "main": IGH_FOLLOW_MAIN}
 cdef enum:
     CALL_COUNT = 13
-    PADDING = 16               # bytes behind an image, as core has
+    PADDING = 16               # bytes after an image, as in core
 
 
 cdef void release_owner(object capsule) noexcept:
@@ -180,7 +180,7 @@ cdef class KernelTime:
 cdef class Exchange:
     cdef igh_exchange c
     cdef KernelTime time
-    cdef object library        # whose code is called
+    cdef object library        # keeps the loaded library alive
 
     def __cinit__(self, KernelTime time not None, library, uintptr_t master, units,
                   uint32_t output_size, uint32_t input_size):
@@ -287,7 +287,7 @@ cdef class Exchange:
         return self.c.changes
 
     def step(self):
-        """One collect and one emit in the caller's thread, GIL released: for the benchmark."""
+        """Run one collect and one emit in the calling thread, without the GIL (for benchmarks)."""
         with nogil:
             igh_collect(&self.c, 0)
             igh_emit(&self.c)

@@ -1,9 +1,10 @@
-"""The binary interface of libethercat: structures, constants and calls, as `ctypes` sees them.
+"""The binary interface of libethercat: structures, constants and calls for `ctypes`.
 
-From the headers of 1.5.2, 1.5.3, 1.6-alpha, 1.6.0, 1.6.1 and 1.6.4 (tests/igh/abi.json has the
-numbers measured from each; the tests compare). The structures are the same in all of them; what
-differs is which calls exist, and what 25 of them return: nothing before 1.6.0, then 0 or -errno.
-The version magic does not tell: 1.6-alpha has 1.6's and returns nothing.
+Source: the headers of 1.5.2, 1.5.3, 1.6-alpha, 1.6.0, 1.6.1 and 1.6.4. tests/igh/abi.json has the
+sizes and offsets measured from each, and the tests compare them. All releases have the same
+structures. They differ in the set of calls and in the return type of 25 calls. Before 1.6.0, these
+calls return nothing; since then, 0 or -errno. The version magic cannot distinguish the two:
+1.6-alpha has the magic of 1.6 and returns nothing.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Final
 
 SYNC_MANAGERS_MAX = 16
 PORTS = 4
-LIST_END = 0xFF  # index of the record behind the last one of a list of SyncManagers
+LIST_END = 0xFF  # index of the record that ends a list of SyncManagers
 
 DIRECTION_OUTPUT, DIRECTION_INPUT = 1, 2
 WATCHDOG_DEFAULT, WATCHDOG_ENABLE, WATCHDOG_DISABLE = 0, 1, 2
@@ -22,11 +23,11 @@ COUNTER_ZERO, COUNTER_INCOMPLETE, COUNTER_COMPLETE = 0, 1, 2
 REQUEST_UNUSED, REQUEST_BUSY, REQUEST_SUCCESS, REQUEST_ERROR = 0, 1, 2, 3
 
 MAGICS = (0x0105, 0x0106)  # 1.5.x, 1.6.x
-RETURNS_SINCE = "ecrt_slave_config_state_timeout"  # a call that came with the return values, 1.6.0
+RETURNS_SINCE = "ecrt_slave_config_state_timeout"  # a call added with the return values, in 1.6.0
 
 
 class MasterState(c.Structure):
-    """`ec_master_state_t`, and `ec_master_link_state_t` alike."""
+    """`ec_master_state_t` and `ec_master_link_state_t`, which have the same layout."""
 
     _fields_ = (
         ("slaves_responding", c.c_uint32),
@@ -67,7 +68,7 @@ class PortLink(c.Structure):
 
 
 class Port(c.Structure):
-    """One of the `ports` of `ec_slave_info_t`."""
+    """An element of `ports` of `ec_slave_info_t`."""
 
     _fields_ = (
         ("desc", c.c_uint32),
@@ -148,7 +149,7 @@ TYPES: Final = MappingProxyType(
     }
 )
 
-# Call → types, what it returns first; "r": nothing before 1.6.0, then 0 or -errno.
+# Call → types, return type first; "r": nothing before 1.6.0, then 0 or -errno.
 CALLS: Final = MappingProxyType(
     {
         "ecrt_version_magic": "u32",

@@ -1,5 +1,8 @@
-"""How a device is named to the master: by the alias of a device and the steps behind it, so that it
-is followed where it is plugged in; by its position where nobody in front of it has an alias."""
+"""Addresses of devices for the kernel master: an alias, and the number of devices after it.
+
+An address with an alias remains valid if the device is moved on the line. A device that has no
+alias at or before its position is addressed by its position.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +11,20 @@ from typing import NamedTuple
 
 
 class Address(NamedTuple):
-    """The first two arguments of `ecrt_master_slave_config`. `alias` 0: `steps` from the start."""
+    """The first two arguments of `ecrt_master_slave_config`.
+
+    `steps` counts from the device with `alias`, or from the first device if `alias` is 0.
+    """
 
     alias: int
     steps: int
 
 
 def addresses(aliases: Sequence[int]) -> list[Address]:
-    """By position. An alias that two have names neither: the master would take the first."""
+    """Return the addresses of all devices, by position.
+
+    An alias that several devices have is not used: the master would take the first of them.
+    """
     found: list[Address] = []
     head: int | None = None
     for position, alias in enumerate(aliases):
@@ -28,7 +37,12 @@ def addresses(aliases: Sequence[int]) -> list[Address]:
 
 
 def place(address: Address, aliases: Sequence[int]) -> int | None:
-    """Where that device is now; None: nowhere."""
+    """Return the current position of a device; None if it is not on the segment.
+
+    Args:
+        address: The address of the device.
+        aliases: The current aliases of all devices, by position.
+    """
     first = 0
     if address.alias:
         if address.alias not in aliases:

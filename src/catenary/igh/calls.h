@@ -1,19 +1,19 @@
-/* The calls of libethercat that a cycle makes, by their addresses.
+/* Function pointers to the calls of libethercat that a cycle makes.
  *
- * Everything that is called here may be called from a real-time thread (ecrt.h says so of each).
+ * ecrt.h states for each of them that it may be called from a real-time thread.
  */
 #ifndef CATENARY_IGH_CALLS_H
 #define CATENARY_IGH_CALLS_H
 
 #include <stdint.h>
 
-/* The calls of a cycle. Those that return nothing before 1.6.0 have two shapes. */
+/* The calls of a cycle. Those that return nothing before 1.6.0 have two signatures. */
 typedef union { void (*says_nothing)(void *); int (*says)(void *); } igh_call;
 typedef union { void (*says_nothing)(void *, uint64_t); int (*says)(void *, uint64_t); } igh_call_time;
 typedef union { void (*says_nothing)(void *, void *); int (*says)(void *, void *); } igh_call_state;
 
 typedef struct igh_calls {
-    int returns;                      /* whether they return something: never read it otherwise */
+    int returns;                      /* true if they return a value; otherwise never read it */
     igh_call receive, send, process, queue, sync_reference_clock, sync_slave_clocks;
     igh_call_time application_time, sync_reference_clock_to;
     igh_call_state domain_state, master_state;

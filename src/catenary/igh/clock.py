@@ -1,4 +1,4 @@
-"""KernelClock: what a kernel master knows of its clocks, as a loop asks its own engine."""
+"""KernelClock: clock figures of a kernel master, in the form of a loop's own clock engine."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from catenary.wire.clock import decode_difference
 
 
 class KernelClock:
-    """Owns the differences that were read. Fulfils `bus.CycleClock`.
+    """Owns the clock differences of the devices. Implements `bus.CycleClock`.
 
-    The phase comes from every cycle, and so does the largest difference of all devices, which is
-    what `locked` goes by. What single devices differ is read one after the other by requests, some
-    a second: libethercat has no cyclic way.
+    The phase and the largest difference of all devices are measured in every cycle; `locked` is
+    computed from them. Differences of single devices are read by requests, one device after the
+    other, a few per second. libethercat has no cyclic call for them.
     """
 
     def __init__(self, exchange: Exchange, plan: ClockPlan) -> None:
@@ -40,14 +40,19 @@ class KernelClock:
         return self._exchange.clock_changes
 
     def next_device(self) -> int | None:
-        """The position whose difference is read next; None: there are no followers."""
+        """Return the position of the device to read next; None if there are no followers."""
         if not self._differences:
             return None
         self._turn = (self._turn + 1) % len(self._differences)
         return list(self._differences)[self._turn]
 
     def note(self, position: int, register: bytes) -> None:
-        """A device's 0x092C: its difference to what it last heard of the reference."""
+        """Record the system time difference of a device.
+
+        Args:
+            position: The position of the device.
+            register: Its register 0x092C, 4 bytes: difference to the last received reference time.
+        """
         found = decode_difference(int.from_bytes(register, "little"))
         mean, _, worst, reads = self._differences[position]
         mean = mean + (found - mean) / 4 if reads else float(found)

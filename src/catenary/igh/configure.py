@@ -1,4 +1,4 @@
-"""A plan → slave configurations, domains and requests of the kernel master, then its activation."""
+"""Configuration of the kernel master from a plan: devices, domains and requests; activation."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from catenary.plan.start_up import WATCHDOG_DIVIDER, DevicePlan, Download
 from catenary.procedure.pdo import LEFT_ALONE
 
 EMERGENCIES = 16  # kept by the master for each device
-REQUEST_SIZE = 256  # bytes of an object that is read in operation; longer ones are read blocking
+REQUEST_SIZE = 256  # bytes of an object read by request; longer ones take a blocking call
 REGISTER_SIZE = 64
 
 Copy = tuple[int, int, int]  # offset in the domain, in the image, bytes
@@ -28,7 +28,7 @@ Copy = tuple[int, int, int]  # offset in the domain, in the image, bytes
 
 @dataclass(slots=True)
 class Domain:
-    """Owns the place of one sync unit in the master's memory."""
+    """Owns the location of one sync unit in the master's memory."""
 
     domain: int
     divider: int
@@ -42,19 +42,19 @@ class Domain:
 
 @dataclass(frozen=True, slots=True)
 class DeviceConfiguration:
-    """The master's handles for one device; they live until the master is deactivated."""
+    """The master's handles for one device, valid until the master is deactivated."""
 
     position: int
     address: Address
     config: int
-    sdo_request: int  # 0: it speaks no CoE
+    sdo_request: int  # 0: no CoE
     register_request: int
     sync: SyncPlan | None  # None: no SYNC signals
 
 
 @dataclass(frozen=True, slots=True)
 class Configuration:
-    """What runs on an activated master."""
+    """The configuration of an activated master."""
 
     devices: tuple[DeviceConfiguration, ...]
     domains: tuple[Domain, ...]
@@ -65,8 +65,19 @@ class Configuration:
 def configure(
     master: Reservation, plan: Plan, found: Sequence[DeviceDescription], epoch_ns: int
 ) -> Configuration:
-    """Tells the master everything and activates it. `found`: all devices. After an error or an
-    interruption the master is reserved as before, and nothing of it is left."""
+    """Configure the master and activate it.
+
+    After an error or an interruption, the master is still reserved and has no configuration.
+
+    Args:
+        master: The reserved master.
+        plan: The plan of the loop.
+        found: The descriptions of all devices, by position.
+        epoch_ns: Offset from the loop's clock to the application time.
+
+    Returns:
+        The handles and the process images of the activated master.
+    """
     try:
         return _configured(master, plan, found, epoch_ns)
     except BaseException:
@@ -127,7 +138,7 @@ def _device(
     _tell_process_data(master, plan, config, who)
     for download in (*plan.before_mapping, *plan.start_up):
         data = ctypes.create_string_buffer(download.data, len(download.data))
-        if download.optional:  # the master gives a device up that refuses one of its list
+        if download.optional:  # a refused SDO in its own list makes the master give up the device
             _download_if_there(master, plan.position, download)
             continue
         place = (download.index, download.subindex, ctypes.addressof(data), len(data))
@@ -145,7 +156,7 @@ def _device(
 
 
 def _download_if_there(master: Reservation, position: int, download: Download) -> None:
-    """Write an object, unless the device does not have it or keeps it as it is."""
+    """Write an object. Ignore the abort codes of an absent or read-only object."""
     try:
         master.download(position, download.index, download.subindex, download.data)
     except SdoAbort as abort:
@@ -154,7 +165,7 @@ def _download_if_there(master: Reservation, position: int, download: Download) -
 
 
 def _tell_process_data(master: Reservation, plan: DevicePlan, config: int, who: str) -> None:
-    """PDOs and watchdogs: what the device has already the master does not write again."""
+    """Configure PDOs and watchdogs. The master writes only values that differ from the device's."""
     mode = abi.WATCHDOG_ENABLE if plan.watchdog_ns else abi.WATCHDOG_DISABLE
     if plan.watchdog_ns:
         master.library.ask(
@@ -192,7 +203,7 @@ def _pdo_info(pdo: Pdo) -> abi.PdoInfo:
 def _tell_clock(
     master: Reservation, plan: DevicePlan, clock: ClockPlan | None, config: int, who: str
 ) -> None:
-    """SYNC0 fires where the frames have gone through: so long after the application time."""
+    """Configure SYNC0. Its shift from the application time lets the frames pass first."""
     if plan.sync is None or clock is None:
         return
     shift_ns = plan.sync.shift_ns + clock.wire_ns + clock.allowance_ns
@@ -204,7 +215,7 @@ def _tell_clock(
 def _register(
     master: Reservation, plan: DevicePlan, domains: Sequence[Domain], config: int, who: str
 ) -> None:
-    """Every SyncManager into its sync unit's domain; where its bytes are there and in the image."""
+    """Map each SyncManager into the domain of its sync unit, and record the offsets of the copy."""
     place = plan.layout
     for direction in Direction:
         output = direction is Direction.OUTPUT
@@ -225,4 +236,4 @@ def _register(
 
 
 def _no_handle(what: str) -> MemoryError:
-    return MemoryError(f"{what}: the kernel has no memory for it; dmesg | tail says more")
+    return MemoryError(f"{what}: the kernel has no memory for it; see dmesg | tail")

@@ -1,7 +1,7 @@
-"""What the master knows of a device → its description, as a scan of our own would give it.
+"""Device descriptions from the data of the kernel master, in the form that our own scan returns.
 
-The library does not tell everything: entries have no names and no types, SyncManagers no addresses.
-What is left open here the master decides.
+libethercat does not report everything: entries have no names and no types, and SyncManagers have
+no addresses. The master chooses the missing values.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ STATUSWORD, SLOT_STRIDE, SLOTS_MAX = 0x6041, 0x800, 16
 PROFILE_DRIVE, PROFILE_MODULAR = 402, 5001
 ATTEMPTS = 3
 MAILBOXES = 2  # SyncManagers 0 and 1 of a device with a mailbox
-STATION_BASE = 0x03E9  # 1001, as our own scans: the master keeps its addresses to itself
+STATION_BASE = 0x03E9  # 1001, as in our own scan: libethercat does not report station addresses
 
-# FMMUs are the master's: "byte-oriented" keeps the plan from giving one to the mailbox.
+# The master assigns the FMMUs; FMMU_BYTE_ORIENTED stops the plan from assigning one to the mailbox.
 CONTROLLER = Information(
     type=0,
     revision=0,
@@ -51,7 +51,12 @@ MAILBOX = MailboxLayout(0, 0, 0, 0, MailboxProtocol.COE, pdo_assign=True, pdo_co
 
 
 def describe(master: Reservation, position: int) -> DeviceDescription:
-    """The description of one device."""
+    """Return the description of one device.
+
+    Args:
+        master: The reserved master.
+        position: The position of the device.
+    """
     info = master.slave(position)
     syncs = [master.sync_manager(position, index) for index in range(info.sync_count)]
     mailbox = _may_have_mailbox(syncs)
@@ -76,7 +81,9 @@ def describe(master: Reservation, position: int) -> DeviceDescription:
         output_pdos=outputs,
         input_pdos=inputs,
         open_ports=(links[0], links[1], links[2], links[3]),
-        system_time=any(port.receive_time for port in info.ports),  # latched where there are clocks
+        system_time=any(
+            port.receive_time for port in info.ports
+        ),  # latched by devices with a clock
         device_type=number,
         slots=_slots(master, position, number),
         mapping_source="IgH master",
@@ -86,8 +93,22 @@ def describe(master: Reservation, position: int) -> DeviceDescription:
 def read_if_there(
     master: Reservation, position: int, index: int, subindex: int = 0
 ) -> bytes | None:
-    """An object; empty where the device refuses it, None where it speaks no CoE. MailboxError where
-    it does not answer: asked again, for the master repeats nothing that a frame has lost."""
+    """Read an object that may be absent.
+
+    The upload is repeated after a missing reply, because the master does not repeat lost frames.
+
+    Args:
+        master: The reserved master.
+        position: The position of the device.
+        index: Index of the object.
+        subindex: Subindex of the object.
+
+    Returns:
+        The data; empty if the device refuses the upload; None if it has no CoE.
+
+    Raises:
+        MailboxError: The device did not answer any attempt.
+    """
     for attempt in range(ATTEMPTS):
         try:
             return master.upload(position, index, subindex)
@@ -104,14 +125,27 @@ def read_if_there(
 def object_information(
     master: Reservation, position: int, index: int, subindex: int
 ) -> ObjectInformation:
-    """How long an object is, found by reading it. Bit length 0: it is not there."""
+    """Return the length of an object, measured by reading it.
+
+    Args:
+        master: The reserved master.
+        position: The position of the device.
+        index: Index of the object.
+        subindex: Subindex of the object.
+
+    Returns:
+        The description of the object; its bit length is 0 if the object is absent.
+    """
     data = read_if_there(master, position, index, subindex)
     return ObjectInformation(index, subindex, 8 * len(data or b""))
 
 
 def _may_have_mailbox(syncs: Sequence[abi.SyncInfo]) -> bool:
-    """Whether the first two SyncManagers carry no PDOs: who is asked for an object without a
-    mailbox makes libethercat and the kernel complain, on stderr and in the log."""
+    """Return True if the first two SyncManagers carry no PDOs.
+
+    An SDO upload from a device without a mailbox makes libethercat print an error on stderr, and
+    the kernel log one.
+    """
     directions = [sync.dir for sync in syncs[:MAILBOXES] if not sync.n_pdos]
     return directions == [abi.DIRECTION_OUTPUT, abi.DIRECTION_INPUT]
 
@@ -119,7 +153,7 @@ def _may_have_mailbox(syncs: Sequence[abi.SyncInfo]) -> bool:
 def _process_data(
     master: Reservation, position: int, syncs: Sequence[abi.SyncInfo], coe: bool
 ) -> tuple[tuple[SyncManager, ...], tuple[Pdo, ...], tuple[Pdo, ...]]:
-    """SyncManagers, and the PDOs assigned to those of outputs and of inputs."""
+    """Return the SyncManagers, the output PDOs and the input PDOs."""
     managers = []
     pdos: dict[SyncManagerUse, list[Pdo]] = {SyncManagerUse.OUTPUTS: [], SyncManagerUse.INPUTS: []}
     for index, sync in enumerate(syncs):
@@ -150,7 +184,7 @@ def _entry(info: abi.PdoEntryInfo) -> Entry:
 
 
 def _slots(master: Reservation, position: int, device_type: int | None) -> tuple[int, ...]:
-    """Its CiA 402 axes: as `procedure/profile.py` finds them."""
+    """Return the slots of the CiA 402 axes, by the rules of `procedure/profile.py`."""
     profile = 0 if device_type is None else device_type & 0xFFFF
     if profile == PROFILE_DRIVE:
         there = [0]

@@ -1,12 +1,12 @@
 /* One cycle of process images over libethercat.
  *
- * emit:    outputs into the domains, application time, clocks, queue, send
- * collect: receive, process and state of every domain that was queued; inputs out of the domains
+ * emit:    copy outputs into the domains, write the application time, sync clocks, queue, send
+ * collect: receive, process every queued domain and read its state, copy inputs from the domains
  *
- * The kernel logs a domain that is processed before its frame is back as a change of its working
- * counter (ecrt_domain_process in IgH's master/domain.c, once a second at most). So the monitor
- * datagram, a broadcast of 16 bytes, is queued last where answers are waited for. Asking for it
- * costs nothing, and the domains are processed when it is back or the deadline has passed.
+ * If a domain is processed before its frame is back, the kernel logs a change of its working
+ * counter (ecrt_domain_process in IgH's master/domain.c, at most once a second). To prevent this,
+ * the monitor datagram (a broadcast of 16 bytes) is queued last if the loop waits for answers.
+ * Checking for it is cheap. The domains are processed when it is back or at the deadline.
  *
  * Budget without the calls: 0.1 us for three drives in one domain.
  */
@@ -24,11 +24,11 @@
 #include "image.h"
 
 #define IGH_COMPLETE 2u               /* wc_state of ec_domain_state_t */
-#define IGH_NAP_NS 20000              /* between two looks for what has not come back */
+#define IGH_NAP_NS 20000              /* between two checks for missing frames */
 #define IGH_PATIENCE_FIRST_NS 50000
-#define IGH_PATIENCE_DECAY 14         /* of patience, a cycle: 2^-14 */
+#define IGH_PATIENCE_DECAY 14         /* patience decreases by 2^-14 of itself per cycle */
 #define IGH_GRACE 2                   /* times the patience: the backup interface's frames */
-#define IGH_DEAF 16u                  /* complete without a monitor: the main interface is lost */
+#define IGH_DEAF 16u                  /* complete cycles without a monitor: main interface is lost */
 #define IGH_MISSED_MAX 1000000000u
 
 static int igh_emit(void *self)
@@ -65,8 +65,9 @@ static int igh_emit(void *self)
     return rc < 0 ? rc : 0;
 }
 
-/* Takes what has come. Without a monitor datagram that has to be everything: it goes by the main
- * interface alone, and where that is lost, a ring's backup interface brings the domains. */
+/* Receive the frames that have arrived. The monitor datagram uses the main interface only. If that
+ * interface is lost, the domains of a ring return by the backup interface: then, as without a
+ * monitor datagram, the cycle counts as back at once. */
 static void igh_receive(igh_exchange *x)
 {
     if (igh_do(&x->calls, x->calls.receive, x->master) < 0)
@@ -78,7 +79,7 @@ static void igh_receive(igh_exchange *x)
     x->back = x->heard || !x->marked || x->deaf >= IGH_DEAF;
 }
 
-/* How many of the domains that were queued are not complete. */
+/* Process the queued domains. Return the number of domains that are not complete. */
 static uint32_t igh_process(igh_exchange *x)
 {
     igh_domain_state state;
@@ -138,8 +139,9 @@ static void igh_judge(igh_exchange *x)
     x->link_up = state.bits >> 4 & 1;
 }
 
-/* Threaded: naps as long as answers take, then looks now and then until they are back. A look that
- * comes too early makes later naps longer by a step; thousands of others make them shorter. */
+/* Threaded execution: sleep for the usual round trip (`patience`), then check every IGH_NAP_NS until
+ * the frames are back. A first check that is too early increases patience by one step; a successful
+ * first check decreases it by 2^-IGH_PATIENCE_DECAY. */
 static void igh_wait_for_answers(igh_exchange *x, int64_t deadline)
 {
     int64_t look = x->sent + x->patience;
@@ -156,7 +158,7 @@ static void igh_wait_for_answers(igh_exchange *x, int64_t deadline)
         x->patience += IGH_NAP_NS;
 }
 
-/* With a backup interface, a part of the answers may come by it after the monitor datagram. */
+/* With a backup interface, some answers may arrive there after the monitor datagram. */
 static uint32_t igh_wait_for_backup(igh_exchange *x, int64_t deadline, uint32_t missing)
 {
     int64_t until = x->sent + IGH_GRACE * x->patience;
@@ -196,7 +198,7 @@ static int igh_collect(void *self, int64_t deadline)
 
 static void igh_drain(void *self)
 {
-    (void)self;                       /* the master takes frames when it is asked to receive */
+    (void)self;                       /* the master fetches frames in its receive call */
 }
 
 static int igh_closed_emit(void *self)
@@ -211,7 +213,7 @@ static int igh_closed_collect(void *self, int64_t deadline)
     return -EBADF;
 }
 
-/* The master's handles are gone: whoever still holds the table gets -EBADF. */
+/* Invalidate the table: the master's handles are gone, and later calls return -EBADF. */
 static void igh_exchange_end(igh_exchange *x)
 {
     x->image.emit = igh_closed_emit;

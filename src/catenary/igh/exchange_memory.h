@@ -1,4 +1,4 @@
-/* What one exchange of process images over libethercat consists of. */
+/* State of one exchange of process images over libethercat. */
 #ifndef CATENARY_IGH_EXCHANGE_MEMORY_H
 #define CATENARY_IGH_EXCHANGE_MEMORY_H
 
@@ -8,8 +8,8 @@
 #include "image.h"
 #include "kernel_time.h"
 
-#define IGH_OP 8                      /* in al_states of ec_master_state_t: a device is in OP */
-#define IGH_READINGS 5                /* of a median */
+#define IGH_OP 8                      /* bit in al_states of ec_master_state_t: a device is in OP */
+#define IGH_READINGS 5                /* readings per median */
 
 typedef struct igh_copy { uint32_t domain_offset, image_offset, size; } igh_copy;
 
@@ -39,33 +39,33 @@ typedef struct igh_exchange {
     uint16_t al_counter;
     int64_t frame_stamp;
 
-    uint32_t serial;                  /* of the emit */
-    uint8_t collected;                /* everything that was sent is back and judged */
+    uint32_t serial;                  /* number of the emit */
+    uint8_t collected;                /* all datagrams of this emit are back and judged */
     uint8_t judged;                   /* misses of this emit have been counted */
-    uint8_t waits;                    /* answers are waited for: threaded */
-    uint8_t marked;                   /* the monitor datagram left last of this emit */
-    uint8_t heard;                    /* it has come back, and all others with it */
-    uint8_t back;                     /* heard, or nothing better is known */
-    uint8_t attended;                 /* the clocks have been looked at after this emit */
-    uint32_t monitored;               /* what it says: the OR of all 0x092C [ns] */
-    uint32_t deaf;                    /* cycles in a row that were complete without it */
-    int64_t sent, patience;           /* when; how long answers take, as found [ns] */
+    uint8_t waits;                    /* collect waits for answers: threaded execution */
+    uint8_t marked;                   /* the monitor datagram was sent last in this emit */
+    uint8_t heard;                    /* the monitor datagram is back, so all others are, too */
+    uint8_t back;                     /* heard, or sent without a usable monitor datagram */
+    uint8_t attended;                 /* the clocks have been processed after this emit */
+    uint32_t monitored;               /* content of the monitor datagram: OR of all 0x092C [ns] */
+    uint32_t deaf;                    /* consecutive complete cycles without it */
+    int64_t sent, patience;           /* time of sending; measured round trip [ns] */
 
     int clock;                        /* IGH_NO_CLOCK ... */
     int64_t period, epoch;
-    int64_t app_time;                 /* told last [ns, link clock] */
+    int64_t app_time;                 /* last application time written [ns, link clock] */
     double rate, rate_limit, bandwidth;
-    int64_t ahead;                    /* reference less our clock, in the last cycle [ns] */
+    int64_t ahead;                    /* reference minus our clock, in the last cycle [ns] */
     igh_readings errors, spreads;
-    int64_t phase_error;              /* `ahead` modulo the period, a median [ns] */
-    uint32_t strays;                  /* phase errors beyond an eighth of a period, in a row */
+    int64_t phase_error;              /* median of `ahead` modulo the period [ns] */
+    uint32_t strays;                  /* consecutive phase errors above an eighth of the period */
     uint64_t clock_reads, clock_misses, send_errors, receive_errors;
 
-    int64_t bound;                    /* of phase and differences, for `locked` [ns] */
-    double mean_error, mean_spread;   /* over some 16 cycles [ns] */
+    int64_t bound;                    /* limit of phase error and differences for `locked` [ns] */
+    double mean_error, mean_spread;   /* over about 16 cycles [ns] */
     int64_t worst_error, spread, worst_spread;
     uint64_t spread_reads, jumps, changes;
-    uint64_t silent, unheard;         /* in a row: no time told; no datagram back */
+    uint64_t silent, unheard;         /* consecutive: no reference time; no monitor datagram back */
     uint8_t locked;
 } igh_exchange;
 

@@ -1,13 +1,13 @@
-/* Distributed clocks over libethercat: what each cycle passes to the master, the difference of the
- * clocks, and a loop that follows the reference clock.
+/* Distributed clocks over libethercat: the times passed to the master in each cycle, the differences
+ * of the clocks, and a control loop that follows the reference clock.
  *
- * The phase error is what the reference clock says to a frame, less our clock when the frame left,
- * modulo the period. Whole periods mean nothing: SYNC0 comes once a period, and the master leaves a
- * clock alone that is less than 1 ms off (EC_SYSTEM_TIME_TOLERANCE_NS in IgH's master/fsm_master.c).
- * IgH's and SOEM's examples normalise, too (update_master_clock in examples/rtai_rtdm_dc/main.c of
- * the former, ec_sync in samples/ec_sample/ec_sample.c of the latter).
+ * The phase error is the reference time read by a frame minus our clock when the frame was sent,
+ * modulo the period. Whole periods have no meaning: SYNC0 fires once a period, and the master does
+ * not correct a clock offset below 1 ms (EC_SYSTEM_TIME_TOLERANCE_NS in IgH's master/fsm_master.c).
+ * The examples of IgH and SOEM also normalise (update_master_clock in examples/rtai_rtdm_dc/main.c
+ * of IgH, ec_sync in samples/ec_sample/ec_sample.c of SOEM).
  *
- * A frame that was late says little about the clocks, so all of this goes by medians of five.
+ * A late frame does not measure the clocks, so all values are medians of five readings.
  */
 #ifndef CATENARY_IGH_FOLLOW_H
 #define CATENARY_IGH_FOLLOW_H
@@ -18,14 +18,14 @@
 
 #include "exchange_memory.h"
 
-#define IGH_SILENT 16u                /* misses in a row: the reference clock is not there */
-#define IGH_SILENT_EVERY 1024u        /* cycles between two questions to one that is not */
-#define IGH_STRAYS 8u                 /* errors beyond an eighth of a period in a row: a jump */
-#define IGH_SEEK_SHARE 16             /* of the period: largest move of a cycle before OP */
-#define IGH_SEEK_GAIN 8               /* of the error: move of a cycle before OP */
+#define IGH_SILENT 16u                /* consecutive misses: the reference clock is lost */
+#define IGH_SILENT_EVERY 1024u        /* cycles between two reads of a lost reference clock */
+#define IGH_STRAYS 8u                 /* consecutive errors above an eighth of a period: a jump */
+#define IGH_SEEK_SHARE 16             /* before OP: largest correction per cycle is period / 16 */
+#define IGH_SEEK_GAIN 8               /* before OP: correction per cycle is error / 8 */
 
-/* The application time goes on by whole periods, however late this thread is within one: the
- * master lets SYNC0 start by it. */
+/* Advance the application time by whole periods, even if this thread is late: the master computes
+ * the start of SYNC0 from it. */
 static void igh_advance(igh_exchange *x, int64_t now)
 {
     int64_t ahead = x->app_time + x->period - now;
@@ -58,8 +58,8 @@ static double igh_limited(double value, double limit)
     return value > limit ? limit : value < -limit ? -limit : value;
 }
 
-/* Whether the reference clock's time is to be asked for: libethercat complains on stderr of every
- * question that has no answer, so a clock that stays silent is asked now and then. */
+/* Return true if the reference time should be read in this cycle. libethercat prints an error on
+ * stderr for every read without an answer, so a lost clock is read only every IGH_SILENT_EVERY. */
 static int igh_asks_reference(const igh_exchange *x)
 {
     return x->silent < IGH_SILENT || x->serial % IGH_SILENT_EVERY == 0;
@@ -79,7 +79,7 @@ static int64_t igh_modulo(int64_t time, int64_t period)
     return 2 * rest <= -period ? rest + period : rest;
 }
 
-/* Adds a reading and returns the median of the last five; of the first one while there are fewer. */
+/* Add a reading and return the median of the last five. The first reading fills all five places. */
 static int64_t igh_median(igh_readings *r, int64_t reading)
 {
     int64_t sorted[IGH_READINGS];
@@ -95,8 +95,8 @@ static int64_t igh_median(igh_readings *r, int64_t reading)
     return sorted[IGH_READINGS / 2];
 }
 
-/* What all devices together say of their difference (a broadcast of 0x092C: the OR of all, at least
- * the largest, less than twice that). */
+/* Record the OR of the differences of all devices, from a broadcast read of 0x092C. The OR is at
+ * least the largest difference, and less than twice that. */
 static void igh_note_spread(igh_exchange *x)
 {
     int64_t spread = igh_median(&x->spreads, x->monitored);
@@ -107,8 +107,8 @@ static void igh_note_spread(igh_exchange *x)
     x->spread_reads++;
 }
 
-/* Together: differences, and where the instants follow their phase, within the bound. Where the
- * reference follows, its own difference is among those of all devices. */
+/* Set `locked`: the differences are within the bound, and so is the phase error if the cycle starts
+ * follow the reference clock. If the reference follows us, its difference is among the others. */
 static void igh_judge_clocks(igh_exchange *x)
 {
     int in_phase = x->clock == IGH_FOLLOW_MAIN
@@ -119,17 +119,18 @@ static void igh_judge_clocks(igh_exchange *x)
     x->locked = (uint8_t)locked;
 }
 
-/* Before any device is in OP: quick, for the master leaves the clocks in some phase and starts SYNC0
- * by it. Slow enough for answers that come two cycles later, after a median of five. */
+/* Return the correction before any device is in OP. It is fast, because the clocks start at an
+ * arbitrary phase and SYNC0 starts by it. It is slow enough for a delay of two cycles and a median
+ * of five. */
 static int64_t igh_sought(const igh_exchange *x)
 {
     double limit = (double)x->period / IGH_SEEK_SHARE;
     return (int64_t)igh_limited((double)x->phase_error / IGH_SEEK_GAIN, limit);
 }
 
-/* Our clock runs after the reference, by a critically damped loop of which neither the rate nor the
- * correction of one period leaves the limit. No wind-up: at the limit the rate learns nothing further
- * outwards. Nor from an error beyond an eighth of the period, and only one that lasts is corrected. */
+/* Follow the reference clock with a critically damped loop. The rate and the correction per period
+ * are limited. Anti-windup: at the limit, the rate integrates only inwards. An error above an eighth
+ * of the period does not change the rate, and is corrected only if it persists (IGH_STRAYS). */
 static void igh_follow(igh_exchange *x)
 {
     double error = (double)x->phase_error, wanted, applied;
@@ -147,7 +148,7 @@ static void igh_follow(igh_exchange *x)
     x->time->offset += (int64_t)applied;
 }
 
-/* Errors beyond an eighth of the period, in a row: where they last, the clock has jumped. */
+/* Count consecutive errors above an eighth of the period. If they persist, the clock has jumped. */
 static void igh_count_strays(igh_exchange *x)
 {
     if (8 * llabs(x->phase_error) <= x->period)
@@ -156,7 +157,7 @@ static void igh_count_strays(igh_exchange *x)
         x->jumps++;
 }
 
-/* The reference clock's time came back: 32 bits of it. */
+/* Process a reading of the reference time (its lower 32 bits). */
 static void igh_note_reference(igh_exchange *x, uint32_t time)
 {
     x->ahead = (int32_t)(time - (uint32_t)(x->sent + x->epoch));
@@ -169,7 +170,7 @@ static void igh_note_reference(igh_exchange *x, uint32_t time)
     igh_count_strays(x);
 }
 
-/* The clocks' datagrams are back. */
+/* Process the clock datagrams of this cycle, which are back. */
 static void igh_attend_clocks(igh_exchange *x)
 {
     uint32_t time;
@@ -189,7 +190,7 @@ static void igh_attend_clocks(igh_exchange *x)
     igh_judge_clocks(x);
 }
 
-/* Once they are back; else it counts, once for each emit. */
+/* Process the clock datagrams when they are back. Otherwise count one miss for each emit. */
 static void igh_watch_clocks(igh_exchange *x, int first)
 {
     if (x->heard && !x->attended)

@@ -1,4 +1,4 @@
-"""KernelAccess: the kernel master of a MainDevice, as its devices and its cycle use it."""
+"""KernelAccess: the kernel master of a MainDevice, shared by its device handles and its cycle."""
 
 from __future__ import annotations
 
@@ -33,38 +33,53 @@ class KernelAccess:
 
     @property
     def cycling(self) -> bool:
-        """True while a loop runs: requests are answered in operation only."""
+        """True while a loop runs. Requests are answered only during operation."""
         return self.main.has_loop
 
     def configuration_of(self, position: int) -> DeviceConfiguration | None:
-        """The master's handles for a device; None: it is not activated."""
+        """Return the master's handles for a device; None if the master is not activated."""
         return None if self.active is None else self.active.devices[position]
 
     def place_of(self, position: int) -> int:
-        """Where a device is now: in operation one that has an alias, or is behind one, may have
-        been plugged in elsewhere. SegmentError where it is nowhere."""
+        """Return the current position of a device.
+
+        During operation, a device that is addressed by an alias may have been moved on the line.
+
+        Raises:
+            SegmentError: The device is not on the segment.
+        """
         device = self.configuration_of(position)
         if device is None or not device.address.alias:
             return position
         found = place(device.address, self.reservation.aliases())
         if found is None:
             raise SegmentError(
-                f"{self.subs[position].station} is nowhere on the segment: no device has the alias "
-                f"{device.address.alias} that leads to it",
-                hint="ethercat slaves shows the aliases; plug it in again",
+                f"{self.subs[position].station} is not on the segment: no device has the alias "
+                f"{device.address.alias} by which it is addressed",
+                hint="plug it in again; ethercat slaves shows the aliases",
             )
         return found
 
     def refuse_blocking(self, position: int) -> None:
-        """ConfigurationError where a call would wait for ever: an activated master answers through
-        the frames of its application, and nobody sends them."""
+        """Refuse a blocking call while the master is activated and no cycles run.
+
+        An activated master sends its requests in the frames of the application. Without cycles,
+        the call would wait for ever.
+
+        Raises:
+            ConfigurationError: The call would wait for ever.
+        """
         if self.active is not None and not self.cycling:
             raise ConfigurationError(
-                f"device {position}: the master is activated, and answers only while cycles flow",
+                f"device {position}: the master is activated, and answers only while cycles run",
                 hint="read and write objects before it is activated, or in a Loop",
             )
 
     def same_configuration(self, device: DeviceConfiguration) -> None:
-        """LoopError where the handles are gone: the loop has ended meanwhile."""
+        """Check that the handles are still valid.
+
+        Raises:
+            LoopError: The loop has ended, and the handles with it.
+        """
         if self.configuration_of(device.position) is not device:
-            raise LoopError("the loop has ended before the device answered", hint="ask again")
+            raise LoopError("the loop ended before the device answered", hint="repeat the request")

@@ -1,8 +1,8 @@
-"""Beside: owns the threads that wait in the kernel for devices, so that nobody else waits there.
+"""Beside: threads for calls that block in the kernel until a device answers.
 
-An object that is read or written by a call of its own (`ecrt_master_sdo_upload`) blocks until the
-device has answered, in the kernel, where no signal reaches it. In a loop that is a thread's matter,
-one for each device: the others, and the service of the loop, go on.
+Calls such as `ecrt_master_sdo_upload` block in the kernel, where no signal interrupts them. While
+a loop runs, each device has its own thread for these calls. Other devices and the service of the
+loop are not delayed.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from catenary.procedure.exchange import Procedure, after
 
 T = TypeVar("T")
 
-LOOK = 0.001  # [s] between two looks at a thread
-BLOCKED_TIMEOUT = 30.0  # [s]; as long as cycles flow, the kernel gives a silent device up before
-END_TIMEOUT = 2.0  # [s] for what is under way when the master is given back
+LOOK = 0.001  # [s] between two checks of a thread
+BLOCKED_TIMEOUT = 30.0  # [s]; while cycles run, the kernel's own timeout for a device is shorter
+END_TIMEOUT = 2.0  # [s] for pending calls when the master is released
 
 
 class Call(Generic[T]):
-    """Owns one call in a thread of its own, and what it returned or raised."""
+    """Owns one call in its own thread, and its result or exception."""
 
     def __init__(self, call: Callable[[], T], what: str) -> None:
         self.what = what
@@ -35,7 +35,7 @@ class Call(Generic[T]):
     def _run(self) -> None:
         try:
             self._results.append(self._call())
-        except Exception as error:  # raised again where it is waited for
+        except Exception as error:  # raised again in `result`
             self._error = error
 
     @property
@@ -49,15 +49,26 @@ class Call(Generic[T]):
 
 
 class Beside:
-    """Owns the calls under way, one for each device at most."""
+    """Owns the pending calls, at most one for each device."""
 
     def __init__(self, timeout: float = BLOCKED_TIMEOUT) -> None:
         self.timeout = timeout
         self._under_way: dict[int, Call[object]] = {}
 
     def run(self, position: int, what: str, call: Callable[[], T]) -> Procedure[T]:
-        """A conversation that waits for `call`, made in a thread. MailboxError where the kernel
-        has not answered after `timeout`: the thread is left to it."""
+        """Run `call` in a thread, and wait for it in a conversation.
+
+        Args:
+            position: The position of the device.
+            what: Name of the call in messages and of its thread.
+            call: A call that may block.
+
+        Returns:
+            The result of `call`.
+
+        Raises:
+            MailboxError: The kernel did not answer within `timeout`. The thread keeps waiting.
+        """
         left = round(self.timeout / LOOK)
         while (before := self._under_way.get(position)) is not None and not before.done:
             yield after(LOOK)
@@ -65,16 +76,16 @@ class Beside:
             if left < 0:
                 raise self._late(position, what, f"the kernel is still busy with {before.what}")
         mine = Call(call, what)
-        self._under_way[position] = mine  # type: ignore[assignment]  # whose result is not asked
+        self._under_way[position] = mine  # type: ignore[assignment]  # its result is not read
         while not mine.done:
             yield after(LOOK)
             left -= 1
             if left < 0:
-                raise self._late(position, what, "the kernel has not come back")
+                raise self._late(position, what, "the kernel has not returned")
         return mine.result()
 
     def end(self) -> None:
-        """Waits for what is under way: a master that is given back answers everything."""
+        """Wait for pending calls. They end when the master is released."""
         for call in self._under_way.values():
             call.thread.join(END_TIMEOUT)
         self._under_way.clear()
@@ -82,5 +93,5 @@ class Beside:
     def _late(self, position: int, what: str, why: str) -> CatenaryError:
         return MailboxError(
             f"device {position}: {what}: no answer within {self.timeout:g} s: {why}",
-            hint="it answers only while cycles flow; dmesg | tail says what it waits for",
+            hint="it answers only while cycles run; dmesg | tail shows what it waits for",
         )

@@ -1,4 +1,4 @@
-"""KernelCarrier: what a loop asks of an activated master."""
+"""KernelCarrier: the services of an activated master for a loop."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ from catenary.wire.coe import Emergency
 from catenary.wire.register import AL_STATUS_CODE, SYSTEM_TIME_DIFFERENCE
 
 OP_TIMEOUT = 20.0  # [s]: the master configures one device after the other
-LOOK = 0.005  # [s] between two looks
-CODE_TIMEOUT, CODE_LOOK = 0.5, 0.010  # [s]: how long, how often a device in error is asked why
+LOOK = 0.005  # [s] between two checks
+CODE_TIMEOUT, CODE_LOOK = 0.5, 0.010  # [s]: timeout and interval of reading an AL status code
 INVALID_SYNC = 0x0030  # AL status code
 SYNC_TYPE = 0x1C32, 1  # object and subindex
 LINKS = 2  # the main one and the backup
@@ -37,7 +37,7 @@ _EMERGENCY = struct.Struct("<HB5s")
 
 
 class KernelCarrier:
-    """Owns an activated configuration. Fulfils `bus.Carrier`."""
+    """Owns an activated configuration. Implements `bus.Carrier`."""
 
     def __init__(self, kernel: KernelAccess, configuration: Configuration) -> None:
         self.configuration = configuration
@@ -56,17 +56,17 @@ class KernelCarrier:
 
     @property
     def clock(self) -> KernelClock | None:
-        """What it knows of the clocks."""
+        """Figures of the distributed clocks; None without clocks."""
         return self._clock
 
     def end(self) -> None:
-        """No call is made any more."""
+        """Stop all calls into libethercat."""
         self._kernel.active = None
         self.configuration.exchange.end()
         self._kernel_log.close()
 
     def state(self, position: int) -> abi.ConfigState:
-        """What the master says of its configuration of a device."""
+        """Return the state of the master's configuration of a device."""
         state = abi.ConfigState()
         config = self.configuration.devices[position].config
         self._library.ask(
@@ -75,7 +75,12 @@ class KernelCarrier:
         return state
 
     def bring_to_op(self, positions: Sequence[int]) -> Procedure[None]:
-        """The master leads them; cycles must flow meanwhile."""
+        """Wait until the master has brought the devices to OP. Cycles must run meanwhile.
+
+        Raises:
+            StateError: A device did not reach OP.
+            IdentityError: Another device is at the position.
+        """
         waiting = list(positions)
         for _ in range(round(OP_TIMEOUT / LOOK)):
             waiting = [p for p in waiting if not self.state(p).operational]
@@ -89,13 +94,13 @@ class KernelCarrier:
         raise (yield from self._not_in_op(waiting))
 
     def _refuses(self, position: int) -> bool:
-        """Whether the master has given it up."""
+        """Return True if the master has stopped its attempts to configure the device."""
         if not self.state(position).online:
             return False
         return bool(self._kernel.reservation.slave(self._kernel.place_of(position)).error_flag)
 
     def survey(self) -> Procedure[list[Answer]]:
-        """Who answers, and from which state; the reason of those that are not in OP."""
+        """Return the state of each device, and the AL status code of each that is not in OP."""
         answers = []
         for sub in self._kernel.subs:
             state = self.state(sub.position)
@@ -109,7 +114,7 @@ class KernelCarrier:
         return answers
 
     def listen(self) -> Procedure[None]:
-        """Emergencies of all devices, links of both interfaces."""
+        """Read emergencies of all devices, the link states, and one device's clock difference."""
         target = ctypes.create_string_buffer(_EMERGENCY.size)
         for device in self.configuration.devices:
             while (
@@ -121,24 +126,24 @@ class KernelCarrier:
         yield from self._read_difference()
 
     def _read_difference(self) -> Procedure[None]:
-        """What one device differs from the reference clock, in turns."""
+        """Read the clock difference of the next device."""
         yield after(0)
         position = None if self._clock is None else self._clock.next_device()
         if position is None or self._clock is None or not self.state(position).operational:
             return
         register = SYSTEM_TIME_DIFFERENCE
-        with contextlib.suppress(RegisterError):  # it has told nothing this time
+        with contextlib.suppress(RegisterError):  # no answer: it is read again in its next turn
             self._clock.note(
                 position, (yield from self._sub(position).read_register(register.address, 4))
             )
 
     def _sub(self, position: int) -> SubDevice:
         sub = self._kernel.subs[position]
-        assert isinstance(sub, SubDevice)  # as every scan of a kernel master makes them
+        assert isinstance(sub, SubDevice)  # made by the scan of a kernel master
         return sub
 
     def _hear(self, position: int, message: bytes) -> None:
-        """An emergency that the master kept for a device, 8 bytes."""
+        """Publish an emergency (8 bytes) that the master has stored for a device."""
         sub = self._kernel.subs[position]
         heard = Emergency(*_EMERGENCY.unpack(message))
         if isinstance(sub, SubDevice):
@@ -151,7 +156,9 @@ class KernelCarrier:
         for number in range(self._link_count):
             state = abi.MasterState()
             found = self._library.ecrt_master_link_state(handle, number, ctypes.byref(state))
-            if found < 0:  # no such interface: asked once, for libethercat complains on stderr
+            if (
+                found < 0
+            ):  # no such interface; not read again: libethercat prints an error on stderr
                 self._link_count = number
                 return
             before, self._links[number] = self._links[number], bool(state.link_up)
@@ -160,20 +167,21 @@ class KernelCarrier:
             now, which = self._kernel.main.link.now() * 1e-9, ("main", "backup")[number]
             end = 0 if number == 0 else len(self._kernel.subs) - 1
             kind = LinkRestored if state.link_up else LinkLost
-            what = "carries again" if state.link_up else "does not carry any more"
+            what = "has its link again" if state.link_up else "lost its link"
             message = f"the cable of the {which} interface {what}"
             self._kernel.main.events.put(kind(now, None, message, (None, end)))
 
     def _status_code(self, position: int) -> Procedure[int]:
         """Return the AL status code of a device in error; 0: unknown.
 
-        The kernel's log has it. Without the permission to read that, ask the device: the master
-        refuses requests until it has acknowledged the error, which may clear the code.
+        The code is in the kernel's log. If this process cannot read the log, read the register of
+        the device. The master refuses requests until it has acknowledged the error, and the
+        acknowledgement may clear the code.
         """
         try:
             place = self._kernel.place_of(position)
         except SegmentError:
-            return 0  # it was unplugged meanwhile, and is nowhere
+            return 0  # it was unplugged meanwhile
         code = self._kernel_log.status_code(self._kernel.reservation.index, place)
         if code:
             return code
@@ -188,32 +196,32 @@ class KernelCarrier:
         return 0
 
     def _not_in_op(self, waiting: Sequence[int]) -> Procedure[CatenaryError]:
-        """Why the first of them is not there."""
+        """Return the error for the first device that is not in OP."""
         sub = self._sub(waiting[0])
         try:
             info = self._kernel.reservation.slave(self._kernel.place_of(sub.position))
         except CatenaryError as error:
             return StateError(
-                f"{sub.station} did not reach OP: it is not there any more ({error})",
+                f"{sub.station} did not reach OP: it is no longer on the segment ({error})",
                 position=sub.position,
                 requested=int(AlState.OP),
                 actual=0,
                 code=0,
-                hint="look at its cable and power: ethercat slaves",
+                hint="check its cable and power; ethercat slaves lists the devices",
             )
         expected, found = sub.identity[:2], (info.vendor_id, info.product_code)
         if expected != found:
             return IdentityError(
-                f"{sub.station}: another device is there now: vendor 0x{found[0]:08X} product "
-                f"0x{found[1]:08X}",
+                f"{sub.station}: another device is at its position: vendor 0x{found[0]:08X} "
+                f"product 0x{found[1]:08X}",
                 position=sub.position,
                 expected=expected,
                 found=found,
-                hint="put the right one back, or scan again",
+                hint="reconnect the original device, or scan again",
             )
         code = yield from self._status_code(sub.position)
         reason = f" (AL status code 0x{code:04X}: {status_code(code).text})" if code else ""
-        others = f"; with it {len(waiting) - 1} others" if len(waiting) > 1 else ""
+        others = f"; {len(waiting) - 1} other devices failed, too" if len(waiting) > 1 else ""
         state = info.al_state & 0xF
         named = str(AlState(state)) if state in tuple(AlState) else f"state {state}"
         return StateError(
@@ -232,30 +240,30 @@ class KernelCarrier:
         if code and status_code(code).cause:
             return status_code(code).cause
         return (
-            f"sudo dmesg | grep EtherCAT has the AL status code, which neither libethercat nor the "
-            f"device reports; ethercat config -v -p {sub.position} shows what was configured"
+            f"sudo dmesg | grep EtherCAT shows the AL status code, which neither libethercat nor "
+            f"the device reports; ethercat config -v -p {sub.position} shows the configuration"
         )
 
     def _cause_of_invalid_sync(self, sub: SubDevice) -> Procedure[str]:
-        """0x0030: the SYNC unit and 0x1C32:01 contradict each other."""
+        """Return the cause of 0x0030: the SYNC unit and 0x1C32:01 contradict each other."""
         sync = self.configuration.devices[sub.position].sync
         kind = yield from self._sync_type(sub)
         said = "its 0x1C32:01 could not be read" if kind is None else f"its 0x1C32:01 is {kind}"
         if sync is not None:
             return (
                 f"this loop starts SYNC0 every {sync.cycle_ns / 1e3:g} us with AssignActivate "
-                f"0x{sync.assign_activate:04X}, and {said}: does its ESI file have another "
-                "AssignActivate or cycle (Dc/OpMode)?"
+                f"0x{sync.assign_activate:04X}, and {said}: compare AssignActivate and cycle with "
+                "Dc/OpMode in its ESI file"
             )
         return (
-            f"{said}, and this loop starts no SYNC0. A program that was killed may have left 2 or "
-            "3 (by SYNC0 or SYNC1) there: switch the device off and on, or ethercat download -p "
-            f"{sub.position} -t uint16 0x1C32 1 0 (free run; 1: by SyncManagers), the same with "
-            "0x1C33; or use dc=True"
+            f"{said}, and this loop does not start SYNC0. A program that was killed may have left "
+            "2 or 3 there (SYNC0 or SYNC1). Switch the device off and on, or run ethercat download "
+            f"-p {sub.position} -t uint16 0x1C32 1 0 (free run; 1: SyncManager events), and the "
+            "same with 0x1C33; or use dc=True"
         )
 
     def _sync_type(self, sub: SubDevice) -> Procedure[int | None]:
-        """Read 0x1C32:01 of a device in error. None if it does not answer soon."""
+        """Return 0x1C32:01 of a device in error; None if it does not answer in time."""
         if not sub.description.coe:
             return None
         asked, deadline = sub.sdo.request(*SYNC_TYPE), self._deadline()
@@ -266,7 +274,7 @@ class KernelCarrier:
         try:
             return int.from_bytes(asked.result(), "little")
         except CatenaryError:
-            return None  # it has no such object, or refuses to report it: see the hint
+            return None  # the object is absent or cannot be read: see the hint
 
     def _deadline(self) -> int:
         return self._kernel.main.link.now() + round(CODE_TIMEOUT * 1e9)

@@ -22,7 +22,7 @@ class KernelLog:
         try:
             self._file = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
             os.lseek(self._file, 0, os.SEEK_END)
-        except OSError:  # not permitted, or not there: nothing is found, and the error says so
+        except OSError:  # not permitted, or absent: `status_code` returns 0
             self.close()
 
     @property
@@ -47,7 +47,7 @@ class KernelLog:
             try:
                 record = os.read(self._file, RECORD_SIZE)
             except BrokenPipeError:
-                continue  # records were overwritten: the next read goes on after them
+                continue  # records were overwritten: the next read continues after them
             except BlockingIOError:
                 return
             if not record:

@@ -1,4 +1,4 @@
-"""KernelMaster: brings devices up and down by the IgH kernel master."""
+"""KernelMaster: state changes and configuration of devices by the IgH kernel master."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ if TYPE_CHECKING:  # plan needs NumPy, a scan does not
     from catenary.plan.request import PdoWish, Wish
     from catenary.plan.start_up import DevicePlan
 
-# [s] An INIT request to a device that fails at that moment may be lost: the master repeats it after
-# 5 s (ec_fsm_change_timeout_ms in IgH's master/fsm_change.c). Seen at every second stop.
+# [s] An INIT request may be lost if the device fails at that moment. The master repeats it after
+# 5 s (ec_fsm_change_timeout_ms in IgH's master/fsm_change.c). Observed at every second stop.
 RESTORE_PATIENCE = 6.0
 
 
 class KernelMaster:
     """Owns a reserved kernel master while a MainDevice is open on it. Implements `bus.Master`.
 
-    The kernel brings devices up, talks to their mailboxes and leads those back that were away; a
-    `Loop` exchanges the process images. Closing the MainDevice gives the master back.
+    The kernel changes the states of the devices, serves their mailboxes and reconfigures devices
+    that return. A `Loop` exchanges the process images. Closing the MainDevice releases the master.
     """
 
     def __init__(self, main: MasterOwner) -> None:
@@ -46,7 +46,7 @@ class KernelMaster:
         self.carrier: KernelCarrier | None = None
 
     def forget(self) -> None:
-        """Let go of the parent's master in a forked child."""
+        """Drop the parent's master in a forked child."""
         carrier, self.carrier = self.carrier, None
         if carrier is not None:
             carrier.end()
@@ -57,10 +57,10 @@ class KernelMaster:
         return self._kernel.reservation
 
     def scan(self) -> tuple[Sequence[SubDevice], tuple[str, ...]]:
-        """Return the devices that the master has found. It has brought them to PRE-OP.
+        """Return the devices that the master has found and brought to PRE-OP.
 
         Raises:
-            NoDeviceError: there are none.
+            NoDeviceError: The master found no device.
         """
         count = self.reservation.device_count()
         self.reservation.wait_preop()
@@ -68,7 +68,7 @@ class KernelMaster:
         if not found:
             raise NoDeviceError(
                 f"{self.reservation.name}: the master finds no device",
-                hint="check cable and power; ethercat slaves lists what it sees",
+                hint="check cable and power; ethercat slaves lists the devices it finds",
             )
         subs = [self._handle(description) for description in found]
         for sub in subs:
@@ -76,7 +76,12 @@ class KernelMaster:
         return subs, ()
 
     def read_mappings(self, wishes: Sequence[Wish], period_ns: int) -> None:
-        """Read what is mapped, and how long other wanted objects are."""
+        """Read the mapped PDOs, and the lengths of requested objects that are not mapped.
+
+        Args:
+            wishes: The process-data requests of the loop.
+            period_ns: The period of the loop.
+        """
         from catenary.plan.planner import gather_wishes
 
         asked = gather_wishes(wishes, period_ns)
@@ -93,7 +98,11 @@ class KernelMaster:
     def read_objects(
         self, wanted: Mapping[int, Sequence[tuple[int, int]]]
     ) -> dict[int, dict[tuple[int, int], bytes]]:
-        """Read objects before a loop, one after the other."""
+        """Read objects before a loop, one after the other.
+
+        Returns:
+            The data of each object that could be read, by position, index and subindex.
+        """
         found: dict[int, dict[tuple[int, int], bytes]] = {}
         for position, places in wanted.items():
             read = {
@@ -104,11 +113,19 @@ class KernelMaster:
         return found
 
     def configure(self, plan: Plan, epoch_ns: int) -> tuple[int | None, ...]:
-        """Tells the master the plan and activates it: from here on it waits for cycles."""
+        """Configure the master by the plan and activate it. It then expects cycles.
+
+        Args:
+            plan: The plan of the loop.
+            epoch_ns: Offset from the loop's clock to the application time.
+
+        Raises:
+            ConfigurationError: The master is already active.
+        """
         if self.carrier is not None:
             raise ConfigurationError(
-                f"{self.reservation.name} is activated already: nothing can be configured any more",
-                hint="leave the loop that runs, or main.leave()",
+                f"{self.reservation.name} is activated already: its configuration cannot change",
+                hint="leave the running loop, or call main.leave()",
             )
         infos = [self.reservation.slave(sub.position) for sub in self.main.subs]
         if plan.cycle.clock is not None:
@@ -125,29 +142,33 @@ class KernelMaster:
         return ()
 
     def _keep_sync_types(self, sub: bus.SubDevice, plan: DevicePlan) -> None:
-        """Read how a device keeps time, before SYNC0 is written to it. Without clocks, write back
-        what could not be written when an earlier loop ended."""
+        """Save the synchronisation types of a device before a loop with SYNC0.
+
+        For a device without SYNC0, restore the types that an earlier loop could not restore.
+        """
         if plan.sync is None:
             self._restore_sync_types(sub)
         elif sub.description.coe and not sub.sync_types:
             sub.sync_types = read_types(self.reservation, sub.position)
 
     def _undo(self, error: BaseException) -> None:
-        """Take back what a configuration that failed has written. Its master was given back and
-        reserved again. Further errors are added to `error` as notes."""
+        """Restore the synchronisation types after a failed configuration.
+
+        The master has been released and reserved again. Further errors become notes of `error`.
+        """
         if self.reservation.handle:
             self.reservation.wait_preop(RESTORE_PATIENCE)
             for problem in self._settle():
-                error.add_note(f"on the way down: {problem}")
+                error.add_note(f"while leaving operation: {problem}")
 
     def leave(self, timeout: float) -> None:
         """End the operation of the master, wait for PRE-OP and restore the synchronisation types.
 
-        The master brings its devices to PRE-OP by itself, within its own times.
+        The master itself brings its devices to PRE-OP, with its own timeouts.
 
         Raises:
             CatenaryError: A device that was synchronised to SYNC0 does not reach PRE-OP, or refuses
-                its former type; further ones as notes.
+                its former type. Further errors are notes of the first.
         """
         carrier, self.carrier = self.carrier, None
         if carrier is None:
@@ -167,7 +188,7 @@ class KernelMaster:
             raise problems[0]
 
     def _settle(self) -> list[CatenaryError]:
-        """Read all states and restore all synchronisation types; return what went wrong."""
+        """Read all states and restore all synchronisation types. Return the errors."""
         problems = []
         for sub in self.main.subs:
             try:
@@ -177,7 +198,7 @@ class KernelMaster:
         return problems
 
     def _restore_sync_types(self, sub: bus.SubDevice) -> None:
-        """Keep the types of a lost device until it returns."""
+        """Restore the types of a device. Those of a lost device are kept until it returns."""
         if not self.reservation.has(sub.position, sub.identity):
             sub.state = None
             return
@@ -187,38 +208,42 @@ class KernelMaster:
             sub.sync_types = {}
 
     def close(self, timeout: float) -> None:
-        """Deactivate the master. Giving it back leaves the devices in PRE-OP."""
+        """Deactivate the master. Its release leaves the devices in PRE-OP."""
         try:
             self.leave(timeout)
-        except CatenaryError as problem:  # the master must be given back all the same
+        except CatenaryError as problem:  # the master must be released nevertheless
             warnings.warn(str(problem), RuntimeWarning, stacklevel=4)
 
     @property
     def configuration(self) -> Configuration:
-        """What runs. RuntimeError before a loop is open."""
+        """The active configuration.
+
+        Raises:
+            RuntimeError: No loop is open.
+        """
         if self._kernel.active is None:
             raise RuntimeError("the master is not activated: with Loop(...) as loop:")
         return self._kernel.active
 
-    # What the master keeps to itself
+    # Services that libethercat does not offer
 
     def passive_scan(self, *, names: bool) -> NoReturn:
-        """Raise ConfigurationError: the states of the devices are the master's."""
+        """Raise ConfigurationError: the master controls the states of the devices."""
         self._cannot(
-            "look at devices without taking them over",
+            "read devices without reserving the master",
             "ethercat slaves -v, and states, reg_read, sii_read, alias, graph, crc",
         )
 
     def diagnose(
         self, subs: Sequence[bus.SubDevice], *, since: Diagnosis | None, lost_frames: int
     ) -> NoReturn:
-        """Raise ConfigurationError: the master's own tool reads error counters."""
+        """Raise ConfigurationError: only the master's own tool reads error counters."""
         self._cannot("read the error counters of all devices", "ethercat crc, ethercat graph CRC")
 
     def request_states(
         self, devices: Sequence[DeviceDescription], positions: Sequence[int], state: AlState
     ) -> dict[int, Outcome]:
-        """Raise ConfigurationError: the master leads the states."""
+        """Raise ConfigurationError: the master controls the states."""
         self._cannot("request a state of single devices", f"ethercat states {state}")
 
     def _cannot(self, what: str, command: str) -> NoReturn:
@@ -240,7 +265,7 @@ def _check_same(before: DeviceDescription, now: DeviceDescription) -> None:
 
 
 def _unmapped(device: DeviceDescription, wish: PdoWish | None) -> Collection[tuple[int, int]]:
-    """Objects wished for that the device has not mapped."""
+    """Return the requested objects that the device has not mapped."""
     if wish is None:
         return ()
     sides = ((Direction.OUTPUT, wish.outputs), (Direction.INPUT, wish.inputs))

@@ -1,4 +1,4 @@
-/* The time a loop over libethercat lives by, as a link that carries no frames. */
+/* The clock of a loop over libethercat, as a link that carries no frames. */
 #ifndef CATENARY_IGH_KERNEL_TIME_H
 #define CATENARY_IGH_KERNEL_TIME_H
 
@@ -9,8 +9,8 @@
 
 #include "link.h"
 
-/* The clock of the loop: CLOCK_MONOTONIC, or virtual time; where it follows the reference clock it
- * is CLOCK_MONOTONIC moved by `offset`, never faster or slower than by `rate_limit` of itself. */
+/* The clock of the loop: CLOCK_MONOTONIC or virtual time, plus `offset`. While it follows the
+ * reference clock, `rate_limit` of the exchange limits the change of `offset` per period. */
 typedef struct igh_time {
     cat_link link;
     int is_virtual;

@@ -1,4 +1,4 @@
-"""Library: owns libethercat, found and checked at run time; every call by its name."""
+"""Library: libethercat, found and checked at run time."""
 
 from __future__ import annotations
 
@@ -18,20 +18,27 @@ PLACES = (
     "/usr/local/etherlab/lib/libethercat.so.1",
 )
 INSTALL = (
-    "install IgH's EtherCAT master (docs/igh.md), or give the library's path: "
+    "install IgH's EtherCAT master (docs/igh.md), or set the library's path: "
     f"{VARIABLE}=/opt/etherlab/lib/libethercat.so.1"
 )
 
 
 class Library:
-    """Owns one loaded libethercat.
+    """Owns one loaded libethercat. Each call is an attribute: `library.ecrt_master_send(master)`.
 
-    `returns`: calls that once returned nothing return 0 or -errno (1.6.0 and later); else what
-    stands in the register is never read.
+    `returns` is True from 1.6.0 on: calls that returned nothing before return 0 or -errno. If it is
+    False, the return values of these calls are never read.
     """
 
     def __init__(self, path: str | os.PathLike[str] | None = None) -> None:
-        """LinkError where there is none, or none that is known here."""
+        """Load the library.
+
+        Args:
+            path: Path of the library; None: `CATENARY_LIBETHERCAT` or the usual places.
+
+        Raises:
+            LinkError: No library was found, or its version is not supported.
+        """
         self._loaded, self.path = _load(path)
         self.returns = hasattr(self._loaded, abi.RETURNS_SINCE)
         self.addresses: dict[str, int] = {}
@@ -52,44 +59,57 @@ class Library:
         self._check(missing)
 
     def __getattr__(self, name: str) -> ctypes._FuncPointer:
-        """A call, declared: `library.ecrt_master_activate(master)`."""
+        """Return a call with its declared types."""
         if not name.startswith("ecrt_") or name not in self.addresses:
             raise AttributeError(name)
         function: ctypes._FuncPointer = getattr(self._loaded, name)
         return function
 
     def ask(self, name: str, *arguments: object, what: str, hint: str = "") -> int:
-        """Makes a call that returns 0 or more, or -errno: then CatenaryError says `what` failed."""
+        """Make a call and check its result.
+
+        Args:
+            name: Name of the call.
+            *arguments: Arguments of the call.
+            what: Name of the action in an error message.
+            hint: Hint of the error; a general one by default.
+
+        Returns:
+            The result, 0 or more; 0 for a call without one.
+
+        Raises:
+            CatenaryError: The call returned -errno.
+        """
         result = getattr(self, name)(*arguments)
         if result is None:
             return 0
         if result < 0:
             raise CatenaryError(
                 f"{what}: {name} returned {result} ({os.strerror(-result)})",
-                hint=hint or "the kernel's log says more: dmesg | tail",
+                hint=hint or "see the kernel's log: dmesg | tail",
             )
         return int(result)
 
     def has(self, name: str) -> bool:
-        """Whether this release has the call."""
+        """Return True if this release has the call."""
         return name in self.addresses
 
     @property
     def version(self) -> str:
-        """What the version magic says: "1.6"."""
+        """Version from the version magic, such as "1.6"."""
         magic = int(self.ecrt_version_magic())
         return f"{magic >> 8}.{magic & 0xFF}"
 
     def _check(self, missing: list[str]) -> None:
         if "ecrt_version_magic" in missing:
-            raise LinkError(f"{self.path} is no libethercat", hint=INSTALL)
+            raise LinkError(f"{self.path} is not a libethercat", hint=INSTALL)
         magic = int(self.ecrt_version_magic())
         if magic not in abi.MAGICS:
             known = " and ".join(f"{each >> 8}.{each & 0xFF}" for each in abi.MAGICS)
             raise LinkError(
                 f"{self.path} is libethercat {magic >> 8}.{magic & 0xFF} (version magic "
-                f"0x{magic:04X}); known are {known}, from 1.5.2 on",
-                hint="its structures may lie elsewhere: install a release that is known here",
+                f"0x{magic:04X}); supported are {known}, from 1.5.2 on",
+                hint="its structures may differ: install a supported release",
             )
         if missing:
             raise LinkError(
@@ -109,6 +129,6 @@ def _load(path: str | os.PathLike[str] | None) -> tuple[ctypes.CDLL, str]:
         except OSError as error:
             reasons.append(str(error))
     if given:
-        hint = "look at the path" if not Path(given).exists() else INSTALL
+        hint = "check the path" if not Path(given).exists() else INSTALL
         raise LinkError(f"libethercat cannot be loaded: {reasons[0]}", hint=hint)
     raise LinkError(f"no libethercat on this machine (tried {', '.join(tried)})", hint=INSTALL)

@@ -1,4 +1,4 @@
-"""Master: a kernel master by its number."""
+"""Master: a kernel master, selected by its number."""
 
 from __future__ import annotations
 
@@ -12,10 +12,13 @@ from catenary.igh.reservation import Reservation
 
 
 class Master:
-    """A kernel master, not yet reserved: what `MainDevice("igh:0")` opens.
+    """A kernel master that is not yet reserved: the source behind `MainDevice("igh:0")`.
 
-    `library`: path of libethercat; None: found. `virtual_time`: time passes only where it is
-    waited for, so that a library that simulates its devices runs faster than life.
+    Args:
+        index: Number of the master, from 0.
+        library: Path of libethercat; None searches for it.
+        virtual_time: True if time advances only in waits. A library that simulates its devices then
+            runs faster than real time.
     """
 
     def __init__(
@@ -26,15 +29,19 @@ class Master:
         virtual_time: bool = False,
     ) -> None:
         if index < 0:
-            raise ValueError(f"master {index}: they are counted from 0")
+            raise ValueError(f"master {index}: the number must be 0 or more")
         self.index = index
         self._library = library
         self._virtual_time = virtual_time
 
     def open_link(self) -> Reservation:
-        """Reserves the master. LinkError says what is in the way, and how to mend it."""
+        """Reserve the master.
+
+        Raises:
+            LinkError: The master cannot be reserved. The message has the cause and the remedy.
+        """
         return Reservation(Library(self._library), self.index, KernelTime(self._virtual_time))
 
     def make_master(self, main: MasterOwner) -> KernelMaster:
-        """Return what brings the devices of a MainDevice up and down."""
+        """Return the controller of the devices of a MainDevice."""
         return KernelMaster(main)

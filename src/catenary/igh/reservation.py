@@ -1,4 +1,4 @@
-"""Reservation: owns a kernel master while it is ours."""
+"""Reservation: a kernel master that is reserved for this process."""
 
 from __future__ import annotations
 
@@ -21,13 +21,15 @@ EMPTY_TIMEOUT = 3.0  # [s]: a link that has just come up finds its devices withi
 PREOP_TIMEOUT = 15.0  # [s] without a change, from INIT; the master itself waits 10
 LEAVE_OP_TIMEOUT = 2.0  # [s] without a change, from the last user's OP back
 SETTLE_TIMEOUT = 60.0  # [s] for all devices: the master takes one after the other
-LOOK = 0.010  # [s] between two looks
-UPLOAD_LIMIT = 1 << 16  # bytes of an object
+LOOK = 0.010  # [s] between two checks
+UPLOAD_LIMIT = 1 << 16  # largest object [bytes]
 
 
 class Reservation:
-    """Owns one kernel master that is reserved for this process. A `Link` that has a clock and
-    carries no frames: the master sends its own."""
+    """Owns one kernel master that is reserved for this process.
+
+    It implements `Link` with a clock only. It carries no frames: the master sends its own.
+    """
 
     def __init__(self, library: Library, index: int, time: KernelTime) -> None:
         self.library = library
@@ -65,45 +67,59 @@ class Reservation:
         self.close()
 
     def reserve(self) -> None:
-        """Takes the master. LinkError where it cannot be had."""
+        """Reserve the master.
+
+        Raises:
+            LinkError: The master cannot be reserved.
+        """
         ctypes.set_errno(0)
         self.handle = self.library.ecrt_request_master(self.index) or 0
         if not self.handle:
             raise refused(self.index, ctypes.get_errno(), self.library)
 
     def close(self) -> None:
-        """Gives the master back: its devices go to PRE-OP."""
+        """Release the master. It then brings its devices to PRE-OP."""
         handle, self.handle = self.handle, 0
         if handle:
             self.beside.end()
             self.library.ecrt_release_master(handle)
 
     def forget(self) -> None:
-        """Close the copies of a forked child: device file and process data. The kernel takes the
-        master back when all copies are closed, so the parent's goes on."""
+        """Close the copies of device file and process data in a forked child.
+
+        The kernel releases the master when all copies are closed, so the parent keeps it.
+        """
         handle, self.handle = self.handle, 0
         if handle:
             self.library.ecrt_release_master(handle)
 
     def renew(self) -> None:
-        """Gives it back and takes it again: nothing of a configuration is left."""
+        """Release the master and reserve it again, which discards its configuration."""
         self.close()
         self.reserve()
 
     def ask(self, name: str, *arguments: object, what: str, hint: str = "") -> int:
-        """A call with the master as its first argument."""
+        """Make a call with the master as its first argument; see `Library.ask`."""
         return self.library.ask(name, self._held(), *arguments, what=what, hint=hint)
 
     def _held(self) -> int:
-        """The handle, which libethercat never checks: a thread may come too late for it."""
+        """Return the handle if the master is reserved.
+
+        libethercat does not check handles, and a thread may make its call after `close`.
+        """
         if not (handle := self.handle):
             raise RuntimeError("the master is not reserved any more")
         return handle
 
-    # What the master knows of its devices
+    # Devices of the master
 
     def device_count(self) -> int:
-        """Devices found, once the master has done scanning. LinkError without a cable."""
+        """Wait for the end of the master's scan and return the number of devices.
+
+        Raises:
+            LinkError: The network interface has no link.
+            SegmentError: The scan did not end in time.
+        """
         begun, info = self.now(), abi.MasterInfo()
         while True:
             self.ask("ecrt_master", ctypes.byref(info), what=f"master {self.index}")
@@ -114,42 +130,42 @@ class Reservation:
             if waited >= SCAN_TIMEOUT:
                 raise SegmentError(
                     f"master {self.index} is still scanning after {SCAN_TIMEOUT:g} s",
-                    hint="ethercat slaves shows how far it is; dmesg what it waits for",
+                    hint="ethercat slaves shows its progress, dmesg what it waits for",
                 )
             self.wait_until(self.now() + round(LOOK * 1e9), False)
         if not info.link_up:
             raise LinkError(
                 f"master {self.index}: its network interface has no link",
-                hint="plug the cable in and switch the first device on; ethercat master shows it",
+                hint="connect the cable and switch the first device on; check with ethercat master",
             )
         return int(info.slave_count)
 
     def slave(self, position: int) -> abi.SlaveInfo:
-        """One device."""
+        """Return the information of one device."""
         info = abi.SlaveInfo()
         self.ask("ecrt_master_get_slave", position, ctypes.byref(info), what=f"device {position}")
         return info
 
     def aliases(self) -> list[int]:
-        """Of all devices that are there now, by position; 0: none."""
+        """Return the aliases of all present devices, by position; 0 if a device has none."""
         return [self.slave(position).alias for position in range(self._present())]
 
     def has(self, position: int, identity: Identity) -> bool:
-        """Return True if that device is at a position now."""
+        """Return True if a device with this vendor and product is at a position now."""
         if position >= self._present():
             return False
         info = self.slave(position)
         return (info.vendor_id, info.product_code) == identity[:2]
 
     def wait_preop(self, patience: float = LEAVE_OP_TIMEOUT) -> None:
-        """Wait until the master has brought its devices to PRE-OP, or nothing changes any more.
+        """Wait until the master has brought its devices to PRE-OP, or no state changes any more.
 
-        In INIT nothing answers an SDO, and an application that has just given the master back
-        leaves the devices on the way down. One with Ethernet over EtherCAT may stay in OP: it
-        answers there, too. Devices may be lost meanwhile: only those that are present count.
+        Devices in INIT do not answer SDOs. After another application has released the master, its
+        devices are still changing to PRE-OP. A device with Ethernet over EtherCAT may stay in OP,
+        where it answers, too. Devices that are lost meanwhile do not count.
 
         Args:
-            patience: How long no state may change, if none is INIT [s].
+            patience: Longest time without a state change if no device is in INIT [s].
         """
         begun = changed = self.now()
         before: list[int] = []
@@ -166,37 +182,48 @@ class Reservation:
             self.wait_until(self.now() + round(LOOK * 1e9), False)
 
     def _present(self) -> int:
-        """Return how many devices the master has now, even while it scans."""
+        """Return the present number of devices, even during a scan."""
         info = abi.MasterInfo()
         self.ask("ecrt_master", ctypes.byref(info), what=f"master {self.index}")
         return int(info.slave_count)
 
     def sync_manager(self, position: int, index: int) -> abi.SyncInfo:
-        """A SyncManager, without its PDOs."""
+        """Return a SyncManager of a device, without its PDOs."""
         info = abi.SyncInfo()
         what = f"device {position}, SyncManager {index}"
         self.ask("ecrt_master_get_sync_manager", position, index, ctypes.byref(info), what=what)
         return info
 
     def pdo(self, position: int, index: int, rank: int) -> abi.PdoInfo:
-        """A PDO of a SyncManager, without its entries."""
+        """Return a PDO of a SyncManager, without its entries."""
         info = abi.PdoInfo()
         what = f"device {position}, SyncManager {index}, PDO {rank}"
         self.ask("ecrt_master_get_pdo", position, index, rank, ctypes.byref(info), what=what)
         return info
 
     def pdo_entry(self, position: int, index: int, rank: int, place: int) -> abi.PdoEntryInfo:
-        """An entry of a PDO."""
+        """Return an entry of a PDO."""
         info = abi.PdoEntryInfo()
         what = f"device {position}, SyncManager {index}, PDO {rank}, entry {place}"
         call = "ecrt_master_get_pdo_entry"
         self.ask(call, position, index, rank, place, ctypes.byref(info), what=what)
         return info
 
-    # Objects; both block, without the GIL
+    # Objects; both calls block, without the GIL
 
     def upload(self, position: int, index: int, subindex: int, limit: int = UPLOAD_LIMIT) -> bytes:
-        """Reads an object. SdoAbort, or MailboxError where no answer came."""
+        """Read an object.
+
+        Args:
+            position: The position of the device.
+            index: Index of the object.
+            subindex: Subindex of the object.
+            limit: Largest accepted length [bytes].
+
+        Raises:
+            SdoAbort: The device refuses the upload.
+            MailboxError: The device did not answer, or the object is longer than `limit`.
+        """
         buffer = ctypes.create_string_buffer(min(limit, UPLOAD_LIMIT))
         size, code = ctypes.c_uint64(), ctypes.c_uint32()
         result = self.library.ecrt_master_sdo_upload(
@@ -210,7 +237,19 @@ class Reservation:
     def download(
         self, position: int, index: int, subindex: int, data: bytes, *, complete: bool = False
     ) -> None:
-        """Writes an object; `complete`: all subindices, from 0 on."""
+        """Write an object.
+
+        Args:
+            position: The position of the device.
+            index: Index of the object.
+            subindex: Subindex of the object.
+            data: The encoded value.
+            complete: True to write all subindices, from 0 on (complete access).
+
+        Raises:
+            SdoAbort: The device refuses the download.
+            MailboxError: The device did not answer.
+        """
         buffer = ctypes.create_string_buffer(data, len(data))
         code = ctypes.c_uint32()
         call: Callable[..., int] = self.library.ecrt_master_sdo_download

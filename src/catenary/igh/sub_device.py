@@ -1,4 +1,4 @@
-"""SubDevice and Sdo on the kernel master: the same handles, another way to the device."""
+"""SubDevice and Sdo on the kernel master: the handles of `bus`, over libethercat."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from catenary.wire.sdo_information import ObjectDescription
 T = TypeVar("T")
 V = TypeVar("V")
 
-LOOK = 0.001  # [s] between two looks at a request
+LOOK = 0.001  # [s] between two checks of a request
 REQUEST_TIMEOUT = 5.0  # [s]
 EMERGENCIES_KEPT = 32
 
 
 class SubDevice(bus.SubDevice):
-    """Owns what is known of one device of the kernel master."""
+    """Owns the description and state of one device of the kernel master."""
 
     def __init__(
         self, main: DeviceOwner, kernel: KernelAccess, description: DeviceDescription
@@ -41,19 +41,19 @@ class SubDevice(bus.SubDevice):
         self.sdo: Sdo = Sdo(self)
         self.kernel = kernel
         self._heard: deque[Emergency] = deque(maxlen=EMERGENCIES_KEPT)
-        self._asking = False  # its register request is in use
+        self._asking = False  # True while the register request is in use
 
     @property
     def emergencies(self) -> tuple[Emergency, ...]:
-        """The last emergencies it sent, oldest first."""
+        """The last emergencies of the device, oldest first."""
         return tuple(self._heard)
 
     def hear(self, emergency: Emergency) -> None:
-        """The master has taken an emergency from it."""
+        """Record an emergency that the master received from the device."""
         self._heard.append(emergency)
 
     def read_state(self) -> DeviceState:
-        """What the master saw last of its EtherCAT state."""
+        """Return the last EtherCAT state of the device that the master has read."""
         info = self.kernel.reservation.slave(self.kernel.place_of(self.position))
         word = info.al_state | (0x10 if info.error_flag else 0)
         known = word & 0xF in tuple(AlState)
@@ -61,8 +61,16 @@ class SubDevice(bus.SubDevice):
         return DeviceState(self.state, bool(info.error_flag), 0, word)
 
     def read_register(self, address: int, size: int) -> Procedure[bytes]:
-        """A conversation that reads registers, while a loop runs: `main.request(...)` takes it.
-        RegisterError where no answer comes."""
+        """Read registers while a loop runs. Pass the conversation to `main.request(...)`.
+
+        Args:
+            address: Address of the first byte, 16 bits.
+            size: Number of bytes, 1 to 64.
+
+        Raises:
+            RegisterError: The request failed or was not answered in time.
+            ConfigurationError: The master is not activated.
+        """
         device = self._checked(address, size)
         library = self.kernel.reservation.library
         request = device.register_request
@@ -76,7 +84,16 @@ class SubDevice(bus.SubDevice):
             self._asking = False
 
     def write_register(self, address: int, data: bytes) -> Procedure[None]:
-        """The same, writing."""
+        """Write registers while a loop runs. Pass the conversation to `main.request(...)`.
+
+        Args:
+            address: Address of the first byte, 16 bits.
+            data: 1 to 64 bytes.
+
+        Raises:
+            RegisterError: The request failed or was not answered in time.
+            ConfigurationError: The master is not activated.
+        """
         device = self._checked(address, len(data))
         library = self.kernel.reservation.library
         request = device.register_request
@@ -91,12 +108,15 @@ class SubDevice(bus.SubDevice):
 
     def _checked(self, address: int, size: int) -> DeviceConfiguration:
         if not 0 <= address <= 0xFFFF or not 1 <= size <= REGISTER_SIZE:
-            raise ValueError(f"{size} bytes at 0x{address:X}: 1 to {REGISTER_SIZE} at 16 bits")
+            raise ValueError(
+                f"{size} bytes at 0x{address:X}: give 1 to {REGISTER_SIZE} bytes and an address of "
+                "16 bits"
+            )
         device = self.kernel.configuration_of(self.position)
         if device is None or not device.register_request:
             raise ConfigurationError(
-                f"{self.station}: registers are read by a request of an activated master",
-                hint="read them while a loop runs; else: ethercat reg_read "
+                f"{self.station}: register access needs an activated master",
+                hint="access registers while a loop runs, or use ethercat reg_read "
                 f"-p {self.position} 0x{address:04X} {size}",
             )
         return device
@@ -123,31 +143,31 @@ class SubDevice(bus.SubDevice):
 
 
 class Sdo(bus.Sdo):
-    """Owns the way to the object dictionary of one device, by the kernel master.
+    """Owns the access to the object dictionary of one device by the kernel master.
 
-    In operation an object is read by a request object, which takes a few cycles and no thread; one
-    longer than 256 bytes, and writing, by a call that blocks a thread of the device's own, not the
-    cycle and nobody else. Everything has a deadline.
+    During operation, a request object reads objects up to 256 bytes. It takes a few cycles and no
+    thread. Longer reads and all writes make a blocking call in a thread of the device, which does
+    not delay the cycle or other devices. All transfers have a deadline.
     """
 
     def __init__(self, sub: SubDevice) -> None:
         super().__init__(sub)
         self._device = sub
-        self._busy = False  # its request object is in use
+        self._busy = False  # True while the request object is in use
 
     def list(self, kind: ListType = ListType.ALL) -> tuple[ObjectDescription, ...]:
-        """ConfigurationError: libethercat does not list dictionaries."""
+        """Raise ConfigurationError: libethercat does not list dictionaries."""
         self._cannot("list", "sdos")
 
     def describe(self, index: int) -> DescribedObject:
-        """ConfigurationError: libethercat does not describe objects."""
+        """Raise ConfigurationError: libethercat does not describe objects."""
         self._cannot("describe", "sdos")
 
     def _cannot(self, what: str, command: str) -> NoReturn:
         raise ConfigurationError(
             f"{self._device.station}: libethercat cannot {what} the objects of a device",
-            hint=f"ethercat {command} -p {self._device.position} does; reading and writing them "
-            "works",
+            hint=f"run ethercat {command} -p {self._device.position}; objects can be read and "
+            "written here",
         )
 
     def _upload(
@@ -174,7 +194,7 @@ class Sdo(bus.Sdo):
             data = yield from self._requested(device, index, subindex, limit)
         finally:
             self._busy = False
-        if data is None:  # too long for the request, or refused: the other call says which, and why
+        if data is None:  # too long or refused: the blocking call reads it or raises the reason
             data = yield from self._uploaded_blocking(index, subindex, limit)
         return data
 
@@ -188,7 +208,7 @@ class Sdo(bus.Sdo):
         return (yield from self._blocking(f"SDO 0x{index:04X}:{subindex:02X}", call))
 
     def _blocking(self, what: str, call: Callable[[], V]) -> Procedure[V]:
-        """A call that waits in the kernel: in a thread while a loop runs in real time."""
+        """Make a call that waits in the kernel; in a thread while a loop runs in real time."""
         kernel, position = self._device.kernel, self._device.position
         kernel.refuse_blocking(position)
         if not kernel.cycling or kernel.reservation.time.is_virtual:
@@ -198,9 +218,9 @@ class Sdo(bus.Sdo):
     def _requested(
         self, device: DeviceConfiguration, index: int, subindex: int, limit: int
     ) -> Procedure[bytes | None]:
-        """What the request object brought; None where it did not."""
+        """Return the data from the request object; None if it is too long or refused."""
         library, request = self._device.kernel.reservation.library, device.sdo_request
-        yield from self._idle(device)  # one that was given up may still be under way
+        yield from self._idle(device)  # an abandoned request may still be busy
         library.ecrt_sdo_request_index(request, index, subindex)
         library.ecrt_sdo_request_timeout(request, round(REQUEST_TIMEOUT * 1000))
         library.ecrt_sdo_request_read(request)
@@ -212,8 +232,11 @@ class Sdo(bus.Sdo):
         return None
 
     def _idle(self, device: DeviceConfiguration) -> Procedure[int]:
-        """The state of the request object once it is not under way. MailboxError: it stays so, as
-        that of a device that is not there does."""
+        """Wait until the request object is not busy and return its state.
+
+        Raises:
+            MailboxError: It stays busy, for example because the device is lost.
+        """
         kernel = self._device.kernel
         state = kernel.reservation.library.ecrt_sdo_request_state
         for _ in range(round(2 * REQUEST_TIMEOUT / LOOK)):
@@ -225,7 +248,7 @@ class Sdo(bus.Sdo):
         raise MailboxError(
             f"{self._device.station}: no answer within {2 * REQUEST_TIMEOUT:g} s: the master has "
             "not served the request",
-            hint="is the device there? ethercat slaves; dmesg | tail",
+            hint="check that the device is present: ethercat slaves; dmesg | tail",
         )
 
     def _download(
@@ -234,11 +257,11 @@ class Sdo(bus.Sdo):
         self._check(index, subindex, complete)
         data = value if type is None else type.encode(value)  # type: ignore[arg-type]
         if not isinstance(data, bytes):
-            raise TypeError(f"give a type for {value!r}, or bytes: type=catenary.types.UDINT")
+            raise TypeError(f"{value!r} needs a type, such as type=catenary.types.UDINT, or bytes")
         if complete and subindex:
             raise ConfigurationError(
-                f"{self._device.station}: libethercat writes complete objects from subindex 0 on",
-                hint="begin the data with subindex 0, in 16 bits",
+                f"{self._device.station}: libethercat starts complete access at subindex 0 only",
+                hint="start the data with subindex 0, in 16 bits",
             )
         return self._downloaded(index, subindex, data, complete)
 
@@ -263,7 +286,7 @@ class Sdo(bus.Sdo):
             raise self._device.error
         if not self._device.description.coe:
             raise MailboxError(
-                f"{self._device.station} does not speak CoE: object 0x{index:04X}:{subindex:02X} "
-                "is out of reach",
+                f"{self._device.station} does not support CoE: object "
+                f"0x{index:04X}:{subindex:02X} cannot be accessed",
                 hint="couplers and simple terminals have no object dictionary",
             )

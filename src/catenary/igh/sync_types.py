@@ -1,7 +1,7 @@
-"""0x1C32:01 and 0x1C33:01 of a device: how it keeps time.
+"""Synchronisation types of a device, 0x1C32:01 and 0x1C33:01.
 
-They are read before a loop with clocks and written back after it. Otherwise the device would wait
-for SYNC0 in the next program, too.
+They are read before a loop with clocks and restored after it. Otherwise the device would also wait
+for SYNC0 in the next program.
 """
 
 from __future__ import annotations
@@ -17,7 +17,12 @@ from catenary.wire.al import AlState
 
 
 def read_types(master: Reservation, position: int) -> dict[int, bytes]:
-    """Read the synchronisation types that the device has, by index."""
+    """Return the synchronisation types of a device, by index of the object.
+
+    Args:
+        master: The reserved master.
+        position: The position of the device.
+    """
     found = {index: read_if_there(master, position, index, 1) for index in SYNC_OBJECTS}
     return {index: kind for index, kind in found.items() if kind}
 
@@ -25,22 +30,22 @@ def read_types(master: Reservation, position: int) -> dict[int, bytes]:
 def write_types(
     master: Reservation, position: int, types: Mapping[int, bytes], state: DeviceState
 ) -> None:
-    """Write the types back that differ from what the device has now, in PRE-OP.
+    """Restore the types that differ from the present ones. The device must be in PRE-OP.
 
     Args:
         master: The reserved master.
-        position: The position of the device now.
-        types: By index, as `read_types` found them.
-        state: Of the device.
+        position: The present position of the device.
+        types: The types by index, from `read_types`.
+        state: The present state of the device.
 
     Raises:
-        StateError: The device is in another state, where it would refuse them.
+        StateError: The device is in another state, in which it would refuse the types.
         CatenaryError: It refuses them, or does not answer.
     """
     if state.state is not AlState.PRE_OP or state.error:
         raise StateError(
             f"device {position} is not in PRE-OP but in {state.state or 'an unknown state'}: "
-            f"{_named(types)} cannot be restored, and it goes on waiting for SYNC0",
+            f"{_named(types)} cannot be restored, and it keeps waiting for SYNC0",
             position=position,
             requested=int(AlState.PRE_OP),
             actual=state.word,

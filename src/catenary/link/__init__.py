@@ -1,4 +1,4 @@
-"""Cables: raw sockets, and recorders, replays and fault injectors round any link.
+"""Links: raw sockets and rings; recorders, replays and fault injectors for any link.
 
 with Recorder(Interface("eth0"), "run.pcapng") as link:
     link.send(frame)
@@ -34,6 +34,8 @@ __all__ = [
 
 
 def lives_in_virtual_time(link: Link) -> bool:
-    """Whether the link's clock advances only while its user waits. A link in Python without a table
-    is taken for one of the machine's time."""
+    """Return True if the link's clock advances only while its user waits.
+
+    A link written in Python without a table is assumed to use the machine's clock.
+    """
     return link.capsule is not None and capsule_in_virtual_time(link.capsule)

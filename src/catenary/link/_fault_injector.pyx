@@ -1,7 +1,7 @@
-"""A fault injector round a link: frames lost, delayed, duplicated or corrupted, deterministically.
+"""A fault injector for a link: lose, delay, duplicate or corrupt frames, deterministically.
 
-All frames received, and those sent that are delayed, pass through one store in order of their due
-time; what happens to a frame is decided once, when it enters. Costs a copy of each received frame.
+All received frames, and delayed sent frames, pass through one store in order of their due time. The
+fault of a frame is decided once, when it enters. The cost is a copy of each received frame.
 """
 
 from libc.stdint cimport int64_t, uint8_t, uint32_t, uint64_t
@@ -31,8 +31,8 @@ cdef enum:                            # positions in fault.KINDS, DIRECTIONS, TR
 
 cdef enum:
     MAX_RULES = 32
-    MAX_HELD = 64                     # frames in flight; more are lost, and counted so
-    TAKEN_AT_ONCE = 256               # frames judged in one call: a flood cannot hold the cycle up
+    MAX_HELD = 64                     # frames in flight; further ones are lost and counted as lost
+    TAKEN_AT_ONCE = 256               # frames per call, so that a flood cannot delay the cycle
     ETHERNET_HEADER = 14
     FIRST_INDEX = 17                  # of the first datagram, in the frame
     FIRST_ACYCLIC_INDEX = 0x80
@@ -74,7 +74,7 @@ ctypedef struct injector_state:
     cat_link *inner
     uint64_t random
     uint64_t order
-    uint32_t active                   # which of the two tables holds; the other is being written
+    uint32_t active                   # index of the valid table; the other one is being written
     rule_table tables[2]
     int64_t seen[2][3]                # by direction and traffic
     uint64_t injected[KIND_COUNT]
@@ -104,7 +104,7 @@ cdef bint hits(injector_state *injector, const rule *fault, const int64_t *numbe
 cdef verdict judge(
     injector_state *injector, int direction, const uint8_t *frame, uint32_t length
 ) noexcept nogil:
-    """Numbers the frame and decides what happens to it."""
+    """Number the frame and select its fault."""
     cdef verdict result
     cdef int64_t numbers[3]
     cdef rule_table *table = &injector.tables[cat_load_acquire32(&injector.active) & 1]
@@ -192,7 +192,7 @@ cdef held_frame *earliest(injector_state *injector, int direction) noexcept nogi
 cdef int enter(
     injector_state *injector, int direction, const uint8_t *frame, uint32_t length
 ) noexcept nogil:
-    """Judges a frame; sends it, or stores it until it is due."""
+    """Select the fault of a frame; send it, or store it until it is due."""
     cdef verdict result = judge(injector, direction, frame, length)
     cdef int64_t now
     cdef int copies = 2 if result.duplicate else 1
@@ -226,7 +226,7 @@ cdef void send_due(injector_state *injector) noexcept nogil:
 
 
 cdef int take_in(injector_state *injector) noexcept nogil:
-    """Judges what the inner link has received. 0, or -errno."""
+    """Select the faults of frames received by the inner link. Return 0, or -errno."""
     cdef const uint8_t *frame = NULL
     cdef int k, length
     for k in range(TAKEN_AT_ONCE):
@@ -273,7 +273,7 @@ cdef int64_t due_of(const held_frame *slot) noexcept nogil:
 
 
 cdef int injector_wait_until(void *self, int64_t deadline, int wake_on_frame) noexcept nogil:
-    """As the inner link's, but awake for delayed frames and asleep for lost ones."""
+    """Wait like the inner link, but wake for delayed frames and not for lost ones."""
     cdef injector_state *injector = <injector_state *> self
     cdef int64_t arrival, until
     cdef int status
@@ -292,11 +292,11 @@ cdef int injector_wait_until(void *self, int64_t deadline, int wake_on_frame) no
         if status < 0 or (status == 0 and until == deadline):
             return status
         if injector.inner.now(injector.inner.self) > deadline:
-            return 0                  # frames that are all lost come faster than time passes
+            return 0                  # lost frames arrive faster than virtual time advances
 
 
 cdef class FaultInjector(WrapperLink):
-    """Owns the faults done to the frames of `link`; the same `seed` and frames, the same faults."""
+    """Owns the faults of the frames of `link`. The same `seed` and frames give the same faults."""
     cdef injector_state injector
 
     def __init__(self, link, *faults, seed=0):
@@ -311,7 +311,7 @@ cdef class FaultInjector(WrapperLink):
         self.table.wait_until = injector_wait_until
 
     def inject(self, *faults):
-        """From now on these faults alone, while frames go on flowing; none: no faults."""
+        """Replace all faults, also while frames are sent. Without arguments, remove all faults."""
         if len(faults) > MAX_RULES:
             raise ValueError(f"{len(faults)} faults; at most {MAX_RULES}")
         cdef uint32_t other = 1 - (self.injector.active & 1)
@@ -322,12 +322,12 @@ cdef class FaultInjector(WrapperLink):
         cat_store_release32(&self.injector.active, other)
 
     def seen(self, direction="received", *, traffic="all"):
-        """Frames so far: the number the next one has."""
+        """Return the number of frames so far, which is the number of the next frame."""
         return self.injector.seen[DIRECTIONS.index(direction)][TRAFFICS.index(traffic)]
 
     @property
     def injected(self):
-        """Faults so far, by kind."""
+        """Number of faults so far, by kind."""
         return {kind: self.injector.injected[i] for i, kind in enumerate(KINDS)}
 
 

@@ -1,8 +1,8 @@
 """Hold SIGINT, SIGTERM and SIGHUP in the calling thread while it forks.
 
-Compiled, because Python runs signal handlers in functions written in Python and in
-`signal.pthread_sigmask`. What a handler raises within a hook of fork is lost: a program would go on
-after Ctrl-C. Here a signal waits until `os.fork` has returned.
+This is compiled, because Python runs signal handlers in functions written in Python and in
+`signal.pthread_sigmask`. An exception of a handler within a fork hook is lost, and a program would
+continue after Ctrl-C. Here, signals stay blocked until `os.fork` has returned.
 """
 
 cdef extern from *:

@@ -1,13 +1,13 @@
-"""The raw link: AF_PACKET frames of one NIC, received from a ring the kernel shares with us.
+"""The raw link: AF_PACKET frames of one NIC, received from a ring in memory shared with the kernel.
 
-`interface.py` opens, checks and binds the socket; here is only what runs in a cycle:
-send 1 system call, receive none (0.07 us a frame with the call from Python, 50 frames waiting on a
-veth; through `recv`, where the ring was refused, 0.7 us).
+`interface.py` opens, checks and binds the socket. This file contains only the calls of a cycle. Send
+takes one system call, receive none (0.07 us per frame including the call from Python, with 50 frames
+waiting on a veth; 0.7 us by `recv`, if the kernel refuses the ring).
 
-Closing: a native thread may be inside a call, or read a frame in the ring. `close` puts zero pages in
-the place of the ring and a socket without a peer in the place of the descriptor; both keep their
-address and number, so that such a thread finds no frame instead of a fault or another file. The kernel
-releases the interface at once; the pages and the number are released with the object.
+Closing: a native thread may be inside a call, or read a frame in the ring. `close` replaces the ring
+by zero pages and the descriptor by a socket without a peer. Both keep their address and number, so
+that such a thread finds no frame, instead of a fault or another file. The kernel releases the
+interface at once; pages and number are released with the object.
 """
 
 import os
@@ -82,8 +82,8 @@ ctypedef struct raw_state:
     uint8_t *ring                     # NULL: no ring, recv() into `buffer`
     uint32_t slot_size
     uint32_t slot_count
-    uint32_t cursor                   # the slot to look at next, < slot_count
-    tpacket2_hdr *held                # handed out, to be released before anything else
+    uint32_t cursor                   # the slot to read next, < slot_count
+    tpacket2_hdr *held                # slot lent to the receiver; released first in the next call
     uint8_t buffer[2048]
 
 
@@ -192,7 +192,7 @@ cdef int wait_for_frame(raw_state *raw, int64_t deadline) noexcept nogil:
 
 
 cdef int pending_error(raw_state *raw) noexcept nogil:
-    """Takes the socket's error, ENETDOWN after `ip link set X down`, so that poll() waits again."""
+    """Read and clear the error of the socket, such as ENETDOWN, so that poll() waits again."""
     cdef int number = 0
     cdef unsigned int size = sizeof(int)
     getsockopt(raw.fd, SOL_SOCKET, SO_ERROR, &number, &size)
@@ -202,7 +202,7 @@ cdef int pending_error(raw_state *raw) noexcept nogil:
 cdef class RawLink(TableLink):
     """Owns an AF_PACKET socket and, unless `ring_size` is 0, the mapping of its TPACKET_V2 ring.
 
-    `receive_path` names how frames are received: "mapped ring", or "recv (reason)".
+    `receive_path` describes how frames are received: "mapped ring", or "recv (reason)".
     """
     cdef raw_state raw
     cdef size_t ring_size
@@ -232,11 +232,11 @@ cdef class RawLink(TableLink):
         return self.raw.fd
 
     def forget(self):
-        """In a forked child: close its copies of ring and socket. The parent's stay open."""
+        """Close the copies of ring and socket in a forked child. The parent's stay open."""
         self.close()
 
     def flush(self):
-        """Drops what has been received so far; says how many frames."""
+        """Drop the frames received so far. Return their number."""
         cdef const uint8_t *frame = NULL
         cdef int count = 0
         while self.table.receive(self.table.self, &frame) > 0:

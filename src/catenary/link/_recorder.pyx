@@ -1,9 +1,9 @@
-"""A recorder round a link: every frame, both ways, into a pcapng file.
+"""A recorder for a link: it writes every frame, in both directions, to a pcapng file.
 
-In the cycle a frame is copied into a ring of finished pcapng blocks (about 0.1 us); a thread of its
-own writes the ring to the file and never holds up the cycle: a full ring drops and counts.
-In virtual time there is no cycle to hold up: the caller writes when the ring is half full, and
-nothing is dropped.
+In the cycle, a frame is copied into a ring of complete pcapng blocks (about 0.1 us). A separate
+thread writes the ring to the file. It never delays the cycle: if the ring is full, frames are
+dropped and counted. In virtual time, the caller writes the file when the ring is half full, and no
+frame is dropped.
 """
 
 from libc.errno cimport EINTR, errno
@@ -74,13 +74,13 @@ ctypedef struct packet_tail:
 ctypedef struct recorder_state:
     cat_link *inner
     uint8_t *ring
-    uint64_t head                     # bytes ever put in; the cycle's
-    uint64_t tail                     # bytes ever written out; the writer's
+    uint64_t head                     # total bytes put in; written by the cycle
+    uint64_t tail                     # total bytes written to the file; written by the writer
     uint64_t recorded                 # frames
     uint64_t dropped                  # frames
-    int64_t stamp_offset              # link clock to the file's
+    int64_t stamp_offset              # from the link's clock to the clock of the file
     uint32_t stop
-    uint32_t write_error              # errno; from then on everything is dropped
+    uint32_t write_error              # errno; after an error, all frames are dropped
     int fd
     bint inline_writer
 
@@ -131,7 +131,7 @@ cdef void record(
 
 
 cdef void drain(recorder_state *recorder) noexcept nogil:
-    """Writes out what the ring holds."""
+    """Write the content of the ring to the file."""
     cdef uint64_t head = cat_load_acquire64(&recorder.head)
     cdef size_t at, size
     cdef ssize_t written
@@ -183,11 +183,11 @@ cdef int recorder_wait_until(void *self, int64_t deadline, int wake_on_frame) no
 
 
 cdef class Recorder(WrapperLink):
-    """Owns a pcapng file being written with all frames of `link`, stamped in [ns].
+    """Owns a pcapng file that receives all frames of `link`, with timestamps in ns.
 
-    Stamps are the time of day; of a link in virtual time, that time. A frame is recorded after it
-    was sent, so an answer is never before its question by more than the call. `dropped` counts
-    frames the file lacks; closing warns of them.
+    Timestamps are the time of day, or the virtual time of a link in virtual time. A frame is
+    recorded after it was sent, so an answer may precede its question by the duration of the call.
+    `dropped` counts the frames that the file lacks; `close` issues a warning about them.
     """
     cdef recorder_state recorder
     cdef cat_memory memory                # the ring
@@ -222,13 +222,13 @@ cdef class Recorder(WrapperLink):
         self.recorder.inner = self.inner
         self.recorder.inline_writer = (self.inner.flags & CAT_LINK_VIRTUAL_TIME) != 0
         if not self.recorder.inline_writer:
-            cat_memory_touch(&self.memory)  # not locked: the cycle's own memory comes first
+            cat_memory_touch(&self.memory)  # not locked: the cycle needs the lockable memory
             self.recorder.stamp_offset = time.time_ns() - self.inner.now(self.inner.self)
             self.start_writer()
         return 0
 
     cdef int start_writer(self) except -1:
-        """A thread that is never real-time, whatever the thread that opens the recorder is."""
+        """Start the writer without real-time priority, even if the calling thread has one."""
         cdef pthread_attr_t attributes
         pthread_attr_init(&attributes)
         pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED)
@@ -241,12 +241,12 @@ cdef class Recorder(WrapperLink):
 
     @property
     def recorded(self):
-        """Frames in the file, or on their way there."""
+        """Number of frames in the file or in the ring."""
         return cat_load_relaxed64(&self.recorder.recorded)
 
     @property
     def dropped(self):
-        """Frames the file lacks: the disk was too slow, or full."""
+        """Number of frames that the file lacks, because the disk was too slow or full."""
         return cat_load_relaxed64(&self.recorder.dropped)
 
     cdef int stop_writer(self) except -1:
@@ -267,7 +267,7 @@ cdef class Recorder(WrapperLink):
 
     cdef int finish_file(self) except -1:
         if self.owner != getpid():
-            os.close(self.recorder.fd)  # a copy: the parent goes on writing
+            os.close(self.recorder.fd)  # a copy: the parent keeps writing
             return 0
         with nogil:
             drain(&self.recorder)

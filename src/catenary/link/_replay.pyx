@@ -1,8 +1,8 @@
-"""A link that answers as a recorded segment did: deterministic, in virtual time, without a segment.
+"""A link that replays the answers of a recorded segment, deterministically and in virtual time.
 
-A frame sent is looked up by its datagrams with all indices 0 (FNV-1a, then compared); the answers
-to the same question come in the recorded order, the last one again and again. The answer carries the
-indices of the frame sent and comes after the recorded latency.
+A sent frame is looked up by its datagrams with all indices 0 (FNV-1a hash, then comparison). The
+answers to the same question are returned in the recorded order; the last one is repeated. An answer
+has the indices of the sent frame and arrives after the recorded latency.
 """
 
 from libc.errno cimport EINVAL, EMSGSIZE, ENOBUFS
@@ -20,7 +20,7 @@ from catenary.link.frame_pairs import Exchange, by_question, read_exchanges
 LATENCY_MAX = 900 * 10**9             # [ns] a quarter of an hour
 
 cdef enum:
-    QUEUE = 64                        # answers under way; a power of two
+    QUEUE = 64                        # pending answers; a power of two
     HEADER_SIZE = 16                  # Ethernet's and EtherCAT's
     DATAGRAM_HEADER = 10
     DATAGRAM_OVERHEAD = 12            # header and working counter
@@ -71,7 +71,7 @@ cdef uint32_t datagram_size(const uint8_t *datagram) noexcept nogil:
 
 
 cdef uint32_t ask(const uint8_t *frame, uint32_t length, uint8_t *asked) noexcept nogil:
-    """Copies the datagrams with all indices 0; their length, or 0: malformed."""
+    """Copy the datagrams with all indices 0. Return their length; 0 if the frame is malformed."""
     cdef uint32_t at = HEADER_SIZE
     cdef uint32_t size
     while at + DATAGRAM_OVERHEAD <= length:
@@ -87,7 +87,7 @@ cdef uint32_t ask(const uint8_t *frame, uint32_t length, uint8_t *asked) noexcep
 
 
 cdef question *find(replay_state *replay, const uint8_t *asked, uint32_t length) noexcept nogil:
-    """The slot of this question, or the empty one where it would be."""
+    """Return the slot of this question, or the empty slot for it."""
     cdef uint64_t value = hash_of(asked, length)
     cdef uint32_t at = <uint32_t> value & replay.mask
     cdef question *slot = &replay.questions[at]
@@ -100,7 +100,7 @@ cdef question *find(replay_state *replay, const uint8_t *asked, uint32_t length)
 
 
 cdef void copy_indices(uint8_t *reply, uint32_t length, const uint8_t *frame) noexcept nogil:
-    """Both have the same datagrams: they were paired by command and size."""
+    """Copy the indices of the question to the answer, which has the same datagrams."""
     cdef uint32_t at = HEADER_SIZE
     while at + DATAGRAM_OVERHEAD <= length:
         reply[at + 1] = frame[at + 1]
@@ -142,7 +142,7 @@ cdef int put_under_way(replay_state *replay, question *slot, const uint8_t *fram
         slot.next_answer += 1
     place = &replay.queue[replay.head & (QUEUE - 1)]
     place.length = reply.length
-    place.due = max(replay.time + reply.latency_ns, last)  # a cable keeps the order
+    place.due = max(replay.time + reply.latency_ns, last)  # a cable preserves the order
     memcpy(place.bytes, reply.bytes, reply.length)
     copy_indices(place.bytes, reply.length, frame)
     replay.head += 1
@@ -179,10 +179,12 @@ cdef int replay_wait_until(void *self, int64_t deadline, int wake_on_frame) noex
 cdef class Replay(TableLink):
     """Owns the answers of a recording: a pcapng or pcap file, or pairs of (frame sent, answer).
 
-    DecodeError: the file is damaged, or has no answers; ValueError: the pairs cannot be.
+    `unmatched` counts frames without an answer in the recording. They are not answered, like lost
+    frames. `first_unmatched` is the first of them.
 
-    `unmatched` counts frames that the recording has no answer for: they stay unanswered, as if
-    lost. `first_unmatched` is the first of them.
+    Raises:
+        DecodeError: The file is damaged, or has no answers.
+        ValueError: The pairs are invalid.
     """
     cdef replay_state replay
     cdef object kept                  # the bytes that the tables point into
@@ -220,7 +222,7 @@ cdef class Replay(TableLink):
         return 0
 
     cdef uint32_t fill_question(self, bytes asked, list exchanges, uint32_t used) except 0:
-        """Enters one question with its answers from number `used` on; the next free number."""
+        """Add a question with its answers, from number `used` on. Return the next free number."""
         cdef uint32_t length = <uint32_t> len(asked)
         cdef question *slot = find(&self.replay, asked, length)
         slot.bytes = asked

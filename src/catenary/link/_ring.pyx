@@ -1,12 +1,12 @@
-"""A ring of devices on two links: every frame goes out on both, and comes back as one.
+"""A ring of devices on two links: every frame is sent on both, and delivered once.
 
-In a closed ring the copy sent on the first link is worked on by all devices and arrives on the
-second; the other copy passes unprocessed. Where the ring is cut both turn round at the cut and come
-back where they were sent. The receiver sees one frame either way (native/ring_merge.h).
+In a closed ring, all devices process the copy sent on the first link, which arrives on the second.
+The other copy passes unprocessed. In a cut ring, both copies turn round at the cut and return on the
+link on which they were sent. The receiver gets one frame in both cases (native/ring_merge.h).
 
-A copy is waited for `pair_wait` after the other has come, and not at all once it has failed to
-come several times in a row and the other has met all devices. Costs a copy of each frame on its way,
-and 2 system calls to send.
+After one copy has arrived, the ring waits `pair_wait` for the other. It does not wait if that copy
+was missing several times in a row and the first copy has met all devices. The cost is a copy of each
+frame and two system calls to send.
 """
 
 from libc.errno cimport EINTR, EMSGSIZE, errno
@@ -63,28 +63,28 @@ cdef enum:
     SECOND = 1
     BOTH = 2
     SLOTS = 256                       # one for each index of a datagram
-    MARK = 11                         # last byte of the source address: of which copy it is
+    MARK = 11                         # last byte of the source address: identifies the copy
     SECOND_BIT = 0x80
     SOURCE = 6
     PROCESSED = 0x02                  # of the source address's first byte: a controller was passed
     DATAGRAMS = CAT_ETHERNET_HEADER + CAT_ETHERCAT_HEADER
     INDEX = DATAGRAMS + 1             # of the first datagram
     HEADERS = DATAGRAMS + CAT_DATAGRAM_HEADER + CAT_DATAGRAM_COUNTER  # of the first datagram
-    GIVEN_UP = 3                      # copies in a row that did not come
-    BURST = 512                       # frames taken in at once
+    GIVEN_UP = 3                      # consecutive missing copies until a copy is given up
+    BURST = 512                       # largest number of frames received per call
     SECOND_NS = 1_000_000_000
 
 cdef int64_t NEVER = 0x7FFFFFFFFFFFFFFF
 
 ctypedef struct slot_t:
     uint32_t length
-    uint32_t nop                      # where a NOP in the frame has its data; 0: it has none
+    uint32_t nop                      # offset of the data of a NOP; 0 without a NOP
     uint32_t nop_size
     uint8_t expected                  # copies sent: bit 0 first, bit 1 second
-    uint8_t back                      # copies that came
+    uint8_t back                      # copies that returned
     uint8_t delivered
-    int64_t since                     # when the first copy came
-    uint64_t order                    # of its becoming complete
+    int64_t since                     # time at which the first copy returned
+    uint64_t order                    # order of completion
     uint8_t sent[CAT_FRAME_MAX]
     uint8_t copies[2][CAT_FRAME_MAX]
 
@@ -92,13 +92,13 @@ ctypedef struct ring_t:
     cat_link *links[2]
     int route                         # FIRST, SECOND or BOTH
     int64_t pair_wait
-    uint32_t missed[2]                # copies in a row that did not come
+    uint32_t missed[2]                # consecutive missing copies
     uint32_t waiting                  # slots with a copy that is not delivered
-    uint32_t arrived_on[2]            # where the last copy of each came back; BOTH: nowhere yet
+    uint32_t arrived_on[2]            # link on which the last copy returned; BOTH: none yet
     uint32_t counted[2]               # devices that answered the last broadcast of each copy
     uint32_t total                    # devices that answered the last broadcast that was delivered
-    uint64_t unpaired                 # frames delivered of one copy, the other being late
-    uint64_t alien                    # frames of others, or of earlier times
+    uint64_t unpaired                 # frames delivered from one copy because the other was late
+    uint64_t alien                    # frames of other senders, or outdated ones
     uint64_t send_errors[2]
     uint8_t pending[SLOTS]            # indices with a copy, in no order
     slot_t *slots
@@ -112,7 +112,7 @@ cdef inline int64_t ring_now(void *self) noexcept nogil:
 
 
 cdef void forget(ring_t *ring, uint8_t index) noexcept nogil:
-    """Takes an index out of those that are waited with."""
+    """Remove an index from the pending ones."""
     cdef uint32_t i
     for i in range(ring.waiting):
         if ring.pending[i] == index:
@@ -156,7 +156,7 @@ cdef int ring_send(void *self, const uint8_t *frame, uint32_t length) noexcept n
         status = ring.links[side].send(ring.links[side].self, copy, length)
         if status < 0:
             ring.send_errors[side] += 1
-            note_missed(ring, side)   # a port without a carrier refuses frames: none comes back
+            note_missed(ring, side)   # a port without a carrier refuses frames: none returns
             worst = status
         else:
             slot.expected |= 1 << side
@@ -164,7 +164,7 @@ cdef int ring_send(void *self, const uint8_t *frame, uint32_t length) noexcept n
 
 
 cdef void take_in(ring_t *ring) noexcept nogil:
-    """Everything that has come back on either link."""
+    """Receive all frames that have returned on either link."""
     cdef const uint8_t *frame = NULL
     cdef int arrived, length, k
     for arrived in range(2):
@@ -202,8 +202,10 @@ cdef void take(ring_t *ring, int arrived, const uint8_t *frame, uint32_t length)
 
 
 cdef bint is_copy(const slot_t *slot, const uint8_t *frame, uint32_t length) noexcept nogil:
-    """True if the frame has the EtherCAT header and all datagrams of the one sent, and its NOP is
-    unchanged. That tells a cycle number from an older one (core/_frames.pyx)."""
+    """Return True if the frame has the EtherCAT header, datagrams and NOP of the sent frame.
+
+    The NOP contains the cycle number, which distinguishes outdated frames (core/_frames.pyx).
+    """
     if length < DATAGRAMS + <uint32_t> (frame[14] | (frame[15] & 7) << 8):
         return False
     if frame[14] != slot.sent[14] or frame[15] != slot.sent[15]:
@@ -221,25 +223,25 @@ cdef inline bint is_processed(const uint8_t *frame) noexcept nogil:
 
 
 cdef inline bint lacks_devices(ring_t *ring, const slot_t *slot, int side) noexcept nogil:
-    """A broadcast that met fewer devices than the last: they may be on the other side now."""
+    """Return True for a broadcast that met fewer devices than the last one (cut ring)."""
     return slot.sent[16] == CAT_BRD and first_counter(slot.copies[side], slot.length) < ring.total
 
 
 cdef int64_t due_at(ring_t *ring, const slot_t *slot) noexcept nogil:
-    """When a frame of which something has come is to be delivered."""
+    """Return the time at which a partly returned frame is delivered."""
     cdef int missing
     if slot.back == slot.expected:
         return slot.since
     missing = SECOND if slot.back == 1 else FIRST
     if not is_processed(slot.copies[1 - missing]) and not is_processed(slot.sent):
-        return NEVER                  # it has seen no device: there is nothing in it
+        return NEVER                  # the copy has met no device, so it contains no data
     if ring.missed[missing] >= GIVEN_UP and not lacks_devices(ring, slot, 1 - missing):
         return slot.since
     return slot.since + ring.pair_wait
 
 
 cdef int next_due(ring_t *ring, int64_t *when) noexcept nogil:
-    """The pending frame that is due first: its place in `pending`; -1: none."""
+    """Return the place in `pending` of the frame that is due first; -1 if there is none."""
     cdef int best = -1
     cdef uint32_t i
     cdef int64_t due
@@ -309,7 +311,7 @@ cdef int ring_wait_until(void *self, int64_t deadline, int wake_on_frame) noexce
 
 
 cdef int wait_for_either(ring_t *ring, int64_t deadline) noexcept nogil:
-    """1: something may have come; 0: the deadline has passed; or -errno."""
+    """Return 1 if a frame may have arrived, 0 at the deadline, or -errno."""
     cdef cat_link *a = ring.links[0]
     cdef cat_link *b = ring.links[1]
     cdef pollfd fds[2]
@@ -331,21 +333,23 @@ cdef int wait_for_either(ring_t *ring, int64_t deadline) noexcept nogil:
     if ready < 0:
         return -errno
     if ready > 0 and not (fds[0].revents & POLLIN or fds[1].revents & POLLIN):
-        # A NIC that went down says so until it is asked; the other carries on.
+        # A NIC that went down reports its error until it is read; the other one keeps working.
         silence(a, &fds[0])
         silence(b, &fds[1])
     return 1 if ready > 0 else 0
 
 
 cdef void silence(cat_link *link, const pollfd *fd) noexcept nogil:
-    """Takes the error of a socket by asking its link for a frame with no time to wait."""
+    """Clear the error of a socket by a receive without waiting."""
     if fd.revents and not fd.revents & POLLIN:
         link.wait_until(link.self, 0, 1)
 
 
 cdef class RingLink(TableLink):
-    """Owns the two links of a ring: closing closes both. `pair_wait` [s]: how long one copy of a
-    frame waits for the other."""
+    """Owns the two links of a ring, and closes both.
+
+    `pair_wait` is the longest wait of one copy of a frame for the other [s].
+    """
     cdef ring_t ring
     cdef cat_memory memory            # the slots
     cdef readonly tuple links
@@ -399,7 +403,7 @@ cdef class RingLink(TableLink):
 
     @property
     def route(self):
-        """Which links frames go out on: "both", "first" or "second"."""
+        """Links on which frames are sent: "both", "first" or "second"."""
         return ROUTES[self.ring.route]
 
     @route.setter
@@ -410,7 +414,7 @@ cdef class RingLink(TableLink):
 
     @property
     def state(self):
-        """How the last frames came back."""
+        """State of the ring, derived from the last frames."""
         return RingState.of(
             [self.ring.arrived_on[side] for side in range(2)],
             [self.ring.missed[side] >= GIVEN_UP for side in range(2)],
@@ -419,7 +423,7 @@ cdef class RingLink(TableLink):
 
     @property
     def counts(self):
-        """unpaired: frames of which one copy alone came in time; alien; send_errors of each link."""
+        """Counters: frames with only one copy in time, alien frames, send errors of each link."""
         return {
             "unpaired": self.ring.unpaired,
             "alien": self.ring.alien,
@@ -446,7 +450,11 @@ cdef class RingLink(TableLink):
 
 
 def merge(bytes first not None, bytes second not None):
-    """The one frame that two copies make. ValueError where they are not copies of one frame."""
+    """Merge two copies into one frame.
+
+    Raises:
+        ValueError: They are not copies of one frame.
+    """
     cdef bytearray merged = bytearray(first)
     cdef uint8_t *out = merged
     if cat_ring_merge(out, <uint32_t> len(first), <const uint8_t *> second, <uint32_t> len(second)):
@@ -455,7 +463,7 @@ def merge(bytes first not None, bytes second not None):
 
 
 def second_copy(bytes frame not None):
-    """What goes out on the second link."""
+    """Return the copy of a frame that is sent on the second link."""
     cdef bytearray copy = bytearray(frame)
     cdef uint8_t *out = copy
     cat_ring_second(out, <uint32_t> len(frame))

@@ -4,7 +4,7 @@ from catenary.errors import LinkError
 from catenary.link.protocol import Link
 
 def capsule_in_virtual_time(capsule: object) -> bool:
-    """Whether the clock of this table advances only while its user waits."""
+    """Return True if the clock of this table advances only while its user waits."""
 
 class TableLink:
     @property
@@ -19,14 +19,14 @@ class TableLink:
     def now(self) -> int: ...
     def wait_until(self, deadline_ns: int, wake_on_frame: bool) -> bool: ...
     def explain(self, number: int) -> LinkError | None:
-        """The error for an errno, where more is known than its name."""
+        """Return an error that explains an errno; None if only its name is known."""
 
     def close(self) -> None: ...
     def __enter__(self) -> Self: ...
     def __exit__(self, *exc_info: object) -> None: ...
 
 def explained_by(link: object, number: int) -> LinkError | None:
-    """Return the error of a link for an errno; None: it knows no more than its name."""
+    """Return the error of a link for an errno; None if only its name is known."""
 
 class WrapperLink(TableLink):
     @property

@@ -1,9 +1,9 @@
 """The Python methods of a link, over its C table (`native/link.h`).
 
-Compiled links derive from `TableLink`, fill its `table` and get the rest. `close` first replaces the
-calls of the table: a later call returns -EBADF. A native thread may still be inside a former call, or
-read a frame that it received. Therefore `close_table` must leave valid what the calls use: memory and
-descriptors are released when the last holder of the table has gone (`__dealloc__`).
+Compiled links derive from `TableLink`, fill its `table` and inherit the rest. `close` first replaces
+the calls of the table: a later call returns -EBADF. A native thread may still be inside a former
+call, or read a frame that it received. Therefore `close_table` must keep the memory and descriptors
+of the calls valid. They are released with the last holder of the table (`__dealloc__`).
 """
 
 from cpython.exc cimport PyErr_CheckSignals
@@ -22,7 +22,7 @@ from catenary.link.protocol import open_link
 
 
 cdef cat_link *table_of(object capsule) except NULL:
-    """The checked table in a capsule; the caller keeps the capsule alive."""
+    """Return the checked table of a capsule. The caller must keep the capsule alive."""
     cdef cat_link *table = <cat_link *> PyCapsule_GetPointer(capsule, CAT_LINK_CAPSULE)
     if table.version != CAT_LINK_VERSION:
         raise ValueError(f"link table of version {table.version}, expected {CAT_LINK_VERSION}")
@@ -65,8 +65,11 @@ cdef class TableLink:
         self.disconnect()
 
     cdef int close_table(self) except -1:
-        """Release the device or the file. Called at most once, after the calls were replaced; another
-        thread may still be inside one of them."""
+        """Release the device or the file.
+
+        It is called at most once, after the calls were replaced. Another thread may still be inside
+        one of them.
+        """
         return 0
 
     cdef void disconnect(self):
@@ -76,7 +79,7 @@ cdef class TableLink:
 
     @property
     def capsule(self):
-        """The table for compiled users; the capsule keeps this link alive, not open."""
+        """The table for compiled users. The capsule keeps this link alive, but not open."""
         capsule = PyCapsule_New(&self.table, CAT_LINK_CAPSULE, release_owner)
         PyCapsule_SetContext(capsule, <void *> <PyObject *> self)
         Py_INCREF(self)
@@ -87,7 +90,7 @@ cdef class TableLink:
         return self.table.send == closed_send
 
     def open_link(self):
-        """An open link is its own source."""
+        """Return this link: an open link is its own source."""
         return self
 
     def send(self, bytes frame not None):
@@ -118,7 +121,7 @@ cdef class TableLink:
         return status == 1
 
     def explain(self, int number):
-        """Return a LinkError that says more than the name of the errno; None: no more is known."""
+        """Return a LinkError that explains an errno; None if only its name is known."""
         return None
 
     cdef failed(self, str verb, int number):
@@ -145,16 +148,16 @@ cdef class TableLink:
 
 
 def explained_by(link, int number):
-    """Return what a link knows of an errno, see `explain`; a link written in Python may lack it."""
+    """Return the result of `explain` of a link; None for a Python link without this method."""
     explain = getattr(link, "explain", None)
     return None if explain is None else explain(number)
 
 
 cdef class WrapperLink(TableLink):
-    """Owns the link it is wrapped round: closing closes both. A base for recorders and the like."""
+    """Owns the link that it wraps, and closes it, too. A base for recorders and fault injectors."""
 
     cdef int wrap(self, object link) except -1:
-        """Opens `link`, where it is a source, and takes its table, clock and flags."""
+        """Open `link` if it is a source, and use its table, clock and flags."""
         opened = open_link(link)
         self.inner_capsule = opened.capsule
         self.inner = table_of(self.inner_capsule)

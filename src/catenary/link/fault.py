@@ -1,4 +1,4 @@
-"""What a fault injector does to which frames."""
+"""Faults for a fault injector: the kind, and the frames it affects."""
 
 from __future__ import annotations
 
@@ -16,12 +16,21 @@ TRAFFICS: tuple[Traffic, ...] = ("all", "cyclic", "acyclic")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fault:
-    """One fault, at the frames numbered `frames` (default: any), each with `probability`.
+    """One fault that affects some frames.
 
-    Frames are counted from 0 per `direction` and `traffic`: cyclic frames have a first datagram of
-    index below 0x80, so that with one frame a cycle `traffic="cyclic"` counts cycles.
-    `delay` [s] goes with kind "delay". "corrupt" inverts the byte at `offset` of the frame, or one
-    bit anywhere in its EtherCAT part where `offset` is None.
+    Frames are counted from 0, separately for each `direction` and `traffic`. The first datagram of
+    a cyclic frame has an index below 0x80. With one frame per cycle, `traffic="cyclic"` therefore
+    counts cycles.
+
+    Args:
+        kind: "lose", "delay", "duplicate" or "corrupt".
+        direction: "sent" or "received".
+        traffic: "all", "cyclic" or "acyclic".
+        frames: Numbers of the affected frames; None affects all.
+        probability: Probability of the fault for each of these frames.
+        delay: The delay [s]; only for kind "delay".
+        offset: Byte to invert, only for kind "corrupt"; None inverts a random bit of the EtherCAT
+            part.
     """
 
     kind: Kind
@@ -39,12 +48,12 @@ class Fault:
             ("traffic", self.traffic, TRAFFICS),
         ):
             if value not in known:
-                raise ValueError(f"{name} {value!r} is none of {', '.join(known)}")
+                raise ValueError(f"invalid {name} {value!r}: must be one of {', '.join(known)}")
         if not 0.0 <= self.probability <= 1.0:
-            raise ValueError(f"probability {self.probability} is not within 0..1")
+            raise ValueError(f"probability {self.probability} is outside 0 to 1")
         if (self.kind == "delay") != (self.delay > 0.0):
-            raise ValueError(f"kind {self.kind!r} does not go with a delay of {self.delay} s")
+            raise ValueError(f"kind {self.kind!r} cannot have a delay of {self.delay} s")
         if self.offset is not None and (self.kind != "corrupt" or self.offset < 0):
-            raise ValueError(f"kind {self.kind!r} does not go with offset {self.offset}")
+            raise ValueError(f"kind {self.kind!r} cannot have offset {self.offset}")
         if self.frames is not None and (self.frames.step < 1 or self.frames.start < 0):
             raise ValueError(f"frames {self.frames} do not count upwards from 0")

@@ -1,12 +1,12 @@
-"""Links and loops after a fork: the child gets copies, and must let go of them.
+"""Links and loops after a fork: the child inherits copies and must close them.
 
-The child closes its copies of sockets, so that the kernel releases an interface with its owner.
-It sends nothing and waits for no thread: the threads of the parent are not in the child. A fork()
-by a C library runs no such hook: owners also compare process numbers.
+The child closes its copies of sockets, so that the kernel releases an interface when its owner
+ends. It does not send, and does not wait for threads: the child has no threads of the parent. A
+fork() by a C library does not run these hooks, so owners also compare process numbers.
 
-Signals wait until the child has let go. Else SIGTERM in its first moments would be lost: Python
-drops what its handlers have noted before the fork ends, and `multiprocessing.Pool.terminate` would
-wait for that child for ever.
+Signals are blocked until the child has closed its copies. Otherwise an early SIGTERM would be lost,
+because Python drops signals that its handlers have recorded before the fork ends.
+`multiprocessing.Pool.terminate` would then wait for that child for ever.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class Inherited(Protocol):
     """An owner of something that a forked child must not use."""
 
     def forget(self) -> None:
-        """Called in the child: close its copies and refuse further use. Must not raise."""
+        """Close the copies of the child and refuse further use. Must not raise."""
         ...
 
 
@@ -42,5 +42,5 @@ def _forget_all() -> None:
 
 
 os.register_at_fork(after_in_child=_forget_all)
-# Registered last, so that a child is ended only after it has let go
+# Registered last: signals reach the child only after it has closed its copies
 os.register_at_fork(before=hold, after_in_parent=release, after_in_child=release)

@@ -1,14 +1,14 @@
-"""Pairs in a recording: a frame sent, and the frame as it came back.
+"""Pairs of frames in a recording: a frame that was sent, and the same frame when it returned.
 
-The first of these that is conclusive shows whether a frame was sent or came back:
+The first conclusive criterion decides whether a frame was sent or returned:
 
-1. The file: pcapng can name the direction of a packet.
-2. The source address: the first controller sets bit 1 of its first byte. It is inconclusive if
+1. The file: pcapng can store the direction of a packet.
+2. The source address: the first controller sets bit 1 of its first byte. This is inconclusive if
    all frames of an address have the bit, because the interface's own address has it (virtual
-   interfaces, 02:...), or none has it, because a simulator does not set it.
-3. The content: a frame is sent with all working counters 0 and comes back counted. Where no device
-   counted it, controllers have still counted up a position or broadcast address. One that comes
-   back as it was sent does so at once, or padded: a master repeats it after some ms only.
+   interfaces, 02:...). It is also inconclusive if none has it: some simulators do not set it.
+3. The content: a frame is sent with all working counters 0, and returns with larger ones. If no
+   device answered, controllers have still incremented a position or broadcast address. A frame that
+   returns unchanged does so at once or with padding; a master repeats a frame only after some ms.
 """
 
 from __future__ import annotations
@@ -34,12 +34,10 @@ class Exchange(NamedTuple):
 
 Shape: TypeAlias = tuple[tuple[int, int, int], ...]
 
-LOST_NS = 100_000_000  # after which no answer comes: masters wait 2 ms (SOEM) to 50 ms (ours)
-AT_ONCE_NS = (
-    1_000_000  # in which no master repeats a frame, and a hundred devices have passed it on
-)
+LOST_NS = 100_000_000  # later frames are not answers: masters wait 2 ms (SOEM) to 50 ms (ours)
+AT_ONCE_NS = 1_000_000  # enough for a hundred devices; shorter than the repetition of any master
 
-# Every controller counts their address up by one (ETG.1000.4 §5.4.1.2)
+# Every controller increments the address of these commands (ETG.1000.4 §5.4.1.2)
 _COUNTED_UP = frozenset(
     (
         *(EcatCommand.APRD, EcatCommand.APWR, EcatCommand.APRW, EcatCommand.ARMW),
@@ -58,16 +56,19 @@ class _Seen(NamedTuple):
 def read_exchanges(path: str | os.PathLike[str]) -> list[Exchange]:
     """Return the exchanges in a capture, pcapng or pcap, in the order of the answers.
 
-    A truncated capture is read up to the cut. Raises DecodeError if it is not a capture.
+    A truncated capture is read up to its end.
+
+    Raises:
+        DecodeError: The file is not a capture.
     """
     return pair(decode_capture(Path(path).read_bytes()).packets)
 
 
 def pair(packets: Iterable[Packet]) -> list[Exchange]:
-    """Pairs each answer with the oldest unanswered frame of the same datagrams and indices that is
-    not lost.
+    """Pair each answer with the oldest unanswered frame that has the same datagrams and indices.
 
-    Frames that are not EtherCAT's, and those never answered, are left out.
+    Frames without an answer within `LOST_NS` are lost. They are omitted, and so are frames of other
+    protocols.
     """
     seen = _ethercat(packets)
     conclusive = _conclusive_sources(seen)
@@ -87,7 +88,7 @@ def pair(packets: Iterable[Packet]) -> list[Exchange]:
 
 
 def shape_of(frame: Frame) -> Shape:
-    """What an answer has in common with its question: addresses and data change on the way."""
+    """Return the properties that an answer shares with its question: command, index and length."""
     return tuple((int(d.command), d.index, len(d.data)) for d in frame.datagrams)
 
 
@@ -120,7 +121,7 @@ def _is_outbound(each: _Seen, waiting: Sequence[_Seen], conclusive: frozenset[by
 
 
 def _came_back_uncounted(sent: _Seen, each: _Seen) -> bool:
-    """True if no device answered, but controllers passed the frame on."""
+    """Return True if no device answered, but controllers passed the frame on."""
     pairs = list(zip(sent.frame.datagrams, each.frame.datagrams, strict=True))
     if any(a.data != b.data or a.ado != b.ado for a, b in pairs):
         return False
@@ -131,7 +132,7 @@ def _came_back_uncounted(sent: _Seen, each: _Seen) -> bool:
 
 
 def by_question(exchanges: Sequence[Exchange]) -> dict[bytes, list[Exchange]]:
-    """The exchanges of each question, in order; questions are alike apart from their indices."""
+    """Group exchanges by question, in order. Questions that differ only in indices are equal."""
     found: dict[bytes, list[Exchange]] = defaultdict(list)
     for exchange in exchanges:
         found[question_of(exchange.sent)].append(exchange)
@@ -139,7 +140,11 @@ def by_question(exchanges: Sequence[Exchange]) -> dict[bytes, list[Exchange]]:
 
 
 def question_of(sent: bytes) -> bytes:
-    """The datagrams of a frame with every index 0. DecodeError: no EtherCAT frame."""
+    """Return the datagrams of a frame with all indices set to 0.
+
+    Raises:
+        DecodeError: It is not an EtherCAT frame.
+    """
     datagrams = decode_frame(sent).datagrams
     last = len(datagrams) - 1
     return b"".join(

@@ -1,4 +1,4 @@
-"""A network interface as a link source: opens, checks and binds the AF_PACKET socket."""
+"""A network interface as a link source: checks, and the AF_PACKET socket."""
 
 from __future__ import annotations
 
@@ -35,16 +35,20 @@ BLOCK_COUNT = 4  # 128 slots: half a millisecond of frames at line rate
 
 @dataclass(frozen=True, slots=True)
 class Interface:
-    """A network interface by its name, as `ip link` shows it.
+    """A network interface, selected by its name in `ip link`.
 
-    `mapped_ring=False` receives by `recv`, for comparison: slower, otherwise the same.
+    With `mapped_ring=False`, frames are received by `recv`, which is slower (for comparisons).
     """
 
     name: str
     mapped_ring: bool = True
 
     def open_link(self) -> RawLink:
-        """Opens the raw link. `LinkError`: unknown, down, no Ethernet, or not permitted."""
+        """Open the raw link.
+
+        Raises:
+            LinkError: The interface is unknown, down or not Ethernet, or permission is missing.
+        """
         check(self.name)
         raw = open_socket(self.name)
         try:
@@ -56,7 +60,7 @@ class Interface:
         except BaseException:
             raw.close()
             raise
-        with raw:  # which is empty once the link owns the descriptor
+        with raw:  # empty after the link has taken the descriptor
             link = RawLink(self.name, raw, size, SLOT_SIZE, receive_path)
         link.flush()
         forget_in_child(link)
@@ -64,7 +68,11 @@ class Interface:
 
 
 def check(name: str) -> None:
-    """Refuses what cannot carry a frame, before anything is opened."""
+    """Check that an interface can carry frames, before a socket is opened.
+
+    Raises:
+        LinkError: It is unknown, down or not Ethernet.
+    """
     names = [known for _, known in socket.if_nameindex()]
     if name not in names:
         near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
@@ -76,13 +84,13 @@ def check(name: str) -> None:
         flags = ask(asking, SIOCGIFFLAGS, name)
         kind = ask(asking, SIOCGIFHWADDR, name)
     if kind not in (ARPHRD_ETHER, ARPHRD_LOOPBACK):
-        raise LinkError(f"network interface {name} is no Ethernet (ARPHRD type {kind})")
+        raise LinkError(f"network interface {name} is not Ethernet (ARPHRD type {kind})")
     if not flags & IFF_UP:
         raise LinkError(f"network interface {name} is down", hint=f"sudo ip link set {name} up")
 
 
 def no_link(name: str, number: int) -> LinkError | None:
-    """Return the error for an interface without a carrier; None: there is another reason.
+    """Return the error for an interface without a carrier; None if the cause is another one.
 
     Without a carrier, the kernel refuses frames with ENOBUFS ("No buffer space available").
     """
@@ -97,19 +105,19 @@ def no_link(name: str, number: int) -> LinkError | None:
         return None
     return LinkError(
         f"{name} has no link: the cable is unplugged or damaged, or the first device has no power",
-        hint=f"look at the link lights; is {name} the right port? `ip link show {name}` shows "
-        "NO-CARRIER until there is a link. Of a veth pair, set the other end up too",
+        hint=f"check the link lights, and that {name} is the right port; `ip link show {name}` "
+        "shows NO-CARRIER until there is a link. For a veth pair, set the other end up, too",
     )
 
 
 def ask(asking: socket.socket, request: int, name: str) -> int:
-    """The first 16 bits of an answer to one of the SIOCGIF* requests (`struct ifreq`)."""
+    """Return the first 16 bits of the answer to a SIOCGIF* request (`struct ifreq`)."""
     answer = fcntl.ioctl(asking, request, struct.pack("16s24x", name.encode()))
     return int(struct.unpack_from("=H", answer, 16)[0])
 
 
 def open_socket(name: str) -> socket.socket:
-    """An AF_PACKET socket that receives nothing before it is bound."""
+    """Open an AF_PACKET socket. It receives no frames before it is bound."""
     try:
         opened = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, 0)
     except PermissionError as error:
@@ -119,7 +127,7 @@ def open_socket(name: str) -> socket.socket:
     try:
         opened.setblocking(False)
         opened.setsockopt(SOL_PACKET, PACKET_QDISC_BYPASS, 1)
-        # without it what we send comes back and looks like an answer of no device
+        # otherwise sent frames are received, too, and look like answers of an empty segment
         opened.setsockopt(SOL_PACKET, PACKET_IGNORE_OUTGOING, 1)
     except OSError as error:
         opened.close()
@@ -131,8 +139,11 @@ def open_socket(name: str) -> socket.socket:
 
 
 def request_ring(opened: socket.socket) -> tuple[int, str]:
-    """Request a receive ring. Returns its size, 0 if the kernel refuses it, and how frames are
-    received."""
+    """Request a receive ring.
+
+    Returns:
+        The size of the ring (0 if the kernel refuses it), and a description of the receive path.
+    """
     size = BLOCK_SIZE * BLOCK_COUNT
     request = struct.pack("=4I", BLOCK_SIZE, BLOCK_COUNT, SLOT_SIZE, size // SLOT_SIZE)
     try:

@@ -1,8 +1,8 @@
-"""One MainDevice per network interface, and what shows that another master uses it.
+"""Lock that allows one MainDevice per network interface, and detection of other masters.
 
 A MainDevice holds an abstract Unix socket named after the interface. Such names belong to a
 network namespace. The kernel releases them when their process ends, also by SIGKILL. Masters
-that do not know this lock are seen by their packet sockets, or by their frames.
+without this lock are detected by their packet sockets, or by their frames.
 
 SOEM (oshw/linux/nicdrv.c) and IgH's generic driver (devices/generic.c) open a packet socket for
 0x88A4 and bind it to the interface: /proc/net/packet lists it. A capture program asks for all
@@ -72,10 +72,10 @@ class Ownership:
             raise _refused(self.others)
 
     def _lock(self, raws: Sequence[RawLink], force: bool) -> Iterator[str]:
-        """Take the locks in the order of names. Yield the holder of one that is taken; stop there
-        unless `force`.
+        """Take the locks in the order of names. Yield the holders of locks that are taken.
 
-        Without this order, two rings would refuse each other.
+        Stop at the first of these unless `force` is True. Without a fixed order, two rings could
+        refuse each other.
         """
         for raw in sorted(raws, key=lambda each: each.name):
             lock = locked(raw.name)
@@ -103,7 +103,7 @@ def _refused(others: Sequence[str]) -> LinkError:
 
 
 def raw_links(link: Link) -> tuple[RawLink, ...]:
-    """Return the links of network interfaces that a link is, or is made of."""
+    """Return the raw links in a link: the link itself, or those it is composed of."""
     if isinstance(link, RawLink):
         return (link,)
     if isinstance(link, RingLink):

@@ -1,4 +1,4 @@
-"""What a link and a link source are, for those who write or use one."""
+"""Protocols of a link and of a link source."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from typing import Protocol, Self, runtime_checkable
 
 @runtime_checkable
 class Link(Protocol):
-    """Carries whole Ethernet frames (destination MAC first, no FCS); one thread at a time.
+    """A carrier of complete Ethernet frames, from the destination MAC on, without FCS.
 
-    `capsule` holds the `cat_link` table of `native/link.h`: the same four calls without Python.
+    Only one thread may use it at a time. `capsule` holds the `cat_link` table of `native/link.h`,
+    which has the same four calls for compiled code.
     """
 
     @property
@@ -19,21 +20,30 @@ class Link(Protocol):
     def capsule(self) -> object: ...
 
     def send(self, frame: bytes) -> None:
-        """Sends one frame; `LinkError` where the device does not take it."""
+        """Send one frame.
+
+        Raises:
+            LinkError: The device refuses the frame.
+        """
         ...
 
     def receive(self) -> bytes | None:
-        """The oldest frame received, without waiting; None: none there."""
+        """Return the oldest received frame, without waiting; None if there is none."""
         ...
 
     def now(self) -> int:
-        """The link's clock [ns]."""
+        """Return the time of the link's clock [ns]."""
         ...
 
     def wait_until(self, deadline_ns: int, wake_on_frame: bool) -> bool:
-        """Waits until `deadline_ns` on the link's clock; True: a frame came first.
+        """Wait until a deadline or a frame.
 
-        Frames are looked for only with `wake_on_frame`.
+        Args:
+            deadline_ns: The deadline on the link's clock.
+            wake_on_frame: True to return early when a frame arrives.
+
+        Returns:
+            True if a frame arrived before the deadline.
         """
         ...
 
@@ -46,11 +56,11 @@ class Link(Protocol):
 
 @runtime_checkable
 class LinkSource(Protocol):
-    """Anything a MainDevice can be opened on: `Interface`, a virtual segment, an open link."""
+    """A source of a link for a MainDevice: an `Interface`, a virtual segment or an open link."""
 
     def open_link(self) -> Link: ...
 
 
 def open_link(source: Link | LinkSource) -> Link:
-    """The link of a source; an open link as it is."""
+    """Open the link of a source; return an open link unchanged."""
     return source.open_link() if isinstance(source, LinkSource) else source

@@ -1,4 +1,4 @@
-"""Two links as one ring, as a link source."""
+"""A ring of two links, as a link source."""
 
 from __future__ import annotations
 
@@ -10,15 +10,19 @@ from catenary.link.protocol import Link, LinkSource
 
 __all__ = ["Ring", "RingLink", "ring_of"]
 
-PAIR_WAIT = 100e-6  # [s]: the two ways round a hundred devices differ by less
+PAIR_WAIT = 100e-6  # [s]; longer than the difference of both directions for a hundred devices
 
 
 @dataclass(frozen=True, slots=True)
 class Ring:
     """A ring of devices between two ports: `Ring(Interface("eth0"), Interface("eth1"))`.
 
-    One cut cable costs the frames that were on their way. `pair_wait` [s]: how long one copy of a
-    frame waits for the other.
+    If a cable is cut, only the frames in transit are lost.
+
+    Args:
+        first: The link of one end.
+        second: The link of the other end.
+        pair_wait: Longest wait of one copy of a frame for the other [s].
     """
 
     first: Link | LinkSource
@@ -28,17 +32,17 @@ class Ring:
     def __post_init__(self) -> None:
         if self.first == self.second:
             raise ConfigurationError(
-                f"{self.first}: the same port twice is no ring",
-                hint='give two different ports, MainDevice("eth0", "eth1"), or one alone',
+                f"{self.first}: the same port twice is not a ring",
+                hint='give two different ports, MainDevice("eth0", "eth1"), or a single port',
             )
 
     def open_link(self) -> RingLink:
-        """Opens both."""
+        """Open both links as one."""
         return RingLink(self.first, self.second, self.pair_wait)
 
 
 def ring_of(link: Link) -> RingLink | None:
-    """The ring that a link is, or is wrapped round; None: there is none."""
+    """Return the ring that a link is or wraps; None if there is none."""
     while not isinstance(link, RingLink):
         inner = getattr(link, "link", None)
         if inner is None:

@@ -1,4 +1,4 @@
-"""How a ring carries, told by where the copies of its frames came back."""
+"""State of a ring, derived from the links on which the copies of its frames returned."""
 
 from __future__ import annotations
 
@@ -7,21 +7,24 @@ from enum import Enum
 from typing import NamedTuple
 
 ROUTES = ("first", "second", "both")
-NOWHERE = 2  # a copy has not come back yet
+NOWHERE = 2  # a copy has not returned yet
 
 
 class Shape(Enum):
-    UNKNOWN = "unknown"  # nothing has come back yet
+    UNKNOWN = "unknown"  # no frame has returned yet
     CLOSED = "closed"
-    CUT = "cut"  # each copy turns round on its side of the cut
-    FIRST_ONLY = "first only"  # nothing comes back of what goes out on the second link
+    CUT = "cut"  # each copy returns on its side of the cut
+    FIRST_ONLY = "first only"  # frames sent on the second link do not return
     SECOND_ONLY = "second only"
-    DEAD = "dead"  # nothing comes back at all
+    DEAD = "dead"  # no frame returns any more
 
 
 class RingState(NamedTuple):
-    """`first_devices`, `second_devices`: how many are reached from each end, as far as broadcasts
-    were counted: in a closed ring all from the first, none from the second."""
+    """Shape of a ring, and the number of devices reached from each end.
+
+    The numbers are working counters of broadcasts. In a closed ring, all devices are reached from
+    the first end and none from the second.
+    """
 
     shape: Shape
     first_devices: int
@@ -31,16 +34,23 @@ class RingState(NamedTuple):
     def of(
         cls, arrived_on: Sequence[int], given_up: Sequence[bool], counted: Sequence[int]
     ) -> RingState:
-        """From, for each copy, the link it came back on last, whether it has stopped coming, and
-        the devices it met."""
+        """Return the state of a ring.
+
+        Args:
+            arrived_on: For each copy, the link on which it returned last.
+            given_up: For each copy, True if it does not return any more.
+            counted: For each copy, the devices that answered its last broadcast.
+        """
         there = [on != NOWHERE and not gone for on, gone in zip(arrived_on, given_up, strict=True)]
         met = [count if here else 0 for count, here in zip(counted, there, strict=True)]
         return cls(_shape(arrived_on, there), *met)
 
     @property
     def cut_behind(self) -> int | None:
-        """The position in front of the cut, -1 where it is the cable of the first link; None:
-        closed, or not known."""
+        """Position of the last device before the cut; -1 if the cable of the first link is cut.
+
+        None if the ring is closed or its state is unknown.
+        """
         if self.shape in (Shape.CUT, Shape.FIRST_ONLY, Shape.SECOND_ONLY):
             return self.first_devices - 1
         return None

@@ -1,4 +1,4 @@
-"""The published interface of PyIgH: a loop of single calls, one for each step of a cycle.
+"""The published interface of PyIgH: a loop of separate calls, one for each step of a cycle.
 
     master = MasterBase("igh:0")
     servo = SlaveServo(0)
@@ -6,8 +6,8 @@
     master.ecat_activate_domain()
     master.ecat_activate_master()
 
-Over the IgH kernel master every `ecat_*` is one call of libethercat, the GIL held by whoever calls;
-over any other MainDevice ("virtual", a `Segment`, "eth0") the same program runs by our own frames.
+On the IgH kernel master, every `ecat_*` is one call of libethercat that holds the GIL. On any other
+target ("virtual", a `Segment`, "eth0"), Catenary itself sends the frames of the same program.
 `Loop` and `Drives` do the same with less code, and without the GIL.
 """
 

@@ -1,4 +1,4 @@
-"""The steps of a cycle over libethercat: one call each, from Python, as published."""
+"""The steps of a cycle over libethercat: one call per step, from Python."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ WORDS = {
 
 
 class MemoryCell:
-    """A mapped object in a domain, in whole bytes. Its owner is the master: it must be active."""
+    """A mapped object in a domain, in whole bytes. Valid while the master is active."""
 
     def __init__(self, address: int, number: Number, signed: bool) -> None:
         self._value = WORDS[number.bit_length, signed].from_address(address)
@@ -41,7 +41,7 @@ class MemoryCell:
 
 
 class BitsCell:
-    """A mapped object in a domain, of any length at any bit."""
+    """A mapped object in a domain, of any bit length at any bit offset."""
 
     def __init__(self, address: int, number: Number, signed: bool) -> None:
         self._shift = number.bit_offset % 8
@@ -61,7 +61,7 @@ class BitsCell:
 
 
 class KernelSteps:
-    """Owns an activated master that the program drives itself."""
+    """Owns an activated master whose cycle the program runs itself."""
 
     def __init__(
         self,
@@ -125,12 +125,12 @@ class KernelSteps:
 
     def close(self) -> None:
         for slave in self._slaves:
-            slave.bind({})  # the memory goes with the operation
+            slave.bind({})  # deactivation frees the memory of the domains
         self._main.leave()
 
 
 def _cells(slave: SlaveBase, plan: Plan, domains: Sequence[Domain]) -> dict[tuple[int, int], Cell]:
-    """Where each object is in the memory of its domain."""
+    """Return the memory cell of each mapped object, by index and subindex."""
     cells: dict[tuple[int, int], Cell] = {}
     for each in slave.objects:
         output = each.direction is Direction.OUTPUT

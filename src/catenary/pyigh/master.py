@@ -1,4 +1,4 @@
-"""MasterBase: the published functions, over libethercat or over a MainDevice of our own."""
+"""MasterBase: the published functions, over libethercat or over Catenary's own MainDevice."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from catenary.target import MainDevice
 
 
 class SlaveInfo(NamedTuple):
-    """What `ecat_get_slave_info` tells."""
+    """Result of `ecat_get_slave_info`."""
 
     position: int
     name: str
@@ -28,7 +28,7 @@ class SlaveInfo(NamedTuple):
 
 
 class MasterStatus(NamedTuple):
-    """What `ecat_master_status` tells; `al_states` is the OR of all AL states."""
+    """Result of `ecat_master_status`; `al_states` is the OR of all AL states."""
 
     slaves_responding: int
     al_states: int
@@ -36,7 +36,7 @@ class MasterStatus(NamedTuple):
 
 
 class SlaveState(NamedTuple):
-    """What `ecat_slave_config_state` tells."""
+    """Result of `ecat_slave_config_state`."""
 
     online: bool
     operational: bool
@@ -44,7 +44,7 @@ class SlaveState(NamedTuple):
 
 
 class Steps(Protocol):
-    """The steps of a cycle, and who does them."""
+    """The steps of a cycle, implemented over libethercat and over a `Loop`."""
 
     def receive(self) -> None: ...
     def process(self) -> bool: ...
@@ -58,9 +58,13 @@ class Steps(Protocol):
 
 
 class MasterBase:
-    """Owns a master that a program drives call by call. A context manager; `close` otherwise.
+    """Owns a master whose cycle a program runs call by call.
 
-    `target`: as for `MainDevice`, or an open one. `period` [s] of the program's cycle.
+    Use it as a context manager, or call `close`.
+
+    Args:
+        target: A target as for `MainDevice`, or a MainDevice.
+        period: The period of the program's cycle [s].
     """
 
     def __init__(
@@ -88,7 +92,7 @@ class MasterBase:
         self.close()
 
     def close(self) -> None:
-        """Ends operation and gives the master back."""
+        """End the operation and release the master."""
         steps, self._steps = self._steps, None
         try:
             if steps is not None:
@@ -100,28 +104,40 @@ class MasterBase:
     # Before operation
 
     def ecat_init_slave(self, slave: SlaveBase) -> None:
-        """Takes a slave in. ConfigurationError where another one is, or none."""
+        """Add a slave to the program.
+
+        Raises:
+            ConfigurationError: No device, or another device, is at the position of the slave.
+        """
         self._before_operation()
         if not 0 <= slave.position < len(self.main.subs):
             raise ConfigurationError(
-                f"there is no slave {slave.position}, the master has {len(self.main.subs)}",
+                f"there is no slave {slave.position}: the master has {len(self.main.subs)}",
                 hint="correct the position, or scan again",
             )
         slave.adopt(self.main.subs[slave.position].description)
         self.slaves.append(slave)
 
     def ecat_activate_domain(self) -> None:
-        """Says that all slaves have been given."""
+        """Confirm that all slaves have been added.
+
+        Raises:
+            ConfigurationError: No slave has been added.
+        """
         self._before_operation()
         if not self.slaves:
-            raise ConfigurationError("no slaves", hint="ecat_init_slave(...) first")
+            raise ConfigurationError("no slaves", hint="call ecat_init_slave(...) first")
         self._planned = True
 
     def ecat_activate_master(self) -> None:
-        """Configures everything. From here on the program must call the steps of the cycle."""
+        """Configure and activate the master. The program must then call the steps of the cycle.
+
+        Raises:
+            RuntimeError: `ecat_activate_domain` has not been called.
+        """
         self._before_operation()
         if not self._planned:
-            raise RuntimeError("ecat_activate_domain() comes first")
+            raise RuntimeError("call ecat_activate_domain() first")
         master = self.main.master
         if isinstance(master, igh.KernelMaster):
             self._steps = KernelSteps(self.main, master, self._wish, self.slaves, self.period)
@@ -131,53 +147,56 @@ class MasterBase:
     # A cycle, in this order
 
     def ecat_master_receive(self) -> None:
-        """Takes the frames that have come back."""
+        """Receive the frames that have returned."""
         self._active.receive()
 
     def ecat_domain_process(self) -> bool:
-        """Takes the inputs out of them; whether all slaves have answered."""
+        """Read the inputs from the received frames. Return True if all slaves have answered."""
         return self._active.process()
 
     def ecat_domain_queue(self) -> None:
-        """Puts the outputs into the next frames."""
+        """Queue the outputs for the next frames."""
         self._active.queue()
 
     def ecat_write_apptime(self, time_ns: int) -> None:
-        """The application's time, for distributed clocks. Our own MainDevice tells its own."""
+        """Set the application time for distributed clocks [ns].
+
+        Without libethercat, this has no effect: the loop uses its own time.
+        """
         self._active.write_time(time_ns)
 
     def ecat_master_send(self) -> None:
-        """Sends them."""
+        """Send the queued frames."""
         self._active.send()
 
     def wait(self) -> None:
-        """Until the next instant of the period."""
+        """Wait until the next cycle start."""
         self._active.wait()
 
-    # Looks
+    # Information
 
     def ecat_get_slave_info(self, position: int) -> SlaveInfo:
-        """A slave, as it was found."""
+        """Return the information of a slave from the last scan."""
         sub = self.main.subs[position]
         return SlaveInfo(position, sub.name, *sub.identity, sub.alias, int(sub.state or 0))
 
     def ecat_master_status(self) -> MasterStatus:
-        """How many answer, and from which states."""
+        """Return the number of answering slaves, their states and the link state."""
         return MasterStatus(*self._active.status())
 
     def ecat_slave_config_state(self, slave: SlaveBase) -> SlaveState:
-        """Whether a slave runs as it was configured."""
+        """Return whether a slave is online and operational, and its AL state."""
         return SlaveState(*self._active.state(slave.position))
 
     @property
     def _active(self) -> Steps:
         if self._steps is None:
-            raise RuntimeError("the master is not active: ecat_activate_master() first")
+            raise RuntimeError("the master is not active: call ecat_activate_master() first")
         return self._steps
 
     def _before_operation(self) -> None:
         if self._steps is not None:
             raise ConfigurationError(
                 "the master is active: nothing can be configured any more",
-                hint="close it and begin again",
+                hint="close it, then create a new one",
             )

@@ -1,4 +1,4 @@
-"""The steps of a cycle over a MainDevice of our own: an inline loop does them."""
+"""The steps of a cycle over Catenary's own MainDevice, by an inline loop."""
 
 from __future__ import annotations
 
@@ -26,8 +26,11 @@ class ArrayCell(NamedTuple):
 
 
 class OwnSteps:
-    """Owns the loop. `receive` sends what was written, waits for the instant and takes the answers:
-    a loop's cycle begins where a program's ends."""
+    """Owns the loop.
+
+    `receive` sends the outputs, waits for the cycle start and reads the inputs: the cycle of the
+    loop starts where the cycle of the program ends.
+    """
 
     def __init__(self, wish: Wish, slaves: list[SlaveBase], period: float) -> None:
         self._wish = wish
@@ -44,16 +47,16 @@ class OwnSteps:
         return bool(self._cycle.ok)
 
     def queue(self) -> None:
-        """The loop does it on its way round."""
+        """Do nothing: the loop queues the outputs itself."""
 
     def write_time(self, time_ns: int) -> None:
-        """The loop has its own."""
+        """Do nothing: the loop uses its own time."""
 
     def send(self) -> None:
-        """The loop does it on its way round."""
+        """Do nothing: the loop sends in `receive`."""
 
     def wait(self) -> None:
-        """`receive` does."""
+        """Do nothing: `receive` waits."""
 
     def status(self) -> tuple[int, int, bool]:
         last = self._loop.log[-1]

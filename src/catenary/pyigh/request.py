@@ -1,4 +1,4 @@
-"""The slaves of a program as one request for process data."""
+"""The slaves of a program as one process-data request."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from catenary.pyigh.slaves import SlaveBase, columns_of, pdos_of
 
 
 class Wish:
-    """All slaves as one wish (`plan.request.Wish`)."""
+    """One process-data request for all slaves. Implements `plan.request.Wish`."""
 
     def __init__(self, main: MainDevice, slaves: Sequence[SlaveBase]) -> None:
         self.main = main

@@ -48,7 +48,11 @@ class RawObject:
 class SlaveBase:
     """Owns the process data of one slave as raw integers: `read(0x6041)`, `write(0x6040, 15)`.
 
-    `vendor`, `product`: what must be there; None: whatever is. `objects`: what is exchanged.
+    Args:
+        position: Position of the slave, from 0.
+        vendor: Required vendor; None accepts any.
+        product: Required product; None accepts any.
+        objects: The objects to exchange.
     """
 
     def __init__(
@@ -66,30 +70,51 @@ class SlaveBase:
         self._cells: Mapping[tuple[int, int], Cell] = {}
 
     def adopt(self, description: DeviceDescription) -> None:
-        """The slave has been found. ConfigurationError for another than the one expected."""
+        """Check the identity of the device that was found.
+
+        Raises:
+            ConfigurationError: Vendor or product differ from the expected ones.
+        """
         found = description.identity
         for wanted, there in ((self.vendor, found.vendor), (self.product, found.product)):
             if wanted is not None and wanted != there:
                 raise ConfigurationError(
                     f"{description}: vendor and product {found.vendor:#x}, {found.product:#x} are "
                     f"not the expected {self.vendor}, {self.product}",
-                    hint="correct the position, or plug the right device in",
+                    hint="correct the position, or connect the expected device",
                 )
 
     def bind(self, cells: Mapping[tuple[int, int], Cell]) -> None:
-        """The master is active: here are the objects."""
+        """Set the cells of the mapped objects; empty when the master is not active."""
         self._cells = cells
 
     def read(self, index: int, subindex: int = 0) -> int:
-        """A mapped object, as of the last `ecat_domain_process`."""
+        """Return a mapped object as of the last `ecat_domain_process`.
+
+        Args:
+            index: Index of the object.
+            subindex: Subindex of the object.
+
+        Raises:
+            MappingError: The object is not mapped.
+        """
         return self._cell(index, subindex).read()
 
     def write(self, index: int, value: int, subindex: int = 0) -> None:
-        """A mapped object; goes out with the next `ecat_master_send`."""
+        """Write a mapped object. The next `ecat_master_send` sends it.
+
+        Args:
+            index: Index of the object.
+            value: The new value.
+            subindex: Subindex of the object.
+
+        Raises:
+            MappingError: The object is not mapped.
+        """
         self._cell(index, subindex).write(value)
 
     def has(self, index: int, subindex: int = 0) -> bool:
-        """Whether an object is mapped."""
+        """Return True if an object is mapped."""
         return (index, subindex) in self._cells
 
     def _cell(self, index: int, subindex: int) -> Cell:
@@ -100,13 +125,20 @@ class SlaveBase:
             names = ", ".join(f"0x{i:04X}:{s:02X}" for i, s in self._cells)
             raise MappingError(
                 f"slave {self.position}: 0x{index:04X}:{subindex:02X} is not exchanged",
-                hint=f"there are {names}",
+                hint=f"exchanged objects: {names}",
             )
         return cell
 
 
 class SlaveServo(SlaveBase):
-    """Owns a CiA 402 axis in the drive's own units. `mode`: "csp", "csv" or "cst"."""
+    """Owns a CiA 402 axis in the drive's own units.
+
+    Args:
+        position: Position of the slave, from 0.
+        vendor: Required vendor; None accepts any.
+        product: Required product; None accepts any.
+        mode: "csp", "csv" or "cst".
+    """
 
     def __init__(
         self,
@@ -117,7 +149,7 @@ class SlaveServo(SlaveBase):
     ) -> None:
         super().__init__(position, vendor, product, SERVO_OBJECTS)
         if mode.upper() not in Mode.__members__:
-            raise ValueError(f'mode={mode!r}: "csp", "csv" or "cst"')
+            raise ValueError(f'invalid mode {mode!r}: use "csp", "csv" or "cst"')
         self._mode = Mode[mode.upper()]
         target = TARGETS[self._mode]
         self.objects = tuple(
@@ -126,8 +158,14 @@ class SlaveServo(SlaveBase):
         self.start_up = ((Object.MODE_OF_OPERATION, 0, bytes([self._mode])),)
 
     def enable(self) -> bool:
-        """One step towards operation enabled, targets following; whether it is there. Call it in
-        every cycle. DriveError during a fault reaction that does not end is the caller's to see."""
+        """Take one step towards operation enabled. Call it in every cycle.
+
+        Until the axis is enabled, the target position follows the actual position. A fault is reset
+        without an error; call `check` to detect it.
+
+        Returns:
+            True if the axis is in operation enabled.
+        """
         state = self.state
         if self.has(Object.MODE_OF_OPERATION):
             self.write(Object.MODE_OF_OPERATION, self._mode)
@@ -139,16 +177,20 @@ class SlaveServo(SlaveBase):
         return False
 
     def disable(self) -> None:
-        """Switches it off."""
+        """Switch the axis off."""
         self.write(Object.CONTROLWORD, 0)
 
     @property
     def state(self) -> AxisState | None:
-        """Its CiA 402 state; None: its statusword codes none."""
+        """CiA 402 state of the axis; None if its statusword is not a valid state."""
         return state_of(self.read(Object.STATUSWORD))
 
     def check(self) -> None:
-        """DriveError in fault."""
+        """Check that the axis is not in fault.
+
+        Raises:
+            DriveError: The axis is in fault, or in its fault reaction.
+        """
         if self.state in (AxisState.FAULT, AxisState.FAULT_REACTION_ACTIVE):
             raise DriveError(f"slave {self.position}: in fault", hint="read its object 0x603F")
 
@@ -165,15 +207,15 @@ class SlaveServo(SlaveBase):
         return self.read(Object.VELOCITY_ACTUAL)
 
     def set_torque(self, permille: int) -> None:
-        """In thousandths of the rated torque."""
+        """Set the target torque in thousandths of the rated torque."""
         self.write(Object.TARGET_TORQUE, permille)
 
     def read_torque(self) -> int:
-        """In thousandths of the rated torque."""
+        """Return the actual torque in thousandths of the rated torque."""
         return self.read(Object.TORQUE_ACTUAL)
 
     def set_mode(self, mode: int) -> None:
-        """0x6060: 8 CSP, 9 CSV, 10 CST. `enable` writes it from now on."""
+        """Set the mode of operation (0x6060): 8 CSP, 9 CSV, 10 CST. `enable` then writes it."""
         self._mode = Mode(mode)
         self.write(Object.MODE_OF_OPERATION, mode)
 
@@ -202,8 +244,16 @@ SERVO_OBJECTS = (
 
 
 class SlaveIO(SlaveBase):
-    """Owns the channels of a terminal in the order of its process data: entries of one bit are
-    digital, wider ones analogue (`signed`: two's complement)."""
+    """Owns the channels of a terminal, in the order of its process data.
+
+    Entries of one bit are digital channels, wider entries are analogue channels.
+
+    Args:
+        position: Position of the slave, from 0.
+        vendor: Required vendor; None accepts any.
+        product: Required product; None accepts any.
+        signed: True if analogue channels are in two's complement.
+    """
 
     def __init__(
         self,
@@ -217,7 +267,7 @@ class SlaveIO(SlaveBase):
 
     def adopt(self, description: DeviceDescription) -> None:
         super().adopt(description)
-        # Objects go by index and subindex here: one that is mapped twice is a single channel.
+        # Objects are identified by index and subindex: one mapped twice is a single channel.
         objects: dict[tuple[Direction, int, int], RawObject] = {}
         for direction in Direction:
             for entry in mapped_entries(description.assignments(direction)):
@@ -250,12 +300,14 @@ class SlaveIO(SlaveBase):
         ]
         if not 0 <= channel < len(mine):
             kind = "digital" if digital else "analogue"
-            raise ValueError(f"{kind} channel {channel}: slave {self.position} has {len(mine)}")
+            raise ValueError(
+                f"{kind} channel {channel} does not exist: slave {self.position} has {len(mine)}"
+            )
         return mine[channel]
 
 
 def pdos_of(slaves: Sequence[SlaveBase]) -> dict[int, PdoWish]:
-    """What all slaves together exchange, by position."""
+    """Return the process-data requests of all slaves, by position."""
     return {
         slave.position: PdoWish(
             outputs=_references(slave, Direction.OUTPUT),
@@ -267,7 +319,7 @@ def pdos_of(slaves: Sequence[SlaveBase]) -> dict[int, PdoWish]:
 
 
 def columns_of(slaves: Sequence[SlaveBase], layout: ImageLayout) -> WishTables:
-    """One integer column for every object that is mapped, in the order of slaves and objects."""
+    """Return one integer column per mapped object, in the order of slaves and objects."""
     sides: dict[Direction, list[Column]] = {Direction.OUTPUT: [], Direction.INPUT: []}
     for slave in slaves:
         for each in slave.objects:
