@@ -88,7 +88,7 @@ def test_a_cpu_there_is_none_of(capsys):
     [
         (["--apply", "--undo"], "not allowed with"),
         (["--seconds", "-1"], "is not between"),
-        (["--period", "1e-9"], "the shortest is 20 us"),
+        (["--period", "1e-9"], "use at least 20 us"),
         (["--priority", "100"], "priority 100 is not within 1 to 99"),
     ],
 )
