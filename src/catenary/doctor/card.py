@@ -10,7 +10,7 @@ ARPHRD_ETHER = 1  # linux/if_arp.h
 
 @dataclass(frozen=True, slots=True)
 class Coalescing:
-    """How long the card holds back its interrupt: `ethtool -c`."""
+    """Delay of the card's interrupts: `ethtool -c`."""
 
     rx_usecs: int
     rx_frames: int

@@ -161,7 +161,7 @@ class HostState:
             return file.read()
 
     def save(self, made: Sequence[Made]) -> None:
-        """Write the file atomically. Raises StateError if the disk is full or permission is missing."""
+        """Write the file atomically. Raises StateError if the disk is full or access is denied."""
         text = msgspec.json.format(msgspec.json.encode(Noted(self.boot, list(made))), indent=2)
         new = self.path.with_suffix(".new")
         try:

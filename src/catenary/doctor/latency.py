@@ -1,7 +1,7 @@
 """Wake-up latency of this machine, measured as cyclictest does: absolute times, a histogram.
 
-The thread is a `realtime.Task` in a `realtime.session()`, as in a user's program: SCHED_FIFO, locked
-memory, processors kept awake. `scheduling` lists settings that were refused during the measurement.
+The thread is a `realtime.Task` in a `realtime.session()`, as in a user's program: SCHED_FIFO,
+locked memory, processors kept awake. `scheduling` lists the settings that were refused.
 """
 
 from __future__ import annotations

@@ -46,7 +46,7 @@ class Machine:
         return self.root / path.lstrip("/")
 
     def text(self, path: str) -> str | None:
-        """Return the text of a file, stripped; None if it cannot be read (`lack` has the reason)."""
+        """Return the text of a file, stripped; None if it cannot be read (see `lack`)."""
         try:
             return self.path(path).read_text(errors="replace").strip()
         except OSError:

@@ -166,7 +166,7 @@ def processor_quota(machine: Machine) -> str:
 
 
 def realtime_runtime(machine: Machine) -> int | None:
-    """Return the real-time runtime of the process's group [us], cgroups version 1; None: unknown."""
+    """Return the real-time runtime of the group [us], cgroups version 1; None if unknown."""
     for folder in groups(machine, "cpu"):
         runtime = machine.number(f"{folder}/cpu.rt_runtime_us")
         if runtime is not None:

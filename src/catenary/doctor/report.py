@@ -98,7 +98,7 @@ def summary_lines(examination: Examination, width: int) -> Iterator[str]:
     elif examination.latency is None:
         yield "No obstacle to a real-time loop found; the wake-up latency was not measured."
     else:
-        yield "Fit for a real-time loop: all checks passed."
+        yield "Fit for a real-time loop: no check failed or warned."
     if examination.changes:
         settings = (
             "1 setting" if len(examination.changes) == 1 else f"{len(examination.changes)} settings"

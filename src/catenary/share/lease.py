@@ -102,7 +102,7 @@ class Lease:
         self.release()
 
     def _renew(self, row: bytes | None) -> None:
-        """Renew the lease and write a row; under the mutex, so that the place stays this client's."""
+        """Renew the lease and write a row; the mutex ensures that the place is still its own."""
         desk, place = self._desk, self._place
         with locked(desk):
             now = time.monotonic_ns()
