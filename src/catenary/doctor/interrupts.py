@@ -23,7 +23,7 @@ def card_interrupts(machine: Machine, card: Card) -> list[int]:
 
 
 def device_name(machine: Machine, place: str) -> str:
-    """virtio3 for a paravirtual card, whose interrupts have that name."""
+    """Return the device name of a paravirtual card, such as virtio3: its interrupts have it."""
     device = machine.path(f"{place}/device")
     return device.resolve().name if device.exists() else ""
 

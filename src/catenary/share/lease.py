@@ -153,7 +153,7 @@ class Lease:
             elif serial and (reason := desk.ending(place, now)):
                 free(desk, place, reason)
         leases = desk.leases.load_all()
-        orphans = ~np.isin(desk.holders, leases)  # of a client killed while it took or released axes
+        orphans = ~np.isin(desk.holders, leases)  # of a client killed meanwhile
         desk.holders[orphans] = 0
         if 0 in leases:
             return leases.index(0)
