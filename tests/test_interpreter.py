@@ -42,7 +42,7 @@ def test_a_copy_gets_the_rights(
     prefix = environment(tmp_path, system, copies=True)
     said = advice(monkeypatch, prefix, system, "python")
     assert said.startswith(f"sudo setcap {interpreter.CAPABILITIES} {prefix}/bin/python;")
-    assert "whoever may run this file gets raw sockets" in said
+    assert "every user who can run this file gets raw sockets" in said
 
 
 def test_a_link_does_not(tmp_path: Path, system: Path, monkeypatch: pytest.MonkeyPatch) -> None:

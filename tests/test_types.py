@@ -71,7 +71,7 @@ def test_indices_and_names_are_unique():
 
 
 def test_unknown_ones_are_refused():
-    with pytest.raises(ValueError, match=r"'FOO'.*known are BOOL, SINT"):
+    with pytest.raises(ValueError, match=r"'FOO'.*known types: BOOL, SINT"):
         by_name("FOO")
     with pytest.raises(ValueError, match="0x0023"):
         by_index(0x0023)
@@ -151,11 +151,11 @@ def test_other_kinds_of_value_are_refused():
         UINT.encode(1.5)
     with pytest.raises(TypeError, match="REAL"):
         REAL.encode("1")
-    with pytest.raises(ValueError, match="beyond"):
+    with pytest.raises(ValueError, match="exceeds"):
         REAL.encode(1e39)
     with pytest.raises(ValueError, match="NUL"):
         VISIBLE_STRING.encode("a\x00b")
-    with pytest.raises(ValueError, match="cannot be written"):
+    with pytest.raises(ValueError, match="cannot be encoded"):
         VISIBLE_STRING.encode("\u20ac")
 
 
@@ -205,7 +205,7 @@ def test_an_array_is_a_tuple() -> None:
     assert str(kind) == "ARRAY [1..3] OF UINT"
     with pytest.raises(DecodeError, match="needs 6 bytes, received 5"):
         kind.decode(bytes(5))
-    with pytest.raises(ValueError, match="got 2 values"):
+    with pytest.raises(ValueError, match="needs 3 values, got 2"):
         kind.encode((1, 2))
 
 

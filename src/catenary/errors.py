@@ -1,8 +1,8 @@
-"""All errors of the package. Each says which device, what was asked, what came back, the likely
-cause and what to do next; the numbers are attributes.
+"""All errors of the package. A message gives the device, the request, the reply, the likely cause
+and the next step. The numbers are attributes.
 
-A caller's mistake is a ValueError or TypeError before anything is sent; these are a peer's, the
-network's or the machine's.
+A caller's mistake raises ValueError or TypeError before anything is sent. The errors here report
+faults of a device, the network or the machine.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class CatenaryError(Exception):
-    """Base of all. `hint` is the next thing to do, without a full stop at its end."""
+    """Base of all errors. `hint` is the next step, without a full stop at the end."""
 
     def __init__(self, message: str, *, hint: str = "") -> None:
         super().__init__(message)
@@ -26,16 +26,19 @@ class CatenaryError(Exception):
 
 
 class DecodeError(CatenaryError):
-    """Bytes that are no value of the format: the only error a decoder raises."""
+    """Bytes that are not valid in their format. Decoders raise no other error."""
 
 
 class ConfigurationError(CatenaryError):
-    """A file or a wish that cannot be: names the file, field or object."""
+    """An invalid file or device configuration. The message names the file, field or object."""
 
 
 class MachineFileError(ConfigurationError):
-    """A machine file that cannot be read or used. `path`, `line` and `key` name the place; None:
-    the file as a whole."""
+    """A machine file that cannot be read or used.
+
+    `path`, `line` and `key` locate the mistake. `line` and `key` are None if it concerns the whole
+    file.
+    """
 
     def __init__(
         self,
@@ -54,12 +57,12 @@ class MachineFileError(ConfigurationError):
 
 
 class LinkError(CatenaryError):
-    """A network interface that cannot be used: unknown, down, not permitted, or in use by another
-    master."""
+    """A network interface that cannot be used: unknown, down, without permission, or in use by
+    another master."""
 
 
 class NoDeviceError(CatenaryError):
-    """Frames went out and no EtherCAT device answered."""
+    """No EtherCAT device answered the frames that were sent."""
 
 
 class ResponseTimeout(CatenaryError):
@@ -67,11 +70,11 @@ class ResponseTimeout(CatenaryError):
 
 
 class SegmentError(CatenaryError):
-    """The segment changed or contradicts itself: a device more, fewer, or answering twice."""
+    """The segment changed or is inconsistent: a device was added, is missing, or answers twice."""
 
 
 class IdentityError(CatenaryError):
-    """A device is not the one expected."""
+    """A device differs from the expected one."""
 
     def __init__(
         self, message: str, *, position: int, expected: object, found: object, hint: str = ""
@@ -83,7 +86,7 @@ class IdentityError(CatenaryError):
 
 
 class RegisterError(CatenaryError):
-    """A device answers, but not to this access of its registers or memory."""
+    """A device answers, but rejects this access to its registers or memory."""
 
 
 class EepromError(CatenaryError):
@@ -91,7 +94,7 @@ class EepromError(CatenaryError):
 
 
 class MailboxError(CatenaryError):
-    """A device answered a mailbox service with a mailbox error, or against the protocol."""
+    """A device answered a mailbox service with a mailbox error or violated the protocol."""
 
 
 class SdoAbort(CatenaryError):
@@ -108,8 +111,10 @@ class SdoAbort(CatenaryError):
 
 
 class StateError(CatenaryError):
-    """A device refused an EtherCAT state, did not reach it in time, or left it. `log`: the last
-    cycles where that happened in a loop."""
+    """A device refused an EtherCAT state, did not reach it in time, or left it.
+
+    `log` holds the last cycles if the error occurred in a loop.
+    """
 
     def __init__(
         self,
@@ -131,11 +136,11 @@ class StateError(CatenaryError):
 
 
 class MappingError(CatenaryError):
-    """A wish for process data that a device cannot fulfil: names the object."""
+    """A process-data request that a device cannot fulfil. The message names the object."""
 
 
 class LoopError(CatenaryError):
-    """The cyclic exchange could not go on. `log` holds the last cycles, oldest first."""
+    """The cyclic exchange could not continue. `log` holds the last cycles, oldest first."""
 
     def __init__(self, message: str, *, log: Log | None = None, hint: str = "") -> None:
         super().__init__(message, hint=hint)
@@ -143,12 +148,11 @@ class LoopError(CatenaryError):
 
 
 class ClockError(LoopError):
-    """Distributed clocks that cannot be set up, do not come together, or have lost their
-    reference."""
+    """Distributed clocks cannot be set up, do not synchronise, or have lost their reference."""
 
 
 class WorkingCounterError(LoopError):
-    """Devices stopped answering in the cyclic exchange: names the silent ones."""
+    """Devices stopped answering in the cyclic exchange. The message names them."""
 
 
 class DriveError(LoopError):
@@ -156,8 +160,11 @@ class DriveError(LoopError):
 
 
 class MoveError(DriveError):
-    """A move that ended before its goal. `axis`: its name; `remaining`: goal minus actual position
-    [rad], of a linear axis [m]; NaN in homing."""
+    """A move that ended before its target.
+
+    `axis` is the name of the axis. `remaining` is the target minus the actual position [rad], for
+    a linear axis [m]; NaN in homing.
+    """
 
     def __init__(
         self, message: str, *, axis: str, remaining: float, log: Log | None = None, hint: str = ""
@@ -168,11 +175,11 @@ class MoveError(DriveError):
 
 
 class RealtimeError(CatenaryError):
-    """The machine does not give what real time needs: says what, and how to get it."""
+    """The machine does not meet a real-time requirement. The hint says how to meet it."""
 
 
 class TaskError(RealtimeError):
-    """A task raised, died, missed a deadline that stops it, or would not end."""
+    """A task raised an error, died, missed its deadline, or did not end."""
 
     def __init__(self, message: str, *, task: str, exit_code: int | None = None, hint: str = ""):
         super().__init__(message, hint=hint)
@@ -181,15 +188,15 @@ class TaskError(RealtimeError):
 
 
 class LawError(LoopError):
-    """A control law that cannot be compiled, or that failed and stopped the drives."""
+    """A control law cannot be compiled, or it failed and stopped the drives."""
 
 
 class ShareError(CatenaryError):
-    """A share that is not there, not to be opened, or no share: names it and what there is."""
+    """A share that does not exist, cannot be opened or is invalid. The message names the share."""
 
 
 class LeaseError(ShareError):
-    """Axes that another client commands, or that this one commands no longer."""
+    """Axes that another client commands, or that this client no longer commands."""
 
 
 class RecordingError(CatenaryError):

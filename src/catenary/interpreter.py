@@ -1,4 +1,4 @@
-"""The Python interpreter of this program, and how it gets the rights that a loop needs."""
+"""The Python interpreter of this program, and the permissions that a loop needs."""
 
 from __future__ import annotations
 
@@ -7,21 +7,27 @@ import sys
 from pathlib import Path
 
 CAPABILITIES = "cap_net_raw,cap_sys_nice,cap_ipc_lock=ep"
-WARNING = "; whoever may run this file gets raw sockets: limit them by its group and `chmod 750`"
+WARNING = (
+    "; every user who can run this file gets raw sockets: restrict it by group and `chmod 750`"
+)
 
 
 def is_own(executable: str, prefix: str, base_prefix: str) -> bool:
-    """True if the file that `setcap` would change belongs to one environment alone.
+    """Return True if the file that `setcap` would change belongs to one environment alone.
 
-    `python -m venv` links to the Python that it was called with, unless told `--copies`. Arguments
-    as in `sys`.
+    `python -m venv` creates a link to its own Python, unless `--copies` is given.
+
+    Args:
+        executable: As `sys.executable`.
+        prefix: As `sys.prefix`.
+        base_prefix: As `sys.base_prefix`.
     """
     inside = Path(executable).resolve().is_relative_to(Path(prefix).resolve())
     return inside and (prefix != base_prefix or (Path(prefix) / "conda-meta").is_dir())
 
 
 def permission_advice() -> str:
-    """Return what grants raw sockets, real-time scheduling and locked memory without root."""
+    """Return the commands that grant raw sockets, real-time scheduling and locked memory."""
     real = Path(sys.executable).resolve()
     if is_own(sys.executable, sys.prefix, sys.base_prefix):
         return f"sudo setcap {CAPABILITIES} {shlex.quote(str(real))}{WARNING}"

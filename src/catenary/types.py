@@ -1,5 +1,5 @@
-"""EtherCAT's base data types with their CoE index numbers, ETG.1000.6 §5.6.7.3 and ETG.1020 (bit
-types). Values travel little endian.
+"""EtherCAT base data types with their CoE index numbers, ETG.1000.6 §5.6.7.3 and ETG.1020 (bit
+types). Values are little endian.
 
     UINT.encode(5)              # b"\\x05\\x00"
     UINT.decode(b"\\x05\\x00")    # 5, an int also for the type checker
@@ -24,7 +24,7 @@ Value: TypeAlias = bool | int | float | str | bytes
 # No slots: `DataType[int]` as a base of a frozen class with slots fails in Python 3.11.
 @dataclass(frozen=True)
 class DataType(Generic[T]):
-    """A data type. `bit_length` 0: any number of bytes."""
+    """A data type. A `bit_length` of 0 means any number of bytes."""
 
     name: str
     index: int  # of its DEFTYPE object in the dictionary
@@ -33,19 +33,24 @@ class DataType(Generic[T]):
 
     @property
     def size(self) -> int:
-        """Its length in bytes when it travels alone; 0: any."""
+        """Length of a single value in bytes; 0 if the type has no fixed length."""
         return (self.bit_length + 7) // 8
 
     def encode(self, value: T) -> bytes:
-        """Its bytes. TypeError for another kind of value, ValueError for one out of range."""
+        """Return the encoded value.
+
+        Raises:
+            TypeError: The value has the wrong Python type.
+            ValueError: The value is out of range.
+        """
         raise NotImplementedError
 
     def decode(self, data: bytes) -> T:
-        """Its value. DecodeError if the bytes are none of this type."""
+        """Return the decoded value. Raises DecodeError if the bytes are not valid for this type."""
         raise NotImplementedError
 
     def parse(self, text: str) -> T:
-        """A value as a person writes it. ValueError if it is none."""
+        """Return the value that a text denotes, such as "0x1F". Raises ValueError if invalid."""
         raise NotImplementedError
 
     def __str__(self) -> str:
@@ -57,7 +62,7 @@ class DataType(Generic[T]):
 
 
 class Boolean(DataType[bool]):
-    """One bit; a byte when it travels alone, where anything but zero is true."""
+    """One bit. A single value takes one byte, and every byte except zero is true."""
 
     def encode(self, value: bool) -> bytes:
         if isinstance(value, str | bytes):  # "false" is true in Python
@@ -72,23 +77,25 @@ class Boolean(DataType[bool]):
         try:
             return {"0": False, "false": False, "1": True, "true": True}[text.strip().lower()]
         except KeyError:
-            raise ValueError(f"{self.name}: {text!r} is none of 0, 1, false, true") from None
+            raise ValueError(
+                f"{self.name}: invalid value {text!r}; use 0, 1, false or true"
+            ) from None
 
 
 @dataclass(frozen=True)
 class Integer(DataType[int]):
-    """A whole number of 1 to 64 bits."""
+    """An integer of 1 to 64 bits."""
 
     signed: bool = False
 
     @property
     def minimum(self) -> int:
-        """The smallest value."""
+        """Smallest value."""
         return -(1 << self.bit_length - 1) if self.signed else 0
 
     @property
     def maximum(self) -> int:
-        """The largest value."""
+        """Largest value."""
         return (1 << self.bit_length - (1 if self.signed else 0)) - 1
 
     def encode(self, value: int) -> bytes:
@@ -106,7 +113,7 @@ class Integer(DataType[int]):
         try:
             number = int(text.strip(), 0)
         except ValueError:
-            raise ValueError(f"{self.name}: {text!r} is no whole number (12, -3, 0x1F)") from None
+            raise ValueError(f"{self.name}: {text!r} is not an integer (12, -3, 0x1F)") from None
         self._check_range(number, ValueError)
         return number
 
@@ -122,9 +129,9 @@ class Real(DataType[float]):
         try:
             return struct.pack(self._format, value)
         except OverflowError:
-            raise ValueError(f"{self.name}: {value} is beyond ±3.4028235e38") from None
+            raise ValueError(f"{self.name}: {value} exceeds ±3.4028235e38") from None
         except struct.error:
-            raise TypeError(f"{self.name}: {value!r} is no number") from None
+            raise TypeError(f"{self.name}: {value!r} is not a number") from None
 
     def decode(self, data: bytes) -> float:
         self._check_size(data)
@@ -134,7 +141,7 @@ class Real(DataType[float]):
         try:
             number = float(text)
         except ValueError:
-            raise ValueError(f"{self.name}: {text!r} is no number") from None
+            raise ValueError(f"{self.name}: {text!r} is not a number") from None
         if not math.isfinite(number):
             raise ValueError(f"{self.name}: {text!r} is not finite")
         self.encode(number)
@@ -147,20 +154,20 @@ class Real(DataType[float]):
 
 @dataclass(frozen=True)
 class Text(DataType[str]):
-    """Characters of a fixed width. Devices pad with NUL: what follows the first one is dropped."""
+    """Characters of a fixed width. Devices pad with NUL; `decode` stops at the first NUL."""
 
     encoding: str = "latin-1"
 
     def encode(self, value: str) -> bytes:
         if "\x00" in value:
-            raise ValueError(f"{self.name}: {value!r} holds a NUL character")
+            raise ValueError(f"{self.name}: {value!r} contains a NUL character")
         try:
             data = value.encode(self.encoding)
             if self.size and len(data) > self.size:
                 raise ValueError(f"{self.name}: {value!r} is longer than {self.size} bytes")
             return data.ljust(self.size, b"\x00")
         except UnicodeEncodeError as error:
-            raise ValueError(f"{self.name}: {value!r} cannot be written: {error.reason}") from None
+            raise ValueError(f"{self.name}: {value!r} cannot be encoded: {error.reason}") from None
 
     def decode(self, data: bytes) -> str:
         self._check_size(data)
@@ -175,7 +182,7 @@ class Text(DataType[str]):
 
 
 class Octets(DataType[bytes]):
-    """Bytes without a meaning, of a fixed length or any."""
+    """Uninterpreted bytes, of fixed or any length."""
 
     def encode(self, value: bytes) -> bytes:
         if self.size and len(value) != self.size:
@@ -193,14 +200,14 @@ class Octets(DataType[bytes]):
             raise ValueError(f"{self.name}: {text!r}: {error}") from None
 
 
-# What complete access reads or writes at once: its entries, as they stand in the object.
+# The types of the entries in an array or a record, which complete access transfers at once.
 Scalar: TypeAlias = (
     DataType[bool] | DataType[int] | DataType[float] | DataType[str] | DataType[bytes]
 )
 
 
 class Array(DataType[tuple[T, ...]]):
-    """`count` values of one type behind one another: `Array(UDINT, 4)`, decoded to a tuple."""
+    """`count` consecutive values of one type: `Array(UDINT, 4)`, decoded to a tuple."""
 
     element: DataType[T]
     count: int
@@ -208,14 +215,14 @@ class Array(DataType[tuple[T, ...]]):
     def __init__(self, element: DataType[T], count: int) -> None:
         _check_sized(element)
         if count < 1:
-            raise ValueError(f"an array of {count} values")
+            raise ValueError(f"Array: count must be at least 1, got {count}")
         super().__init__(f"ARRAY [1..{count}] OF {element}", 0, count * element.bit_length)
         object.__setattr__(self, "element", element)
         object.__setattr__(self, "count", count)
 
     def encode(self, value: tuple[T, ...]) -> bytes:
         if len(value) != self.count:
-            raise ValueError(f"{self.name}: got {len(value)} values")
+            raise ValueError(f"{self.name}: needs {self.count} values, got {len(value)}")
         width = self.element.bit_length
         return _packed([(width, self.element.encode(each)) for each in value])
 
@@ -228,14 +235,16 @@ class Array(DataType[tuple[T, ...]]):
 
 
 class Record(DataType[Mapping[str, Value]]):
-    """Named values behind one another: `Record({"vendor": UDINT, "product": UDINT})`, decoded to a
-    dict. Entries of some bits are packed as in the object; a gap is a field nobody reads."""
+    """Consecutive named values: `Record({"vendor": UDINT, "product": UDINT})`, decoded to a dict.
+
+    Entries of less than a byte are packed as in the object. Declare a gap as an unused field.
+    """
 
     fields: Mapping[str, Scalar]
 
     def __init__(self, fields: Mapping[str, Scalar]) -> None:
         if not fields:
-            raise ValueError("a record without fields")
+            raise ValueError("Record: needs at least one field")
         for kind in cast(Iterable[DataType[Value]], fields.values()):
             _check_sized(kind)
         name = f"STRUCT ({', '.join(f'{name}: {kind}' for name, kind in fields.items())})"
@@ -244,7 +253,9 @@ class Record(DataType[Mapping[str, Value]]):
 
     def encode(self, value: Mapping[str, Value]) -> bytes:
         if value.keys() != self.fields.keys():
-            raise ValueError(f"{self.name}: got values for {', '.join(value) or 'nothing'}")
+            raise ValueError(
+                f"{self.name}: needs every field, got values for {', '.join(value) or 'nothing'}"
+            )
         kinds = cast(Mapping[str, DataType[Value]], self.fields)
         return _packed(
             [(kind.bit_length, kind.encode(value[name])) for name, kind in kinds.items()]
@@ -260,19 +271,27 @@ class Record(DataType[Mapping[str, Value]]):
 
 
 def sized(kind: DataType[T], size: int) -> DataType[T]:
-    """A type of any length as one of `size` bytes: `sized(VISIBLE_STRING, 32)`."""
+    """Return a fixed-length variant of a type of any length: `sized(VISIBLE_STRING, 32)`.
+
+    Args:
+        kind: A type without a fixed length.
+        size: The length [bytes].
+
+    Raises:
+        ValueError: The type has a fixed length already, or `size` is less than 1.
+    """
     if kind.bit_length or size < 1:
-        raise ValueError(f"{kind} of {size} bytes")
+        raise ValueError(f"{kind} of {size} bytes: needs a type of any length and at least 1 byte")
     return replace(kind, name=f"{kind}({size})", bit_length=8 * size)
 
 
 def _check_sized(kind: DataType[T]) -> None:
     if not kind.bit_length:
-        raise ValueError(f"{kind} has no size of its own: give it one, sized({kind}, 32)")
+        raise ValueError(f"{kind} has no fixed size; use sized({kind}, 32)")
 
 
 def _packed(parts: Sequence[tuple[int, bytes]]) -> bytes:
-    """Values of some bits each, the first in the lowest bits."""
+    """Return the values as packed bits, the first in the lowest bits."""
     number = bit = 0
     for width, data in parts:
         number |= int.from_bytes(data, "little") << bit
@@ -337,16 +356,23 @@ _BY_NAME = {name: entry for entry in ALL for name in (entry.name, *entry.aliases
 
 
 def by_name(name: str) -> DataType[Value]:
-    """The type called so, in capitals or not, in PLC or CANopen words. ValueError if unknown."""
+    """Return the type with a PLC or CANopen name. Raises ValueError if the name is unknown.
+
+    The comparison ignores case.
+    """
     found = _BY_NAME.get(name.strip().upper())
     if found is None:
         known = ", ".join(entry.name for entry in ALL)
-        raise ValueError(f"unknown data type {name!r}; known are {known}")
+        raise ValueError(f"unknown data type {name!r}; known types: {known}")
     return cast(DataType[Value], found)
 
 
 def by_index(index: int) -> DataType[Value]:
-    """The type with this CoE index. ValueError if unknown (a structure, or a vendor's own)."""
+    """Return the type with this CoE index.
+
+    Raises:
+        ValueError: No base type has the index: it is a structure or a vendor's own type.
+    """
     found = _BY_INDEX.get(index)
     if found is None:
         raise ValueError(f"no base data type has the index 0x{index:04X}")

@@ -124,7 +124,7 @@ def test_frames_lost_on_nobodys_cable(segment: cat.Segment, main: cat.MainDevice
     [found] = after(segment, main, faults.lose_frames(20, every=4, way="back")).findings
     assert found.kind is Kind.MAIN
     assert found.evidence == (
-        "20 frames did not come back whole, and no device has seen a broken one"
+        "20 frames did not return undamaged, but no device has counted a broken one"
     )
 
 

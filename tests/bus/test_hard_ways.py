@@ -212,4 +212,4 @@ def test_a_port_behind_which_nobody_answers_is_noted() -> None:
         odd.core.poke(2, 0x0110, word.to_bytes(2, "little"))
         main.scan()
         [note] = main.notes
-    assert note.startswith("device 2 port 1 is open, but nobody answers behind it")
+    assert note.startswith("device 2 port 1 is open, but no device answers behind it")

@@ -164,7 +164,7 @@ def test_a_scan_is_refused_while_a_loop_runs() -> None:
         main.scan()
         with (
             main.attached(LaneRunner(Lane(main.link))),
-            pytest.raises(RuntimeError, match="while a loop runs"),
+            pytest.raises(RuntimeError, match="a loop runs on this MainDevice"),
         ):
             main.scan()
 

@@ -23,7 +23,7 @@ def test_number_is_decimal_or_hexadecimal(text: str, value: int) -> None:
 
 @pytest.mark.parametrize("text", ["", "1F", "0x", "1.5", "five"])
 def test_number_refuses_what_is_none(text: str) -> None:
-    with pytest.raises(argparse.ArgumentTypeError, match="no number"):
+    with pytest.raises(argparse.ArgumentTypeError, match="not a number"):
         number(text)
 
 
@@ -60,7 +60,7 @@ def test_seconds_are_positive_and_finite(text: str) -> None:
 
 def test_minutes_are_called_so() -> None:
     assert positive_minutes("0.5") == 0.5
-    with pytest.raises(argparse.ArgumentTypeError, match="no number of minutes"):
+    with pytest.raises(argparse.ArgumentTypeError, match="not a number of minutes"):
         positive_minutes("N")
 
 

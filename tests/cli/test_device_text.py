@@ -100,7 +100,7 @@ def test_a_list_that_was_cut_short_is_printed_with_a_note(
     status, out, err = call(f"sdo list {target} 0 --json", capsys)
     assert status == 0
     assert {0x1000, 0x1018} <= {row["index"] for row in json.loads(out)}
-    assert err.startswith("note: the list of objects was cut short: ")
+    assert err.startswith("note: the list of objects is truncated: ")
 
 
 @pytest.mark.parametrize(
@@ -129,7 +129,7 @@ def test_an_object_without_a_description_has_a_row_and_a_note(
     target = made(tmp_path, servo("mailbox_quirks = { malformed_descriptions = [0x1008] }"))
     _, out, err = call(f"sdo list {target} 0", capsys)
     assert re.search(r"^0x1008 +\(not described\)$", out, re.MULTILINE)
-    assert err.startswith("note: 0x1008 cannot be described: an answer of SDO information")
+    assert err.startswith("note: 0x1008 cannot be described: invalid SDO information")
     _, out, _ = call(f"sdo list {target} 0 --json", capsys)
     [row] = [row for row in json.loads(out) if row["index"] == 0x1008]
     assert (row["subindex"], row["problem"]) == (None, "not described")

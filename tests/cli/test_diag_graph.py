@@ -111,7 +111,7 @@ def test_graph_says_what_is_no_tree(
     segment.core.poke(2, 0x0110, open_too.to_bytes(2, "little"))
     found, out, _ = call("graph eth9", capsys)
     assert found == 1
-    assert "! device 2 port 1 is open, but nobody answers behind it" in out
+    assert "! device 2 port 1 is open, but no device answers behind it" in out
     assert call("diag eth9", capsys)[0] == 1
 
 

@@ -46,7 +46,7 @@ def test_text_has_a_line_for_each_device_with_its_cable() -> None:
 def test_text_shows_what_contradicts_itself() -> None:
     nodes = (Node("a", 0, "INIT", None, None), Node("b", 0, "INIT", None, None))
     text = as_text(Drawing("eth0", make_topology([LINE, LINE]), nodes))
-    assert text.splitlines()[-1].startswith("! device 1 port 1 is open, but nobody answers")
+    assert text.splitlines()[-1].startswith("! device 1 port 1 is open, but no device answers")
 
 
 def test_errors_in_a_few_words() -> None:

@@ -116,7 +116,7 @@ def test_categories_without_an_end_are_bounded_and_named(
     status, out, err = call("sii read eth9 1", capsys)
     assert status == 1
     assert out.splitlines()[-1] == "001000"
-    assert "no end mark: 4096 bytes are shown" in err
+    assert "no end mark: 4096 bytes are used" in err
 
 
 def test_another_products_image_needs_insisting(
@@ -142,7 +142,7 @@ def test_a_wrong_checksum_is_refused_whoever_insists(
     path.write_bytes(image)
     status, _, err = call(f"sii write eth9 1 {path} --force", capsys)
     assert status == 1
-    assert f"put 0x{checksum_of(bytes(image)):02X} into byte 14" in err
+    assert f"write 0x{checksum_of(bytes(image)):02X} to byte 14" in err
 
 
 def test_an_image_larger_than_the_eeprom_is_refused(
@@ -223,8 +223,8 @@ def test_a_file_that_is_not_an_image_is_named(
     status, out, err = call(f"sii show {path}", capsys)
     assert status == 1
     assert "cannot be read as an image" in out
-    assert "less than a header" in err
-    assert "not Intel hex" in err
+    assert "the header alone needs" in err
+    assert "convert Intel hex" in err
 
 
 def test_every_byte_that_differs_is_shown() -> None:
@@ -281,7 +281,7 @@ def test_real_images_are_shown_whole(shared_data: Path) -> None:
     [
         ("sii read virtual 6", 2, "the segment has 6"),
         ("sii write virtual 1 /nowhere.bin", 1, "/nowhere.bin: No such file"),
-        ("sii write virtual 1 /dev/null", 1, "0 bytes are less than a header"),
+        ("sii write virtual 1 /dev/null", 1, "0 bytes: the header alone needs"),
         ("sii show /nowhere.bin", 1, "/nowhere.bin: No such file"),
     ],
 )

@@ -120,7 +120,7 @@ def test_an_alias_that_another_device_will_have_is_refused_too(
     [
         ("state virtual OP -p 6", 2, "the segment has 6"),
         ("reg read virtual 6 AL_STATUS", 2, "the segment has 6"),
-        ("reg read virtual 2 alstatis", 2, "near it: AL status"),
+        ("reg read virtual 2 alstatis", 2, "similar names: AL status"),
         ("reg read virtual 2 alstatis", 2, "or give its address"),
         (
             "reg read virtual 2 UNKNOWN",
@@ -131,8 +131,8 @@ def test_an_alias_that_another_device_will_have_is_refused_too(
         ("reg read virtual 2 013A", 2, "write 0x013A"),
         ("reg read virtual 2 AL_STATUS 4", 2, "has 2 bytes, not 4"),
         ("reg read virtual 2 0xFFFF 2", 2, "outside 0x0000 to 0xFFFF"),
-        ("reg read virtual 2 0xF000 8", 1, "does not let 0xF000 to 0xF007 be read"),
-        ("reg write virtual 2 AL_STATUS 4", 1, "does not let 0x0130 to 0x0131 be written"),
+        ("reg read virtual 2 0xF000 8", 1, "0xF000 to 0xF007 cannot be read"),
+        ("reg write virtual 2 AL_STATUS 4", 1, "0x0130 to 0x0131 cannot be written"),
         ("reg write virtual 2 watchdog-divider 100000", 2, "does not fit into 2 bytes"),
         ("reg write virtual 2 0x0131 4", 2, "say --size"),
         ("reg write virtual 2 0x0131 '4 xy'", 2, "no pairs of hexadecimal digits"),

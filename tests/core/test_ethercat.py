@@ -19,5 +19,5 @@ def test_the_header_has_the_numbers_of_wire() -> None:
         "DATAGRAM_COUNTER": datagram.OVERHEAD - datagram.HEADER_SIZE,
         "AL_STATE": al.STATE_MASK,
         "AL_ERROR": al.ERROR_FLAG,
-        "AL_OP": al.State.OP,
+        "AL_OP": al.AlState.OP,
     }

@@ -51,7 +51,7 @@ def test_a_device_that_forwards_has_lost_its_address() -> None:
     topology = make_topology(line(4))
     [found] = judge_silence(topology, names(topology), [1])
     assert found.evidence == (
-        "it does not answer, and those behind it do: it has lost its station address"
+        "it does not answer, but the devices behind it do: it has lost its station address"
     )
 
 

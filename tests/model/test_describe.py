@@ -135,7 +135,7 @@ def test_a_mailbox_that_no_datagram_can_carry_is_left_out_with_a_note(size: int)
     assert device.mailbox is None
     assert device.notes == (
         f"its SII has a mailbox of {size} bytes at 0x1000 (16 to 1486 bytes from 0x1000 on are "
-        "possible): it is used without its mailbox",
+        "possible): the mailbox is not used",
     )
 
 

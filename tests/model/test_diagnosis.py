@@ -133,7 +133,7 @@ def test_marked_frames_that_nobody_owns_up_to_broke_before_the_device_in_front()
     [found] = judge(seen(line(5), {3: counted(p0=MARKED, processing_unit=14)}))
     assert found.kind is Kind.CABLE
     assert found.cable == Cable(1, 1, 2)
-    assert "marked as broken, and no device has counted where they broke" in found.evidence
+    assert "marked as broken, but no device has counted where they broke" in found.evidence
 
 
 def test_frames_marked_before_the_first_device() -> None:
@@ -167,7 +167,7 @@ def test_lost_frames_are_explained_by_a_cable() -> None:
 def test_a_port_with_nobody_behind_it_counts_too() -> None:
     [found] = judge(seen([LINE, LINE], {1: counted(p1=BROKEN)}))
     assert found.where == (
-        "the cable between device 1 (d1) port 1 and what is no device that answers"
+        "the cable between device 1 (d1) port 1 and something that does not answer"
     )
 
 

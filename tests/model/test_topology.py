@@ -70,7 +70,7 @@ def test_the_frame_comes_back_from_every_branch() -> None:
 
 def test_a_port_behind_which_nobody_answers_is_named() -> None:
     [only] = make_topology([LINE, LINE]).contradictions
-    assert only.startswith("device 1 port 1 is open, but nobody answers behind it")
+    assert only.startswith("device 1 port 1 is open, but no device answers behind it")
 
 
 def test_the_open_end_of_a_ring_is_the_second_interface() -> None:
@@ -93,22 +93,22 @@ def test_a_swapped_device_in_the_middle_is_named() -> None:
     # on the cable: 0, 2 with IN and OUT swapped, 1; the frame is worked on by 1 before 2
     [only] = make_topology([LINE, END, LINE]).contradictions
     assert only == (
-        "device 2 has no place: no open port is left for it; its IN and OUT are swapped: "
-        "devices behind it answer before it"
+        "device 2 has no place in the tree: no open port is left for it; its IN and OUT are "
+        "swapped: devices behind it answer before it"
     )
 
 
 def test_a_swapped_device_at_the_end_is_named() -> None:
     [only] = make_topology([LINE, SWAPPED_END]).contradictions
     assert only == (
-        "device 1 is entered by port 1, its port 0 is closed: its IN and OUT are swapped"
+        "frames enter device 1 by port 1, its port 0 is closed: its IN and OUT are swapped"
     )
 
 
 def test_more_devices_than_ports() -> None:
     [only] = make_topology([END, END]).contradictions
     assert only.startswith("device 1 has no place")
-    assert "look again" in only
+    assert "scan again" in only
 
 
 @st.composite

@@ -87,7 +87,7 @@ def test_a_port_that_cannot_be_closed_is_named_before_anything_is_measured() -> 
     ) as e:
         play(as_line(STATION, 1, seven()), controller)
     assert "processor" not in e.value.hint
-    assert "as a line" in e.value.hint
+    assert "use a line" in e.value.hint
     assert controller.seen[-1] == BEFORE
 
 

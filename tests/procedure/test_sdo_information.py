@@ -126,14 +126,14 @@ def test_fragments_without_an_end_are_cut_off_with_a_note() -> None:
     endless = [SdoInformation(Opcode.LIST_RESPONSE, b"\x01\x00" * 50, 7, True)] * 2000
     indices, note = play(read_object_list(channel()), answering(lambda _: endless))
     assert len(indices) > 10_000
-    assert note == "the list of objects was cut short: its fragments have no end"
+    assert note == "the list of objects is truncated: its fragments have no end"
 
 
 def test_of_fragments_that_stop_the_first_ones_are_kept() -> None:
     first = in_parts(Opcode.LIST_RESPONSE, ObjectList(ListType.ALL, (0x1000,) * 50).encode(), 10)
     indices, note = play(read_object_list(channel()), answering(lambda _: first[:3]))
     assert indices == (0x1000,) * 14
-    assert note.startswith("the list of objects was cut short: no answer to a COE message")
+    assert note.startswith("the list of objects is truncated: no answer to a COE message")
 
 
 def test_a_list_that_announces_fragments_by_their_number_alone() -> None:
@@ -151,7 +151,7 @@ def test_a_list_shorter_than_the_device_counts_has_a_note() -> None:
 
     indices, note = play(read_object_list(channel()), answering(short))
     assert indices == (0x1000,)
-    assert note == "the list of objects was cut short: 1 of 57 are in it"
+    assert note == "the list of objects is truncated: it contains 1 of 57"
 
 
 @pytest.mark.parametrize("data", [b"", b"\x01", b"\x00\x10\x01"])
@@ -196,7 +196,7 @@ def test_of_an_object_that_is_not_described_the_index_is_kept() -> None:
     assert [each.index for each in found] == list(range(0x1000, 0x100A))
     assert [each.index for each in found if not each.object_code] == [0x1003, 0x1005]
     assert len(notes) == 1
-    assert notes[0].startswith("0x1003, 0x1005 cannot be described: an answer of SDO information")
+    assert notes[0].startswith("0x1003, 0x1005 cannot be described: invalid SDO information")
 
 
 def test_after_three_failures_in_a_row_nothing_more_is_asked() -> None:
@@ -204,4 +204,4 @@ def test_after_three_failures_in_a_row_nothing_more_is_asked() -> None:
     found, notes = play(list_objects(channel()), device)
     assert len(found) == 10
     assert len(device.received) == 2 + 5
-    assert notes[-1] == "nothing more was asked after 3 failures in a row"
+    assert notes[-1] == "requests ended after 3 failures in a row"

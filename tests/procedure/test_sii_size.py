@@ -47,7 +47,7 @@ def test_the_header_says_it(main: cat.MainDevice) -> None:
 def test_a_header_that_claims_more_than_its_controller_addresses() -> None:
     extent = play(read_extent(STATION), eeprom(header(64) + b"\xff" * 1920))
     assert (extent.size, extent.limit) == (2048, 2048)
-    assert "its header says 8192 bytes" in extent.note
+    assert "its header specifies 8192 bytes" in extent.note
 
 
 def test_an_emulated_eeprom_does_not_begin_anew_though_it_shows_one_address_byte() -> None:

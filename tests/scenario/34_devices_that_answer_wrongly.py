@@ -71,13 +71,13 @@ def drip(request: bytes, right: Answers) -> Answers:
 
 MISDEEDS: list[tuple[Misdeed, type[CatenaryError] | None, str]] = [
     (twice, None, ""),
-    (of_another_protocol, ResponseTimeout, "of another kind instead"),
+    (of_another_protocol, ResponseTimeout, "other messages arrived"),
     (nothing, ResponseTimeout, "no answer to a COE message within 2 s"),
-    (cut_short, MailboxError, "a CoE message that is none"),
-    (about_something_else, ResponseTimeout, "of another kind instead"),
+    (cut_short, MailboxError, "invalid CoE message"),
+    (about_something_else, ResponseTimeout, "other messages arrived"),
     (noise, CatenaryError, "device 2"),
     (without_end, MailboxError, "announces 4294967295 bytes, the limit is"),
-    (drip, MailboxError, "against the protocol"),
+    (drip, MailboxError, "violates the protocol"),
 ]
 
 

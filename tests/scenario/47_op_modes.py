@@ -120,4 +120,4 @@ def test_a_ring_whose_port_cannot_be_closed_says_so() -> None:
         ):
             raise AssertionError("the delays of this ring cannot be measured")
         assert "processor" not in str(refused.value)
-        assert "as a line" in refused.value.hint
+        assert "use a line" in refused.value.hint

@@ -51,7 +51,7 @@ def test_a_segment_is_read(tmp_path: Path) -> None:
         ('[[device]]\nkind = "servo"\naxis = 2', "axis"),
         ('[[device]]\nkind = "motor"', "motor"),
         ('[[device]]\nkind = "servo"\naxes = "two"', r"device\[0\].axes"),
-        ('[[device]]\nkind = "servo"\naxes = 9', "1 to 8 axes"),
+        ('[[device]]\nkind = "servo"\naxes = 9', "axes must be 1 to 8"),
         ('[[device]]\nkind = "digital_outputs"\nbits = 17', "1 to 16 bits"),
         ('[[device]]\nkind = "servo"\ninertia = -1.0', "inertia"),
         ('[[device]]\nkind = "servo"\ncrystal = { ppm = 900.0 }', "at most 500 ppm"),
@@ -146,7 +146,7 @@ def test_faults_and_wiring_are_read(tmp_path: Path) -> None:
     [
         ('kind = "explode"', "explode"),
         ('kind = "power_cycle"', "device"),
-        ('kind = "power_cycle"\ndevice = 1', r"fault\[0\].*there is no device 1"),
+        ('kind = "power_cycle"\ndevice = 1', r"fault\[0\].*device 1 does not exist"),
         ('kind = "power_cycle"\ndevice = 0\nfor = -1.0', "for must be above 0"),
         ('kind = "power_cycle"\ndevice = 0\nfor_ = 1.0', "for_"),
         ('kind = "cut"\nbetween = [0, 2]', "not neighbours"),
@@ -168,7 +168,7 @@ def test_errors_of_faults_name_the_field(tmp_path: Path, text: str, says: str) -
     ("text", "says"),
     [
         ('kind = "servo"\nbehind = [0, 3]', "device 0 has no port 3"),
-        ('kind = "servo"\nbehind = [1, 1]', "can hang behind one of 0 to 0"),
+        ('kind = "servo"\nbehind = [1, 1]', "must be behind one of 0 to 0"),
         ('kind = "junction"\nport_count = 5', "port_count"),
     ],
 )

@@ -422,14 +422,14 @@ def test_more_faults_of_frames_than_there_is_room_for_miss() -> None:
 @pytest.mark.parametrize(
     ("fault", "says"),
     [
-        (power_cycle(5), "power_cycle: device: there is no device 5, the last one is 4"),
+        (power_cycle(5), "power_cycle: device: device 5 does not exist; the last one is 4"),
         (cut(between=(1, 3)), "cut: between: 1 and 3 are not neighbours"),
         (corrupt(between=(4, 5)), "between"),
         (mailbox_silent(0), "device 0, coupler, has no application"),
-        (drive_fault(1), "is no servo"),
+        (drive_fault(1), "is not a servo"),
         (drive_fault(2, axis=1), "axis"),
         (exchange(2, 2), "other"),
-        (exchange(2, 9), "other: there is no device 9"),
+        (exchange(2, 9), "other: device 9 does not exist"),
     ],
 )
 def test_a_fault_that_does_not_fit_names_the_field(fault: Fault, says: str) -> None:

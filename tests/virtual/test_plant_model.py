@@ -42,7 +42,7 @@ def test_a_urdf_is_a_model_without_its_meshes(tmp_path: Path) -> None:
 
 def test_a_urdf_that_collides_needs_its_meshes(tmp_path: Path) -> None:
     path = model(tmp_path, URDF, "two.urdf")
-    with pytest.raises(ConfigurationError, match=r"upper.stl is not there(.|\n)*contacts=False"):
+    with pytest.raises(ConfigurationError, match=r"upper.stl does not exist(.|\n)*contacts=False"):
         Plant(path)
 
 
@@ -79,10 +79,10 @@ def test_no_joints_named_takes_the_models_in_their_order(tmp_path: Path) -> None
     [
         ([Joint("shoulder"), Joint("elbwo")], (), "no joint 'elbwo'; its joints are sh"),
         ([Joint("shoulder"), Joint("shoulder")], (), "'shoulder' is used twice"),
-        ([Joint("shoulder")], (), r"no motor turns 'elbow'(.|\n)*passive=\['elbow'\]"),
+        ([Joint("shoulder")], (), r"'elbow' has no motor(.|\n)*passive=\['elbow'\]"),
         ([Joint("shoulder"), Joint("elbow")], ("elbow",), "'elbow' is used twice"),
         ([Joint("shoulder")], ("wrist",), "no joint 'wrist'"),
-        ([Joint("shoulder"), Joint("elbow", start=3.0)], (), "start at 3: it goes from -2 to 2"),
+        ([Joint("shoulder"), Joint("elbow", start=3.0)], (), "start at 3: its range is -2 to 2"),
     ],
 )  # fmt: skip
 def test_joints_that_do_not_match_name_those_there_are(
@@ -96,7 +96,7 @@ def test_joints_that_do_not_match_name_those_there_are(
     ("joints", "axes", "says"),
     [
         ([Joint("shoulder"), Joint("elbow")], 1, r"no axis for joint 'elbow'; .* \(1, 0\)"),
-        ([Joint("shoulder"), Joint("elbow")], 3, "2 joints are turned, but .* has 3 axes"),
+        ([Joint("shoulder"), Joint("elbow")], 3, "2 joints have motors, but .* has 3 axes"),
         ([Joint("shoulder", axis=(0, 0)), Joint("elbow")], 2, r"no axis \(0, 0\) for joint"),
         ([Joint("shoulder", axis=(1, 0)), Joint("elbow", axis=(1, 0))], 1, r"two joints .*1, 0"),
     ],
@@ -123,10 +123,10 @@ def test_axes_beside_the_model_keep_their_own_motors(tmp_path: Path) -> None:
     ("name", "text", "says"),
     [
         ("arm.xml", None, "No such file"),
-        ("arm.xml", "<mujoco><worldbody>", "is no XML"),
-        ("arm.xacro", "<html/>", r"<html> is neither MJCF(.|\n)*have to be expanded"),
-        ("arm.xml", "<mujoco><worldbody><body/><tendon/></worldbody></mujoco>", "MuJoCo refuses"),
-        ("arm.urdf", URDF.replace('<mass value="1"/>', '<mass value="0"/>'), "MuJoCo refuses"),
+        ("arm.xml", "<mujoco><worldbody>", "is not valid XML"),
+        ("arm.xacro", "<html/>", r"<html> is neither MJCF(.|\n)*expand xacro"),
+        ("arm.xml", "<mujoco><worldbody><body/><tendon/></worldbody></mujoco>", "MuJoCo rejects"),
+        ("arm.urdf", URDF.replace('<mass value="1"/>', '<mass value="0"/>'), "MuJoCo rejects"),
     ],
 )
 def test_files_that_are_no_models(tmp_path: Path, name: str, text: str | None, says: str) -> None:
@@ -138,7 +138,7 @@ def test_files_that_are_no_models(tmp_path: Path, name: str, text: str | None, s
 
 def test_bodies_that_begin_in_one_another_are_named(tmp_path: Path) -> None:
     path = model(tmp_path, TOUCHING)
-    with pytest.raises(ConfigurationError, match=r"'finger' and body 'world' begin 50.0 mm inside"):
+    with pytest.raises(ConfigurationError, match=r"'finger' and body 'world' overlap by 50.0 mm"):
         Plant(path)
     Plant(path, contacts=False)
     Plant(path, [Joint("grip", start=0.05)])  # just touching

@@ -87,7 +87,7 @@ def test_one_link_at_a_time() -> None:
 def test_a_device_stands_in_one_segment() -> None:
     coupler = Coupler()
     Segment([coupler])
-    with pytest.raises(ValueError, match="stands in a segment"):
+    with pytest.raises(ValueError, match="already in a segment"):
         Segment([coupler])
 
 

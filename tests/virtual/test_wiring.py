@@ -34,12 +34,12 @@ def test_branches_come_by_port_3_then_1_then_2() -> None:
     ("behind", "says"),
     [
         ({1: (0, 1), 2: (0, 3)}, r"order \[0, 2, 1\]"),
-        ({2: (0, 1)}, "port 1 of device 0 has device 1 already"),
+        ({2: (0, 1)}, "port 1 of device 0 is already connected to device 1"),
         ({2: (1, 3)}, "device 1 has no port 3"),
         ({2: (0, 0)}, "device 0 has no port 0"),
         ({1: (2, 1)}, "behind one of 0 to 0, not 2"),
-        ({5: (0, 1)}, "no device 5"),
-        ({0: (1, 1)}, "no device 0 that could hang elsewhere"),
+        ({5: (0, 1)}, "device 5 cannot be placed"),
+        ({0: (1, 1)}, "device 0 cannot be placed"),
     ],
 )
 def test_a_wrong_tree_is_explained(behind: dict[int, tuple[int, int]], says: str) -> None:

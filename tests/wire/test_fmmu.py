@@ -46,7 +46,7 @@ def test_refusals():
         decode_fmmu(bytes(15))
     with pytest.raises(ValueError, match="0 to 7"):
         Fmmu(0, 1, 0, 8, 0, 0).encode()
-    with pytest.raises(ValueError, match="at least one bit"):
+    with pytest.raises(ValueError, match="bit_length must be at least 1"):
         fmmu.bits(0, 0, 0)
     with pytest.raises(ValueError, match="FMMU"):
         Fmmu(1 << 32, 1, 0, 7, 0, 0).encode()

@@ -88,7 +88,7 @@ def test_alien_frames_are_named(data, reason):
 
 
 def test_a_frame_that_was_cut_off_is_refused():
-    with pytest.raises(DecodeError, match="says 28 bytes, 27 received"):
+    with pytest.raises(DecodeError, match="specifies 28 bytes, 27 received"):
         decode_frame(FRAME[:-1])
 
 

@@ -53,7 +53,7 @@ def test_any_bytes_give_a_value_or_decode_error(data):
     ("data", "reason"),
     [
         (GOLDEN[:5], "5 bytes, the header needs 6"),
-        (GOLDEN[:15], "says 10 bytes, 9 received"),
+        (GOLDEN[:15], "specifies 10 bytes, 9 received"),
         (GOLDEN[:5] + b"\x17" + GOLDEN[6:], "unknown protocol 7"),
     ],
 )
@@ -63,7 +63,7 @@ def test_refusals_say_why(data, reason):
 
 
 def test_what_does_not_fit_is_refused():
-    with pytest.raises(ValueError, match="the mailbox has 15"):
+    with pytest.raises(ValueError, match="exceeds the mailbox of 15"):
         decode_mailbox(GOLDEN).encode(15)
     with pytest.raises(ValueError, match="out of range"):
         Mailbox(Type.COE, b"", counter=8).encode()

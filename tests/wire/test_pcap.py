@@ -56,8 +56,8 @@ def test_a_cut_record_is_left_out_and_counted() -> None:
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
-        (b"", "magic number is missing"),
-        (b"\x0a\x0d\x0d\x0a", "magic number is 0a0d0d0a"),
+        (b"", "magic number missing"),
+        (b"\x0a\x0d\x0d\x0a", "magic number 0a0d0d0a"),
         (pcap()[:23], "23 bytes, the header needs 24"),
     ],
 )

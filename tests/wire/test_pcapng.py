@@ -104,13 +104,13 @@ def test_any_byte_wrong_gives_a_value_or_decode_error(place, byte):
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
-        (b"\x00" * 11, "11 bytes, no block fits"),
+        (b"\x00" * 11, "11 bytes, a block needs at least 12"),
         (b"\x01" * 12, "does not begin with a section header"),
-        (encode_header()[:20], "block at byte 0 says"),
-        (encode_header() + struct.pack("<III", 6, 13, 13), "says 13 bytes"),
+        (encode_header()[:20], "block at byte 0 has an invalid length"),
+        (encode_header() + struct.pack("<III", 6, 13, 13), "length of 13 bytes"),
         (encode_header()[:8] + b"abcd" + encode_header()[12:], "byte-order magic"),
         (encode_header()[:28] + encode_packet(Packet(0, b"")), "interface 0"),
-        (encode_header()[:-4] + bytes(4), "ends with another length"),
+        (encode_header()[:-4] + bytes(4), "has two different lengths"),
     ],
 )
 def test_refusals_say_why(data, reason):

@@ -26,9 +26,9 @@ def test_every_register_of_the_map_is_found_by_its_constant() -> None:
 
 
 def test_a_wrong_name_is_answered_with_near_ones() -> None:
-    with pytest.raises(ValueError, match="no register 'alstatis'; near it: AL status"):
+    with pytest.raises(ValueError, match="unknown register 'alstatis'; similar names: AL status"):
         by_name("alstatis")
-    with pytest.raises(ValueError, match=r"no register 'qqqqqqq'$"):
+    with pytest.raises(ValueError, match=r"unknown register 'qqqqqqq'$"):
         by_name("qqqqqqq")
 
 

@@ -17,9 +17,9 @@ from catenary.wire.register_text import _EXPLANATIONS, explain
     [
         ("AL_STATUS", b"\x08\x00", "OP"),
         ("AL_STATUS", b"\x14\x00", "SAFE-OP, with an error: see AL status code"),
-        ("AL_STATUS", b"\x00\x00", "no EtherCAT state: 0 (word 0x0000)"),
-        ("AL_CONTROL", b"\x12\x00", "PRE-OP asked for, the error acknowledged"),
-        ("SII_CONFIGURATION", b"\x01", "the EEPROM is the device's processor (PDI)'s"),
+        ("AL_STATUS", b"\x00\x00", "invalid EtherCAT state 0 (word 0x0000)"),
+        ("AL_CONTROL", b"\x12\x00", "PRE-OP requested, error acknowledged"),
+        ("SII_CONFIGURATION", b"\x01", "EEPROM assigned to the device's processor (PDI)"),
         ("SYSTEM_TIME_DIFFERENCE", b"\x05\x00\x00\x80", "-5 ns"),
         ("ACTIVATION", b"\x03", "CYCLIC_OPERATION, SYNC0"),
         ("sync manager 0", bytes(8), "off (0 bytes at 0x0000)"),

@@ -99,7 +99,7 @@ def test_is_filled_up_to_the_size_of_the_eeprom():
     image = Sii(Header(1, 2, 3)).encode(2048)
     assert len(image) == 2048
     assert set(image[128:]) == {0xFF}
-    with pytest.raises(ValueError, match="the EEPROM has 100"):
+    with pytest.raises(ValueError, match="exceed the EEPROM of 100"):
         Sii(Header(1, 2, 3)).encode(100)
 
 
@@ -119,8 +119,11 @@ def test_the_debugging_checksum_is_accepted_as_controllers_do():
     ("image", "reason"),
     [
         (IMAGE[:127], "127 bytes, the header needs 128"),
-        (IMAGE[:128] + b"\x0a\x00\xff\x7f", r"category 10 at byte 128 says 65534 bytes, 0 left"),
-        (IMAGE[:128] + b"\x0a\x00\x00", "a category's header needs 4 bytes, 3 left"),
+        (
+            IMAGE[:128] + b"\x0a\x00\xff\x7f",
+            r"category 10 at byte 128 specifies 65534 bytes, 0 left",
+        ),
+        (IMAGE[:128] + b"\x0a\x00\x00", "a category header needs 4 bytes, 3 left"),
         (IMAGE[:128] + bytes(0x10000), "more than 512 categories"),
         (IMAGE[:128] + bytes(0x20000), "at most 131072"),
         (IMAGE[:128] + bytes.fromhex("0a0001000505"), "string 1 at byte 1 does not fit"),

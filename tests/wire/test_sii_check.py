@@ -26,10 +26,10 @@ def test_a_good_image_is_not_objected_to() -> None:
 @pytest.mark.parametrize(
     ("image", "text"),
     [
-        (b"", "less than a header"),
-        (GOOD[:100], "100 bytes are less than a header, which has 128"),
-        (GOOD[:1001], "1001 bytes are no whole words"),
-        (bytes(0x20002), "more than any EEPROM has"),
+        (b"", "the header alone needs"),
+        (GOOD[:100], "100 bytes: the header alone needs 128"),
+        (GOOD[:1001], "1001 bytes: the length must be even"),
+        (bytes(0x20002), "an EEPROM has at most"),
         (spoiled(14, b"\x00"), "the checksum in word 7 is 0x0000"),
     ],
 )
@@ -42,8 +42,8 @@ def test_what_nobody_may_insist_on(image: bytes, text: str) -> None:
 @pytest.mark.parametrize(
     ("image", "text"),
     [
-        (GOOD + b"\xff\xff", "2050 bytes, but says of itself that the EEPROM has 2048"),
-        (spoiled(130, b"\xff\x7f"), "category 10 at byte 128 says 65534 bytes"),
+        (GOOD + b"\xff\xff", "2050 bytes, but its header specifies an EEPROM of 2048"),
+        (spoiled(130, b"\xff\x7f"), "category 10 at byte 128 specifies 65534 bytes"),
         (GOOD[:136], "the categories have no end mark"),
         (spoiled(128, bytes(1920)), "the categories have no end mark"),
     ],

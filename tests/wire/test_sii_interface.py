@@ -34,5 +34,5 @@ def test_every_word_is_a_value_or_decode_error(word):
     if word >> 8 & 7 in list(SiiCommand):
         assert ControlStatus.from_word(word).word == word & ~0x001E
     else:
-        with pytest.raises(DecodeError, match="no command"):
+        with pytest.raises(DecodeError, match="invalid command"):
             ControlStatus.from_word(word)

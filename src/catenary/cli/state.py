@@ -49,7 +49,7 @@ def add_parser(commands: Commands) -> None:
 
 
 def state_name(text: str) -> str:
-    """Return the name of a state in `wire.al.State`."""
+    """Return the name of a state in `wire.al.AlState`."""
     from catenary.wire.al import AlState
 
     try:

@@ -1,5 +1,8 @@
-"""The compiled cyclic core: frames, axes, hand-over, cycle, thread. It knows bytes, arrays and the
-tables of a CyclePlan, read by attribute; it imports nothing of catenary."""
+"""The compiled cyclic core: frames, axes, hand-over, cycle, thread.
+
+It works on bytes, arrays and the tables of a CyclePlan, which it reads by attribute. It imports no
+other part of catenary.
+"""
 
 from catenary.core._axes import (
     AXIS_DROPPED,

@@ -1,14 +1,14 @@
-"""Axes and columns: between process images and arrays; owned by Engine."""
+"""Axes and columns: conversion between process images and arrays. Owned by Engine."""
 
 from typing import Final
 
 # Bits of axis_flags; bits 6 and 7 hold the requested state in force (0 disabled, 1 enabled,
 # 2 quick stop, 3 reset).
-AXIS_FOLLOWED: Final[int]  # set-points are followed: enabled, in the requested mode, bit 12
-AXIS_LIMITED: Final[int]  # the set-point sent last was limited
+AXIS_FOLLOWED: Final[int]  # set-points are followed: enabled, requested mode in force, bit 12
+AXIS_LIMITED: Final[int]  # the last set-point sent was limited
 AXIS_DROPPED: Final[int]  # the core stopped the axis since the last request
-AXIS_REFUSED: Final[int]  # the target was NaN, infinite or further than the step limit
-AXIS_FALLBACK: Final[int]  # no set-point that counts, or on the way back to the set-points
+AXIS_REFUSED: Final[int]  # the target was NaN, infinite or beyond the step limit
+AXIS_FALLBACK: Final[int]  # without a valid set-point, or returning to the set-points
 AXIS_MODE_REFUSED: Final[int]  # the drive did not show the last requested mode
 
 class Axes:

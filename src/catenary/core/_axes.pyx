@@ -1,15 +1,15 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""Axes, columns and areas: between the bytes of the process images and arrays in SI units.
+"""Axes, columns and areas: conversion of process images (bytes) from and to arrays in SI units.
 
-Theory of operation. An axis is a slot of a CiA 402 drive; each quantity has the place that the plan
-states, or none. `axes_read` runs after the inputs of a cycle: bytes → actual values, position counters
-of any width unwrapped to 64 bits (`counts`, `last_raw`), then _guard.pyx judges the axis. `axes_write`
-runs before the outputs: orders (_guard.pyx), set-points (_setpoints.pyx), controlword, bytes. A number
-is written only if it differs from what is in the image (`put_t`). `axes_apply_late` corrects outputs
-that a law has computed for a stop that came later. `axes_tell` reports the axes after the frames.
-`told` collects the flags of the cycle, `handed_over` counts the cycles of a hand-over, and
-`stop_asked` counts stop requests of any thread. Areas are bytes of an image that the application has
-as they are: copied, never interpreted. _axes.pxd defines every word of an axis.
+Theory of operation. An axis is a slot of a CiA 402 drive. The plan states the place of each
+quantity, or that it is absent. `axes_read` runs after the inputs of a cycle. It decodes the actual
+values and unwraps position counters of any width to 64 bits (`counts`, `last_raw`); then _guard.pyx
+judges the axis. `axes_write` runs before the outputs: requests (_guard.pyx), set-points
+(_setpoints.pyx), controlword, bytes. A number is written only if it differs from the image (`put_t`).
+`axes_apply_late` applies late stop requests to outputs that a law has computed. `axes_tell` reports
+the axes after the frames. `told` collects the flags of the cycle, `handed_over` counts the cycles of a
+hand-over, and `stop_asked` counts stop requests of any thread. Areas are bytes of an image that the
+application uses unchanged: copied, never interpreted. _axes.pxd defines every word of an axis.
 
 Budget: 60 ns per axis and direction.
 """
@@ -63,24 +63,24 @@ AXIS_REFUSED = REFUSED
 AXIS_FALLBACK = FALLBACK
 AXIS_MODE_REFUSED = MODE_REFUSED
 
-STILL_NS = 5_000_000                   # at rest for this long: stopped
-BEYOND_NS = 20_000_000                 # CSV: outside a limit and leaving for this long: stop
-CLIMBING_NS = 10_000_000_000           # a request to enable lapses
-MUTE_NS = 1_000_000_000                # without bit 12: longer than a brake takes to open
-KEEP_NS = 10_000_000                   # CSP keeps its velocity in an underrun
-MODE_NS = 100_000_000                  # 0x6061 shows the requested mode
-GAP_NS = 10_000_000                    # bit 12 lost: the axis is given up
-STOP_NS = 50_000_000                   # a quick stop shows an effect
+STILL_NS = 5_000_000                   # at rest for this long: the axis has stopped
+BEYOND_NS = 20_000_000                 # CSV: stop an axis that is outside a limit and leaving for this long
+CLIMBING_NS = 10_000_000_000           # a request to enable expires
+MUTE_NS = 1_000_000_000                # missing bit 12; longer than a brake takes to open
+KEEP_NS = 10_000_000                   # in an underrun, CSP keeps its velocity for this long
+MODE_NS = 100_000_000                  # 0x6061 must show the requested mode within this time
+GAP_NS = 10_000_000                    # bit 12 lost for this long: the axis is stopped
+STOP_NS = 50_000_000                   # a quick stop must show an effect within this time
 STOP_TORQUE_NS = 20_000_000            # the same in CST
-CUT_NS = 20_000_000                    # disable operation shows an effect
-LATE_CYCLES = 3                        # least number of cycles of a late limit
+CUT_NS = 20_000_000                    # disable operation must show an effect within this time
+LATE_CYCLES = 3                        # minimum of a late limit
 ON_LOSS = {"quick_stop": 0, "disable": 1, "csp_hold": 2}
 
 
 # ---- inputs
 
 cdef inline void read_position(axis_t *a, const uint8_t *inputs, double elapsed) noexcept nogil:
-    """`elapsed` [s]: since it was read last."""
+    """Decode the position. `elapsed` [s]: time since the last reading."""
     cdef number_t *n = &a.actual_position
     cdef uint64_t raw
     cdef double before = a.position
@@ -90,7 +90,7 @@ cdef inline void read_position(axis_t *a, const uint8_t *inputs, double elapsed)
         raw = number_bits(n, inputs)
         if not a.known:
             a.counts = number_integer(n, inputs)
-        else:  # the shorter way round
+        else:  # the shorter direction
             a.counts += (<int64_t>((raw - a.last_raw) << n.right)) >> n.right
         a.last_raw = raw
         a.position = <double>a.counts * n.scale + n.offset
@@ -98,7 +98,7 @@ cdef inline void read_position(axis_t *a, const uint8_t *inputs, double elapsed)
         return
     if not a.known:
         a.velocity = 0.0
-    elif elapsed > 0:  # 0: the second collect of a cycle, when a law starts in an inline loop
+    elif elapsed > 0:  # 0: second collect of a cycle, when a law starts in an inline loop
         a.velocity = (a.position - before) / elapsed
 
 
@@ -160,8 +160,10 @@ cdef inline void read_areas(const axes_t *x, actual_t *out) noexcept nogil:
 
 
 cdef void axes_read(axes_t *x, actual_t *out, uint64_t number, int64_t instant) noexcept nogil:
-    """After collect of cycle `number`, whose instant is `instant` [ns]: the input image → the actual
-    values that a law computes with. `axes_tell` follows, when there is time."""
+    """Decode the input image into the actual values of cycle `number`, after its collect.
+
+    `instant`: its cycle start [ns]. `axes_tell` follows later, in the post-processing.
+    """
     cdef const uint8_t *inputs = x.image.inputs
     cdef axis_t *a
     cdef uint32_t i
@@ -183,7 +185,7 @@ cdef void axes_read(axes_t *x, actual_t *out, uint64_t number, int64_t instant) 
 
 
 cdef void axes_tell(axes_t *x, actual_t *out) noexcept nogil:
-    """Beside the values of `axes_read`: how the axes stand, and what was sent to them last."""
+    """Report the state of the axes and what was sent last, next to the values of `axes_read`."""
     cdef const axis_t *a
     cdef uint32_t i
     x.moving = 0
@@ -209,8 +211,7 @@ cdef void axes_tell(axes_t *x, actual_t *out) noexcept nogil:
 # ---- outputs
 
 cdef inline bint takes(put_t *put, double value) noexcept nogil:
-    """Whether it is another one. Most set-points of most cycles stand in the image already: those of
-    the other modes."""
+    """Store a value; return True if it changed. Most set-points do not: those of other modes."""
     if value == put.value:
         return False
     put.value = value
@@ -237,7 +238,7 @@ cdef inline void write_axis(axis_t *a, uint8_t *outputs, uint16_t controlword) n
 
 
 cdef inline void lead_axis(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil:
-    """The controlword towards its goal, and the set-points as they are commanded."""
+    """Send the controlword towards the requested state, and the commanded set-points."""
     write_axis(a, x.image.outputs, guard_controlword(x, a, bits))
 
 
@@ -252,7 +253,7 @@ cdef inline bint apply_stop(axes_t *x) noexcept nogil:
 
 
 cdef void write_columns(axes_t *x, const target_t *t) noexcept nogil:
-    """A column that is not finite keeps what was sent last."""
+    """Write the columns. A column that is not finite keeps its last value."""
     cdef const column_t *c
     cdef uint32_t k
     for k in range(x.output_count):
@@ -278,8 +279,9 @@ cdef inline void write_areas(axes_t *x, const target_t *t) noexcept nogil:
 
 
 cdef void write_velocity_offsets(axes_t *x) noexcept nogil:
-    """After the columns: while an axis does not follow its set-points, 0x60B1 is the velocity of
-    its command."""
+    """Write 0x60B1 after the columns. While an axis does not follow its set-points, 0x60B1 is the
+    velocity of its command.
+    """
     cdef axis_t *a
     cdef uint32_t i
     for i in range(x.axis_count):
@@ -295,13 +297,15 @@ cdef void write_velocity_offsets(axes_t *x) noexcept nogil:
 
 
 cdef inline bint update_counts(const target_t *t, uint64_t number, uint32_t timeout) noexcept nogil:
-    """Return True if the last update of a program in the background counts in cycle `number`."""
+    """Return True if the last update of a background program is still valid in cycle `number`."""
     return t.header.updated > 0 and number <= t.header.updated + timeout
 
 
 cdef void axes_write(axes_t *x, const target_t *target, bint fresh, uint64_t number) noexcept nogil:
-    """Write the committed targets, as far as they count, into the output image of cycle `number`.
-    `fresh`: they were committed since the last cycle."""
+    """Write the valid part of the committed targets into the output image of cycle `number`.
+
+    `fresh`: the targets were committed since the last cycle.
+    """
     cdef axis_t *a
     cdef uint32_t i
     x.number = number
@@ -332,7 +336,7 @@ cdef void axes_write(axes_t *x, const target_t *target, bint fresh, uint64_t num
 
 
 cdef void axes_hand_over(axes_t *x) noexcept nogil:
-    """The source of the set-points changes: commands return to the new ones without a jump."""
+    """Change the source of the set-points: commands return to the new ones without a jump."""
     cdef uint32_t i
     for i in range(x.axis_count):
         x.axes[i].returning = x.axes[i].accepted > 0
@@ -343,9 +347,12 @@ cdef inline bint removes_power(const target_t *target, uint32_t i) noexcept nogi
 
 
 cdef bint axes_apply_late(axes_t *x, const target_t *target, bint fresh) noexcept nogil:
-    """Apply late stop requests to outputs that a law has computed: stops and, where orders are
-    fresh, requested states that remove power, and control bits of axes that work. What gives power
-    or resets waits for the next write, set-points and all. Return True if outputs may differ."""
+    """Apply late stop requests to outputs that a law has computed.
+
+    These are stops and, if the orders are fresh, requested states that remove power and control
+    bits of axes that work. Requests that give power or reset wait for the next write, with their
+    set-points. Return True if outputs may differ.
+    """
     cdef axis_t *a
     cdef uint32_t i
     if apply_stop(x):
@@ -367,10 +374,10 @@ cdef bint axes_apply_late(axes_t *x, const target_t *target, bint fresh) noexcep
 cdef inline void follow(target_t *target, uint32_t i, bint followed, uint64_t since,
                         double commanded_position, double commanded_velocity,
                         double commanded_torque) noexcept nogil:
-    """Set the target of an axis that is not followed to what is sent to it.
+    """Set the target of an axis that is not followed to the value that is sent to it.
 
-    An axis that has become followed since the last commit starts from what is commanded: what was
-    written before cannot have been meant for it. Its torque stays: the axis was enabled with it.
+    An axis that has become followed since the last commit starts from the commanded value, because
+    earlier targets cannot be meant for it. Its torque stays: the axis was enabled with it.
     """
     if not followed:
         target.position[i] = commanded_position
@@ -383,9 +390,12 @@ cdef inline void follow(target_t *target, uint32_t i, bint followed, uint64_t si
 
 cdef inline void follow_update(const axes_t *x, const actual_t *actual, target_t *target, uint32_t i,
                                double velocity, double torque) noexcept nogil:
-    """The same, in the background: velocity and torque stay while the last update counts, which may
-    enable the axis. Afterwards they are what is commanded, so that a later update of another axis
-    does not revive them."""
+    """Set the target as `follow` does, for a program in the background.
+
+    Velocity and torque stay while the last update is valid, because it may enable the axis.
+    Afterwards they are the commanded values, so that a later update of another axis does not revive
+    them.
+    """
     cdef uint64_t number = actual.header.number
     cdef uint8_t quantity = quantity_of(target.mode[i])
     if quantity == VELOCITY:
@@ -415,7 +425,7 @@ cdef void axes_follow(const axes_t *x, const actual_t *actual, target_t *target)
 
 
 cdef void axes_follow_now(const axes_t *x, target_t *target) noexcept nogil:
-    """Adapt a law's targets to how the axes are now."""
+    """Adapt a law's targets to the present state of the axes."""
     cdef const axis_t *a
     cdef uint32_t i
     for i in range(x.axis_count):
@@ -425,10 +435,10 @@ cdef void axes_follow_now(const axes_t *x, target_t *target) noexcept nogil:
                a.commanded_velocity, a.commanded_torque)
 
 
-# ---- the edge
+# ---- Python interface
 
 def finite_or(value, double absent, where, *, positive=True):
-    """A limit as a float; None: `absent`."""
+    """Return a limit as a float; None: `absent`."""
     if value is None:
         return absent
     if not isfinite(value) or (positive and value <= 0):
@@ -437,7 +447,7 @@ def finite_or(value, double absent, where, *, positive=True):
 
 
 def cycles_of(duration_ns, period_ns, where):
-    """Whole cycles that last at least so long; 0 stays 0: off."""
+    """Return the number of cycles that last at least `duration_ns`; 0 stays 0 (off)."""
     if not 0 <= duration_ns < 1 << 62:
         raise ValueError(f"{where}: {duration_ns}")
     return min(-(-duration_ns // period_ns), 0x7FFFFFFF)

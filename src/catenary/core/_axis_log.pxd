@@ -20,7 +20,7 @@ cdef struct axis_record_t:     # as AXIS_FIELDS
 
 cdef struct axis_log_t:
     uint8_t *rows              # NULL: axes are not logged
-    uint64_t mask              # number of rows less one; a power of two less one
+    uint64_t mask              # number of rows minus one, a power of two minus one
     uint32_t axes
     uint32_t row_size
 

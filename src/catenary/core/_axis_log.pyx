@@ -2,9 +2,9 @@
 """Values of every axis in every logged cycle: a ring of rows in the locked memory of the log.
 
 A row is the number of its cycle, then one axis_record_t for each axis. The writer clears the number,
-writes the records and stores the number again (release). A reader copies a row that has its number
-before and after the copy; else the row is not of that cycle, or no longer. `rows` NULL: no axis is
-logged. Budget: 10 ns for each axis.
+writes the records and stores the number again (release). A reader copies a row and checks that the
+number is the same before and after the copy; otherwise the row belongs to another cycle. `rows` NULL:
+no axis is logged. Budget: 10 ns for each axis.
 """
 
 from libc.stdint cimport uint8_t, uint32_t, uint64_t
@@ -66,7 +66,8 @@ cdef void axis_log_put(axis_log_t *log, uint64_t number, const actual_t *actual,
 
 
 cdef bytes axis_log_row(const axis_log_t *log, uint64_t number):
-    """Return the records of a cycle: empty if axes are not logged, None if the row is not of it."""
+    """Return the records of a cycle: empty if axes are not logged, None if the row was
+    overwritten."""
     cdef uint8_t *row
     cdef uint64_t *stamp
     if log.rows == NULL:

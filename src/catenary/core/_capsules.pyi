@@ -1,1 +1,1 @@
-"""Tables that come in capsules; private to the core."""
+"""C tables passed in capsules; private to the core."""

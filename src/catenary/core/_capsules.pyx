@@ -1,5 +1,5 @@
 # cython: boundscheck=False, wraparound=False
-"""Tables that come in capsules: checked once, before the cycle uses them."""
+"""C tables passed in capsules, checked once before the cycle uses them."""
 
 from cpython.pycapsule cimport PyCapsule_GetPointer
 
@@ -17,7 +17,7 @@ from catenary.core._native cimport (
 
 
 cdef const cat_link *link_in(object capsule) except NULL:
-    """Return the link table of a capsule, after a check of its version."""
+    """Return the link table of a capsule; check its version."""
     cdef const cat_link *link = <const cat_link *>PyCapsule_GetPointer(capsule, CAT_LINK_CAPSULE)
     if link.version != CAT_LINK_VERSION:
         raise ValueError(f"link: table version {link.version}, expected {CAT_LINK_VERSION}")
@@ -25,7 +25,7 @@ cdef const cat_link *link_in(object capsule) except NULL:
 
 
 cdef cat_image *image_in(object capsule, plan) except NULL:
-    """Return the image table of a capsule, after a check that it was made for this plan."""
+    """Return the image table of a capsule; check that it was made for this plan."""
     cdef cat_image *image = <cat_image *>PyCapsule_GetPointer(capsule, CAT_IMAGE_CAPSULE)
     if image.version != CAT_IMAGE_VERSION:
         raise ValueError(f"image: table version {image.version}, expected {CAT_IMAGE_VERSION}")
@@ -39,7 +39,7 @@ cdef cat_image *image_in(object capsule, plan) except NULL:
 
 
 cdef const cat_sink *sink_in(object capsule, tuple sizes) except NULL:
-    """Return the sink table of a capsule, after a check of its block sizes [bytes]."""
+    """Return the sink table of a capsule; check its block sizes [bytes]."""
     cdef const cat_sink *sink = <const cat_sink *>PyCapsule_GetPointer(capsule, CAT_SINK_CAPSULE)
     if sink.version != CAT_SINK_VERSION:
         raise ValueError(f"sink table of version {sink.version}, not {CAT_SINK_VERSION}")

@@ -1,8 +1,8 @@
 # cython: boundscheck=False, wraparound=False
-"""The CiA 402 step, IEC 61800-7-201 §6: statusword → state, (state, goal) → controlword.
+"""CiA 402, IEC 61800-7-201 §6: statusword → state, (state, requested state) → controlword.
 
-Two table look-ups, a few nanoseconds an axis. It decides nothing else: when a goal drops and which
-set-points count is _axes' matter.
+Two table look-ups, a few nanoseconds per axis. _guard.pyx decides when a requested state ends and
+_setpoints.pyx which set-points are valid.
 """
 
 from libc.stdint cimport uint8_t, uint16_t
@@ -25,18 +25,18 @@ CODING = (
 )
 
 COMMANDS = (
-    # towards disabled, enabled, quick stop, reset; transitions of IEC 61800-7-201 figure 5
-    (0x00, 0x00, 0x00, 0x00),  # not ready to switch on: left by the drive itself
+    # for disabled, enabled, quick stop, reset; transitions of IEC 61800-7-201 figure 5
+    (0x00, 0x00, 0x00, 0x00),  # not ready to switch on: the drive leaves it by itself
     (0x00, 0x06, 0x00, 0x00),  # switch on disabled: stays, 2, stays, stays
     (0x06, 0x07, 0x02, 0x06),  # ready to switch on: stays, 3, 7, stays
     (0x06, 0x0F, 0x02, 0x06),  # switched on: 6, 4, 10, 6
     (0x07, 0x0F, 0x02, 0x07),  # operation enabled: 5 (ramp of 0x605C), stays, 11 (0x605A), 5
     (0x00, 0x00, 0x02, 0x00),  # quick stop active: 12, 12 (16 would move at once), stays, 12
-    (0x00, 0x00, 0x00, 0x00),  # fault reaction active: left by the drive itself
+    (0x00, 0x00, 0x00, 0x00),  # fault reaction active: the drive leaves it by itself
     (0x00, 0x80, 0x00, 0x80),  # fault: stays (and prepares the edge of bit 7), 15, stays, 15
 )
 
-cdef uint8_t[128] STATE_OF  # only the low seven bits of the statusword count
+cdef uint8_t[128] STATE_OF  # only the low seven bits of the statusword are used
 cdef uint8_t[8][4] COMMAND_OF
 
 
@@ -50,7 +50,7 @@ cdef uint16_t cia402_command(uint8_t state, uint8_t goal, uint16_t previous) noe
         return 0
     command = COMMAND_OF[state][goal]
     if command == FAULT_RESET and previous & 0x0F:
-        return 0  # the drive fell into the fault enabled: its commands are cleared first
+        return 0  # fault of an enabled drive: clear its commands first
     return command
 
 

@@ -1,47 +1,60 @@
-"""The cycle and the distributed clocks. `plan` is a catenary.plan.ClockPlan, read by attribute;
-ValueError names what cannot be."""
+"""Distributed clocks of a cycle.
+
+`plan` is a catenary.plan.ClockPlan, read by attribute. ValueError names an invalid field.
+"""
 
 class PhaseController:
-    """The phase controller alone: errors in, corrections out."""
+    """Phase controller: phase errors in, corrections of the cycle start out."""
 
     def __init__(self, plan: object, period_ns: int) -> None: ...
     def step(self, error_ns: int | None) -> int:
-        """What the next instant moves by [ns], for the error of the last one (within half a period
-        of 0; positive: late); None: no answer in this cycle."""
+        """Return the shift of the next cycle start [ns].
+
+        Args:
+            error_ns: Phase error of the last cycle start [ns], within half a period of 0; positive:
+                late. None: no answer in this cycle.
+        """
 
     @property
     def drift(self) -> float:
-        """By which periods differ lastingly [ns]."""
+        """Lasting difference between the periods [ns]."""
     @property
     def bandwidth(self) -> float: ...
     @property
     def jumps(self) -> int:
-        """How often the clock has jumped."""
+        """Number of jumps of the reference clock."""
 
 class Clock:
-    """Owns what a cycle knows of distributed clocks: `Engine.clock`."""
+    """Owner of the distributed clocks of a cycle: `Engine.clock`."""
 
     def __init__(self, plan: object, period_ns: int) -> None: ...
     def figures(self) -> dict[str, float]:
-        """locked, bound (in force), following (in phase or on the way), time (system time of the
-        reference, the last one), time_sent (link's time, when the frame left that brought it),
-        error, mean_error, worst_error (of the instants' phase; where the reference follows: its
-        own), rate (of the reference against the link's clock, a share), samples, missed, silent
-        (cycles without the reference, in all and in a row), holding (its time is kept here),
-        ignored (samples beyond any drift), jumps. Times in ns."""
+        """Return the figures of the clocks; times in ns.
+
+        locked; bound (in force); following (True: in phase). time: last system time of the
+        reference; time_sent: when the frame that read it left, on the link's clock. error,
+        mean_error, worst_error: phase error of the cycle starts, or of the reference if it follows.
+        rate: of the reference relative to the link's clock, as a ratio. samples. missed, silent:
+            cycles without the reference,
+        in total and in a row. holding: the core continues its time. ignored: samples larger than
+        any drift. jumps.
+        """
 
     def differences(self) -> list[tuple[float, int, int, int]]:
-        """Per follower (0x092C, local minus reference): mean, last, largest magnitude [ns], reads."""
+        """Return (mean, last, largest magnitude, reads) of each follower [ns].
+
+        The difference is 0x092C, local minus reference.
+        """
 
     def reset_figures(self) -> None:
-        """Forgets the largest magnitudes."""
+        """Forget the largest magnitudes."""
 
     def keep_within(self, bound_ns: int) -> None:
-        """The bound of differences and phase from now on."""
+        """Set the bound of differences and phase."""
 
     def set_epoch(self, epoch_ns: int) -> None:
-        """System time minus the link's time, before `start`."""
+        """Set system time minus link time. Call it before `start`."""
 
     @property
     def changes(self) -> int:
-        """How often the clocks came together or apart; reading it ends CYCLE_CLOCKS."""
+        """Number of times the clocks were locked or unlocked. Reading it clears CYCLE_CLOCKS."""

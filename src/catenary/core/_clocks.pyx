@@ -1,15 +1,15 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""The cycle and the distributed clocks: the time in the frame, the phase of the instants, the watch.
+"""Distributed clocks in the cycle: time in the frames, phase of the cycle starts, supervision.
 
-Every frame that leaves is stamped; what the reference clock said as it passed gives the phase of the
-instant it belonged to. A PI controller of rising inertia turns phase errors into longer or shorter
-periods (docs/clocks.md explains its gains); plan/clocks.py has the numbers. Where the clocks follow
-the MainDevice, the instants are set into phase once and stay on their grid.
-Its twin in Python: tests/core/phase_twin.py. Budget: 60 ns a cycle.
+Every frame is stamped when it leaves. The time that the reference clock put into it gives the phase of
+its cycle start. A PI controller of rising inertia turns phase errors into longer or shorter periods
+(docs/clocks.md explains its gains); plan/clocks.py has the numbers. If the clocks follow the
+MainDevice, the cycle starts are set into phase once and stay on their grid.
+Its twin in Python: tests/core/phase_twin.py. Budget: 60 ns per cycle.
 
-A reference that does not answer is not asked any more: a device that was switched off comes back
-with another time, and must not spread it. All others then take the time the frame carries, which is
-kept here; now and then the reference is read, and leads again once it says the same.
+A reference that does not answer is no longer read in each frame: a device that was switched off
+returns with another time, which must not spread. All other clocks then follow the time in the frame,
+which the core continues. The reference is probed now and then, and leads again once its time agrees.
 """
 
 from libc.math cimport fabs
@@ -19,21 +19,21 @@ from catenary.core._memory cimport cat_memory_free, memory_take
 from catenary.core._native cimport CAT_FPRD, CAT_FRMW
 
 cdef enum:
-    HOLD = 2                   # an answer tells of an instant that was fixed two cycles before
-    REJECTED_MAX = 8           # errors beyond `step` in a row: the clock has jumped
-    SILENT_MAX = 16            # cycles without the reference before its time is kept here
+    HOLD = 2                   # an answer belongs to a cycle start that was fixed two cycles before
+    REJECTED_MAX = 8           # errors beyond `step` in a row that mean a jump of the clock
+    SILENT_MAX = 16            # cycles without the reference until the core continues its time
     PROBED = 0xFFFFFFFF
-    PROBE_EVERY = 8            # cycles, while its time is kept
-    ADP = 2                    # in a datagram's header
+    PROBE_EVERY = 8            # cycles between two probes of a lost reference
+    ADP = 2                    # offset in a datagram's header
     ADO = 4
     DATA = 10
-    NOBODY = 0xFFFF            # IgH's too; 0 is the address of whoever was just switched on
+    NOBODY = 0xFFFF            # as in IgH; 0 is the address of a device just switched on
     SYSTEM_TIME = 0x0910
     DIFFERENCE = 0x092C
-    SETTLE = 16                # cycles within the bound, besides a round of all followers
+    SETTLE = 16                # cycles within the bound, in addition to one round of all followers
 
 cdef double FIRST_BANDWIDTH = 1.0 / 16
-cdef double SLOWING = 0.25     # the time constant grows by so many cycles a cycle
+cdef double SLOWING = 0.25     # growth of the time constant per cycle [cycles]
 cdef double MEAN_SHARE = 1.0 / 16
 cdef double DIFFERENCE_SHARE = 1.0 / 8
 
@@ -45,7 +45,7 @@ cdef inline double bounded(double value, double limit) noexcept nogil:
 
 
 cdef inline int64_t wrapped(int64_t value, int64_t period) noexcept nogil:
-    """Into ± half a period."""
+    """Return the value wrapped into ± half a period."""
     value %= period
     if value >= period - period // 2:
         value -= period
@@ -55,7 +55,7 @@ cdef inline int64_t wrapped(int64_t value, int64_t period) noexcept nogil:
 
 
 cdef int64_t moved(phase_t *p, double by) noexcept nogil:
-    """Whole nanoseconds of a correction; the rest waits."""
+    """Return the whole nanoseconds of a correction; keep the remainder."""
     cdef int64_t whole
     by += p.residue
     whole = <int64_t>by
@@ -64,12 +64,12 @@ cdef int64_t moved(phase_t *p, double by) noexcept nogil:
 
 
 cdef int64_t phase_coast(phase_t *p) noexcept nogil:
-    """A cycle without an answer: the drift found so far goes on."""
+    """Continue the drift found so far in a cycle without an answer."""
     return moved(p, p.drift) if p.state == FOLLOWING else 0
 
 
 cdef int64_t phase_seek(phase_t *p, int64_t error) noexcept nogil:
-    """Sets the instants into phase at once, forward: none comes early."""
+    """Set the cycle starts into phase at once, only forward: none is early."""
     p.state = FOLLOWING
     p.hold = HOLD
     p.rejected = 0
@@ -79,11 +79,13 @@ cdef int64_t phase_seek(phase_t *p, int64_t error) noexcept nogil:
 
 
 cdef int64_t phase_step(phase_t *p, int64_t error) noexcept nogil:
-    """What to move the next instant by, for an error within ± half a period (positive: late).
+    """Return the shift of the next cycle start for an error within ± half a period (positive:
+    late).
 
-    Single errors beyond `step` are strays. After some in a row the clock has jumped; that is made up
-    for within the limit of the rate, about as fast as the other clocks can: an instant that jumped
-    too would put the frames behind the SYNC signals of those on their way."""
+    Single errors beyond `step` are outliers. Several in a row mean that the clock has jumped. The
+    jump is corrected within the rate limit, about as fast as the other clocks follow. Cycle starts
+    that jumped too would put the frames after the SYNC signals of clocks that still follow.
+    """
     cdef double wanted, applied, gain
     if p.state == SEEKING:
         return phase_seek(p, error)
@@ -101,7 +103,7 @@ cdef int64_t phase_step(phase_t *p, int64_t error) noexcept nogil:
     p.mean += (error - p.mean) * MEAN_SHARE
     wanted = p.drift - 2 * p.bandwidth * error
     applied = bounded(wanted, p.rate_limit)
-    if applied == wanted or (wanted > 0) == (error > 0):  # no wind-up: nothing further outwards
+    if applied == wanted or (wanted > 0) == (error > 0):  # anti-windup: integrate only inwards
         gain = p.bandwidth * p.bandwidth
         p.drift = bounded(p.drift - gain * error, p.drift_limit)
     p.bandwidth = p.bandwidth / (1 + SLOWING * p.bandwidth)
@@ -129,7 +131,7 @@ cdef inline void put16(uint8_t *field, uint16_t value) noexcept nogil:
 
 
 cdef inline int64_t expected_time(const clock_t *k, int64_t now) noexcept nogil:
-    """What the reference will say to a frame that leaves now, at the rate that was found."""
+    """Return the reference time expected for a frame that leaves now, at the estimated rate."""
     cdef int64_t since
     if k.follows_main or k.samples == 0:
         return now + k.epoch
@@ -138,7 +140,7 @@ cdef inline int64_t expected_time(const clock_t *k, int64_t now) noexcept nogil:
 
 
 cdef void ask(clock_t *k) noexcept nogil:
-    """Whose difference the frame brings; while the reference is gone, now and then its time."""
+    """Select the follower that the frame reads; sometimes a lost reference instead."""
     if k.holding and k.silent % PROBE_EVERY == 0:
         k.asked = PROBED
         put16(k.watch_header + ADP, k.reference)
@@ -151,8 +153,9 @@ cdef void ask(clock_t *k) noexcept nogil:
 
 
 cdef void clock_emit(clock_t *k, int64_t now) noexcept nogil:
-    """Right before the frame leaves. For devices that find no reference before them it carries
-    what the reference is expected to say: they go on as they are."""
+    """Write the time into the frame right before it leaves. Devices without a reference before them
+    receive the expected reference time, so that they continue undisturbed.
+    """
     k.payload = <uint32_t>expected_time(k, now)
     put32(k.time_header + DATA, k.payload)
     put16(k.time_header + ADP, NOBODY if k.holding else k.reference)
@@ -169,7 +172,7 @@ cdef void take_time(clock_t *k, const uint8_t *data, uint16_t counter) noexcept 
     cdef uint32_t low = word32(data)
     cdef int64_t expected = expected_time(k, k.sent)
     if k.holding or counter == 0 or (low == k.payload and counter != k.listeners):
-        return  # untouched: others took what we sent
+        return  # untouched: the other devices received our own time
     k.time = expected + <int32_t>(low - <uint32_t>expected)
     k.time_sent = k.sent
     k.samples += 1
@@ -177,7 +180,7 @@ cdef void take_time(clock_t *k, const uint8_t *data, uint16_t counter) noexcept 
 
 
 cdef void take_probe(clock_t *k, uint32_t low) noexcept nogil:
-    """The reference answers again, and its time goes with ours: it leads."""
+    """Let the reference lead again if it answers and its time agrees with ours."""
     cdef int32_t error = <int32_t>(low - k.payload)
     if -k.phase.step <= error <= k.phase.step:
         k.holding = 0
@@ -185,8 +188,9 @@ cdef void take_probe(clock_t *k, uint32_t low) noexcept nogil:
 
 
 cdef void take_difference(clock_t *k, const uint8_t *data, uint16_t counter) noexcept nogil:
-    """0x092C is sign-magnitude. A device that does not answer keeps its last one: its process data
-    tells of it."""
+    """Store a difference. 0x092C is sign-magnitude. A device that does not answer keeps its last
+    one: its process data reports the loss.
+    """
     cdef follower_t *f
     cdef uint32_t raw = word32(data)
     cdef int32_t value = <int32_t>(raw & 0x7FFFFFFF)
@@ -213,7 +217,7 @@ cdef void take_difference(clock_t *k, const uint8_t *data, uint16_t counter) noe
 
 cdef void clock_take(clock_t *k, uint8_t command, const uint8_t *data,
                      uint16_t counter) noexcept nogil:
-    """One datagram of the frame that came back; the frame may be shown again."""
+    """Evaluate one datagram of a returned frame. The same frame may be passed again."""
     if not k.awaited:
         return
     if command == CAT_FRMW:
@@ -225,7 +229,7 @@ cdef void clock_take(clock_t *k, uint8_t command, const uint8_t *data,
 # ---- the end of a cycle's input
 
 cdef int64_t follow_reference(clock_t *k) noexcept nogil:
-    """The error of the instant, not of the frame: how late it left after its instant is known."""
+    """Return the error of the cycle start, not of the frame: its delay after the start is known."""
     cdef int64_t at_instant
     if not k.sampled:
         return phase_coast(&k.phase)
@@ -235,7 +239,7 @@ cdef int64_t follow_reference(clock_t *k) noexcept nogil:
 
 
 cdef int64_t lead_reference(clock_t *k) noexcept nogil:
-    """The instants are set into phase with our own time; the error is the reference's."""
+    """Set the cycle starts into phase with our own time; the error is that of the reference."""
     if k.sampled:
         if k.phase.hold:
             k.phase.hold -= 1
@@ -248,7 +252,7 @@ cdef int64_t lead_reference(clock_t *k) noexcept nogil:
 
 
 cdef void take_bound(clock_t *k) noexcept nogil:
-    """Another bound: what has been read is judged anew."""
+    """Apply a new bound: evaluate all differences again."""
     cdef uint32_t i
     k.bound = k.bound_asked
     k.outside = 0
@@ -262,7 +266,7 @@ cdef void take_bound(clock_t *k) noexcept nogil:
 
 
 cdef void watch(clock_t *k) noexcept nogil:
-    """Whether all is within the bound: for a while, before it counts; at once, when it is left."""
+    """Update `locked`: set after some time within the bound, cleared at once outside it."""
     cdef bint good = (k.phase.state == FOLLOWING and k.phase.hold == 0 and k.samples > 0
                       and k.silent < SILENT_MAX and k.outside == 0
                       and fabs(k.phase.mean) <= k.bound)
@@ -279,7 +283,7 @@ cdef void watch(clock_t *k) noexcept nogil:
 
 
 cdef int64_t clock_close(clock_t *k) noexcept nogil:
-    """After the frames of a cycle have been looked for: what to move the next instant by [ns]."""
+    """Return the shift of the next cycle start [ns], after the frames of a cycle were collected."""
     cdef int64_t move, magnitude
     if k.sent == 0:
         return 0
@@ -302,7 +306,7 @@ cdef int64_t clock_close(clock_t *k) noexcept nogil:
     return move
 
 
-# ---- the edge
+# ---- Python interface
 
 cdef set_phase(phase_t *p, plan, int64_t period_ns):
     if not (0 < plan.bandwidth <= 0.25 and 0 <= plan.rate_limit_ns <= 0.1 * period_ns
@@ -316,14 +320,14 @@ cdef set_phase(phase_t *p, plan, int64_t period_ns):
 
 
 cdef class PhaseController:
-    """The controller alone, for tests beside its twin."""
+    """The phase controller alone, for tests against its twin."""
     cdef phase_t c
 
     def __cinit__(self, plan, int64_t period_ns):
         set_phase(&self.c, plan, period_ns)
 
     def step(self, error_ns):
-        """What the next instant moves by [ns]; None: a cycle without an answer."""
+        """Return the shift of the next cycle start [ns]; None: a cycle without an answer."""
         return phase_coast(&self.c) if error_ns is None else phase_step(&self.c, error_ns)
 
     @property
@@ -361,7 +365,7 @@ cdef class Clock:
         self.c.outside = self.c.follower_count
 
     def figures(self):
-        """The state, as numbers; times in ns."""
+        """Return the figures as numbers; times in ns."""
         cdef clock_t *k = &self.c
         return {
             "locked": bool(k.locked),
@@ -382,7 +386,7 @@ cdef class Clock:
         }
 
     def differences(self):
-        """(mean, last, largest magnitude, reads) of every follower [ns]."""
+        """Return (mean, last, largest magnitude, reads) of every follower [ns]."""
         cdef uint32_t i
         return [
             (self.c.followers[i].mean, self.c.followers[i].last, self.c.followers[i].worst,
@@ -406,7 +410,7 @@ cdef class Clock:
 
     @property
     def changes(self):
-        """How often the clocks were locked or unlocked; reading it acknowledges them."""
+        """Number of times the clocks were locked or unlocked; reading it acknowledges them."""
         self.c.acknowledged = self.c.changes
         return self.c.changes
 

@@ -25,17 +25,17 @@ cdef enum:  # phases
     IN_CONTROLLER = 7
     OUTPUT_DELAY = 8
     INPUT_AGE = 9
-    INTERPRETER = 10           # written by Python's thread
+    INTERPRETER = 10           # written by the thread of Python
     PHASES = 11
 
 cdef enum:
-    LOG_MARGIN = 24            # the writer is not overtaken while the log is copied
+    LOG_MARGIN = 24            # safety distance to the writer while the log is copied
 
 cdef struct record_t:
     uint64_t number
     int64_t scheduled_ns
     int64_t wake_ns
-    int32_t period_ns          # phases: -1 where unknown
+    int32_t period_ns          # phases; -1: unknown
     int32_t lateness_ns
     int32_t receive_ns
     int32_t process_ns
@@ -59,31 +59,31 @@ cdef struct cycle_t:
     lane_t *lane
     handover_t *handover
     clock_t *clock             # NULL: no distributed clocks
-    law_t *law                 # NULL: none runs
-    cat_law_monitor monitor    # of all laws that this cycle runs
-    cat_pointer law_request    # of a law_t; CAT_POINTER_NONE: stop the law. Claimed: `law`
-    cat_pointer stream         # of a stream_t; none: the application or the law sets the set-points
+    law_t *law                 # NULL: no law runs
+    cat_law_monitor monitor    # monitor of all laws of this cycle
+    cat_pointer law_request    # law_t; CAT_POINTER_NONE: stop the law. Claimed: `law`
+    cat_pointer stream         # stream_t; none: the application or the law sets the set-points
     const cat_sink *sink       # NULL: none
     int execution
-    bint patient               # a cycle may begin at any time within its period: engines in turns
+    bint patient               # a cycle may begin at any time within its period: several engines in one thread
     int64_t period
-    int64_t busy_wait          # before each cycle start
-    int64_t collect_deadline   # after the wake-up
-    int64_t law_reserve        # of the period, for the law and the post-processing
-    int64_t sync_margin        # from the cycle start to the frames, at most, with clocks
+    int64_t busy_wait          # busy-wait time before each cycle start
+    int64_t collect_deadline   # time after the wake-up
+    int64_t law_reserve        # part of the period for the law and the post-processing
+    int64_t sync_margin        # with clocks: maximum time from the cycle start to the frames
     uint32_t lost_limit
     int64_t origin             # the first cycle start
-    int64_t next               # cycle start to wait for
+    int64_t next               # next cycle start
     int64_t scheduled          # cycle start of this cycle
     int64_t wake
-    int64_t interval           # since the last one; -1: none
-    int64_t usable             # when Python had the inputs; 0: not known
+    int64_t interval           # time since the last cycle start; -1: none
+    int64_t usable             # when Python had the inputs; 0: unknown
     int64_t sent               # when the last cyclic frame was handed to the kernel
-    int64_t turnaround         # wake-up → last frame seen, of the last whole cycle
+    int64_t turnaround         # wake-up → last frame seen, of the last complete cycle
     int64_t process            # of this cycle; -1: no application
-    int64_t input_age          # of this cycle; -1: not known
+    int64_t input_age          # of this cycle; -1: unknown
     uint64_t number
-    uint32_t skipped           # cycle starts before this cycle
+    uint32_t skipped           # number of cycle starts skipped before this cycle
     uint32_t lost_in_row
     uint32_t flags
     int missing
@@ -92,13 +92,13 @@ cdef struct cycle_t:
     bint kept                  # a commit of the application waits for the end of a law
     uint64_t lost
     uint64_t late
-    uint64_t missed_sync       # cycles whose frames left later than sync_margin
+    uint64_t missed_sync       # number of cycles that sent frames later than sync_margin
     uint64_t uncommitted
-    uint64_t underruns         # cycles for which the stream was empty
-    uint64_t begun             # wake-ups since the start: the first has no period
+    uint64_t underruns         # number of cycles that found the stream empty
+    uint64_t begun             # number of wake-ups since the start; the first has no period
     record_t *records
-    uint64_t records_mask      # number of records less one; a power of two less one
-    axis_log_t axis_log        # as many rows; written with the actual values
+    uint64_t records_mask      # number of records minus one, a power of two minus one
+    axis_log_t axis_log        # same number of rows; written with the actual values
     histogram_t *histograms    # PHASES of them; exchanged by Python (acquire, release)
 
 cdef void cycle_start(cycle_t *c, int64_t origin) noexcept nogil

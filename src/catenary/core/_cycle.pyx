@@ -1,5 +1,5 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""One cycle in its two execution modes, and the cycle starts that it keeps.
+"""One cycle in its two execution modes, and its cycle starts.
 
 Theory of operation.
 
@@ -7,18 +7,18 @@ Theory of operation.
     threaded, law   wait, apply late stop requests, send, collect, law, compute outputs, publish
     inline          wait, collect (never blocks), [Python], compute outputs, send
 
-`cycle_native` is one threaded cycle, with or without a law; an inline loop runs it in its caller's
+`cycle_native` is one threaded cycle, with or without a law. An inline loop runs it in its caller's
 thread while a law runs. A law computes after the frames of its cycle are back, for the next cycle
-(`computed`): from input to output it has one period, as Python has, and its frames leave at the cycle
-start. Its first step follows the collect of the cycle in which it was requested, its last targets are
-sent in the cycle after its last step. Requests of the application that come meanwhile count one cycle
-later, except for stops, requested states that remove power, and control bits (`axes_apply_late`).
+(`computed`). Like Python, it has one period from input to output, and its frames leave at the cycle
+start. Its first step follows the collect of the cycle in which it was requested. Its last targets are
+sent in the cycle after its last step. Requests of the application during a law apply one cycle later,
+except for stops, requested states that remove power, and control bits (`axes_apply_late`).
 
 In virtual time all modes run in the caller's thread. Cycle starts are origin + k·period. A cycle that
-begins late is sent if its frames can be back before the next cycle start (`turnaround`), with a law
-before its reserve; otherwise it is skipped and counted, never made up for by a burst. Inline, a body
-that ends after the next cycle start skips that one: its frames cannot be back yet. With clocks, frames
-that leave later than the margin before SYNC0 are sent and counted (`missed_sync`).
+begins late is sent if its frames can return before the next cycle start (`turnaround`), with a law
+before its reserve. Otherwise it is skipped and counted; no burst makes up for it. Inline, a body
+that ends after the next cycle start skips that one: its frames cannot return in time. With clocks,
+frames that leave later than the margin before SYNC0 are sent and counted (`missed_sync`).
 
 Phases. receive: inputs usable, from the wake-up (inline) or from the last frame (threaded). process:
 the body of the application, or the law. send: wake-up → last cyclic frame handed to the kernel
@@ -151,7 +151,7 @@ cdef inline record_t *record_of(cycle_t *c) noexcept nogil:
 
 
 cdef void clear_next_record(cycle_t *c) noexcept nogil:
-    """Clear the record of the next cycle after this one, not at its head."""
+    """Clear the record of the next cycle in advance, not at the start of that cycle."""
     cdef record_t *record = &c.records[(c.number + 1) & c.records_mask]
     memset(record, 0, sizeof(record_t))
     record.period_ns = -1
@@ -171,8 +171,10 @@ cdef inline int32_t short_ns(int64_t value) noexcept nogil:
 # ---- cycle starts
 
 cdef bint skip_missed(cycle_t *c, int64_t present) noexcept nogil:
-    """Skip the cycles that cannot be collected before their next cycle start, and inline the one
-    that would begin before its frames can be back. Return True if the one that is left lies ahead."""
+    """Skip the cycles that cannot be collected before their next cycle start. Inline, also skip the
+    cycle that would begin before its frames can return. Return True if the remaining one lies
+    ahead.
+    """
     cdef int64_t late = present - c.next
     cdef int64_t reserve = c.law_reserve if c.law != NULL else 0
     cdef int64_t missed
@@ -194,7 +196,8 @@ cdef bint skip_missed(cycle_t *c, int64_t present) noexcept nogil:
 
 
 cdef int cycle_wait(cycle_t *c) noexcept nogil:
-    """Wait for the next cycle start and begin its cycle. 0; -EINTR: call again; or -errno."""
+    """Wait for the next cycle start and begin its cycle. Return 0; -EINTR: call again; or
+    -errno."""
     cdef int64_t present
     cdef int rc
     skip_missed(c, now(c))
@@ -215,7 +218,8 @@ cdef int cycle_wait(cycle_t *c) noexcept nogil:
 
 cdef void cycle_await_lane(cycle_t *c, int64_t until) noexcept nogil:
     """threaded: take acyclic frames as they arrive, so that the next request leaves with the next
-    cycle. An inline loop collects them at the next cycle start."""
+    cycle. An inline loop collects them at the next cycle start.
+    """
     if c.execution != THREADED:
         return
     while c.lane.under_way > 0 and now(c) < until:
@@ -225,7 +229,7 @@ cdef void cycle_await_lane(cycle_t *c, int64_t until) noexcept nogil:
 
 
 cdef void begin(cycle_t *c, int64_t wake) noexcept nogil:
-    """Only what the frames need; figures follow in the post-processing."""
+    """Begin a cycle with what the frames need; figures follow in the post-processing."""
     cdef record_t *record
     c.number += 1
     c.scheduled = c.next
@@ -251,7 +255,7 @@ cdef void begin(cycle_t *c, int64_t wake) noexcept nogil:
 # ---- halves
 
 cdef void collect(cycle_t *c, actual_t *actual, int64_t deadline) noexcept nogil:
-    """The half after the wire: frames → images → actual values."""
+    """Run the half of a cycle after the wire: frames → images → actual values."""
     cdef int rc = c.image.collect(c.image.self, deadline)
     c.missing = rc if rc >= 0 else -1
     c.outstanding = 0
@@ -261,7 +265,7 @@ cdef void collect(cycle_t *c, actual_t *actual, int64_t deadline) noexcept nogil
 
 
 cdef inline void follow_clock(cycle_t *c) noexcept nogil:
-    """After the frames of a cycle and before the next are stamped."""
+    """Adjust the cycle start after the frames of a cycle, before the next ones are stamped."""
     if c.clock != NULL:
         c.next += clock_close(c.clock)
         if c.clock.changes != c.clock.acknowledged:
@@ -282,7 +286,7 @@ cdef inline void judge(cycle_t *c) noexcept nogil:
 
 
 cdef void tell(cycle_t *c, actual_t *actual, const target_t *target) noexcept nogil:
-    """Report the cycle besides its values: axes, header, log, sticky flags."""
+    """Report the cycle in addition to its values: axes, header, log, sticky flags."""
     cdef actual_header_t *header = actual.header
     cdef record_t *record = record_of(c)
     cdef uint32_t unit
@@ -315,8 +319,9 @@ cdef void tell(cycle_t *c, actual_t *actual, const target_t *target) noexcept no
 
 
 cdef void send(cycle_t *c) noexcept nogil:
-    """Send the output image. A frame that could not go is counted by the image and is missing at
-    collect."""
+    """Send the output image. A frame that could not be sent is counted by the image and is missing
+    at collect.
+    """
     cdef record_t *record = record_of(c)
     if c.clock != NULL:
         c.clock.scheduled = c.scheduled
@@ -330,7 +335,8 @@ cdef void send(cycle_t *c) noexcept nogil:
 
 cdef bint take_streamed(cycle_t *c, target_t *target, bint fresh, uint64_t number) noexcept nogil:
     """Take the next row of the stream for the outputs of cycle `number`. Return True for fresh
-    set-points; an empty stream is an underrun, a closed one hands over."""
+    set-points. An empty stream is an underrun; a closed one hands over.
+    """
     cdef stream_t *stream
     if not cat_pointer_is_offered(&c.stream):
         if target.header.streamed and not fresh:
@@ -356,8 +362,9 @@ cdef bint take_streamed(cycle_t *c, target_t *target, bint fresh, uint64_t numbe
 
 cdef int64_t give(cycle_t *c, record_t *record, int64_t since, const actual_t *actual,
                   const target_t *target) noexcept nogil:
-    """Give the cycle to the sink; return what the post-processing took. The sink's own time cannot
-    be in what it is given."""
+    """Pass the cycle to the sink; return the duration of the post-processing without the sink,
+    whose own time cannot be part of the data it receives.
+    """
     record.tail_ns = short_ns(now(c) - since)
     c.sink.put(c.sink.self, c.number, record, actual.header, target.header)
     return now(c) - since
@@ -365,7 +372,7 @@ cdef int64_t give(cycle_t *c, record_t *record, int64_t since, const actual_t *a
 
 cdef void post_process(cycle_t *c, int64_t since, const actual_t *actual,
                        const target_t *target) noexcept nogil:
-    """Acyclic frames; then the figures of the cycle, and the sink."""
+    """Run the post-processing: acyclic frames, then the figures of the cycle, then the sink."""
     cdef record_t *record
     cdef histogram_t *h = <histogram_t *>cat_load_acquire_pointer(<void **>&c.histograms)
     cdef int64_t took
@@ -401,14 +408,16 @@ cdef void post_process(cycle_t *c, int64_t since, const actual_t *actual,
 # ---- laws
 
 cdef int64_t cycle_law_reserve(const cycle_t *c, int64_t budget) noexcept nogil:
-    """Return the part of the period that a law and the post-processing need; 0: the default
-    budget."""
+    """Return the part of the period reserved for a law and the post-processing; 0: the default
+    budget.
+    """
     return (budget if budget > 0 else c.period * 2 // 5) + c.period // 20
 
 
 cdef void end_law(cycle_t *c, uint32_t status) noexcept nogil:
-    """Hand over: what was committed before the law counts no longer. `status` RUNNING: the law has
-    ended itself, its last targets are still to be sent."""
+    """Hand over: targets committed before the law are no longer valid. `status` RUNNING: the law
+    has ended by itself and its last targets are still to be sent.
+    """
     if c.law == NULL:
         return
     c.handover.target[c.handover.target_triple.front].header.hold = 1
@@ -420,14 +429,14 @@ cdef void end_law(cycle_t *c, uint32_t status) noexcept nogil:
 
 
 cdef void forget_law(cycle_t *c) noexcept nogil:
-    """The last access: from here on the engine may free the law."""
+    """Access the law for the last time: afterwards the engine may free it."""
     c.law = NULL
     law_monitor_park(&c.monitor)
     cat_pointer_release(&c.law_request)
 
 
 cdef void take_law(cycle_t *c, const target_t *orders) noexcept nogil:
-    """Start the requested law, or end the one that runs. It begins from what is commanded."""
+    """Start the requested law, or end the running one. It begins from the commanded values."""
     cdef target_t *target = &c.handover.target[OF_LAW]
     cdef void *requested
     cdef uint32_t i
@@ -450,7 +459,8 @@ cdef void take_law(cycle_t *c, const target_t *orders) noexcept nogil:
 
 cdef void take_orders(cycle_t *c, const target_t *committed) noexcept nogil:
     """Copy what the application may request while a law computes: states, modes, control bits, and
-    bytes of areas, which a law does not have."""
+    bytes of areas, which a law cannot access.
+    """
     cdef target_t *target = &c.handover.target[OF_LAW]
     cdef uint32_t axes = c.handover.counts.axes
     memcpy(target.request, committed.request, axes * sizeof(uint32_t))
@@ -461,7 +471,7 @@ cdef void take_orders(cycle_t *c, const target_t *committed) noexcept nogil:
 
 
 cdef bint step_law(cycle_t *c, actual_t *actual, target_t *target) noexcept nogil:
-    """Run one step of the law. Return False if what it left in the targets must not be sent."""
+    """Run one step of the law. Return False if the targets it left must not be sent."""
     cdef law_t *law = c.law
     cdef int64_t since = now(c)
     cdef bint goes_on
@@ -490,7 +500,7 @@ cdef bint step_law(cycle_t *c, actual_t *actual, target_t *target) noexcept nogi
 
 
 cdef void compute_next(cycle_t *c, actual_t *actual, target_t *target) noexcept nogil:
-    """The law's part of a cycle: one step, and the outputs of the next cycle."""
+    """Run a law's part of a cycle: one step, and the outputs of the next cycle."""
     cdef bint fresh = step_law(c, actual, target)
     axes_write(c.axes, target, fresh, c.number + 1)
     if c.image.fill != NULL:
@@ -505,8 +515,9 @@ cdef void compute_next(cycle_t *c, actual_t *actual, target_t *target) noexcept 
 # ---- execution modes
 
 cdef void cycle_start(cycle_t *c, int64_t origin) noexcept nogil:
-    """Set the first cycle start: one period from now, or on the grid of `origin`; after a stop the
-    old grid goes on."""
+    """Set the first cycle start: one period from now, or on the grid of `origin`. After a stop the
+    old grid continues.
+    """
     cdef int64_t present = now(c)
     if c.origin == 0:
         c.origin = origin if origin > 0 else present + c.period
@@ -525,7 +536,8 @@ cdef void cycle_start(cycle_t *c, int64_t origin) noexcept nogil:
 
 
 cdef void write_committed(cycle_t *c, target_t *committed, bint fresh) noexcept nogil:
-    """The outputs of a cycle without a law: the targets that the application has committed."""
+    """Write the outputs of a cycle without a law: the targets that the application has
+    committed."""
     if fresh:
         c.process = committed.header.process_ns
         c.input_age = committed.header.input_age_ns
@@ -538,7 +550,7 @@ cdef void write_committed(cycle_t *c, target_t *committed, bint fresh) noexcept 
 
 
 cdef void note_return(cycle_t *c) noexcept nogil:
-    """After a collect with a deadline: how long the frames took."""
+    """Note after a collect with a deadline how long the frames took."""
     cdef int64_t seen = c.image.frame_stamp[0]
     if c.missing == 0:
         record_of(c).round_trip_ns = short_ns(seen - c.sent)
@@ -546,14 +558,14 @@ cdef void note_return(cycle_t *c) noexcept nogil:
 
 
 cdef void cycle_native(cycle_t *c) noexcept nogil:
-    """One threaded cycle after the wait."""
+    """Run one threaded cycle after the wait."""
     cdef bint fresh
     cdef target_t *committed = handover_latch(c.handover, &fresh)
     cdef target_t *target = committed
     cdef actual_t *actual = &c.handover.actual[c.handover.actual_triple.back]
     cdef int64_t reserve = c.law_reserve if c.law != NULL else 0
     cdef int64_t published
-    if c.outstanding:  # of an inline cycle before
+    if c.outstanding:  # left by an inline cycle
         c.image.collect(c.image.self, 0)
         axes_read(c.axes, actual, c.number, c.scheduled)
     fresh = fresh or c.kept
@@ -588,27 +600,27 @@ cdef void cycle_native(cycle_t *c) noexcept nogil:
 
 
 cdef bint cycle_wants_native(cycle_t *c) noexcept nogil:
-    """inline: return True if the next cycle is a law's."""
+    """inline: return True if the next cycle runs a law."""
     if c.law != NULL or c.computed:
         return True
     return cat_pointer_is_offered(&c.law_request)
 
 
 cdef void cycle_inputs(cycle_t *c, actual_t *actual) noexcept nogil:
-    """inline, after the wait."""
+    """inline: read the inputs after the wait."""
     collect(c, actual, 0)
     tell(c, actual, &c.handover.target[PRIVATE])
 
 
 cdef void cycle_usable(cycle_t *c) noexcept nogil:
-    """inline: from here on Python works with the inputs."""
+    """inline: note that Python can use the inputs from here on."""
     c.usable = now(c)
     c.input_age = c.usable - c.sent
     record_of(c).receive_ns = short_ns(c.usable - c.wake)
 
 
 cdef void cycle_outputs(cycle_t *c, target_t *target, bint application) noexcept nogil:
-    """inline, after Python's body; `application` False: a hand-over."""
+    """inline: send after the body of Python; `application` False: a hand-over."""
     cdef int64_t done = now(c)
     cdef actual_t *actual = &c.handover.actual[PRIVATE]
     target.header.seen = c.number

@@ -15,41 +15,41 @@ from catenary.core._thread cimport cat_scheduling, thread_t
 cdef struct engine_t:
     cycle_t cycle
     thread_t thread
-    int error                  # why the native thread ended by itself
-    uint32_t done              # it has ended
+    int error                  # reason why the native thread ended by itself
+    uint32_t done              # the native thread has ended
 
 cdef class Engine:
     cdef engine_t e
     cdef handover_t *h
-    cdef Frames frames         # None: the image table came from outside
+    cdef Frames frames         # None: an external image table is used
     cdef cat_image *image
     cdef const cat_link *link
-    cdef tuple owners          # of the two tables
+    cdef tuple owners          # owners of the two tables
     cdef Lane lane
     cdef Axes axes
     cdef readonly Clock clock  # None: no distributed clocks
     cdef Handover handover
     cdef dict _buffers
-    cdef bint virtual          # the link's time is virtual: everything in the caller's thread
+    cdef bint virtual          # the link's time is virtual: everything runs in the caller's thread
     cdef uint16_t device_count
     cdef bint alone            # no other program shares the virtual time: waits keep the GIL
     cdef Figures figures
-    cdef Law law               # runs, or its end has not been seen yet; None: Python says the targets
-    cdef list laws             # those the cycle may know
-    cdef Stream stream         # says the set-points; None: Python or the law does
-    cdef list streams          # those the cycle may know
+    cdef Law law               # running, or its end has not been seen yet; None: Python sets the targets
+    cdef list laws             # laws that the cycle may still use
+    cdef Stream stream         # sets the set-points; None: Python or the law does
+    cdef list streams          # streams that the cycle may still use
     cdef cat_scheduling scheduling_before
     cdef bint saved_scheduling
     cdef bint native           # the cycle runs in its own thread
     cdef bint running
     cdef bint forgotten        # this is a forked child: the cycle is the parent's
-    cdef bint committed        # the targets of the next step are on their way already
-    cdef bint writing          # another thread writes the targets: they stay as it leaves them
-    cdef uint64_t writing_since  # the cycle that it sees
-    cdef bint emitted          # inline: the frames of this cycle are on their way
-    cdef object sink           # keeps what is given the cycles alive
-    cdef int64_t left          # when `next` returned [ns]; -1: no application since
-    cdef int64_t input_age     # at that time [ns]
+    cdef bint committed        # the targets of the next step are committed already
+    cdef bint writing          # another thread writes the targets: do not change them
+    cdef uint64_t writing_since  # number of the cycle that this thread sees
+    cdef bint emitted          # inline: the frames of this cycle were sent
+    cdef object sink           # keeps the sink's capsule alive
+    cdef int64_t left          # when `next` returned [ns]; -1: no application since then
+    cdef int64_t input_age     # age of the inputs at that time [ns]
     cdef int64_t zero          # cycle start of the first iteration, on the link's clock; 0: none yet
 
     cdef not_running(self)

@@ -1,14 +1,15 @@
-"""Engine: owns everything that a cyclic exchange needs, and is its only entry from Python."""
+"""Engine: owns all parts of a cyclic exchange and is its only entry from Python."""
 
 from catenary.core._clocks import Clock
 from catenary.core._law import Law
 from catenary.core._stream import Stream
 
 class Engine:
-    """Owner of one cyclic exchange: frames, buffers, acyclic queue, histograms and, in the threaded
-    mode, its native thread. Only the thread that iterates may call `next`, `run`, `spend` and
-    `run_until_stopped`, and write the target buffers. The acyclic queue has one thread of its own.
-    On a link in virtual time both modes run in the caller's thread.
+    """Owner of one cyclic exchange: frames, buffers, acyclic queue, histograms, native thread.
+
+    Only the thread that iterates may call `next`, `run`, `spend` and `run_until_stopped`, and write
+    the target buffers. The acyclic queue has one thread of its own. The threaded mode has a native
+    thread. On a link in virtual time both modes run in the caller's thread.
 
     Args:
         plan: a catenary.plan.CyclePlan, read by attribute.
@@ -23,100 +24,136 @@ class Engine:
     def __init__(self, plan: object, link: object, image: object = None) -> None: ...
     @property
     def buffers(self) -> dict[str, memoryview]:
-        """The private buffers, one per name of plan.request.Views, typed ("d", "q", "I", "H", "b",
-        "B"), for `numpy.asarray`. Read-only: actual_position, actual_velocity, actual_torque,
-        statusword, mode_actual, axis_state, axis_flags, input_reals, input_integers, input_bits,
-        input_bytes, and unit_valid ("B"), unit_counter ("H") per sync unit. Writable: target_position,
-        target_velocity, target_torque, mode_target, goal, request, controlword_bits,
-        output_reals, output_integers, output_bits, output_bytes.
+        """Return the private buffers, one per name of plan.request.Views.
 
-        A quantity no object is mapped for reads NaN (velocity: estimated from the position).
-        A goal is taken over when `request` of its axis has changed: goal[i] = 1; request[i] += 1.
+        They are typed ("d", "q", "I", "H", "b", "B"), for `numpy.asarray`. Read-only:
+        actual_position, actual_velocity, actual_torque, statusword, mode_actual, axis_state,
+        axis_flags, input_reals, input_integers, input_bits, input_bytes, and unit_valid ("B"),
+        unit_counter ("H") per sync unit. Writable: target_position, target_velocity, target_torque,
+        mode_target, goal, request, controlword_bits, output_reals, output_integers, output_bits,
+        output_bytes.
+
+        A quantity that is not mapped reads NaN (velocity: estimated from the position).
+        A requested state is taken over when `request` of its axis has changed: goal[i] = 1;
+        request[i] += 1.
         Until an axis is followed, each `next` and `run` overwrites its targets with what is sent to
         it: the actual position (powered: the held one), velocity and torque.
         """
 
     def start(self, origin_ns: int = 0) -> None:
-        """Flushes the link, sets the first instant, starts the native thread. Nothing was
-        committed yet: drives stay disabled, outputs zero (or as the target buffers say after
-        the first `run` or `next`). Again after `stop`: continues. OSError if no thread can be had."""
+        """Start the cycles: flush the link, set the first cycle start, start the native thread.
+
+        Until the first commit, drives stay disabled and outputs are zero. After `stop` it
+        continues.
+
+        Raises:
+            OSError: The native thread cannot be started.
+        """
 
     def next(self, timeout_ns: int = 0) -> int:
         """Commit the target buffers, let the next cycle run, and swap in the newest actual values.
-        Return CYCLE_* flags.
 
         inline: send, wait for the cycle start, collect. threaded: wait for the newest cycle for at
         most `timeout_ns` (0: one second and four periods).
 
+        Returns:
+            The CYCLE_* flags.
+
         Raises:
-            OSError: the link has failed.
-            KeyboardInterrupt: and others that signal handlers raise, at once.
+            OSError: The link has failed.
+            KeyboardInterrupt: Raised at once, like other exceptions of signal handlers.
         """
 
     def commit_targets(self) -> None:
-        """Commits the target buffers for the next `next`, where that has a thread of its own to
-        wait for: with several engines all commit before the first one is waited for."""
+        """Commit the target buffers before the next `next`, if that waits for a native thread.
+
+        With several engines, commit all of them before waiting for the first one.
+        """
 
     @property
     def led(self) -> bool:
         """True if a law that has begun, or a stream, sets the targets."""
 
     def keep_targets(self) -> None:
-        """Let the next `next` commit nothing."""
+        """Make the next `next` commit nothing."""
 
     background: bool
-    """True if a thread repeats the targets of a program: CSP then has no late limit, and set-points
-    of CSV and CST count until the command timeout after an update; then their targets are what is
-    commanded. Not for inline cycles: ValueError."""
+    """True if a thread repeats the targets of a program.
+
+    CSP then has no late limit. Set-points of CSV and CST are valid until the command timeout after
+    an update; then their targets are the commanded values. Inline cycles raise ValueError.
+    """
 
     def begin_update(self) -> None:
-        """Let another thread than the one that iterates write the target buffers: until `end_update`
-        `next` does not change them. One thread at a time, which keeps the other from committing."""
+        """Allow another thread than the one that iterates to write the target buffers.
+
+        Until `end_update`, `next` does not change them. Use it in one thread at a time, which keeps
+        the other from committing.
+        """
 
     def end_update(self, commit: bool) -> None:
         """End an update; commit the target buffers as new ones of the program in the background."""
 
     @property
     def origin(self) -> int:
-        """First cycle start [ns]; 0 before `start`. `start(origin_ns)` keeps to the grid of another
-        engine."""
+        """First cycle start [ns]; 0 before `start`.
+
+        Pass it to `start` of another engine, to put both on the same grid.
+        """
 
     def take_turns(self) -> None:
         """Allow cycles to begin at any time within the period: several engines in one thread."""
 
     def run(self, cycles: int) -> int:
-        """Run cycles without an application, for start-up and leaving: a hand-over. Requests, modes,
-        control bits and columns are committed, set-points are not; CSV and CST axes are not
-        enabled. Return the flags of the last cycle. The GIL is released; signal handlers run at
-        least every 10 ms. Afterwards the target buffers hold what was commanded last."""
+        """Run cycles without an application, for start-up and shutdown: a hand-over.
+
+        Requests, modes, control bits and columns are committed; set-points are not. CSV and CST
+        axes are not enabled. The GIL is released; signal handlers run at least every 10 ms.
+        Afterwards the target buffers contain the last commanded values.
+
+        Returns:
+            The flags of the last cycle.
+        """
 
     def spend(self, duration_ns: int) -> None:
-        """Let virtual time pass as if the application computed for this long. The cycles that fall
-        into it run without it (threaded) or are missed (inline). In real time, compute for this
-        long without the GIL."""
+        """Let virtual time pass as if the application computed for this long.
+
+        The cycles in this time run without it (threaded) or are missed (inline). In real time,
+        compute for this long without the GIL.
+        """
 
     def quick_stop_all(self) -> None:
-        """Stop every axis with the next frames; each needs a new request afterwards. Callable from
-        any thread."""
+        """Stop every axis with the next frames; each needs a new request afterwards.
+
+        It can be called from any thread.
+        """
 
     def run_until_stopped(self, timeout_ns: int) -> bool:
-        """Run until no axis is powered (each is disabled, in fault, or its unit is lost). Return
-        False if `timeout_ns` passed first."""
+        """Run until no axis is powered (each is disabled, in fault, or its unit is lost).
+
+        Returns:
+            False if `timeout_ns` passed first.
+        """
 
     def stop(self) -> None:
         """End the native thread and release the link; a no-op if not running."""
 
     def forget(self) -> None:
-        """In a forked child: let go of the parent's cycle without touching it. Give the calling
-        thread its scheduling back. From now on, every call that needs cycles raises RuntimeError."""
+        """Release the parent's cycle in a forked child without touching it.
+
+        The calling thread gets its scheduling back. Every later call that needs cycles raises
+        RuntimeError.
+        """
 
     def now(self) -> int:
-        """The link's clock [ns]."""
+        """Return the link's time [ns]."""
 
     @property
     def zero_ns(self) -> int:
         """Cycle start of the first iteration [ns], on the link's clock: the zero of `Cycle.time`.
-        0 before the first iteration. Engines of one loop share that of the first one."""
+
+        0 before the first iteration. Engines of one loop share that of the first one.
+        """
 
     @zero_ns.setter
     def zero_ns(self, zero: int) -> None: ...
@@ -127,8 +164,10 @@ class Engine:
         """Number of cycles so far: 1 for the first."""
     @property
     def time_ns(self) -> int:
-        """Cycle start [ns] since the first one of `start`, on the link's clock. A multiple of the
-        period, except where cycle starts follow the reference clock."""
+        """Cycle start [ns] since the first one of `start`, on the link's clock.
+
+        A multiple of the period, unless the cycle starts follow the reference clock.
+        """
     @property
     def flags(self) -> int: ...
     @property
@@ -141,64 +180,85 @@ class Engine:
     def missing_frames(self) -> int: ...
     @property
     def al_status(self) -> int:
-        """OR of all AL states of the last return; bit 4: a device signals an error."""
+        """OR of the AL states in the last returned frame; bit 4: a device reports an error."""
     @property
     def al_counter(self) -> int:
         """Number of devices that answered the AL status datagram in this cycle."""
 
     @property
     def disturbed(self) -> bool:
-        """True if, at the last collect, a device did not answer or was not in OP without an error.
-        Readable from any thread."""
+        """True if a device did not answer at the last collect, or was not in OP without an error.
+
+        It can be read from any thread.
+        """
 
     # Figures. Exact after `stop`; while the native thread runs, they may differ by one cycle.
     @property
     def counters(self) -> dict[str, int]:
-        """Counts since construction: cycles, lost (cycles not ok), late (cycles skipped),
-        uncommitted (cycles without new targets), underrun (cycles for which the stream was empty),
-        missed_sync (frames that left later than the
-        margin before SYNC0), page_faults (of the native thread in runs that have ended), stale,
-        alien, corrupt, duplicate, repeated, unprocessed (frames),
-        lane_sent, lane_received, lane_dropped, send_errors, receive_errors."""
+        """Counts since construction.
+
+        cycles; lost: cycles not ok; late: cycles skipped; uncommitted: cycles without new targets;
+        underrun: cycles that found the stream empty; missed_sync: frames that left later than the
+        margin before SYNC0; page_faults: of the native thread in runs that have ended; frames:
+        stale, alien, corrupt, duplicate, repeated, unprocessed; lane_sent, lane_received,
+        lane_dropped; send_errors, receive_errors.
+        """
 
     def histograms(self) -> dict[str, dict[str, float]]:
-        """Return per phase (core/_cycle.pyx) count, mean, min, max, sd, p50, p99, p999 [s]; for
-        an empty phase the count 0 only."""
+        """Return count, mean, min, max, sd, p50, p99, p999 [s] of each phase (core/_cycle.pyx).
+
+        An empty phase has only its count, 0.
+        """
 
     def histogram_counts(self, phase: str) -> list[tuple[float, float, int]]:
-        """Return (lower, upper, count) of every bucket that is not empty [s]."""
+        """Return (lower, upper, count) of every bucket of a phase that is not empty [s]."""
 
     def reset_histograms(self) -> None:
-        """Forget the figures so far, for example those of the start-up."""
+        """Clear the figures so far, for example those of the start-up."""
 
     def log(self) -> bytes:
-        """Return the records (RECORD_FIELDS) of the last cycles, oldest first. With the plan's
-        `log_axes`, each is followed by one record (AXIS_FIELDS) for each axis: what was measured,
-        the targets of the frames that brought it (law: those computed from it), and what was sent."""
+        """Return the records (RECORD_FIELDS) of the last cycles, oldest first.
+
+        With the plan's `log_axes`, each is followed by one record (AXIS_FIELDS) for each axis:
+        measured values, the targets of the frames that read them (law: those computed from them),
+        and what was sent.
+        """
 
     @property
     def scheduling(self) -> str:
-        """Scheduling and memory that were obtained; "virtual time" if the link has it.
+        """Scheduling and memory obtained; "virtual time" for a link in virtual time.
 
-        "SCHED_FIFO 80, CPU 1, 1.7 MB locked", or "SCHED_OTHER: not permitted (EPERM), 1.6 MB locked,
-        10 MB touched only (ENOMEM, RLIMIT_MEMLOCK 8 MB: raise `ulimit -l`, or grant CAP_IPC_LOCK)".
-        Cycle buffers are locked first, the log last. Memory that is touched only causes no page
-        faults while the system has enough of it.
+        "SCHED_FIFO 80, CPU 1, 1.7 MB locked", or "SCHED_OTHER: not permitted (EPERM), 1.6 MB
+        locked, 10 MB touched only (ENOMEM, RLIMIT_MEMLOCK 8 MB: raise `ulimit -l`, or grant
+        CAP_IPC_LOCK)". Cycle buffers are locked first, the log last. Memory that is only touched
+        causes no page faults while the system has enough of it.
         """
 
     # The acyclic queue.
     def lane_push(self, frame: bytes) -> bool:
-        """Queue one Ethernet frame (index of its first datagram 0x80 to 0xFF), to be sent after the
-        cyclic ones. Return False if the queue (64) is full. Raises ValueError for a frame that is
-        not EtherCAT or has an index of the cycle."""
+        """Queue one Ethernet frame, to be sent after the cyclic ones.
+
+        The index of its first datagram must be 0x80 to 0xFF.
+
+        Returns:
+            False if the queue (64 frames) is full.
+
+        Raises:
+            ValueError: The frame is not EtherCAT, or its index belongs to the cycle.
+        """
 
     def lane_pop(self) -> bytes | None:
-        """Return the oldest acyclic frame that came back, or None."""
+        """Return the oldest acyclic frame that has returned, or None."""
 
     def lane_wait(self, timeout_ns: int) -> bool:
-        """Wait, without the GIL, until a frame can be popped. Return False after `timeout_ns`. In
-        virtual time, the thread that iterates calls it; time passes up to the next cycle start
-        (threaded) or not at all (inline)."""
+        """Wait, without the GIL, until an acyclic frame has returned.
+
+        In virtual time, the thread that iterates calls it. Time then passes up to the next cycle
+        start (threaded) or not at all (inline).
+
+        Returns:
+            False if `timeout_ns` passed first.
+        """
 
     @property
     def clock(self) -> Clock | None:
@@ -206,9 +266,15 @@ class Engine:
 
     # Sinks.
     def set_sink(self, capsule: object) -> None:
-        """Give every cycle, after its frames, to a capsule "catenary.sink" (native/sink.h); None:
-        to none. Raises RuntimeError while the engine runs, ValueError for a table of another
-        version or of other blocks."""
+        """Pass every cycle, after its frames, to a sink: a capsule "catenary.sink" (native/sink.h).
+
+        Args:
+            capsule: The sink; None: no sink.
+
+        Raises:
+            RuntimeError: The engine is running.
+            ValueError: The table has another version or other block sizes.
+        """
 
     @property
     def sink_sizes(self) -> tuple[int, int, int]:
@@ -217,39 +283,61 @@ class Engine:
     def sink_fields(
         self,
     ) -> tuple[dict[str, tuple[int, str, int | None]], dict[str, tuple[int, str, int | None]]]:
-        """Return the layout of a sink's blocks, (actual, target): name → (offset, NumPy format,
-        count; None for a single number). `reals`, `integers`, `bits`: the columns, by bank."""
+        """Return the layout of a sink's blocks, (actual, target).
+
+        Each maps a name to (offset, NumPy format, count; None for a single number). `reals`,
+        `integers` and `bits` are the columns, by bank.
+        """
 
     # Laws.
     def law_fields(
         self,
     ) -> tuple[dict[str, tuple[int, str, int | None]], dict[str, tuple[int, str, int | None]]]:
-        """Return the layout of a law's blocks, (actual, target): name → (offset, NumPy format,
-        count; None for a single number). actual: n, ok, dt [s], position, velocity, torque, enabled, reals,
-        integers, bits; target: position, velocity, torque, reals, integers, bits."""
+        """Return the layout of a law's blocks, (actual, target).
+
+        Each maps a name to (offset, NumPy format, count; None for a single number). actual: n, ok,
+        dt [s], position, velocity, torque, enabled, reals, integers, bits; target: position,
+        velocity, torque, reals, integers, bits.
+        """
 
     def blocks(self) -> tuple[memoryview, memoryview]:
         """Return the private buffers as the blocks of `law_fields`; the second is writable."""
 
     def start_law(self, law: Law) -> None:
-        """Start a law: from the next cycle on, it computes the set-points and output columns in the
-        cycle thread, from what is commanded now. Requested states, modes and control bits stay
-        with the application. A law that runs already is stopped. While it runs, `next` overwrites
-        the target buffers with what is commanded.
+        """Start a compiled law. From the next cycle on, it computes the set-points in the cycle
+        thread.
+
+        It also computes the output columns. It begins with the commanded values and replaces a
+        running law. Requested states, modes and control bits stay with the application. While the
+        law runs, `next` overwrites the target buffers with the commanded values.
 
         Raises:
-            ValueError: its budget leaves too little of the period for the frames.
+            ValueError: The budget leaves too little of the period for the frames.
         """
 
     def stop_law(self) -> None:
         """Stop the law: a hand-over until the application commits targets."""
 
     def run_law(self, duration_ns: int, trouble: int) -> int:
-        """Wait without the GIL until the law has ended, for at most `duration_ns`; where the caller's
-        thread runs the cycles, also until a flag of `trouble` is set. Return the flags of the
-        newest cycle."""
+        """Wait without the GIL until the law has ended.
+
+        Args:
+            duration_ns: Longest wait [ns].
+            trouble: Flags that end the wait, if the caller's thread runs the cycles.
+
+        Returns:
+            The flags of the newest cycle.
+        """
 
     def set_stream(self, stream: Stream | None) -> None:
-        """Take one row of the stream per cycle as set-points; a law that runs finds it in its
-        targets. None: a hand-over until the application commits targets. An empty stream is an
-        underrun. Raises ValueError if the number of axes differs."""
+        """Take one row of the stream per cycle as set-points. A running law finds it in its
+        targets.
+
+        An empty stream is an underrun.
+
+        Args:
+            stream: The stream; None: a hand-over until the application commits targets.
+
+        Raises:
+            ValueError: The number of axes differs.
+        """

@@ -1,14 +1,14 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
 """Engine: owns all parts of one cyclic exchange and is the only entry from Python.
 
-Theory of operation. In the threaded mode, `native` is set and a native thread runs the cycles; `step`
+Theory of operation. In the threaded mode, `native` is set and a native thread runs the cycles. `step`
 commits the targets and waits for the newest cycle. Inline, and in virtual time, `step` runs the cycle
 in the caller's thread: `inline_outputs` and `inline_inputs`, or `lockstep` for a threaded cycle.
 `hold` runs cycles without an application: a hand-over. The GIL is released around waits only if
 another thread could need it (`alone`: not in virtual time). `law` and `stream` are the ones that
 compute the set-points; `laws` and `streams` keep every one that the cycle may still use. `committed`
-marks targets that were committed before `next`, `emitted` inline frames that were sent. `left` and
-`input_age` tell when the body began, and how old its inputs were.
+marks targets that were committed before `next`, `emitted` inline frames that were sent. `left` is the
+time at which the body began, and `input_age` the age of its inputs at that time.
 
 Budget of `next`, besides the link: 1 us for three drives.
 """
@@ -97,12 +97,12 @@ from catenary.core._thread cimport (
 )
 
 cdef enum:
-    SIGNALS_NS = 10_000_000    # native cycles in a row, before signal handlers get their turn
-    SILENCE_NS = 1_000_000_000 # and periods: longest wait for a cycle of a thread that lives
+    SIGNALS_NS = 10_000_000    # longest run of native cycles between two calls of signal handlers
+    SILENCE_NS = 1_000_000_000 # plus some periods: longest wait for a cycle of a live thread
 
 
 cdef void thread_loop(void *argument) noexcept nogil:
-    """The native thread's life. Ends when asked, or when the link's wait fails."""
+    """Run the native thread until it is asked to end, or until a wait on the link fails."""
     cdef engine_t *e = <engine_t *>argument
     cdef int rc
     while not cat_load_acquire32(&e.thread.stop):
@@ -124,7 +124,7 @@ def counts_of(columns, areas):
 
 
 def check_plan(plan):
-    """Raise ValueError for numbers of a plan that cannot be."""
+    """Raise ValueError if a number of the plan is out of range."""
     if plan.execution not in EXECUTION_MODES:
         raise ValueError(f"execution: {plan.execution!r}, must be one of {', '.join(EXECUTION_MODES)}")
     if not 1000 <= plan.period_ns <= 1 << 40:
@@ -216,7 +216,7 @@ cdef class Engine:
     # ---- the cycle that `actual` belongs to
 
     cdef actual_header_t *actual_header(self) noexcept:
-        """Of the cycle that Python's actual values belong to; lives as long as the engine."""
+        """Return the header of Python's actual values; it lives as long as the engine."""
         return self.h.actual[PRIVATE].header
 
     cdef void begin_iteration(self) noexcept:
@@ -309,7 +309,7 @@ cdef class Engine:
         self.e.error = 0
         self.e.done = 0
         self.left = -1
-        handover_swap(self.h)  # what an earlier run left
+        handover_swap(self.h)  # left by an earlier run
         if not self.virtual:
             self.settle_memory()
         self.e.thread.body = thread_loop
@@ -404,7 +404,7 @@ cdef class Engine:
         self.e.cycle.patient = not self.native
 
     cdef uint32_t step(self, int64_t timeout_ns=0) except? 0xFFFFFFFF:
-        """`timeout_ns` 0: a second and some periods."""
+        """Run one step. `timeout_ns` 0: one second and some periods."""
         if not self.running:
             raise self.not_running()
         if timeout_ns == 0:
@@ -423,7 +423,7 @@ cdef class Engine:
         return self.flags_since()
 
     cdef bint is_led(self) noexcept:
-        """Whether a law that has begun, or a stream, says the set-points."""
+        """Return True if a started law, or a stream, sets the set-points."""
         return self.stream is not None or (self.law is not None and self.law.c.status != WAITING)
 
     cdef uint32_t flags_since(self) noexcept:
@@ -435,7 +435,8 @@ cdef class Engine:
 
     cdef bint is_native_cycle(self, bint application) noexcept nogil:
         """Return True if the next cycle of the caller's thread is a threaded one. Inline: only
-        while a law runs; it is taken over after Python's last outputs."""
+        while a law runs; it is taken over after Python's last outputs.
+        """
         cdef cycle_t *c = &self.e.cycle
         if c.execution != INLINE:
             return True
@@ -446,8 +447,9 @@ cdef class Engine:
         return True
 
     cdef void follow(self) noexcept:
-        """After new actual values: Python's targets where they follow by themselves. While a law
-        runs that is all of them, and until the cycle of its end has been seen."""
+        """Update the targets of Python that follow by themselves, after new actual values. While a
+        law runs, and until the cycle of its end has been seen, these are all targets.
+        """
         cdef actual_t *actual = &self.h.actual[PRIVATE]
         if self.law is None and self.stream is None:
             if not self.writing:
@@ -456,18 +458,18 @@ cdef class Engine:
         if not self.writing:
             self.take_commanded()
         if self.law is not None and self.law.ended_before(actual.header.number):
-            # Python may have missed the cycle that said so.
+            # Python may have missed the cycle with this flag.
             actual.header.flags |= LAW_FAILED if self.law.failed() else LAW_DONE
             self.law = None
 
     cdef void inline_outputs(self, bint application) noexcept nogil:
-        """Once a cycle: a wait that a signal ended must not send a second time."""
+        """Send once per cycle: a wait interrupted by a signal must not send a second time."""
         if not self.emitted:
             cycle_outputs(&self.e.cycle, &self.h.target[PRIVATE], application)
             self.emitted = True
 
     cdef int inline_inputs(self) except -1:
-        """The wait, and the half of the cycle after it, in Python's thread."""
+        """Wait, and run the half of the cycle after it, in Python's thread."""
         cdef cycle_t *c = &self.e.cycle
         cdef int rc
         while True:
@@ -487,7 +489,7 @@ cdef class Engine:
         return 0
 
     cdef int lockstep(self) except -1:
-        """One cycle of an execution mode that has its own thread in real time, in the caller's here."""
+        """Run one threaded cycle in the caller's thread (virtual time)."""
         cdef actual_header_t *header = self.h.actual[PRIVATE].header
         cdef uint64_t before = header.number
         cdef int rc
@@ -499,7 +501,7 @@ cdef class Engine:
                     rc = self.native_cycle_here()
             if rc == 0:
                 if before > 0 and header.number > before + 1:
-                    header.flags |= LATE  # cycles happened in `spend`
+                    header.flags |= LATE  # cycles ran in `spend`
                 self.enter_body()
                 return 0
             self.interrupted(rc)
@@ -513,7 +515,7 @@ cdef class Engine:
         return rc
 
     cdef int inline_cycle_here(self) noexcept nogil:
-        """Nobody computes."""
+        """Run one inline cycle without an application."""
         cdef cycle_t *c = &self.e.cycle
         cdef int rc
         self.inline_outputs(False)
@@ -548,7 +550,7 @@ cdef class Engine:
         target.header.hold = hold
         target.header.seen = self.h.actual[PRIVATE].header.number
         target.header.stamp = target.header.seen + 1
-        if self.writing:  # an axis that became followed since does not follow this
+        if self.writing:  # an axis that became followed meanwhile keeps the written target
             target.header.seen = self.writing_since
         target.header.process_ns = -1
         target.header.input_age_ns = -1
@@ -558,7 +560,7 @@ cdef class Engine:
         handover_commit(self.h)
 
     cdef int await_cycle(self, int64_t timeout_ns) except -1:
-        """Swaps the newest cycle in, waiting for one if need be. 0, NONE or STOPPED."""
+        """Swap in the newest cycle; wait for one if needed. Return 0, NONE or STOPPED."""
         cdef int64_t deadline = -1
         cdef int64_t left, woken
         cdef uint32_t seen
@@ -574,7 +576,7 @@ cdef class Engine:
             if left <= 0:
                 return NONE
             cat_store_release32(&self.h.waiting, 1)
-            cat_fence()  # waiting before published is read: the writer does it the other way round
+            cat_fence()  # set waiting before reading published; the writer does the reverse
             seen = cat_load_acquire32(&self.h.published)
             rc = 0
             if not handover_swap(self.h):
@@ -599,13 +601,14 @@ cdef class Engine:
         return flags | self.flags_since()
 
     cdef uint32_t hold(self, int64_t cycles, bint until_stopped, int64_t deadline) except? 0xFFFFFFFF:
-        """Cycles without an application: so many, or until nothing moves or the deadline [ns]."""
+        """Run cycles without an application: a number of them, until all axes stop, or the deadline
+        [ns]."""
         cdef actual_t *actual = &self.h.actual[PRIVATE]
         cdef int64_t batch
         cdef uint32_t flags = actual.header.flags
-        self.commit(True)  # an inline loop runs native cycles around a law
+        self.commit(True)  # a hand-over also around an inline law
         if self.e.cycle.execution != INLINE:
-            handover_swap(self.h)  # cycles are counted from the commit on
+            handover_swap(self.h)  # count cycles from the commit on
         while cycles > 0:
             batch = 1 if until_stopped else min(cycles, max(SIGNALS_NS // self.e.cycle.period, 1))
             flags = self.hold_native(batch) if self.native else self.hold_here(batch)
@@ -620,7 +623,7 @@ cdef class Engine:
         return flags
 
     cdef uint32_t hold_native(self, int64_t cycles) except? 0xFFFFFFFF:
-        """Lets the native thread do so many cycles."""
+        """Let the native thread run this number of cycles."""
         cdef uint64_t last = self.h.actual[PRIVATE].header.number + cycles
         cdef uint32_t flags
         while self.h.actual[PRIVATE].header.number < last:
@@ -630,7 +633,7 @@ cdef class Engine:
         return self.h.actual[PRIVATE].header.flags
 
     cdef uint32_t hold_here(self, int64_t cycles) except? 0xFFFFFFFF:
-        """Does so many cycles in the caller's thread, without the GIL."""
+        """Run this number of cycles in the caller's thread, without the GIL."""
         cdef int rc = 0
         while cycles > 0:
             with nogil:
@@ -647,7 +650,7 @@ cdef class Engine:
         return self.h.actual[PRIVATE].header.flags
 
     cdef void take_commanded(self) noexcept:
-        """The application goes on from what is being sent."""
+        """Set the application's targets to the commanded values."""
         cdef actual_t *actual = &self.h.actual[PRIVATE]
         cdef target_t *target = &self.h.target[PRIVATE]
         cdef uint32_t axes = self.h.counts.axes
@@ -657,7 +660,7 @@ cdef class Engine:
         axes_follow(&self.axes.c, actual, target)
 
     cdef int interrupted(self, int rc) except -1:
-        """After a wait that failed: signal handlers, or OSError."""
+        """Handle a failed wait: run signal handlers, or raise OSError."""
         if rc == -EINTR:
             PyErr_CheckSignals()
             return 0
@@ -681,17 +684,17 @@ cdef class Engine:
             since = self.now_ns()
             while c.execution != INLINE and c.next <= self.now_ns():
                 self.spend_cycle()
-            left -= slice + self.now_ns() - since  # the cycles take none of the application's time
+            left -= slice + self.now_ns() - since  # the cycles do not use the application's time
 
     cdef void compute(self, int64_t duration_ns) noexcept:
-        """Where time passes by itself."""
+        """Compute for this long, where time passes by itself."""
         cdef int64_t end = self.now_ns() + duration_ns
         with nogil:
             while self.e.cycle.link.now(self.e.cycle.link.self) < end:
                 pass
 
     cdef int spend_cycle(self) except -1:
-        """A cycle that happens while the application computes: it does not see it yet."""
+        """Run a cycle while the application computes; it does not see this cycle yet."""
         cdef int rc
         with nogil:
             rc = cycle_wait(&self.e.cycle)
@@ -700,7 +703,7 @@ cdef class Engine:
         return self.interrupted(rc) if rc < 0 else 0
 
     cdef int pass_time(self, int64_t duration) except -1:
-        """Execution time, where the link knows of it; else simply time."""
+        """Let time pass: as execution time if the link supports it."""
         cdef const cat_link *link = self.e.cycle.link
         cdef int64_t until = self.now_ns() + duration
         cdef int rc
@@ -731,7 +734,7 @@ cdef class Engine:
         return f"{scheduling_text(&self.e.thread)}, {self.memory_text()}"
 
     cdef void settle_memory(self) noexcept:
-        """Touch and lock what the cycle uses. The log is last: it is the first to be refused."""
+        """Touch and lock the memory of the cycle. The log is last, so that it is refused first."""
         if self.frames is not None:
             cat_memory_settle(&self.frames.memory)
         if self.clock is not None:
@@ -773,15 +776,15 @@ cdef class Engine:
             self.law.supersede()
         if not self.virtual:
             cat_memory_settle(&law.memory_block)
-        self.laws = [*self.laws, law]  # before it is offered: the cycle must not outlive it
+        self.laws = [*self.laws, law]  # before the offer: it must outlive its use by the cycle
         self.law = law
         law.c.threaded = self.native
-        self.h.target[PRIVATE].header.updated = 0  # it does not count after the law
+        self.h.target[PRIVATE].header.updated = 0  # not valid after the law
         cat_pointer_offer(&self.e.cycle.law_request, &law.c)
         self.laws = [known for known in self.laws if self.is_law_used(known)]
 
     cdef int check_reserve(self, int64_t budget) except -1:
-        """Refuse a law that leaves the frames too little of the period."""
+        """Raise ValueError if a law leaves too little of the period for the frames."""
         cdef cycle_t *c = &self.e.cycle
         cdef int64_t left = c.period - cycle_law_reserve(c, budget)
         if left > c.turnaround:
@@ -798,7 +801,7 @@ cdef class Engine:
         cat_pointer_offer(&self.e.cycle.law_request, CAT_POINTER_NONE)
 
     cdef bint is_law_used(self, Law law) noexcept:
-        """Return True if the cycle runs the law or has not served the request for it yet."""
+        """Return True if the cycle runs the law or has not processed its request yet."""
         return cat_pointer_is_used(&self.e.cycle.law_request, &law.c)
 
     def run_law(self, int64_t duration_ns, uint32_t trouble):
@@ -841,9 +844,9 @@ cdef class Engine:
         if stream is not None:
             if not self.virtual:
                 cat_memory_settle(&stream.memory)
-            self.streams = [*self.streams, stream]  # before it is offered, as with laws
+            self.streams = [*self.streams, stream]  # before the offer, as with laws
         self.stream = stream
-        self.h.target[PRIVATE].header.updated = 0  # it does not count after the stream
+        self.h.target[PRIVATE].header.updated = 0  # not valid after the stream
         cat_pointer_offer(&self.e.cycle.stream, NULL if stream is None else &stream.c)
         self.streams = [known for known in self.streams if self.is_stream_used(known)]
         handover_swap(self.h)
@@ -892,7 +895,7 @@ cdef class Engine:
     def log(self):
         return self.figures.log()
 
-    # ---- the acyclic lane
+    # ---- the acyclic queue
 
     def lane_push(self, bytes frame not None):
         return self.lane.push(frame)

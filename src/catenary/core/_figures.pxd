@@ -8,7 +8,7 @@ cdef class Figures:
     """Owns the log records and the histograms of a cycle."""
     cdef cycle_t *cycle
     cdef histogram_t *spare
-    cdef cat_memory memory     # histograms
+    cdef cat_memory memory     # memory of the histograms
     cdef cat_memory log_memory
     cdef uint64_t log_cycles
     cdef int attach(self, cycle_t *cycle, uint64_t log_cycles, uint32_t log_axes) except -1

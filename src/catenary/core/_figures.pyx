@@ -42,7 +42,10 @@ cdef class Figures:
 
     cdef bytes log(self):
         """Return the last records, oldest first, each followed by those of its axes if they are
-        logged. A cycle that is not complete yet, or was overwritten meanwhile, is left out."""
+        logged.
+
+        Cycles that are incomplete or were overwritten meanwhile are left out.
+        """
         cdef cycle_t *c = self.cycle
         cdef uint64_t last = c.number
         cdef uint64_t number
@@ -71,7 +74,7 @@ cdef class Figures:
         return histogram_counts(&self.cycle.histograms[<int>PHASE_NAMES[phase]])
 
     cdef void reset(self) noexcept:
-        """Exchange the histograms: the native thread may be adding to the old ones at this moment."""
+        """Exchange the histograms, because the native thread may be adding to the old ones."""
         cdef histogram_t *old = self.cycle.histograms
         cdef int phase
         for phase in range(PHASES):

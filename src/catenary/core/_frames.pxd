@@ -6,13 +6,13 @@ from catenary.core._native cimport cat_image, cat_link
 from catenary.core._lane cimport lane_t
 
 cdef enum:
-    FRAMES_MAX = 1024          # of a plan, all dividers and phases together
-    FRAMES_PER_CYCLE_MAX = 32  # without cycle numbers: an index returns after four cycles at least
+    FRAMES_MAX = 1024          # in a plan, all dividers and phases together
+    FRAMES_PER_CYCLE_MAX = 32  # without cycle numbers: an index is reused after four cycles at least
     INDEX_COUNT = 128          # 0x00 to 0x7F belong to the cycle, the others to the acyclic queue
 
 cdef enum:                     # receive modes
-    POLL = 0                   # sleep until the deadline, then take what is there
-    WAIT = 1                   # sleep until a frame has come
+    POLL = 0                   # sleep until the deadline, then take the frames that arrived
+    WAIT = 1                   # sleep until a frame arrives
     BUSY = 2                   # busy-wait
 
 cdef struct copy_t:            # bytes between a frame and an image
@@ -23,13 +23,13 @@ cdef struct copy_t:            # bytes between a frame and an image
 cdef struct datagram_t:
     uint8_t kind
     uint8_t command
-    uint8_t right              # judged: back with the expected working counter
-    uint64_t header_mask       # of its first eight bytes: what comes back as it was sent
-    uint16_t length            # of the data
+    uint8_t right              # evaluated: returned with the expected working counter
+    uint64_t header_mask       # bits of the first eight bytes that return unchanged
+    uint16_t length            # length of the data
     uint16_t expected_counter
     int32_t unit               # sync unit; -1: none
     uint32_t frame
-    uint32_t offset            # of the header, in the frame
+    uint32_t offset            # offset of the header in the frame
     uint32_t first_output
     uint32_t output_count
     uint32_t first_input
@@ -37,39 +37,39 @@ cdef struct datagram_t:
 
 cdef struct frame_t:
     uint32_t length
-    uint32_t used              # up to the end of the last datagram; padding follows
+    uint32_t used              # end of the last datagram; padding follows
     uint32_t first_datagram
     uint32_t datagram_count
-    uint32_t divider           # due in cycles whose serial is `phase` modulo `divider`
+    uint32_t divider           # due in cycles with serial modulo divider equal to `phase`
     uint32_t phase
-    uint32_t number_offset     # of the cycle number, in the frame; 0: the frame has none
-    uint8_t needed             # its loss makes the cycle bad
-    uint8_t index              # of the last emit in which it was due
+    uint32_t number_offset     # offset of the cycle number in the frame; 0: none
+    uint8_t needed             # its loss makes the cycle not ok
+    uint8_t index              # index in the last emit in which it was due
     uint8_t due                # sent in the last emit
-    uint8_t back               # since the last emit: accepted
-    uint8_t judged             # since the last emit: counters, AL status and clocks were taken
-    uint8_t template[1536]     # what is sent
-    uint8_t returned[1536]     # what came back last
+    uint8_t back               # accepted since the last emit
+    uint8_t judged             # counters, AL status and clocks were evaluated since the last emit
+    uint8_t template[1536]     # frame to send
+    uint8_t returned[1536]     # last frame returned
 
 cdef struct unit_t:
-    uint32_t frame             # one of those that carry it: all are due in the same cycles
-    uint32_t datagrams         # of this unit, in all frames
-    uint32_t right             # since the last emit: datagrams with the expected counter
-    uint16_t counter           # since the last emit: sum of the working counters
-    uint8_t optional           # its loss does not make the cycle bad
+    uint32_t frame             # a frame with data of this unit; all of them are due in the same cycles
+    uint32_t datagrams         # number of datagrams of this unit, in all frames
+    uint32_t right             # datagrams since the last emit with the expected working counter
+    uint16_t counter           # sum of the working counters since the last emit
+    uint8_t optional           # its loss does not make the cycle not ok
 
-cdef struct sent_t:            # the last use of an index
-    uint32_t serial            # of the emit; 0: never used
+cdef struct sent_t:            # last use of an index
+    uint32_t serial            # serial of the emit; 0: never used
     uint16_t frame
-    uint8_t answered           # a frame with this index has come back, in time or late
+    uint8_t answered           # a frame with this index has returned, in time or late
 
 cdef struct frame_counters_t:
-    uint64_t stale             # ours, of an earlier cycle
-    uint64_t alien             # another protocol, source or index
-    uint64_t corrupt           # an EtherCAT frame that contradicts itself or its template
-    uint64_t duplicate         # ours, a second time in this cycle
-    uint64_t unprocessed       # an echo no device has touched
-    uint64_t repeated          # of the stale and duplicate frames, those that were back before
+    uint64_t stale             # our frame, of an earlier cycle
+    uint64_t alien             # other protocol, source or index
+    uint64_t corrupt           # an EtherCAT frame that is inconsistent or differs from its template
+    uint64_t duplicate         # our frame, a second time in this cycle
+    uint64_t unprocessed       # an echo that no device has processed
+    uint64_t repeated          # stale and duplicate frames that had returned before
     uint64_t send_errors
     uint64_t receive_errors
 
@@ -96,20 +96,20 @@ cdef struct frames_t:
     uint8_t al_status
     uint16_t al_counter
     int64_t frame_stamp        # when the last frames were seen; 0: not read yet
-    uint8_t ok                 # every needed unit that was due is valid, every needed frame is back
-    uint8_t whole              # every needed unit is valid
+    uint8_t ok                 # every required due unit is valid, every required frame is back
+    uint8_t whole              # every required unit is valid
     # since the last emit
-    uint32_t serial            # of the emit; never 0
-    uint32_t missing           # frames that are due and not back
-    uint32_t missing_needed    # those of them that are needed
-    uint32_t right             # datagrams judged right
-    uint16_t al_answered       # devices that answered the AL status datagram
+    uint32_t serial            # number of the emit; never 0
+    uint32_t missing           # number of due frames that are not back
+    uint32_t missing_needed    # number of them that are required
+    uint32_t right             # number of datagrams with the expected working counter
+    uint16_t al_answered       # number of devices that answered the AL status datagram
     uint8_t al_seen            # OR of their answers
-    uint8_t judged             # once at least
-    uint8_t collected          # judged with all frames back: nothing more can come
-    # for longer
+    uint8_t judged             # evaluated at least once
+    uint8_t collected          # evaluated with all frames back: nothing more can arrive
+    # across emits
     uint8_t filled             # the templates have the outputs of the next emit
-    uint8_t settled            # the last judgement found every datagram of all frames right
+    uint8_t settled            # the last evaluation found every datagram of all frames right
     uint32_t next_index
     sent_t sent[128]           # by index
     frame_counters_t counters

@@ -2,17 +2,17 @@
 """The frame engine: the image table (native/image.h) on a link (native/link.h), ETG.1000.4 §5.4.
 
 Theory of operation
-    The plan makes a template for each frame. `emit` advances `serial`, gives each frame that is due
-    in this cycle the next index, copies the outputs into the templates and sends them. `collect`
-    takes what the link received until all frames are back or the deadline has passed. Then it judges
-    once: frames that came back (`judge_frame`), sync units (`judge_units`), and copies the inputs of
-    valid units to the image. The inputs of other units keep their last good values.
+    The plan makes a template for each frame. `emit` advances `serial`, gives each due frame the
+    next index, copies the outputs into the templates and sends them. `collect`
+    takes received frames until all are back or the deadline has passed. Then it judges once:
+    returned frames (`judge_frame`), then sync units (`judge_units`), and copies the inputs of
+    valid units to the image. The inputs of other units keep their last valid values.
 
 Matching
-    A received frame is accepted if source, EtherType, commands, addresses and lengths are those of
-    the template and its index was given out in this cycle. An index returns after 128 frames: a
-    frame that is repeated that much later is accepted too. Frames with a cycle number (a NOP datagram,
-    `exact_matching` in the plan) are accepted only with the number of this cycle.
+    A received frame is accepted if source, EtherType, commands, addresses and lengths match the
+    template and its index was assigned in this cycle. An index is reused after 128 frames, so a
+    frame that is repeated that much later is accepted too. Frames with a cycle number (a NOP
+    datagram, `exact_matching` in the plan) are accepted only with the number of this cycle.
     Every other frame is counted by kind and dropped (`frame_counters_t`).
 
 Validity
@@ -97,7 +97,7 @@ cdef inline uint16_t counter_of(const datagram_t *d, const uint8_t *frame) noexc
 
 
 cdef inline uint32_t number_in(const frame_t *frame, const uint8_t *bytes) noexcept nogil:
-    """The cycle number in a frame that has one, in the byte order of this machine."""
+    """Return the cycle number of a frame that has one, in the byte order of this machine."""
     cdef uint32_t number
     memcpy(&number, bytes + frame.number_offset, NUMBER_SIZE)
     return number
@@ -149,9 +149,9 @@ cdef int frames_emit(void *self) noexcept nogil:
     cdef uint32_t i
     cdef int rc, first_error = 0
     f.serial += 1
-    if f.serial == 0:  # 0: never sent
+    if f.serial == 0:  # 0 means never sent
         f.serial = 1
-    if f.clock != NULL:  # its datagrams are in the frame that goes first
+    if f.clock != NULL:  # its datagrams are in the first frame
         clock_emit(f.clock, f.link.now(f.link.self))
     f.missing = 0
     f.missing_needed = 0
@@ -194,14 +194,16 @@ cdef void forget_returns(frames_t *f) noexcept nogil:
 # ---- receive and match
 
 cdef inline bint is_ours(const uint8_t *ours, const uint8_t *bytes) noexcept nogil:
-    """Same EtherType and source, except for the bit that controllers set: bytes 6 to 13 of a frame."""
+    """Return True for our EtherType and source, except the bit set by controllers (bytes 6 to
+    13)."""
     return ((eight_at(bytes + SOURCE) ^ eight_at(ours + SOURCE)) & ~<uint64_t>SOURCE_PROCESSED) == 0
 
 
 cdef inline bint is_shaped(const frames_t *f, const frame_t *frame, const uint8_t *bytes,
                            uint32_t length) noexcept nogil:
-    """True if the datagrams are those of the template and all have the index of the frame. Datagrams
-    of clocks address another device each cycle: a late frame is stale, not corrupt."""
+    """Return True if the datagrams match the template and all have the index of the frame.
+    Datagrams of clocks address another device in each cycle: a late frame is stale, not corrupt.
+    """
     cdef const datagram_t *d
     cdef const datagram_t *end
     cdef uint8_t index = bytes[DATAGRAMS + 1]
@@ -221,7 +223,7 @@ cdef inline bint is_shaped(const frames_t *f, const frame_t *frame, const uint8_
 
 
 cdef bint is_untouched(const frames_t *f, const frame_t *frame, const uint8_t *bytes) noexcept nogil:
-    """True for an echo: no controller has set its bit of the source address or counted."""
+    """Return True for an echo: no controller has set its bit in the source address or counted."""
     cdef uint32_t k
     if bytes[SOURCE] != frame.template[SOURCE] or frame.template[SOURCE] & SOURCE_PROCESSED:
         return False
@@ -232,7 +234,7 @@ cdef bint is_untouched(const frames_t *f, const frame_t *frame, const uint8_t *b
 
 
 cdef inline int64_t stamp_of(frames_t *f) noexcept nogil:
-    """The time at which the frames that are being taken were seen."""
+    """Return the time at which the frames being taken were seen."""
     if f.frame_stamp == 0:
         f.frame_stamp = f.link.now(f.link.self)
     return f.frame_stamp
@@ -240,7 +242,7 @@ cdef inline int64_t stamp_of(frames_t *f) noexcept nogil:
 
 cdef inline bint is_current(const frames_t *f, const frame_t *frame, const sent_t *sent,
                             const uint8_t *bytes) noexcept nogil:
-    """True if the frame was sent in this cycle, as far as its index and its cycle number show."""
+    """Return True if the frame was sent in this cycle, according to index and cycle number."""
     if sent.serial != f.serial:
         return False
     return frame.number_offset == 0 or number_in(frame, bytes) == f.serial
@@ -248,8 +250,9 @@ cdef inline bint is_current(const frames_t *f, const frame_t *frame, const sent_
 
 cdef void count_stale(frames_t *f, const frame_t *frame, sent_t *sent,
                       const uint8_t *bytes) noexcept nogil:
-    """A late frame comes once. One that was back before, or that an older use of the index sent, is
-    repeated."""
+    """Count a late frame. If it had returned before, or belongs to an older use of the index, it is
+    repeated.
+    """
     f.counters.stale += 1
     if sent.answered or (frame.number_offset and number_in(frame, bytes) != sent.serial):
         f.counters.repeated += 1
@@ -293,7 +296,7 @@ cdef void take(frames_t *f, const uint8_t *bytes, uint32_t length) noexcept nogi
 
 
 cdef int drain(frames_t *f, int budget) noexcept nogil:
-    """Take what has arrived. Returns what is left of the budget."""
+    """Take the frames that have arrived. Return the remaining budget."""
     cdef const uint8_t *bytes
     cdef int length
     while budget > 0:
@@ -309,7 +312,8 @@ cdef int drain(frames_t *f, int budget) noexcept nogil:
 
 
 cdef int await_frames(frames_t *f, int64_t deadline, int budget) noexcept nogil:
-    """Wait until all frames are back or the deadline has passed. Returns 0, or -errno of the wait."""
+    """Wait until all frames are back or the deadline has passed. Return 0, or -errno of the
+    wait."""
     cdef const cat_link *link = f.link
     cdef int rc
     while f.missing > 0 and budget > 0:
@@ -333,7 +337,7 @@ cdef int await_frames(frames_t *f, int64_t deadline, int budget) noexcept nogil:
 # ---- judge
 
 cdef void judge_frame(frames_t *f, frame_t *frame) noexcept nogil:
-    """Judge the datagrams of a frame that is back, once: working counters, AL status, clocks."""
+    """Judge the datagrams of a returned frame, once: working counters, AL status, clocks."""
     cdef datagram_t *d = &f.datagrams[frame.first_datagram]
     cdef const datagram_t *end = d + frame.datagram_count
     cdef uint16_t counter
@@ -381,7 +385,7 @@ cdef void judge_units(frames_t *f) noexcept nogil:
 
 
 cdef void copy_inputs(frames_t *f) noexcept nogil:
-    """Copy the inputs of the datagrams that are back: of units all or none."""
+    """Copy the inputs of returned datagrams, of each unit all or none."""
     cdef const datagram_t *d = f.datagrams
     cdef const datagram_t *end = d + f.datagram_count
     cdef const frame_t *frame
@@ -399,8 +403,9 @@ cdef void copy_inputs(frames_t *f) noexcept nogil:
 
 
 cdef void judge(frames_t *f) noexcept nogil:
-    """The one judging pass of a collect: frames, then units, then the inputs. If the units are
-    settled and every datagram is right again, they are as they were."""
+    """Judge a collect: frames, then units, then the inputs. If the units are settled and every
+    datagram is right again, they are unchanged.
+    """
     cdef frame_t *frame = f.frames
     cdef const frame_t *last = frame + f.frame_count
     cdef bint all_right
@@ -439,7 +444,7 @@ cdef int frames_collect(void *self, int64_t deadline) noexcept nogil:
 
 
 cdef void frames_flush(frames_t *f) noexcept nogil:
-    """Drop what arrived, and what was filled, before the first cycle."""
+    """Drop received frames and filled outputs before the first cycle."""
     cdef const uint8_t *bytes
     cdef int k
     f.filled = 0
@@ -448,7 +453,7 @@ cdef void frames_flush(frames_t *f) noexcept nogil:
             return
 
 
-# ---- construction: the plan is checked once, so that no function above has to
+# ---- construction: the plan is checked here once, so that the functions above need not
 
 def check(condition, message):
     """Raise ValueError(message) unless the condition holds."""
@@ -457,8 +462,10 @@ def check(condition, message):
 
 
 def frames_per_cycle(frames):
-    """Return an upper bound of the frames that are due in one cycle: for each divider its fullest
-    phase. The plan refuses by the same number (plan/frames.py)."""
+    """Return an upper bound of the frames due in one cycle: for each divider its fullest phase.
+
+    The plan uses the same bound (plan/frames.py).
+    """
     counts = {}
     for frame in frames:
         counts.setdefault(frame.divider, {}).setdefault(frame.phase, []).append(frame)
@@ -522,7 +529,7 @@ cdef class Frames:
             for d in frame.datagrams:
                 copies = self.make_datagram(number, frame, d, copies)
         if plan.sync_units and all(unit.optional for unit in plan.sync_units):
-            for number in range(self.c.frame_count):  # no device is required: silence is no loss
+            for number in range(self.c.frame_count):  # no device is required: a missing reply is not a loss
                 self.c.frames[<int>number].needed = 0
 
     def make_frame(self, uint32_t number, frame):
@@ -607,16 +614,17 @@ cdef class Frames:
         frame.number_offset = plan.offset + HEADER
 
     def kept(self, plan):
-        """Return the mask of the bits in the first eight bytes of a header that come back as sent:
-        not the index, the circulating bit or the reserved bits of the length word."""
-        adp = plan.command not in ADDRESS_MOVES and plan.kind != CLOCK  # another each cycle
+        """Return the mask of the bits in the first eight bytes of a header that return unchanged.
+        The index, the circulating bit and the reserved bits of the length word are excluded.
+        """
+        adp = plan.command not in ADDRESS_MOVES and plan.kind != CLOCK  # another one in each cycle
         ado = plan.kind != CLOCK
         return bytes((0xFF, 0, *[0xFF * adp] * 2, *[0xFF * ado] * 2, 0xFF, 0x87))
 
     def place_unit(self, where, uint32_t unit, uint32_t number):
         """Check that all frames of a unit are due in the same cycles."""
         cdef frame_t *first
-        if not self.c.unit_valid[unit]:  # used as a mark until the first cycle
+        if not self.c.unit_valid[unit]:  # used as a marker until the first cycle
             self.c.unit_valid[unit] = 1
             self.c.units[unit].frame = number
         first = &self.c.frames[self.c.units[unit].frame]
@@ -637,7 +645,7 @@ cdef class Frames:
         return place + 1
 
     cdef carry_time(self, clock_t *clock):
-        """Give the clock the places of its data in the templates."""
+        """Tell the clock where its data is in the templates."""
         cdef uint32_t k
         cdef datagram_t *d
         cdef uint8_t *header

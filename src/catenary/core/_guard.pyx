@@ -1,18 +1,18 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""Safety of one axis in one cycle: what is requested of it, whether it is followed, how it stops.
-docs/safety.md has the table of reactions and their scenarios; _setpoints.pyx computes what is sent.
+"""Safety of one axis in one cycle: requests, whether it is followed, and how it stops.
+docs/safety.md has the table of reactions and their scenarios; _setpoints.pyx computes the outputs.
 
 Theory of operation. `guard_observe` runs after the inputs of a cycle, the other functions before its
 outputs. `goal` is the requested state in force, `mode` the mode of operation in force, `mode_wanted`
-the one that 0x6060 requests. The set-points of the application count only while the axis is
+the one requested in 0x6060. The set-points of the application are valid only while the axis is
 *followed*: requested state enabled, OPERATION_ENABLED, the mode shown is the one in force, statusword
-bit 12 where the mode defines it, and its unit answers. `worked` is set once it was followed since
-OPERATION_ENABLED or since a mode change; `tells` once its drive has shown bit 12; `gap_cycles` counts
+bit 12 if the mode defines it, and its unit answers. `worked` is set once the axis was followed since
+OPERATION_ENABLED or since a mode change; `tells` once its drive has shown bit 12. `gap_cycles` counts
 since bit 12 was lost, `mute_cycles` while it was never shown, `climbing_cycles` since the request.
 
 A stop (`stop_axis`) needs a new request afterwards; `stop_reason` and `stop_cycle` keep its cause. It
 sends quick stop, then disable operation, then disable voltage (`stop_command`, `stop_cycles`). With
-`on_loss` csp_hold, an axis in CST whose set-points stay away is held in CSP instead (`holding`).
+`on_loss` csp_hold, an axis in CST without set-points is held in CSP instead (`holding`).
 
 Budget: 10 ns per axis that works.
 """
@@ -47,7 +47,7 @@ cdef inline void begin_stop(axis_t *a) noexcept nogil:
     """Start the sequence of a stop. A repeated request or a second reason does not restart it."""
     a.stop_cycles = 0
     a.followed_at_stop = (a.tells and a.status & FOLLOWS_COMMAND != 0
-                          and a.mode in (CSP, CSV, CST))  # elsewhere the bit is another one
+                          and a.mode in (CSP, CSV, CST))  # in other modes the bit has another meaning
 
 
 cdef void stop_axis(axes_t *x, axis_t *a, uint8_t reason) noexcept nogil:
@@ -67,7 +67,7 @@ cdef void stop_axis(axes_t *x, axis_t *a, uint8_t reason) noexcept nogil:
 
 
 cdef void lose_axis(axes_t *x, axis_t *a, uint8_t reason) noexcept nogil:
-    """Stop an axis whose set-points stay away, by its option `on_loss`."""
+    """Stop an axis without set-points, according to its option `on_loss`."""
     if a.on_loss != LOSS_CSP_HOLD or a.mode != CST or a.goal != ENABLED or a.holding:
         stop_axis(x, a, reason)
         return
@@ -82,7 +82,7 @@ cdef void lose_axis(axes_t *x, axis_t *a, uint8_t reason) noexcept nogil:
 
 
 cdef inline bint enters_without_torque(const axis_t *a, int8_t mode) noexcept nogil:
-    """Return True if a powered axis would enter torque control, and its load is not known."""
+    """Return True if a powered axis would enter torque control with an unknown load."""
     return (a.state == OPERATION_ENABLED and quantity_of(mode) == TORQUE
             and quantity_of(a.mode) != TORQUE
             and not a.torque_demand.present and not a.actual_torque.present)
@@ -126,13 +126,13 @@ cdef void take_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noex
         if a.goal != ENABLED:
             a.followed = 0
         if a.lost:
-            stop_axis(x, a, STOP_DEVICE_LOST)  # the request must not come true later
+            stop_axis(x, a, STOP_DEVICE_LOST)  # the request must not take effect later
     if a.goal == ENABLED and not a.followed and not a.holding:
         if not t.header.hold:
             if is_commanded(x, a.mode):
                 a.armed = 1
             elif quantity_of(a.mode) == TORQUE:
-                a.armed = 0  # a torque that does not count any more
+                a.armed = 0  # this torque is not valid any more
         if a.armed or quantity_of(a.mode) == POSITION:
             a.climbing_cycles += 1
         if a.climbing_cycles > x.climbing_limit:
@@ -154,10 +154,11 @@ cdef void guard_stop(axes_t *x) noexcept nogil:
 
 
 cdef uint16_t stop_command(axes_t *x, axis_t *a) noexcept nogil:
-    """Return the command for an axis in OPERATION_ENABLED that is to stop.
+    """Return the command for an axis in OPERATION_ENABLED that must stop.
 
-    A drive that clears bit 12 is reacting: it has until the stop deadline for its ramp. A lost device
-    may return within that time, still powered: its first frame must not cut the voltage."""
+    A drive that clears bit 12 is reacting: its ramp may last until the stop deadline. A lost device
+    may return within that time, still powered: its first frame must not remove the voltage.
+    """
     cdef uint32_t patience = max(x.stop_patience, 4 * a.divider)
     cdef bint quick = a.goal == QUICK_STOP or (a.stopping and a.on_loss != LOSS_DISABLE)
     if quantity_of(a.mode) == TORQUE:
@@ -172,7 +173,7 @@ cdef uint16_t stop_command(axes_t *x, axis_t *a) noexcept nogil:
 
 
 cdef inline bint may_lose_voltage(const axes_t *x, const axis_t *a) noexcept nogil:
-    """QUICK_STOP_ACTIVE: True at rest, or after the stop deadline, as a velocity may be noise."""
+    """QUICK_STOP_ACTIVE: return True at rest, or after the deadline, as a velocity may be noise."""
     return a.still_cycles >= x.still_limit or a.stop_cycles > x.stop_limit
 
 
@@ -188,7 +189,7 @@ cdef uint16_t guard_lead(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil:
         command = stop_command(x, a)
     else:
         if a.state == QUICK_STOP_ACTIVE and not may_lose_voltage(x, a):
-            goal = QUICK_STOP  # every way out disables, and the axis would coast
+            goal = QUICK_STOP  # every other exit disables, and the axis would coast
         command = cia402_command(a.state, goal, a.command)
     if a.clear_reset:
         command &= ~FAULT_RESET
@@ -211,7 +212,7 @@ cdef void prepare_mode(axis_t *a, int8_t mode) noexcept nogil:
     """Set the target with which a powered axis enters another mode without a jump."""
     cdef uint8_t quantity = quantity_of(mode)
     if quantity == quantity_of(a.mode) and mode != CSP:
-        return  # the same target; that of profile position may be far away
+        return  # same target; that of profile position may be far away
     if quantity == POSITION:
         a.commanded_position = a.position
     elif quantity == VELOCITY:
@@ -221,14 +222,15 @@ cdef void prepare_mode(axis_t *a, int8_t mode) noexcept nogil:
 
 
 cdef void prepare_other_mode(axis_t *a) noexcept nogil:
-    """Set the target of the mode that a powered drive shows, or is to show, if it is not in force."""
+    """Set the target of the mode that a powered drive shows, or shall show, if it is not in
+    force."""
     cdef int8_t other = a.mode_wanted if a.mode_wanted != a.mode else a.mode_shown
     if other != a.mode:
         prepare_mode(a, other)
 
 
 cdef void begin_setpoints(axis_t *a) noexcept nogil:
-    """Forget the set-points so far: the axis stands at its command."""
+    """Forget the previous set-points: the axis holds its command."""
     a.setpoint = a.commanded_position
     a.ghost = a.commanded_position
     a.setpoint_velocity = 0.0
@@ -247,14 +249,15 @@ cdef void begin_setpoints(axis_t *a) noexcept nogil:
 
 
 cdef void enter_mode(axis_t *a) noexcept nogil:
-    """0x6061 shows the requested mode: it is in force now."""
+    """Put the requested mode in force: 0x6061 shows it."""
     prepare_mode(a, a.mode_wanted)
     a.mode = a.mode_wanted
     begin_setpoints(a)
 
 
 cdef void refuse_mode(axes_t *x, axis_t *a, int8_t mode) noexcept nogil:
-    """Restore the mode in force: the drive does not show the requested one, or must not enter it."""
+    """Restore the mode in force: the drive does not show the requested mode or must not enter
+    it."""
     a.mode_refused = mode
     a.mode_wanted = a.mode
     a.waiting_cycles = 0

@@ -32,13 +32,13 @@ cdef struct counts_t:
     uint32_t output_bytes
 
 cdef struct actual_header_t:
-    uint64_t number            # cycles done
-    int64_t time_ns            # its cycle start, from the first one
-    int64_t sent_ns            # when its last cyclic frame was handed to the kernel, link's clock
+    uint64_t number            # number of cycles so far
+    int64_t time_ns            # cycle start, relative to the first one
+    int64_t sent_ns            # when the last cyclic frame was handed to the kernel, link's clock
     uint32_t flags
     uint32_t lost_in_row
     uint32_t skipped
-    uint32_t moving            # axes under power and not at rest
+    uint32_t moving            # number of axes that are powered and not at rest
     double period              # [s]
     uint32_t axis_count
     uint16_t missing_frames
@@ -56,10 +56,10 @@ cdef struct actual_t:           # a header and the arrays of ACTUAL (_handover.p
     double *commanded_torque
     double *input_reals
     int64_t *input_integers
-    uint64_t *followed_since   # the cycle; of axes that are followed
+    uint64_t *followed_since   # number of the cycle; for axes that are followed
     uint64_t *stop_cycle
     uint16_t *statusword
-    uint16_t *controlword      # as sent last
+    uint16_t *controlword      # last one sent
     uint16_t *unit_counter
     int8_t *mode
     uint8_t *state
@@ -71,14 +71,14 @@ cdef struct actual_t:           # a header and the arrays of ACTUAL (_handover.p
     uint8_t *unit_valid
 
 cdef struct target_header_t:
-    uint64_t seen              # the cycle whose actual values the application had read
-    uint64_t stamp             # the cycle that the set-points are meant for
-    int64_t process_ns         # what its body took; -1: unknown
-    int64_t input_age_ns       # of its inputs when the body began; -1: unknown
-    uint64_t updated           # background: the cycle of the last update; 0: none counts
+    uint64_t seen              # newest cycle of which the application had read the actual values
+    uint64_t stamp             # number of the cycle that the set-points are meant for
+    int64_t process_ns         # duration of the body; -1: unknown
+    int64_t input_age_ns       # age of its inputs when the body began; -1: unknown
+    uint64_t updated           # background: number of the cycle of the last update; 0: none is valid
     uint32_t hold              # hand-over: no application commits set-points
     uint32_t streamed          # the set-points are a row of a stream
-    uint32_t background        # a thread repeats what a program has updated: see updated
+    uint32_t background        # a thread repeats the updates of a program: see updated
 
 cdef struct target_t:           # a header and the arrays of TARGET, in its order
     target_header_t *header
@@ -100,16 +100,16 @@ cdef struct handover_t:
     uint32_t target_size
     cat_triple actual_triple
     cat_triple target_triple
-    actual_t actual[4]         # three to hand over, the last one Python's own
-    target_t target[6]         # and the law's two
-    uint32_t published         # futex word: counts publications
+    actual_t actual[4]         # three to exchange; the last one is Python's own
+    target_t target[6]         # as above, and the law's two
+    uint32_t published         # futex word: number of publications
     uint32_t waiting           # Python sleeps on it
     uint32_t sticky            # flags of cycles that Python has not read yet
 
 cdef enum:
     PRIVATE = 3
     OF_LAW = 4
-    BEFORE_LAW = 5             # what the law found: restored when it fails
+    BEFORE_LAW = 5             # targets before the law; restored if it fails
     TARGETS = 6
 
 cdef class Handover:

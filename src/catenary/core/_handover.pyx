@@ -1,11 +1,11 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""Hand-over between the cycle and Python: private buffers that Python sees, and triple buffers
-(native/triple_buffer.h) both ways, so that a vector is never half old and half new.
+"""Hand-over between the cycle and Python: private buffers for Python, and triple buffers
+(native/triple_buffer.h) in both directions, so that a vector is never half old and half new.
 
 Theory of operation. One block of memory per direction and slot: a header and the arrays of one table,
-items of 8 bytes first. Slots 0 to 2 are exchanged, PRIVATE is Python's own, OF_LAW the targets of a
-law, BEFORE_LAW what the law found. `published` counts publications and is the futex word on which
-Python sleeps while `waiting`. `sticky` keeps flags of cycles that Python has not read yet.
+items of 8 bytes first. Slots 0 to 2 are exchanged. PRIVATE is Python's own, OF_LAW holds the targets
+of a law, BEFORE_LAW those before its step. `published` counts publications and is the futex word on
+which Python sleeps while `waiting`. `sticky` keeps flags of cycles that Python has not read yet.
 
 Budget: 0.1 us per direction for three drives, to copy some 200 bytes.
 """
@@ -30,9 +30,9 @@ cdef enum:
     COUNT_MAX = 1 << 16
 
 
-# Arrays of the two blocks, in the order of actual_t and target_t (_handover.pxd): name, NumPy format,
-# what it counts, and its names for Python's views (plan.request.Views), for laws and for sinks; None:
-# not shown there. Items of 8 bytes come first, so that each array is aligned.
+# Arrays of the two blocks, in the order of actual_t and target_t (_handover.pxd): name, NumPy
+# format, kind of the item count, and its names for Python's views (plan.request.Views), laws and
+# sinks; None: not visible there. Items of 8 bytes come first, so that each array is aligned.
 ACTUAL = (
     ("position", "<f8", "axes", "actual_position", "position", "position"),
     ("velocity", "<f8", "axes", "actual_velocity", "velocity", "velocity"),
@@ -91,32 +91,32 @@ cdef size_t lay(void **block, uint8_t *memory, size_t header_size, tuple table, 
 
 
 cdef void handover_commit(handover_t *h) noexcept nogil:
-    """Python's side: what it wrote is what counts from the next instant on."""
+    """Python: commit its targets for the next cycle start."""
     memcpy(h.target[h.target_triple.back].header, h.target[PRIVATE].header, h.target_size)
     cat_triple_publish(&h.target_triple)
 
 
 cdef target_t *handover_latch(handover_t *h, bint *fresh) noexcept nogil:
-    """The cycle's side: the newest committed targets, `fresh` when not seen before."""
+    """Cycle: return the newest committed targets; `fresh` if not seen before."""
     fresh[0] = cat_triple_take(&h.target_triple) != 0
     return &h.target[h.target_triple.front]
 
 
 cdef void handover_publish(handover_t *h) noexcept nogil:
-    """The cycle's side: offers the actual values in the back slot."""
+    """Cycle: publish the actual values in the back slot."""
     cat_triple_publish(&h.actual_triple)
     cat_add32(&h.published, 1)
 
 
 cdef void handover_wake(handover_t *h) noexcept nogil:
-    """Wakes Python where it sleeps; a system call, only then."""
-    cat_fence()  # published before waiting is read: else a sleeper may be missed
+    """Wake Python if it sleeps; only then this is a system call."""
+    cat_fence()  # publish before reading `waiting`; otherwise a sleeper may be missed
     if cat_load_acquire32(&h.waiting):
         cat_futex_wake(&h.published)
 
 
 cdef bint handover_swap(handover_t *h) noexcept nogil:
-    """Python's side: copies the newest actual values to its own; whether there were any."""
+    """Python: copy the newest actual values to its own; return True if there were any."""
     if not cat_triple_take(&h.actual_triple):
         return False
     memcpy(h.actual[PRIVATE].header, h.actual[h.actual_triple.front].header, h.actual_size)
@@ -124,7 +124,7 @@ cdef bint handover_swap(handover_t *h) noexcept nogil:
 
 
 cdef class Field:
-    """One array of a private buffer; keeps its owner alive."""
+    """One array of a private buffer. It keeps its owner alive."""
     cdef object owner
     cdef void *start
     cdef Py_ssize_t count
@@ -150,7 +150,7 @@ cdef class Field:
 
 cdef class Handover:
     def __cinit__(self, axes, units, input_counts, output_counts):
-        """Counts: of axes, sync units, columns by bank (real, integer, bit), and bytes of areas."""
+        """Counts: axes, sync units, columns by bank (real, integer, bit), and bytes of areas."""
         counts = [axes, units, *input_counts[:3], *output_counts[:3]]
         if not all(0 <= count <= COUNT_MAX for count in counts):
             raise ValueError(f"more than {COUNT_MAX} axes, sync units or columns: {counts}")
@@ -208,8 +208,9 @@ cdef class Handover:
         return fields
 
     def law_fields(self):
-        """Return the blocks that a law works on, (actual, target): name → (offset, NumPy format,
-        count; None for a single number)."""
+        """Return the layout of the blocks of a law, (actual, target): name → (offset, NumPy format,
+        count; None for a single number).
+        """
         cdef actual_t *a = &self.c.actual[PRIVATE]
         cdef char *start = <char *>a.header
         actual = {
@@ -221,7 +222,7 @@ cdef class Handover:
         return actual, self.places(<void **>&self.c.target[PRIVATE], TARGET, OF_A_LAW)
 
     def sink_fields(self):
-        """Return the blocks that a sink is given, (actual, target): as `law_fields`."""
+        """Return the layout of the blocks of a sink, (actual, target), as `law_fields` does."""
         cdef actual_t *a = &self.c.actual[PRIVATE]
         cdef char *start = <char *>a.header
         actual = {
@@ -241,7 +242,7 @@ cdef class Handover:
         }
 
     def blocks(self):
-        """Python's own blocks whole, (actual, target), as bytes."""
+        """Return Python's own blocks, (actual, target), as bytes."""
         cdef actual_t *a = &self.c.actual[PRIVATE]
         cdef target_t *t = &self.c.target[PRIVATE]
         return (

@@ -38,7 +38,7 @@ cdef list histogram_counts(const histogram_t *h):
 
 
 cdef class Histogram:
-    """Owns one histogram of its own, for times measured outside the cycle."""
+    """Owns one histogram for times measured outside the cycle."""
     cdef histogram_t *c
 
     def __cinit__(self):

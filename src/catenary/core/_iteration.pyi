@@ -7,20 +7,26 @@ from typing import Protocol, Self
 from catenary.core._engine import Engine
 
 class Cycle:
-    """The cycle that the actual values belong to. It is the same object in every iteration: copy
-    what you want to keep."""
+    """The cycle of the current actual values.
+
+    It is the same object in every iteration: copy what you want to keep.
+    """
 
     def __init__(self, engine: Engine) -> None: ...
     @property
     def number(self) -> int:
-        """Number of the cycle, 0 for the first of the iteration. Skipped cycle starts leave gaps in
-        `time` only."""
+        """Number of the cycle, 0 for the first of the iteration.
+
+        Skipped cycle starts leave gaps in `time` only.
+        """
 
     @property
     def time(self) -> float:
-        """Cycle start [s] since that of the first cycle of the iteration, on the link's clock. A
-        multiple of the period, except where cycle starts follow the reference clock: then it is
-        the time that has passed."""
+        """Cycle start [s] since that of the first cycle of the iteration, on the link's clock.
+
+        A multiple of the period, unless the cycle starts follow the reference clock. Then it is the
+        elapsed time.
+        """
 
     @property
     def ok(self) -> bool:
@@ -61,11 +67,11 @@ class Mover(Protocol):
 class Iteration:
     """Iterator that steps the engine once per `next` and yields its one Cycle.
 
-    It calls `judge(flags)` if one of the CYCLE_* flags of `trouble` is set, or if the devices' AL
-    states together differ from `al_status`; an exception of `judge` ends the iteration. The first
-    step commits nothing. `beside` is called before every step. Each of the list `movers` computes
+    It calls `judge(flags)` if one of the CYCLE_* flags of `trouble` is set, or if the OR of the AL
+    states differs from `al_status`. An exception of `judge` ends the iteration. The first step
+    commits nothing. `beside` is called before every step. Each of the list `movers` computes
     targets before every step that commits, with the time of the cycle [s]. With a `commit_lock`, a
-    step that finds it taken commits nothing: another thread is writing the targets.
+    step that finds it taken commits nothing, because another thread is writing the targets.
     """
 
     def __init__(

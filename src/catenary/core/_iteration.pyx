@@ -1,6 +1,6 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""Iteration of a loop. It is compiled: after a wait, the first microseconds of a cycle are spent on what
-is not in the caches, and a Python generator with its properties is a large part of that.
+"""Iteration of a loop. It is compiled to avoid cache misses: they dominate the first microseconds
+after a wait, and a Python generator with its properties causes many of them.
 """
 
 from libc.stdint cimport int64_t, uint32_t, uint64_t
@@ -78,7 +78,7 @@ cdef class Iteration:
         if self.beside is not None:
             self.beside()
         if self.cycle is None:
-            # The first cycle commits nothing: the body has not said anything yet.
+            # The first cycle commits nothing: the body has not run yet.
             flags = self.engine.run(1)
             self.cycle = Cycle(self.engine)
         else:
@@ -92,7 +92,7 @@ cdef class Iteration:
         return self.cycle
 
     cdef int commit_if_free(self) except -1:
-        """Commit, unless another thread is writing the targets; never wait for it."""
+        """Commit unless another thread is writing the targets; never wait for it."""
         if not self.commit_lock.acquire(False):
             self.engine.keep_targets()
             return 0

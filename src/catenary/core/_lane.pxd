@@ -6,13 +6,13 @@ from catenary.core._native cimport cat_link, cat_packet_ring
 cdef struct lane_t:
     cat_packet_ring *out       # frames of the service thread, to be sent
     cat_packet_ring *back      # frames that came back
-    int64_t wire_time          # of the frames of one cycle, at most [ns]
-    uint32_t arrived           # futex word: counts arrivals
-    uint32_t waiting           # 1: the service thread sleeps, or is about to sleep, on `arrived`
-    uint32_t under_way         # the cycle's: sent in the last cycle and not back yet
-    uint64_t sent              # the cycle's, as the next two
+    int64_t wire_time          # maximum wire time of acyclic frames per cycle [ns]
+    uint32_t arrived           # futex word: number of arrivals
+    uint32_t waiting           # 1: the service thread sleeps on `arrived`, or is about to
+    uint32_t under_way         # cycle only: frames sent in the last cycle that are not back yet
+    uint64_t sent              # cycle only, like the next two
     uint64_t received
-    uint64_t dropped           # came back to a full ring, or could not be sent
+    uint64_t dropped           # frames that returned to a full ring or could not be sent
 
 cdef class Lane:
     """Owner of the two rings of the acyclic queue."""

@@ -1,7 +1,7 @@
-"""The acyclic lane; owned by Engine, whose lane_push, lane_pop and lane_wait are these."""
+"""The acyclic queue. Engine owns it and offers it as lane_push, lane_pop and lane_wait."""
 
 class Lane:
-    """Owns the two rings of the acyclic lane."""
+    """Owner of the two rings of the acyclic queue."""
 
     def __init__(self, wire_time_ns: int) -> None: ...
     def push(self, frame: bytes) -> bool: ...

@@ -2,17 +2,17 @@
 """The acyclic queue: frames of procedures, sent after the cyclic frames.
 
 Theory of operation
-    One service thread pushes whole frames into `out` and pops returned ones from `back`; both are
+    One service thread pushes whole frames into `out` and pops returned ones from `back`. Both are
     rings for one producer and one consumer (native/packet_ring.h). After each cycle `lane_send` sends
-    at most four frames, as far as their wire time fits into what the plan leaves of the period
-    (plan/frames.py) less the part of it that has passed. The first frame is sent in any case, so that
-    a conversation never starves. Frames with an index from 0x80 on return through `lane_received`.
+    at most four frames. Their wire time must fit into the part of the period that the plan leaves
+    (plan/frames.py) and that has not passed. The first frame is always sent, so that a
+    conversation never starves. Frames with an index from 0x80 on return through `lane_received`.
     The cycle never waits for the service thread.
 
 Waking
     The service thread sets `waiting`, then sleeps while `arrived` is unchanged. The cycle increments
-    `arrived`, then wakes it if `waiting` is set. A full fence lies between the two steps of the cycle;
-    the futex compares `arrived` again in the kernel, so that no wake-up is lost.
+    `arrived`, then wakes the thread if `waiting` is set. A full fence separates the two steps of the
+    cycle. The futex compares `arrived` again in the kernel, so that no wake-up is lost.
 
 Budget: 0.05 us if nothing is queued, else what the link's send takes, at most four times.
 """
@@ -50,8 +50,9 @@ cdef inline int64_t wire_time(uint32_t length) noexcept nogil:
 
 
 cdef void lane_send(lane_t *lane, const cat_link *link, int64_t passed) noexcept nogil:
-    """Send at most four frames that fit into the wire time left; the first one in any case.
-    `passed` [ns] since the cycle start."""
+    """Send at most four frames that fit into the remaining wire time; always send the first one.
+    `passed` [ns]: time since the cycle start.
+    """
     cdef const cat_packet *packet
     cdef int64_t left = lane.wire_time - passed
     cdef uint32_t count
@@ -87,7 +88,7 @@ cdef void lane_received(lane_t *lane, const uint8_t *bytes, uint32_t length,
 
 cdef class Lane:
     def __cinit__(self, int64_t wire_time_ns):
-        """`wire_time_ns`: of acyclic frames per cycle, at most."""
+        """`wire_time_ns`: maximum wire time of acyclic frames per cycle."""
         if wire_time_ns < 0:
             raise ValueError(f"acyclic_ns: {wire_time_ns}")
         cdef size_t size = sizeof(cat_packet_ring)
@@ -115,7 +116,7 @@ cdef class Lane:
         return frame
 
     def wait(self, int64_t timeout_ns):
-        """Wait once. A signal or a spurious wake-up ends it early."""
+        """Wait once. A signal or a spurious wake-up ends the wait early."""
         cdef uint32_t seen = cat_load_acquire32(&self.c.arrived)
         if cat_ring_peek(self.c.back) != NULL:
             return True

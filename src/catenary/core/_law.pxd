@@ -5,7 +5,7 @@ from catenary.core._handover cimport actual_t, target_t
 from catenary.core._memory cimport cat_memory
 from catenary.core._native cimport cat_law_monitor, cat_law_numbers, cat_law_step, cat_triple
 
-cdef enum:  # how a law stands
+cdef enum:  # state of a law
     WAITING = 0                # not taken over by the cycle yet
     RUNNING = 1
     FINISHED = 2
@@ -15,37 +15,37 @@ cdef enum:  # how a law stands
     NOT_FINITE = 6
     OVERRUN = 7
 
-cdef struct exchange_t:        # numbers that change all at once
+cdef struct exchange_t:        # numbers that are replaced together
     uint32_t count
     cat_triple triple
     double *slots[3]
 
 cdef struct law_t:
     cat_law_step step
-    cat_law_numbers numbers    # the law's own
+    cat_law_numbers numbers    # memory of the law
     exchange_t memory_in
     exchange_t memory_out
     exchange_t parameters_in
-    int64_t budget             # [ns] of one step; 0: none
-    int64_t limit              # [ns] of processor time in one call: it never returns
-    uint32_t overrun_limit     # steps in a row over the budget
+    int64_t budget             # [ns] per step; 0: none
+    int64_t limit              # [ns] of processor time in one call, after which it counts as stuck
+    uint32_t overrun_limit     # number of steps in a row over the budget that end the law
     uint32_t overruns_in_row
     uint64_t overruns
     uint64_t steps
-    int64_t longest            # [ns]
-    int64_t begun              # its first instant
-    uint64_t ended_at          # cycle
+    int64_t longest            # longest step [ns]
+    int64_t begun              # first cycle start
+    uint64_t ended_at          # number of the cycle
     uint32_t status            # futex word
-    uint32_t axis              # NOT_FINITE: whose target
+    uint32_t axis              # NOT_FINITE: number of the axis
     bint threaded              # the cycle runs in another thread: memory is copied on request
-    uint32_t wanted            # counts requests for the memory
-    uint32_t given             # the last request that was answered; futex word
+    uint32_t wanted            # number of requests for the memory
+    uint32_t given             # last request that was answered; futex word
 
 cdef class Law:
     """Owns a law's numbers while it runs."""
     cdef law_t c
     cdef cat_law_monitor rehearsal
-    cdef int priority              # of the monitor
+    cdef int priority              # priority of the monitor
     cdef cat_memory memory_block   # all its numbers
     cdef allocate(self, exchange_t *numbers, double **place)
     cdef fill(self, exchange_t *numbers, values)

@@ -1,25 +1,37 @@
-"""A law in the cycle: its numbers, its budget, and what ended it."""
+"""A law in the cycle: its numbers, its budget, and how it ended."""
 
 from collections.abc import Sequence
 from typing import Final
 
-# `Law.status`; 0: not taken over by the cycle yet. Every status but these two stopped the drives.
+# `Law.status`; 0: not taken over by the cycle yet. LAW_FINISHED and LAW_STOPPED hold the axes, all
+# later ones stop the drives.
 LAW_RUNNING: Final[int]
-LAW_FINISHED: Final[int]  # it returned "finished": the axes hold
-LAW_STOPPED: Final[int]  # by `stop_law`, or by another law: the axes hold
+LAW_FINISHED: Final[int]  # the law returned "finished": the axes hold
+LAW_STOPPED: Final[int]  # stopped by `stop_law` or by another law: the axes hold
 LAW_RAISED: Final[int]
-LAW_NEVER_RETURNED: Final[int]  # it was given up
+LAW_NEVER_RETURNED: Final[int]  # aborted by the monitor
 LAW_NOT_FINITE: Final[int]  # the set-point of `axis` was NaN or infinite
-LAW_OVERRUN: Final[int]  # `overrun_limit` steps in a row took longer than the budget
+LAW_OVERRUN: Final[int]  # `overrun_limit` steps in a row exceeded the budget
 LAW_ABORTED: Final[int]  # `Law.rehearse`: a step never returned
 
 class Law:
-    """A function of native/law.h at `address`, with its numbers.
+    """A compiled function of native/law.h at `address`, with its numbers.
 
-    `memory`: the law's own, `parameters`: the application's; at most 4096 each. `budget_ns` of one
-    step, 0: none; `overrun_limit` steps in a row over it stop the drives. A step that computes for
-    20 ms (twice the budget, if that is more) is given up by a thread of `priority` (SCHED_FIFO; 0: as
-    the caller). The laws of an engine share this thread; the first one sets its priority. The caller keeps what the address belongs to alive. ValueError, OSError.
+    A step that computes for 20 ms (twice the budget, if that is more) is aborted by a monitor
+    thread. The laws of an engine share this thread; the first one sets its priority. The caller
+    keeps the owner of `address` alive.
+
+    Args:
+        address: Address of the function.
+        memory: Initial memory of the law, at most 4096 numbers.
+        parameters: Parameters set by the application, at most 4096 numbers.
+        budget_ns: Budget of one step [ns]; 0: none.
+        overrun_limit: Number of steps in a row over the budget that stop the drives.
+        priority: SCHED_FIFO priority of the monitor; 0: that of the caller.
+
+    Raises:
+        ValueError: A number is out of range.
+        OSError: The monitor thread cannot be started.
     """
 
     def __init__(
@@ -33,12 +45,12 @@ class Law:
         priority: int,
     ) -> None: ...
     def set_memory(self, values: Sequence[float]) -> None:
-        """All at once, before the next step. ValueError for another number of numbers."""
+        """Replace the memory before the next step. Raises ValueError if the length differs."""
 
     def set_parameters(self, values: Sequence[float]) -> None: ...
     @property
     def memory(self) -> list[float]:
-        """As the last step left it."""
+        """Return the memory as the last step left it."""
 
     @property
     def status(self) -> int: ...
@@ -46,16 +58,25 @@ class Law:
     def ended(self) -> bool: ...
     @property
     def axis(self) -> int:
-        """LAW_NOT_FINITE: whose set-point."""
+        """Number of the axis with an invalid set-point, for LAW_NOT_FINITE."""
 
     @property
     def figures(self) -> dict[str, int]:
-        """steps, overruns, longest_ns."""
+        """Return steps, overruns and longest_ns."""
 
     def wait(self, timeout_ns: int) -> bool:
-        """Waits for the end, without the GIL. Whether it has ended."""
+        """Wait for the end of the law, without the GIL; return True if it has ended."""
 
     def rehearse(self, actual: bytes, target: bytes) -> int:
-        """A few steps on copies of the blocks and of the memory: what is slow the first time happens
-        now. What the law returned last (native/law.h). OSError if the thread that watches it cannot
-        be started."""
+        """Run a few steps on copies of the blocks and of the memory, to warm the caches.
+
+        Args:
+            actual: Block of the actual values.
+            target: Block of the targets.
+
+        Returns:
+            The last return value of the law (native/law.h).
+
+        Raises:
+            OSError: The monitor thread cannot be started.
+        """

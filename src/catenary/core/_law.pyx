@@ -1,13 +1,13 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""A law in the cycle: its numbers, its budget, and what ends it.
+"""A law in the cycle: its numbers, its budget, and how it ends.
 
-Theory of operation. The law is a function of native/law.h. Parameters and a new memory reach it by
-triple buffers before a step, all at once. Its memory is copied for the application after a step: on
-request where the cycle has its own thread (`wanted`, `given`), else each time. `status` says how it
-ended and is a futex word. A step over the budget is counted; `overrun_limit` of them in a row end the
-law. One that never returns is given up by the engine's monitor.
+Theory of operation. The law is a function of native/law.h. Parameters and a new memory reach it
+through triple buffers before a step, all at once. Its memory is copied for the application after a
+step: on request if the cycle has its own thread (`wanted`, `given`), otherwise each time. `status` is
+a futex word and gives the reason of the end. A step over the budget is counted; `overrun_limit` of
+them in a row end the law. The engine's monitor aborts a step that never returns.
 
-Budget: 30 ns besides the law, without memory.
+Budget: 30 ns in addition to the law, without memory.
 """
 
 import os
@@ -54,14 +54,14 @@ LAW_OVERRUN = OVERRUN
 LAW_ABORTED = CAT_LAW_ABORTED
 
 cdef enum:
-    NUMBERS_MAX = 4096         # copied in every cycle
-    STUCK_NS = 20_000_000      # of processor time in one call: it never returns
+    NUMBERS_MAX = 4096         # they are copied in every cycle
+    STUCK_NS = 20_000_000      # processor time in one call, after which it counts as stuck
     REHEARSALS = 3
     ANSWER_NS = 200_000_000    # longest wait for a copy of the memory
-    SLICE_NS = 10_000_000      # of it, between signals
+    SLICE_NS = 10_000_000      # part of it between two checks for signals
 
 
-# ---- numbers that change all at once
+# ---- numbers that are replaced together
 
 cdef inline void give(exchange_t *numbers, const double *values) noexcept nogil:
     if numbers.count:
@@ -70,7 +70,7 @@ cdef inline void give(exchange_t *numbers, const double *values) noexcept nogil:
 
 
 cdef inline bint take(exchange_t *numbers, double *values) noexcept nogil:
-    """False: nothing new."""
+    """Take the newest numbers; return False if nothing is new."""
     if numbers.count == 0 or not cat_triple_take(&numbers.triple):
         return False
     memcpy(values, numbers.slots[numbers.triple.front], numbers.count * sizeof(double))
@@ -96,7 +96,7 @@ cdef void law_end(law_t *law, uint32_t status, uint64_t number) noexcept nogil:
 
 
 cdef int first_not_finite(const axes_t *axes, const target_t *target) noexcept nogil:
-    """The first axis whose set-point is NaN or infinite; -1: none."""
+    """Return the first axis with a set-point that is NaN or infinite; -1: none."""
     cdef uint32_t i
     cdef double value
     for i in range(axes.axis_count):
@@ -114,8 +114,9 @@ cdef int first_not_finite(const axes_t *axes, const target_t *target) noexcept n
 cdef bint law_run(law_t *law, cat_law_monitor *monitor, const axes_t *axes,
                   const actual_t *actual, target_t *target, int64_t instant,
                   uint64_t number) noexcept nogil:
-    """Run one step. Return True if the law goes on. What a failed step left in `target` must not
-    be sent."""
+    """Run one step. Return True if the law goes on. What a failed step left in `target` must not be
+    sent.
+    """
     cdef int rc, axis
     take(&law.parameters_in, law.numbers.parameters)
     take(&law.memory_in, law.numbers.memory)
@@ -137,7 +138,7 @@ cdef bint law_run(law_t *law, cat_law_monitor *monitor, const axes_t *axes,
 
 
 cdef void law_tell(law_t *law) noexcept nogil:
-    """After a step of a law that goes on: copy its memory where the application wants it."""
+    """Copy the memory of a law that goes on, if the application has requested it."""
     cdef uint32_t wanted
     if not law.threaded:
         give(&law.memory_out, law.numbers.memory)
@@ -150,7 +151,7 @@ cdef void law_tell(law_t *law) noexcept nogil:
 
 
 cdef bint law_took(law_t *law, int64_t duration, uint64_t number) noexcept nogil:
-    """Notes how long the step took; whether it may go on."""
+    """Record the duration of a step; return True if the law may go on."""
     law.longest = max(law.longest, duration)
     if law.budget == 0 or duration <= law.budget:
         law.overruns_in_row = 0
@@ -182,7 +183,7 @@ cdef void law_monitor_park(cat_law_monitor *monitor) noexcept nogil:
     cat_law_monitor_park(monitor)
 
 
-# ---- the edge
+# ---- Python interface
 
 cdef class Law:
     def __cinit__(self, uintptr_t address, memory, parameters, *, int64_t budget_ns,
@@ -230,7 +231,7 @@ cdef class Law:
         if len(values) != numbers.count:
             raise ValueError(f"{numbers.count} numbers, not {len(values)}")
         checked = [float(value) for value in values]
-        slot = numbers.slots[numbers.triple.back]  # not before: float() may run anything
+        slot = numbers.slots[numbers.triple.back]  # not earlier: float() may run any code
         for i, value in enumerate(checked):
             slot[i] = value
         if numbers.count:
@@ -253,8 +254,9 @@ cdef class Law:
         return [numbers.slots[numbers.triple.front][i] for i in range(numbers.count)]
 
     cdef int request_memory(self) except -1:
-        """Wait until the cycle has copied the memory after its next step; the end of the law does
-        so too. Give up after ANSWER_NS: the last copy counts."""
+        """Wait until the cycle has copied the memory after its next step, or the law has ended.
+        After ANSWER_NS return anyway: the last copy is used.
+        """
         cdef uint32_t wanted = self.c.wanted + 1
         cdef uint32_t given
         cdef int64_t waited = 0
@@ -278,13 +280,13 @@ cdef class Law:
         return cat_load_acquire32(&self.c.status) > RUNNING
 
     cdef void supersede(self) noexcept:
-        """Ends it where the cycle has not begun with it: then it never will."""
+        """End the law before its start, if the cycle has not begun with it."""
         if cat_change32(&self.c.status, WAITING, STOPPED_BY_APPLICATION):
             give(&self.c.memory_out, self.c.numbers.memory)
             cat_futex_wake(&self.c.status)
 
     cdef bint ended_before(self, uint64_t number) noexcept:
-        """That cycle has seen its end."""
+        """Return True if the law ended in this cycle or before."""
         return cat_load_acquire32(&self.c.status) > RUNNING and number >= self.c.ended_at
 
     cdef bint failed(self) noexcept:

@@ -1,7 +1,7 @@
 """Memory of the cycle; its state is part of `Engine.scheduling`."""
 
 def amount(size: int) -> str:
-    """Return a number of bytes for people: "1.2 MB"."""
+    """Return a number of bytes as text: "1.2 MB"."""
 
 def reason(error: int) -> str:
     """Return why memory is not locked, and what to do. `error`: errno of mlock."""

@@ -1,4 +1,4 @@
-"""Memory of the cycle, by the allocator of native/locked_memory.h, and its state in words."""
+"""Memory of the cycle, from the allocator of native/locked_memory.h, and its state as text."""
 
 import errno as error_names
 import resource
@@ -7,7 +7,7 @@ KILO, MEGA = 1024, 1024 * 1024
 
 
 cdef void *memory_take(cat_memory *memory, size_t count, size_t size) except NULL:
-    """Return `count` zeroed elements of `size` bytes. Raise MemoryError if there is no room."""
+    """Return `count` zeroed elements of `size` bytes. Raise MemoryError if memory is exhausted."""
     cdef void *part = cat_memory_take(memory, count, size)
     if part == NULL:
         raise MemoryError(f"{count * size} bytes for the cycle")
@@ -15,7 +15,7 @@ cdef void *memory_take(cat_memory *memory, size_t count, size_t size) except NUL
 
 
 def amount(size):
-    """Return a number of bytes for people: "1.2 MB"."""
+    """Return a number of bytes as text: "1.2 MB"."""
     return f"{size / MEGA:.3g} MB" if size >= MEGA else f"{size / KILO:.3g} kB"
 
 

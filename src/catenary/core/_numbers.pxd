@@ -1,19 +1,19 @@
 # cython: cdivision=True
 """Numbers in a process image: any bit offset, 1 to 64 bits, inlined where they are used.
 
-Little endian hosts (x86-64, ARM64). Images are padded, so that whole words may be touched. A number
-sits in one word of 64 bits, moved to its upper end and down again; the few that span nine bytes, and
-what is beyond an int64, take the longer way (_numbers.pyx).
+Little endian hosts (x86-64, ARM64). Images are padded, so that whole words may be accessed. A number
+is in one 64-bit word: it is shifted to the upper end and down again. Numbers that span nine bytes or
+exceed an int64 use the slow functions (_numbers.pyx).
 """
 
 from libc.stdint cimport int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 from libc.string cimport memcpy
 
 cdef extern from "<math.h>" nogil:
-    long long llrint(double value)  # to nearest, halves to even: as rint, without a call
+    long long llrint(double value)  # rounds to nearest, halves to even: like rint, without a call
 
 cdef enum:
-    IMAGE_PADDING = 16         # bytes behind an image: numbers are read and written as whole words
+    IMAGE_PADDING = 16         # bytes after an image: numbers are read and written as whole words
 
 cdef enum:
     UNSIGNED = 0
@@ -24,17 +24,17 @@ cdef struct number_t:
     uint8_t present
     uint8_t kind
     uint8_t bits
-    uint8_t shift              # of its lowest bit, in the byte
-    uint8_t split              # spans nine bytes
-    uint8_t left               # to the upper end of its word, and
-    uint8_t right              # down again
+    uint8_t shift              # of the lowest bit in its byte
+    uint8_t split              # the number spans nine bytes
+    uint8_t left               # shift to the upper end of the word
+    uint8_t right              # shift down again
     uint32_t byte
     uint64_t mask
     double scale
     double offset
-    double low                 # of the raw value, as far as a double can say
+    double low                 # lowest raw value, as far as a double can represent it
     double high
-    int64_t lowest             # of the raw value; an unsigned one of 64 bits ends at 2^63 - 1 here
+    int64_t lowest             # lowest raw value; the highest of 64 unsigned bits is 2^63 - 1 here
     int64_t highest
 
 cdef uint64_t number_bits_split(const number_t *n, const uint8_t *image) noexcept nogil
@@ -43,7 +43,7 @@ cdef double number_real(const number_t *n, const uint8_t *image) noexcept nogil
 cdef bint number_put_other(const number_t *n, uint8_t *image, double raw) noexcept nogil
 
 cdef inline uint64_t number_word(const number_t *n, const uint8_t *image) noexcept nogil:
-    """The number at the upper end of a word."""
+    """Return a word with the number at its upper end."""
     cdef uint64_t word
     if n.split:
         return number_bits_split(n, image) << n.right
@@ -63,14 +63,14 @@ cdef inline void number_put_bits(const number_t *n, uint8_t *image, uint64_t raw
     memcpy(image + n.byte, &word, 8)
 
 cdef inline int64_t number_integer(const number_t *n, const uint8_t *image) noexcept nogil:
-    """The raw value; unsigned 64-bit ones beyond 2^63 wrap."""
+    """Return the raw value; unsigned 64-bit values beyond 2^63 wrap."""
     cdef uint64_t word = number_word(n, image)
     if n.kind == SIGNED:
         return (<int64_t>word) >> n.right
     return <int64_t>(word >> n.right)
 
 cdef inline bint number_put_integer(const number_t *n, uint8_t *image, int64_t value) noexcept nogil:
-    """Writes a raw value; whether it had to be cut to the type's range. 64 bits take all there is."""
+    """Write a raw value; return True if it was saturated. 64-bit types take every int64."""
     cdef int64_t kept = value
     if n.bits < 64:
         kept = min(max(value, n.lowest), n.highest)
@@ -78,7 +78,7 @@ cdef inline bint number_put_integer(const number_t *n, uint8_t *image, int64_t v
     return kept != value
 
 cdef inline double number_value(const number_t *n, const uint8_t *image) noexcept nogil:
-    """In SI units."""
+    """Return the value in SI units."""
     cdef uint64_t word
     if n.kind == REAL:
         return number_real(n, image) * n.scale + n.offset
@@ -88,8 +88,9 @@ cdef inline double number_value(const number_t *n, const uint8_t *image) noexcep
     return <double>(word >> n.right) * n.scale + n.offset
 
 cdef inline bint number_put_value(const number_t *n, uint8_t *image, double value) noexcept nogil:
-    """Writes a finite SI value, rounded; whether it had to be cut to the type's range. llrint is
-    right as far as an int64 goes, 9.2e18."""
+    """Write a finite SI value, rounded; return True if it was saturated to the type's range. llrint
+    is exact up to the limit of an int64, 9.2e18.
+    """
     cdef double raw = (value - n.offset) / n.scale
     cdef int64_t rounded, kept
     if n.kind == REAL or not -9.2e18 < raw < 9.2e18:
@@ -100,7 +101,7 @@ cdef inline bint number_put_value(const number_t *n, uint8_t *image, double valu
     return kept != rounded
 
 cdef inline bint number_put_wrapped(const number_t *n, uint8_t *image, double value) noexcept nogil:
-    """As number_put_value, but a counter that is beyond its range goes round: its low bits."""
+    """Write like number_put_value, but wrap a counter beyond its range: keep its low bits."""
     cdef double raw
     if n.kind == REAL:
         return number_put_value(n, image, value)

@@ -9,7 +9,7 @@ cdef double HIGHEST_SINGLE = 3.4028234663852886e38
 cdef double HIGHEST_DOUBLE = 1.7976931348623157e308
 
 
-# ---- the longer way
+# ---- slow functions
 
 cdef uint64_t number_bits_split(const number_t *n, const uint8_t *image) noexcept nogil:
     cdef uint64_t word
@@ -28,7 +28,7 @@ cdef void number_put_bits_split(const number_t *n, uint8_t *image, uint64_t raw)
 
 
 cdef double number_real(const number_t *n, const uint8_t *image) noexcept nogil:
-    """The raw value of a floating-point number."""
+    """Return the raw value of a floating-point number."""
     cdef uint64_t raw = number_bits(n, image)
     cdef uint32_t raw32 = <uint32_t>raw
     cdef float single
@@ -41,7 +41,8 @@ cdef double number_real(const number_t *n, const uint8_t *image) noexcept nogil:
 
 
 cdef bint number_put_other(const number_t *n, uint8_t *image, double raw) noexcept nogil:
-    """A floating-point number, or an integer that an int64 cannot hold; whether it had to be cut."""
+    """Write a floating-point number, or an integer beyond int64; return True if it was
+    saturated."""
     cdef uint64_t bits
     cdef uint32_t bits32
     cdef float single
@@ -63,10 +64,11 @@ cdef bint number_put_other(const number_t *n, uint8_t *image, double raw) noexce
     return kept != raw
 
 
-# ---- the edge
+# ---- Python interface
 
 cdef int make_number(number_t *n, object plan, object image_size, object where) except -1:
-    """Fills `n` from a plan's Number; None: absent. ValueError names `where` and what is wrong."""
+    """Set `n` from a plan's Number; None: absent. ValueError names `where` and the invalid
+    field."""
     n.present = 0
     if plan is None:
         return 0
@@ -101,14 +103,14 @@ cdef int make_number(number_t *n, object plan, object image_size, object where) 
 
 
 def whole_range(kind, bits):
-    """The raw values of an integer, as far as an int64 holds them."""
+    """Return the range of an integer's raw values, as far as an int64 holds them."""
     if kind == SIGNED:
         return -(1 << (bits - 1)), (1 << (bits - 1)) - 1
     return 0, (1 << min(bits, 63)) - 1
 
 
 cdef double highest(int kind, int bits) except? -1:
-    """The largest double inside the type."""
+    """Return the largest double within the type."""
     if kind == REAL:
         return HIGHEST_SINGLE if bits == 32 else HIGHEST_DOUBLE
     value_bits = bits - 1 if kind == SIGNED else bits

@@ -1,29 +1,29 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
 """Set-points of one axis in one cycle: commanded_position, commanded_velocity, commanded_torque.
 
-Theory of operation. A followed axis gets the committed set-point, within its limits. Six situations
-decide what is sent instead:
+Theory of operation. A followed axis gets the committed set-point, within its limits. In six situations
+something else is sent:
 
-- not powered: target := actual; in SWITCHED_ON a committed torque is sent, so that it is there when
+- not powered: target := actual; in SWITCHED_ON a committed torque is sent, so that it is present when
   the brake opens;
 - waiting: powered and to be enabled, but not followed: before bit 12 is shown, during a mode change,
   after bit 12 was lost (`waiting_cycles`);
-- hand-over (`x.handed_over`): a law or stream ended, or a call of ours waits;
-- underrun: no set-point was committed, or the one of this axis was refused (`late_cycles`);
+- hand-over (`x.handed_over`): a law or stream ended, or an internal call waits;
+- underrun: no set-point was committed, or that of this axis was refused (`late_cycles`);
 - background (`x.background`): a thread repeats the set-points of a program. CSP falls back without a
-  late limit while nothing is committed; in CSV and CST a set-point counts until the last update is
-  older than the command timeout, then CSV decelerates and CST is stopped (`is_timed_out`);
+  late limit while nothing is committed. In CSV and CST a set-point is valid until the last update is
+  older than the command timeout; then CSV decelerates and CST is stopped (`is_timed_out`);
 - stopping: another state was requested, or the core stopped the axis.
 
 In the profile modes the drive makes the trajectory. In PP the command stays until another one is
 committed, and no underrun counts: the drive ends its motion by itself. In PV the velocity stays in
 an underrun, and the late limit of CSV counts; in all other situations the target is 0.
-In all of them CSP and CSV decelerate and hold, and CST keeps its torque; each is bounded in time
-(`judge_lateness`, _guard.pyx). In an underrun CSP first keeps the velocity of the last two set-points:
-`ghost` is the set-point of this cycle, which the core continues in a fallback (`fallback_cycles`).
-`setpoint` is the last one that the application has written, `accepted` counts them up to two. When
-set-points come back, the command returns to them within acceleration, deceleration and torque slope
-(`returning`).
+In all six situations CSP and CSV decelerate and hold, and CST keeps its torque; each is bounded in
+time (`judge_lateness`, _guard.pyx). In an underrun CSP first keeps the velocity of the last two
+set-points. `ghost` is the set-point of this cycle, which the core continues in a fallback
+(`fallback_cycles`). `setpoint` is the last one that the application has written; `accepted` counts
+them up to two. When set-points return, the command returns to them within acceleration, deceleration
+and torque slope (`returning`).
 
 Budget: 10 ns per axis that follows.
 """
@@ -79,7 +79,7 @@ cdef inline double approach(double value, double goal, double step) noexcept nog
     return value + copysign(step, goal - value)
 
 
-# ---- fallback: without set-points that count
+# ---- fallback: no valid set-point
 
 cdef void return_to(axes_t *x, axis_t *a, double target, double velocity) noexcept nogil:
     """Move the command towards a moving set-point: velocity from the remaining distance."""
@@ -99,7 +99,7 @@ cdef void track(axes_t *x, axis_t *a, double target, double velocity) noexcept n
     """Command a set-point that moves at `velocity`: within the limits, or on the way back to it."""
     cdef double held = a.commanded_position
     cdef double step = a.velocity_limit * x.period
-    # An axis found outside its limits may stay or come back, not leave further.
+    # An axis that is outside its limits may stay or return, but not leave further.
     target = clamp(a, target, fmin(a.position_min, held), fmax(a.position_max, held))
     if a.returning:
         return_to(x, a, target, velocity)
@@ -120,7 +120,7 @@ cdef double towards_limits(const axis_t *a, double velocity) noexcept nogil:
 
 
 cdef inline double fallback_velocity(const axis_t *a) noexcept nogil:
-    """Return the velocity at which set-points stayed away. A single step is not a velocity."""
+    """Return the velocity at which set-points stopped. A single step does not define a velocity."""
     cdef double last = a.setpoint_velocity
     cdef double before = a.previous_velocity
     if last * before <= 0.0:
@@ -142,7 +142,7 @@ cdef void fall_back_position(axes_t *x, axis_t *a, bint keep) noexcept nogil:
 
 
 cdef void fall_back(axes_t *x, axis_t *a, bint keep) noexcept nogil:
-    """Compute one cycle without a set-point that counts. `keep`: CSP may keep its velocity."""
+    """Compute one cycle without a valid set-point. `keep`: CSP may keep its velocity."""
     cdef uint8_t quantity = quantity_of(a.mode)
     if a.mode == PROFILE_POSITION:
         return
@@ -159,7 +159,7 @@ cdef void fall_back(axes_t *x, axis_t *a, bint keep) noexcept nogil:
         a.commanded_velocity = approach(a.commanded_velocity, 0.0, a.deceleration * x.period)
 
 
-# ---- set-points that count
+# ---- valid set-points
 
 cdef bint is_number(axis_t *a, double value) noexcept nogil:
     if isfinite(value):
@@ -205,14 +205,14 @@ cdef void follow_position(axes_t *x, axis_t *a, const target_t *t, double target
     if a.fallback_cycles:
         a.returning = a.accepted > 0
         if t.header.streamed:
-            a.previous_velocity = 0.0  # the pause between two rows is not known
+            a.previous_velocity = 0.0  # the pause between two rows is unknown
     a.accepted = min(a.accepted + 1, 2)
     a.refused_cycles = 0
     a.fallback_cycles = 0
     a.ghost = target + a.setpoint_velocity * x.period * <double>age
     track(x, a, a.ghost, a.setpoint_velocity)
     if age > 0:
-        a.returning = 1  # the next one may go on from the pause or from the present
+        a.returning = 1  # the next set-point may continue from before the pause or from now
 
 
 cdef bint is_leaving(const axis_t *a) noexcept nogil:
@@ -256,8 +256,9 @@ cdef void follow_velocity(axes_t *x, axis_t *a, double target) noexcept nogil:
 
 
 cdef double limited_torque(axis_t *a, double target) noexcept nogil:
-    """Return the torque within its limit, none towards a position limit that is reached and none
-    that accelerates beyond the velocity limit."""
+    """Return the torque within its limit: none towards a reached position limit and none that
+    accelerates beyond the velocity limit.
+    """
     target = clamp(a, target, -a.torque_limit, a.torque_limit)
     if a.position >= a.position_max or a.velocity > a.velocity_limit:
         target = clamp(a, target, -INFINITY, 0.0)
@@ -282,11 +283,11 @@ cdef void follow_torque(axes_t *x, axis_t *a, double target) noexcept nogil:
 cdef void limit_torque(axes_t *x, axis_t *a) noexcept nogil:
     a.commanded_torque = limited_torque(a, a.commanded_torque)
     if is_leaving(a):
-        stop_axis(x, a, STOP_POSITION_LIMIT)  # without torque only the drive can brake it
+        stop_axis(x, a, STOP_POSITION_LIMIT)  # without torque only the drive can brake the axis
 
 
 cdef void follow(axes_t *x, axis_t *a, const target_t *t, uint32_t i, bint fresh) noexcept nogil:
-    """Follow the set-point of this cycle, if there is one that counts; else fall back."""
+    """Follow the set-point of this cycle if it is valid; otherwise fall back."""
     cdef uint8_t quantity = quantity_of(a.mode)
     cdef double target = 0.0
     if quantity == POSITION:
@@ -315,14 +316,15 @@ cdef void follow(axes_t *x, axis_t *a, const target_t *t, uint32_t i, bint fresh
 
 
 cdef inline bint is_timed_out(const axes_t *x, const axis_t *a) noexcept nogil:
-    """Return True if the last update of a program in the background does not count any more. A
-    hand-over before it still has its own time."""
+    """Return True if the last update of a program in the background is no longer valid. A hand-over
+    before it still has its own time.
+    """
     return (x.handed_over == 0 and not is_commanded(x, a.mode)
             and x.number - x.handed_over_at > x.handover_limit)
 
 
 cdef void judge_lateness(axes_t *x, axis_t *a) noexcept nogil:
-    """Stop a followed axis whose set-points have stayed away for too long."""
+    """Stop a followed axis that has been without set-points for too long."""
     cdef uint8_t quantity = quantity_of(a.mode)
     cdef uint32_t limit = x.late_limit_position
     if quantity == VELOCITY:
@@ -343,10 +345,11 @@ cdef void judge_lateness(axes_t *x, axis_t *a) noexcept nogil:
         lose_axis(x, a, STOP_REFUSED if a.refused_cycles else STOP_UNDERRUN)
 
 
-# ---- what is sent
+# ---- outputs
 
 cdef void rest(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nogil:
-    """Not powered: target := actual. The torque committed last is sent before the brake opens."""
+    """Not powered: set target := actual. The torque committed last is sent before the brake
+    opens."""
     a.commanded_position = a.position
     a.commanded_velocity = 0.0
     a.commanded_torque = 0.0
@@ -359,7 +362,7 @@ cdef void rest(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nog
 
 
 cdef void stopping(axes_t *x, axis_t *a) noexcept nogil:
-    """Powered, but to stop: decelerate; the last torque stays until the voltage is cut."""
+    """Powered, but stopping: decelerate; the last torque stays until the voltage is removed."""
     a.stop_cycles += 1
     fall_back(x, a, False)
     prepare_other_mode(a)
@@ -369,7 +372,7 @@ cdef void stopping(axes_t *x, axis_t *a) noexcept nogil:
 
 
 cdef void wait_for_mode(axes_t *x, axis_t *a) noexcept nogil:
-    """The drive shows another mode than the one requested: the mode in force hands over."""
+    """Hand over in the mode in force while the drive shows another mode than the requested one."""
     fall_back(x, a, False)
     prepare_other_mode(a)
     if quantity_of(a.mode) == TORQUE:
@@ -386,7 +389,7 @@ cdef void wait_for_mode(axes_t *x, axis_t *a) noexcept nogil:
 
 
 cdef void wait_for_bit_12(axes_t *x, axis_t *a) noexcept nogil:
-    """Bit 12 was shown and is lost: the drive ignores its targets."""
+    """Wait while bit 12 is lost: the drive ignores its targets."""
     if quantity_of(a.mode) == POSITION:
         a.flags |= FALLBACK
         a.command_velocity = 0.0
@@ -399,7 +402,7 @@ cdef void wait_for_bit_12(axes_t *x, axis_t *a) noexcept nogil:
 
 
 cdef void waiting(axes_t *x, axis_t *a, const target_t *t, uint32_t i, bint fresh) noexcept nogil:
-    """Powered and to be enabled, but not followed (yet)."""
+    """Handle an axis that is powered and to be enabled, but not followed (yet)."""
     a.waiting_cycles += 1
     if a.mode_wanted != a.mode or (a.worked and not shows_mode(a)):
         wait_for_mode(x, a)
@@ -414,7 +417,7 @@ cdef void waiting(axes_t *x, axis_t *a, const target_t *t, uint32_t i, bint fres
 
 cdef void axis_setpoints(axes_t *x, axis_t *a, const target_t *t, uint32_t i,
                           bint fresh) noexcept nogil:
-    """Compute what is sent to the axis in this cycle: commanded_*."""
+    """Compute the outputs of the axis in this cycle: commanded_*."""
     cdef uint8_t quantity = quantity_of(a.mode)
     a.flags &= DROPPED | MODE_REFUSED
     if a.state != OPERATION_ENABLED:

@@ -4,16 +4,16 @@ from catenary.core._handover cimport target_t
 from catenary.core._memory cimport cat_memory
 
 cdef struct stream_t:
-    double *rows               # position, velocity, torque of all axes, one behind the other
-    uint64_t *seen             # of each row: the cycle whose actual values its writer had read
+    double *rows               # position, velocity, torque of all axes, row after row
+    uint64_t *seen             # per row: newest cycle of which its writer had read the actual values
     uint32_t axes
-    uint32_t capacity          # rows
-    uint64_t written           # rows so far; the writer's
-    uint64_t taken             # rows so far; the cycle's
-    uint64_t dry               # instants without a row, since the first one
+    uint32_t capacity          # number of rows
+    uint64_t written           # number of rows written so far; the writer's
+    uint64_t taken             # number of rows taken so far; the cycle's
+    uint64_t dry               # cycle starts without a row, since the first one
 
 cdef class Stream:
-    """Owns the rows of set-points that wait for their instants."""
+    """Owns the rows of set-points that wait for their cycle starts."""
     cdef stream_t c
     cdef cat_memory memory
 

@@ -1,13 +1,30 @@
-"""Set-points that wait for their instants."""
+"""Set-points written ahead of their cycle starts."""
 
 class Stream:
-    """A ring of at most `capacity` rows of set-points for `axes` axes: position [rad], velocity
-    [rad/s] and torque [N·m] of all axes, one behind the other. One thread writes. ValueError."""
+    """Ring of set-points: one row per cycle start. One thread writes.
+
+    A row contains position [rad], velocity [rad/s] and torque [N·m] of all axes, in this order.
+
+    Args:
+        axes: Number of axes.
+        capacity: Maximum number of rows.
+
+    Raises:
+        ValueError: A number is out of range.
+    """
 
     def __init__(self, axes: int, capacity: int) -> None: ...
     def write(self, rows: bytes, seen: int) -> int:
-        """Rows of 3·axes float64. How many found room. `seen`: the cycle whose actual values the
-        writer had read: a position counts only for axes that were followed by then."""
+        """Append rows; return the number of rows for which there was room.
+
+        Args:
+            rows: Rows of 3·axes float64.
+            seen: The cycle whose actual values the writer had read. A position is valid only for
+                axes that were followed in that cycle.
+
+        Raises:
+            ValueError: The size is not a multiple of a row.
+        """
 
     @property
     def waiting(self) -> int: ...
@@ -17,4 +34,4 @@ class Stream:
     def capacity(self) -> int: ...
     @property
     def dry(self) -> int:
-        """Instants without a row since the first one was taken."""
+        """Number of cycle starts without a row since the first one was taken."""

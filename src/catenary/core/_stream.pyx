@@ -22,7 +22,7 @@ cdef inline double *row_of(stream_t *s, uint64_t number) noexcept nogil:
 
 
 cdef bint stream_take(stream_t *s, target_t *target) noexcept nogil:
-    """Make the next row the set-points. Return False if there is none."""
+    """Use the next row as the set-points. Return False if there is none."""
     cdef size_t size = s.axes * sizeof(double)
     cdef const double *row
     if cat_load_acquire64(&s.written) == s.taken:
@@ -49,7 +49,7 @@ cdef class Stream:
         self.c.seen = <uint64_t *>memory_take(&self.memory, capacity, sizeof(uint64_t))
 
     def write(self, bytes rows not None, uint64_t seen):
-        """Rows of 3·axes float64. How many found room."""
+        """Append rows of 3·axes float64; return the number of rows for which there was room."""
         cdef stream_t *s = &self.c
         cdef size_t size = s.axes * QUANTITIES * sizeof(double)
         cdef const char *source = rows

@@ -23,20 +23,20 @@ ctypedef void (*body_t)(void *argument) noexcept nogil
 
 cdef struct thread_t:
     pthread_t handle
-    pid_t owner                # the process it lives in
+    pid_t owner                # process that owns the thread
     body_t body
     void *argument
-    int priority               # SCHED_FIFO; 0: as it is
-    int cpu                    # -1: as it is
-    int priority_error         # errno of asking for them
+    int priority               # SCHED_FIFO priority; 0: unchanged
+    int cpu                    # -1: unchanged
+    int priority_error         # errno of the request for priority and CPU
     int cpu_error
-    int policy                 # obtained
+    int policy                 # policy obtained
     int obtained
     uint32_t started           # futex word
-    uint32_t stop              # asked to end
+    uint32_t stop              # request to end
     uint32_t ended
     int running
-    uint64_t page_faults       # of the body; complete after thread_join
+    uint64_t page_faults       # page faults of the body; complete after thread_join
 
 cdef int thread_start(thread_t *t) noexcept nogil
 cdef void thread_join(thread_t *t) noexcept nogil

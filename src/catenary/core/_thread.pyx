@@ -40,8 +40,8 @@ cdef extern from *:
         size_t size;
     } stack_part;
 
-    /* Faults the pages in now rather than in a cycle. Returns those that are whole and below the frame of
-     * the caller. */
+    /* Fault in the pages now rather than in a cycle. Return those that are whole and below the
+     * frame of the caller. */
     static __attribute__((noinline)) stack_part touch_stack(void) {
         volatile char pages[STACK_TOUCHED];
         uintptr_t page = (uintptr_t)sysconf(_SC_PAGESIZE);
@@ -55,7 +55,7 @@ cdef extern from *:
 
     static void keep_stack(stack_part part) { madvise(part.start, part.size, MADV_KEEPONFORK); }
 
-    /* A thread that takes no signals: they belong to Python's. */
+    /* Create a thread that receives no signals: they belong to Python's. */
     static int create_thread(pthread_t *handle, void *(*body)(void *), void *argument) {
         pthread_attr_t attributes;
         sigset_t all, before;
@@ -100,7 +100,7 @@ cdef extern from *:
         pthread_setaffinity_np(pthread_self(), sizeof saved->cpus, &saved->cpus);
     }
 
-    /* The ordinary scheduler rounds waits up by 50 us unless told otherwise. */
+    /* The ordinary scheduler rounds waits up by 50 us by default. */
     static void sharpen_timers(void) { prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL); }
 
     /* Minor and major page faults of the calling thread. */
@@ -131,7 +131,7 @@ cdef enum:
 
 
 cdef void thread_schedule(thread_t *t) noexcept nogil:
-    """Asks for priority and CPU for the calling thread, and notes what it got."""
+    """Request priority and CPU for the calling thread, and note what was obtained."""
     t.priority_error = set_priority(t.priority) if t.priority > 0 else 0
     t.cpu_error = set_cpu(t.cpu) if t.cpu >= 0 else 0
     sharpen_timers()
@@ -154,7 +154,7 @@ cdef void *thread_body(void *argument) noexcept nogil:
 
 
 cdef int thread_start(thread_t *t) noexcept nogil:
-    """Starts the body once the scheduling is known. 0 or -errno."""
+    """Start the body once the scheduling is known. Return 0 or -errno."""
     cdef int rc
     t.started = 0
     t.stop = 0
@@ -193,7 +193,7 @@ cdef object refused(str what, int error):
 
 
 cdef object scheduling_text(const thread_t *t):
-    """For people and reports: "SCHED_FIFO 80, CPU 1"."""
+    """Return the scheduling as text: "SCHED_FIFO 80, CPU 1"."""
     if t.policy == SCHED_FIFO:
         text = f"SCHED_FIFO {t.obtained}"
     elif t.policy == SCHED_RR:

@@ -1,1 +1,1 @@
-"""What a device is: SII, object dictionary, topology; what its counters say. No I/O."""
+"""Model of devices and segments: SII, object dictionary, topology, diagnosis. No I/O."""

@@ -1,4 +1,4 @@
-"""From the devices that do not answer to the place where the segment is interrupted. Pure."""
+"""Location of an interruption of the segment, from the devices that do not answer."""
 
 from __future__ import annotations
 
@@ -7,15 +7,20 @@ from collections.abc import Collection
 from catenary.model.finding import Finding, Kind, Names
 from catenary.model.topology import Topology
 
-_BREAK = "look at the plugs of that cable, and whether the device has power"
-_FORGOT = "it was switched off and on, or reset itself: bring it up again (scan)"
+_BREAK = "check the plugs of that cable and the power of the device"
+_FORGOT = "it was power-cycled or reset itself: start it up again (scan)"
 
 
 def judge_silence(topology: Topology, names: Names, silent: Collection[int]) -> tuple[Finding, ...]:
-    """Where devices stopped answering: the first of each branch, with what hangs behind it.
+    """Return one finding for the first silent device of each branch.
 
-    A device that forwards frames and does not answer has lost its station address: those behind
-    it still answer.
+    If a device forwards frames but does not answer, the devices behind it still answer. Such a
+    device has lost its station address.
+
+    Args:
+        topology: The tree of the devices.
+        names: The names of the devices.
+        silent: Positions of the devices that do not answer.
     """
     found = []
     for position in sorted(silent):
@@ -27,7 +32,12 @@ def judge_silence(topology: Topology, names: Names, silent: Collection[int]) -> 
 
 
 def behind(topology: Topology, position: int) -> tuple[int, ...]:
-    """The positions of all devices that hang behind one."""
+    """Return the positions of all devices behind a device.
+
+    Args:
+        topology: The tree of the devices.
+        position: The device.
+    """
     found: list[int] = []
     waiting = [cable.lower for cable in topology.children(position)]
     while waiting:
@@ -37,18 +47,20 @@ def behind(topology: Topology, position: int) -> tuple[int, ...]:
 
 
 def _cut(topology: Topology, position: int, silent: Collection[int]) -> bool:
-    """Whether nobody behind a silent device answers either."""
+    """Return True if all devices behind a silent device are silent, too."""
     return all(each in silent for each in behind(topology, position))
 
 
 def _finding(topology: Topology, names: Names, position: int, silent: Collection[int]) -> Finding:
-    who = names.device(position)
+    name = names.device(position)
     others = behind(topology, position)
     if others and not _cut(topology, position, silent):
-        evidence = "it does not answer, and those behind it do: it has lost its station address"
-        return Finding(Kind.SILENT, who, evidence, _FORGOT, (position,))
+        evidence = (
+            "it does not answer, but the devices behind it do: it has lost its station address"
+        )
+        return Finding(Kind.SILENT, name, evidence, _FORGOT, (position,))
     cable = topology.cable_at(position, 0)
-    where = f"{names.cable(cable)}, or the power of {who}" if cable else who
+    where = f"{names.cable(cable)}, or the power of {name}" if cable else name
     also = f" and the {len(others)} behind it" * bool(others)
-    evidence = f"{who}{also} {'do' if others else 'does'} not answer"
+    evidence = f"{name}{also} {'do' if others else 'does'} not answer"
     return Finding(Kind.SILENT, where, evidence, _BREAK, (position, *others), cable)

@@ -1,6 +1,9 @@
-"""How long a frame takes from one device to the next, from the times at which one broadcast write
-(0x0900) passed their ports: half of what it was away behind a port, less what it spent inside the
-next device's branch. The same way there and back is assumed, as in `delays`."""
+"""Delay of a frame from one device to the next, computed from the times at which a broadcast write
+(0x0900) passed their ports.
+
+The delay is half of the time that the frame spent behind a port, minus the time inside the next
+device's branch. As in `delays`, both directions are assumed to take the same time.
+"""
 
 from __future__ import annotations
 
@@ -9,17 +12,24 @@ from collections.abc import Sequence
 from catenary.model.delays import TIME_SPAN, PortTimes
 from catenary.model.topology import Cable, Topology
 
-JITTER_NS = 200  # of four stamps: a tick of 10 ns each, those of slow PHYs some more
+JITTER_NS = 200  # of four time stamps: one tick of 10 ns each, more with slow PHYs
 
 
 def cable_delays_ns(
     topology: Topology, times: Sequence[PortTimes | None]
 ) -> tuple[int | None, ...]:
-    """By position: the way from the device before, one way [ns], cable and forwarding; None where
-    one of the two has no clock, or no device is before it."""
+    """Return the one-way delay from the previous device [ns], by position.
+
+    The delay includes cable and forwarding. It is None if one of the two devices has no clock, or
+    if there is no previous device.
+
+    Args:
+        topology: The tree of the devices.
+        times: Receive times of one latch, by position; None for a device without a clock.
+    """
     found: list[int | None] = [None] * len(topology)
     for position in range(len(topology)):
-        before = 0  # the port at which the frame was last
+        before = 0  # the port at which the frame last arrived
         for cable in topology.children(position):
             found[cable.lower] = _delay(topology, times, cable, before)
             before = cable.upper_port or 0
@@ -37,5 +47,5 @@ def _delay(
     last = onwards[-1].upper_port if onwards else 0
     inside = (lower[last or 0] - lower[0]) % TIME_SPAN
     if away - inside < -JITTER_NS:
-        return None  # the stamps are not of one frame
+        return None  # the time stamps belong to different frames
     return max(0, round((away - inside) / 2))

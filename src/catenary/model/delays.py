@@ -1,16 +1,16 @@
-"""How long a frame takes from the reference clock to every other clock, from the times at which one
+"""Propagation delays from the first clock to every other clock, computed from the times at which a
 broadcast write (0x0900) passed the ports. ETG.1000.4 §6.8.2; Beckhoff, ESC data sheet I, §9.1.2.
 
-Between two ports of one device the frame was away on the cable behind the second. Taking from that
-what it spent inside the next device's branch leaves the way there and back. Both take the same, but
-for the processing units: a frame passes one as it leaves by a device's first port, and as it turns
-round in the last device of a branch (data sheet: t_Diff). SOEM (`ecx_configdc`), IgH
-(`ec_slave_calc_port_delays`) and ethercrab (`configure_subdevice_offsets`) leave that out: 20 ns
-for each device on a line. Every clock measures with its own crystal; over some microseconds an
-error of 100 ppm does not count.
+The time between two ports of a device is the time that the frame spent in the branch behind the
+second port. This time minus the time inside the next device's branch is the way there and back.
+Both directions take the same time, except for the processing units (data sheet: t_Diff). A frame
+passes a processing unit when it leaves by a device's first port. It also passes one when it returns
+in the last device of a branch. SOEM (`ecx_configdc`), IgH (`ec_slave_calc_port_delays`) and
+ethercrab (`configure_subdevice_offsets`) ignore this difference: 20 ns per device on a line. Every
+clock measures with its own crystal. Over some microseconds an error of 100 ppm is negligible.
 
-Devices without clocks are cable: behind one that branches, several clocks may share what a clock
-before it measured; then what is known of no part is shared out evenly.
+Devices without clocks count as cable. If such a device branches, several clocks may share one
+measured time. The unknown part is then distributed evenly.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from typing import NamedTuple
 from catenary.model.topology import PORT_ORDER, Ports
 
 PortTimes = tuple[int, int, int, int]
-PROCESSING_NS = 40  # what a processing unit adds to forwarding; of other controllers, 20 to 40
+PROCESSING_NS = 40  # extra delay of a processing unit; other controllers have 20 to 40 ns
 TIME_SPAN = 1 << 32  # receive times are 32 bits wide and wrap every 4.3 s
 
 
 @dataclass(frozen=True, slots=True)
 class ClockPlace:
-    """One device of the tree; `receive_times_ns`: of one latch, None where it has no clock."""
+    """One device of the tree. `receive_times_ns` is of one latch; None if it has no clock."""
 
     parent: int | None
     parent_port: int | None
@@ -38,21 +38,26 @@ class ClockPlace:
 
 
 class _Head(NamedTuple):
-    """A clock, and how many devices without one lie before it."""
+    """A clock, and the number of devices without a clock before it."""
 
     position: int
     between: int
 
 
 def delays_ns(latches: Sequence[Sequence[ClockPlace]]) -> tuple[int | None, ...]:
-    """Delay of every device behind the first clock [ns], None where there is no clock.
+    """Return the delay of every device from the first clock [ns]; None if it has no clock.
 
-    `latches`: the same devices, measured once or several times: the mean counts. What each gives
-    is taken unrounded and as it is, below zero too: a wire shorter than the jitter of its stamps
-    comes out right in the mean.
+    The result is the mean over all latches. Single results are not rounded and may be negative.
+    The mean is therefore correct even for a wire shorter than the jitter of the time stamps.
+
+    Args:
+        latches: The same devices, measured once or several times.
+
+    Raises:
+        ValueError: `latches` is empty.
     """
     if not latches:
-        raise ValueError("no delay without a measurement")
+        raise ValueError("delays_ns: needs at least one measurement")
     several = [_delays(places) for places in latches]
     return tuple(
         None if None in column else max(0, round(fmean(d for d in column if d is not None)))
@@ -68,7 +73,7 @@ def _delays(places: Sequence[ClockPlace]) -> list[float | None]:
         times, delay = place.receive_times_ns, delays[position]
         if times is None or delay is None:
             continue
-        before = 0  # the port the frame came back at last
+        before = 0  # the port at which the frame last returned
         for port in _onwards(place):
             away = _interval(times, before, port)
             reached = delay + _interval(times, 0, before)
@@ -88,8 +93,11 @@ def _start(
     children: Sequence[Sequence[int]],
     delays: list[float | None],
 ) -> None:
-    """The first clock is where counting begins. Further ones that no clock precedes (behind a
-    branch without clocks) are reached after the branches before them, cables not known."""
+    """Set the delays of the clocks that no other clock precedes; the first one has delay 0.
+
+    Further such clocks are in other branches of a device without a clock. The frame reaches them
+    after the earlier branches; the unknown cable delays are ignored.
+    """
     reached = 0.0
     for position, place in enumerate(places):
         if place.parent is not None:
@@ -108,8 +116,16 @@ def _share(
     *,
     first: bool,
 ) -> None:
-    """The first clocks behind one port, in the order of the frame. `first`: the frame leaves by
-    this port straight from the processing unit."""
+    """Set the delays of the first clocks behind one port.
+
+    Args:
+        places: All devices.
+        heads: The first clocks behind the port, in the order of the frame.
+        reached: Delay at which the frame leaves by the port [ns].
+        away: Time until the frame returns to the port [ns].
+        delays: The list to change.
+        first: True if the frame comes to this port directly from the processing unit.
+    """
     wire = (away - sum(_loop(places[head.position]) for head in heads)) / (len(heads) + 1)
     if len(heads) == 1:
         [head] = heads
@@ -122,14 +138,14 @@ def _share(
 
 
 def _loop(place: ClockPlace) -> float:
-    """How long a frame is away behind a clock, all of its branches together."""
+    """Return the time [ns] that a frame spends in all branches behind a clock."""
     assert place.receive_times_ns is not None
     ports = _onwards(place)
     return _interval(place.receive_times_ns, 0, ports[-1]) if ports else 0
 
 
 def _interval(times: PortTimes, start: int, end: int) -> int:
-    """From port to port, across the wrap; a little below zero where stamps jitter."""
+    """Return the time from port to port [ns], with wrap-around. Jitter can make it negative."""
     interval = (times[end] - times[start]) % TIME_SPAN
     return interval - TIME_SPAN if interval >= TIME_SPAN // 2 else interval
 
@@ -142,14 +158,14 @@ def _children(places: Sequence[ClockPlace]) -> list[list[int]]:
     children: list[list[int]] = [[] for _ in places]
     for position, place in enumerate(places):
         if place.parent is not None:
-            children[place.parent].append(position)  # positions count in the frame's order
+            children[place.parent].append(position)  # positions follow the order of the frame
     return children
 
 
 def _first_clocks(
     places: Sequence[ClockPlace], children: Sequence[Sequence[int]], start: int
 ) -> Iterator[_Head]:
-    """The clocks of a branch that no clock of the branch precedes."""
+    """Yield the clocks of a branch that no other clock of the branch precedes."""
     waiting = [_Head(start, 0)]
     while waiting:
         head = waiting.pop()

@@ -1,8 +1,8 @@
 """Registers and SII image → DeviceDescription, ETG.1000.6 §5.4.
 
-Real images are odd: no FMMU category, no end mark, vendor 0, PDOs that name a SyncManager the image
-does not have, an EEPROM nobody wrote. None of this ends a scan: what cannot be used is left out and
-noted in the description.
+Real images have faults: no FMMU category, no end mark, vendor 0, PDOs that name a missing
+SyncManager, an EEPROM that was never written. These faults do not end a scan. Unusable parts are
+left out and noted in the description.
 """
 
 from __future__ import annotations
@@ -65,7 +65,20 @@ def describe(
     image: bytes,
     system_time: bool = False,
 ) -> DeviceDescription:
-    """The description of one device. DecodeError only for `information` of the wrong size."""
+    """Return the description of one device. Faults of the image become notes.
+
+    Args:
+        position: Position in the segment.
+        station_address: Configured station address.
+        alias: Station alias (0x0012).
+        dl_status: DL status (0x0110).
+        information: ESC information, 10 bytes (0x0000 to 0x0009).
+        image: SII image, as far as it was read.
+        system_time: True if the device has a system time (0x0910).
+
+    Raises:
+        DecodeError: `information` has the wrong size.
+    """
     bare = DeviceDescription(
         position=position,
         station_address=station_address,
@@ -97,7 +110,7 @@ def _decoded(image: bytes, notes: list[str]) -> Sii | None:
     product = image[20:24]
     if product in _UNPROGRAMMED:
         return None
-    # Cards that were programmed by hand work with a wrong checksum; their content may be good.
+    # Some devices were programmed by hand and work with a wrong checksum; the content may be valid.
     start = 2 * CHECKSUM_WORD
     try:
         return decode_sii(image[:start] + _CHECKSUM_DISABLED + image[start + 2 :])
@@ -118,7 +131,7 @@ def _filled(bare: DeviceDescription, sii: Sii, notes: list[str]) -> DeviceDescri
     return replace(
         bare,
         identity=Identity(header.vendor, header.product, header.revision, header.serial),
-        name=name or order or nameless,  # as SOEM and IgH show it
+        name=name or order or nameless,  # as in SOEM and IgH
         mailbox=_mailbox(sii, notes),
         sync_managers=managers,
         outputs=assignments(outputs),
@@ -133,7 +146,7 @@ def _filled(bare: DeviceDescription, sii: Sii, notes: list[str]) -> DeviceDescri
 
 
 def assignments(pdos: tuple[Pdo, ...]) -> tuple[Assignment, ...]:
-    """PDOs by the SyncManager they belong to by default."""
+    """Return the PDOs grouped by their default SyncManager."""
     channels = sorted({pdo.sync_manager for pdo in pdos if pdo.sync_manager is not None})
     return tuple(
         Assignment(channel, tuple(pdo for pdo in pdos if pdo.sync_manager == channel))
@@ -150,11 +163,11 @@ def _mailbox(sii: Sii, notes: list[str]) -> MailboxLayout | None:
         notes.append(
             f"its SII has a mailbox of {impossible[0].size} bytes at 0x{impossible[0].offset:04X} "
             f"({MAILBOX_MIN} to {MAXIMUM_DATA} bytes from 0x{PROCESS_RAM:04X} on are possible): "
-            "it is used without its mailbox"
+            "the mailbox is not used"
         )
         return None
     coe = sii.general.coe if sii.general else CoeDetails(0)
-    # Details that were never filled in deny nothing; so IgH, fsm_pdo.c (`has_general`).
+    # Details without any bit set are treated as unknown, as in IgH, fsm_pdo.c (`has_general`).
     unknown = coe == CoeDetails(0)
     protocols = MailboxProtocol(sii.header.mailbox_protocols & 0x3F)
     return MailboxLayout(
@@ -179,7 +192,7 @@ def _is_possible(area: MailboxArea) -> bool:
 
 
 def _sync_managers(sii: Sii, supported: int, notes: list[str]) -> tuple[SyncManager, ...]:
-    """Return those that the controller has (register 0x0005; 0: unknown)."""
+    """Return the SyncManagers that the controller supports (register 0x0005; 0: unknown)."""
     count = min(supported or SYNC_MANAGER_COUNT, SYNC_MANAGER_COUNT)
     if len(sii.sync_managers) > count:
         notes.append(f"its SII has {len(sii.sync_managers)} SyncManagers, its controller {count}")
@@ -197,7 +210,10 @@ def _sync_managers(sii: Sii, supported: int, notes: list[str]) -> tuple[SyncMana
 
 
 def _kind(entry: sii_categories.SyncManagerEntry) -> SyncManagerUse:
-    """What the image says; early images leave it 0, then the control byte tells (as in SOEM)."""
+    """Return the use of a SyncManager.
+
+    Early images leave it 0. It then follows from the control byte, as in SOEM.
+    """
     if entry.use in (1, 2, 3, 4):
         return SyncManagerUse(entry.use)
     if not entry.address:
@@ -222,7 +238,7 @@ def _pdos(
         channel = None if pdo.sync_manager == NOT_ASSIGNED else pdo.sync_manager
         if channel is not None and channel not in usable:
             notes.append(
-                f"PDO 0x{pdo.index:04X} names SyncManager {channel}, which is none for "
+                f"PDO 0x{pdo.index:04X} names SyncManager {channel}, which does not carry "
                 f"{kind.name.lower()}"
             )
             channel = None
@@ -257,7 +273,7 @@ def _op_mode(texts: _Texts, mode: sii_categories.ClockMode) -> OpMode:
 
 
 class _Texts:
-    """The printable part of an image's strings, by number from 1; empty where there is none."""
+    """The printable strings of an image, by number from 1; empty if there is none."""
 
     def __init__(self, sii: Sii) -> None:
         self._strings = ["", *(printable(text) for text in sii.strings)]

@@ -1,7 +1,7 @@
-"""What a SubDevice is, as values: identity, memory, mailbox, SyncManagers, PDOs.
+"""The description of a SubDevice as values: identity, memory, mailbox, SyncManagers, PDOs.
 
-Made from its registers (ETG.1000.4 §6.1), its SII (ETG.1000.6 §5.4, ETG.2010) and, where it has
-one, its object dictionary (ETG.1000.6 §5.6.7.4). Nothing here asks the network.
+The sources are its registers (ETG.1000.4 §6.1), its SII (ETG.1000.6 §5.4, ETG.2010) and, if
+present, its object dictionary (ETG.1000.6 §5.6.7.4). Nothing here accesses the network.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from catenary.wire.sii_categories import SyncManagerUse
 
 
 class Identity(NamedTuple):
-    """The four numbers of 0x1018, which the SII repeats."""
+    """The four numbers of object 0x1018, which are also in the SII."""
 
     vendor: int
     product: int
@@ -31,29 +31,30 @@ class Identity(NamedTuple):
         )
 
     def same_kind(self, other: Identity) -> bool:
-        """Whether both are the same product, whatever their revision and serial number."""
+        """Return True if vendor and product are equal. Revision and serial number are ignored."""
         return (self.vendor, self.product) == (other.vendor, other.product)
 
 
 class Direction(IntEnum):
-    """Seen from the MainDevice."""
+    """Direction of process data, seen from the MainDevice."""
 
     OUTPUT = 0  # RxPDOs
     INPUT = 1  # TxPDOs
 
     @property
     def use(self) -> SyncManagerUse:
-        """Of the SyncManagers that carry it."""
+        """Use of the SyncManagers that carry this direction."""
         return SyncManagerUse.OUTPUTS if self is Direction.OUTPUT else SyncManagerUse.INPUTS
 
     @property
     def noun(self) -> str:
+        """Word for messages."""
         return "outputs" if self is Direction.OUTPUT else "inputs"
 
 
 @dataclass(frozen=True, slots=True)
 class MailboxLayout:
-    """The standard mailbox. "Receive" is the SubDevice's view: what the MainDevice writes."""
+    """The standard mailbox, seen from the SubDevice: the MainDevice writes the receive mailbox."""
 
     receive_offset: int
     receive_size: int
@@ -62,29 +63,30 @@ class MailboxLayout:
     protocols: MailboxProtocol
     complete_access: bool = False  # SDO complete access
     sdo_information: bool = False
-    pdo_assign: bool = False  # 0x1C1x may be written
-    pdo_configuration: bool = False  # 0x16xx and 0x1Axx may be written
+    pdo_assign: bool = False  # 0x1C1x can be written
+    pdo_configuration: bool = False  # 0x16xx and 0x1Axx can be written
 
     @property
     def coe(self) -> bool:
+        """True if the mailbox supports CoE."""
         return MailboxProtocol.COE in self.protocols
 
 
 @dataclass(frozen=True, slots=True)
 class SyncManager:
-    """One channel as its device wants it (SII category 41)."""
+    """One SyncManager as specified by its device (SII category 41)."""
 
     index: int
     use: SyncManagerUse
     start: int  # physical address
-    length: int  # bytes; of process data: the default mapping's
+    length: int  # bytes; for process data, of the default mapping
     control: int  # register 0x0804 + 8·index
     enabled: bool = True
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One object inside a PDO. Index 0 is a gap."""
+    """One object in a PDO. Index 0 marks a gap."""
 
     index: int
     subindex: int
@@ -94,7 +96,7 @@ class Entry:
 
     @property
     def place(self) -> tuple[int, int, int]:
-        """Index, subindex and length, by which entries are compared."""
+        """Index, subindex and bit length. Entries are compared by these."""
         return self.index, self.subindex, self.bit_length
 
     def __str__(self) -> str:
@@ -104,47 +106,50 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class Pdo:
-    """A process data object: entries that travel together."""
+    """A process data object: entries that are transferred together."""
 
     index: int
     entries: tuple[Entry, ...]
-    sync_manager: int | None  # assigned to by default; None: not
+    sync_manager: int | None  # default assignment; None: not assigned
     fixed: bool = False  # its entries cannot be changed
-    mandatory: bool = False  # cannot be taken out of the assignment
+    mandatory: bool = False  # cannot be removed from the assignment
     name: str = ""
     excludes: frozenset[int] = frozenset()  # PDOs that cannot be assigned with it (ESI `Exclude`)
 
     @property
     def bit_length(self) -> int:
+        """Total length of its entries."""
         return sum(entry.bit_length for entry in self.entries)
 
 
 @dataclass(frozen=True, slots=True)
 class Assignment:
-    """The PDOs that one SyncManager carries, in their order."""
+    """The PDOs that one SyncManager carries, in order."""
 
     sync_manager: int
     pdos: tuple[Pdo, ...]
-    fixed: bool = False  # its list of PDOs (0x1C10 + SyncManager) cannot be changed
+    fixed: bool = False  # the list of PDOs (0x1C10 + SyncManager) cannot be changed
 
     @property
     def bit_length(self) -> int:
+        """Total length of its PDOs."""
         return sum(pdo.bit_length for pdo in self.pdos)
 
     @property
     def byte_length(self) -> int:
+        """Total length of its PDOs, rounded up to whole bytes."""
         return (self.bit_length + 7) // 8
 
 
 @dataclass(frozen=True, slots=True)
 class OpMode:
-    """One way of a device to use distributed clocks: Dc/OpMode of an ESI file (ETG.2000), category
-    60 of the SII (ETG.2010). Factors count periods or SYNC0 cycles, see `plan.clocks`."""
+    """One mode of a device with distributed clocks: Dc/OpMode of an ESI file (ETG.2000), category
+    60 of the SII (ETG.2010). Factors are multiples of the period or of SYNC0, see `plan.clocks`."""
 
     name: str = ""
     description: str = ""
     assign_activate: int = 0  # registers 0x0980 (low byte) and 0x0981
-    sync0_ns: int = 0  # cycle time of SYNC0; 0: `sync0_factor` says it
+    sync0_ns: int = 0  # cycle time of SYNC0; 0: given by `sync0_factor`
     sync0_factor: int = 0
     shift_ns: int = 0
     sync1_factor: int = 0
@@ -153,7 +158,7 @@ class OpMode:
 
 @dataclass(frozen=True, slots=True)
 class ObjectInformation:
-    """What the dictionary says of one entry (SDO information, ETG.1000.6 §5.6.3.6)."""
+    """The dictionary's description of one entry (SDO information, ETG.1000.6 §5.6.3.6)."""
 
     index: int
     subindex: int
@@ -163,12 +168,12 @@ class ObjectInformation:
     input_mappable: bool = True  # as TxPDO
     name: str = ""
     note: str = ""  # why the dictionary does not describe it
-    readable: bool = True  # False: the dictionary says that it can only be written
+    readable: bool = True  # False: write-only according to the dictionary
 
 
 @dataclass(frozen=True, slots=True)
 class ObjectValue:
-    """The value of an entry of the dictionary when it was read; None: it could not be read."""
+    """The value of a dictionary entry at the time of reading; None if it could not be read."""
 
     index: int
     subindex: int
@@ -177,7 +182,7 @@ class ObjectValue:
 
 @dataclass(frozen=True, slots=True)
 class DeviceDescription:
-    """One SubDevice at one place of the segment."""
+    """One SubDevice at its position in the segment."""
 
     position: int
     station_address: int
@@ -187,24 +192,24 @@ class DeviceDescription:
     controller: Information
     mailbox: MailboxLayout | None
     sync_managers: tuple[SyncManager, ...]
-    outputs: tuple[Assignment, ...]  # what is assigned now, by SyncManager
+    outputs: tuple[Assignment, ...]  # assigned now, by SyncManager
     inputs: tuple[Assignment, ...]
-    output_pdos: tuple[Pdo, ...]  # all that the device has, assigned or not
+    output_pdos: tuple[Pdo, ...]  # all PDOs of the device, assigned or not
     input_pdos: tuple[Pdo, ...]
     open_ports: tuple[bool, bool, bool, bool] = (True, False, False, False)
-    sii_denies_lrw: bool = False  # flag of the general category; the controller may deny it, too
+    sii_denies_lrw: bool = False  # flag of the general category; the controller has its own
     parent: int | None = None  # position of the device before it in the tree
     parent_port: int | None = None
-    system_time: bool = False  # it has a clock that can follow: a system time (0x0910)
-    op_modes: tuple[OpMode, ...] = ()  # ways to use it, the first is the default
+    system_time: bool = False  # it has a clock that can be synchronised (0x0910)
+    op_modes: tuple[OpMode, ...] = ()  # modes of distributed clocks; the first is the default
     group: str = ""
     order: str = ""
     device_type: int | None = None  # object 0x1000
     slots: tuple[int, ...] = ()  # CiA 402 axes: objects + 0x800·slot
-    objects: tuple[ObjectInformation, ...] = ()  # what has been asked of the dictionary
-    values: tuple[ObjectValue, ...] = ()  # of objects that a start-up list would write
+    objects: tuple[ObjectInformation, ...] = ()  # dictionary entries that were read
+    values: tuple[ObjectValue, ...] = ()  # values of objects that a start-up list would write
     mapping_source: str = "SII"  # or "CoE"
-    notes: tuple[str, ...] = ()  # what is odd about its SII, or differs from its dictionary
+    notes: tuple[str, ...] = ()  # faults of its SII, or differences from its dictionary
 
     @property
     def profile(self) -> int | None:
@@ -213,29 +218,33 @@ class DeviceDescription:
 
     @property
     def is_drive(self) -> bool:
+        """True if the device has CiA 402 axes."""
         return bool(self.slots)
 
     @property
     def clock_bits(self) -> int:
-        """Width of its system time, 64 or 32; 0: it has none."""
+        """Width of its system time in bits, 64 or 32; 0 if it has none."""
         return self.controller.clock_bits if self.system_time else 0
 
     @property
     def supports_lrw(self) -> bool:
-        """True if neither the controller nor the SII denies that LRW works.
+        """True if neither the controller nor the SII excludes LRW.
 
-        SOEM asks the SII alone (src/ec_config.c), IgH neither of them (master/datagram_pair.c).
+        SOEM checks only the SII (src/ec_config.c), IgH none of them (master/datagram_pair.c).
         """
         return self.controller.supports_lrw and not self.sii_denies_lrw
 
     @property
     def coe(self) -> bool:
+        """True if the mailbox supports CoE."""
         return self.mailbox is not None and self.mailbox.coe
 
     def assignments(self, direction: Direction) -> tuple[Assignment, ...]:
+        """Return the assigned PDOs of one direction, by SyncManager."""
         return self.outputs if direction is Direction.OUTPUT else self.inputs
 
     def pdos(self, direction: Direction) -> tuple[Pdo, ...]:
+        """Return all PDOs of one direction, assigned or not."""
         return self.output_pdos if direction is Direction.OUTPUT else self.input_pdos
 
     def with_process_data(
@@ -248,8 +257,8 @@ class DeviceDescription:
 
         Args:
             direction: Outputs or inputs.
-            assignments: What is assigned now, by SyncManager.
-            pdos: All PDOs of the direction; None: as before.
+            assignments: The new assignment, by SyncManager.
+            pdos: All PDOs of the direction; None leaves them unchanged.
         """
         pdos = self.pdos(direction) if pdos is None else pdos
         if direction is Direction.OUTPUT:
@@ -257,12 +266,24 @@ class DeviceDescription:
         return replace(self, inputs=assignments, input_pdos=pdos)
 
     def known_object(self, index: int, subindex: int) -> ObjectInformation | None:
+        """Return the description of a dictionary entry if it was read, else None.
+
+        Args:
+            index: The index of the object.
+            subindex: The subindex of the entry.
+        """
         for known in self.objects:
             if (known.index, known.subindex) == (index, subindex):
                 return known
         return None
 
     def known_value(self, index: int, subindex: int) -> bytes | None:
+        """Return the value of a dictionary entry if it was read, else None.
+
+        Args:
+            index: The index of the object.
+            subindex: The subindex of the entry.
+        """
         for value in self.values:
             if (value.index, value.subindex) == (index, subindex):
                 return value.data
@@ -273,10 +294,10 @@ class DeviceDescription:
 
 
 def mapped_pdos(assignments: Iterable[Assignment]) -> tuple[Pdo, ...]:
-    """Return all PDOs of the assignments, in their order."""
+    """Return all PDOs of the assignments, in order."""
     return tuple(pdo for assignment in assignments for pdo in assignment.pdos)
 
 
 def mapped_entries(assignments: Iterable[Assignment]) -> tuple[Entry, ...]:
-    """Return all entries of the assignments, gaps left out."""
+    """Return all entries of the assignments, without gaps."""
     return tuple(entry for pdo in mapped_pdos(assignments) for entry in pdo.entries if entry.index)

@@ -1,4 +1,4 @@
-"""Which device is which, after some were switched off, moved or exchanged. Pure."""
+"""Matching of found devices to known ones, after some were power-cycled, moved or replaced."""
 
 from __future__ import annotations
 
@@ -6,14 +6,18 @@ from collections.abc import Sequence
 
 
 def vacancies(found: Sequence[int], known: Sequence[int]) -> dict[int, tuple[int, ...]]:
-    """For each device that is no longer, or not yet, one of ours, the places it may belong to.
+    """Return the free positions to which each unmatched device may belong.
 
-    `found`: the station addresses read by position, in the order of the frame; a device that was
-    switched on has 0. `known`: the station addresses of our devices, by position. Returns, by rank
-    in `found`, the positions in `known` that nobody holds between the neighbours of that device.
+    A device matches if its address is known and in the order of the cable. As many devices as
+    possible are matched, so that a device with an address from another place is not a neighbour.
 
-    A device that brings an address along from elsewhere is no neighbour: those count that keep the
-    order of the cable, as many as can be.
+    Args:
+        found: Station addresses in the order of the frame; a device that was powered up has 0.
+        known: Station addresses of the known devices, by position.
+
+    Returns:
+        For the rank of each unmatched device in `found`: the positions in `known` between its
+        matched neighbours.
     """
     place = {address: position for position, address in enumerate(known)}
     ours = _longest_rising([place.get(address, -1) for address in found])
@@ -28,10 +32,12 @@ def vacancies(found: Sequence[int], known: Sequence[int]) -> dict[int, tuple[int
 
 
 def _longest_rising(places: Sequence[int]) -> dict[int, int]:
-    """The longest strictly rising sequence among the places that are not negative: its ranks, each
-    with its place. Of several the first."""
-    length: dict[int, int] = {}  # of the longest one that ends at this rank
-    before: dict[int, int] = {}  # the rank before it there
+    """Return the longest strictly rising sequence of non-negative places, as {rank: place}.
+
+    Of several such sequences, the first one found is returned.
+    """
+    length: dict[int, int] = {}  # of the longest sequence that ends at this rank
+    before: dict[int, int] = {}  # the previous rank in that sequence
     for rank, place in enumerate(places):
         if place < 0:
             continue

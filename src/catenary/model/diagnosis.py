@@ -1,15 +1,15 @@
-"""From error counters to the cable or device at fault. Pure.
+"""Diagnosis: find the cable or device at fault from error counters.
 
-A controller that receives a broken frame counts it as an invalid frame of that port and marks it;
-the devices behind then only count it as forwarded. So the fault lies on the way to the port that
-has invalid frames: between it and its neighbour. Symbol errors are noise on that cable, also where
-no frame was hit. Lost links are counted at both ends of a cable that was pulled, but only at the
-neighbours of a device that lost its power, whose own counters begin again.
+A controller that receives a broken frame counts an invalid frame at that port and marks the frame.
+The devices after it only count the frame as forwarded. The fault is therefore between the port with
+invalid frames and its neighbour. Symbol errors are noise on that cable, even if no frame was hit.
+If a cable was unplugged, both ends count lost links. If a device lost its power, only its
+neighbours count lost links; its own counters restart at 0.
 
-Sources: Beckhoff, ESC data sheet I, §14 "Error counters" (which counter counts what, and that one
-error shows in several); Beckhoff, application note "ESC FAQ", §3.12.4 "Error counter interpretation
-guide", figure 2 and table 1, whose cases are named where they are used; Beckhoff Infosys, EtherCAT
-system documentation, "Error counters of the slaves".
+Sources: Beckhoff, ESC data sheet I, §14 "Error counters" (meaning of each counter; one error may
+appear in several); Beckhoff, application note "ESC FAQ", §3.12.4 "Error counter interpretation
+guide", figure 2 and table 1, whose cases are cited below; Beckhoff Infosys, EtherCAT system
+documentation, "Error counters of the slaves".
 """
 
 from __future__ import annotations
@@ -21,50 +21,55 @@ from catenary.model.finding import Finding, Kind, Names
 from catenary.model.topology import Cable, Topology
 from catenary.wire.error_counters import FULL, ErrorCounters, PortErrors
 
-WIDESPREAD = 3  # cables with noise, and at least half of all: no cable is to blame for that
+WIDESPREAD = 3  # noisy cables; if they are also half of all, the cause is not a single cable
 
-_CABLE = "look at its plugs, bends and shield, and how near power cables are; exchange it"
-_DEVICE = "exchange it; before that its supply, its earth and the plugs on both of its sides"
+_CABLE = "check its plugs, bends, shield and distance to power cables; replace it"
+_DEVICE = "check its supply, its earth and the plugs on both sides; then replace it"
 _POWER = (
-    "look for a weak supply or a loose supply terminal; a cable of which one pair is broken looks "
-    "much the same"
+    "check for a weak supply or a loose supply terminal; a cable with one broken pair shows "
+    "similar counts"
 )
 _EVERYWHERE = (
-    "look for what all share: earthing and shields, cables beside those of motors and inverters, "
-    "the supply"
+    "check what all devices share: earthing and shields, cables next to those of motors and "
+    "inverters, the supply"
 )
 _MAIN = (
-    "no other program may use this network interface; then its driver, and ethtool -S for its own "
-    "error counts"
+    "make sure that no other program uses this network interface; then check its driver and its "
+    "own error counts (ethtool -S)"
 )
-_PDI = "the fault is inside: its firmware or the link between controller and processor; exchange it"
+_PDI = "the fault is inside the device: update its firmware, or replace it"
 _NO_ERRORS = PortErrors()
 
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """What is to be judged: counts of one span of time, by position. None: nobody answered."""
+    """Error counts of one time span, by position. None stands for a device that did not answer."""
 
     topology: Topology
     names: Names
     errors: tuple[ErrorCounters | None, ...]
-    restarted: frozenset[int] = frozenset()  # devices whose counters began again
-    lost_frames: int = 0  # that the MainDevice sent and did not get back whole
+    restarted: frozenset[int] = frozenset()  # positions of devices whose counters restarted
+    lost_frames: int = 0  # frames that the MainDevice sent and did not receive undamaged
 
     def port(self, position: int | None, port: int | None) -> PortErrors:
-        """What one end of a cable has counted; of the MainDevice nothing is known."""
+        """Return the counts at one end of a cable; all zero for the MainDevice.
+
+        Args:
+            position: The device; None is the MainDevice.
+            port: The port of the device.
+        """
         if position is None or port is None:
             return _NO_ERRORS
         errors = self.errors[position]
         return _NO_ERRORS if errors is None else errors.ports[port]
 
     def ends(self, cable: Cable) -> tuple[PortErrors, PortErrors]:
-        """What both ends of a cable have counted, the upper one first."""
+        """Return the counts at both ends of a cable, the upper end first."""
         return self.port(*cable[:2]), self.port(*cable[2:])
 
 
 def judge(seen: Observation) -> tuple[Finding, ...]:
-    """What is wrong, the likeliest cause of the most first. Empty: nothing is."""
+    """Return the faults, the most probable cause first; empty if there is none."""
     power, explained = _power(seen)
     explained |= _interrupted(seen)
     transport = [*power, *_links(seen, explained), *_noise(seen), *_stray_ports(seen)]
@@ -73,12 +78,15 @@ def judge(seen: Observation) -> tuple[Finding, ...]:
     return (*transport, *_processors(seen))
 
 
-# ---- links that went away
+# ---- lost links
 
 
 def _power(seen: Observation) -> tuple[list[Finding], set[Cable]]:
-    """Devices whose neighbours all lost the link to them while they have counted none themselves:
-    their counters began at 0 with their power. And the cables that this explains."""
+    """Return the devices that lost their power, and the cables that this explains.
+
+    All neighbours of such a device have lost the link to it. The device itself has not counted a
+    lost link, because its counters restarted at 0 when the power returned.
+    """
     found: list[Finding] = []
     explained: set[Cable] = set()
     for position, errors in enumerate(seen.errors):
@@ -92,18 +100,18 @@ def _power(seen: Observation) -> tuple[list[Finding], set[Cable]]:
         if counted and position not in seen.restarted:
             continue
         explained.update(cables)
-        told = " and ".join(
+        links = " and ".join(
             f"{seen.names.end(*end)} lost its link {_times(seen.port(*end).lost_links)}"
             for end in lost
         )
         where = f"the power of {seen.names.device(position)}"
-        evidence = f"{told}, while it has counted none itself: its counters began again"
+        evidence = f"{links}, but it has counted none itself: its counters restarted at 0"
         found.append(Finding(Kind.POWER, where, evidence, _POWER, (position,)))
     return found, explained
 
 
 def _interrupted(seen: Observation) -> set[Cable]:
-    """The cables of devices that do not answer: of those `judge_silence` tells."""
+    """Return the cables of devices that do not answer; `judge_silence` reports these."""
     silent = {position for position, errors in enumerate(seen.errors) if errors is None}
     return {cable for cable in seen.topology.cables if silent & {cable.upper, cable.lower}}
 
@@ -113,7 +121,7 @@ def _far_end(cable: Cable, position: int) -> tuple[int | None, int | None]:
 
 
 def _links(seen: Observation, explained: set[Cable]) -> Iterator[Finding]:
-    """Cables whose link went away: cases 10 and 11 of the guide."""
+    """Yield the cables with lost links: cases 10 and 11 of the guide."""
     for cable in seen.topology.cables:
         ends = seen.ends(cable)
         if cable in explained or not any(end.lost_links for end in ends):
@@ -121,7 +129,7 @@ def _links(seen: Observation, explained: set[Cable]) -> Iterator[Finding]:
         yield _cable_finding(seen, cable)
 
 
-# ---- frames broken on the way
+# ---- broken frames
 
 
 def _noisy(seen: Observation, cable: Cable) -> int:
@@ -129,8 +137,11 @@ def _noisy(seen: Observation, cable: Cable) -> int:
 
 
 def _noise(seen: Observation) -> Iterator[Finding]:
-    """Cables on which frames broke: cases 7 to 10, 12 and 16. All of them: something shared. All
-    of one device, and no other: that device."""
+    """Yield the causes of broken frames: cases 7 to 10, 12 and 16.
+
+    If most cables have broken frames, the cause is shared. If exactly the cables of one device
+    have broken frames, the cause is the device. Otherwise each cable is a cause.
+    """
     noisy = [
         cable
         for cable in seen.topology.cables
@@ -148,7 +159,7 @@ def _noise(seen: Observation) -> Iterator[Finding]:
         return
     culprit = _common_device(seen.topology, noisy)
     if culprit is not None:
-        evidence = "all its cables are noisy and no other is: " + "; ".join(
+        evidence = "all its cables are noisy, and no other cable is: " + "; ".join(
             _counted(seen, cable) for cable in noisy
         )
         where = seen.names.device(culprit)
@@ -158,7 +169,7 @@ def _noise(seen: Observation) -> Iterator[Finding]:
 
 
 def _common_device(topology: Topology, noisy: Sequence[Cable]) -> int | None:
-    """The one device whose cables are exactly these, two at least."""
+    """Return the device whose cables are exactly the noisy ones (at least two), or None."""
     if len(noisy) < 2:
         return None
     for position in range(len(topology)):
@@ -175,7 +186,7 @@ def _cable_finding(seen: Observation, cable: Cable) -> Finding:
 
 
 def _counted(seen: Observation, cable: Cable) -> str:
-    """What each end of a cable has counted, in words."""
+    """Return a text with the counts at both ends of a cable."""
     upper, lower = seen.ends(cable)
     parts = []
     for end, count in ((cable[:2], upper), (cable[2:], lower)):
@@ -194,8 +205,10 @@ def _words(count: PortErrors) -> str:
 
 
 def _stray_ports(seen: Observation) -> Iterator[Finding]:
-    """Ports that count, and no device is behind them: a ring's second end, or something that is no
-    EtherCAT device."""
+    """Yield the ports that count errors although no device is behind them.
+
+    They are connected to the second end of a ring, or to something that is not an EtherCAT device.
+    """
     wired = {end for cable in seen.topology.cables for end in (cable[:2], cable[2:])}
     for position, errors in enumerate(seen.errors):
         for port, count in enumerate(errors.ports if errors is not None else ()):
@@ -204,7 +217,7 @@ def _stray_ports(seen: Observation) -> Iterator[Finding]:
                 continue
             second = (position, port) == seen.topology.second_end
             behind = (
-                "the MainDevice's second interface" if second else "what is no device that answers"
+                "the MainDevice's second interface" if second else "something that does not answer"
             )
             end = seen.names.end(position, port)
             where = f"the cable between {end} and {behind}"
@@ -212,19 +225,22 @@ def _stray_ports(seen: Observation) -> Iterator[Finding]:
             yield Finding(Kind.CABLE, where, evidence, _CABLE, (position,))
 
 
-# ---- what nobody owns up to
+# ---- errors without a located cause
 
 
 def _forwarded(seen: Observation) -> Iterator[Finding]:
-    """Frames marked as broken by a device that has not counted them (it may lack the counter): the
-    fault is before the device in front of the first that sees the mark. Cases 13 to 15."""
+    """Yield the cause of frames that are marked as broken, but that no device counted as invalid.
+
+    The device that marked them may lack the counter. The fault is on its input side: it is the
+    device before the first one that counts forwarded errors. Cases 13 to 15.
+    """
     path = seen.topology.path()
     first = next((at for at in path if seen.port(*at).forwarded), None)
     if first is None:
         return
     evidence = (
         f"{counted(seen.port(*first).forwarded, 'frame')} arrived at {seen.names.end(*first)} "
-        "marked as broken, and no device has counted where they broke"
+        "marked as broken, but no device has counted where they broke"
     )
     rank = path.index(first)
     if rank == 0:
@@ -238,16 +254,19 @@ def _forwarded(seen: Observation) -> Iterator[Finding]:
 
 
 def _processing_units(seen: Observation) -> Iterator[Finding]:
-    """Frames that arrived whole and are no EtherCAT frames: the MainDevice's, or another program's
-    (cases 1 and 2). From a later device on: the device before it spoils them inside."""
+    """Yield the cause of undamaged frames that are not valid EtherCAT frames: cases 1 and 2.
+
+    At the first device, the MainDevice or another program sends them. At a later device, the
+    device before it corrupts them internally.
+    """
     for position, errors in enumerate(seen.errors):
         if errors is None or not errors.processing_unit:
             continue
         if errors.ports[0].invalid_frames or errors.ports[0].forwarded:
             continue  # broken frames are counted here as well
         evidence = (
-            f"{counted(errors.processing_unit, 'frame')} arrived whole at "
-            f"{seen.names.device(position)}, but as no valid EtherCAT"
+            f"{counted(errors.processing_unit, 'frame')} arrived undamaged at "
+            f"{seen.names.device(position)}, but not as valid EtherCAT"
         )
         parent = seen.topology.places[position].parent
         if parent is None:
@@ -259,13 +278,15 @@ def _processing_units(seen: Observation) -> Iterator[Finding]:
 
 
 def _lost_frames(seen: Observation) -> Iterator[Finding]:
-    """Frames that came back broken or not at all, and no device has counted one: they were lost
-    behind the last port that counts, on the way back to the MainDevice. Cases 5 and 6."""
+    """Yield the cause of lost or broken frames that no device has counted: cases 5 and 6.
+
+    They were lost after the last port with a counter, on the way back to the MainDevice.
+    """
     if not seen.lost_frames or None in seen.errors:
         return
     evidence = (
-        f"{counted(seen.lost_frames, 'frame')} did not come back whole, and no device has seen a "
-        "broken one"
+        f"{counted(seen.lost_frames, 'frame')} did not return undamaged, but no device has counted "
+        "a broken one"
     )
     where = f"the way back from {seen.names.device(0)} to the MainDevice, its port or its driver"
     advice = f"the cable to the first device: {_CABLE}; {_MAIN}"
@@ -284,7 +305,12 @@ def _processors(seen: Observation) -> Iterator[Finding]:
 
 
 def counted(count: int, what: str) -> str:
-    """The count in words. A counter stops at 255."""
+    """Return a count with its noun: "1 frame", "255 or more frames" (a counter stops at 255).
+
+    Args:
+        count: The value of the counter.
+        what: The noun in the singular.
+    """
     if count == 1:
         return f"1 {what}"
     return f"{count} {what}s" if count < FULL else f"{FULL} or more {what}s"

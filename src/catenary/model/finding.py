@@ -1,4 +1,4 @@
-"""What a diagnosis says: where a fault is, what shows it, what to do."""
+"""Results of a diagnosis: location of a fault, evidence and advice."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from catenary.model.topology import Cable
 
 
 class Kind(StrEnum):
-    """Where to look."""
+    """Location of a fault."""
 
-    CABLE = "cable"  # with its plugs
+    CABLE = "cable"  # including its plugs
     DEVICE = "device"
-    POWER = "power"  # of a device
-    SILENT = "silent"  # a device, or all from one on, does not answer
-    EVERYWHERE = "everywhere"  # a cause that the whole segment shares
+    POWER = "power"  # power of a device
+    SILENT = "silent"  # a device, or all devices from one on, do not answer
+    EVERYWHERE = "everywhere"  # one cause for the whole segment
     MAIN = "main"  # the MainDevice, its port or driver
-    WIRING = "wiring"  # what is no tree
+    WIRING = "wiring"  # the wiring is not a tree
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One fault. `devices`: the positions it is about."""
+    """One fault. `devices` are the positions that it concerns."""
 
     kind: Kind
     where: str
@@ -38,21 +38,29 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """How devices are called; by position."""
+    """Names of devices in messages, by position."""
 
     names: tuple[str, ...]
 
     def device(self, position: int) -> str:
+        """Return the name of a device."""
         name = self.names[position]
         return f"device {position} ({name})" if name else f"device {position}"
 
     def devices(self, positions: Sequence[int]) -> str:
+        """Return the names of several devices."""
         return ", ".join(self.device(position) for position in positions)
 
     def end(self, position: int | None, port: int | None) -> str:
-        """One end of a cable."""
+        """Return the name of one end of a cable.
+
+        Args:
+            position: The device; None is the MainDevice.
+            port: The port of the device.
+        """
         return "the MainDevice" if position is None else f"{self.device(position)} port {port}"
 
     def cable(self, cable: Cable) -> str:
+        """Return the name of a cable."""
         upper = self.end(cable.upper, cable.upper_port)
         return f"the cable between {upper} and {self.end(cable.lower, cable.lower_port)}"

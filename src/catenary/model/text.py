@@ -1,8 +1,8 @@
-"""Text of devices: names in the SII and in the object dictionary."""
+"""Texts from devices: names in the SII and in the object dictionary."""
 
 from __future__ import annotations
 
 
 def printable(text: str) -> str:
-    """Return the printable characters of a name, without spaces at its ends."""
+    """Return the printable characters of a name, without leading and trailing spaces."""
     return "".join(c for c in text if c.isprintable()).strip()

@@ -1,11 +1,11 @@
-"""The tree of the segment from the ports that are open, ETG.1000.4 §6.1.3 (DL status 0x0110).
+"""The tree of the segment, from the open ports of all devices, ETG.1000.4 §6.1.3 (0x0110).
 
-A frame enters at port 0 and leaves by the open ports in the order 0 → 3 → 1 → 2; positions count
-in that order, so the list of open ports per position is enough to find every device's parent.
+A frame enters at port 0 and leaves by the open ports in the order 0 → 3 → 1 → 2. Positions follow
+this order. The open ports per position are therefore sufficient to find the parent of every device.
 
-What is not a tree is said, not mended: a device that is wired the wrong way round, a port that is
-open where nobody answers. (SOEM, `ecx_configdc`, takes the earliest receive time for the port of
-entry; which devices are behind a swapped one the order of answers does not tell all the same.)
+Contradictions are reported, not corrected: a device with swapped IN and OUT, an open port without a
+device behind it. (SOEM, `ecx_configdc`, takes the port with the earliest receive time as the
+entry. The order of answers still does not show which devices are behind a swapped one.)
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from catenary.wire.dl import DlStatus
 
-PORT_ORDER = (3, 1, 2)  # in which a device sends a frame onwards after port 0
+PORT_ORDER = (3, 1, 2)  # order in which a device forwards a frame after port 0
 Ports = tuple[bool, bool, bool, bool]
 
 
@@ -27,7 +27,7 @@ class Place:
 
 
 def open_ports(dl_status: int) -> Ports:
-    """Ports with a communicating neighbour."""
+    """Return for each port whether it communicates with a neighbour."""
     port_0, port_1, port_2, port_3 = DlStatus.from_word(dl_status).ports
     return (
         port_0.communication,
@@ -38,10 +38,13 @@ def open_ports(dl_status: int) -> Ports:
 
 
 def tree(ports: Sequence[Ports]) -> tuple[Place, ...]:
-    """The place of each device. A contradiction (more devices than open ports) ends in a device
-    without a parent: what the registers say is then not a tree."""
+    """Return the place of each device in the tree.
+
+    If there are more devices than open ports, the registers do not describe a tree. The devices
+    without an open port then have no parent.
+    """
     places: list[Place] = []
-    unfilled: list[tuple[int, int]] = []  # (position, port), the next to be filled last
+    unfilled: list[tuple[int, int]] = []  # (position, port); the last one is filled next
     for position, open_here in enumerate(ports):
         if unfilled:
             parent, port = unfilled.pop()
@@ -54,7 +57,7 @@ def tree(ports: Sequence[Ports]) -> tuple[Place, ...]:
 
 
 class Cable(NamedTuple):
-    """What carries frames between two ports. `upper` None: the MainDevice."""
+    """A cable between two ports. If `upper` is None, the upper end is the MainDevice."""
 
     upper: int | None
     upper_port: int | None
@@ -64,8 +67,11 @@ class Cable(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Topology:
-    """A segment's tree. All tuples by position. `second_end`: the port (position, port) that is
-    wired to the second interface of a ring's MainDevice."""
+    """The tree of a segment. All tuples are by position.
+
+    `second_end` is the port (position, port) that is wired to the second interface of the
+    MainDevice in a ring.
+    """
 
     ports: tuple[Ports, ...]
     places: tuple[Place, ...]
@@ -77,7 +83,7 @@ class Topology:
 
     @property
     def cables(self) -> tuple[Cable, ...]:
-        """The cable to every device that has a place, by position."""
+        """Cables to all devices that have a place, by position."""
         return tuple(
             Cable(place.parent, place.parent_port, position)
             for position, place in enumerate(self.places)
@@ -85,18 +91,23 @@ class Topology:
         )
 
     def children(self, position: int) -> tuple[Cable, ...]:
-        """The cables from a device onwards, in the order of the frame."""
+        """Return the cables from a device to its children, in the order of the frame."""
         return tuple(cable for cable in self.cables if cable.upper == position)
 
     def cable_at(self, position: int, port: int) -> Cable | None:
-        """What is plugged into a port; None: nothing that is known of."""
+        """Return the cable at a port; None if no cable is known there.
+
+        Args:
+            position: The device.
+            port: The port of the device.
+        """
         for cable in self.cables:
             if (position, port) in (cable[:2], cable[2:]):
                 return cable
         return None
 
     def path(self) -> tuple[tuple[int, int], ...]:
-        """The ports (position, port) at which a frame arrives, in its order, there and back."""
+        """Return the ports (position, port) at which a frame arrives, in order, there and back."""
         arrivals: list[tuple[int, int]] = []
         waiting = [(cable.lower, cable.lower_port) for cable in self.cables[:1]]
         while waiting:
@@ -111,9 +122,14 @@ class Topology:
 
 
 def make_topology(ports: Sequence[Ports], *, ring: bool = False) -> Topology:
-    """The tree of the devices, and what contradicts it. `ring`: one open port without a device
-    behind it is that of the MainDevice's second interface; from there a cut ring's devices behind
-    the cut are reached."""
+    """Return the tree of the devices, with its contradictions.
+
+    Args:
+        ports: Open ports of each device, by position.
+        ring: True for a ring. One open port without a device behind it is then connected to the
+            second interface of the MainDevice. If the ring is cut, the MainDevice reaches the
+            devices after the cut from there.
+    """
     places = tree(ports)
     taken = {(place.parent, place.parent_port) for place in places}
     unanswered = [
@@ -131,8 +147,9 @@ def make_topology(ports: Sequence[Ports], *, ring: bool = False) -> Topology:
         *_entered_elsewhere(ports),
         *_without_a_place(places, unanswered),
         *(
-            f"device {position} port {port} is open, but nobody answers behind it: a device that "
-            "is no EtherCAT device or has no firmware, or the second port of a MainDevice (a ring)"
+            f"device {position} port {port} is open, but no device answers behind it: something "
+            "that is not an EtherCAT device, a device without firmware, or a MainDevice's second "
+            "port (a ring)"
             for position, port in unanswered
             if ports[position][0] and (position == 0 or places[position].parent is not None)
         ),
@@ -147,7 +164,7 @@ def _entered_elsewhere(ports: Sequence[Ports]) -> Iterator[str]:
         others = [str(port) for port in PORT_ORDER if open_here[port]]
         if others:
             yield (
-                f"device {position} is entered by port {' or '.join(others)}, its port 0 is "
+                f"frames enter device {position} by port {' or '.join(others)}, its port 0 is "
                 "closed: its IN and OUT are swapped"
             )
         else:
@@ -163,5 +180,5 @@ def _without_a_place(
         if any(open_at == position for open_at, _ in unanswered):
             cause = "its IN and OUT are swapped: devices behind it answer before it"
         else:
-            cause = "a port came or went while the devices were counted: look again"
-        yield f"device {position} has no place: no open port is left for it; {cause}"
+            cause = "a port opened or closed while the devices were counted: scan again"
+        yield f"device {position} has no place in the tree: no open port is left for it; {cause}"

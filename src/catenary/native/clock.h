@@ -1,8 +1,8 @@
-/* A clock somebody waits on: the machine's, or one that is virtual and shared.
+/* A clock to wait on: that of the machine, or a virtual and shared one.
  *
- * One thread uses a table at a time; only `wake` may be called by others. Nothing here allocates,
- * raises or takes the GIL. Python passes the table in a capsule named CAT_CLOCK_CAPSULE; whoever
- * holds the table keeps the Python object that owns it alive.
+ * One thread uses a table at a time; other threads may call only `wake`. Nothing here allocates,
+ * raises or takes the GIL. Python passes the table in a capsule named CAT_CLOCK_CAPSULE. The holder
+ * of the table keeps the Python object that owns it alive.
  */
 #ifndef CATENARY_CLOCK_H
 #define CATENARY_CLOCK_H
@@ -24,11 +24,11 @@ typedef struct cat_clock {
     int64_t (*now)(void *self);       /* [ns] */
 
     /* Waits until `deadline` [ns, absolute]. 0: it has passed; 1: woken before; or -errno
-     * (-EINTR: a signal came first; call again with the same deadline to go on). */
+     * (-EINTR: a signal came first; call again with the same deadline to continue). */
     int (*wait_until)(void *self, int64_t deadline);
 
-    /* Spends execution time [ns]: virtual: lets it pass, preempted by whoever has precedence on
-     * the same processor; the machine's: computes that long. 0 or -errno, as above. */
+    /* Spends execution time [ns]. Virtual: lets it pass, preempted by participants of higher
+     * priority on the same processor. Machine: computes for this long. 0 or -errno, as above. */
     int (*spend)(void *self, int64_t duration);
 
     /* Ends the running or the next `wait_until`. */

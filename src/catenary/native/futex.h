@@ -9,7 +9,7 @@
 #include <time.h>
 #include <unistd.h>
 
-/* Sleeps while *word == value, at most timeout_ns. 0: woken or changed; -ETIMEDOUT; -EINTR. */
+/* Sleep while *word == value, at most timeout_ns. Return 0: woken or changed; -ETIMEDOUT; -EINTR. */
 static inline int cat_futex_wait(uint32_t *word, uint32_t value, int64_t timeout_ns) {
     struct timespec timeout = {timeout_ns / 1000000000, timeout_ns % 1000000000};
     if (syscall(SYS_futex, word, FUTEX_WAIT_PRIVATE, value, &timeout, 0, 0) == 0) return 0;
@@ -21,7 +21,7 @@ static inline void cat_futex_wake(uint32_t *word) {
 }
 
 /* The same for a word in memory that processes share, until an absolute `deadline_ns`
- * (INT64_MAX: for ever). As punctual as clock_nanosleep, and it can be woken. */
+ * (INT64_MAX: for ever). As precise as clock_nanosleep, but it can be woken. */
 static inline int cat_futex_wait_shared(uint32_t *word, uint32_t value, int64_t deadline_ns) {
     struct timespec until = {deadline_ns / 1000000000, deadline_ns % 1000000000};
     struct timespec *timeout = deadline_ns == INT64_MAX ? 0 : &until;

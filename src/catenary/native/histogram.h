@@ -1,8 +1,8 @@
 /* A histogram of times [ns] or counts in fixed memory, without pointers: it can lie in memory that
- * processes share. One writer; a reader may see the value that is being added half counted.
+ * processes share. One writer; a reader may see a value that is only partly added.
  *
- * Up to 512 every number has its bucket, then 256 buckets share an octave, so a percentile is
- * wrong by at most 0.4 %. Adding takes a few nanoseconds and two cache lines.
+ * Every number up to 512 has its own bucket. Above, 256 buckets share an octave, so that a
+ * percentile is wrong by at most 0.4 %. Adding takes a few nanoseconds and two cache lines.
  */
 #ifndef CATENARY_HISTOGRAM_H
 #define CATENARY_HISTOGRAM_H
@@ -10,13 +10,13 @@
 #include <math.h>
 #include <stdint.h>
 
-#define CAT_OCTAVE_BITS 8             /* buckets an octave: 2^8 */
+#define CAT_OCTAVE_BITS 8             /* log2 of the buckets per octave */
 #define CAT_OCTAVES 33                /* up to 2^41: 36 minutes in ns */
 #define CAT_BUCKETS ((CAT_OCTAVES + 1) << CAT_OCTAVE_BITS)
 
 typedef struct cat_histogram {
     uint64_t count;
-    int64_t first;                    /* deviations are summed from it: no cancellation */
+    int64_t first;                    /* deviations are summed relative to it, which avoids cancellation */
     int64_t low;
     int64_t high;
     double sum;
@@ -31,14 +31,14 @@ static inline uint32_t cat_histogram_bucket(uint64_t value) {
     return (uint32_t)(((uint64_t)shift << CAT_OCTAVE_BITS) + (value >> shift));
 }
 
-/* The lowest value that falls into a bucket. */
+/* Return the lowest value of a bucket. */
 static inline int64_t cat_histogram_edge(uint32_t bucket) {
     if (bucket < (2u << CAT_OCTAVE_BITS)) return bucket;
     int shift = (int)(bucket >> CAT_OCTAVE_BITS) - 1;
     return ((int64_t)bucket - ((int64_t)shift << CAT_OCTAVE_BITS)) << shift;
 }
 
-/* Negative values count as 0. */
+/* Add a value. Negative values count as 0. */
 static inline void cat_histogram_add(cat_histogram *h, int64_t value) {
     if (value < 0) value = 0;
     if (h->count == 0) h->first = h->low = h->high = value;
@@ -51,7 +51,7 @@ static inline void cat_histogram_add(cat_histogram *h, int64_t value) {
     h->count++;
 }
 
-/* The middle of the bucket that holds the value of this rank, within the extremes. */
+/* Return the middle of the bucket that contains the value of this rank, within the extremes. */
 static inline double cat_histogram_percentile(const cat_histogram *h, double fraction) {
     uint64_t rank = (uint64_t)(fraction * (double)(h->count - 1) + 0.5), below = 0;
     for (uint32_t k = 0; k < CAT_BUCKETS; k++) {

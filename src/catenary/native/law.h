@@ -1,24 +1,25 @@
-/* A control law: a function that runs in the cycle thread, and the monitor that gets the thread out of
- * one that never returns.
+/* A control law: a function that runs in the cycle thread, and the monitor that aborts one that
+ * never returns.
  *
- * `actual` and `target` point to blocks of the core whose layout is that of `law_fields`. Targets start
- * as what was commanded last; the core's limits apply to what the law leaves in them.
+ * `actual` and `target` point to blocks of the core with the layout of `law_fields`. Targets start
+ * as the last commanded values. The core's limits apply to what the law leaves in them.
  *
  * Theory of operation
- *   A guard belongs to one thread that calls laws (the runner). `under_way` is the number of its call. A
- *   monitor is a thread that watches one guard. Every 5 ms it compares the processor time of the runner
- *   with that at which it first saw the call. Beyond `limit` it stores the number in `condemned` and
- *   sends the runner a signal. The handler leaves the call by siglongjmp if it is still the same call.
- *   Signals that come late or to another thread have no effect.
+ *   A guard belongs to one thread that calls laws (the runner). `under_way` is the number of its
+ *   call. A monitor is a thread that watches one guard. Every 5 ms it compares the processor time of
+ *   the runner with that at which it first saw the call. Beyond `limit` it stores the number in
+ *   `condemned` and sends the runner a signal. The handler leaves the call by siglongjmp if it is
+ *   still the same call.
+ *   Signals that arrive late or in another thread have no effect.
  *
  * state of a monitor (futex word)
  *   PARKED  sleeps without a timeout: no law runs
  *   ACTIVE  checks every 5 ms
  *   ENDING  the thread ends
  *
- * The runner activates and parks the monitor, its owner ends it when the runner has stopped. Parking is
- * one store: the monitor notices it at its next check. The cycle and a rehearsal in another thread have
- * a guard and a monitor each, so that both may be inside a law at once.
+ * The runner activates and parks the monitor. Its owner ends it when the runner has stopped.
+ * Parking is one store: the monitor notices it at its next check. The cycle and a rehearsal in
+ * another thread have a guard and a monitor each, so that both may run a law at once.
  */
 #ifndef CATENARY_LAW_H
 #define CATENARY_LAW_H
@@ -36,10 +37,10 @@
 
 #define CAT_LAW_GOES_ON 0
 #define CAT_LAW_FINISHED 1
-#define CAT_LAW_RAISED (-1)   /* an exception, an index out of bounds among them */
-#define CAT_LAW_ABORTED (-2)  /* by the guard */
+#define CAT_LAW_RAISED (-1)   /* an exception, for example an index out of bounds */
+#define CAT_LAW_ABORTED (-2)  /* aborted by the monitor */
 
-/* Numbers of the law: `memory` is its own, `parameters` the application's. */
+/* Numbers of the law: `memory` belongs to it, `parameters` to the application. */
 typedef struct cat_law_numbers {
     double *memory;
     int64_t memory_count;
@@ -47,7 +48,7 @@ typedef struct cat_law_numbers {
     int64_t parameter_count;
 } cat_law_numbers;
 
-/* `time` [s] since its first step. Must not block; CAT_LAW_GOES_ON, _FINISHED or _RAISED. */
+/* `time` [s] since the first step. Must not block. Returns CAT_LAW_GOES_ON, _FINISHED or _RAISED. */
 typedef int (*cat_law_step)(const void *actual, void *target, double *memory, int64_t memory_count,
                             const double *parameters, int64_t parameter_count, double time);
 
@@ -55,13 +56,13 @@ typedef int (*cat_law_step)(const void *actual, void *target, double *memory, in
  * `limit`. Lock-free atomics are safe in a signal handler (C11 §7.14.1.1). */
 typedef struct cat_law_guard {
     sigjmp_buf jump;
-    uint64_t calls;               /* the runner's */
+    uint64_t calls;               /* number of calls of the runner */
     uint64_t under_way;           /* number of the call; 0: none */
-    uint64_t condemned;           /* the call that is to be given up */
-    uint64_t limit;               /* [ns] of the runner's processor time in one call */
-    uint32_t task;                /* thread ID of the runner, for the kernel */
+    uint64_t condemned;           /* number of the call to abort */
+    uint64_t limit;               /* maximum processor time of the runner in one call [ns] */
+    uint32_t task;                /* thread ID of the runner in the kernel */
     uint32_t known;               /* the runner is ready to be interrupted */
-    pthread_t runner;             /* the thread that calls */
+    pthread_t runner;             /* the thread that calls laws */
 } cat_law_guard;
 
 enum { CAT_LAW_PARKED, CAT_LAW_ACTIVE, CAT_LAW_ENDING };
@@ -69,9 +70,9 @@ enum { CAT_LAW_PARKED, CAT_LAW_ACTIVE, CAT_LAW_ENDING };
 typedef struct cat_law_monitor {
     cat_law_guard guard;
     uint32_t state;               /* futex word */
-    uint32_t started;             /* the thread runs; its owner's */
+    uint32_t started;             /* the thread runs; used by its owner */
     pthread_t thread;
-    pid_t owner;                  /* the process that the thread lives in: a forked child has none */
+    pid_t owner;                  /* process of the thread; a forked child does not have it */
 } cat_law_monitor;
 
 #define CAT_LAW_SIGNAL (SIGRTMIN + 7)
@@ -96,7 +97,7 @@ static inline int64_t cat_law_time_used(uint32_t task) {
     return used.tv_sec * 1000000000LL + used.tv_nsec;
 }
 
-/* Sends the signal that ends a call. Nothing happens if the thread has ended. */
+/* Send the signal that ends a call. No effect if the thread has ended. */
 static inline void cat_law_interrupt(cat_law_guard *guard, uint32_t task) {
     siginfo_t info = {0};
     info.si_signo = CAT_LAW_SIGNAL;
@@ -108,11 +109,11 @@ static inline void cat_law_interrupt(cat_law_guard *guard, uint32_t task) {
 }
 
 typedef struct cat_law_seen {
-    uint64_t call;                /* that was under way at the last check; 0: none */
-    int64_t since;                /* processor time of its runner when it was first seen [ns] */
+    uint64_t call;                /* call at the last check; 0: none */
+    int64_t since;                /* processor time of the runner when the call was first seen [ns] */
 } cat_law_seen;
 
-/* Give up the call that has computed for `limit`. */
+/* Abort a call that has computed for `limit`. */
 static inline void cat_law_check(cat_law_guard *guard, cat_law_seen *seen) {
     uint64_t call = cat_load_acquire64(&guard->under_way);
     uint32_t task = cat_load_relaxed32(&guard->task);
@@ -138,8 +139,8 @@ static void *cat_law_watch(void *argument) {
     }
 }
 
-/* Owner: start the thread, parked. `priority` (SCHED_FIFO) above the runner's; 0: as the caller. 0 or
- * -errno. */
+/* Owner: start the thread, parked. `priority`: SCHED_FIFO, above the runner's; 0: that of the
+ * caller. Return 0 or -errno. */
 static inline int cat_law_monitor_start(cat_law_monitor *monitor, int priority) {
     struct sigaction action = {.sa_sigaction = cat_law_give_up, .sa_flags = SA_SIGINFO | SA_NODEFER};
     struct sched_param parameters = {.sched_priority = priority};
@@ -156,7 +157,7 @@ static inline int cat_law_monitor_start(cat_law_monitor *monitor, int priority) 
     if (rc) return -rc;
     monitor->started = 1;
     monitor->owner = getpid();
-    if (priority > 0) /* refused to ordinary users: then the runner has none either */
+    if (priority > 0) /* refused without permission, but then the runner has no priority either */
         pthread_setschedparam(monitor->thread, SCHED_FIFO, &parameters);
     return 0;
 }
@@ -171,20 +172,20 @@ static inline void cat_law_monitor_stop(cat_law_monitor *monitor) {
     monitor->started = 0;
 }
 
-/* Runner: watch the calls of a law from now on. One system call, as another one at its first call. */
+/* Runner: watch the calls of a law from now on. One system call, and one more at its first call. */
 static inline void cat_law_monitor_activate(cat_law_monitor *monitor, int64_t limit) {
-    monitor->guard.known = 0; /* a new thread may have the pthread_t of one that has ended */
+    monitor->guard.known = 0; /* a new thread may reuse the pthread_t of one that has ended */
     cat_store_release64(&monitor->guard.limit, (uint64_t)limit);
     cat_store_release32(&monitor->state, CAT_LAW_ACTIVE);
     cat_futex_wake(&monitor->state);
 }
 
-/* Runner: no law runs any more. */
+/* Runner: stop watching; no law runs. */
 static inline void cat_law_monitor_park(cat_law_monitor *monitor) {
     cat_store_release32(&monitor->state, CAT_LAW_PARKED);
 }
 
-/* Unblock the signal in this thread, and in this one only. */
+/* Unblock the signal in this thread only. */
 static __attribute__((noinline)) void cat_law_meet_runner(cat_law_guard *guard) {
     sigset_t ours;
     sigemptyset(&ours);
@@ -195,7 +196,7 @@ static __attribute__((noinline)) void cat_law_meet_runner(cat_law_guard *guard) 
     guard->known = 1;
 }
 
-/* CAT_LAW_ABORTED: the monitor has given up the call. */
+/* Run one step. Return its result, or CAT_LAW_ABORTED if the monitor has aborted it. */
 static inline int cat_law_call(cat_law_guard *guard, cat_law_step step, const void *actual,
                                void *target, const cat_law_numbers *n, double time) {
     int rc;

@@ -1,9 +1,9 @@
 /* The link table: how the compiled core, the compiled wrappers and the virtual segment
- * hand Ethernet frames to one another without Python.
+ * exchange Ethernet frames without Python.
  *
  * A link carries whole Ethernet frames: destination MAC first, no preamble, no FCS.
  * One thread uses a link at a time; nothing here allocates or raises.
- * Python passes the table in a capsule named CAT_LINK_CAPSULE; whoever holds the table keeps
+ * Python passes the table in a capsule named CAT_LINK_CAPSULE. The holder of the table keeps
  * the Python object that owns it alive.
  */
 #ifndef CATENARY_LINK_H
@@ -18,10 +18,10 @@
 
 /* flags */
 #define CAT_LINK_VIRTUAL_TIME 1u      /* `now` advances only in `wait_until`: run in the caller's thread */
-#define CAT_LINK_SHARED_TIME 2u       /* virtual, and others live by it: wait without the GIL */
-#define CAT_LINK_SPENDS 4u            /* `spend` is there */
-#define CAT_LINK_POLLS 8u             /* `fd` is there: readable when a frame can be received */
-#define CAT_LINK_FORETELLS 16u        /* `due` is there */
+#define CAT_LINK_SHARED_TIME 2u       /* virtual and shared with other participants: wait without the GIL */
+#define CAT_LINK_SPENDS 4u            /* `spend` is implemented */
+#define CAT_LINK_POLLS 8u             /* `fd` is valid: readable when a frame can be received */
+#define CAT_LINK_FORETELLS 16u        /* `due` is implemented */
 
 typedef struct cat_link {
     uint32_t version;                 /* CAT_LINK_VERSION */
@@ -31,33 +31,33 @@ typedef struct cat_link {
     /* Sends one frame. 0, or -errno (-ENOBUFS: the device's queue is full, -ENETDOWN ...). */
     int (*send)(void *self, const uint8_t *frame, uint32_t length);
 
-    /* Takes the oldest received frame without waiting: its length, with *frame pointing at bytes
-     * that stay valid until the next `receive` or `wait_until`; 0: none there; or -errno. */
+    /* Takes the oldest received frame without waiting. Returns its length and sets *frame to bytes
+     * that stay valid until the next `receive` or `wait_until`; 0: no frame; or -errno. */
     int (*receive)(void *self, const uint8_t **frame);
 
     /* The link's clock [ns]: CLOCK_MONOTONIC for a NIC, virtual time for a virtual segment. */
     int64_t (*now)(void *self);
 
-    /* Waits until `deadline` [ns, absolute, the link's clock] and, where `wake_on_frame`, returns
-     * early once a frame can be received.
-     * 1: a frame is there (only with wake_on_frame); 0: the deadline has passed; or -errno
+    /* Waits until `deadline` [ns, absolute, the link's clock]. With `wake_on_frame` it returns
+     * early when a frame can be received.
+     * 1: a frame is available (only with wake_on_frame); 0: the deadline has passed; or -errno
      * (-EINTR: a signal came first; the caller decides). */
     int (*wait_until)(void *self, int64_t deadline, int wake_on_frame);
 
-    /* Only with CAT_LINK_SPENDS. Lets execution time [ns] pass; whoever precedes on the same
-     * virtual processor preempts it, so that more time may have passed. 0, or -errno as above. */
+    /* Only with CAT_LINK_SPENDS. Lets execution time [ns] pass. Participants of higher priority on
+     * the same virtual processor preempt it, so that more time may pass. 0, or -errno as above. */
     int (*spend)(void *self, int64_t duration);
 
-    /* Only with CAT_LINK_FORETELLS (segments in this process). When the next frame can be received [ns];
-     * INT64_MAX: none is under way. */
+    /* Only with CAT_LINK_FORETELLS (segments in this process). Time of the next frame to receive
+     * [ns]; INT64_MAX: none. */
     int64_t (*due)(void *self);
 
     /* Only with CAT_LINK_POLLS. */
     int fd;
 } cat_link;
 
-/* Replaces the calls of a table. A thread that is inside a former call finishes it there: the owner
- * keeps valid what that call uses. */
+/* Replace the functions of a table. A thread that is inside an old function finishes it: the owner
+ * must keep valid what that function uses. */
 static inline void cat_link_replace_calls(
         cat_link *link,
         int (*send)(void *, const uint8_t *, uint32_t),

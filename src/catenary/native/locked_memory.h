@@ -1,19 +1,19 @@
-/* Memory of the cycle: no page fault in the cycle thread, and no page swapped out where the system allows.
+/* Memory of the cycle: no page faults in the cycle thread, and locked if the system permits it.
  *
  * cat_memory_take    return a zeroed part that begins at a cache line
  * cat_memory_settle  touch every page, then lock it (real time only, before the cycle uses it)
- * cat_memory_touch   touch every page only: for memory that must not use up the limit first
- * cat_memory_free    give everything back; the kernel unlocks what is unmapped
+ * cat_memory_touch   touch every page without locking: for memory of lower priority
+ * cat_memory_free    release everything; the kernel unlocks unmapped pages
  *
- * A memory is a list of chunks. A chunk is a mapping of whole pages: this header, then parts one after
- * the other. A new chunk is made when the newest has no room. Nothing is returned to a chunk: parts
- * live as long as their owner.
+ * A memory is a list of chunks. A chunk is a mapping of whole pages: this header, then its parts. A
+ * new chunk is made when the newest is full. Parts are not returned to a chunk: they live as long
+ * as their owner.
  *
- * state  RESERVED  mapped, not touched: all that virtual time needs
- *        TOUCHED   every page has a frame of its own; `error` says why it is not locked
+ * state  RESERVED  mapped, not touched: sufficient for virtual time
+ *        TOUCHED   every page has a frame of its own; `error` is the reason why it is not locked
  *        LOCKED    touched, and never swapped out
  *
- * The kernel refuses a chunk as a whole when it exceeds RLIMIT_MEMLOCK: whoever settles first is locked
+ * The kernel refuses a whole chunk that exceeds RLIMIT_MEMLOCK: the first to settle is locked
  * first. A page is touched by an atomic addition of 0, so that an owner may settle at any time.
  *
  * A forked child finds zeros in touched memory (MADV_WIPEONFORK). Copy-on-write would cost the cycle of
@@ -32,7 +32,7 @@
 #include <unistd.h>
 
 #define CAT_CACHE_LINE 64u
-#define CAT_CHUNK_SIZE (16u * 1024u)  /* at least */
+#define CAT_CHUNK_SIZE (16u * 1024u)  /* minimum */
 
 enum { CAT_MEMORY_RESERVED, CAT_MEMORY_TOUCHED, CAT_MEMORY_LOCKED };
 
@@ -48,11 +48,11 @@ typedef struct cat_memory {
     cat_chunk *chunks;                /* the newest first */
 } cat_memory;
 
-/* The sum over several memories. */
+/* Sums over several memories. */
 typedef struct cat_memory_state {
     size_t locked;                    /* bytes */
     size_t touched;                   /* bytes that are touched and not locked */
-    int error;                        /* why, of the last one */
+    int error;                        /* errno of the last memory that is not locked */
 } cat_memory_state;
 
 static inline size_t cat_round_up(size_t size, size_t step) { return (size + step - 1) / step * step; }
@@ -75,7 +75,7 @@ static inline cat_chunk *cat_chunk_new(size_t room) {
     return chunk;
 }
 
-/* `count` zeroed elements of `size` bytes; NULL: no memory. */
+/* Return `count` zeroed elements of `size` bytes; NULL: out of memory. */
 static inline void *cat_memory_take(cat_memory *memory, size_t count, size_t size) {
     cat_chunk *chunk = memory->chunks;
     size_t bytes;
@@ -101,8 +101,8 @@ static inline void cat_touch(void *start, size_t size) {
         __atomic_fetch_add(bytes + at, 0, __ATOMIC_RELAXED);
 }
 
-/* Give every page of a chunk a frame of its own, also after a fork. Linux before 4.14 refuses to wipe
- * and copies instead: the child is safe without it (`forget`), the parent's cycle is slower. */
+/* Give every page of a chunk a frame of its own, also after a fork. Linux before 4.14 refuses to
+ * wipe and copies instead: the child is safe without it (`forget`), the parent's cycle is slower. */
 static inline void cat_chunk_touch(cat_chunk *chunk) {
 #ifndef __SANITIZE_ADDRESS__
     madvise(chunk, chunk->size, MADV_WIPEONFORK);
@@ -127,7 +127,7 @@ static inline void cat_memory_touch(cat_memory *memory) {
     }
 }
 
-/* Add what became of a memory. */
+/* Add the state of a memory to the sums. */
 static inline void cat_memory_add_state(const cat_memory *memory, cat_memory_state *sum) {
     for (const cat_chunk *chunk = memory->chunks; chunk; chunk = chunk->next) {
         if (chunk->state == CAT_MEMORY_LOCKED) sum->locked += chunk->size;

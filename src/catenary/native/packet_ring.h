@@ -1,5 +1,5 @@
 /* A bounded ring of Ethernet frames between one producer thread and one consumer thread.
- * Neither ever waits for the other; a full ring refuses, an empty ring says so.
+ * Neither waits for the other: push fails on a full ring, peek returns NULL on an empty one.
  */
 #ifndef CATENARY_PACKET_RING_H
 #define CATENARY_PACKET_RING_H
@@ -14,17 +14,17 @@
 typedef struct cat_packet {
     uint32_t length;
     uint32_t reserved;
-    int64_t stamp;                    /* [ns], as the producer wishes */
-    uint8_t bytes[CAT_FRAME_MAX + 6]; /* + 6: keeps the next slot aligned */
+    int64_t stamp;                    /* [ns], set by the producer */
+    uint8_t bytes[CAT_FRAME_MAX + 6]; /* + 6 aligns the next slot */
 } cat_packet;
 
 typedef struct cat_packet_ring {
-    uint32_t head __attribute__((aligned(64)));   /* next slot to write; the producer's */
-    uint32_t tail __attribute__((aligned(64)));   /* next slot to read; the consumer's */
+    uint32_t head __attribute__((aligned(64)));   /* next slot to write; used by the producer */
+    uint32_t tail __attribute__((aligned(64)));   /* next slot to read; used by the consumer */
     cat_packet slots[CAT_RING_SLOTS];
 } cat_packet_ring;
 
-/* 0, -1 when full, -2 when the frame is too long. */
+/* Return 0, -1 if the ring is full, -2 if the frame is too long. */
 static inline int cat_ring_push(cat_packet_ring *ring, const uint8_t *bytes, uint32_t length, int64_t stamp) {
     uint32_t head = ring->head;
     if (length > CAT_FRAME_MAX) return -2;
@@ -37,7 +37,7 @@ static inline int cat_ring_push(cat_packet_ring *ring, const uint8_t *bytes, uin
     return 0;
 }
 
-/* The oldest packet, or NULL when empty; it stays the ring's until cat_ring_drop. */
+/* Return the oldest packet, or NULL if the ring is empty. It is valid until cat_ring_drop. */
 static inline const cat_packet *cat_ring_peek(const cat_packet_ring *ring) {
     uint32_t tail = ring->tail;
     if (cat_load_acquire32(&ring->head) == tail) return 0;

@@ -3,44 +3,45 @@
  * offered  the pointer of the owner; NULL: none
  * claimed  the pointer that the user works with; NULL: none
  *
- * Each is one atomic word, so that a pointer is never paired with state of another one. The user
- * claims a pointer before it reads what lies there, and checks afterwards that it is still offered
+ * Each is one atomic word, so that a pointer is never paired with the state of another one. The
+ * user claims a pointer before it reads the object, and checks afterwards that it is still offered
  * (a hazard pointer: Michael, IEEE TPDS 15(6), 2004). The owner keeps what is offered or claimed.
  * Both words use sequentially consistent order: each side stores one word, then loads the other.
  *
- * Two uses: `claim` reads a pointer that stays offered; `take` removes a request from the word, so
- * that each request is served at most once and the newest one wins.
+ * Two uses: `claim` reads a pointer that stays offered. `take` removes a request from the word, so
+ * that each request is served at most once and the newest one replaces older ones.
  */
 #ifndef CATENARY_POINTER_HANDOVER_H
 #define CATENARY_POINTER_HANDOVER_H
 
 #include <stdint.h>
 
-#define CAT_POINTER_NONE ((void *)1)  /* a request for no object, in contrast to no request */
+#define CAT_POINTER_NONE ((void *)1)  /* a request for no object, different from no request */
 
 typedef struct cat_pointer {
     void *offered;
     void *claimed;
 } cat_pointer;
 
-/* Owner: offers `pointer`. Returns the former offer, NULL if `take` has removed it. */
+/* Owner: offer `pointer`. Return the former offer, NULL if `take` has removed it. */
 static inline void *cat_pointer_offer(cat_pointer *p, void *pointer) {
     return __atomic_exchange_n(&p->offered, pointer, __ATOMIC_SEQ_CST);
 }
 
-/* Owner: 1 if the user has `pointer` or may still get it. The offer is read first: a request moves
- * from `offered` to `claimed`, never back. */
+/* Owner: return 1 if the user has `pointer` or may still get it. The offer is read first: a request
+ * moves from `offered` to `claimed`, never back. */
 static inline int cat_pointer_is_used(const cat_pointer *p, const void *pointer) {
     return __atomic_load_n(&p->offered, __ATOMIC_SEQ_CST) == pointer
         || __atomic_load_n(&p->claimed, __ATOMIC_SEQ_CST) == pointer;
 }
 
-/* User: 1 if something is offered. */
+/* User: return 1 if something is offered. */
 static inline int cat_pointer_is_offered(const cat_pointer *p) {
     return __atomic_load_n(&p->offered, __ATOMIC_ACQUIRE) != 0;
 }
 
-/* User: the offered pointer, or NULL; it stays valid until `release`, the next `claim` or `take`. */
+/* User: return the offered pointer, or NULL. It is valid until `release`, the next `claim` or
+ * `take`. */
 static inline void *cat_pointer_claim(cat_pointer *p) {
     void *pointer = __atomic_load_n(&p->offered, __ATOMIC_SEQ_CST);
     for (;;) {
@@ -51,7 +52,7 @@ static inline void *cat_pointer_claim(cat_pointer *p) {
     }
 }
 
-/* User: removes the request. 0: there is none; 1: *pointer is the requested object, claimed until
+/* User: remove the request. Return 0: none; 1: *pointer is the requested object, claimed until
  * `release` or the next `take`, or NULL for CAT_POINTER_NONE. */
 static inline int cat_pointer_take(cat_pointer *p, void **pointer) {
     void *offered = __atomic_load_n(&p->offered, __ATOMIC_SEQ_CST);
@@ -64,7 +65,7 @@ static inline int cat_pointer_take(cat_pointer *p, void **pointer) {
     return 1;
 }
 
-/* User: works with none from now on. */
+/* User: release the claimed pointer. */
 static inline void cat_pointer_release(cat_pointer *p) {
     __atomic_store_n(&p->claimed, 0, __ATOMIC_RELEASE);
 }

@@ -1,8 +1,8 @@
 /* The latest value from one writer thread to one reader thread, never torn, never waiting.
  *
  * Three slots: the writer owns one, the reader owns one, the third is offered. Publishing and
- * taking exchange the own slot for the offered one. What the reader did not take in time is
- * overwritten: only the latest value counts.
+ * taking exchange the own slot for the offered one. A value that the reader does not take in time
+ * is overwritten by the next one.
  */
 #ifndef CATENARY_TRIPLE_BUFFER_H
 #define CATENARY_TRIPLE_BUFFER_H
@@ -10,11 +10,11 @@
 #include <stdint.h>
 #include "atomics.h"
 
-#define CAT_TRIPLE_NEW 4u             /* with the slot's number: not taken yet */
+#define CAT_TRIPLE_NEW 4u             /* flag added to the slot number: not taken yet */
 
-/* Each word has 60 bytes on both sides, so that no two of them share a cache line of 64 bytes
- * wherever the structure lies. It needs the alignment of a uint32_t only: objects of Python, of which
- * it is a member, are aligned to 16 bytes. */
+/* Each word has 60 bytes on both sides, so that two words never share a cache line of 64 bytes,
+ * wherever the structure lies. Its alignment is that of a uint32_t, because it is a member of
+ * Python objects, which are aligned to 16 bytes. */
 typedef struct cat_triple {
     uint8_t before[60];
     uint32_t offered;             /* slot | CAT_TRIPLE_NEW */
@@ -31,12 +31,12 @@ static inline void cat_triple_init(cat_triple *triple) {
     triple->front = 2u;
 }
 
-/* Offers the slot `back` after it was filled; `back` is another one afterwards. */
+/* Offer the filled slot `back`; afterwards `back` is another slot. */
 static inline void cat_triple_publish(cat_triple *triple) {
     triple->back = cat_exchange32(&triple->offered, triple->back | CAT_TRIPLE_NEW) & 3u;
 }
 
-/* 1: `front` is a newer slot than before; 0: nothing new, `front` is as it was. */
+/* Return 1 if `front` is now a newer slot; 0: nothing new, `front` is unchanged. */
 static inline int cat_triple_take(cat_triple *triple) {
     if (!(cat_load_acquire32(&triple->offered) & CAT_TRIPLE_NEW)) return 0;
     triple->front = cat_exchange32(&triple->offered, triple->front) & 3u;

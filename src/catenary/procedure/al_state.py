@@ -1,4 +1,4 @@
-"""Changing the state of a device, ETG.1000.6 §5.3 and §6.4; times by ETG.1020 table "Timeouts"."""
+"""State changes of a device, ETG.1000.6 §5.3 and §6.4; times from ETG.1020 table "Timeouts"."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from catenary.wire.al import AlControl, AlState, AlStatus, status_code
 from catenary.wire.datagram import EcatCommand
 from catenary.wire.register import AL_CONTROL, AL_STATUS, AL_STATUS_CODE
 
-# By the state asked for [s]; the ESI's defaults (ETG.2000, StateMachine/Timeout).
+# By requested state [s]; the defaults of the ESI (ETG.2000, StateMachine/Timeout).
 TIMEOUTS = {
     AlState.INIT: 5.0,  # back to INIT
     AlState.PRE_OP: 3.0,
@@ -21,7 +21,7 @@ TIMEOUTS = {
 }
 
 ACKNOWLEDGE_TIMEOUT = 0.5  # [s]
-TAKE_TIMEOUT = 0.5  # [s]; an application looks at AL control every few milliseconds
+TAKE_TIMEOUT = 0.5  # [s]; applications read AL control every few milliseconds
 
 _STATUS_START = AL_STATUS.address
 _STATUS_SIZE = AL_STATUS_CODE.address + AL_STATUS_CODE.size - AL_STATUS.address
@@ -30,18 +30,19 @@ _STATUS_SIZE = AL_STATUS_CODE.address + AL_STATUS_CODE.size - AL_STATUS.address
 class DeviceState(NamedTuple):
     """AL status and its code, read together."""
 
-    state: AlState | None  # None: a value the standard does not have
+    state: AlState | None  # None: a value that the standard does not define
     error: bool
     code: int
     word: int
 
     @property
     def name(self) -> str:
+        """Name of the state; its number if the standard does not define it."""
         return str(self.state) if self.state is not None else f"state {self.word & 0xF}"
 
 
 def read_state(station: Station) -> Procedure[DeviceState]:
-    """The state the device is in now."""
+    """Read the present state of a device."""
     [reply] = yield [read_memory(station.address, _STATUS_START, _STATUS_SIZE, repeatable=True)]
     return _decoded(answered(reply, station, "AL status"))
 
@@ -49,8 +50,16 @@ def read_state(station: Station) -> Procedure[DeviceState]:
 def request_state(
     station: Station, target: AlState, *, timeout: float | None = None
 ) -> Procedure[DeviceState]:
-    """Asks for a state and waits until the device is there. A pending error is acknowledged
-    first. StateError with the device's own code if it refuses or takes too long."""
+    """Request a state and wait until the device reaches it. A pending error is acknowledged first.
+
+    Args:
+        station: The device.
+        target: The requested state.
+        timeout: Time for the change [s]; None for the default of the state.
+
+    Raises:
+        StateError: The device refuses or takes too long. The error has its AL status code.
+    """
     before = yield from read_state(station)
     if before.error:
         yield from acknowledge(station, before)
@@ -61,8 +70,18 @@ def request_state(
 
 
 def write_control(station: Station, control: AlControl) -> Procedure[None]:
-    """Asks for a state. A controller takes no AL control before its application has read the one
-    before (ET1100 datasheet, register 0x0120): then it is asked again."""
+    """Write AL control until the controller accepts it.
+
+    A controller rejects AL control until its application has read the previous one (ET1100
+    datasheet, register 0x0120).
+
+    Args:
+        station: The device.
+        control: The requested state.
+
+    Raises:
+        StateError: The controller does not accept the request in time.
+    """
     deadline, pace = Deadline(TAKE_TIMEOUT), Pace()
     while True:
         [taken, status] = yield [
@@ -73,15 +92,22 @@ def write_control(station: Station, control: AlControl) -> Procedure[None]:
             return
         now = _decoded(answered(status, station, f"request for {control.state}"))
         if deadline.passed(status):
-            raise _refused(station, control.state, now, "does not look at the request for")
+            raise _refused(station, control.state, now, "does not read the request for")
         yield after(pace.pause())
 
 
 def acknowledge(station: Station, pending: DeviceState) -> Procedure[DeviceState]:
-    """Acknowledges an AL error by asking for the state the device is in already.
+    """Acknowledge an AL error by requesting the present state.
 
-    A controller that emulates its application only copies AL control into AL status, so its error
-    is the copy of an acknowledgement: asking without one clears it.
+    A controller that emulates its application only copies AL control to AL status. Its error is
+    then a copy of the acknowledgement. A request without acknowledgement clears it.
+
+    Args:
+        station: The device.
+        pending: Its state with the error.
+
+    Raises:
+        StateError: The error remains.
     """
     state = pending.state or AlState.INIT
     now = pending
@@ -90,7 +116,7 @@ def acknowledge(station: Station, pending: DeviceState) -> Procedure[DeviceState
         now = yield from _await_no_error(station, ACKNOWLEDGE_TIMEOUT)
         if not now.error:
             return now
-    raise _refused(station, state, now, "does not take the acknowledgement of its error in")
+    raise _refused(station, state, now, "does not accept the acknowledgement of its error in")
 
 
 def _await_no_error(station: Station, timeout: float) -> Procedure[DeviceState]:
@@ -137,6 +163,6 @@ def _refused(station: Station, target: AlState, now: DeviceState, what: str) -> 
         actual=now.word & 0x0F,
         code=now.code,
         hint=known.cause
-        or "read its AL status again; its manual lists what it needs. Without an "
-        "error code, look for a second master on this line that requests states, too",
+        or "read its AL status again; its manual lists the requirements. Without an "
+        "error code, check for a second master that also requests states",
     )

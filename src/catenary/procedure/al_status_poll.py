@@ -1,6 +1,6 @@
-"""Who answers, and from which state: all devices asked in one frame, ETG.1000.4 §6.1, §6.4.
+"""AL status of all devices in one frame, ETG.1000.4 §6.1, §6.4.
 
-Unlike `al_state.read_state` nobody's silence is an error: silence is what is looked for.
+Unlike in `al_state.read_state`, a missing reply is not an error, but a result.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _SIZE = AL_STATUS_CODE.address + AL_STATUS_CODE.size - _START
 
 
 class Answer(NamedTuple):
-    """What one device said. `word` None: it said nothing."""
+    """The answer of one device. `word` is None if it did not answer."""
 
     station: Station
     word: int | None  # AL status
@@ -25,7 +25,7 @@ class Answer(NamedTuple):
 
 
 def survey(stations: Sequence[Station]) -> Procedure[list[Answer]]:
-    """The answer of every device, silence included."""
+    """Return the answers of all devices, including those that did not answer."""
     replies = yield [
         read_memory(station.address, _START, _SIZE, repeatable=True) for station in stations
     ]

@@ -17,23 +17,32 @@ from catenary.wire.sii import (
 
 
 def read_alias(station: Station) -> Procedure[int]:
-    """The alias in the EEPROM: what the device will have after its next power-up."""
+    """Read the alias in the EEPROM. The device uses it from its next power-up."""
     return int.from_bytes((yield from read_words(station, STATION_ALIAS_WORD, 1)), "little")
 
 
 def write_alias(station: Station, alias: int) -> Procedure[None]:
-    """Writes alias and checksum. The device takes it over at its next power-up. EepromError where
-    the checksum is wrong already: a right one would hide that the rest was never checked."""
+    """Write alias and checksum to the EEPROM. The device uses the alias from its next power-up.
+
+    Args:
+        station: The device.
+        alias: The alias, 0 to 65535; 0 means no alias.
+
+    Raises:
+        ValueError: The alias is out of range.
+        EepromError: The present checksum is wrong, or a word cannot be written. A corrected
+            checksum would hide that the rest of the configuration is invalid.
+    """
     if not 0 <= alias <= 0xFFFF:
-        raise ValueError(f"a station alias is 0 to 65535, not {alias}")
+        raise ValueError(f"station alias {alias} is out of range; use 0 to 65535")
     old = yield from read_words(station, 0, CONFIGURATION_WORDS)
     checksum = int.from_bytes(old[2 * CHECKSUM_WORD :], "little")
     if checksum != CHECKSUM_DISABLED:
         if checksum & 0xFF != checksum_of(old):
             raise EepromError(
-                f"{station}: the checksum of its EEPROM is 0x{checksum:04X}, "
-                f"0x{checksum_of(old):04X} would be right: its configuration is not to be trusted",
-                hint="write the whole image of its maker: catenary sii write",
+                f"{station}: the checksum of its EEPROM is 0x{checksum:04X}, expected "
+                f"0x{checksum_of(old):04X}: its configuration may be damaged",
+                hint="write the whole image of the vendor: catenary sii write",
             )
         new = bytearray(old)
         new[2 * STATION_ALIAS_WORD : 2 * STATION_ALIAS_WORD + 2] = alias.to_bytes(2, "little")

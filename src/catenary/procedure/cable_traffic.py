@@ -1,4 +1,4 @@
-"""Traffic for its own sake: cables show their faults only to frames that pass."""
+"""Test traffic: faults of a cable appear only while frames pass."""
 
 from __future__ import annotations
 
@@ -8,13 +8,22 @@ from catenary.procedure.station import Deadline
 from catenary.wire.datagram import EcatCommand
 
 PAUSE = 1e-3  # [s] between two frames
-PATTERN = bytes(range(256)) * 5  # every byte, and nearly a full frame
-IN_VAIN = 50  # frames in a row that nobody gives back
+PATTERN = bytes(range(256)) * 5  # every byte value, nearly a full frame
+IN_VAIN = 50  # lost frames in a row
 
 
 def exercise(seconds: float) -> Procedure[tuple[int, int]]:
-    """Sends a long frame every millisecond for some seconds; how many went out, and how many did
-    not come back whole. NoDeviceError where the segment is gone."""
+    """Send a long frame every millisecond for some time.
+
+    Args:
+        seconds: The duration.
+
+    Returns:
+        The number of sent frames, and of those that were lost or returned damaged.
+
+    Raises:
+        NoDeviceError: No frame comes back any more.
+    """
     deadline, sent, lost, in_vain = Deadline(seconds), 0, 0, 0
     while True:
         [reply] = yield [Request(EcatCommand.NOP, 0, PATTERN, False)]
@@ -23,8 +32,8 @@ def exercise(seconds: float) -> Procedure[tuple[int, int]]:
         lost += bool(in_vain)
         if in_vain >= IN_VAIN:
             raise NoDeviceError(
-                f"no frame comes back any more, after {sent - in_vain} that did",
-                hint="the cable to the first device, or its power",
+                f"the last {in_vain} frames were lost or damaged, after {sent - in_vain} frames",
+                hint="check the cable to the first device, and its power",
             )
         if deadline.passed(reply):
             return sent, lost

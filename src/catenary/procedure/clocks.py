@@ -1,11 +1,11 @@
-"""Distributed clocks before the cycle: delays measured, offsets written, filters reset, drift taken
-out, SYNC signals started. ETG.1000.4 §6.8, ETG.1020 §"Distributed clocks"; Beckhoff, ESC data sheet
-I, §9.1.2 to §9.1.5. All in PRE-OP.
+"""Set-up of distributed clocks before the cycle: measure delays, write offsets, reset filters,
+compensate drift. ETG.1000.4 §6.8, ETG.1020 §"Distributed clocks"; Beckhoff, ESC data sheet I,
+§9.1.2 to §9.1.5. All steps are in PRE-OP.
 
-The system time of a device is its local time plus its offset; its time loop follows the time that a
-frame brings from the reference clock, less the delay of the way. A device may stamp receive times
-and yet have no system time (an EL2828 does: ethercrab's capture replay-dc.pcapng); delays are then
-measured through it, and it is left alone, as IgH does (`has_dc_system_time`).
+The system time of a device is its local time plus its offset. Its time loop follows the time of the
+reference clock, which a frame carries, plus the propagation delay. A device may stamp receive times
+but have no system time (an EL2828: ethercrab's capture replay-dc.pcapng). Delays are then measured
+through it, and its clock is not configured, as in IgH (`has_dc_system_time`).
 """
 
 from __future__ import annotations
@@ -36,23 +36,23 @@ from catenary.wire.register import (
     SYSTEM_TIME_OFFSET_LOW,
 )
 
-LATCHES = 16  # a mean of so many: stamps jitter by a tick of 10 ns each, those of slow PHYs by more
-LOST_MAX = 16  # frames of a burst in a row: beyond, nobody is there
-BURST_STEP = 512  # frames under way in one step of the procedure
+LATCHES = 16  # number of latches for the mean: time stamps jitter by 10 ns or more
+LOST_MAX = 16  # lost frames in a row; with more, the reference is assumed lost
+BURST_STEP = 512  # frames per step of the procedure
 # The reset values, which SOEM (`ecx_set_slaves_to_default`), KickCAT (`enableDC`) and ethercrab
 # write: no filter on the difference, 2^12 on the speed, and the bandwidth of the loop.
 DIFFERENCE_FILTER, SPEED_FILTER, SPEED_START = 0, 12, 0x1000
 SPAN_64, SPAN_32 = 1 << 64, 1 << 32
-RingEnd = tuple[int, int]  # position and port of what the second interface is wired to
+RingEnd = tuple[int, int]  # position and port wired to the second interface
 
 
 @dataclass(frozen=True, slots=True)
 class ClockMeasurement:
-    """What one measurement of a segment's clocks says; tuples by position."""
+    """Result of one measurement of the clocks of a segment; tuples by position."""
 
-    delays_ns: tuple[int | None, ...]  # behind the first clock; None: no clock
-    local_times_ns: tuple[int | None, ...]  # when the last latch passed; None: no system time
-    latched_ns: int  # the same moment, on the link's clock: within half a round trip
+    delays_ns: tuple[int | None, ...]  # from the first clock; None: no clock
+    local_times_ns: tuple[int | None, ...]  # local time of the last latch; None: no system time
+    latched_ns: int  # the same time on the link's clock, within half a round trip
 
     @property
     def first(self) -> int | None:
@@ -63,7 +63,7 @@ class ClockMeasurement:
         return None
 
     def runs(self, position: int) -> bool:
-        """Whether the device has a system time that can follow."""
+        """Return True if the device has a system time that can be synchronised."""
         return self.local_times_ns[position] is not None
 
 
@@ -73,8 +73,14 @@ def measure(
     second_end: RingEnd | None = None,
     latches: int = LATCHES,
 ) -> Procedure[ClockMeasurement]:
-    """Latches all receive times, several times, and makes delays of them. `second_end`: the port of
-    a ring that is closed meanwhile, since nothing comes back through the ports of a closed ring."""
+    """Latch all receive times several times, and compute the delays.
+
+    Args:
+        devices: All devices, by position.
+        second_end: In a ring, the port to close during the measurement. Frames do not return
+            through the ports of an intact ring. None for a line.
+        latches: The number of latches.
+    """
     if second_end is None:
         return (yield from _measure(devices, latches))
     position, port = second_end
@@ -110,10 +116,19 @@ def align(
     reference: int,
     epoch_ns: int,
 ) -> Procedure[None]:
-    """Offsets and delays behind the reference clock, and filters that begin anew.
+    """Write offsets and delays of all devices from the reference clock on, and reset the filters.
 
-    The reference then says the link's time + `epoch_ns`, and all behind it what the reference says.
-    ClockError where the reference has no system time.
+    The system time of the reference is then the link's time + `epoch_ns`. The devices after it have
+    the system time of the reference.
+
+    Args:
+        devices: All devices, by position.
+        measured: The measurement of their clocks.
+        reference: Position of the reference clock.
+        epoch_ns: System time minus the link's time [ns].
+
+    Raises:
+        ClockError: The reference has no system time.
     """
     origin, nearest = measured.local_times_ns[reference], measured.delays_ns[reference]
     if origin is None or nearest is None:
@@ -133,10 +148,18 @@ def align(
 
 
 def compensate(device: DeviceDescription, count: int = BURST) -> Procedure[None]:
-    """Static drift compensation: the reference's time carried to all, `count` frames in a row.
+    """Run the static drift compensation: distribute the time of the reference in many frames.
 
-    One datagram a frame: a controller compares against the time at which the *frame* began, so a
-    second one in it says nothing new (ESC data sheet I §9.1.5; KickCAT, ethercrab send one each).
+    Each frame has one datagram. A controller compares with the time at which the *frame* began, so
+    that a second datagram has no effect (ESC data sheet I §9.1.5). KickCAT and ethercrab also send
+    one per frame.
+
+    Args:
+        device: The reference clock.
+        count: The number of frames.
+
+    Raises:
+        ClockError: The reference does not answer.
     """
     request = distribute(device)
     while count > 0:
@@ -147,10 +170,18 @@ def compensate(device: DeviceDescription, count: int = BURST) -> Procedure[None]
 
 
 def lead(device: DeviceDescription, count: int, epoch_ns: int) -> Procedure[None]:
-    """The same where the reference follows the MainDevice: each frame tells it our time first.
+    """Run the static drift compensation for a reference that follows the MainDevice.
 
-    What is told is the time of the last answer: on a NIC the reference learns our rate from it, and
-    a phase some 10 us behind, which the cycle makes good.
+    Each frame first writes the MainDevice's time, as of the last answer, to the reference. With a
+    NIC, the reference adopts our rate, and a phase about 10 us late. The cycle corrects the phase.
+
+    Args:
+        device: The reference clock.
+        count: The number of frames.
+        epoch_ns: System time minus the link's time [ns].
+
+    Raises:
+        ClockError: The reference does not answer.
     """
     register = SYSTEM_TIME_LOW
     [reply] = yield [read(EcatCommand.FPRD, device.station_address, register)]
@@ -158,8 +189,8 @@ def lead(device: DeviceDescription, count: int, epoch_ns: int) -> Procedure[None
     silent = 0
     for _ in range(count):
         now = (reply.time_ns + epoch_ns) % SPAN_32
-        told = write(EcatCommand.FPWR, device.station_address, register, now, repeatable=False)
-        answer, reply = yield [told, spread]
+        update = write(EcatCommand.FPWR, device.station_address, register, now, repeatable=False)
+        answer, reply = yield [update, spread]
         silent = 0 if _is_answer(answer) else silent + 1
         if silent > LOST_MAX:
             raise _no_reference(device)
@@ -177,24 +208,32 @@ def _no_reference(device: DeviceDescription) -> ClockError:
 
 
 def distribute(device: DeviceDescription) -> Request:
-    """FRMW of the system time's low half, which is all that a time loop compares."""
+    """Return the FRMW of the low half of the system time. A time loop compares only this half."""
     request = read(EcatCommand.FRMW, device.station_address, SYSTEM_TIME_LOW)
     return request._replace(repeatable=False, alone=True)
 
 
 def alignment(device: DeviceDescription, offset: int, delay: int) -> tuple[Request, Request]:
-    """Writes what its system time is ahead of its local one, and its delay [ns]."""
+    """Return the requests that write the offset and the delay of a clock.
+
+    Args:
+        device: The device.
+        offset: System time minus local time [ns].
+        delay: Delay from the reference clock [ns].
+    """
     station = device.station_address
     if device.clock_bits == 64:
         written = write(EcatCommand.FPWR, station, SYSTEM_TIME_OFFSET, offset % SPAN_64)
-    else:  # ethercrab #322: eight bytes to a 32-bit clock are refused
+    else:  # ethercrab #322: a 32-bit clock rejects eight bytes
         written = write(EcatCommand.FPWR, station, SYSTEM_TIME_OFFSET_LOW, offset % SPAN_32)
     return written, write(EcatCommand.FPWR, station, SYSTEM_TIME_DELAY, delay)
 
 
 def filters(station: int | None = None) -> tuple[Request, ...]:
-    """Lets the time loop of one device, or of all, begin anew. Depths first: several controllers
-    take them over with the write that resets the loop."""
+    """Return the requests that reset the time loop of one device, or of all (None).
+
+    Filter depths come first: some controllers apply them with the write that resets the loop.
+    """
     command = EcatCommand.BWR if station is None else EcatCommand.FPWR
     return (
         write(command, station or 0, SYSTEM_TIME_DIFFERENCE_FILTER, DIFFERENCE_FILTER),
@@ -204,36 +243,36 @@ def filters(station: int | None = None) -> tuple[Request, ...]:
 
 
 def read_system_time(device: DeviceDescription) -> Procedure[int]:
-    """What its clock says now [ns]; of a 32-bit clock, the low half."""
+    """Read the system time of a device [ns]; of a 32-bit clock, the low half."""
     register = SYSTEM_TIME if device.clock_bits == 64 else SYSTEM_TIME_LOW
     [reply] = yield [read(EcatCommand.FPRD, device.station_address, register)]
     return register.unpack(answered(reply, _station(device), "its system time"))
 
 
 def no_system_time(device: DeviceDescription) -> ClockError:
-    """The error for a device that a clock was asked of."""
+    """Return the error for a device without the requested clock."""
     what = "only stamps receive times" if device.controller.supports_clocks else "has none"
     return ClockError(
-        f"{device}: a clock is asked of it, but it {what}",
-        hint="leave it out of dc=, and choose another reference clock",
+        f"{device}: distributed clocks were requested, but the device {what}",
+        hint="remove it from dc=, and choose another reference clock",
     )
 
 
 def _latch(clocks: Sequence[DeviceDescription]) -> Procedure[int]:
-    """One broadcast that stamps all ports; when that was."""
+    """Latch the receive times of all ports by broadcast; return the time [ns, the link's clock]."""
     [before] = yield [read(EcatCommand.FPRD, clocks[0].station_address, RECEIVE_TIME_LATCH)]
     [reply] = yield [write(EcatCommand.BWR, 0, RECEIVE_TIME_LATCH, 0)]
     if reply.lost or reply.working_counter < len(clocks):
         raise ClockError(
-            f"{reply.working_counter} of {len(clocks)} devices with clocks took the broadcast that "
-            "measures delays",
-            hint="devices come and go: look for a loose contact, then scan again",
+            f"{reply.working_counter} of {len(clocks)} devices with clocks received the broadcast "
+            "that measures delays",
+            hint="the number of devices changes: check for a loose contact, then scan again",
         )
     return (before.time_ns + reply.time_ns) // 2
 
 
 def _questions(device: DeviceDescription) -> tuple[Request, Request]:
-    """Port times, and the local time at the processing unit: of a 32-bit clock that is port 0's."""
+    """Return the reads of port times and local time; a 32-bit clock uses the time of port 0."""
     station = device.station_address
     if device.clock_bits == 64:
         unit = read(EcatCommand.FPRD, station, RECEIVE_TIME_PROCESSING_UNIT)
@@ -252,7 +291,7 @@ def _port_times(device: DeviceDescription, reply: Reply) -> PortTimes:
 
 def _local_time(device: DeviceDescription, answers: tuple[Reply, Reply]) -> int:
     ports, unit = answers
-    if unit.working_counter != 1:  # no such register: port 0 says it, without the upper half
+    if unit.working_counter != 1:  # no such register: use port 0, without the upper half
         return _port_times(device, ports)[0]
     return int.from_bytes(unit.data, "little")
 

@@ -1,7 +1,7 @@
-"""Writing SyncManagers, FMMUs and the watchdog, ETG.1000.4 §6.3, §6.6, §6.7.
+"""Configuration of SyncManagers, FMMUs and the watchdog, ETG.1000.4 §6.3, §6.6, §6.7.
 
-The mailbox's SyncManagers are written in INIT, those of the process data in PRE-OP. The watchdog is
-read back, because drives rely on it when the MainDevice is gone.
+The SyncManagers of the mailbox are written in INIT, those of the process data in PRE-OP. The
+watchdog is verified, because drives rely on it if the MainDevice fails.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from catenary.wire.sync_manager import (
 
 
 def configure_mailbox(channel: MailboxChannel) -> Procedure[None]:
-    """SyncManagers 0 and 1, and the counters from the beginning. In INIT."""
+    """Write SyncManagers 0 and 1 and reset the counters, in INIT."""
     layout = channel.layout
     yield from configure_mailbox_areas(
         channel.station,
@@ -42,7 +42,13 @@ def configure_mailbox(channel: MailboxChannel) -> Procedure[None]:
 def configure_mailbox_areas(
     station: Station, receive: MailboxArea, send: MailboxArea
 ) -> Procedure[None]:
-    """SyncManagers 0 and 1: the standard mailbox, or in INIT on the way to BOOT the other one."""
+    """Write SyncManagers 0 and 1, in INIT: the standard mailbox, or before BOOT the bootstrap one.
+
+    Args:
+        station: The device.
+        receive: The memory that the MainDevice writes.
+        send: The memory that the MainDevice reads.
+    """
     out = SyncManager(receive.offset, receive.size, MAILBOX_OUT)
     back = SyncManager(send.offset, send.size, MAILBOX_IN)
     yield from _write_all(
@@ -55,8 +61,19 @@ def configure_mailbox_areas(
 def configure_process_data(
     station: Station, device: DeviceDescription, plan: DevicePlan
 ) -> Procedure[None]:
-    """SyncManagers and FMMUs of the process data and the watchdog. In PRE-OP. What an earlier
-    plan may have left is switched off first: an enabled SyncManager keeps its length."""
+    """Write SyncManagers and FMMUs of the process data, and the watchdog, in PRE-OP.
+
+    SyncManagers of an earlier plan are disabled first, because an enabled one keeps its length.
+
+    Args:
+        station: The device.
+        device: Its description.
+        plan: Its plan.
+
+    Raises:
+        ConfigurationError: The watchdog reads back different from the written values, or a control
+            byte of the SII is invalid.
+    """
     planned = plan.layout.sync_managers
     possible = {each.index for each in device.sync_managers if not _is_mailbox(device, each.index)}
     requests = [
@@ -78,7 +95,7 @@ def configure_process_data(
 
 
 def _watchdog_registers(plan: DevicePlan) -> list[tuple[Register[int], int]]:
-    """Return the registers of the watchdog and their values; none for a device without outputs."""
+    """Return the watchdog registers and their values; empty for a device without outputs."""
     if not plan.layout.output_size:
         return []
     time = (register.WATCHDOG_TIME_PROCESS_DATA, plan.watchdog_count)
@@ -88,7 +105,7 @@ def _watchdog_registers(plan: DevicePlan) -> list[tuple[Register[int], int]]:
 def _verify_watchdog(
     station: Station, plan: DevicePlan, written: list[tuple[Register[int], int]]
 ) -> Procedure[None]:
-    """Read the watchdog's registers and trigger bits back."""
+    """Verify the watchdog registers and the trigger bits."""
     outputs = [m for m in plan.layout.sync_managers if m.direction is Direction.OUTPUT]
     expected = [(reg, value, ~0) for reg, value in written]
     expected += [
@@ -125,9 +142,9 @@ def _planned_manager(station: Station, plan: SyncManagerPlan) -> Request:
         control = Control.from_byte(plan.control)
     except DecodeError as error:
         raise ConfigurationError(
-            f"{station}: its SII gives SyncManager {plan.index} a control byte that cannot be: "
+            f"{station}: its SII specifies an invalid control byte for SyncManager {plan.index}: "
             f"{error}",
-            hint="its SII is wrong; ask the maker for a corrected image",
+            hint="its SII is wrong; ask the vendor for a corrected image",
         ) from error
     return _sync_manager(station, plan.index, SyncManager(plan.start, plan.length, control))
 

@@ -1,6 +1,6 @@
-"""The error counters of all devices, asked for in shared frames: 20 bytes each, 46 devices a frame.
+"""The error counters of all devices, read in shared frames: 20 bytes each, 46 devices per frame.
 
-As in `survey` nobody's silence is an error.
+As in `survey`, a missing reply is not an error.
 """
 
 from __future__ import annotations
@@ -25,9 +25,14 @@ Totals: TypeAlias = tuple[ErrorCounters | None, ...]  # by position; None: no an
 
 
 def read_error_counters(stations: Sequence[Station]) -> Procedure[Totals]:
-    """What every device has counted; None: it said nothing. Where no frame comes back at all,
-    nobody has said anything; ResponseTimeout where only some frames do: the devices asked in the
-    others are not silent."""
+    """Return the counts of every device; None for a device that did not answer.
+
+    If all frames are lost, no device has answered.
+
+    Raises:
+        ResponseTimeout: Only some frames were lost. It is then unknown whether the devices in
+            these frames answered.
+    """
     if not stations:
         return ()
     replies = yield [
@@ -44,7 +49,12 @@ def read_error_counters(stations: Sequence[Station]) -> Procedure[Totals]:
 
 
 def counted_since(now: Totals, before: Totals) -> tuple[Totals, frozenset[int]]:
-    """What was counted between two readings, and whose counters began again in between."""
+    """Return the counts between two readings, and the devices whose counters restarted.
+
+    Args:
+        now: The later reading.
+        before: The earlier reading.
+    """
     pairs = list(zip(now, before, strict=True))
     counted = tuple(new if new is None or old is None else new.since(old) for new, old in pairs)
     restarted = frozenset(
@@ -56,7 +66,7 @@ def counted_since(now: Totals, before: Totals) -> tuple[Totals, frozenset[int]]:
 
 
 def clear_error_counters(stations: Sequence[Station]) -> Procedure[None]:
-    """Clears all counters, whatever is written (ESC data sheet II, §3.33 to §3.38)."""
+    """Clear all counters. A write of any value clears them (ESC data sheet II, §3.33 to §3.38)."""
     yield [request for station in stations for request in _clearing(station.address)]
 
 

@@ -1,10 +1,9 @@
-"""What a conversation says to its runner: datagrams to exchange, or a time to let pass.
+"""The interface between a procedure and its runner: datagrams to exchange, or a time to wait.
 
-A procedure is a generator: it yields a list of `Request`s and is resumed with the list of their
-`Reply`s, in the same order; or it yields `after(seconds)` and is resumed with an empty list when
-the time has passed. It never sleeps, retries or touches a link: its runner does. Its `return`
-value is the result. It knows the time from its replies alone (`Reply.time_ns`, the link's clock),
-which is how deadlines are kept without a clock.
+A procedure is a generator. It yields a list of `Request`s and is resumed with the list of their
+`Reply`s, in the same order. Or it yields `after(seconds)` and is resumed with an empty list after
+that time. It never sleeps, retries or accesses a link; its runner does. Its `return` value is the
+result. Its only clock is the time in its replies (`Reply.time_ns`, the link's clock).
 
     def read_al_status(station):
         [reply] = yield [read(EcatCommand.FPRD, station, AL_STATUS)]
@@ -23,8 +22,8 @@ from catenary.wire.register import Register
 class Request(NamedTuple):
     """One datagram to send.
 
-    `repeatable`: a lost one may be sent again without harm. The runner repeats it; one that is not
-    repeatable comes back as a lost reply, and the procedure recovers by the standard's own means.
+    If it is `repeatable` and gets lost, the runner sends it again. Otherwise the procedure receives
+    a lost reply and recovers as the standard specifies. `alone`: it needs a separate frame.
     """
 
     command: EcatCommand
@@ -37,8 +36,8 @@ class Request(NamedTuple):
 class Reply(NamedTuple):
     data: bytes
     working_counter: int
-    lost: bool = False  # no answer, or a repeatable request without one after all its repeats
-    time_ns: int = 0  # when it was back, or given up; the link's clock
+    lost: bool = False  # no answer, for a repeatable request after all repeats
+    time_ns: int = 0  # when it arrived or timed out; the link's clock
 
 
 class After(NamedTuple):
@@ -52,32 +51,65 @@ Procedure: TypeAlias = Generator[Step, list[Reply], T]
 
 
 def after(seconds: float) -> After:
-    """Let time pass on the link's clock [s]."""
+    """Return the step that waits for a time on the link's clock [s]."""
     return After(seconds)
 
 
 def physical(station: int, address: int) -> int:
-    """The 32-bit address of a physical access: ADP in the low, ADO in the high word."""
+    """Return the 32-bit address of a physical access: ADP in the low, ADO in the high word.
+
+    Args:
+        station: Station address, negative position, or 0 for a broadcast.
+        address: Address in the device's memory.
+    """
     return (station & 0xFFFF) | (address & 0xFFFF) << 16
 
 
 def read(command: EcatCommand, station: int, register: Register[V]) -> Request:
-    """Reads one register; `station` is a station address, a negative position or 0 (broadcast)."""
+    """Return the request to read one register.
+
+    Args:
+        command: The command, such as FPRD.
+        station: Station address, negative position, or 0 for a broadcast.
+        register: The register.
+    """
     return Request(command, physical(station, register.address), bytes(register.size), True)
 
 
 def write(
     command: EcatCommand, station: int, register: Register[V], value: V, *, repeatable: bool = True
 ) -> Request:
-    """Writes one register."""
+    """Return the request to write one register.
+
+    Args:
+        command: The command, such as FPWR.
+        station: Station address, negative position, or 0 for a broadcast.
+        register: The register.
+        value: The value to write.
+        repeatable: True if a lost request may be sent again.
+    """
     return Request(command, physical(station, register.address), register.pack(value), repeatable)
 
 
 def read_memory(station: int, address: int, size: int, *, repeatable: bool) -> Request:
-    """Reads a device's memory by its station address (FPRD)."""
+    """Return the request to read a device's memory by its station address (FPRD).
+
+    Args:
+        station: The station address.
+        address: The first byte.
+        size: The number of bytes.
+        repeatable: True if a lost request may be sent again.
+    """
     return Request(EcatCommand.FPRD, physical(station, address), bytes(size), repeatable)
 
 
 def write_memory(station: int, address: int, data: bytes, *, repeatable: bool) -> Request:
-    """Writes a device's memory by its station address (FPWR)."""
+    """Return the request to write a device's memory by its station address (FPWR).
+
+    Args:
+        station: The station address.
+        address: The first byte.
+        data: The bytes to write.
+        repeatable: True if a lost request may be sent again.
+    """
     return Request(EcatCommand.FPWR, physical(station, address), data, repeatable)

@@ -1,8 +1,8 @@
-"""Devices found in SAFE-OP or OP: left by a master that was killed, or driven by a live one.
+"""Devices found in SAFE-OP or OP: left by a master that was killed, or controlled by an active one.
 
-The process-data watchdog shows which (ETG.1000.4 §6.3; ET1100 datasheet, section II, 0x0420 and
-0x0440): without writes of ours it expires, unless another master goes on refreshing the outputs.
-Devices are addressed by position (APRD): they may not have their station addresses yet.
+The process-data watchdog distinguishes the two cases (ETG.1000.4 §6.3; ET1100 datasheet, section
+II, 0x0420 and 0x0440). It expires, unless another master still refreshes the outputs. Devices are
+addressed by position (APRD), because they may not have station addresses yet.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from catenary.wire.register import (
 from catenary.wire.sync_manager import SIZE, Activation, Direction, decode_sync_manager
 
 RUNNING = (AlState.SAFE_OP, AlState.OP)
-ACTIVE = 0x01  # 0x0440: the watchdog has not expired, or is off
+ACTIVE = 0x01  # 0x0440: the watchdog has not expired or is disabled
 POLL = 0.010  # [s]
-LONGEST_NS = 5_000_000_000  # twice a longer watchdog time is too long to wait
+LONGEST_NS = 5_000_000_000  # longest wait: twice the watchdog time
 
 
 class Running(NamedTuple):
@@ -38,16 +38,16 @@ class Running(NamedTuple):
     position: int
     state: AlState
     error: bool
-    sync_managers: int  # how many it has
+    sync_managers: int  # number of SyncManagers
 
     def __str__(self) -> str:
         return f"device {self.position} in {self.state}{' with an error' * self.error}"
 
 
 def find_running(device_count: int) -> Procedure[list[Running]]:
-    """Return the devices in SAFE-OP or OP. Changes nothing.
+    """Return the devices in SAFE-OP or OP. This changes nothing.
 
-    In a cut ring, two devices at the same distance from both ends answer together; they are left
+    In a cut ring, two devices at the same distance from both ends answer together. They are left
     out.
     """
     replies = yield [
@@ -67,11 +67,10 @@ def find_running(device_count: int) -> Procedure[list[Running]]:
 
 
 def find_refreshed(running: Sequence[Running]) -> Procedure[list[int]]:
-    """Return the positions in OP whose outputs another master refreshes, waiting for at most twice
-    their watchdog times. Changes nothing.
+    """Return the positions in OP whose outputs another master refreshes. This changes nothing.
 
-    Only a device whose watchdog is on and triggered by its outputs shows this. SAFE-OP is left out:
-    a watchdog that was never triggered looks like one that is active.
+    It waits for at most twice the watchdog times. Only devices whose outputs trigger an enabled
+    watchdog are checked. SAFE-OP is left out: a watchdog that was never triggered looks active.
     """
     watched = {}
     for device in running:
@@ -117,7 +116,7 @@ def _watchdog_time(device: Running) -> Procedure[int]:
 
 
 def _triggers(blocks: bytes) -> bool:
-    """Return True if a SyncManager of outputs is on and triggers the watchdog."""
+    """Return True if a SyncManager of outputs is enabled and triggers the watchdog."""
     for start in range(0, len(blocks), SIZE):
         try:
             each = decode_sync_manager(blocks[start : start + SIZE])

@@ -1,17 +1,18 @@
 """The mailbox of one SubDevice, ETG.1000.4 §5.6 and §6.7, ETG.1000.6 §5.1.
 
-One message is outstanding at a time, and whole transfers take turns (`exclusively`). What the
-network loses is recovered by the standard's own means, never by blindly sending the datagram again,
-which jams mailboxes (SOEM#684):
+One message is outstanding at a time, and whole transfers take turns (`exclusively`). Lost messages
+are recovered as the standard specifies. The datagram is never simply sent again, because that
+blocks mailboxes (SOEM#684):
 
 - A lost read: toggle the repeat request of SyncManager 1, wait for the acknowledge, read again.
 - A lost write: it is unknown whether it arrived. An answer within a grace period shows that it did.
   Otherwise write the message again with the same counter: the device recognises the repetition.
 
-The counter of what the device sends only identifies repetitions. Devices may start it anywhere,
-leave it 0 (ethercrab#236) or at another value, or copy ours (KickCAT, CoE/mailbox/response.cc). So
-a message is dropped only if a repetition was requested, and the message equals the last accepted
-one in every byte. SOEM (ecx_mbxreceive) and IgH (fsm_coe.c) compare no counter on reception.
+The counter in messages of the device only identifies repetitions. Devices may start it at any
+value, leave it constant at 0 (ethercrab#236) or another value, or copy the counter of the request
+(KickCAT, CoE/mailbox/response.cc). A message is therefore dropped only if a repetition was
+requested, and the message equals the last accepted one in every byte. SOEM (ecx_mbxreceive) and
+IgH (fsm_coe.c) do not compare the counter on reception.
 """
 
 from __future__ import annotations
@@ -45,22 +46,27 @@ from catenary.wire.sync_manager import Activation, PdiControl, Status
 
 T = TypeVar("T")
 
-OUT, IN = 0, 1  # SyncManagers of the mailbox, by the standard
+OUT, IN = 0, 1  # SyncManagers of the mailbox, defined by the standard
 WRITE_TIMEOUT = 1.0  # [s] until the device has emptied its mailbox
-READ_TIMEOUT = 2.0  # [s] until it answers; AKDs take their time over 0x1010
+READ_TIMEOUT = 2.0  # [s] until it answers; AKDs need long for 0x1010
 REPEAT_TIMEOUT = 0.2  # [s] until it acknowledges a repeat request
-EAGER_MAX = 256  # bytes of a mailbox that is read without a look before
-LOOK = 100e-6  # [s] between the first two looks whether it has answered
-TURN = 0.5e-3  # [s] between two looks whether the mailbox is free
+EAGER_MAX = 256  # largest mailbox [bytes] that is read without a status check before
+LOOK = 100e-6  # [s] between the first two polls for an answer
+TURN = 0.5e-3  # [s] between two checks whether the mailbox is free
 GRACE = 0.1  # [s] for an answer to a message whose frame was lost
-RECOVERIES = 5  # of one message, then the cable is to blame
-STRANGERS = 64  # messages in a row that nobody can use; queues of devices are shorter
+RECOVERIES = 5  # attempts per message; after these the cable is assumed faulty
+STRANGERS = 64  # unexpected messages in a row; device queues are shorter
 
 
 def exclusively(channel: MailboxChannel, conversation: Procedure[T]) -> Procedure[T]:
-    """The conversation, once nobody else talks to this device: whoever runs it, transfers never
-    mix, and take place in the order they were begun. The wait ends, because every conversation
-    does."""
+    """Run a conversation when no other conversation with this device is active.
+
+    Transfers are therefore never interleaved. They run in the order in which they were started.
+
+    Args:
+        channel: The mailbox of the device.
+        conversation: The procedure to run.
+    """
     ticket = object()
     channel.turns.append(ticket)
     try:
@@ -79,8 +85,20 @@ def converse(
     *,
     timeout: float = READ_TIMEOUT,
 ) -> Procedure[T]:
-    """Sends one message and returns what `accept` makes of the answer. `accept` returns None for
-    a message that is none (a late answer to something else)."""
+    """Send one message and return its answer, as converted by `accept`.
+
+    Args:
+        channel: The mailbox of the device.
+        kind: The protocol of the message.
+        data: The data of the message.
+        accept: Converts an answer. It returns None for a message that is not the answer, such as
+            a late answer to another request.
+        timeout: Deadline of the answer [s].
+
+    Raises:
+        ResponseTimeout: No answer within `timeout`, or too many frames were lost.
+        MailboxError: The device violates the protocol, or answers with a mailbox error.
+    """
     if channel.owed:
         channel.posted_ns = None
         yield from _settle(channel)
@@ -90,7 +108,7 @@ def converse(
     for _ in range(RECOVERIES):
         sent, stale = yield from _post(channel, message)
         if sent and not stale:
-            channel.repetitions = 0  # the mailbox was empty: none of them is still to come
+            channel.repetitions = 0  # the mailbox was empty: no repetition is pending
         if sent and channel.thinks_ns:
             yield after(channel.thinks_ns * 1e-9)
         if stale and (older := (yield from _take(channel))) is not None:
@@ -103,14 +121,23 @@ def converse(
             raise _no_answer(channel, kind, timeout, channel.dropped - before)
     raise ResponseTimeout(
         f"{channel.station}: {RECOVERIES} frames with the same mailbox message were lost",
-        hint="look at the cable: the error counters at 0x0300 tell which",
+        hint="check the cables: the error counters at 0x0300 show which one is faulty",
     )
 
 
 def further(
     channel: MailboxChannel, accept: Callable[[Mailbox], T | None], *, timeout: float = READ_TIMEOUT
 ) -> Procedure[T]:
-    """The next part of an answer that comes in several messages."""
+    """Return the next part of an answer that consists of several messages.
+
+    Args:
+        channel: The mailbox of the device.
+        accept: Converts a message; it returns None for an unexpected one.
+        timeout: Deadline of the part [s].
+
+    Raises:
+        ResponseTimeout: No answer within `timeout`.
+    """
     channel.owed = True
     before = channel.dropped
     answer = yield from _await(channel, accept, Deadline(timeout))
@@ -122,18 +149,18 @@ def further(
 def _await(
     channel: MailboxChannel, accept: Callable[[Mailbox], T | None], deadline: Deadline
 ) -> Procedure[T | None]:
-    """What `accept` takes of the messages that come until the deadline."""
+    """Return the first message that `accept` converts; None if none arrives by the deadline."""
     for _ in range(STRANGERS):
         received = yield from _fetch(channel, deadline)
         if received is None:
             return None
-        channel.owed = False  # also where it is an error, or cannot be read
+        channel.owed = False  # also if it is an error or cannot be decoded
         answer = _sorted(channel, received, accept)
         if answer is not None:
             return answer
         channel.owed = True
     raise MailboxError(
-        f"{channel.station} sends one message after the other that nobody asked for",
+        f"{channel.station} sent {STRANGERS} unexpected mailbox messages in a row",
         hint="its firmware is at fault, or two masters talk to it",
     )
 
@@ -141,26 +168,40 @@ def _await(
 def _no_answer(
     channel: MailboxChannel, kind: Type, timeout: float, strangers: int
 ) -> ResponseTimeout:
-    instead = f"; {strangers} messages of another kind instead" if strangers else ""
+    instead = f"; {strangers} other messages arrived" if strangers else ""
     return ResponseTimeout(
         f"{channel.station}: no answer to a {kind.name} message within {timeout:g} s{instead}",
         hint="its firmware is at fault, or two masters talk to it"
         if strangers
-        else "the device's application may hang: read its state; power-cycle it",
+        else "the application of the device may hang: read its state, then power-cycle it",
     )
 
 
 def tell(channel: MailboxChannel, kind: Type, data: bytes) -> Procedure[bool]:
-    """Sends one message that has no answer. False: its frame was lost, it may have arrived."""
+    """Send one message that has no answer.
+
+    Args:
+        channel: The mailbox of the device.
+        kind: The protocol of the message.
+        data: The data of the message.
+
+    Returns:
+        False if the frame was lost; the device may have received the message.
+    """
     channel.counter = next_counter(channel.counter)
     message = Mailbox(kind, data, channel.counter).encode(channel.layout.receive_size)
     return (yield from _post(channel, message))[0]
 
 
 def drain(channel: MailboxChannel, accept: Callable[[Mailbox], T | None]) -> Procedure[list[T]]:
-    """Reads what lies in the mailbox without asking for anything: late answers, emergencies."""
+    """Read all messages in the mailbox without sending a request: late answers, emergencies.
+
+    Args:
+        channel: The mailbox of the device.
+        accept: Converts a message; it returns None for an unexpected one.
+    """
     found: list[T] = []
-    for _ in range(STRANGERS):  # who sends on and on is heard again later
+    for _ in range(STRANGERS):  # limits a device that sends continuously; the rest is read later
         if not (yield from _is_full(channel, IN))[0]:
             break
         received = yield from _take(channel)
@@ -171,16 +212,20 @@ def drain(channel: MailboxChannel, accept: Callable[[Mailbox], T | None]) -> Pro
 
 
 def _post(channel: MailboxChannel, message: bytes) -> Procedure[tuple[bool, bool]]:
-    """Writes the message once the mailbox is empty: (whether its frame came back, whether an older
-    message of the device waited then). SOEM looks for one too before it sends, in a frame of its
-    own (ec_main.c); without that a device that answers twice would be one answer behind for good.
+    """Write the message when the mailbox is empty.
+
+    The read mailbox is checked in the same frame. Without this check, a device that answers twice
+    would stay one answer behind. SOEM checks in a separate frame (ec_main.c).
+
+    Returns:
+        True if the frame came back, and True if an older message of the device was waiting.
     """
     deadline, pace = Deadline(WRITE_TIMEOUT), Pace()
     station, layout = channel.station.address, channel.layout
-    look = read(EcatCommand.FPRD, station, sync_manager_status(IN))._replace(repeatable=False)
+    check = read(EcatCommand.FPRD, station, sync_manager_status(IN))._replace(repeatable=False)
     while True:
         request = write_memory(station, layout.receive_offset, message, repeatable=False)
-        seen, reply = yield [look, request]
+        seen, reply = yield [check, request]
         if reply.lost:
             return False, False
         if reply.working_counter:
@@ -195,14 +240,14 @@ def _post(channel: MailboxChannel, message: bytes) -> Procedure[tuple[bool, bool
 
 
 def _settle(channel: MailboxChannel) -> Procedure[None]:
-    """Gives a late answer its last chance: it is not the next question's."""
+    """Wait for a late answer, so that it is not taken as the answer to the next request."""
     received = yield from _fetch(channel, Deadline(GRACE))
     if received is not None:
         _put_aside(channel, received)
 
 
 def _put_aside(channel: MailboxChannel, message: Mailbox) -> None:
-    """A message that nobody waits for any more; an emergency is heard."""
+    """Drop a late message. An emergency is still reported."""
     emergency = _emergency(message)
     if emergency is not None:
         channel.hear(emergency)
@@ -214,17 +259,17 @@ def _stuck(channel: MailboxChannel, full: bool) -> MailboxError:
     if full:
         return MailboxError(
             f"{channel.station} has not read its mailbox for {WRITE_TIMEOUT:g} s",
-            hint="its application hangs, or waits for its own mailbox to be read: power-cycle it",
+            hint="its application hangs, or waits until its own mailbox is read: power-cycle it",
         )
     return MailboxError(
-        f"{channel.station} does not take mailbox messages at "
+        f"{channel.station} does not accept mailbox messages at "
         f"0x{channel.layout.receive_offset:04X} (working counter 0)",
-        hint="its SyncManager 0 is off: bring it to PRE-OP again",
+        hint="its SyncManager 0 is disabled: bring it to PRE-OP again",
     )
 
 
 def _fetch(channel: MailboxChannel, deadline: Deadline) -> Procedure[Mailbox | None]:
-    """The next message the device sends; None when the deadline has passed."""
+    """Return the next message of the device; None if the deadline has passed."""
     pace = Pace(max(LOOK, channel.thinks_ns * 1e-10))  # a tenth
     empty_ns: int | None = None
     while True:
@@ -235,8 +280,8 @@ def _fetch(channel: MailboxChannel, deadline: Deadline) -> Procedure[Mailbox | N
             return received
         if channel.emptied:
             raise MailboxError(
-                f"{channel.station} was brought up anew before it answered",
-                hint="ask again",
+                f"{channel.station} was started up again before it answered",
+                hint="repeat the request",
             )
         if deadline.passed_at(time_ns):
             return None
@@ -247,20 +292,20 @@ def _fetch(channel: MailboxChannel, deadline: Deadline) -> Procedure[Mailbox | N
 def _look(channel: MailboxChannel) -> Procedure[tuple[bool, Mailbox | None, int]]:
     """Return (True if there was a message, the message unless it was a repetition, time [ns]).
 
-    A small mailbox is read in the same frame that looks: an empty one is not changed by it, and
-    answers with a working counter of 0. This is done only where counters identify repetitions: if
-    the frame is lost, it is unknown whether it took a message. The mailbox is then read as it is.
-    Only if nothing arrives within a grace period is the device asked to repeat its last message,
-    because some stacks cannot repeat.
+    A small mailbox is read in the same frame as its status. This does not change an empty mailbox,
+    which answers with a working counter of 0. It is done only if counters identify repetitions: if
+    the frame is lost, it is unknown whether it emptied the mailbox. The mailbox is then read again.
+    A repetition is requested only if nothing arrives within a grace period, because some stacks
+    cannot repeat a message.
     """
     careful = not channel.counts or channel.layout.send_size > EAGER_MAX
     if careful or channel.unsure_ns is not None:
         return (yield from _look_first(channel))
     station = channel.station
-    look = read(EcatCommand.FPRD, station.address, sync_manager_status(IN))._replace(
+    check = read(EcatCommand.FPRD, station.address, sync_manager_status(IN))._replace(
         repeatable=False
     )
-    status, reply = yield [look, _read_request(channel)]
+    status, reply = yield [check, _read_request(channel)]
     if reply.lost:
         channel.unsure_ns = reply.time_ns
         return False, None, reply.time_ns
@@ -272,7 +317,7 @@ def _look(channel: MailboxChannel) -> Procedure[tuple[bool, Mailbox | None, int]
 
 
 def _look_first(channel: MailboxChannel) -> Procedure[tuple[bool, Mailbox | None, int]]:
-    """The same, where a full mailbox is read in a frame of its own."""
+    """Do the same as `_look`, but read a full mailbox in a separate frame."""
     full, status = yield from _is_full(channel, IN)
     unsure_ns = channel.unsure_ns
     if not full and unsure_ns is not None and status.time_ns - unsure_ns > GRACE * 1e9:
@@ -299,7 +344,7 @@ def _read_request(channel: MailboxChannel) -> Request:
 
 
 def _take(channel: MailboxChannel) -> Procedure[Mailbox | None]:
-    """Read the full mailbox. Return None for a repetition of what was read before, or nothing."""
+    """Read the full mailbox. Return None if it was empty or contained a repetition."""
     for _ in range(RECOVERIES):
         [reply] = yield [_read_request(channel)]
         if not reply.lost:
@@ -309,7 +354,7 @@ def _take(channel: MailboxChannel) -> Procedure[Mailbox | None]:
             return None
     raise ResponseTimeout(
         f"{channel.station}: {RECOVERIES} frames that read its mailbox were lost",
-        hint="look at the cable: the error counters at 0x0300 tell which",
+        hint="check the cables: the error counters at 0x0300 show which one is faulty",
     )
 
 
@@ -318,15 +363,17 @@ def _decoded(channel: MailboxChannel, data: bytes) -> Mailbox | None:
         message = decode_mailbox(data)
     except DecodeError as error:
         raise MailboxError(
-            f"{channel.station}: a mailbox message that is none: {error}",
-            hint="its firmware is at fault; a capture of the bring-up shows the bytes",
+            f"{channel.station}: invalid mailbox message: {error}",
+            hint="its firmware is at fault; a capture of the start-up shows the bytes",
         ) from error
     return message if channel.accept(message) else None
 
 
 def _ask_again(channel: MailboxChannel) -> Procedure[bool]:
-    """Repeat request and acknowledge of SyncManager 1, ETG.1000.4 §6.7.2: the device puts its
-    last message into the buffer once more. Whether there is one now."""
+    """Request a repetition with SyncManager 1, ETG.1000.4 §6.7.2, and wait for the acknowledge.
+
+    The device then writes its last message to the buffer again. Return True if there is one now.
+    """
     channel.repeat_requested = not channel.repeat_requested
     channel.repetitions += 1
     activation = Activation.ENABLE
@@ -350,7 +397,7 @@ def _ask_again(channel: MailboxChannel) -> Procedure[bool]:
         return False
     raise MailboxError(
         f"{station} does not acknowledge the repeat request of its mailbox",
-        hint="its stack lacks the recovery of ETG.1000.4 §6.7.2: bring it to INIT and back",
+        hint="its stack does not support ETG.1000.4 §6.7.2: bring it to INIT and back",
     )
 
 
@@ -370,14 +417,14 @@ def _sorted(
 
 
 def _error_reply(channel: MailboxChannel, message: Mailbox) -> MailboxError:
-    """Return the error for a mailbox error reply, also for a malformed one."""
+    """Return the error for a mailbox error reply, valid or malformed."""
     try:
         reply = decode_error(message.data)
         what = f"0x{reply.code:04X}: {reply.text}"
     except DecodeError as error:
         what = f"without a valid code ({error.message})"
     return MailboxError(
-        f"{channel.station} answers with mailbox error {what}",
+        f"{channel.station} answered with mailbox error {what}",
         hint="the device does not offer this mailbox service",
     )
 
@@ -389,5 +436,5 @@ def _emergency(message: Mailbox) -> coe.Emergency | None:
     try:
         decoded = coe.decode_coe(message.data)
     except DecodeError:
-        return None  # cut short: dropped and counted like anything nobody can use
+        return None  # truncated: dropped and counted like other unexpected messages
     return decoded if isinstance(decoded, coe.Emergency) else None

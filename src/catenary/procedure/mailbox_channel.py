@@ -1,4 +1,4 @@
-"""MailboxChannel: what must be remembered of one SubDevice's mailbox between two messages."""
+"""The state of one SubDevice's mailbox between two messages."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ THINKS_MAX_NS = 20_000_000
 
 
 class Heard(NamedTuple):
-    """An emergency and when it was read [ns, the link's clock]."""
+    """An emergency and the time at which it was read [ns, the link's clock]."""
 
     emergency: coe.Emergency
     time_ns: int
@@ -31,31 +31,33 @@ Listener: TypeAlias = Callable[[Heard], None]
 class MailboxChannel:
     """Owns the state of one SubDevice's mailbox: counters, repeat toggle, emergencies.
 
-    Emergencies come between the answers to anybody's questions: `listener` is told of each, whoever
-    read it; those of before there was one are told by `listen`.
+    Emergencies arrive between the answers to other requests. `listener` is called for each of them,
+    in every conversation. `listen` reports those that arrived before there was a listener.
     """
 
     station: Station
     layout: MailboxLayout
-    counter: int = 0  # of what was written last
-    received: Mailbox | None = None  # message that was accepted last
-    counts: bool = False  # its counter differed from that of the message before, and from 0
-    repetitions: int = 0  # requested from the device, and not read yet
-    received_ns: int = 0  # when that was
+    counter: int = 0  # of the last written message
+    received: Mailbox | None = None  # last accepted message
+    counts: bool = False  # its counter differed from the previous one and from 0
+    repetitions: int = 0  # requested from the device, not yet read
+    received_ns: int = 0  # when the last message was read
     repeat_requested: bool = False  # state of the toggle bit
     emergencies: deque[Heard] = field(default_factory=lambda: deque(maxlen=EMERGENCIES_KEPT))
     listener: Listener | None = None
-    dropped: int = 0  # messages nobody waited for, duplicates
-    turns: deque[object] = field(default_factory=deque)  # conversations: the first one holds it
-    posted_ns: int | None = None  # when it was asked last, until the answer is there
-    thinks_ns: int = 0  # the device, before it answers, at least
-    unsure_ns: int | None = None  # when a frame was lost that may have taken a message
-    owed: bool = False  # a question was given up; its answer may still come
-    undescribed: int = 0  # answers of SDO information in a row that were missing or malformed
-    emptied: bool = False  # configured anew since the question was asked: nobody will answer it
+    dropped: int = 0  # unexpected messages and duplicates
+    turns: deque[object] = field(
+        default_factory=deque
+    )  # waiting conversations; the first one holds the mailbox
+    posted_ns: int | None = None  # time of the last request, until its answer arrives
+    thinks_ns: int = 0  # minimum time until the device answers
+    unsure_ns: int | None = None  # time of a lost frame that may have emptied the mailbox
+    owed: bool = False  # a request timed out; its answer may still arrive
+    undescribed: int = 0  # consecutive missing or malformed SDO information answers
+    emptied: bool = False  # configured again since the request: it has no answer
 
     def reset(self) -> None:
-        """After the SyncManagers were configured anew."""
+        """Reset the state after the SyncManagers were configured again."""
         self.counter = self.repetitions = 0
         self.received = None
         self.counts = self.repeat_requested = self.owed = False
@@ -63,10 +65,10 @@ class MailboxChannel:
         self.emptied = True
 
     def accept(self, message: Mailbox) -> bool:
-        """Return False for a repetition of the last accepted message, else accept this one.
+        """Return False for a repetition of the last accepted message; else accept this one.
 
-        An equal message is a repetition only if one was requested: a device whose counter does not
-        change sends equal answers to equal questions.
+        An equal message is a repetition only if one was requested. A device whose counter does not
+        change sends equal answers to equal requests.
         """
         expected, self.repetitions = self.repetitions > 0, max(self.repetitions - 1, 0)
         if expected and message == self.received:
@@ -77,24 +79,31 @@ class MailboxChannel:
         return True
 
     def learn(self, empty_ns: int | None) -> None:
-        """An answer is there; at `empty_ns` it was not yet (None: nobody had looked). Nobody looks
-        much earlier the next time: a device takes as long again, and looks cost frames."""
+        """Adapt the time until the first poll to the time that an answer took.
+
+        A device usually needs the same time again, and each poll costs a frame.
+
+        Args:
+            empty_ns: Time of the last poll without an answer; None if the first poll had it.
+        """
         if empty_ns is None:
             self.thinks_ns = self.thinks_ns * 9 // 10
         elif self.posted_ns is not None:
-            more = max(2 * self.thinks_ns, THINKS_FIRST_NS)  # one that was slow once is not slow
+            more = max(
+                2 * self.thinks_ns, THINKS_FIRST_NS
+            )  # limits the growth after a single slow answer
             self.thinks_ns = min(empty_ns - self.posted_ns, more, THINKS_MAX_NS)
         self.posted_ns = None
 
     def listen(self, listener: Listener) -> None:
-        """From now on; what was heard before is told at once."""
+        """Set the listener, and report earlier emergencies to the first one."""
         if self.listener is None:
             for heard in tuple(self.emergencies):
                 listener(heard)
         self.listener = listener
 
     def hear(self, emergency: coe.Emergency) -> None:
-        """An emergency was read."""
+        """Store an emergency and report it to the listener."""
         heard = Heard(emergency, self.received_ns)
         self.emergencies.append(heard)
         if self.listener is not None:

@@ -1,8 +1,8 @@
-"""Names of mapped entries and PDOs, and data types, from the object dictionary, where the SII has
-none. Without a data type, an entry would be read as an unsigned integer.
+"""Names of mapped entries and PDOs, and data types, from the object dictionary.
 
-Some SIIs name neither. SOEM's slaveinfo.c asks the dictionary, too (SDO information, ETG.1000.6
-§5.6.3). Names are useful, not necessary: whatever the device answers, nothing fails here.
+They complete the SII, which may contain neither names nor types. An entry without a data type would
+be read as an unsigned integer. SOEM's slaveinfo.c also reads the dictionary (SDO information,
+ETG.1000.6 §5.6.3). Names are optional: no answer of the device causes an error here.
 """
 
 from __future__ import annotations
@@ -30,7 +30,12 @@ TIMEOUT = 5.0  # [s] for all names of one device
 def name_entries(
     channel: MailboxChannel, device: DeviceDescription
 ) -> Procedure[DeviceDescription]:
-    """Return the description with names of all assigned entries and PDOs, as far as known."""
+    """Return the description with names of all assigned entries and PDOs, as far as known.
+
+    Args:
+        channel: The mailbox of the device.
+        device: The description.
+    """
     if device.mailbox is None or not (device.mailbox.coe and device.mailbox.sdo_information):
         return device
     dictionary = _Names(channel)
@@ -43,7 +48,7 @@ def name_entries(
 
 
 class _Names:
-    """Owns the descriptions of one dictionary that were read: none is read twice."""
+    """Owner of the descriptions of one dictionary; each is read once."""
 
     def __init__(self, channel: MailboxChannel) -> None:
         self._channel = channel
@@ -51,7 +56,7 @@ class _Names:
         self._objects: dict[int, ObjectDescription | None] = {}
 
     def name(self, pdo: Pdo) -> Procedure[Pdo]:
-        """Return the PDO with a name, and with names of its entries."""
+        """Return the PDO with its name and the names of its entries."""
         if not pdo.name:
             pdo = replace(pdo, name=(yield from self._object_name(pdo.index)))
         entries = []
@@ -61,7 +66,7 @@ class _Names:
         return replace(pdo, entries=tuple(entries))
 
     def _named(self, entry: Entry) -> Procedure[Entry]:
-        """Return the entry with its name, or that of its object if it has none of its own."""
+        """Return the entry with its name, or with the name of its object if it has none."""
         known = yield from self._object(entry.index)
         if known is not None and known.object_code == ObjectCode.VAR:
             return _completed(entry, printable(known.name), known.data_type)
@@ -85,7 +90,7 @@ class _Names:
             self._objects[index] = yield from read_object_description(self._channel, index)
             self._channel.undescribed = 0
         except SdoAbort:
-            pass  # no such object, or no name: it keeps none
+            pass  # the object does not exist or has no name
         except (MailboxError, ResponseTimeout):
             self._channel.undescribed += 1
         return self._objects[index]
@@ -107,7 +112,7 @@ def _completed(entry: Entry, name: str, data_type: int) -> Entry:
 
 
 def _with_pdo(device: DeviceDescription, direction: Direction, named: Pdo) -> DeviceDescription:
-    """Return the description with one PDO replaced, wherever it occurs."""
+    """Return the description with all occurrences of one PDO replaced."""
 
     def renamed(pdos: Iterable[Pdo]) -> tuple[Pdo, ...]:
         return tuple(named if pdo.index == named.index else pdo for pdo in pdos)

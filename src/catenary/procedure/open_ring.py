@@ -1,5 +1,8 @@
-"""A ring that is a line while something is measured: the port at its second end is closed, register
-0x0100, ETG.1000.4 §6.2, so that frames turn round there and come back through every port."""
+"""Temporary operation of a ring as a line, for measurements, ETG.1000.4 §6.2.
+
+The port at the second end of the ring is closed (register 0x0100). Frames then return there and
+pass every port.
+"""
 
 from __future__ import annotations
 
@@ -14,16 +17,22 @@ from catenary.wire.register import DL_CONTROL, DL_STATUS
 
 T = TypeVar("T")
 
-TEMPORARY = 1 << 1  # the loops return to what they were after about a second: also if we are killed
-LOOPS = 8  # the first bit of port 0's
-LOOKS, PAUSE = 10, 1e-3  # [s] until a port is closed: controllers do so with the end of the frame
+TEMPORARY = 1 << 1  # the settings expire after about a second, even if the program is killed
+LOOPS = 8  # the first bit of port 0
+LOOKS, PAUSE = 10, 1e-3  # [s] until a port is closed: controllers close it at the end of the frame
 
 
 def as_line(station: Station, port: int, procedure: Procedure[T]) -> Procedure[T]:
-    """Run `procedure` with a port closed, and open it again.
+    """Run a procedure with a closed port, and open the port again.
 
-    ClockError: the port cannot be closed, or it opened by itself before the end, so that what was
-    measured counts for nothing.
+    Args:
+        station: The device at the second end of the ring.
+        port: The port to close.
+        procedure: The procedure to run.
+
+    Raises:
+        ClockError: The port cannot be closed, or it opened before the end. The measurement is
+            then invalid.
     """
     [reply] = yield [read(EcatCommand.FPRD, station.address, DL_CONTROL)]
     before = DL_CONTROL.unpack(answered(reply, station, "DL control"))
@@ -41,7 +50,7 @@ def as_line(station: Station, port: int, procedure: Procedure[T]) -> Procedure[T
         raise ClockError(
             f"{station}: port {port}, the second end of the ring, did not stay closed while the "
             "delays were measured",
-            hint="it opens by itself after a second: give the program a processor of its own",
+            hint="it opens automatically after a second: reserve a processor core for the program",
         )
     return result
 
@@ -53,9 +62,9 @@ def _await_closed(station: Station, port: int) -> Procedure[None]:
         yield after(PAUSE)
     raise ClockError(
         f"{station}: port {port}, the second end of the ring, cannot be closed: DL control "
-        "(0x0100) was written, DL status (0x0110) still shows an open loop",
-        hint="its controller lacks loop control, so that delays cannot be measured in this ring: "
-        "let another device be the second end, or use the ring as a line, with one interface",
+        "(0x0100) was written, but DL status (0x0110) still shows an open loop",
+        hint="its controller lacks loop control, so delays cannot be measured in this ring: "
+        "put another device at the second end, or use a line with one interface",
     )
 
 

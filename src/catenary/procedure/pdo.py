@@ -1,5 +1,5 @@
-"""PDO assignment and mapping in the object dictionary, ETG.1000.6 §5.6.7.4: read, written where a
-plan differs, read again to verify."""
+"""PDO assignment and mapping in the object dictionary, ETG.1000.6 §5.6.7.4: reading, writing
+according to a plan, and verification."""
 
 from __future__ import annotations
 
@@ -30,9 +30,13 @@ LEFT_ALONE = NOT_THERE | {0x0601_0000, 0x0601_0002, 0x0609_0030, 0x0800_0020, 0x
 def read_mapping(
     channel: MailboxChannel, device: DeviceDescription
 ) -> Procedure[DeviceDescription]:
-    """Return the description with the mapping that the device has now.
+    """Return the description with the present mapping of the device.
 
-    A direction whose 0x1C1x cannot be read keeps what the SII says; so in IgH (fsm_pdo.c).
+    A direction whose 0x1C1x cannot be read keeps the mapping of the SII, as in IgH (fsm_pdo.c).
+
+    Args:
+        channel: The mailbox of the device.
+        device: The description.
     """
     outputs = yield from _read_direction(channel, device, Direction.OUTPUT)
     inputs = yield from _read_direction(channel, device, Direction.INPUT)
@@ -49,15 +53,20 @@ def read_mapping(
 def write_downloads(
     channel: MailboxChannel, device: DeviceDescription, plan: DevicePlan
 ) -> Procedure[None]:
-    """Write the plan's SDO downloads in their order.
+    """Write the SDO downloads of a plan in order.
 
-    `device` has the mapping of before. It is written back, as far as the device allows, if the new
-    one is refused.
+    If the device refuses the new mapping, the old one is written back as far as possible.
+
+    Args:
+        channel: The mailbox of the device.
+        device: The description with the old mapping.
+        plan: The plan of the device.
 
     Raises:
-        MappingError: The device refused the new mapping. Names the object and the alternatives.
-        SdoAbort: It refused another download.
-        ConfigurationError: A start-up object has another value after it was written.
+        MappingError: The device refused the new mapping. The message names the object and the
+            alternatives.
+        SdoAbort: The device refused another download.
+        ConfigurationError: The value of a start-up object differs after it was written.
     """
     for step in plan.before_mapping:
         yield from _write_object(channel, step)
@@ -72,7 +81,7 @@ def write_downloads(
 
 
 def _write_object(channel: MailboxChannel, step: Download) -> Procedure[None]:
-    """Write one object outside of the mapping, and verify it where the plan says so."""
+    """Write one object outside of the mapping, and verify it if the plan requires it."""
     try:
         yield from download(channel, step.index, step.subindex, step.data)
     except SdoAbort as abort:
@@ -87,7 +96,7 @@ def _write_object(channel: MailboxChannel, step: Download) -> Procedure[None]:
         if abort.code not in WRITE_ONLY:
             raise
         return
-    # Devices pad texts with zeros, or return an integer in a longer one.
+    # Devices may pad texts with zeros, or return an integer in a longer type.
     if found.rstrip(b"\0") != step.data.rstrip(b"\0"):
         raise ConfigurationError(
             f"{channel.station}: start-up object {step.place}: wrote {step.text}, bytes "
@@ -99,8 +108,15 @@ def _write_object(channel: MailboxChannel, step: Download) -> Procedure[None]:
 def restore_mapping(
     channel: MailboxChannel, device: DeviceDescription, plan: DevicePlan
 ) -> Procedure[None]:
-    """Write the mapping of before, as far as the device allows. SOEM and IgH leave the device
-    without one, so that its next scan finds no process data."""
+    """Write the old mapping back, as far as the device allows.
+
+    SOEM and IgH leave the device without a mapping. Its next scan then finds no process data.
+
+    Args:
+        channel: The mailbox of the device.
+        device: The description with the old mapping.
+        plan: The plan of the device.
+    """
     for step in restoring_downloads(device, plan):
         with suppress(SdoAbort):
             yield from download(channel, step.index, step.subindex, step.data)
@@ -120,7 +136,7 @@ def _refused_mapping(
     return MappingError(
         f"{channel.station}: {what}: {refusal}"
         + (f"\n  tried because:{alternatives}" if alternatives else ""),
-        hint="its SII allows the change, the device does not; ask only for objects that it maps, "
+        hint="its SII allows the change, the device does not; request only objects that it maps, "
         "or choose other PDOs with pdos= (`catenary scan` shows the mapping)",
     )
 
@@ -128,10 +144,15 @@ def _refused_mapping(
 def verify_mapping(
     channel: MailboxChannel, device: DeviceDescription, plan: DevicePlan
 ) -> Procedure[None]:
-    """Read the mapping again after it was written, and write the old one back if it differs.
+    """Read the mapping after it was written, and write the old one back if it differs.
+
+    Args:
+        channel: The mailbox of the device.
+        device: The description with the old mapping.
+        plan: The plan of the device.
 
     Raises:
-        MappingError: The device took another mapping than the one written.
+        MappingError: The mapping of the device differs from the written one.
     """
     for direction in Direction:
         found = yield from _read_direction(channel, device, direction)
@@ -141,9 +162,9 @@ def verify_mapping(
         yield from restore_mapping(channel, device, plan)
         taken = place_names(_shape(found), empty="nothing")
         raise MappingError(
-            f"{channel.station}: took a mapping of {direction.noun} that is not the one "
-            f"written: {taken} instead of {place_names(wanted, empty='nothing')}",
-            hint="its firmware corrects mappings; map what it accepts",
+            f"{channel.station}: its mapping of {direction.noun} differs from the written one: "
+            f"{taken} instead of {place_names(wanted, empty='nothing')}",
+            hint="its firmware changes mappings; map only objects that it accepts",
         )
 
 
@@ -154,7 +175,7 @@ def _shape(assignments: tuple[Assignment, ...]) -> tuple[tuple[int, int, int], .
 def _read_direction(
     channel: MailboxChannel, device: DeviceDescription, direction: Direction
 ) -> Procedure[tuple[Assignment, ...] | None]:
-    """Return the assignments; None: the dictionary shows none of this direction."""
+    """Return the assignments; None if the dictionary has none of this direction."""
     known = {pdo.index: pdo for pdo in device.pdos(direction)}
     before = {each.sync_manager: each for each in device.assignments(direction)}
     shown = False
@@ -167,7 +188,7 @@ def _read_direction(
         pdos = []
         for data in indices:
             index = int.from_bytes(data[:2], "little")
-            if index:  # 0: a place kept free
+            if index:  # 0: an unused place
                 pdos.append((yield from _read_pdo(channel, index, known.get(index), manager.index)))
         before[manager.index] = Assignment(manager.index, tuple(pdos))
         shown = True
@@ -181,9 +202,9 @@ def _read_pdo(
     if words is None:
         if known is None:
             raise MappingError(
-                f"{channel.station}: assigns PDO 0x{index:04X}, which neither its dictionary nor "
-                "its SII has",
-                hint="write 0x1C12 and 0x1C13 anew, or restore its defaults (0x1011)",
+                f"{channel.station}: assigns PDO 0x{index:04X}, which is in neither its dictionary "
+                "nor its SII",
+                hint="write 0x1C12 and 0x1C13 again, or restore its defaults (0x1011)",
             )
         return replace(known, sync_manager=sync_manager)
     if known is None:
@@ -192,7 +213,12 @@ def _read_pdo(
 
 
 def read_entries(words: list[bytes], known: tuple[Entry, ...]) -> tuple[Entry, ...]:
-    """Return the entries of a mapping object, with names and types of those that are known."""
+    """Return the entries of a mapping object, with names and types if known.
+
+    Args:
+        words: The values of subindices 1 to n.
+        known: Entries with names and types.
+    """
     names = {(entry.index, entry.subindex): entry for entry in known}
     return tuple(_entry(data, names) for data in words)
 
@@ -207,7 +233,12 @@ def _entry(data: bytes, names: dict[tuple[int, int], Entry]) -> Entry:
 
 
 def read_list(channel: MailboxChannel, index: int) -> Procedure[list[bytes] | None]:
-    """Return subindices 1 to n of a list object; None if the device does not let it be read."""
+    """Return subindices 1 to n of a list object; None if it cannot be read.
+
+    Args:
+        channel: The mailbox of the device.
+        index: The index of the object.
+    """
     try:
         count = (yield from upload_small(channel, index, 0))[:1]
         items = []
@@ -221,7 +252,7 @@ def read_list(channel: MailboxChannel, index: int) -> Procedure[list[bytes] | No
 def _joined(
     offered: tuple[Pdo, ...], assignments: tuple[Assignment, ...] | None
 ) -> tuple[Pdo, ...]:
-    """All PDOs of a device: those of the SII, corrected and completed by what was read."""
+    """Return all PDOs of a device: those of the SII, updated and completed by the assignments."""
     if assignments is None:
         return offered
     read = {pdo.index: pdo for pdo in mapped_pdos(assignments)}

@@ -1,5 +1,7 @@
-"""Reports of a device on its PDOs before a plan: differences from its SII, contents of PDOs that
-are not assigned, and lists and entries that cannot be changed. Nothing is written.
+"""The PDOs that a device offers, read before planning. Nothing is written.
+
+The reports contain differences from the SII, the contents of PDOs that are not assigned, and lists
+and entries that cannot be changed.
 """
 
 from __future__ import annotations
@@ -27,13 +29,19 @@ OFFERS_MAX = 64  # PDOs read in one direction; an EL6731 has 250 of them
 def read_first_mapping(
     channel: MailboxChannel, device: DeviceDescription
 ) -> Procedure[DeviceDescription]:
-    """Return the description with the mapping that the device reports. Notes show where its SII
-    differs, or why the SII's is used."""
+    """Return the description with the mapping that the device reports.
+
+    Notes contain differences from the SII, or the reason why the mapping of the SII is used.
+
+    Args:
+        channel: The mailbox of the device.
+        device: The description from the SII.
+    """
     reading = within(MAPPING_TIMEOUT, channel.station, read_mapping(channel, device))
     try:
         found = yield from reading
     except (MappingError, MailboxError, ResponseTimeout) as error:
-        note = f"its mapping cannot be read, its SII's is used: {error.message}"
+        note = f"its mapping cannot be read, that of its SII is used: {error.message}"
         return replace(device, notes=(*device.notes, note))
     notes = [note for direction in Direction for note in _differences(device, found, direction)]
     return replace(found, notes=(*device.notes, *notes))
@@ -42,10 +50,15 @@ def read_first_mapping(
 def read_offers(
     channel: MailboxChannel, device: DeviceDescription, direction: Direction
 ) -> Procedure[DeviceDescription]:
-    """Return the description with the entries of PDOs that are not assigned, and with `fixed` as
-    the dictionary says. For a direction in which objects are missing.
+    """Return the description with the PDOs that are not assigned, and with `fixed` flags.
 
-    After a reply that is missing or malformed, the entries of the other PDOs are those of the SII.
+    This is for a direction in which requested objects are missing. After a missing or malformed
+    reply, the entries of the remaining PDOs are those of the SII.
+
+    Args:
+        channel: The mailbox of the device.
+        device: The description.
+        direction: Outputs or inputs.
     """
     taken = {pdo.index for pdo in mapped_pdos(device.assignments(direction))}
     known = {pdo.index: pdo for pdo in device.pdos(direction)}
@@ -71,8 +84,15 @@ def read_offers(
 def read_values(
     channel: MailboxChannel, device: DeviceDescription, places: Sequence[tuple[int, int]]
 ) -> Procedure[DeviceDescription]:
-    """Return the description with the values of these objects, for a plan to show. After a reply
-    that is missing or malformed, the others are not read."""
+    """Return the description with the values of some objects, to be shown in a plan.
+
+    After a missing or malformed reply, the remaining objects are not read.
+
+    Args:
+        channel: The mailbox of the device.
+        device: The description.
+        places: Index and subindex of each object.
+    """
     values = []
     for index, subindex in dict.fromkeys(places):
         try:
@@ -89,8 +109,10 @@ def read_values(
 def _is_read_only(
     channel: MailboxChannel, device: DeviceDescription, index: int
 ) -> Procedure[bool]:
-    """Return True if the dictionary says that subindex 0 cannot be written in PRE-OP. An entry
-    without any right to read it is inconclusive: some devices leave the access word empty."""
+    """Return True if subindex 0 cannot be written in PRE-OP according to the dictionary.
+
+    An entry without any read access is inconclusive: some devices leave the access word empty.
+    """
     if device.mailbox is None or not device.mailbox.sdo_information:
         return False
     entry, _ = yield from describe_entry(channel, index, 0)
@@ -111,10 +133,10 @@ def _differences(
         now = pdo_names(each.pdos, empty="none")
         then = pdo_names(before.get(each.sync_manager, ()), empty="none")
         if now != then:
-            yield f"SyncManager {each.sync_manager} carries PDOs {now}, its SII says {then}"
+            yield f"SyncManager {each.sync_manager} carries PDOs {now}, its SII specifies {then}"
         for pdo in each.pdos:
             other = known.get(pdo.index)
             if other is not None and shape(other) != shape(pdo):
                 has = place_names(shape(pdo), empty="no entries")
-                said = place_names(shape(other), empty="no entries")
-                yield f"PDO 0x{pdo.index:04X} has {has}, its SII says {said}"
+                expected = place_names(shape(other), empty="no entries")
+                yield f"PDO 0x{pdo.index:04X} has {has}, its SII specifies {expected}"

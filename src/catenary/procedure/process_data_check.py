@@ -1,5 +1,8 @@
-"""Who does not put process data into the frame, though it answers to everything else: its inputs
-alone, one logical read a device (LRD), ETG.1000.4 §6.6. Outputs are not asked for: that writes."""
+"""Detection of devices that answer but do not insert their process data, ETG.1000.4 §6.6.
+
+Each device is checked with one logical read (LRD) of its inputs. Outputs are not checked, because
+that would write them.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +13,11 @@ from catenary.wire.datagram import EcatCommand
 
 
 def probe_inputs(areas: Mapping[int, tuple[int, int]]) -> Procedure[tuple[int, ...]]:
-    """The positions of the devices whose inputs nobody gave. `areas`: by position, where their
-    inputs lie: (logical address, bytes)."""
+    """Return the positions of the devices that do not insert their inputs.
+
+    Args:
+        areas: By position, the inputs as (logical address, bytes).
+    """
     if not areas:
         return ()
     replies = yield [

@@ -1,7 +1,7 @@
-"""What kind of device it is: object 0x1000, and where its CiA 402 axes are.
+"""Device type (object 0x1000) and slots of CiA 402 axes.
 
-ETG.6010 §"Multi-axis": axis k's objects lie 0x800·k above the first one's. Modular devices
-(profile 5001, ETG.5001) list the profile of every slot in 0xF010.
+ETG.6010 §"Multi-axis": the objects of axis k are 0x800·k above those of the first axis. Modular
+devices (profile 5001, ETG.5001) list the profile of every slot in 0xF010.
 """
 
 from __future__ import annotations
@@ -31,7 +31,12 @@ WRITABLE = Access.WRITE_PRE_OP | Access.WRITE_SAFE_OP | Access.WRITE_OP
 def read_profile(
     channel: MailboxChannel, device: DeviceDescription
 ) -> Procedure[DeviceDescription]:
-    """The description with device type and drive slots."""
+    """Return the description with device type and drive slots.
+
+    Args:
+        channel: The mailbox of the device.
+        device: The description.
+    """
     data = yield from _upload_if_there(channel, DEVICE_TYPE, 0)
     if data is None:
         return device
@@ -48,10 +53,16 @@ def read_profile(
 def read_object(
     channel: MailboxChannel, device: DeviceDescription, index: int, subindex: int
 ) -> Procedure[ObjectInformation]:
-    """Return what the dictionary has of an entry. Bit length 0: it does not exist.
+    """Return the dictionary's description of an entry. Bit length 0 means that it does not exist.
 
-    If the device does not describe it by SDO information, its length is found by reading it, and
-    mapping it is left to the device.
+    If the device does not describe it by SDO information, its length is found by reading it. The
+    device then decides whether it can be mapped.
+
+    Args:
+        channel: The mailbox of the device.
+        device: The description.
+        index: The index of the object.
+        subindex: The subindex of the entry.
     """
     note = ""
     if device.mailbox is not None and device.mailbox.sdo_information:
@@ -96,7 +107,7 @@ def _listed_axes(channel: MailboxChannel) -> Procedure[tuple[int, ...]]:
 
 
 def _upload_if_there(channel: MailboxChannel, index: int, subindex: int) -> Procedure[bytes | None]:
-    """Return None if the device refuses: whatever the reason, the object is of no use."""
+    """Read an object. Return None if the device refuses, for any reason."""
     try:
         return (yield from upload_small(channel, index, subindex))
     except SdoAbort:

@@ -1,8 +1,7 @@
-"""Looking at a segment without changing what it does: for diagnosis beside another program's
-bring-up, or of devices that are where they are for a reason.
+"""Passive scan of a segment for diagnostics, without a change of its operation.
 
-No state is asked for, no mapping, FMMU or SyncManager is touched. A device is written to in one
-case only: it has no station address of its own (none was ever given, or a twin has the same).
+No state is requested, and no mapping, FMMU or SyncManager is written. Only a device without a
+unique station address is written: it has none, or another device has the same.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from catenary.wire.register import STATION_ADDRESS
 
 
 def visit(device_count: int) -> Procedure[tuple[StationRegisters, ...]]:
-    """The registers of all devices, by the station addresses they have already."""
+    """Read the registers of all devices, by their present station addresses."""
     found = yield from read_addresses(device_count)
     addresses = distinct(found)
     yield from give_addresses(found, addresses)
@@ -25,7 +24,7 @@ def visit(device_count: int) -> Procedure[tuple[StationRegisters, ...]]:
 
 
 def read_addresses(device_count: int) -> Procedure[tuple[int, ...]]:
-    """The station addresses of the devices, in the order of the frame."""
+    """Read the station addresses of the devices, in the order of the frame."""
     replies = yield [read(EcatCommand.APRD, -rank, STATION_ADDRESS) for rank in range(device_count)]
     return tuple(
         STATION_ADDRESS.unpack(answered(reply, Station(rank, 0), "station address"))
@@ -34,7 +33,12 @@ def read_addresses(device_count: int) -> Procedure[tuple[int, ...]]:
 
 
 def give_addresses(found: Sequence[int], wanted: Sequence[int]) -> Procedure[None]:
-    """Writes the station addresses that differ; both in the order of the frame."""
+    """Write the station addresses that differ.
+
+    Args:
+        found: The present addresses, in the order of the frame.
+        wanted: The new addresses, in the same order.
+    """
     missing = [rank for rank in range(len(found)) if wanted[rank] != found[rank]]
     if not missing:
         return
@@ -46,7 +50,7 @@ def give_addresses(found: Sequence[int], wanted: Sequence[int]) -> Procedure[Non
 
 
 def distinct(found: Sequence[int]) -> tuple[int, ...]:
-    """The addresses as found; where one is 0 or there already, the next one that is free."""
+    """Return unique addresses: an address that is 0 or a duplicate becomes the next free one."""
     taken = set(found)
     addresses: list[int] = []
     for position, address in enumerate(found):

@@ -1,5 +1,5 @@
-"""When one broadcast passed the ports of all devices: registers 0x0900 to 0x090F, ETG.1000.4
-§6.8.2. Nothing else of the clocks is touched."""
+"""Receive times of one broadcast at the ports of all devices: registers 0x0900 to 0x090F,
+ETG.1000.4 §6.8.2. Other clock registers are not changed."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from catenary.wire.register import RECEIVE_TIME_LATCH, RECEIVE_TIMES
 def read_receive_times(
     devices: Sequence[DeviceDescription],
 ) -> Procedure[tuple[PortTimes | None, ...]]:
-    """Latches and reads; None: no clock, or no answer."""
+    """Latch and read the receive times, by position; None if a device has no clock or no answer."""
     clocks = [device for device in devices if device.controller.supports_clocks]
     if not clocks:
         return (None,) * len(devices)

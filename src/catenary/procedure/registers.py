@@ -1,4 +1,4 @@
-"""Reading and writing any part of a device's memory, for diagnosis."""
+"""Access to any part of a device's memory, for diagnosis."""
 
 from __future__ import annotations
 
@@ -8,25 +8,43 @@ from catenary.procedure.station import Station, answered
 
 
 def read_register(station: Station, address: int, size: int) -> Procedure[bytes]:
-    """`size` bytes from `address`. RegisterError where the device has nothing to read there."""
+    """Read a part of a device's memory.
+
+    Args:
+        station: The device.
+        address: The first byte.
+        size: The number of bytes.
+
+    Raises:
+        RegisterError: The device answers, but cannot be read at this address.
+    """
     [reply] = yield [read_memory(station.address, address, size, repeatable=True)]
     if not reply.lost and reply.working_counter == 0 and (yield from _is_there(station)):
         raise RegisterError(
-            f"{station} does not let {_span(address, size)} be read (working counter 0)",
-            hint="past the end of its memory, or the buffer of a SyncManager that is empty or "
-            "must be read as a whole",
+            f"{station}: {_span(address, size)} cannot be read (working counter 0)",
+            hint="the address is beyond its memory, or in the buffer of a SyncManager that is "
+            "empty or must be read as a whole",
         )
     return answered(reply, station, _span(address, size))
 
 
 def write_register(station: Station, address: int, data: bytes) -> Procedure[None]:
-    """Writes `data` from `address`. RegisterError where the device takes nothing there."""
+    """Write to a part of a device's memory.
+
+    Args:
+        station: The device.
+        address: The first byte.
+        data: The bytes to write.
+
+    Raises:
+        RegisterError: The device answers, but cannot be written at this address.
+    """
     [reply] = yield [write_memory(station.address, address, data, repeatable=False)]
     if not reply.lost and reply.working_counter == 0 and (yield from _is_there(station)):
         raise RegisterError(
-            f"{station} does not let {_span(address, len(data))} be written (working counter 0)",
-            hint="it is read only, locked (AL control, until its application has read the request "
-            "before), past the end of its memory, or the buffer of a SyncManager",
+            f"{station}: {_span(address, len(data))} cannot be written (working counter 0)",
+            hint="the register is read-only or locked (AL control, until the application has read "
+            "the previous request), beyond its memory, or in the buffer of a SyncManager",
         )
     answered(reply, station, _span(address, len(data)))
 

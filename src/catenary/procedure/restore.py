@@ -1,7 +1,7 @@
-"""Bringing one device back into a network that runs: found, made sure of, told its part anew.
+"""Return of one device to a running network: find, identify and configure it again.
 
-A device that was switched off has forgotten all but its EEPROM: station address, SyncManagers,
-FMMUs, and what was mapped. IgH's and TwinCAT's way: back to INIT, then everything again.
+A device that was switched off has lost its station address, SyncManagers, FMMUs and mapping; only
+its EEPROM remains. As in IgH and TwinCAT, it goes to INIT and is completely configured again.
 """
 
 from __future__ import annotations
@@ -32,16 +32,22 @@ from catenary.wire.sii_interface import CONFIGURATION_FORCE
 
 
 class Presence(NamedTuple):
-    """One device as the cable shows it now."""
+    """One device that is present now."""
 
     rank: int  # in the order of the frame
-    station_address: int  # 0: it was switched on and nobody has spoken to it
+    station_address: int  # 0: it was powered up and has no address yet
     alias: int
 
 
 def look_around(at_most: int) -> Procedure[list[Presence]]:
-    """Who is there, by position. Devices that come or go meanwhile are left for the next look;
-    those behind the cut of a ring are counted and have no position."""
+    """Return the present devices, by position.
+
+    If devices appear or disappear meanwhile, the result is empty; try again later. Devices after
+    the cut of a ring are counted but have no position.
+
+    Args:
+        at_most: Largest number of devices to read.
+    """
     [counted] = yield [read(EcatCommand.BRD, 0, AL_STATUS)]
     count = min(counted.working_counter, at_most)
     if counted.lost or count == 0:
@@ -65,18 +71,23 @@ def look_around(at_most: int) -> Procedure[list[Presence]]:
 
 
 def give_address(presence: Presence, station: Station) -> Procedure[None]:
-    """The station address of a place, to the device that stands there."""
+    """Set the station address of a present device.
+
+    Args:
+        presence: The device.
+        station: Its position and station address.
+    """
     [reply] = yield [write(EcatCommand.APWR, -presence.rank, STATION_ADDRESS, station.address)]
     answered(reply, station, "station address")
 
 
 def forget_address(presence: Presence) -> Procedure[None]:
-    """Takes the station address from a device that is not ours: two must not answer to one."""
+    """Clear the station address of an unknown device, so that no two devices have the same."""
     yield [write(EcatCommand.APWR, -presence.rank, STATION_ADDRESS, 0)]
 
 
 def identify(station: Station) -> Procedure[Identity]:
-    """What its EEPROM says it is. Takes the EEPROM from the device's application first."""
+    """Take the EEPROM from the device's application, and read the identity from it."""
     replies = yield [
         write(EcatCommand.FPWR, station.address, SII_CONFIGURATION, CONFIGURATION_FORCE),
         write(EcatCommand.FPWR, station.address, SII_CONFIGURATION, 0),
@@ -87,7 +98,12 @@ def identify(station: Station) -> Procedure[Identity]:
 
 
 def bring_to_pre_op(station: Station, channel: MailboxChannel | None) -> Procedure[None]:
-    """From whatever state to PRE-OP by way of INIT, with nothing left of before."""
+    """Bring a device from any state through INIT to PRE-OP, and clear its configuration.
+
+    Args:
+        station: The device.
+        channel: Its mailbox; None if it has none.
+    """
     yield from request_state(station, AlState.INIT)
     requests = [
         _cleared(station, *FMMU_BLOCK),
@@ -95,7 +111,9 @@ def bring_to_pre_op(station: Station, channel: MailboxChannel | None) -> Procedu
     ]
     for reply in (yield requests):
         answered(reply, station, "FMMUs and SyncManagers")
-    yield [write(EcatCommand.FPWR, station.address, ACTIVATION, 0)]  # has no answer without clocks
+    yield [
+        write(EcatCommand.FPWR, station.address, ACTIVATION, 0)
+    ]  # no answer from a device without clocks
     if channel is not None:
         yield from configure_mailbox(channel)
     yield from hand_over(station)
@@ -109,8 +127,17 @@ def bring_to_safe_op(
     plan: DevicePlan,
     clock: Procedure[None] | None = None,
 ) -> Procedure[None]:
-    """Its start-up list and process data, from PRE-OP. What it has mapped is read first: it may be
-    something else after power-up than before. `clock`: what sets its clock, last of all."""
+    """Write the start-up list and the process data, and bring a device from PRE-OP to SAFE-OP.
+
+    The mapping is read first, because it may have changed with the power-up.
+
+    Args:
+        station: The device.
+        channel: Its mailbox; None if it has none.
+        device: Its description.
+        plan: Its plan.
+        clock: The procedure that sets its clock, run last; None without a clock.
+    """
     if channel is not None and device.coe:
         found = yield from read_mapping(channel, device)
         again = renewed(plan, found)

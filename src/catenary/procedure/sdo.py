@@ -36,10 +36,10 @@ ABORT_TOGGLE = 0x0503_0000
 ABORT_TIMEOUT = 0x0504_0000
 ABORT_LENGTH = 0x0607_0012  # data type does not match, length too high
 ABORT_MEMORY = 0x0504_0005  # out of memory
-UPLOAD_LIMIT = 1 << 20  # bytes: more than any object of a device we know
+UPLOAD_LIMIT = 1 << 20  # bytes: larger than all known objects
 UPLOAD_TIMEOUT = 60.0  # [s] for all segments: 1 MiB in mailboxes of 128 bytes, 7 ms each
-SMALL_LIMIT = 4096  # bytes: most of these objects have up to 4, but a requested one may be a string
-SMALL_TIMEOUT = 5.0  # [s] for one of them
+SMALL_LIMIT = 4096  # bytes: most of these objects have up to 4, but some are strings
+SMALL_TIMEOUT = 5.0  # [s] per object
 NOT_THERE = frozenset((0x0602_0000, 0x0609_0011))  # no such object, no such subindex
 
 
@@ -55,24 +55,33 @@ def upload(
     """Read one object.
 
     Args:
-        complete_access: Read all subindices from `subindex` on.
+        channel: The mailbox of the device.
+        index: The index of the object.
+        subindex: The subindex of the entry.
+        complete_access: True to read all subindices from `subindex` on.
         limit: Largest size [bytes].
-        timeout: Deadline of the whole transfer [s]; each message has its own, too.
+        timeout: Deadline of the whole transfer [s]. Each message also has its own deadline.
 
     Raises:
         SdoAbort: The device refuses.
-        MailboxError: The device announces more than `limit` bytes, sends more than it has
-            announced, or needs longer than `timeout`.
+        MailboxError: The device announces more than `limit` bytes, sends more than announced, or
+            takes longer than `timeout`.
     """
     return exclusively(channel, _upload(channel, index, subindex, complete_access, limit, timeout))
 
 
 def upload_small(channel: MailboxChannel, index: int, subindex: int) -> Procedure[bytes]:
-    """Read one object of a scan or a plan: with a limit and a deadline for small objects.
+    """Read one object for a scan or a plan, with the limit and the deadline of small objects.
+
+    Args:
+        channel: The mailbox of the device.
+        index: The index of the object.
+        subindex: The subindex of the entry.
 
     Raises:
         SdoAbort: The device refuses.
-        MailboxError: More than `SMALL_LIMIT` bytes, or longer than `SMALL_TIMEOUT`.
+        MailboxError: The object has more than `SMALL_LIMIT` bytes, or takes longer than
+            `SMALL_TIMEOUT`.
     """
     return upload(channel, index, subindex, limit=SMALL_LIMIT, timeout=SMALL_TIMEOUT)
 
@@ -99,7 +108,7 @@ def _upload(
         raise MailboxError(
             f"{channel.station}: SDO 0x{index:04X}:{subindex:02X} announces {first.size} bytes, "
             f"the limit is {limit}",
-            hint="if it is, ask with a larger limit; else its firmware is at fault",
+            hint="if the object is that large, increase the limit; else its firmware is at fault",
         )
     data = bytearray(first.data)
     toggle, last = False, False
@@ -113,7 +122,7 @@ def _upload(
         )
         if segment.toggle != toggle:
             raise (yield from _break_off(channel, index, subindex, ABORT_TOGGLE))
-        # More than was announced is refused, less is not: as in IgH (fsm_coe.c). SOEM takes both.
+        # More data than announced is refused, less is not, as in IgH (fsm_coe.c). SOEM allows both.
         if not (segment.data or segment.last) or len(data) + len(segment.data) > first.size:
             raise (yield from _break_off(channel, index, subindex, ABORT_LENGTH))
         data += segment.data
@@ -126,9 +135,9 @@ def _too_slow(
 ) -> MailboxError:
     index, subindex = place
     return MailboxError(
-        f"{channel.station}: SDO 0x{index:04X}:{subindex:02X}: {received} of {size} bytes within "
-        f"{timeout:g} s",
-        hint="if the device is known to be slow, read with a longer timeout",
+        f"{channel.station}: SDO 0x{index:04X}:{subindex:02X}: received {received} of {size} bytes "
+        f"within {timeout:g} s",
+        hint="if the device is slow, read with a longer timeout",
     )
 
 
@@ -140,7 +149,18 @@ def download(
     *,
     complete_access: bool = False,
 ) -> Procedure[None]:
-    """Writes one object. SdoAbort if the device refuses."""
+    """Write one object.
+
+    Args:
+        channel: The mailbox of the device.
+        index: The index of the object.
+        subindex: The subindex of the entry.
+        data: The bytes to write.
+        complete_access: True to write all subindices from `subindex` on.
+
+    Raises:
+        SdoAbort: The device refuses.
+    """
     return exclusively(channel, _download(channel, index, subindex, data, complete_access))
 
 
@@ -180,13 +200,13 @@ def _ask(
     place: tuple[int, int],
     matches: Callable[[T], bool] = lambda _: True,
 ) -> Procedure[T]:
-    """Sends one SDO request and returns its answer; an abort is raised."""
+    """Send one SDO request and return its answer. Raises SdoAbort if the device refuses."""
 
     def accept(mailbox: Mailbox) -> T | Abort | None:
         message = decoded(channel, mailbox)
         if isinstance(message, Abort):
-            # Some devices name no object, or another one; one service runs at a time, so it is
-            # ours. SOEM (ecx_SDOread) and IgH (fsm_coe.c) do not compare it either.
+            # Some devices name no object or another one. Only one service runs at a time, so the
+            # abort belongs to it. SOEM (ecx_SDOread) and IgH (fsm_coe.c) do not compare it either.
             return message
         return message if isinstance(message, expected) and matches(message) else None
 
@@ -198,26 +218,36 @@ def _ask(
 
 
 def decoded(channel: MailboxChannel, mailbox: Mailbox) -> Message | None:
-    """The CoE message in a mailbox; None: it is of another protocol."""
+    """Return the CoE message in a mailbox message; None if it is of another protocol.
+
+    Args:
+        channel: The mailbox of the device, for errors.
+        mailbox: The mailbox message.
+
+    Raises:
+        MailboxError: The message is invalid.
+    """
     if mailbox.type is not Type.COE:
         return None
     try:
         return decode_coe(mailbox.data)
     except DecodeError as error:
         raise MailboxError(
-            f"{channel.station}: a CoE message that is none: {error}",
-            hint="its firmware is at fault; a capture of the bring-up shows the bytes",
+            f"{channel.station}: invalid CoE message: {error}",
+            hint="its firmware is at fault; a capture of the start-up shows the bytes",
         ) from error
 
 
 def _break_off(
     channel: MailboxChannel, index: int, subindex: int, code: int
 ) -> Procedure[MailboxError]:
-    """Tells the device that the transfer ends here; the error for the caller to raise. An abort
-    is not answered, so only a lost frame could keep it from the device."""
+    """Abort a transfer, and return the error for the caller to raise.
+
+    An abort has no answer. The device receives it unless the frame is lost.
+    """
     yield from tell(channel, Type.COE, Abort(index, subindex, code).encode())
     return MailboxError(
-        f"{channel.station}: SDO 0x{index:04X}:{subindex:02X}: a segment against the protocol "
+        f"{channel.station}: SDO 0x{index:04X}:{subindex:02X}: a segment violates the protocol "
         f"({abort_code(code).text})",
         hint="its firmware is at fault, or two masters talk to it",
     )
@@ -229,8 +259,11 @@ def refused(
     """Return the error for an abort code.
 
     Args:
-        code: None if the device gave no complete one; the error has code 0 then.
-        what: What was refused; empty: an SDO to the object.
+        channel: The mailbox of the device.
+        index: The index of the object.
+        subindex: The subindex of the entry.
+        code: The abort code; None if it is missing or incomplete. The error then has code 0.
+        what: What was refused; empty for an SDO to the object.
     """
     known = abort_code(code or 0)
     why = "without an abort code" if code is None else f"with 0x{code:08X}: {known.text}"

@@ -1,6 +1,7 @@
-"""SDO information services, ETG.1000.6 §5.6.3: which objects a device has, and what they are.
+"""SDO information services, ETG.1000.6 §5.6.3: the objects of a device and their descriptions.
 
-An answer may come in fragments, one mailbox message each, without being asked for again.
+An answer may consist of fragments, one mailbox message each. The device sends them without further
+requests.
 """
 
 from __future__ import annotations
@@ -35,15 +36,15 @@ from catenary.wire.sdo_information import (
 T = TypeVar("T")
 
 ABOUT = {Opcode.LIST_RESPONSE: 2, Opcode.OBJECT_RESPONSE: 2, Opcode.ENTRY_RESPONSE: 3}  # bytes
-ANSWER_MAX = 2 + 2 * 0x1_0000  # bytes: the list of all indices there can be
+ANSWER_MAX = 2 + 2 * 0x1_0000  # bytes: a list of all possible indices
 ANSWER_TIMEOUT = 20.0  # [s] for all fragments of one answer
-FAILURES_MAX = 3  # answers in a row that are missing or malformed; then nothing more is asked
-PLACES_SHOWN = 8  # of each reason
+FAILURES_MAX = 3  # missing or malformed answers in a row, then requests end
+PLACES_SHOWN = 8  # per reason
 FAILURES = (SdoAbort, MailboxError, ResponseTimeout)
 
 
 class ObjectIndices(NamedTuple):
-    """The indices of a list, and what is wrong with it; an empty note: nothing."""
+    """The indices of a list, and a note about its faults; empty if there are none."""
 
     indices: tuple[int, ...]
     note: str = ""
@@ -58,7 +59,7 @@ class ObjectDescriptions(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class DescribedObject:
-    """An object and its entries, by subindex; a variable has one. `notes`: what is missing."""
+    """An object and its entries, by subindex; a variable has one. `notes` lists what is missing."""
 
     description: ObjectDescription
     entries: tuple[EntryDescription, ...]
@@ -66,17 +67,25 @@ class DescribedObject:
 
     @property
     def index(self) -> int:
+        """Index of the object."""
         return self.description.index
 
     @property
     def name(self) -> str:
+        """Name of the object."""
         return self.description.name
 
 
 def read_object_list(
     channel: MailboxChannel, kind: ListType = ListType.ALL
 ) -> Procedure[ObjectIndices]:
-    """Read the indices of the objects of a kind; what arrived of a list that was cut short.
+    """Read the indices of the objects of a kind.
+
+    If the list was truncated, the result contains the received part and a note.
+
+    Args:
+        channel: The mailbox of the device.
+        kind: The kind of list.
 
     Raises:
         SdoAbort: The device refuses.
@@ -85,17 +94,25 @@ def read_object_list(
     indices = _understood(channel, decode_object_list, data).indices
     if cut or len(data) % 2:
         reason = cut or f"{len(data)} bytes are not whole indices"
-        return ObjectIndices(indices, f"the list of objects was cut short: {reason}")
+        return ObjectIndices(indices, f"the list of objects is truncated: {reason}")
     if kind is ListType.ALL:
         count = yield from _count_objects(channel)
         if count > len(indices):
-            note = f"the list of objects was cut short: {len(indices)} of {count} are in it"
+            note = f"the list of objects is truncated: it contains {len(indices)} of {count}"
             return ObjectIndices(indices, note)
     return ObjectIndices(indices)
 
 
 def read_object_description(channel: MailboxChannel, index: int) -> Procedure[ObjectDescription]:
-    """Read the description of an object. SdoAbort if the device refuses."""
+    """Read the description of an object.
+
+    Args:
+        channel: The mailbox of the device.
+        index: The index of the object.
+
+    Raises:
+        SdoAbort: The device refuses.
+    """
     data, _ = yield from _ask(channel, object_request(index), Opcode.OBJECT_RESPONSE, (index, 0))
     return _understood(channel, decode_object_description, data)
 
@@ -103,7 +120,17 @@ def read_object_description(channel: MailboxChannel, index: int) -> Procedure[Ob
 def read_entry_description(
     channel: MailboxChannel, index: int, subindex: int, info: ValueInfo = ValueInfo.NONE
 ) -> Procedure[EntryDescription]:
-    """Read the description of an entry. SdoAbort if the device refuses."""
+    """Read the description of an entry.
+
+    Args:
+        channel: The mailbox of the device.
+        index: The index of the object.
+        subindex: The subindex of the entry.
+        info: Optional fields to read.
+
+    Raises:
+        SdoAbort: The device refuses.
+    """
     request = entry_request(index, subindex, info)
     data, _ = yield from _ask(channel, request, Opcode.ENTRY_RESPONSE, (index, subindex))
     return _understood(channel, decode_entry_description, data)
@@ -112,8 +139,13 @@ def read_entry_description(
 def describe_object(channel: MailboxChannel, index: int) -> Procedure[DescribedObject]:
     """Read the descriptions of an object and of its entries.
 
-    Subindices that do not exist are left out, because arrays may have gaps; others that the device
-    does not describe are left out with a note, as in IgH (fsm_coe.c, dict_entry_response).
+    Subindices that do not exist are left out, because arrays may have gaps. Other subindices that
+    the device does not describe are left out with a note, as in IgH (fsm_coe.c,
+    dict_entry_response).
+
+    Args:
+        channel: The mailbox of the device.
+        index: The index of the object.
     """
     description = yield from read_object_description(channel, index)
     single = description.object_code == ObjectCode.VAR
@@ -135,11 +167,18 @@ def describe_object(channel: MailboxChannel, index: int) -> Procedure[DescribedO
 def describe_entry(
     channel: MailboxChannel, index: int, subindex: int
 ) -> Procedure[tuple[EntryDescription | None, str]]:
-    """Read the description of an entry where it is useful, not necessary.
+    """Read the optional description of an entry.
+
+    After `FAILURES_MAX` missing or malformed answers in a row, the device is not asked again.
+
+    Args:
+        channel: The mailbox of the device.
+        index: The index of the object.
+        subindex: The subindex of the entry.
 
     Returns:
-        The description, None if the device does not describe the entry; and a note if its answer
-        was missing or malformed. After some of these the device is not asked again.
+        The description, or None if the device does not describe the entry; and a note if its
+        answer was missing or malformed.
     """
     if channel.undescribed >= FAILURES_MAX:
         return None, ""
@@ -160,8 +199,12 @@ def list_objects(
 ) -> Procedure[ObjectDescriptions]:
     """Read the descriptions of all objects of a kind.
 
-    Those that do not exist although they are listed are left out. Of others that the device does
-    not describe, the index is known; their object code is 0. Both have a note.
+    Objects that are listed but do not exist are left out. Other objects that the device does not
+    describe have object code 0. Both have a note.
+
+    Args:
+        channel: The mailbox of the device.
+        kind: The kind of list.
     """
     indices, note = yield from read_object_list(channel, kind)
     found: list[ObjectDescription] = []
@@ -181,7 +224,7 @@ def list_objects(
 
 
 class _Failures:
-    """Owns the places that the device did not describe, by the reason."""
+    """Owner of the places that the device did not describe, by reason."""
 
     def __init__(self, channel: MailboxChannel, note: str = "") -> None:
         self._first = (note,) if note else ()
@@ -191,23 +234,25 @@ class _Failures:
 
     @property
     def notes(self) -> tuple[str, ...]:
+        """One note per reason."""
         found = (
             f"{_enumerated(places)} cannot be described: {reason}"
             for reason, places in self._places.items()
         )
-        stopped = f"nothing more was asked after {FAILURES_MAX} failures in a row"
+        stopped = f"requests ended after {FAILURES_MAX} failures in a row"
         return (*self._first, *found, *((stopped,) if self.are_too_many else ()))
 
     @property
     def are_too_many(self) -> bool:
-        """True if the device should not be asked again: each further question may take seconds."""
+        """True if the device should not be asked again: each further request may take seconds."""
         return self._in_a_row >= FAILURES_MAX
 
     def forget(self) -> None:
-        """A good answer came."""
+        """Reset the count of failures after a valid answer."""
         self._in_a_row = 0
 
     def add(self, place: str, error: CatenaryError) -> None:
+        """Add a failure at a place. A refusal does not count as a failure in a row."""
         refusal = isinstance(error, SdoAbort)
         reason = error.message.removeprefix(self._prefix)
         reason = "refused " + reason.partition(" refused ")[2] if refusal else reason
@@ -225,17 +270,17 @@ def _is_absent(error: CatenaryError) -> bool:
 
 
 def _count_objects(channel: MailboxChannel) -> Procedure[int]:
-    """Return the number of objects as the device counts them; 0 if it does not say.
+    """Return the number of objects that the device reports; 0 if it does not report it.
 
     KickCAT (lib/src/CoE/mailbox/response.cc, fillList) computes the number of fragments from the
-    mailbox size without its headers, and so leaves out the end of a list, without a mark.
+    mailbox size and ignores the headers. It therefore omits the end of a list without notice.
     """
     request = list_request(ListType.LENGTHS)
     try:
         data, _ = yield from _ask(channel, request, Opcode.LIST_RESPONSE, (0, 0))
         return next(iter(_understood(channel, decode_object_list, data).indices), 0)
     except FAILURES:
-        return 0  # optional: the list itself is there
+        return 0  # optional: the list itself was received
 
 
 def _ask(
@@ -247,7 +292,7 @@ def _ask(
 def _exchange(
     channel: MailboxChannel, request: SdoInformation, expected: Opcode, place: tuple[int, int]
 ) -> Procedure[tuple[bytes, str]]:
-    """Return the joined data of all fragments, and why the last ones are missing (empty: none)."""
+    """Return the joined data of all fragments, and why the last are missing (empty if complete)."""
 
     def accept_part(mailbox: Mailbox) -> SdoInformation | None:
         message = decoded(channel, mailbox)
@@ -256,7 +301,7 @@ def _exchange(
         return message if message.opcode in (expected, Opcode.ERROR) else None
 
     def accept_first(mailbox: Mailbox) -> SdoInformation | None:
-        # Every answer repeats what it is about: list type, index, or index and subindex.
+        # Every answer repeats the list type, the index, or the index and subindex of the request.
         part, about = accept_part(mailbox), request.data[: ABOUT[expected]]
         late = part and part.opcode is expected and not part.data.startswith(about)
         return None if late else part
@@ -271,7 +316,7 @@ def _exchange(
         except FAILURES as error:
             return bytes(data), error.message.removeprefix(f"{channel.station}: ")
         if deadline.passed_at(channel.received_ns):
-            return bytes(data), f"more fragments follow after {ANSWER_TIMEOUT:g} s"
+            return bytes(data), f"fragments still follow after {ANSWER_TIMEOUT:g} s"
         if not content or len(data) + len(content) > ANSWER_MAX:
             return bytes(data), "its fragments have no end"
         data += content
@@ -279,7 +324,7 @@ def _exchange(
 
 
 def _is_continued(part: SdoInformation) -> bool:
-    """Return True if fragments follow. For a list both fields count, as in IgH (fsm_coe.c)."""
+    """Return True if fragments follow. A list uses both fields, as in IgH (fsm_coe.c)."""
     return part.incomplete or (part.opcode is Opcode.LIST_RESPONSE and part.fragments_left > 0)
 
 
@@ -296,6 +341,6 @@ def _understood(channel: MailboxChannel, decode: Callable[[bytes], T], data: byt
         return decode(data)
     except DecodeError as error:
         raise MailboxError(
-            f"{channel.station}: an answer of SDO information that is none: {error}",
+            f"{channel.station}: invalid SDO information answer: {error}",
             hint="its firmware is at fault; a capture shows the bytes",
         ) from error

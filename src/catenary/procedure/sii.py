@@ -1,8 +1,8 @@
-"""Reading the SII, ETG.1000.4 §6.4 (interface) and ETG.1000.6 §5.4 (content).
+"""Read access to the SII, ETG.1000.4 §6.4 (interface) and ETG.1000.6 §5.4 (content).
 
-Frugal: of the header's 64 words only those are read that say something, of the categories those
-that somebody wants, and no word twice. Where an EEPROM has been ready by the next frame, the frame
-that fetches a word also carries the command for the one after it.
+Only the used words of the header and the wanted categories are read, and no word is read twice. If
+an EEPROM was ready by the next frame, the frame that fetches a word also contains the command for
+the next one.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from catenary.wire.sii_interface import ControlStatus, SiiCommand
 
 READ_TIMEOUT = 0.5  # [s] for 4 or 8 bytes; an I²C EEPROM needs less than a millisecond
 SHORTEN = 0.9
-NOT_WORTH_WAITING = 50e-6  # [s]; a frame takes as long
+NOT_WORTH_WAITING = 50e-6  # [s]; as long as a frame
 ERRORS_FORGIVEN = 3  # an EEPROM behind a busy processor may miss an acknowledge (SOEM, IgH retry)
 
 HEADER_WORDS = 0x40
 IDENTITY_WORD, IDENTITY_WORDS = 0x08, 8
 END = 0xFFFF
-ADDRESSES = 0x10000  # words that a 16-bit count can reach
-CATEGORIES_MAX = 64  # of a sane image; an unprogrammed one goes on for ever
-# What the header says, as (first word, words): the rest is for the EEPROM's writer.
+ADDRESSES = 0x10000  # words in the range of a 16-bit address
+CATEGORIES_MAX = 64  # limit for valid images; an unprogrammed one has no end
+# Used parts of the header, as (first word, words); the rest is for programming the EEPROM.
 HEADER_PARTS = ((0x00, 0x10), (0x14, 0x0A), (0x3E, 0x02))
 STRINGS, GENERAL, FMMU, SYNC_MANAGERS, TX_PDO, RX_PDO, CLOCKS = 10, 30, 40, 41, 50, 51, 60
 WANTED = frozenset((STRINGS, GENERAL, FMMU, SYNC_MANAGERS, TX_PDO, RX_PDO, CLOCKS))
@@ -42,9 +42,14 @@ _EIGHT_BYTES = ControlStatus(eight_bytes=True).word
 
 
 def read_image(station: Station, *, wanted: Collection[int] = WANTED) -> Procedure[bytes]:
-    """The image up to END, with zeros where nothing was read and unwanted categories left out.
+    """Read the image up to END.
 
-    A list of categories that never ends, as on an unprogrammed EEPROM, is cut off.
+    Unread words are zero; unwanted categories are left out. A list of categories without an end,
+    as in an unprogrammed EEPROM, is truncated.
+
+    Args:
+        station: The device.
+        wanted: The types of categories to read.
     """
     reader = _Reader(station)
     image = bytearray(2 * HEADER_WORDS)
@@ -63,37 +68,46 @@ def read_image(station: Station, *, wanted: Collection[int] = WANTED) -> Procedu
 
 
 def read_words(station: Station, first: int, count: int) -> Procedure[bytes]:
-    """`count` words from word address `first`, as they are."""
+    """Read words without interpretation.
+
+    Args:
+        station: The device.
+        first: Address of the first word.
+        count: The number of words.
+    """
     return (yield from _Reader(station).words(first, count))
 
 
 def read_identity(station: Station) -> Procedure[Identity]:
-    """Vendor, product, revision and serial number: words 0x08 to 0x0F."""
+    """Read vendor, product, revision and serial number: words 0x08 to 0x0F."""
     data = yield from read_words(station, IDENTITY_WORD, IDENTITY_WORDS)
     return Identity(*struct.unpack("<4I", data))
 
 
 class _Reader:
-    """Owns the bytes read last: a read brings two or four words, also those asked for next; and
-    how long reads take, so that the first look comes when the EEPROM is ready."""
+    """Owner of the last read bytes and of the typical read time.
+
+    A read returns two or four words, so that the next words may already be known. The read time
+    determines when the EEPROM is first polled.
+    """
 
     def __init__(self, station: Station) -> None:
         self._station = station
         self._start = 0  # word address of `_data`
         self._data = b""
         self._typical = 0.0  # [s]
-        self._prompt = False  # the first look found it ready, without a pause
-        self._commanded = (-1, 0)  # the word whose read is under way, and since when [ns]
+        self._prompt = False  # the first poll found it ready, without a pause
+        self._commanded = (-1, 0)  # the word of the pending read, and its start [ns]
 
     def words(self, first: int, count: int) -> Procedure[bytes]:
-        """`count` words from word address `first`."""
+        """Read `count` words from word address `first`."""
         end = self._start + len(self._data) // 2
         data = b""
         if self._start <= first < end:
             data = self._data[2 * (first - self._start) :]
         while len(data) < 2 * count:
             self._start = first + len(data) // 2
-            # The width is that of the last read; without one nothing is asked for ahead.
+            # The width is that of the last read; the first read has no command ahead.
             ahead = self._start + len(self._data) // 2
             wanted = self._start < ahead < first + count
             self._data = yield from self._read(self._start, ahead if wanted else None)
@@ -101,7 +115,7 @@ class _Reader:
         return data[: 2 * count]
 
     def _read(self, word: int, ahead: int | None) -> Procedure[bytes]:
-        """What one read command brings: 4 or 8 bytes. `ahead`: the word that is wanted next."""
+        """Return the 4 or 8 bytes of one read command. `ahead` is the next wanted word."""
         if ahead is not None and self._prompt:
             data = yield from self._read_and_command(word, ahead)
             if data:
@@ -109,9 +123,11 @@ class _Reader:
         return (yield from self._read_alone(word))
 
     def _read_and_command(self, word: int, ahead: int) -> Procedure[bytes]:
-        """Fetches `word` and commands `ahead` in one frame. Nothing where that did not work out:
-        then it is unknown which of the two the EEPROM has read, and `word` must be asked for
-        again."""
+        """Fetch `word` and command the read of `ahead` in one frame.
+
+        Return no bytes if this fails. It is then unknown which of the two words the EEPROM has
+        read, and `word` must be read again.
+        """
         started_ns = yield from self._under_way(word)
         command = _COMMAND.pack(SiiCommand.READ << 8, ahead)
         station = self._station
@@ -131,7 +147,7 @@ class _Reader:
         return fetched.data[_DATA : _DATA + (8 if status & _EIGHT_BYTES else 4)]
 
     def _until_idle(self, word: int) -> Procedure[None]:
-        """Lets a read that nobody wants any more come to its end."""
+        """Wait until an abandoned read has ended."""
         deadline, pace = Deadline(READ_TIMEOUT), Pace()
         while True:
             [reply] = yield [read_memory(self._station.address, _START, 2, repeatable=True)]
@@ -143,7 +159,7 @@ class _Reader:
             yield after(pace.pause())
 
     def _under_way(self, word: int) -> Procedure[int]:
-        """The read of `word` has been commanded, now or ahead; when [ns]."""
+        """Command the read of `word` unless it is pending; return the time of the command [ns]."""
         commanded, since_ns = self._commanded
         self._commanded = (-1, 0)
         if commanded == word:
@@ -175,7 +191,7 @@ class _Reader:
             yield after(pace.pause())
 
     def _learn(self, looks: int, elapsed: float) -> None:
-        """The pause before the next first look: as long as this took, then slowly shorter."""
+        """Adapt the pause before the first poll: the time of this read, then slowly shorter."""
         self._prompt = looks == 1 and not self._typical
         if looks > 1:
             self._typical = elapsed
@@ -184,7 +200,7 @@ class _Reader:
             self._typical = shorter if shorter > NOT_WORTH_WAITING else 0.0
 
     def _command(self, command: SiiCommand, word: int) -> Procedure[int]:
-        """Writes a command with its address; when it was back [ns]."""
+        """Write a command with its address; return the time of its reply [ns]."""
         data = _COMMAND.pack(command << 8, word)
         [reply] = yield [write_memory(self._station.address, _START, data, repeatable=True)]
         answered(reply, self._station, "SII command")
@@ -192,8 +208,8 @@ class _Reader:
 
 
 def _failed(station: Station, word: int, status: int) -> EepromError:
-    why = f"busy for {READ_TIMEOUT:g} s" if status & _BUSY else "an error of the interface"
+    why = f"busy for {READ_TIMEOUT:g} s" if status & _BUSY else "interface error"
     return EepromError(
         f"{station}: SII word 0x{word:04X} cannot be read: {why} (control/status 0x{status:04X})",
-        hint="the EEPROM is missing or its processor holds it: power-cycle the device",
+        hint="the EEPROM is missing, or the processor is using it: power-cycle the device",
     )

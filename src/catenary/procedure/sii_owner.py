@@ -1,5 +1,5 @@
-"""Whose the EEPROM is: the MainDevice's or the device's processor's (PDI), registers 0x0500 and
-0x0501, ETG.1000.4 §6.4.2."""
+"""Owner of the EEPROM: the MainDevice or the device's processor (PDI), registers 0x0500 and 0x0501,
+ETG.1000.4 §6.4.2."""
 
 from __future__ import annotations
 
@@ -20,15 +20,24 @@ T = TypeVar("T")
 
 
 def hand_over(station: Station) -> Procedure[None]:
-    """Gives the EEPROM to the device's processor: some need it on their way from INIT to PRE-OP.
-    SOEM (`ecx_config_init`) and IgH (`ec_fsm_slave_config_enter_assign_pdi`) do so right before."""
+    """Assign the EEPROM to the device's processor. Some devices need it from INIT to PRE-OP.
+
+    SOEM (`ecx_config_init`) and IgH (`ec_fsm_slave_config_enter_assign_pdi`) do the same just
+    before PRE-OP.
+    """
     yield from _configure(station, CONFIGURATION_TO_PDI)
 
 
 def with_eeprom(station: Station, procedure: Procedure[T], *, force: bool = False) -> Procedure[T]:
-    """Runs `procedure` with the EEPROM in our hands; afterwards it is whose it was.
+    """Run a procedure with the EEPROM assigned to the MainDevice, then restore the owner.
 
-    EepromError where the device's processor is at it just now; `force` takes it all the same.
+    Args:
+        station: The device.
+        procedure: The procedure to run.
+        force: True to take the EEPROM even during an access of the device's processor.
+
+    Raises:
+        EepromError: The device's processor is accessing the EEPROM, and `force` is False.
     """
     was_theirs = yield from _take(station, force)
     try:
@@ -43,7 +52,7 @@ def with_eeprom(station: Station, procedure: Procedure[T], *, force: bool = Fals
 
 
 def _take(station: Station, force: bool) -> Procedure[bool]:
-    """Whether it was the processor's before."""
+    """Take the EEPROM. Return True if the processor owned it before."""
     owner, access = yield [
         read(EcatCommand.FPRD, station.address, SII_CONFIGURATION),
         read(EcatCommand.FPRD, station.address, SII_PDI_ACCESS),

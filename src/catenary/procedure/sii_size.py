@@ -1,4 +1,4 @@
-"""How large an EEPROM is: what its image says, where that can be believed."""
+"""The size of an EEPROM, according to its image."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from catenary.wire.sii import MAXIMUM_SIZE, decode_header
 from catenary.wire.sii_check import BYTES_PER_KBIT
 from catenary.wire.sii_interface import ControlStatus
 
-SMALL = 2048  # bytes: what one address byte reaches, 16 kbit
-PROBE_WORDS = 16  # with vendor, product, revision and serial number
+SMALL = 2048  # bytes: limit of one address byte, 16 kbit
+PROBE_WORDS = 16  # includes vendor, product, revision and serial number
 CAUTIOUS = 4096  # bytes: the smallest EEPROM with two address bytes
 
 
 class Extent(NamedTuple):
-    """The size of an EEPROM, and what there is to say about it."""
+    """The size of an EEPROM, and a note about its faults."""
 
     size: int  # bytes
     limit: int  # bytes that its controller can address
@@ -29,8 +29,11 @@ class Extent(NamedTuple):
 
 
 def read_extent(station: Station) -> Procedure[Extent]:
-    """The size by the header; where that is damaged, up to the end mark; where there is none, a
-    small bound. An image that goes on for ever, as an unprogrammed one, ends here."""
+    """Return the size of an EEPROM.
+
+    The size is in the header. If the header is damaged, the image ends at the end mark. Without an
+    end mark, as in an unprogrammed EEPROM, a small limit is returned.
+    """
     [reply] = yield [read(EcatCommand.FPRD, station.address, SII_CONTROL_STATUS)]
     word = SII_CONTROL_STATUS.unpack(answered(reply, station, "SII status"))
     limit = MAXIMUM_SIZE if ControlStatus.from_word(word).two_byte_address else SMALL
@@ -41,26 +44,28 @@ def read_extent(station: Station) -> Procedure[Extent]:
         end = yield from _end_of_categories(station, limit)
         if end is None:
             bound = min(limit, CAUTIOUS)
-            return Extent(bound, limit, f"{error.message}; no end mark: {bound} bytes are shown")
+            return Extent(bound, limit, f"{error.message}; no end mark: {bound} bytes are used")
         return Extent(end, limit, f"{error.message}; {end} bytes up to the end mark")
     if size > limit and not (yield from _wraps(station, data)):
         limit = MAXIMUM_SIZE
     if size <= limit:
         return Extent(size, limit)
     return Extent(
-        limit, limit, f"its header says {size} bytes, its controller addresses {limit} of them"
+        limit, limit, f"its header specifies {size} bytes, its controller can address {limit}"
     )
 
 
 def _wraps(station: Station, header: bytes) -> Procedure[bool]:
-    """Whether the EEPROM begins anew where one address byte ends. Emulated ones do not say that
-    they take two, and do (KickCAT's, and processors that play the EEPROM)."""
+    """Return True if the content repeats after the range of one address byte.
+
+    Emulated EEPROMs (KickCAT, other processors) accept two address bytes without reporting it.
+    """
     beyond = yield from read_words(station, SMALL // 2, PROBE_WORDS)
     return beyond == header[: 2 * PROBE_WORDS]
 
 
 def _end_of_categories(station: Station, limit: int) -> Procedure[int | None]:
-    """Bytes up to and with the end mark; None: there is none within reason."""
+    """Return the bytes up to and including the end mark; None if none is found within `limit`."""
     word = HEADER_WORDS
     for _ in range(CATEGORIES_MAX):
         kind, length = struct.unpack("<HH", (yield from read_words(station, word, 2)))

@@ -1,4 +1,4 @@
-"""Writing the SII, word by word, ETG.1000.4 §6.4.5: each word is read back before the next."""
+"""Word-by-word write access to the SII, ETG.1000.4 §6.4.5. Each word is verified."""
 
 from __future__ import annotations
 
@@ -16,27 +16,40 @@ from catenary.wire.sii import CONFIGURATION_WORDS
 from catenary.wire.sii_interface import ControlStatus, SiiCommand
 
 WRITE_TIMEOUT = 0.5  # [s] for a word; EEPROMs need 3 to 10 ms
-ATTEMPTS = 4  # of a word: an EEPROM behind a busy processor misses an acknowledge now and then
-REST = 5e-3  # [s] the longest write cycle of an I²C EEPROM; some devices show no busy in it (IgH)
+ATTEMPTS = 4  # per word: an EEPROM behind a busy processor may miss an acknowledge
+REST = 5e-3  # [s] longest write cycle of an I²C EEPROM; some devices do not report it as busy (IgH)
 
-_COMMAND = struct.Struct("<HIH")  # control, address and data in one datagram: the enable bit
-# holds for the frame it comes in alone (ESC data sheet, register 0x0502)
+# Control, address and data in one datagram: the enable bit is valid only for the frame that sets it
+# (ESC data sheet, register 0x0502)
+_COMMAND = struct.Struct("<HIH")
 _WRITE = ControlStatus(command=SiiCommand.WRITE, write_enable=True).word
 _ADDRESSES = 0x10000
 
 
 class Change(NamedTuple):
-    """One word to be written."""
+    """One word to write."""
 
     word: int  # address
     value: int
 
 
 def changes(old: bytes, new: bytes) -> tuple[Change, ...]:
-    """The words in which two images differ, the checksum's last: while a write is under way, or
-    where it broke off, the controller can tell that its configuration is not whole."""
+    """Return the words in which two images differ, the configuration with its checksum last.
+
+    During a write, or if it was interrupted, the checksum is wrong. The controller then detects
+    that its configuration is incomplete.
+
+    Args:
+        old: The present image.
+        new: The new image, of the same length.
+
+    Raises:
+        ValueError: The lengths differ or are odd.
+    """
     if len(old) != len(new) or len(new) % 2:
-        raise ValueError(f"images of {len(old)} and {len(new)} bytes cannot be compared by words")
+        raise ValueError(
+            f"images of {len(old)} and {len(new)} bytes: lengths must be equal and even"
+        )
     differing = [
         Change(word, int.from_bytes(new[2 * word : 2 * word + 2], "little"))
         for word in range(len(new) // 2)
@@ -46,20 +59,37 @@ def changes(old: bytes, new: bytes) -> tuple[Change, ...]:
 
 
 def write_words(station: Station, wanted: Sequence[Change]) -> Procedure[None]:
-    """Writes words in their order. EepromError names the first that could not be."""
+    """Write words in order.
+
+    Args:
+        station: The device.
+        wanted: The words to write.
+
+    Raises:
+        EepromError: A word could not be written. The message names the first one.
+    """
     for each in wanted:
         yield from write_word(station, each)
 
 
 def write_word(station: Station, wanted: Change) -> Procedure[None]:
-    """Writes one word and reads it back."""
+    """Write one word and verify it.
+
+    Args:
+        station: The device.
+        wanted: The word to write.
+
+    Raises:
+        EepromError: The word could not be written.
+        ValueError: The address or the value has more than 16 bits.
+    """
     if not 0 <= wanted.word < _ADDRESSES or not 0 <= wanted.value <= 0xFFFF:
-        raise ValueError(f"SII: {wanted} is no word")
+        raise ValueError(f"SII: address and value must be 0 to 65535, got {wanted}")
     data = _COMMAND.pack(_WRITE, wanted.word, wanted.value)
     found, status = b"", ControlStatus()
     for _ in range(ATTEMPTS):
         yield from _until_idle(station, wanted.word)
-        # Not repeated blindly: a controller that is busy with the first would refuse the second.
+        # Not repeatable: a controller that is busy with the first command rejects the second.
         yield [write_memory(station.address, SII_CONTROL_STATUS.address, data, repeatable=False)]
         status = yield from _until_idle(station, wanted.word)
         yield after(REST)
@@ -80,7 +110,7 @@ def _until_idle(station: Station, word: int) -> Procedure[ControlStatus]:
             return status
         if deadline.passed(reply):
             raise EepromError(
-                f"{station}: its EEPROM is busy with word 0x{word:04X} for {WRITE_TIMEOUT:g} s",
+                f"{station}: its EEPROM was busy with word 0x{word:04X} for {WRITE_TIMEOUT:g} s",
                 hint="power-cycle the device, then read its EEPROM",
             )
         yield after(pace.pause())
@@ -89,10 +119,10 @@ def _until_idle(station: Station, word: int) -> Procedure[ControlStatus]:
 def _refused(station: Station, wanted: Change, found: bytes, status: ControlStatus) -> EepromError:
     if status.failed:
         why = f"the EEPROM does not acknowledge (control/status 0x{status.word:04X})"
-        hint = "it is write protected, or smaller than its header says"
+        hint = "it is write-protected, or smaller than its header specifies"
     else:
-        why = f"reads back as 0x{int.from_bytes(found, 'little'):04X}"
-        hint = "it is write protected (a pin, or the device's processor emulates it), or worn out"
+        why = f"the value read back is 0x{int.from_bytes(found, 'little'):04X}"
+        hint = "it is write-protected (by a pin, or by a processor that emulates it), or worn out"
     return EepromError(
         f"{station}: SII word 0x{wanted.word:04X} cannot be written to 0x{wanted.value:04X}: {why}",
         hint=hint,

@@ -1,5 +1,8 @@
-"""One device from any state to any other, by the states between, ETG.1000.6 §6.4.1: upwards none
-may be skipped, and each needs something written before it is asked for. Downwards all may."""
+"""State changes of one device through intermediate states, ETG.1000.6 §6.4.1.
+
+On the way up, no state may be skipped, and each needs some configuration before it is requested. On
+the way down, all intermediate states may be skipped.
+"""
 
 from __future__ import annotations
 
@@ -27,17 +30,28 @@ UPWARDS = (AlState.INIT, AlState.PRE_OP, AlState.SAFE_OP, AlState.OP)
 
 
 def path(now: AlState | None, target: AlState) -> tuple[AlState, ...]:
-    """The states to ask for in turn; `target` by itself where it is there already."""
+    """Return the states to request in order; only `target` if it is already reached.
+
+    Args:
+        now: The present state; None if it is invalid.
+        target: The final state.
+    """
     if now is target:
         return (target,)
-    if now is None or AlState.BOOT in (now, target):  # no state at all; BOOT has one neighbour
+    # The only neighbour of BOOT is INIT.
+    if now is None or AlState.BOOT in (now, target):
         start = () if now is AlState.INIT or target is AlState.INIT else (AlState.INIT,)
         return (*start, *(upwards(target) or (target,)))
     return upwards(target, above=now) or (target,)
 
 
 def upwards(target: AlState, above: AlState = AlState.INIT) -> tuple[AlState, ...]:
-    """The states above one, up to another; none where that is below."""
+    """Return the states above one state, up to another; empty if the other is below.
+
+    Args:
+        target: The last state.
+        above: The state before the first one.
+    """
     if target is AlState.BOOT:
         return (AlState.BOOT,)
     return UPWARDS[UPWARDS.index(above) + 1 : UPWARDS.index(target) + 1]
@@ -46,7 +60,16 @@ def upwards(target: AlState, above: AlState = AlState.INIT) -> tuple[AlState, ..
 def climb(
     station: Station, device: DeviceDescription, target: AlState
 ) -> Procedure[MailboxChannel | None]:
-    """Brings a device to INIT, PRE-OP or BOOT. Its mailbox, where it was opened on the way."""
+    """Bring a device to INIT, PRE-OP or BOOT.
+
+    Args:
+        station: The device.
+        device: Its description.
+        target: The final state.
+
+    Returns:
+        Its mailbox if it was opened on the way, else None.
+    """
     channel = None
     before = (yield from read_state(station)).state
     for state in path(before, target):
@@ -61,8 +84,14 @@ def climb(
 
 
 def restart(station: Station, device: DeviceDescription) -> Procedure[DeviceDescription]:
-    """From INIT to PRE-OP, with the mapping it has there. By INIT also where it is in PRE-OP: only
-    then its mailbox is known to begin with the same counters as ours."""
+    """Bring a device through INIT to PRE-OP, and return the description with its mapping.
+
+    INIT is necessary even if the device is in PRE-OP. Only then its mailbox counters restart.
+
+    Args:
+        station: The device.
+        device: Its description.
+    """
     yield from request_state(station, AlState.INIT)
     channel = yield from climb(station, device, AlState.PRE_OP)
     if channel is None or not device.coe:
@@ -73,7 +102,15 @@ def restart(station: Station, device: DeviceDescription) -> Procedure[DeviceDesc
 def bring_to_safe_op(
     station: Station, device: DeviceDescription, plan: DevicePlan
 ) -> Procedure[DeviceState]:
-    """From PRE-OP to SAFE-OP with the mapping it has."""
+    """Configure the process data and bring a device from PRE-OP to SAFE-OP.
+
+    The mapping is not changed.
+
+    Args:
+        station: The device.
+        device: Its description.
+        plan: Its plan.
+    """
     yield from configure_process_data(station, device, plan)
     return (yield from request_state(station, AlState.SAFE_OP))
 
@@ -87,13 +124,13 @@ def _open_mailbox(station: Station, device: DeviceDescription) -> Procedure[Mail
 
 
 def _open_bootstrap(station: Station) -> Procedure[None]:
-    """SyncManagers 0 and 1 as the EEPROM has them for BOOT."""
+    """Configure SyncManagers 0 and 1 with the bootstrap mailbox of the EEPROM."""
     data = yield from with_eeprom(station, read_words(station, BOOTSTRAP_WORD, 4))
     numbers = struct.unpack("<4H", data)
     receive, send = MailboxArea(*numbers[:2]), MailboxArea(*numbers[2:])
     if not (receive.size and send.size):
         raise EepromError(
-            f"{station} has no bootstrap mailbox in its EEPROM: it has no state BOOT",
-            hint="devices that take firmware over EtherCAT have one",
+            f"{station} has no bootstrap mailbox in its EEPROM: it does not support BOOT",
+            hint="only devices with firmware update over EtherCAT have one",
         )
     yield from configure_mailbox_areas(station, receive, send)

@@ -11,7 +11,7 @@ T = TypeVar("T")
 
 
 class Station(NamedTuple):
-    """One device as errors name it. `address`: its configured station address."""
+    """The name of one device in errors. `address` is its configured station address."""
 
     position: int
     address: int
@@ -22,11 +22,21 @@ class Station(NamedTuple):
 
 
 def answered(reply: Reply, station: Station, what: str) -> bytes:
-    """The data of a reply that this one device, and no other, must have given."""
+    """Return the data of a reply that exactly this device must have given.
+
+    Args:
+        reply: The reply.
+        station: The device.
+        what: The requested data, for errors.
+
+    Raises:
+        ResponseTimeout: The frame was lost, or the device did not answer.
+        SegmentError: Several devices answered.
+    """
     if reply.lost:
         raise ResponseTimeout(
             f"{station}: {what}: the frame did not come back",
-            hint="check cable and power of the first device; look for other traffic on this port",
+            hint="check cable and power of the first device; check for other traffic on this port",
         )
     if reply.working_counter == 0:
         raise ResponseTimeout(
@@ -38,16 +48,16 @@ def answered(reply: Reply, station: Station, what: str) -> bytes:
         raise SegmentError(
             f"{station}: {what}: {reply.working_counter} devices answer to station "
             f"0x{station.address:04X}",
-            hint="a device joined with an old station address: scan again",
+            hint="a device was added with an old station address: scan again",
         )
     return reply.data
 
 
 class Deadline:
-    """Counts one span of time on the stamps of replies [s]; it starts with the first one seen.
+    """A deadline [s] measured by the time stamps of replies. It starts with the first reply.
 
-    From one reply to the next at most a quarter of the span counts: a program that was halted
-    looks some times more before it calls a device silent.
+    The time between two replies counts for at most a quarter of the deadline. A program that was
+    halted therefore polls a few more times before it treats a device as silent.
     """
 
     def __init__(self, seconds: float) -> None:
@@ -56,9 +66,11 @@ class Deadline:
         self._seen_ns: int | None = None
 
     def passed(self, reply: Reply) -> bool:
+        """Return True if the deadline has passed at the time of a reply."""
         return self.passed_at(reply.time_ns)
 
     def passed_at(self, time_ns: int) -> bool:
+        """Return True if the deadline has passed at a time [ns, the link's clock]."""
         if self._seen_ns is not None:
             self._left_ns -= min(time_ns - self._seen_ns, self.seconds * 1e9 / 4)
         self._seen_ns = time_ns
@@ -68,7 +80,13 @@ class Deadline:
 def within(
     seconds: float, station: Station, procedure: Procedure[T], what: str = "its description was"
 ) -> Procedure[T]:
-    """Run a procedure with an overall deadline. `what`: what it reads or writes, for the error.
+    """Run a procedure with an overall deadline.
+
+    Args:
+        seconds: The deadline.
+        station: The device, for the error.
+        procedure: The procedure to run.
+        what: What it reads or writes, for the error, with a verb: "its description was".
 
     Raises:
         ResponseTimeout: The procedure has not ended after `seconds`.
@@ -88,18 +106,19 @@ def within(
         procedure.close()
     raise ResponseTimeout(
         f"{station}: {what} not complete within {seconds:g} s",
-        hint="it answers, but too slowly: update its firmware, or take it off the segment",
+        hint="it answers too slowly: update its firmware, or remove it from the segment",
     )
 
 
 class Pace:
-    """The growing pause between two polls [s]: quick at first, then easy on the cable."""
+    """The pause between two polls [s]. It doubles after each poll, up to a maximum."""
 
     def __init__(self, first: float = 100e-6, longest: float = 5e-3) -> None:
         self._next = first
         self._longest = longest
 
     def pause(self) -> float:
+        """Return the next pause [s]."""
         pause = self._next
         self._next = min(2 * pause, self._longest)
         return pause

@@ -1,4 +1,4 @@
-"""Counting devices and giving them addresses, ETG.1000.4 §6.1.2 and ETG.1020 §"Start-up"."""
+"""Device count, reset and station addresses, ETG.1000.4 §6.1.2 and ETG.1020 §"Start-up"."""
 
 from __future__ import annotations
 
@@ -25,50 +25,55 @@ from catenary.wire.register import (
 )
 from catenary.wire.sii_interface import CONFIGURATION_FORCE
 
-RESET_TIMEOUT = 2.0  # [s]; who is not in INIT then is asked by name
-STATION_BASE = 0x1001  # of position 0; 0 would answer nothing, small numbers are likely aliases
+RESET_TIMEOUT = 2.0  # [s]; a device that is not in INIT then is requested separately
+STATION_BASE = 0x1001  # of position 0; 0 is not an address, small numbers are likely aliases
 FMMU_BLOCK = (0x0600, 256)  # all 16 FMMUs
 SYNC_MANAGER_BLOCK = (0x0800, 128)  # all 16 SyncManagers
 
 
 @dataclass(frozen=True, slots=True)
 class StationRegisters:
-    """What the registers of one device say before anything is asked of its EEPROM."""
+    """Registers of one device that are read before its EEPROM."""
 
     position: int
     station_address: int
     alias: int
     dl_status: int
     information: bytes  # 0x0000 to 0x0009
-    system_time: bool = False  # answers to 0x0910: some clocks only stamp receive times
+    system_time: bool = False  # it has register 0x0910; some clocks only stamp receive times
 
 
 class Counted(NamedTuple):
-    """Answer of all devices to one broadcast."""
+    """Combined answer of all devices to one broadcast."""
 
     devices: int
     states: int  # the OR of all AL status words
 
 
 def count() -> Procedure[Counted]:
-    """Count the devices that process a broadcast. NoDeviceError if none does."""
+    """Count the devices that process a broadcast. Raises NoDeviceError if there is none."""
     [reply] = yield [read(EcatCommand.BRD, 0, AL_STATUS)]
     if reply.lost:
         raise NoDeviceError(
-            "no device: no frame comes back",
-            hint="check the cable and the power of the first device; is this the right port?",
+            "no device: no frame came back",
+            hint="check the network port, and the cable and the power of the first device",
         )
     if reply.working_counter == 0:
         raise NoDeviceError(
-            "no device: frames come back unprocessed (working counter 0)",
-            hint="`lo`, a bridge or a switch echoes frames; take the port the segment is wired to",
+            "no device: frames came back unprocessed (working counter 0)",
+            hint="`lo`, a bridge or a switch echoes frames; use the port that is wired to devices",
         )
     return Counted(reply.working_counter, AL_STATUS.unpack(reply.data))
 
 
 def reset(device_count: int) -> Procedure[None]:
-    """All devices to INIT with errors acknowledged; FMMUs, SyncManagers, SYNC signals cleared;
-    their EEPROM taken from the process data interface."""
+    """Bring all devices to INIT, and clear their FMMUs, SyncManagers and SYNC signals.
+
+    Errors are acknowledged. The EEPROMs are taken from the process data interface.
+
+    Raises:
+        SegmentError: The number of devices differs from `device_count`.
+    """
     yield from _all_to(AlState.INIT, RESET_TIMEOUT)
     replies = yield [
         _clear(*FMMU_BLOCK),
@@ -79,35 +84,45 @@ def reset(device_count: int) -> Procedure[None]:
     ]
     if replies[-1].working_counter != device_count:
         raise SegmentError(
-            f"{device_count} devices were counted, {replies[-1].working_counter} took a broadcast",
-            hint="devices come and go: look for a loose contact, then scan again",
+            f"{device_count} devices were counted, "
+            f"but {replies[-1].working_counter} received a broadcast",
+            hint="the number of devices changes: check for a loose contact, then scan again",
         )
 
 
 def bring_all_down(stations: Sequence[Station], state: AlState, timeout: float) -> Procedure[None]:
-    """All devices to a lower state by broadcast, whatever each of them is in. StateError names
-    the first that stays up. Devices that are gone are nobody's business here: those that are
-    left must come down all the same."""
+    """Bring all devices to a lower state by broadcast, from any state.
+
+    Devices that do not answer are ignored, so that the others still reach the state.
+
+    Args:
+        stations: The devices.
+        state: The requested state.
+        timeout: Time for all devices [s].
+
+    Raises:
+        StateError: A device stays in a higher state. The message names the first one.
+    """
     if (yield from _all_to(state, timeout)):
         return
     for answer in (yield from survey(stations)):
         if answer.word is None or answer.word & 0x0F <= state:
             continue
         raise StateError(
-            f"{answer.station} stays in state {answer.word & 0x0F}; {state} was asked for",
+            f"{answer.station} stays in state {answer.word & 0x0F}; requested state: {state}",
             position=answer.station.position,
             requested=int(state),
             actual=answer.word & 0x0F,
             code=answer.code,
-            hint="its outputs may be on: switch off its power",
+            hint="its outputs may be active: switch off its power",
         )
 
 
 def _all_to(state: AlState, timeout: float) -> Procedure[bool]:
-    """Asks all at once, errors acknowledged, and waits. Whether all are there.
+    """Request a state from all devices, acknowledge errors, and return True if all reach it.
 
-    Controllers that emulate their application copy AL control into AL status, the acknowledgement
-    too, which then looks like an error: so the state is asked for a second time without it.
+    Controllers that emulate their application copy AL control to AL status. The acknowledgement
+    then looks like an error. The state is therefore requested again without it.
     """
     for control in (AlControl(state, acknowledge=True), AlControl(state)):
         if not (yield from _ask_all(control.word, timeout)):
@@ -116,10 +131,10 @@ def _all_to(state: AlState, timeout: float) -> Procedure[bool]:
 
 
 def _ask_all(word: int, timeout: float) -> Procedure[bool]:
-    """Until the or of all AL status words is `word`, or the same without an error.
+    """Write AL control until the OR of all AL status words is `word`, with or without an error.
 
-    A controller takes no AL control before its application has read the one before (working
-    counter too small): then all are asked again.
+    A controller rejects AL control until its application has read the previous one. The working
+    counter is then too small, and the request is repeated for all devices.
     """
     deadline, pace = Deadline(timeout), Pace()
     taken = False
@@ -136,8 +151,11 @@ def _ask_all(word: int, timeout: float) -> Procedure[bool]:
 
 
 def assign(places: Sequence[int]) -> Procedure[tuple[StationRegisters, ...]]:
-    """Gives the devices, in the order of the frame, the station addresses of these positions; then
-    reads their registers by them."""
+    """Set the station addresses of all devices, then read their registers.
+
+    Args:
+        places: The positions of the devices, in the order of the frame.
+    """
     addresses = [STATION_BASE + place for place in places]
     replies = yield [
         write(EcatCommand.APWR, -rank, STATION_ADDRESS, address)
@@ -152,7 +170,7 @@ def assign(places: Sequence[int]) -> Procedure[tuple[StationRegisters, ...]]:
 
 
 def read_registers(addresses: Sequence[int]) -> Procedure[tuple[StationRegisters, ...]]:
-    """What every device's registers say, asked by station addresses, in the order of positions."""
+    """Read the registers of all devices by station address, in the order of positions."""
     per_device = 4
     replies = yield [request for address in addresses for request in _questions(address)]
     registers = []
@@ -174,7 +192,7 @@ def read_registers(addresses: Sequence[int]) -> Procedure[tuple[StationRegisters
 
 
 def duplicate_aliases(registers: Sequence[StationRegisters]) -> dict[int, tuple[int, ...]]:
-    """Aliases that several devices have, with their positions. Alias 0 is none."""
+    """Return aliases shared by several devices, with their positions. Alias 0 means no alias."""
     positions: dict[int, list[int]] = {}
     for device in registers:
         if device.alias:

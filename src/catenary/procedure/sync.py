@@ -1,8 +1,8 @@
-"""SYNC signals started and stopped, ETG.1000.4 §6.8.5 and ETG.1020 §"Distributed clocks". In
-PRE-OP, before SAFE-OP is asked for: devices check then that what they need is running.
+"""Start and stop of SYNC signals, ETG.1000.4 §6.8.5 and ETG.1020 §"Distributed clocks".
 
-All are told one start time, far enough ahead, and it is verified that all were told in time: a
-start time that has passed comes again after 4 s in a 32-bit clock, and never in one of 64 bits.
+SYNC signals are started in PRE-OP, because devices check them on the way to SAFE-OP. All devices
+receive one start time, which must be in the future. It is verified that it was written in time: a
+32-bit clock reaches a past start time again after 4 s, a 64-bit clock never.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ from catenary.wire.register import (
 )
 
 ATTEMPTS = 3
-PEERS_MAX = 4  # asked what time it is
-AHEAD_NS = 1_000_000  # what must be left of the time ahead when all have been told
+PEERS_MAX = 4  # devices asked for their system time
+AHEAD_NS = 1_000_000  # minimum time between the last write and the start time
 
 
 def bring_together(
@@ -57,8 +57,20 @@ def bring_together(
     follow: FollowedClock = "reference",
     second_end: RingEnd | None = None,
 ) -> Procedure[ClockMeasurement]:
-    """All there is to do before the cycle: clocks measured, aligned, brought together by a burst of
-    `burst` frames, SYNC signals started. `syncs`: by position. `second_end`: of a ring."""
+    """Set up distributed clocks before the cycle: measure, align, compensate, start SYNC signals.
+
+    Args:
+        devices: All devices, by position.
+        syncs: The SYNC signals, by position.
+        reference: Position of the reference clock.
+        epoch_ns: System time minus the link's time [ns].
+        burst: Number of frames of the drift compensation.
+        follow: The clock that the others follow.
+        second_end: In a ring, the port that is wired to the second interface; None for a line.
+
+    Raises:
+        ClockError: The clocks cannot be set up.
+    """
     measured = yield from measure(devices, second_end=second_end)
     yield from align(devices, measured, reference, epoch_ns)
     if follow == "main":
@@ -77,12 +89,24 @@ def rejoin(
     delay_ns: int,
     epoch_ns: int,
 ) -> Procedure[None]:
-    """The clock of a device that was switched off, set while all others run: by what one of its
-    `peers` (positions, the reference first) says to the same frame. ClockError if none answers.
-    `delay_ns`: as it was measured before; `epoch_ns`: system time less the link's, now."""
+    """Set the clock of a device that was switched off, while all other clocks run.
+
+    The device and one of its peers are read in the same frame. The difference is the offset.
+
+    Args:
+        devices: All devices, by position.
+        position: The device.
+        sync: Its SYNC signals; None if it has none.
+        peers: Positions of devices with running clocks, the reference first.
+        delay_ns: Its delay from the reference, as measured before [ns].
+        epoch_ns: System time minus the link's time, now [ns].
+
+    Raises:
+        ClockError: None of the peers answers.
+    """
     device = devices[position]
-    told = filters(device.station_address)
-    for each in (*alignment(device, 0, delay_ns), *told):
+    resets = filters(device.station_address)
+    for each in (*alignment(device, 0, delay_ns), *resets):
         yield from _write_all([device], [each])
     asked = [devices[peer] for peer in peers if peer != position][:PEERS_MAX]
     replies = yield [_system_time(each) for each in (*asked, device)]
@@ -92,13 +116,13 @@ def rejoin(
             continue
         offset = _read_time(reply, peer, epoch_ns) - own
         yield from _write_all([device] * 2, list(alignment(device, offset, delay_ns)))
-        yield from _write_all([device], list(told[-1:]))
+        yield from _write_all([device], list(resets[-1:]))
         if sync is not None:
             yield from start(devices, {position: sync}, peer, epoch_ns)
         return
     raise ClockError(
-        f"{device}: no clock answers that its own could be set by",
-        hint="it is tried again when the reference clock or another one is back",
+        f"{device}: its clock cannot be set, because no other clock answers",
+        hint="the loop tries again when the reference clock or another clock returns",
     )
 
 
@@ -108,28 +132,43 @@ def start(
     reference: DeviceDescription,
     epoch_ns: int,
 ) -> Procedure[int]:
-    """Lets the SYNC signals begin, at one beat for all. Returns that time [ns, system time]."""
+    """Start the SYNC signals of all devices at one common time.
+
+    Args:
+        devices: All devices, by position.
+        syncs: The SYNC signals, by position.
+        reference: The reference clock.
+        epoch_ns: System time minus the link's time [ns].
+
+    Returns:
+        The SYNC0 time at which they start, without shifts [ns, system time].
+
+    Raises:
+        ClockError: The start time had passed before all devices had received it.
+    """
     chosen = [devices[position] for position in sorted(syncs)]
     for _ in range(ATTEMPTS):
         yield from stop(chosen)
         yield from _write_all(chosen, [_cycle_times(d, syncs[d.position]) for d in chosen])
         now_ns = yield from _now(reference, epoch_ns)
-        beat_ns = start_time_ns(now_ns, list(syncs.values()))
-        yield from _write_all(chosen, [_start_time(d, syncs[d.position], beat_ns) for d in chosen])
+        sync0_time_ns = start_time_ns(now_ns, list(syncs.values()))
+        yield from _write_all(
+            chosen, [_start_time(d, syncs[d.position], sync0_time_ns) for d in chosen]
+        )
         yield from _write_all(chosen, [_activation(d, syncs[d.position]) for d in chosen])
-        told_ns = yield from _now(reference, epoch_ns)
-        first_ns = beat_ns + min(sync.shift_ns for sync in syncs.values())
-        if told_ns + AHEAD_NS < first_ns:
-            return beat_ns
+        written_ns = yield from _now(reference, epoch_ns)
+        first_ns = sync0_time_ns + min(sync.shift_ns for sync in syncs.values())
+        if written_ns + AHEAD_NS < first_ns:
+            return sync0_time_ns
     raise ClockError(
-        f"SYNC signals: telling {len(chosen)} devices when to start took longer than the "
-        f"{(beat_ns - now_ns) * 1e-6:.0f} ms ahead, {ATTEMPTS} times",
-        hint="the machine is too busy: give the program a processor of its own",
+        f"SYNC signals: writing the start time to {len(chosen)} devices took longer than the "
+        f"{(sync0_time_ns - now_ns) * 1e-6:.0f} ms until it, in {ATTEMPTS} attempts",
+        hint="the machine is too busy: reserve a processor core for the program",
     )
 
 
 def read_types(channel: MailboxChannel) -> Procedure[dict[int, bytes]]:
-    """Return how a device keeps time with the bus: 0x1C32:01 and 0x1C33:01, those that it shows."""
+    """Return the synchronisation types of a device: 0x1C32:01 and 0x1C33:01, as far as readable."""
     found = {}
     for index in SYNC_OBJECTS:
         with suppress(SdoAbort):
@@ -138,7 +177,15 @@ def read_types(channel: MailboxChannel) -> Procedure[dict[int, bytes]]:
 
 
 def write_types(channel: MailboxChannel, types: Mapping[int, bytes]) -> Procedure[None]:
-    """Lets it keep time as it did before a loop asked for clocks, where it lets that be written."""
+    """Restore the synchronisation types that a device had before, as far as writable.
+
+    Args:
+        channel: The mailbox of the device.
+        types: The values of 0x1C32:01 and 0x1C33:01, by index.
+
+    Raises:
+        SdoAbort: The device refuses for another reason than a read-only or missing object.
+    """
     for index, kind in types.items():
         try:
             yield from download(channel, index, 1, kind)
@@ -148,14 +195,14 @@ def write_types(channel: MailboxChannel, types: Mapping[int, bytes]) -> Procedur
 
 
 def stop(devices: Sequence[DeviceDescription]) -> Procedure[None]:
-    """No SYNC signals any more."""
+    """Stop the SYNC signals of the devices."""
     yield from _write_all(
         devices, [write(EcatCommand.FPWR, d.station_address, ACTIVATION, 0) for d in devices]
     )
 
 
 def _now(reference: DeviceDescription, epoch_ns: int) -> Procedure[int]:
-    """The system time, in full: the low half as the reference says it, near the link's time."""
+    """Return the full system time: the reference's low half, completed by the link's time."""
     [reply] = yield [read(EcatCommand.FPRD, reference.station_address, SYSTEM_TIME_LOW)]
     low = SYSTEM_TIME_LOW.unpack(answered(reply, _station(reference), "its system time"))
     return _near(low, reply.time_ns + epoch_ns)
@@ -167,7 +214,7 @@ def _system_time(device: DeviceDescription) -> Request:
 
 
 def _read_time(reply: Reply, device: DeviceDescription, epoch_ns: int) -> int:
-    """In full: a clock of 32 bits near the link's time."""
+    """Return the full system time of a reply; a 32-bit clock is completed by the link's time."""
     value = int.from_bytes(answered(reply, _station(device), "its system time"), "little")
     return value if device.clock_bits == 64 else _near(value, reply.time_ns + epoch_ns)
 
@@ -181,8 +228,8 @@ def _cycle_times(device: DeviceDescription, sync: SyncPlan) -> Request:
     return write(EcatCommand.FPWR, device.station_address, SYNC_CYCLE_TIMES, times)
 
 
-def _start_time(device: DeviceDescription, sync: SyncPlan, beat_ns: int) -> Request:
-    start_ns = beat_ns + sync.shift_ns
+def _start_time(device: DeviceDescription, sync: SyncPlan, sync0_time_ns: int) -> Request:
+    start_ns = sync0_time_ns + sync.shift_ns
     if device.clock_bits == 64:
         return write(EcatCommand.FPWR, device.station_address, SYNC0_START_TIME, start_ns % SPAN_64)
     return write(EcatCommand.FPWR, device.station_address, SYNC0_START_TIME_LOW, start_ns % SPAN_32)

@@ -1,4 +1,4 @@
-"""A virtual EtherCAT segment at register level: in this process, in virtual time, or on a NIC."""
+"""Virtual EtherCAT segments at register level: in this process, in virtual time, or on a NIC."""
 
 from catenary.virtual import faults
 from catenary.virtual.coe.quirks import MailboxQuirks

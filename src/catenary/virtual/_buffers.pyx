@@ -1,4 +1,4 @@
-"""The application's side of SyncManagers: mailboxes and buffers, and its own switch of each."""
+"""SyncManagers seen from the application: mailboxes, buffers, and the PDI's switch of each."""
 
 from cpython.bytes cimport PyBytes_FromStringAndSize
 from libc.stdint cimport uint8_t
@@ -21,7 +21,7 @@ from catenary.virtual._segment cimport (
 
 
 cdef class Buffers:
-    """Those of the controllers of `core`. `position` and `n`: the device's and the SyncManager's."""
+    """SyncManagers of the controllers of `core`. `position`: the device; `n`: its SyncManager."""
 
     cdef Core _core
     cdef cat_segment *_segment
@@ -30,13 +30,13 @@ cdef class Buffers:
         self._core, self._segment = core, core._segment
 
     def settings(self, int position, int n):
-        """(start, length, control, enabled, full)"""
+        """Return (start, length, control, enabled, full)."""
         cdef sync_manager *sm = self._core._sync_manager_at(position, n)
         cdef controller *c = self._core._at(position)
         return sm.start, sm.length, sm_registers(c, n)[4], bool(sm.enabled), bool(sm.full)
 
     def block(self, int position, int n, bint blocked):
-        """The PDI's own switch: a blocked SyncManager lets nobody pass."""
+        """Set the PDI's switch: a blocked SyncManager refuses all access."""
         cdef controller *c = self._core._at(position)
         cdef uint8_t *r
         self._core._sync_manager_at(position, n)
@@ -47,7 +47,7 @@ cdef class Buffers:
         unlock(self._segment)
 
     def acknowledge_repeat(self, int position, int n):
-        """The last answer is there again: the MainDevice asked for it."""
+        """Acknowledge a repeat request: the last answer is available again."""
         cdef controller *c = self._core._at(position)
         cdef uint8_t *r
         self._core._sync_manager_at(position, n)
@@ -57,7 +57,7 @@ cdef class Buffers:
         unlock(self._segment)
 
     def read(self, int position, int n):
-        """A complete buffer the MainDevice wrote (a mailbox is emptied by it), or None."""
+        """Return a complete buffer from the MainDevice (this empties a mailbox), or None."""
         cdef uint8_t buffer[4096]
         cdef controller *c = self._core._at(position)
         cdef int size
@@ -68,7 +68,7 @@ cdef class Buffers:
         return None if size < 0 else PyBytes_FromStringAndSize(<char *>buffer, size)
 
     def write(self, int position, int n, bytes data):
-        """False: the mailbox is full, or the SyncManager does not let it pass."""
+        """Write a buffer. Return False if the mailbox is full or the SyncManager refuses access."""
         cdef controller *c = self._core._at(position)
         cdef int size
         self._core._sync_manager_at(position, n)
@@ -78,7 +78,8 @@ cdef class Buffers:
         return size >= 0
 
     def take_back(self, int position, int n):
-        """What still lies in a mailbox for the MainDevice is taken out again, or None."""
+        """Take back an answer that is still in a mailbox for the MainDevice; None if there is
+        none."""
         cdef controller *c = self._core._at(position)
         cdef sync_manager *sm = self._core._sync_manager_at(position, n)
         data = None

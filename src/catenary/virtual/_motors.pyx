@@ -1,4 +1,4 @@
-"""The motors of virtual servos: what they are made of, where they are, what befalls them (servo.h)."""
+"""Motors of virtual servos: parameters, state, and injected loads and faults (servo.h)."""
 
 from catenary.virtual._segment cimport (
     Core,
@@ -11,7 +11,7 @@ from catenary.virtual._segment cimport (
 
 
 cdef class Motors:
-    """Those of the devices of `core`, by the device's position and the number of its axis."""
+    """Motors of the devices of `core`, by the device's position and the number of its axis."""
 
     cdef Core _core
     cdef cat_segment *_segment
@@ -35,7 +35,7 @@ cdef class Motors:
     def set_quirks(self, int position, int axis, *, double mode_delay, unsigned int refused_modes,
                    bint never_bit_12, bint follows_without_bit_12, bint ignores_quick_stop,
                    bint ignores_disable):
-        """Make the drive differ from the profile (devices/servo_quirks.py)."""
+        """Set differences of the drive from the profile (devices/servo_quirks.py)."""
         cdef servo_axis *a = self._core._axis(position, axis)
         a.quirks.mode_delay, a.quirks.refused_modes = mode_delay, refused_modes
         a.quirks.never_bit_12 = never_bit_12
@@ -47,30 +47,30 @@ cdef class Motors:
         self._core._axis(position, axis).bit_12_hidden = seconds
 
     def state(self, int position, int axis):
-        """(position [rad], velocity [rad/s], torque [N m], state)"""
+        """Return (position [rad], velocity [rad/s], torque [N m], state)."""
         cdef servo_axis *a = self._core._axis(position, axis)
         return a.position, a.velocity, a.torque, a.state
 
     def tune(self, int position, int axis, *, double velocity_gain, double integral_gain):
-        """The velocity loop's gains [N m s/rad], [N m/rad]."""
+        """Set the velocity loop's gains [N m s/rad], [N m/rad]."""
         cdef servo_axis *a = self._core._axis(position, axis)
         a.velocity_gain, a.integral_gain = velocity_gain, integral_gain
 
     def place(self, int position, int axis, double to):
-        """Turns the shaft [rad]."""
+        """Turn the shaft to a position [rad]."""
         cdef servo_axis *a = self._core._axis(position, axis)
         lock(self._segment)
         servo_place(a, to)
         unlock(self._segment)
 
     def load(self, int position, int axis, double load):
-        """A torque from outside [N m]."""
+        """Apply an external torque [N m]."""
         self._core._axis(position, axis).load = load
 
     def inject(self, int position, int axis, int code):
-        """A fault with this code; 0: its cause is gone."""
+        """Inject a fault with this code; 0 ends its cause."""
         self._core._axis(position, axis).injected = code
 
     def stop_torque(self, int position, int axis, bint active):
-        """Safe torque off."""
+        """Switch safe torque off on or off."""
         self._core._axis(position, axis).sto = active

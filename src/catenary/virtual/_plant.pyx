@@ -1,4 +1,4 @@
-"""The compiled side of a plant: a MuJoCo model's arrays and step, by their addresses (plant.h)."""
+"""Compiled side of a plant: arrays and step function of a MuJoCo model, by address (plant.h)."""
 
 from libc.stdint cimport int64_t, uintptr_t
 from libc.stdlib cimport calloc
@@ -26,7 +26,7 @@ cdef extern from "<time.h>" nogil:
     int clock_nanosleep(int clock, int flags, const timespec *until, timespec *left)
 
 cdef enum:
-    LONGEST_SLEEP = 20000000             # how long its thread takes to end [ns]
+    LONGEST_SLEEP = 20000000             # maximum time until its thread ends [ns]
 
 
 cdef void _sleep(int64_t until) noexcept nogil:
@@ -36,15 +36,18 @@ cdef void _sleep(int64_t until) noexcept nogil:
 
 
 cdef class CompiledPlant:
-    """A view of the plant of `core`, which owns it."""
+    """View of the plant of `core`, which owns it."""
 
     cdef Core _core
     cdef plant *_plant
 
     def __init__(self, Core core, int joints, *, uintptr_t step, uintptr_t hear, uintptr_t model,
                  uintptr_t data, int64_t period_ns, keep):
-        """`step`, `hear`, `model`, `data`: addresses of mj_step, of what sets a thread's message
-        handler (0: none), of an mjModel and an mjData; `keep` owns them."""
+        """Connect a plant to the segment.
+
+        `step`, `hear`, `model`, `data`: addresses of mj_step, of the function that sets a thread's
+        message handler (0: none), of an mjModel and of an mjData. `keep` owns them.
+        """
         cdef plant *p
         if core._segment.plant != NULL:
             raise ValueError("the segment has a plant already")
@@ -64,7 +67,7 @@ cdef class CompiledPlant:
 
     def __dealloc__(self):
         if self._core is not None and self._core._segment.plant != self._plant:
-            plant_free(self._plant)          # it never began
+            plant_free(self._plant)          # the plant was never started
 
     cdef plant_joint *_joint(self, int n) except NULL:
         if not 0 <= n < self._plant.count:
@@ -73,7 +76,8 @@ cdef class CompiledPlant:
 
     def make_joint(self, int n, *, uintptr_t q, uintptr_t v, uintptr_t force, uintptr_t friction,
                    double ratio, double zero, double dry, double brake, int64_t brake_delay_ns):
-        """`q` to `friction`: addresses of its numbers in qpos, qvel, qfrc_applied, dof_frictionloss."""
+        """`q` to `friction`: addresses of its values in qpos, qvel, qfrc_applied,
+        dof_frictionloss."""
         cdef plant_joint *j = self._joint(n)
         if not (q and v and force and friction and ratio):
             raise ValueError(f"impossible joint {n}")
@@ -82,7 +86,7 @@ cdef class CompiledPlant:
         j.brake_delay = brake_delay_ns
 
     def hang(self, int n, int position, int axis):
-        """From now on the motor of this axis turns joint n."""
+        """Connect the motor of this axis to joint n."""
         cdef plant_joint *j = self._joint(n)
         lock(self._core._segment)
         try:
@@ -91,7 +95,7 @@ cdef class CompiledPlant:
             unlock(self._core._segment)
 
     def begin(self):
-        """All joints are made: steps from now on."""
+        """Start stepping; all joints are made."""
         lock(self._core._segment)
         self._plant.due = self._core._segment.now + self._plant.period
         self._core._segment.plant = self._plant
@@ -100,7 +104,7 @@ cdef class CompiledPlant:
         unlock(self._core._segment)
 
     def run(self):
-        """Real time: steps the plant, and what is due beside it, until `end` or its own."""
+        """Step the plant and do due work in real time, until `end` or a failed step."""
         cdef cat_segment *s = self._core._segment
         cdef plant *p = self._plant
         cdef int64_t now, due
@@ -128,10 +132,10 @@ cdef class CompiledPlant:
 
     @property
     def wild(self) -> int:
-        """The joint that went beyond all bounds, -1: none; then the plant stands still."""
+        """Joint that exceeded all bounds, -1: none. If any, the plant has stopped."""
         return self._plant.wild - 1
 
     @property
     def complaint(self) -> str:
-        """MuJoCo's, in its words; then the plant stands still."""
+        """Error message of MuJoCo. If any, the plant has stopped."""
         return (<bytes>self._plant.words).decode("utf-8", "replace")

@@ -1,6 +1,7 @@
-"""The compiled segment: controllers, clock, and accessors for the application's side. The frame
-path is in the headers, one for each mechanism; nothing of it runs under the GIL. SyncManagers from
-inside are in `_buffers.pyx`, motors in `_motors.pyx`.
+"""The compiled segment: controllers, clock, and accessors for the application's side.
+
+The frame path is in the headers, one per mechanism; none of it needs the GIL. Access to
+SyncManagers from the application is in `_buffers.pyx`, motors are in `_motors.pyx`.
 """
 
 from cpython.bytes cimport PyBytes_FromStringAndSize
@@ -54,7 +55,8 @@ cdef int _serve_application(void *owner) noexcept with gil:
 
 
 cdef class Core:
-    """Owns the controllers' memory. `position` counts devices from the MainDevice, from 0."""
+    """Owns the controllers' memory. `position` counts devices from the MainDevice, starting at
+    0."""
 
     def __cinit__(self, int count, bint is_virtual, *, bint ring=False, int64_t detection_ns=0):
         if not 0 <= count <= 65535:
@@ -86,11 +88,11 @@ cdef class Core:
             raise IndexError(f"the device at position {position} has no axis {axis}")
         return &c.axes[axis]
 
-    # -- making ---------------------------------------------------------------------------------
+    # -- construction ---------------------------------------------------------------------------
 
     def make_controller(self, int position, *, int ram, bytes sii, int slots, int axes, int fmmus,
                         int sync_managers, int clock_bits, bint lrw, int identification, ports):
-        """Has no power yet. `ports`: the numbers of those it has."""
+        """Make a controller without power. `ports`: the numbers of its ports."""
         cdef controller *c = self._at(position)
         cdef int made
         if c.memory != NULL:
@@ -111,7 +113,7 @@ cdef class Core:
         memcpy(c.sii.image, <const char *>sii, len(sii))
 
     def remove_controller(self, int position):
-        """The device is taken out; its place and cables stay."""
+        """Remove the device; its position and cables stay."""
         cdef controller *c = self._at(position)
         lock(self._segment)
         controller_remove(c)
@@ -119,7 +121,7 @@ cdef class Core:
         unlock(self._segment)
 
     def exchange_controllers(self, int one, int other):
-        """Two devices change places, with all they remember; neither has power."""
+        """Exchange two devices with their complete state; both are without power."""
         cdef controller *a = self._at(one)
         cdef controller *b = self._at(other)
         lock(self._segment)
@@ -128,7 +130,8 @@ cdef class Core:
         unlock(self._segment)
 
     def switch_power(self, int position, bint on):
-        """Off: all but EEPROM, crystal and shafts is lost, and the neighbours' light with it."""
+        """Switch the power. Off: all but EEPROM, crystal and shafts is lost, and the neighbours'
+        light."""
         cdef controller *c = self._at(position)
         if c.memory == NULL:
             raise ValueError(f"no controller at position {position}")
@@ -144,12 +147,12 @@ cdef class Core:
         return bool(self._at(position).powered)
 
     def ports(self, int position):
-        """The numbers of the ports the device has."""
+        """Return the numbers of the device's ports."""
         cdef controller *c = self._at(position)
         return tuple([p for p in range(PORTS) if c.ports[<int>p].exists])
 
     def mute(self, int position, bint muted):
-        """Logical datagrams pass the device by: they are neither answered nor counted."""
+        """Make the device ignore logical datagrams: neither answered nor counted."""
         self._at(position).mute = muted
 
     # -- time and service -----------------------------------------------------------------------
@@ -160,7 +163,7 @@ cdef class Core:
 
     @property
     def epoch(self) -> int:
-        """From here faults count their time [ns]; -1: real time, and no frame came yet."""
+        """Zero of the faults' time [ns]; -1: real time, before the first frame."""
         return self._segment.epoch
 
     @property
@@ -168,7 +171,7 @@ cdef class Core:
         return bool(self._segment.is_virtual)
 
     def use_clock(self, clock):
-        """Lives by the virtual time of `clock.capsule` (native/clock.h), beside others."""
+        """Use the shared virtual time of `clock.capsule` (native/clock.h)."""
         cdef const cat_clock *table
         capsule = clock.capsule
         if not PyCapsule_IsValid(capsule, CAT_CLOCK_CAPSULE):
@@ -176,12 +179,12 @@ cdef class Core:
         table = <const cat_clock *>PyCapsule_GetPointer(capsule, CAT_CLOCK_CAPSULE)
         if table.version != CAT_CLOCK_VERSION or not table.flags & CAT_CLOCK_VIRTUAL:
             raise ValueError("the clock is not virtual, or of another version")
-        self._clock = clock, capsule       # own the table
+        self._clock = clock, capsule       # keep the owner of the table alive
         self._segment.clock = table
         self._segment.now = self._segment.epoch = table.now(table.self)
 
     def use_service(self, service):
-        """`service()` runs the application side and returns when it is due again [ns]."""
+        """Set the service: it runs the application side and returns its next due time [ns]."""
         self._service = service
 
     def wake_at(self, int64_t when):
@@ -196,7 +199,7 @@ cdef class Core:
         try:
             self._segment.service_due = self._service()
             return 0
-        except KeyboardInterrupt:          # before or after the work: the caller gets it back
+        except KeyboardInterrupt:          # at the start or end of the service: the caller gets it back
             self._segment.service_due = self._segment.now
             PyErr_SetInterrupt()
             return -EINTR
@@ -205,13 +208,13 @@ cdef class Core:
             return -EIO
 
     def raise_failure(self):
-        """An exception in the application side, where the caller can see it."""
+        """Raise an exception of the application side in the caller."""
         failure, self.failure = self.failure, None
         if failure is not None:
             raise failure
 
     def advance(self):
-        """Real time: compiled work up to now."""
+        """Do the compiled work up to now, in real time."""
         if not self._segment.is_virtual:
             with nogil:
                 lock(self._segment)
@@ -219,13 +222,13 @@ cdef class Core:
                 unlock(self._segment)
 
     def take_events(self):
-        """[(position, events)], cleared by being taken."""
+        """Return [(position, events)] and clear them."""
         cdef int k
         cdef uint32_t events
         taken = []
         if not self._segment.pending:
             return taken
-        self._segment.pending = 0          # before the look: what comes now raises it again
+        self._segment.pending = 0          # before the check: a new event sets it again
         for k in range(self.count):
             if self._segment.controllers[k].events:
                 lock(self._segment)
@@ -238,7 +241,7 @@ cdef class Core:
     # -- the PDI side ---------------------------------------------------------------------------
 
     def peek(self, int position, int address, int size):
-        """Bytes of the controller's memory, without any effect."""
+        """Return bytes of the controller's memory, without side effects."""
         cdef controller *c = self._at(position)
         if address < 0 or size < 0 or address + size > <int64_t>c.memory_size:
             raise ValueError(f"no memory at 0x{address:04X}, {size} bytes")
@@ -248,7 +251,7 @@ cdef class Core:
         return PyBytes_FromStringAndSize(<char *>c.memory + address, size)
 
     def poke(self, int position, int address, bytes data):
-        """Memory as it is, past all rules: for error counters and injected faults."""
+        """Set memory directly, without any rules: for error counters and injected faults."""
         cdef controller *c = self._at(position)
         if address < 0 or address + len(data) > <int64_t>c.memory_size:
             raise ValueError(f"no memory at 0x{address:04X}, {len(data)} bytes")
@@ -257,7 +260,7 @@ cdef class Core:
         unlock(self._segment)
 
     def fetch_al_control(self, int position):
-        """What the MainDevice asks for; fetching opens the register for the next request."""
+        """Return the requested state. This opens the register for the next request."""
         cdef controller *c = self._at(position)
         lock(self._segment)
         c.al_unread = 0
@@ -278,14 +281,14 @@ cdef class Core:
         self._at(position).outputs_valid = valid
 
     def expect_outputs(self, int position):
-        """EVENT_OUTPUTS comes with the next complete process data."""
+        """Raise EVENT_OUTPUTS at the next complete process data."""
         self._at(position).outputs_seen = 0
 
     def outputs_seen(self, int position):
         return bool(self._at(position).outputs_seen)
 
     def outputs_at(self, int position):
-        """Segment time [ns] at which outputs were last taken over; `FOREVER`: not yet."""
+        """Return the segment time [ns] of the last update of the outputs; `FOREVER`: not yet."""
         cdef controller *c = self._at(position)
         cdef int64_t when
         lock(self._segment)
@@ -294,7 +297,7 @@ cdef class Core:
         return when
 
     def output_image(self, int position, int n):
-        """The last complete outputs, without taking them; empty where there are none."""
+        """Return the last complete outputs without taking them; empty before the first ones."""
         cdef controller *c = self._at(position)
         cdef sync_manager *sm = self._sync_manager_at(position, n)
         if not (sm.enabled and sm.written) or sm.mailbox:
@@ -304,7 +307,7 @@ cdef class Core:
     # -- process data and models ----------------------------------------------------------------
 
     def map_process_data(self, int position, bint outputs, int n, list entries):
-        """`entries`: (bit, bits, slot, is_signed); n -1: nothing is mapped."""
+        """Set the mapping. `entries`: (bit, bits, slot, is_signed); n -1: nothing is mapped."""
         cdef controller *c = self._at(position)
         cdef mapping *m = &c.outputs if outputs else &c.inputs
         cdef int k = 0
@@ -330,7 +333,7 @@ cdef class Core:
         unlock(self._segment)
 
     def run_model(self, int position, int64_t period_ns):
-        """Steps the device's model from now on, every `period_ns`."""
+        """Step the device's model every `period_ns` from now on."""
         cdef controller *c = self._at(position)
         if period_ns < 1000:
             raise ValueError(f"a device cycle of {period_ns} ns is shorter than 1 us")
@@ -340,13 +343,14 @@ cdef class Core:
         unlock(self._segment)
 
     def ignore_loop_control(self, int position):
-        """The ports follow their links, whatever DL control says."""
+        """Make the ports follow their links, regardless of DL control."""
         self._at(position).fixed_loops = 1
 
     def run_model_by_pulses(self, int position, int signal, int64_t cycle_ns,
                             int64_t longest_step_ns):
-        """Steps the device's model at the pulses of `signal`, its bit in 0x0981, `cycle_ns` apart,
-        and between them in equal steps of at most `longest_step_ns`."""
+        """Step the device's model at the pulses of `signal`, a bit in 0x0981, with period
+        `cycle_ns`. Between the pulses it takes equal steps of at most `longest_step_ns`.
+        """
         cdef controller *c = self._at(position)
         cdef int64_t steps
         if not 1000 <= cycle_ns < 1 << 32 or longest_step_ns < 1000:
@@ -358,8 +362,9 @@ cdef class Core:
         unlock(self._segment)
 
     def tune_synchronous(self, int position, *, int64_t minimum_ns, int64_t copy_ns, int limit):
-        """The shortest SYNC0 cycle; how long before a pulse outputs have to be there; how many
-        pulses in a row without new outputs are an error."""
+        """Set the shortest SYNC0 cycle, how long before a pulse outputs must arrive, and how many
+        consecutive pulses without new outputs are an error.
+        """
         cdef controller *c = self._at(position)
         if not (0 <= minimum_ns and 0 <= copy_ns and 1 <= limit <= 0xFFFF):
             raise ValueError(f"impossible synchronisation at position {position}")
@@ -367,12 +372,12 @@ cdef class Core:
         c.synchronous.limit = limit
 
     def synchronous(self, int position):
-        """(keeps time by SYNC0, pulses come, missed, exceeded, shift too short, error)"""
+        """Return (synchronised to SYNC0, pulses seen, missed, exceeded, shift too short, error)."""
         cdef synchronous_cycle *d = &self._at(position).synchronous
         return bool(d.active), bool(d.seen), d.missed, d.exceeded, d.shift_short, bool(d.error)
 
     def system_time(self, int position):
-        """What the clock says at this moment [ns]: nobody on the bus can read it so exactly."""
+        """Return the exact time of the device's clock [ns], which no frame can read."""
         cdef int64_t time
         lock(self._segment)
         time = dc_system_time(self._at(position), self._segment.now)
@@ -380,7 +385,7 @@ cdef class Core:
         return time
 
     def pulses(self, int position):
-        """SYNC0 and SYNC1 pulses since power-on."""
+        """Return the numbers of SYNC0 and SYNC1 pulses since power-on."""
         cdef controller *c = self._at(position)
         return c.sync.pulses0, c.sync.pulses1
 
@@ -406,8 +411,9 @@ cdef class Core:
         self._at(position).frozen = frozen
 
     def tune_crystal(self, int position, double error, double swing, double period_s, double scatter_ns):
-        """From now on: the error of the frequency and its slow swing, as shares; how far time stamps
-        scatter."""
+        """Set frequency error and slow swing of the crystal (relative values), and the scatter of
+        time stamps.
+        """
         cdef controller *c = self._at(position)
         cdef double turn = 2e-9 * pi / period_s if swing != 0 else 0
         lock(self._segment)
@@ -432,7 +438,7 @@ cdef class Core:
         return f.frames, f.datagrams, f.malformed, f.foreign, f.lost, f.expired
 
     def pass_frame(self, bytes frame):
-        """One frame through the line at once, as it comes back; None: it does not."""
+        """Process one frame at once and return it; None if it is lost."""
         cdef uint8_t buffer[2048]
         cdef int exit = -LOSS_NO_LIGHT
         cdef int size = len(frame)
@@ -450,11 +456,11 @@ cdef class Core:
         return PyBytes_FromStringAndSize(<char *>buffer, size) if exit >= 0 else None
 
     def answer_packets(self, int fd, int second_fd, int stop_fd, int64_t max_age_ns):
-        """Run the packet loop on AF_PACKET sockets until `stop_fd` can be read. 0 or -errno.
+        """Run the packet loop on AF_PACKET sockets until `stop_fd` is readable. Return 0 or -errno.
 
         Args:
-            second_fd: The other end of a ring; -1: none.
-            max_age_ns: Frames that were in their socket for longer are lost.
+            second_fd: Socket of the other end of a ring; -1: none.
+            max_age_ns: Frames that waited in their socket for longer are dropped.
         """
         cdef int result
         with nogil:

@@ -1,4 +1,4 @@
-"""Link tables into a segment: how a MainDevice in this process hands it frames."""
+"""Link tables into a segment: they pass frames of a MainDevice in this process."""
 
 from cpython.bytes cimport PyBytes_FromStringAndSize
 from cpython.pycapsule cimport PyCapsule_New
@@ -32,7 +32,7 @@ cdef extern from "link.h":
 
 
 cdef class SegmentLink:
-    """Owns a link table into the segment's line. Keep it as long as its capsule is used."""
+    """Owns a link table into the segment's line. Keep it alive while its capsule is used."""
 
     cdef cat_link _table
     cdef Core _core
@@ -51,7 +51,7 @@ cdef class SegmentLink:
         self._open = True
         self.name = name
         self._table.version = CAT_LINK_VERSION
-        self._table.flags = CAT_LINK_FORETELLS   # in real time too: what comes was sent by us
+        self._table.flags = CAT_LINK_FORETELLS   # in real time too: returning frames are our own
         self._table.due = line_due
         if core._segment.is_virtual:
             self._table.flags |= CAT_LINK_VIRTUAL_TIME
@@ -92,7 +92,7 @@ cdef class SegmentLink:
         with nogil:
             result = line_wait_until(self._end, deadline_ns, wake_on_frame)
         if result == -EINTR:
-            return False                   # a signal came first: Python handles it on return
+            return False                   # a signal came first: Python handles it after the return
         return bool(self._check(result))
 
     def close(self):

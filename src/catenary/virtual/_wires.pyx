@@ -1,4 +1,4 @@
-"""The wires of a segment: cables, the ways frames take, what hits frames, and which were lost."""
+"""Wires of a segment: cables, routes of frames, frame faults, and lost frames."""
 
 from libc.stdint cimport int64_t, uint32_t, uint64_t
 
@@ -25,7 +25,7 @@ FRAME_FAULTS_MAX = MAX_FRAME_FAULTS
 
 
 cdef class Wires:
-    """Owns nothing: a view of the cables of `core`."""
+    """View of the cables of `core`; it owns nothing."""
 
     cdef Core _core
 
@@ -33,7 +33,8 @@ cdef class Wires:
         self._core = core
 
     def lay_cable(self, int n, tuple up, tuple down):
-        """Cable n between two (device, port); device -1 and -2: the MainDevice's interfaces."""
+        """Connect cable n to two (device, port); devices -1 and -2 are the MainDevice's
+        interfaces."""
         cdef cable_end above, below
         above.device, above.port = up
         below.device, below.port = down
@@ -51,7 +52,7 @@ cdef class Wires:
         return &self._core._segment.cables[n]
 
     def plug_cable(self, int n, bint plugged, bint at_once=False):
-        """`at_once`: the controllers see it without their time of detection."""
+        """Plug or unplug a cable. `at_once`: without the controllers' detection time."""
         cdef cable *k = self._cable(n)
         lock(self._core._segment)
         if not self._core._segment.is_virtual:
@@ -61,7 +62,7 @@ cdef class Wires:
         unlock(self._core._segment)
 
     def raise_end(self, int end, bint up):
-        """An interface of the MainDevice is driven, or no longer: as a network card is switched on."""
+        """Switch an interface of the MainDevice on or off, like a network card."""
         if not 0 <= end <= self._core._segment.ring:
             raise IndexError(f"no end {end}")
         lock(self._core._segment)
@@ -73,14 +74,14 @@ cdef class Wires:
         return bool(self._cable(n).light)
 
     def delay_cable(self, int n, int64_t delay_ns):
-        """One way."""
+        """Set the delay of a cable, one way."""
         lock(self._core._segment)
         self._cable(n).delay = delay_ns
         segment_light(self._core._segment, False)
         unlock(self._core._segment)
 
     def processed(self, int end):
-        """The positions of the devices that process a frame from an interface, in order."""
+        """Return the positions of the devices that process a frame from an interface, in order."""
         cdef uint32_t k
         cdef route *r = &self._core._segment.routes[end]
         lock(self._core._segment)
@@ -94,7 +95,8 @@ cdef class Wires:
 
     def add_frame_fault(self, int kind, *, int64_t frames, uint32_t every, int64_t delay_ns,
                         int cable, int offset):
-        """Its number; `frames` -1: no end. The order of kinds is frame_faults.h's."""
+        """Add a fault and return its number. `frames` -1: unlimited. Kinds are in frame_faults.h's
+        order."""
         cdef int n
         cdef frame_fault *f
         for n in range(MAX_FRAME_FAULTS):
@@ -120,8 +122,9 @@ cdef class Wires:
         unlock(self._core._segment)
 
     def losses(self, uint64_t since):
-        """[(sent [ns], cause, interface)] of the frames lost from number `since` on, as far as the
-        log of LOSS_LOG goes back; and how many there were in all."""
+        """Return [(sent [ns], cause, interface)] of the frames lost from number `since` on, as far
+        as the log (LOSS_LOG) goes back, and the total number of lost frames.
+        """
         cdef uint64_t k
         cdef loss *x
         lock(self._core._segment)

@@ -1,5 +1,6 @@
-"""A segment as a TOML file: `[[device]]` tables in the order of the line, `[[fault]]` tables, a
-`[plant]` that their motors move.
+"""Segments in TOML files.
+
+`[[device]]` tables in the order of the line, `[[fault]]` tables, and a `[plant]` for their motors.
 
 ring = true
 
@@ -217,7 +218,7 @@ class PlantTable(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     contacts: bool = True
 
     def plant(self, path: str | Path) -> Plant:
-        """`path`: of the file; the model's is counted from there."""
+        """Make the plant. The path of the model is relative to the folder of the file `path`."""
         return Plant(
             Path(path).parent / self.model,
             self.joint,
@@ -236,7 +237,9 @@ class SegmentFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 OUT_OF_RANGE = (ArithmeticError, LookupError, ValueError, struct.error)
-HINT = "docs/virtual.md lists the fields of devices and plants, docs/faults.md those of faults"
+HINT = (
+    "see docs/virtual.md for the fields of devices and plants, docs/faults.md for those of faults"
+)
 
 
 @contextmanager
@@ -249,7 +252,7 @@ def _named(where: str) -> Iterator[None]:
 
 
 def _device_in_fault(kind: type, given: Any) -> Any:
-    """`with = {kind = "servo", ...}` of a fault."""
+    """Return the device of `with = {kind = "servo", ...}` in a fault."""
     if kind is not Device:
         raise NotImplementedError
     try:
@@ -273,8 +276,16 @@ def _read(path: str | Path) -> SegmentFile:
 
 
 def read_segment(path: str | Path, *, clock: ClockKind = "virtual", ring: bool = False) -> Segment:
-    """The segment of a file, with its faults; a ring where the file or the caller says so.
-    ConfigurationError names the file and the field."""
+    """Read a segment with its faults from a file.
+
+    Args:
+        path: The TOML file.
+        clock: See `Segment`.
+        ring: True makes it a ring, regardless of the file.
+
+    Raises:
+        ConfigurationError: The file is invalid. The message names the file and the field.
+    """
     file = _read(path)
     devices = []
     for position, table in enumerate(file.device):

@@ -1,7 +1,7 @@
-/* What a controller counts time with: a crystal whose frequency is off by a constant and swings
- * slowly with the temperature, and the scatter of the time stamps taken by it.
+/* The crystal of a controller: constant frequency error, slow swing with the temperature, and
+ * scatter of its time stamps.
  *
- * The count between two instants is a closed expression: a crystal costs nothing while nobody looks. */
+ * The count between two times is a closed formula, so that an unused crystal costs nothing. */
 #ifndef CATENARY_VIRTUAL_CRYSTAL_H
 #define CATENARY_VIRTUAL_CRYSTAL_H
 
@@ -9,20 +9,20 @@
 #include <stdint.h>
 
 typedef struct {
-    double error;                    /* of the frequency, as a share of it */
-    double swing;                    /* greatest share that the temperature adds or takes */
-    double turn;                     /* angular frequency of that [rad/ns], 0: none */
-    double scatter;                  /* time stamps lie within so much [ns] */
-    uint64_t random;                 /* state of the generator of the scatter */
+    double error;                    /* relative error of the frequency */
+    double swing;                    /* maximum relative change by the temperature */
+    double turn;                     /* angular frequency of this change [rad/ns], 0: none */
+    double scatter;                  /* width of the time stamps' scatter [ns] */
+    uint64_t random;                 /* generator state of the scatter */
 } crystal;
 
-/* How fast the crystal counts at `when`: 1 is right. */
+/* Rate of the crystal at `when`; 1 is exact. */
 static inline double crystal_rate(const crystal *x, int64_t when) {
     double swing = x->turn > 0 ? x->swing * sin(x->turn * (double)when) : 0;
     return 1.0 + x->error + swing;
 }
 
-/* What the crystal counts between two instants of the segment's clock [ns]. */
+/* Counted time between two times of the segment's clock [ns]. */
 static inline double crystal_count(const crystal *x, int64_t from, int64_t to) {
     double counted = (double)(to - from) * (1.0 + x->error);
     if (x->turn > 0)
@@ -30,7 +30,8 @@ static inline double crystal_count(const crystal *x, int64_t from, int64_t to) {
     return counted;
 }
 
-/* Uniform, half of the scatter either way; the same in every run (xorshift64*, Marsaglia 2003, Vigna 2016). */
+/* Uniform, half of the scatter in either direction; the same in every run (xorshift64*, Marsaglia
+ * 2003, Vigna 2016). */
 static inline int64_t crystal_scatter(crystal *x) {
     if (x->scatter <= 0)
         return 0;

@@ -1,4 +1,4 @@
-"""A controller's crystal, as the clocks of real ones are: a little off, and drifting."""
+"""A controller's crystal with the frequency error, drift and jitter of a real one."""
 
 from __future__ import annotations
 
@@ -7,17 +7,19 @@ from dataclasses import dataclass, fields
 from typing import Literal
 
 ClockBits = Literal[32, 64]
-PPM_LIMIT = 500.0  # beyond it no time control loop can follow
+PPM_LIMIT = 500.0  # beyond this a time control loop cannot follow
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Crystal:
-    """What a controller counts time with. The default is exact.
+    """Frequency error and time stamp jitter of a controller's clock. The default is exact.
 
-    ppm: constant error of the frequency; positive: it counts too fast.
-    drift_ppm, drift_period [s]: a slow sine of the temperature added to it.
-    jitter [s]: time stamps (receive times, system times read or compared) scatter evenly over so
-    much, half of it either way, the same in every run.
+    Attributes:
+        ppm: Constant frequency error [ppm]. Positive: the clock runs fast.
+        drift_ppm: Amplitude of a slow sine added to the frequency error, as from temperature [ppm].
+        drift_period: Period of this sine [s].
+        jitter: Width of the uniform scatter of time stamps (receive times, system times read or
+            compared) [s], half of it in either direction. The sequence is the same in every run.
     """
 
     ppm: float = 0.0
@@ -28,13 +30,15 @@ class Crystal:
     def __post_init__(self) -> None:
         for f in fields(self):
             if not math.isfinite(getattr(self, f.name)):
-                raise ValueError(f"crystal: {f.name} must be a number, not {getattr(self, f.name)}")
+                raise ValueError(f"crystal: {f.name} must be finite, not {getattr(self, f.name)}")
         if abs(self.ppm) + abs(self.drift_ppm) > PPM_LIMIT:
-            raise ValueError(f"a crystal is off by at most {PPM_LIMIT:g} ppm, drift included")
+            raise ValueError(f"crystal: |ppm| + |drift_ppm| must be at most {PPM_LIMIT:g} ppm")
         if self.drift_period < 1:
-            raise ValueError("a crystal's drift_period is at least 1 s: temperatures are slow")
+            raise ValueError(
+                f"crystal: drift_period must be at least 1 s, not {self.drift_period} s"
+            )
         if not 0 <= self.jitter <= 1e-3:
-            raise ValueError(f"a crystal's jitter is 0 to 1 ms, not {self.jitter} s")
+            raise ValueError(f"crystal: jitter must be 0 to 1 ms, not {self.jitter} s")
 
 
 EXACT = Crystal()

@@ -1,7 +1,7 @@
 /* Frames and datagrams, ETG.1000.4 §5.4: the fifteen commands, addressing and working counters.
  *
- * Everything in a frame is hostile: a length that does not fit ends the work on that frame, and
- * what was not reached goes back untouched. Budget: 0.1 us a datagram and device touched. */
+ * Everything in a frame is hostile. A length that does not fit ends the work on that frame, and
+ * the rest returns unchanged. Budget: 0.1 us per datagram and device accessed. */
 #ifndef CATENARY_VIRTUAL_DATAGRAM_H
 #define CATENARY_VIRTUAL_DATAGRAM_H
 
@@ -22,14 +22,14 @@ enum {
     ETHERNET_HEADER = 14,
     ETHERCAT_HEADER = 2,
     DATAGRAM_HEADER = 10,
-    CIRCULATING = 0x40                /* of a datagram's second length byte */
+    CIRCULATING = 0x40                /* bit of a datagram's second length byte */
 };
 
 static void fill_mask(uint8_t *mask, uint32_t address, uint32_t size, uint8_t bits) {
     memset(mask + address, bits, size);
 }
 
-/* Bits a MainDevice may change. What is 0 here is read-only or not modelled. */
+/* Bits that a MainDevice may change. A 0 bit is read-only or not modelled. */
 static void make_write_mask(uint8_t *mask) {
     memset(mask, 0, REG_END);
     fill_mask(mask, REG_STATION, 2, 0xFF);
@@ -73,7 +73,7 @@ static void make_write_mask(uint8_t *mask) {
     fill_mask(mask, REG_USER_RAM, REG_END - REG_USER_RAM, 0xFF);
 }
 
-/* Registers with a condition: may this byte be written now? */
+/* Registers with a condition: return 1 if this byte may be written now. */
 static inline int register_open(const controller *c, uint32_t address) {
     if (address >= REG_SII_CONTROL && address < REG_SII_END)
         return sii_accessible(c);
@@ -116,7 +116,7 @@ static void clear_error_counters(controller *c, uint32_t first, uint32_t end) {
             memset(c->memory + groups[k].address, 0, groups[k].size);
 }
 
-/* What a write of registers [first, end) sets going. */
+/* Apply the effects of a write to registers [first, end). */
 static void registers_written(controller *c, uint32_t first, uint32_t end, const uint8_t *data,
                               const uint8_t *activate_before, int64_t passage) {
     if (touches(first, end, REG_WRITE_ENABLE, REG_ESC_WRITE_PROTECTION + 1 - REG_WRITE_ENABLE))
@@ -147,8 +147,8 @@ static void registers_written(controller *c, uint32_t first, uint32_t end, const
     clock_registers_written(c, first, end, data, passage);
 }
 
-/* The SII command bits show what was commanded only after the write was judged: the control word
- * keeps its status bits through the mask. */
+/* The SII command bits change only after the write was checked: the control word keeps its status
+ * bits through the mask. */
 static int register_write(controller *c, uint32_t address, uint32_t size, const uint8_t *data, int64_t passage) {
     uint8_t activate[MAX_SM], loops = c->memory[REG_DL_CONTROL + 1];
     int done = 0;
@@ -185,7 +185,7 @@ static void register_read(controller *c, uint32_t address, uint32_t size, uint8_
         store16(event, load16(event) & (uint16_t)~ECAT_EVENT_DL_STATUS);
 }
 
-/* A physical access, clipped to the memory there is. 1: some byte was accessed. */
+/* A physical access, clipped to the existing memory. Return 1 if any byte was accessed. */
 static int physical_write(controller *c, uint32_t address, uint32_t size, const uint8_t *data, int64_t passage) {
     int done = 0;
     if (address < REG_END) {
@@ -215,7 +215,7 @@ static int physical_read(controller *c, uint32_t address, uint32_t size, uint8_t
     return done | ram_access(c, address, min32(size, c->memory_size - address), data, 0);
 }
 
-/* Read and write at once: what goes out is what was there before. */
+/* Read and write together: the data returned is that from before the write. */
 static int physical_exchange(controller *c, uint32_t address, uint32_t size, uint8_t *data, int64_t passage) {
     uint8_t *incoming = c->segment->incoming;
     memcpy(incoming, data, size);
@@ -251,7 +251,7 @@ static inline int station_matches(const controller *c, uint16_t station) {
         || ((c->memory[REG_DL_CONTROL + 3] & DL_CONTROL_ALIAS) && load16(c->memory + REG_ALIAS) == station);
 }
 
-/* One datagram at one controller. `header` is its ten bytes; ADP counts on in place. */
+/* Process one datagram at one controller. `header`: its ten bytes; ADP is incremented in place. */
 static int datagram_at(controller *c, uint8_t *header, uint32_t size, uint8_t *data, int64_t passage) {
     int command = header[0];
     uint16_t adp = load16(header + 2);
@@ -272,7 +272,7 @@ static int datagram_at(controller *c, uint8_t *header, uint32_t size, uint8_t *d
     return adp == 0 ? physical_command(c, command, ado, size, data, passage) : 0;
 }
 
-/* One datagram through the first `stops` processing units of a route. */
+/* Process one datagram in the first `stops` processing units of a route. */
 static void datagram_through(cat_segment *s, const route *r, uint32_t stops, uint8_t *header, uint32_t size) {
     uint8_t *data = header + DATAGRAM_HEADER;
     uint16_t counter = load16(data + size), interrupts = load16(header + 8);
@@ -289,15 +289,15 @@ static void datagram_through(cat_segment *s, const route *r, uint32_t stops, uin
     store16(data + size, counter);
 }
 
-/* Which datagrams there are: a frame whose lengths do not fit is an error of every processing unit. */
+/* Count an error in every processing unit: the lengths in the frame do not fit. */
 static void frame_malformed(cat_segment *s, const route *r, uint32_t stops) {
     s->counters.malformed++;
     for (uint32_t k = 0; k < stops; k++)
         count_up(r->stops[k].controller->memory + REG_PROCESSING_UNIT_ERRORS);
 }
 
-/* A whole Ethernet frame, in place, through the first `stops` processing units of a route.
- * `mark`: a closed port 0 on its way marks its datagrams as circulating. */
+/* Process a whole Ethernet frame, in place, in the first `stops` processing units of a route.
+ * `mark`: a closed port 0 on the route marks its datagrams as circulating. */
 static void frame_process(cat_segment *s, const route *r, uint32_t stops, int mark, uint8_t *frame, uint32_t length) {
     uint16_t head = load16(frame + ETHERNET_HEADER);
     uint32_t at = ETHERNET_HEADER + ETHERCAT_HEADER;
@@ -305,7 +305,7 @@ static void frame_process(cat_segment *s, const route *r, uint32_t stops, int ma
     s->route = r;
     inputs_flush(s);
     if (stops > 0)
-        frame[6] |= 0x02;             /* controllers mark what they processed as locally administered */
+        frame[6] |= 0x02;             /* controllers set the "locally administered" bit of processed frames */
     if (head >> 12 != 1 || end > length) {
         frame_malformed(s, r, stops);
         return;
@@ -336,8 +336,8 @@ static inline int frame_is_marked(const uint8_t *frame, uint32_t length) {
     return length > at && (frame[at] & CIRCULATING);
 }
 
-/* A frame that came in at an interface, worked through all it reaches. The interface it leaves at,
- * or -cause: it is lost. */
+/* Process a received frame along its whole route. Return the interface at which it leaves, or
+ * -cause if it is lost. */
 static int frame_through(cat_segment *s, const route *r, const fate *fate, uint8_t *frame, uint32_t length) {
     uint32_t stops = r->stop_count;
     int exit = r->exit, mark = r->circulates > 0;

@@ -1,4 +1,4 @@
-"""The description of a virtual device, from which its SII image and its objects are made."""
+"""Description of a virtual device, the source of its SII image and its objects."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from dataclasses import dataclass, replace
 from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 from catenary.virtual.op_modes import STANDARD, OpMode
 
-# Private: no vendor of the EtherCAT Technology Group has this identity ("CTNY" in ASCII).
+# Private vendor ID, not assigned by the EtherCAT Technology Group ("CTNY" in ASCII).
 VENDOR_ID = 0x43544E59
 
 
 @dataclass(frozen=True, slots=True)
 class MappedEntry:
-    """One entry of a PDO; index 0 is a gap of `bits`."""
+    """One entry of a PDO. Index 0 is a gap of `bits`."""
 
     index: int
     subindex: int
     bits: int
     name: str
-    data_type: int = 0  # CANopen's number, ETG.1020
+    data_type: int = 0  # CANopen data type, ETG.1020
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class SyncManagerDefault:
 
 @dataclass(frozen=True, slots=True)
 class MailboxDefault:
-    """Offsets and sizes of the standard mailbox, seen from the MainDevice: `receive` is SM0."""
+    """Offsets and sizes of the standard mailbox as the MainDevice names them: `receive` is SM0."""
 
     receive_offset: int
     receive_size: int
@@ -63,7 +63,7 @@ class Description:
     product_code: int
     serial: int
     alias: int
-    emulation: bool  # AL status follows AL control: no microcontroller
+    emulation: bool  # AL status follows AL control, without a microcontroller
     pdi_type: int
     mailbox: MailboxDefault | None
     sync_managers: tuple[SyncManagerDefault, ...]
@@ -78,17 +78,17 @@ class Description:
     identification: int = 0
     ports: tuple[int, ...] = (0, 1)
     mapping_quirks: MappingQuirks = NO_MAPPING_QUIRKS
-    op_modes: tuple[OpMode, ...] = STANDARD  # of a device with clock and axes
-    loop_control: bool = True  # its ports can be closed (0x0101)
+    op_modes: tuple[OpMode, ...] = STANDARD  # for devices with a clock and axes
+    loop_control: bool = True  # the ports can be closed (0x0101)
     lrw: bool = True
-    sii_variant: str = ""  # how the SII differs from the device
+    sii_variant: str = ""  # describes how the SII differs from the device
 
     @property
     def revision(self) -> int:
-        """Revision 1 in the upper word; in the lower one a checksum of all but the names.
+        """Revision number: upper word 1, lower word a checksum of all fields except the names.
 
-        Devices whose SIIs differ have different revisions: SOEM copies the SII of the first device
-        of an identity to all others (src/ec_config.c, ecx_lookup_prev_sii).
+        Devices with different SIIs have different revisions. SOEM copies the SII of the first
+        device of an identity to all others (src/ec_config.c, ecx_lookup_prev_sii).
         """
         kind = replace(self, name="", order="", group="", serial=0, alias=0, identification=0)
         return 0x0001_0000 | zlib.crc32(repr(kind).encode()) & 0xFFFF

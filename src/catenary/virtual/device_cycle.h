@@ -1,9 +1,9 @@
-/* When a device's model steps, and when its process data changes hands: at its own cycle ("free
- * run"), or by SYNC0 pulses ("DC Sync0", ETG.1020 §0x1C32). In the same way by SYNC1 ("DC Sync1").
+/* Steps of a device's model and exchange of its process data: at its own cycle ("free run"), by
+ * SYNC0 pulses ("DC Sync0", ETG.1020 §0x1C32), or in the same way by SYNC1 ("DC Sync1").
  *
- * With SYNC0 the device latches its inputs and takes over its outputs at the pulse, and its own cycle
- * is a part of SYNC0's, locked to it: a pulse restarts the count. Where pulses stay away the own
- * cycle goes on, half a step later than expected, until the device gives them up. */
+ * With SYNC0 the device latches its inputs and updates its outputs at the pulse. Its own cycle is a
+ * fraction of the SYNC0 cycle and locked to it: a pulse restarts the count. Without pulses its own
+ * cycle continues, half a step later than expected, until the device detects the loss. */
 #ifndef CATENARY_VIRTUAL_DEVICE_CYCLE_H
 #define CATENARY_VIRTUAL_DEVICE_CYCLE_H
 
@@ -11,7 +11,7 @@
 #include "servo.h"
 #include "sync_unit.h"
 
-enum { CATCH_UP_STEPS = 4000 };       /* a clock that jumped further is not caught up with */
+enum { CATCH_UP_STEPS = 4000 };       /* limit of catching up after a jump of the clock */
 
 static void model_axes(controller *c, int fresh) {
     for (int k = 0; k < c->axis_count; k++)
@@ -40,7 +40,7 @@ static inline void outputs_accept(controller *c) {
     outputs_take(c);
 }
 
-/* One step at the device's own cycle. */
+/* One step of the device's own cycle. */
 static void model_step_free(controller *c) {
     int fresh = 0;
     if (c->outputs.sm >= 0 && c->outputs_valid) {
@@ -53,7 +53,7 @@ static void model_step_free(controller *c) {
     model_inputs(c);
 }
 
-/* The pulses have stopped: nobody holds the device to the bus any more. */
+/* The pulses have stopped: end the synchronisation of the device. */
 static void pulses_lost(controller *c) {
     synchronous_cycle *d = &c->synchronous;
     if (!d->seen || c->segment->now - d->last <= (int64_t)(d->limit + 1) * d->cycle)
@@ -73,7 +73,7 @@ static void model_step_between(controller *c) {
     if (d->left >= 0)
         d->left--;
     if (d->left == 0)
-        c->step_due += c->step_period / 2;                   /* the next pulse is to come first */
+        c->step_due += c->step_period / 2;                   /* the next pulse must come first */
     if (d->left >= 0)
         return;
     pulses_lost(c);
@@ -90,7 +90,7 @@ static void model_step(controller *c) {
         model_step_free(c);
 }
 
-/* 1: there are outputs that came since the last pulse, early enough to be copied for this one. */
+/* Return 1 if new outputs arrived since the last pulse, early enough to be copied for this one. */
 static int outputs_in_time(controller *c) {
     synchronous_cycle *d = &c->synchronous;
     if (c->outputs.sm < 0 || !(*outputs_status(c) & SM_STATUS_WRITTEN))
@@ -112,14 +112,15 @@ static void outputs_missed(controller *c) {
     raise_event(c, EVENT_SYNC_MISSED);
 }
 
-/* A terminal without microcontroller: its controller lays the outputs on the pins at SYNC0 by itself
- * (Beckhoff, EtherCAT Slave Controller, section II, 0x0150 digital I/O: "outputs updated at SYNC0"). */
+/* A terminal without microcontroller: its controller updates the output pins at SYNC0 by itself
+ * (Beckhoff, EtherCAT Slave Controller, section II, 0x0150 digital I/O: "outputs updated at
+ * SYNC0"). */
 static void pins_sync0(controller *c) {
     if (c->outputs.sm >= 0 && c->outputs_valid)
         outputs_accept(c);
 }
 
-/* A pulse that the device keeps time by, now. */
+/* A pulse that the device synchronises to occurs now. */
 static void model_pulse(controller *c) {
     synchronous_cycle *d = &c->synchronous;
     int64_t now = c->segment->now;
@@ -146,8 +147,8 @@ static void model_pulse(controller *c) {
     c->step_due = now + c->step_period + (d->left == 0 ? c->step_period / 2 : 0);
 }
 
-/* From now on the device keeps time by pulses of `signal` (SYNC_PULSE_0 or _1), `cycle` apart, in
- * `steps` steps of its own. */
+/* Synchronise the device to pulses of `signal` (SYNC_PULSE_0 or _1) with period `cycle`, divided
+ * into `steps` steps of its own. */
 static void synchronous_begin(controller *c, int64_t cycle, int steps, uint8_t signal) {
     synchronous_cycle *d = &c->synchronous;
     d->cycle = cycle;
@@ -172,7 +173,7 @@ static inline void model_period(controller *c, int64_t period) {
     due_at(c, c->step_due);
 }
 
-/* All work of the model that is due now: a pulse comes before a step. */
+/* Do all work of the model that is due now: a pulse before a step. */
 static inline void device_advance(controller *c) {
     int64_t now = c->segment->now;
     int pulses = c->sync.due <= now ? sync_advance(c) : 0;

@@ -1,4 +1,4 @@
-"""Faults take their course: each begins and ends at its instant, and is written down."""
+"""Playback of faults: start and end each fault at its time, and log it."""
 
 from __future__ import annotations
 
@@ -17,31 +17,31 @@ from catenary.virtual.scheduler import Agenda
 from catenary.virtual.wiring import Wiring
 
 SECOND = 1_000_000_000
-# In the order of the compiled side (frame_faults.h).
+# Same order as in the compiled code (frame_faults.h).
 FRAME_KINDS = ("lose_out", "lose_back", "corrupt", "garble", "delay", "duplicate")
 LOSS_CAUSES = {
-    1: "no light",  # ran into a dark cable before the controllers had seen that it is dark
+    1: "no light",  # entered a dark cable before the controllers detected the loss
     2: "closed port",
     3: "circulating",
-    4: "in flight",  # a cable went dark under it
+    4: "in flight",  # a cable went dark while the frame was on it
     5: "injected",
     6: "corrupt",
-    7: "expired",  # it was in the socket of a served segment for longer than `max_age`
+    7: "expired",  # waited in the socket of a served segment for longer than `max_age`
 }
 
 End: TypeAlias = Callable[[], None]
 
 
 class FaultEvent(NamedTuple):
-    """What was injected when [s], the segment's time."""
+    """Entry of the fault log: time on the segment's clock [s], the fault, and what happened."""
 
     time: float
     fault: f.Fault
-    what: Literal["begins", "ends", "misses"]  # misses: there is nothing (any more) it could hit
+    what: Literal["begins", "ends", "misses"]  # misses: its target has disappeared
 
 
 class Loss(NamedTuple):
-    """A frame that did not come back: when it was sent [s], why, and on which link (0, 1)."""
+    """A lost frame: when it was sent [s], why it was lost, and on which link (0, 1)."""
 
     time: float
     cause: str
@@ -49,7 +49,7 @@ class Loss(NamedTuple):
 
 
 class FaultPlayer:
-    """Owns the faults that are planned or on, and the log of them."""
+    """Owns the planned and active faults, and their log."""
 
     def __init__(
         self,
@@ -66,7 +66,7 @@ class FaultPlayer:
         self.wiring = wiring
         self._agenda = agenda
         self._replaced = replaced
-        self._waiting: list[f.Fault] = []  # real time: until the first frame
+        self._waiting: list[f.Fault] = []  # real time: wait for the first frame
         self._planned = 0
         self._frame_faults: list[tuple[int, f.FrameFault]] = []
         self._losses_seen = 0
@@ -79,12 +79,16 @@ class FaultPlayer:
 
     @property
     def done(self) -> bool:
-        """No fault is still to begin or to end."""
+        """True if no fault is still to begin or to end."""
         left = any(self._wires.frame_fault_left(n) > 0 for n, _fault in self._frame_faults)
         return not (self._waiting or self._planned or left)
 
     def add(self, fault: f.Fault) -> None:
-        """Plans it. ValueError names the field that does not fit this segment."""
+        """Plan a fault.
+
+        Raises:
+            ValueError: The fault does not fit this segment. The message names the field.
+        """
         self._check(fault)
         if fault.at is None:
             self._now(fault)
@@ -96,7 +100,7 @@ class FaultPlayer:
     def _now(self, fault: f.Fault) -> None:
         if self._core.is_virtual:
             self._begin(fault)
-        else:  # devices belong to the service's thread
+        else:  # the service's thread owns the devices
             self._planned += 1
             self._agenda.after(0, partial(self._due, fault))
 
@@ -105,7 +109,7 @@ class FaultPlayer:
         self._agenda.at(self._core.epoch + round(at * SECOND), partial(self._due, fault))
 
     def start(self) -> None:
-        """The first frame came: time counts from it."""
+        """Start the fault clock. Called at the first frame."""
         waiting, self._waiting = self._waiting, []
         for fault in waiting:
             self._plan(fault, fault.at or 0.0)
@@ -118,7 +122,7 @@ class FaultPlayer:
         try:
             self._check_kind(fault)
             self._check_room(fault)
-        except ValueError:  # another device stands there by now
+        except ValueError:  # the device was replaced meanwhile
             self.log.append(FaultEvent(self.now, fault, "misses"))
             return
         self.log.append(FaultEvent(self.now, fault, "begins"))
@@ -137,12 +141,12 @@ class FaultPlayer:
         end()
 
     def take_losses(self) -> list[Loss]:
-        """The frames that did not come back, since the last call; the latest 4096 at most."""
+        """Return the frames lost since the last call, at most the latest 4096."""
         found, self._losses_seen = self._wires.losses(self._losses_seen)
         epoch = max(self._core.epoch, 0)
         return [Loss((sent - epoch) / SECOND, LOSS_CAUSES[why], end) for sent, why, end in found]
 
-    # -- what fits -----------------------------------------------------------------------------
+    # -- checks --------------------------------------------------------------------------------
 
     def _check(self, fault: f.Fault) -> None:
         try:
@@ -155,7 +159,7 @@ class FaultPlayer:
     def _check_place(self, name: str, position: int | None) -> None:
         if position is not None and position >= len(self._devices):
             last = len(self._devices) - 1
-            raise ValueError(f"{name}: there is no device {position}, the last one is {last}")
+            raise ValueError(f"{name}: device {position} does not exist; the last one is {last}")
 
     def _check_kind(self, fault: f.Fault) -> None:
         match fault:
@@ -180,12 +184,12 @@ class FaultPlayer:
         if isinstance(fault, f.FrameFault):
             self._drop_used_up()
             if len(self._frame_faults) >= FRAME_FAULTS_MAX:
-                raise ValueError(f"at most {FRAME_FAULTS_MAX} faults can hit frames at a time")
+                raise ValueError(f"at most {FRAME_FAULTS_MAX} frame faults can be active at a time")
 
     def _check_ports(self, name: str, device: Device, position: int) -> None:
         for port in range(4):
             if self.wiring.at_port(position, port) and port not in device.ports:
-                raise ValueError(f"{name}: {device.name} has no port {port}, where a cable hangs")
+                raise ValueError(f"{name}: {device.name} has no port {port}, but a cable is there")
 
     def _applied(self, position: int) -> AppliedDevice:
         device = self._devices[position]
@@ -196,13 +200,13 @@ class FaultPlayer:
     def _servo(self, position: int) -> Servo:
         device = self._devices[position]
         if not isinstance(device, Servo):
-            raise ValueError(f"device: device {position}, {device.kind}, is no servo")
+            raise ValueError(f"device: device {position}, {device.kind}, is not a servo")
         return device
 
-    # -- what happens --------------------------------------------------------------------------
+    # -- injection -----------------------------------------------------------------------------
 
     def _inject(self, fault: f.Fault) -> End | None:
-        """Begins it; what ends it."""
+        """Begin the fault and return the function that ends it, if any."""
         core, wires = self._core, self._wires
         match fault:
             case f.LoseFrames() | f.Corrupt() | f.Garble() | f.Delay() | f.Duplicate():
@@ -259,7 +263,7 @@ class FaultPlayer:
         device = self._applied(fault.device)
         application = device.application
         if not self._core.powered(fault.device):
-            return None  # it has no application now, and forgets what was done to the last one
+            return None  # a device without power has lost its application
         match fault:
             case f.MailboxSilent():
                 application.mailbox.silence(True)
@@ -279,7 +283,7 @@ class FaultPlayer:
         return lambda: undo() if device in self._devices else None
 
     def _while_running(self, device: AppliedDevice, undo: End) -> End:
-        """A device that was off since then has forgotten it anyway."""
+        """Return `undo`, skipped if the device was off meanwhile and has lost the fault anyway."""
         application = device.application
         return lambda: undo() if device.application is application else None
 

@@ -1,11 +1,11 @@
-"""Faults in plain words: frozen values that a segment obeys, in Python and as `[[fault]]` tables.
+"""Faults: frozen values to inject into a segment, in Python or as `[[fault]]` tables.
 
     Segment(devices, faults=[lose_frames(3, at=2.0), power_cycle(2, at=1.5, for_=0.8)])
     segment.inject(cut(between=(4, 5)))          # no `at`: at once
 
-Every fault has `at` [s], the segment's time (docs/faults.md says from when it counts); without it
-the fault begins at once. `for_` [s] is how long it lasts; without it: to the end. In TOML `kind`
-is the word, and `for_` and `with_` are written `for` and `with`.
+Every fault has a start time `at` [s] on the segment's clock (docs/faults.md defines its zero).
+Without `at` the fault starts at once. `for_` is its duration [s]; without it the fault never ends.
+In TOML the field `kind` names the fault, and `for_` and `with_` are written `for` and `with`.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def _check(name: str, value: float | None, low: float, *, above: bool = False) -
     if value is None:
         return
     if not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise ValueError(f"{name} must be a number, not {value!r}")
+        raise ValueError(f"{name} must be a finite number, not {value!r}")
     if value < low or (above and value == low):
         raise ValueError(f"{name} must be {'above' if above else 'at least'} {low:g}, not {value}")
 
@@ -41,7 +41,7 @@ class _Fault(
 
     @property
     def kind(self) -> str:
-        """The word for it."""
+        """Name of the fault, as in a `[[fault]]` table."""
         return str(self.__struct_config__.tag)
 
 
@@ -54,8 +54,10 @@ class _Lasting(_Fault, frozen=True, kw_only=True):
 
 
 class _OfFrames(_Lasting, frozen=True, kw_only=True):
-    """Hits the first frame from `at` on and then every `every`-th, `n` in all; without `n`: one, or
-    all within `for_`."""
+    """Fault that hits the first frame from `at` on, then every `every`-th, `n` frames in total.
+
+    Without `n` it hits one frame, or all frames within `for_`.
+    """
 
     every: int = 1
 
@@ -66,13 +68,13 @@ class _OfFrames(_Lasting, frozen=True, kw_only=True):
 
     @property
     def frames(self) -> int | None:
-        """How many it hits at most; None: no end."""
+        """Maximum number of frames to hit; None: unlimited."""
         n: int | None = getattr(self, "n", None)
         return 1 if n is None and self.for_ is None else n
 
 
 class LoseFrames(_OfFrames, tag="lose_frames", frozen=True):
-    """Frames vanish: on their way "out", before the first device, or on their way "back"."""
+    """Frames are lost on the way "out" (before the first device) or on the way "back"."""
 
     n: int | None = None
     way: Literal["out", "back"] = msgspec.field(default="out")
@@ -80,20 +82,25 @@ class LoseFrames(_OfFrames, tag="lose_frames", frozen=True):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.way not in ("out", "back"):
-            raise ValueError(f'way is "out" or "back", not {self.way!r}')
+            raise ValueError(f'way must be "out" or "back", not {self.way!r}')
 
 
 class Corrupt(_OfFrames, tag="corrupt", frozen=True):
-    """Bits turn on the cable between two neighbours: the controllers behind count it and take
-    nothing from the frame, and the MainDevice's interface drops it."""
+    """Bits flip on the cable between two neighbours.
+
+    The controllers behind the cable count the error and ignore the frame. The MainDevice's
+    interface drops it.
+    """
 
     n: int | None = None
     between: tuple[Neighbour, Neighbour] = ("main", 0)
 
 
 class Garble(_OfFrames, tag="garble", frozen=True):
-    """Frames come back with wrong bytes and a check sequence that fits: the byte at `offset`
-    inverted, or one bit anywhere."""
+    """Frames return with wrong bytes but a valid check sequence.
+
+    The byte at `offset` is inverted; without `offset` one random bit is.
+    """
 
     n: int | None = None
     offset: int | None = None
@@ -104,7 +111,7 @@ class Garble(_OfFrames, tag="garble", frozen=True):
 
 
 class Delay(_OfFrames, tag="delay", frozen=True):
-    """Frames come back `by` [s] later."""
+    """Frames return `by` [s] later."""
 
     n: int | None = None
     by: float = 1e-3
@@ -115,19 +122,19 @@ class Delay(_OfFrames, tag="delay", frozen=True):
 
 
 class Duplicate(_OfFrames, tag="duplicate", frozen=True):
-    """Frames come back twice."""
+    """Frames return twice."""
 
     n: int | None = None
 
 
 class Cut(_Lasting, tag="cut", frozen=True):
-    """No light between two neighbours ("main": the MainDevice); joined again after `for_`."""
+    """Broken cable between two neighbours ("main": the MainDevice); repaired after `for_`."""
 
     between: tuple[Neighbour, Neighbour]
 
 
 class Join(_Fault, tag="join", frozen=True):
-    """The cable between two neighbours is whole (again)."""
+    """Repair of the cable between two neighbours."""
 
     between: tuple[Neighbour, Neighbour]
 
@@ -146,46 +153,48 @@ class _LastingOfDevice(_Lasting, frozen=True, kw_only=True):
 
 
 class Unplug(_LastingOfDevice, tag="unplug", frozen=True):
-    """The cable towards the MainDevice is pulled from a device, which keeps its power."""
+    """The uplink cable of a device is unplugged. The device keeps its power."""
 
     device: int
 
 
 class Replug(_OfDevice, tag="replug", frozen=True):
-    """... and put in again."""
+    """The uplink cable of a device is plugged in again."""
 
     device: int
 
 
 class PowerCycle(_LastingOfDevice, tag="power_cycle", frozen=True):
-    """A device has no power for `for_`; what is behind it is gone too, unless there is a ring.
-    It comes back in INIT, without station address, with its objects' defaults."""
+    """A device loses power for `for_`. Without a ring, all devices behind it are unreachable too.
+
+    The device returns in INIT, without station address and with default object values.
+    """
 
     device: int
 
 
 class Swap(_LastingOfDevice, tag="swap", frozen=True):
-    """A device is taken out, and `with_` put in its place, at once or `for_` later."""
+    """A device is removed and replaced by `with_`, at once or after `for_`."""
 
     device: int
     with_: Device = msgspec.field(name="with")
 
 
 class Exchange(_LastingOfDevice, tag="exchange", frozen=True):
-    """Two devices change places, as after a repair; both are without power for `for_`."""
+    """Two devices change places, as after a repair. Both are without power for `for_`."""
 
     device: int
     other: int
 
 
 class MailboxSilent(_LastingOfDevice, tag="mailbox_silent", frozen=True):
-    """A device takes no request from its mailbox: SM0 stays full, SM1 empty."""
+    """A device stops reading its mailbox: SM0 stays full and SM1 stays empty."""
 
     device: int
 
 
 class LateMailbox(_LastingOfDevice, tag="late_mailbox", frozen=True):
-    """A device takes `by` [s] longer for what it is asked by mailbox."""
+    """A device takes `by` [s] longer to answer mailbox requests."""
 
     device: int
     by: float = 0.05
@@ -211,7 +220,7 @@ class RefuseState(_LastingOfDevice, tag="refuse_state", frozen=True):
 
 
 class LeaveState(_OfDevice, tag="leave_state", frozen=True):
-    """A device falls to a lower state by itself and shows an AL status code."""
+    """A device falls back to a lower state by itself and shows an AL status code."""
 
     device: int
     state: int | str = "SAFE-OP"
@@ -224,19 +233,19 @@ class LeaveState(_OfDevice, tag="leave_state", frozen=True):
 
 
 class WrongWorkingCounter(_LastingOfDevice, tag="wrong_working_counter", frozen=True):
-    """A device lets process data pass it by: it neither takes nor gives nor counts."""
+    """A device ignores logical datagrams: it neither reads, writes nor counts them."""
 
     device: int
 
 
 class Freeze(_LastingOfDevice, tag="freeze", frozen=True):
-    """A device's model stands still; its controller goes on answering with old inputs."""
+    """A device's model stops; its controller continues to answer with old inputs."""
 
     device: int
 
 
 class DriveFault(_LastingOfDevice, tag="drive_fault", frozen=True):
-    """A servo's axis has a fault with this error code (0x603F); its cause goes after `for_`."""
+    """A servo's axis enters fault with this error code (0x603F). The cause ends after `for_`."""
 
     device: int
     code: int = 0x2310
@@ -244,14 +253,14 @@ class DriveFault(_LastingOfDevice, tag="drive_fault", frozen=True):
 
 
 class SafeTorqueOff(_LastingOfDevice, tag="safe_torque_off", frozen=True):
-    """A servo's axis has its torque taken off by its safety input."""
+    """Safe torque off of a servo's axis."""
 
     device: int
     axis: int = 0
 
 
 class Drift(_LastingOfDevice, tag="drift", frozen=True):
-    """A device's crystal runs `ppm` millionths fast (negative: slow)."""
+    """A device's crystal runs fast by `ppm` [ppm] (negative: slow)."""
 
     device: int
     ppm: float
@@ -289,14 +298,18 @@ Fault: TypeAlias = (
 
 
 def number_of_state(state: int | str) -> int:
-    """1 INIT, 2 PRE-OP, 3 BOOT, 4 SAFE-OP, 8 OP."""
+    """Return the AL state number: 1 INIT, 2 PRE-OP, 3 BOOT, 4 SAFE-OP, 8 OP.
+
+    Raises:
+        ValueError: The name or number is not an AL state.
+    """
     number = STATES.get(state) if isinstance(state, str) else state
     if number is None or number not in STATES.values():
-        raise ValueError(f"state {state!r} is none of {', '.join(STATES)}")
+        raise ValueError(f"unknown state {state!r}; use one of {', '.join(STATES)}")
     return number
 
 
-# The words, as scenarios use them.
+# Lower-case names, the same as `kind` in a `[[fault]]` table.
 lose_frames = LoseFrames
 corrupt = Corrupt
 garble = Garble

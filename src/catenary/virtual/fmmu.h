@@ -37,7 +37,8 @@ static inline void put_bit(uint8_t *p, uint64_t bit, int value) {
     p[bit >> 3] = (uint8_t)(value ? p[bit >> 3] | mask : p[bit >> 3] & ~mask);
 }
 
-/* The part of the datagram [base, base + size) bytes that FMMU f covers. 1: accessed. */
+/* Access the part of the datagram [base, base + size) bytes that FMMU f covers. Return 1 if
+ * accessed. */
 static int fmmu_access(controller *c, const fmmu *f, uint64_t base, uint32_t size, uint8_t *data, int write) {
     uint64_t lo = f->first > base * 8 ? f->first : base * 8;
     uint64_t hi = f->end < (base + size) * 8 ? f->end : (base + size) * 8;
@@ -72,8 +73,8 @@ static int fmmu_access(controller *c, const fmmu *f, uint64_t base, uint32_t siz
     return 1;
 }
 
-/* A logical datagram at one controller: how much the working counter rises. The outputs are taken
- * before the inputs are put in, as a frame whose outputs and inputs overlap needs it. */
+/* Process a logical datagram at one controller; return the increment of the working counter.
+ * Outputs are read before inputs are written, as required for overlapping areas of a frame. */
 static inline int fmmu_datagram(controller *c, uint32_t address, uint32_t size, uint8_t *data, int reads, int writes) {
     uint64_t base = address;
     if (c->fmmu_active == 0 || c->logical_end <= base * 8 || c->logical_first >= (base + size) * 8)

@@ -1,17 +1,17 @@
-/* Faults that hit frames: which ones, and what becomes of them; and the log of what did not come
- * back. Nothing here costs a frame more than one comparison while no such fault is on. */
+/* Faults that hit frames: selection, effect, and the log of lost frames. Without such a fault, a
+ * frame costs at most one additional comparison. */
 #ifndef CATENARY_VIRTUAL_FRAME_FAULTS_H
 #define CATENARY_VIRTUAL_FRAME_FAULTS_H
 
 #include "route.h"
 
-/* The order is that of fault_player.FRAME_KINDS. LOSE_OUT: before the first device; LOSE_BACK:
- * behind the last. CORRUPT: bits turn on a cable; GARBLE: with a check sequence that fits. */
+/* Same order as fault_player.FRAME_KINDS. LOSE_OUT: before the first device; LOSE_BACK: after the
+ * last. CORRUPT: bits flip on a cable; GARBLE: wrong bytes with a valid check sequence. */
 enum frame_fault_kind { FAULT_LOSE_OUT, FAULT_LOSE_BACK, FAULT_CORRUPT, FAULT_GARBLE, FAULT_DELAY, FAULT_DUPLICATE };
 
 typedef struct {
     int lose_out, lose_back, garble, offset, duplicate;
-    const arrival *corrupt;          /* where the bits had turned when it came in */
+    const arrival *corrupt;          /* arrival at which the bits had flipped */
     int64_t delay;
 } fate;
 
@@ -43,7 +43,7 @@ static void fate_add(cat_segment *s, const frame_fault *f, const arrival *where,
     }
 }
 
-/* What becomes of the frame that takes this route; counts it. */
+/* Return the effect of faults on the frame that takes this route; count it. */
 static fate fate_of(cat_segment *s, const route *r) {
     fate result = NO_FATE;
     for (int n = 0; s->fault_count && n < MAX_FRAME_FAULTS; n++) {
@@ -59,7 +59,7 @@ static fate fate_of(cat_segment *s, const route *r) {
     return result;
 }
 
-/* Inverts the byte at `offset`, or one bit anywhere behind the Ethernet header. */
+/* Invert the byte at `offset`, or one bit anywhere after the Ethernet header. */
 static void frame_garble(cat_segment *s, uint8_t *frame, uint32_t length, int offset) {
     if (offset >= 0 && (uint32_t)offset < length)
         frame[offset] ^= 0xFF;
@@ -69,7 +69,7 @@ static void frame_garble(cat_segment *s, uint8_t *frame, uint32_t length, int of
     frame[14 + bit / 8] ^= (uint8_t)(1u << (bit & 7));
 }
 
-/* Bad bits are counted by the port they came in at, and by all controllers behind as forwarded. */
+/* Count bad bits: at the port where they arrived, and at all later controllers as forwarded errors. */
 static void frame_corrupted(cat_segment *s, const route *r, const arrival *where) {
     for (const arrival *a = where; a < r->arrivals + r->arrival_count; a++) {
         if (a->device < 0)

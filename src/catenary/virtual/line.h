@@ -1,7 +1,8 @@
 /* The line: frames on their way, due work, and the two clocks.
  *
- * A frame is worked through all controllers when it is sent and comes back after its own length
- * on the wire and the delay of its route, unless a cable on it goes dark before. In virtual time `now` advances in `wait_until` only. */
+ * A frame is processed in all controllers when it is sent. It returns after its own length on the
+ * wire and the delay of its route, unless a cable on it goes dark before. In virtual time only
+ * `wait_until` advances `now`. */
 #ifndef CATENARY_VIRTUAL_LINE_H
 #define CATENARY_VIRTUAL_LINE_H
 
@@ -17,7 +18,7 @@
 enum {
     BYTE_NS = 80,                     /* 100 Mbit/s */
     FRAME_OVERHEAD = 8 + 4 + 12,      /* preamble, check sequence, gap */
-    INSTANTS_MAX = 10000              /* that are worked off before the next frame, in real time */
+    INSTANTS_MAX = 10000              /* limit of due times processed before the next frame, in real time */
 };
 
 static int64_t monotonic_now(void) {
@@ -29,7 +30,7 @@ static int64_t monotonic_now(void) {
 static void wake_service(cat_segment *s) {
     if (s->event_fd >= 0) {
         uint64_t one = 1;
-        ssize_t written = write(s->event_fd, &one, sizeof one);   /* full: it is awake already */
+        ssize_t written = write(s->event_fd, &one, sizeof one);   /* full: the thread is awake already */
         (void)written;
     }
 }
@@ -37,7 +38,7 @@ static void wake_service(cat_segment *s) {
 static inline void lock(cat_segment *s) { pthread_mutex_lock(&s->mutex); }
 static inline void unlock(cat_segment *s) { pthread_mutex_unlock(&s->mutex); }
 
-/* All compiled work of one controller that is due at `now`; when the next is. */
+/* Do all compiled work of one controller that is due at `now`; return the next due time. */
 static int64_t controller_advance(controller *c) {
     int64_t *due = c->segment->dues + c->position;
     *due = NEVER;
@@ -52,8 +53,8 @@ static int64_t controller_advance(controller *c) {
     return *due;
 }
 
-/* Frames that a dark cable catches on their way are lost, though the controllers behind have had
- * them already: at most the frames of some microseconds. */
+/* Lose the frames that are on a cable when it goes dark, although controllers after it have already
+ * processed them. These are at most the frames of some microseconds. */
 static void lose_in_flight(cat_segment *s, segment_end *e) {
     uint32_t kept = e->head;
     for (uint32_t k = e->head; k != e->tail; k++) {
@@ -74,7 +75,7 @@ static void lose_in_flight(cat_segment *s, segment_end *e) {
     e->tail = kept;
 }
 
-/* Cables or power changed. `at_once`: the controllers need no time to see it. */
+/* Handle a change of cables or power. `at_once`: without the controllers' detection time. */
 static void segment_light(cat_segment *s, int at_once) {
     int64_t detection = s->detection;
     routes_refresh(s);
@@ -88,10 +89,11 @@ static void segment_light(cat_segment *s, int at_once) {
         links_check(s);
 }
 
-/* Runs compiled work up to `until`, in the order of its times; in virtual time it stops where an
- * event wants the application. With a plant every instant has its turn, so that motors and joints
- * keep step however late it is; the joints come first, as encoders show what was before. In real time
- * what exceeds INSTANTS_MAX waits: no number of SYNC0 pulses that frames ask for keeps frames waiting. */
+/* Do compiled work up to `until`, in the order of its times. In virtual time stop when an event
+ * needs the application. With a plant every due time is processed separately, so that motors and
+ * joints stay in step even when late. Joints come first, because encoders show the earlier state.
+ * In real time work beyond INSTANTS_MAX waits: no number of SYNC0 pulses requested by frames can
+ * delay frames. */
 static void segment_work(cat_segment *s, int64_t until, int steps_plant) {
     int64_t bound = plant_bound(s, until, steps_plant);
     for (uint32_t left = INSTANTS_MAX; s->next_due <= bound && (s->is_virtual || left > 0); left--) {
@@ -119,15 +121,15 @@ static void segment_work(cat_segment *s, int64_t until, int steps_plant) {
         s->now = until;
 }
 
-/* In real time a plant is stepped by its own thread: others go no further than its next step. */
+/* In real time a plant is stepped by its own thread. Other threads stop at its next step. */
 static inline void segment_advance(cat_segment *s, int64_t until) { segment_work(s, until, s->is_virtual); }
 
-/* The next place in the queue of frames towards an interface. */
+/* Return the next place in the queue of frames towards an interface. */
 static inline queued_frame *queue_place(segment_end *e) {
     return &e->queue[e->order[e->tail & (QUEUE_SIZE - 1)]];
 }
 
-/* The frame in the next place is complete: it stands behind those that arrive before it. */
+/* Put the complete frame into the queue, before those that arrive later. */
 static void queue_put(segment_end *e) {
     uint32_t k = e->tail++;
     uint16_t place = e->order[k & (QUEUE_SIZE - 1)];
@@ -143,7 +145,7 @@ static void queue_put(segment_end *e) {
 
 static inline int queue_full(const segment_end *e) { return e->tail - e->head >= QUEUE_SIZE; }
 
-/* The frame is put down a second time, right behind the first. */
+/* Put the frame a second time, directly after the first. */
 static void queue_twice(segment_end *e, const queued_frame *first) {
     if (queue_full(e))
         return;
@@ -153,7 +155,7 @@ static void queue_twice(segment_end *e, const queued_frame *first) {
     queue_put(e);
 }
 
-/* A frame of `length` in `q` starts at q->sent: worked through, and on its way back or lost. */
+/* Process a frame of `length` in `q` that starts at q->sent; queue it for its return, or lose it. */
 static void line_take(cat_segment *s, queued_frame *q, const route *r) {
     fate fate = s->fault_count ? fate_of(s, r) : NO_FATE;
     s->passage = q->sent;
@@ -172,7 +174,7 @@ static void line_take(cat_segment *s, queued_frame *q, const route *r) {
 
 static int wait_in_virtual_time(segment_end *e, int64_t deadline, int wake_on_frame);
 
-/* On a shared clock time may have passed elsewhere, in a wait on another segment's link. */
+/* On a shared clock, time may have passed during a wait on another segment's link. */
 static inline void catch_up(segment_end *e) {
     cat_segment *s = e->segment;
     if (s->clock) {
@@ -248,7 +250,7 @@ static int line_receive(void *self, const uint8_t **frame) {
 
 static inline int64_t earlier(int64_t a, int64_t b) { return a < b ? a : b; }
 
-/* When the next frame can be received here. */
+/* Return the time of the next frame to receive. */
 static int64_t line_due(void *self) {
     const queued_frame *q = queue_first(self);
     return q ? q->arrival : NEVER;
@@ -284,7 +286,7 @@ static int wait_in_virtual_time(segment_end *e, int64_t deadline, int wake_on_fr
     }
 }
 
-/* Execution time of the thread that uses the link; then what has come due meanwhile. */
+/* Let execution time of the thread that uses the link pass; then do the work that is due. */
 static int line_spend(void *self, int64_t duration) {
     segment_end *e = self;
     cat_segment *s = e->segment;

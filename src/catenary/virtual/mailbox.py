@@ -1,5 +1,6 @@
-"""The mailbox of a device, ETG.1000.4 §5.6: requests in by SM0, answers out by SM1, one at a time,
-with repeat on request.
+"""Mailbox of a device, ETG.1000.4 §5.6: requests arrive in SM0, answers leave by SM1.
+
+One message at a time, with repeat on request.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ ERROR_SYNTAX, ERROR_UNSUPPORTED_PROTOCOL, ERROR_TOO_SHORT, ERROR_SIZE = 0x01, 0x
 
 
 class MailboxPorts(Protocol):
-    """The two SyncManagers, from the PDI side."""
+    """The two mailbox SyncManagers, seen from the PDI side."""
 
     def fetch_request(self) -> bytes | None: ...
 
@@ -30,7 +31,7 @@ class MailboxPorts(Protocol):
 
 
 class Mailbox:
-    """Owns the answers on their way to the MainDevice."""
+    """Owns the answers that wait for the MainDevice."""
 
     def __init__(
         self,
@@ -51,7 +52,7 @@ class Mailbox:
         self.reset()
 
     def reset(self) -> None:
-        """As the device enters PRE-OP: nothing is pending, counting starts anew."""
+        """Discard all pending messages and restart the counter, on entry to PRE-OP."""
         self._waiting: deque[bytes] = deque()
         self._in_buffer: bytes | None = None
         self._last_read: bytes | None = None
@@ -60,13 +61,13 @@ class Mailbox:
         self._fetching = False
 
     def silence(self, silent: bool) -> None:
-        """Requests are taken no longer; or again, with what still waits."""
+        """Stop or resume the mailbox. Waiting answers are delivered on resume."""
         self.silent = silent
         self.request_written()
         self._deliver()
 
     def delay(self, nanoseconds: int) -> None:
-        """Requests are fetched that much later from now on, or sooner."""
+        """Change the time until a request is fetched by `nanoseconds`; the result is at least 0."""
         self._delay_ns = max(0, self._delay_ns + nanoseconds)
 
     def request_written(self) -> None:
@@ -111,7 +112,7 @@ class Mailbox:
         return given.get(self._quirks.counter, self._counter)
 
     def send(self, payload: bytes) -> None:
-        """An unasked CoE message: an emergency. The queue is short, as a device's is."""
+        """Queue an unsolicited CoE message (an emergency). It is dropped if 16 messages wait."""
         if len(self._waiting) < 16:
             self._queue((COE_PROTOCOL, payload))
             self._deliver()
@@ -126,7 +127,7 @@ class Mailbox:
         self._deliver()
 
     def repeat_requested(self) -> None:
-        """Puts the answer read last into SM1 again, before what lies there; then acknowledges."""
+        """Put the last answer into SM1 again, before any waiting one, and acknowledge."""
         if self._last_read is not None:
             if self._in_buffer is not None and self._ports.take_back_answer() is not None:
                 self._waiting.appendleft(self._in_buffer)

@@ -1,4 +1,4 @@
-"""Quirks of process data: mappings of real devices that cannot be changed, or differ from the SII.
+"""Quirks of process data: mappings that cannot be changed, or that differ from the SII.
 
 In TOML a quirk is a field of a table: `mapping_quirks = { fixed_pdos = "silent" }`.
 """
@@ -13,12 +13,11 @@ Fixed = Literal["no", "declared", "silent"]
 
 
 class MappingQuirks(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Differences of one device's PDO objects from a freely mappable one. Without arguments:
-    none."""
+    """Differences of one device's PDO objects from freely mappable ones. The default has none."""
 
-    # The entries of PDOs (0x16xx, 0x1Axx) cannot be written. "declared": SII flag 0x0010 and the
-    # access rights of the dictionary say so, as in Kollmorgen's AKD for 0x1701 to 0x1B26 (AKD
-    # EtherCAT manual, "Fixed PDO Mappings"). "silent": only the write is refused;
+    # PDO entries (0x16xx, 0x1Axx) cannot be written. "declared": SII flag 0x0010 and the access
+    # rights of the dictionary say so, as in Kollmorgen's AKD for 0x1701 to 0x1B26 (AKD EtherCAT
+    # manual, "Fixed PDO Mappings"). "silent": only the write is refused;
     # OpenEtherCATsociety/SOEM#924 and #598 (0x1600 cannot be written, 0x1C12 can).
     fixed_pdos: Fixed = "no"
 
@@ -26,24 +25,24 @@ class MappingQuirks(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     # OpenEtherCATsociety/SOES, applications/raspberry_lan9252demo/slave_objectlist.c.
     fixed_lists: Fixed = "no"
 
-    # Abort code of a refused write that is not declared. 0x06010002 is usual; Beckhoff's EL2535
+    # Abort code of a refused write that is not declared. 0x06010002 is usual. Beckhoff's EL2535
     # answers 0x08000021 (OpenEtherCATsociety/SOEM#311).
     abort_code: int = 0x0601_0002
 
-    # PDOs that the dictionary has assigned at power-up, instead of those of the SII.
-    # sittner/linuxcnc-ethercat#97: the PDOs of an EL6900 are not those of its description.
+    # PDOs that the dictionary assigns at power-up, instead of those of the SII.
+    # sittner/linuxcnc-ethercat#97: the PDOs of an EL6900 differ from its description.
     power_up: tuple[int, ...] | None = None
 
-    # PDOs that carry the same object cannot be assigned together, as the standard and compact PDOs
-    # of Beckhoff's EL30xx (infosys.beckhoff.com, el30xx, "Changeover of process data sets"). The
-    # refusal is 0x08000021 (SOEM#311).
+    # PDOs that contain the same object cannot be assigned together, like the standard and compact
+    # PDOs of Beckhoff's EL30xx (infosys.beckhoff.com, el30xx, "Changeover of process data sets").
+    # The abort code is 0x08000021 (SOEM#311).
     exclusive: bool = False
 
-    # Objects that cannot be mapped (0x06040041), though the dictionary says that they can.
+    # Objects that cannot be mapped (0x06040041), although the dictionary marks them as mappable.
     refused_objects: tuple[int, ...] = ()
 
-    # CoE details of the SII, ETG.2010 table 5: 0x2F has all. Without bit 2 the SII denies changes
-    # of the lists of PDOs, without bit 3 changes of their entries.
+    # CoE details of the SII, ETG.2010 table 5: 0x2F has all. Without bit 2 the SII excludes changes
+    # of the PDO assignment, without bit 3 changes of the PDO entries.
     coe_details: int = 0x2F
 
     def __post_init__(self) -> None:

@@ -1,8 +1,9 @@
-"""A MuJoCo model as a plant needs it: read from MJCF or URDF, its joints by name, the addresses of
-its numbers. MuJoCo is imported here alone, and only when a plant is made.
+"""MuJoCo model of a plant: read from MJCF or URDF, joints by name, addresses of its arrays.
 
-Friction: under load MuJoCo's dry friction creeps. `SOLIMP`, and a time constant as short as the
-step allows, make it stiff: the arm of examples/cobot creeps 1e-6 rad/s on its brakes.
+Only this module imports MuJoCo, and only when a plant is made.
+
+Friction: under load, MuJoCo's dry friction creeps. `SOLIMP` and the shortest time constant that
+the step allows make it stiff: the arm of examples/cobot creeps 1e-6 rad/s on its brakes.
 """
 
 from __future__ import annotations
@@ -21,12 +22,12 @@ if TYPE_CHECKING:
 
 ROOTS = ("mujoco", "robot")
 SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)
-TIME_CONSTANT_STEPS, DAMPING_RATIO = 2.0, 1.0  # MuJoCo's documentation: no less than two steps
-DEEPEST = 1e-3  # bodies may touch at the start, no more [m]
+TIME_CONSTANT_STEPS, DAMPING_RATIO = 2.0, 1.0  # MuJoCo's documentation: at least two steps
+DEEPEST = 1e-3  # maximum penetration of bodies at the start [m]
 
 
 class Addresses(NamedTuple):
-    """Where a joint's numbers lie, in qpos, qvel, qfrc_applied and dof_frictionloss."""
+    """Addresses of a joint's values in qpos, qvel, qfrc_applied and dof_frictionloss."""
 
     q: int
     v: int
@@ -35,7 +36,16 @@ class Addresses(NamedTuple):
 
 
 def read_model(path: str | Path, *, step: float, contacts: bool) -> Model:
-    """Reads an MJCF or URDF file. ConfigurationError says what is missing or wrong."""
+    """Read an MJCF or URDF file.
+
+    Args:
+        path: The file.
+        step: Time step of the simulation [s].
+        contacts: False disables contacts and ignores collision shapes.
+
+    Raises:
+        ConfigurationError: MuJoCo or the file is missing, or the model is invalid.
+    """
     path = Path(path)
     mujoco = _mujoco(path)
     root = _root(path)
@@ -46,10 +56,10 @@ def read_model(path: str | Path, *, step: float, contacts: bool) -> Model:
             meshes = _leave_out_shapes(root, path) if contacts else _leave_out_shapes(root)
             model = mujoco.MjModel.from_xml_string(ElementTree.tostring(root, "unicode"), meshes)
     except (ValueError, mujoco.FatalError) as error:
-        raise ConfigurationError(f"{path}: MuJoCo refuses the model: {error}") from error
+        raise ConfigurationError(f"{path}: MuJoCo rejects the model: {error}") from error
     model.opt.timestep = step
     flags = mujoco.mjtDisableBit
-    # the motors are the only actuators; a simulation that failed must not begin anew unasked
+    # the motors are the only actuators; a failed simulation must not reset itself
     model.opt.disableflags |= flags.mjDSBL_ACTUATION | flags.mjDSBL_AUTORESET
     if not contacts:
         model.opt.disableflags |= flags.mjDSBL_CONTACT
@@ -71,13 +81,13 @@ def _root(path: Path) -> ElementTree.Element:
     try:
         root = ElementTree.fromstring(path.read_bytes())
     except OSError as error:
-        raise ConfigurationError(f"{path}: {error.strerror}: a plant needs its model") from error
+        raise ConfigurationError(f"{path}: {error.strerror}: cannot read the model") from error
     except ElementTree.ParseError as error:
-        raise ConfigurationError(f"{path} is no XML: {error}") from error
+        raise ConfigurationError(f"{path} is not valid XML: {error}") from error
     if root.tag not in ROOTS:
         raise ConfigurationError(
             f"{path}: <{root.tag}> is neither MJCF (<mujoco>) nor URDF (<robot>)",
-            hint="xacro files have to be expanded: xacro robot.urdf.xacro > robot.urdf"
+            hint="expand xacro files first: xacro robot.urdf.xacro > robot.urdf"
             if path.suffix == ".xacro"
             else "",
         )
@@ -85,8 +95,11 @@ def _root(path: Path) -> ElementTree.Element:
 
 
 def _leave_out_shapes(root: ElementTree.Element, path: Path | None = None) -> dict[str, bytes]:
-    """Takes out of a URDF what is only looked at, and without `path` what collides too; the meshes
-    of what is left, found from `path` up."""
+    """Remove visual shapes from a URDF, and without `path` also collision shapes.
+
+    Returns:
+        The files of the remaining meshes by name, found from `path` upwards.
+    """
     for link in root.iter("link"):
         for shape in [*link.iter("visual"), *([] if path else link.iter("collision"))]:
             link.remove(shape)
@@ -95,7 +108,10 @@ def _leave_out_shapes(root: ElementTree.Element, path: Path | None = None) -> di
 
 
 def _mesh(name: str, path: Path) -> Path:
-    """`package://name/meshes/x.stl`: below the package's folder, where the URDF is too."""
+    """Return the path of a mesh.
+
+    `package://name/meshes/x.stl` is searched in the folders above the URDF file.
+    """
     below = name.removeprefix("package://").removeprefix("file://")
     parts = Path(below).parts
     for start in range(len(parts) if "://" in name else 1):
@@ -103,8 +119,8 @@ def _mesh(name: str, path: Path) -> Path:
             if (folder / Path(*parts[start:])).is_file():
                 return folder / Path(*parts[start:])
     raise ConfigurationError(
-        f"{path}: the mesh {name} is not there",
-        hint="contacts=False (in TOML: contacts = false) needs no shapes",
+        f"{path}: the mesh {name} does not exist",
+        hint="with contacts=False (in TOML: contacts = false) no meshes are needed",
     )
 
 
@@ -122,7 +138,7 @@ class Model:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """The joints a motor can turn: hinges and slides."""
+        """Names of the joints that a motor can drive: hinges and slides."""
         kinds = self._mujoco.mjtJoint
         turnable = int(kinds.mjJNT_HINGE), int(kinds.mjJNT_SLIDE)
         return tuple(
@@ -132,7 +148,12 @@ class Model:
         )
 
     def check_joints(self, turned: Sequence[str], passive: Sequence[str]) -> None:
-        """Every joint is turned by one motor, or passive: else an error names those there are."""
+        """Check that every joint has one motor or is passive.
+
+        Raises:
+            ConfigurationError: A name is unknown, used twice or missing. The message lists the
+                joints.
+        """
         there = f"its joints are {', '.join(self.joints) or 'none'}"
         for name in [*turned, *passive]:
             if name not in self.joints:
@@ -142,7 +163,7 @@ class Model:
         left = [name for name in self.joints if name not in turned and name not in passive]
         if left:
             raise ConfigurationError(
-                f"{self.path}: no motor turns {', '.join(map(repr, left))}; {there}",
+                f"{self.path}: {', '.join(map(repr, left))} has no motor; {there}",
                 hint=f"give each a joint of the plant, or passive={left!r}",
             )
 
@@ -153,11 +174,11 @@ class Model:
         return int(self.model.jnt_dofadr[self._id(name)])
 
     def place(self, name: str, position: float) -> None:
-        """Where a joint is at first [rad or m]."""
+        """Set the initial position of a joint [rad or m]."""
         low, high = self.model.jnt_range[self._id(name)].tolist()
         if self.model.jnt_limited[self._id(name)] and not low <= position <= high:
             raise ConfigurationError(
-                f"{self.path}: joint {name!r} cannot start at {position:g}: it goes from {low:g} to"
+                f"{self.path}: joint {name!r} cannot start at {position:g}: its range is {low:g} to"
                 f" {high:g}"
             )
         self._starts[name] = position
@@ -169,24 +190,24 @@ class Model:
         self._mujoco.mj_forward(self.model, self.data)
 
     def check_start(self) -> None:
-        """ConfigurationError where bodies begin inside of one another: contact tears at them."""
+        """Raise ConfigurationError if bodies overlap at the start: contact forces would be huge."""
         self._start()
         for contact in self.data.contact:
             if contact.dist > -DEEPEST:
                 continue
             one, other = (self._body(geom) for geom in (contact.geom1, contact.geom2))
             raise ConfigurationError(
-                f"{self.path}: {one} and {other} begin {-1e3 * contact.dist:.1f} mm inside of one"
-                " another: their contact would hold or tear the joints",
+                f"{self.path}: {one} and {other} overlap by {-1e3 * contact.dist:.1f} mm at the"
+                " start: their contact would block or overload the joints",
                 hint="exclude the pair (MJCF: <contact><exclude body1=... body2=.../></contact>),"
-                " start elsewhere, or contacts=False",
+                " use another start position, or contacts=False",
             )
 
     def _body(self, geom: int) -> str:
         return f"body {self.model.body(self.model.geom_bodyid[geom]).name!r}"
 
     def add_motor(self, name: str, *, inertia: float, viscous: float) -> None:
-        """What the motor adds at the joint: [kg·m²], [N·m·s/rad]."""
+        """Add a motor's inertia [kg·m²] and viscous friction [N·m·s/rad] at the joint."""
         dof = self._dof(name)
         self.model.dof_armature[dof] += inertia
         self.model.dof_damping[dof] += viscous
@@ -195,26 +216,28 @@ class Model:
         self.model.dof_solimp[dof] = SOLIMP
 
     def settle(self) -> None:
-        """The motors are in: all that follows from them, and the beginning once more."""
+        """Recompute derived values after all motors were added, and return to the start."""
         self._mujoco.mj_setConst(self.model, self.data)
         self._start()
         try:
             self._mujoco.mj_step(self.model, self.data)  # fails here rather than in compiled code
         except self._mujoco.FatalError as error:
-            raise ConfigurationError(f"{self.path}: MuJoCo cannot simulate it: {error}") from error
+            raise ConfigurationError(
+                f"{self.path}: MuJoCo cannot simulate the model: {error}"
+            ) from error
         self._start()
 
     def inertia(self, name: str) -> float:
-        """What a motor at the joint has to turn at the start, with its own [kg·m²]."""
+        """Return the inertia at the joint in the start position, motor included [kg·m²]."""
         dof = self._dof(name)
-        import numpy as np  # comes with MuJoCo; without a plant nothing here needs it
+        import numpy as np  # installed with MuJoCo, needed for plants only
 
         dense = np.zeros((self.model.nv, self.model.nv))
         self._mujoco.mj_fullM(self.model, self.data, dense)
         return float(dense[dof, dof])
 
     def dry_friction(self, name: str) -> float:
-        """That the model gives the joint [N·m]."""
+        """Return the dry friction of the joint in the model [N·m]."""
         return float(self.model.dof_frictionloss[self._dof(name)])
 
     # -- for compiled code ---------------------------------------------------------------------
@@ -229,7 +252,7 @@ class Model:
         )
 
     def function(self, name: str) -> int:
-        """Of the library the mujoco package itself uses; 0: it has none of this name."""
+        """Return the address of a function in the mujoco package's library; 0 if missing."""
         [library] = Path(str(self._mujoco.__file__)).parent.glob("libmujoco.so*")
         function = getattr(ctypes.CDLL(str(library)), name, None)
         return 0 if function is None else ctypes.cast(function, ctypes.c_void_p).value or 0

@@ -1,4 +1,4 @@
-"""OpModes of a virtual device: what category 60 of its SII says of distributed clocks (ETG.2010).
+"""OpModes of a virtual device: category 60 of its SII, distributed clocks (ETG.2010).
 
 In TOML: `quirks = { op_modes = [{ name = "DC", assign_activate = 0x0700, sync1_factor = -1 }] }`.
 """
@@ -22,20 +22,20 @@ class OpMode(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     def __post_init__(self) -> None:
         for name, bits in (("sync0_ns", 32), ("assign_activate", 16)):
             if not 0 <= getattr(self, name) < 1 << bits:
-                raise ValueError(f"OpMode {self.name!r}: {name} has {bits} bits without sign")
+                raise ValueError(f"OpMode {self.name!r}: {name} must fit {bits} bits, unsigned")
         for name, bits in (
             *(("shift_ns", 32), ("sync1_shift_ns", 32)),
             *(("sync0_factor", 16), ("sync1_factor", 16)),
         ):
             if not -(1 << bits - 1) <= getattr(self, name) < 1 << bits - 1:
-                raise ValueError(f"OpMode {self.name!r}: {name} has {bits} bits with a sign")
+                raise ValueError(f"OpMode {self.name!r}: {name} must fit {bits} bits, signed")
 
 
 FREE_RUN = OpMode(name="FreeRun")
 STANDARD = (FREE_RUN, OpMode(name="DC Sync0", assign_activate=0x0300, sync0_factor=1))
 
-# The ESI of Beckhoff's EL3702, as ecmc's notes on DC clocks quote it: four samples in a period,
-# SYNC1 once a period. A servo with it needs `sync_signal="sync1"`.
+# ESI of Beckhoff's EL3702, as quoted in ecmc's notes on DC clocks: four samples per period,
+# one SYNC1 per period. A servo with these modes needs `sync_signal="sync1"`.
 EL3702 = (
     *STANDARD,
     OpMode(
@@ -54,14 +54,14 @@ SYNC1_ALONE = (
     OpMode(name="FreeRun"),
 )
 
-# What AB&T's EasyConfigurator writes for every EasyCAT: a shift of 2.0 s, in its comment "10nS
-# unit" (Seobuk/Easycat_config, HUslave.xml; pollen-robotics' pollen_Orbita2d.xml).
+# The modes that AB&T's EasyConfigurator writes for every EasyCAT: a shift of 2.0 s, in its comment
+# "10nS unit" (Seobuk/Easycat_config, HUslave.xml; pollen-robotics' pollen_Orbita2d.xml).
 EASYCAT = (
     OpMode(name="SM_Sync or Async"),
     OpMode(name="DC_Sync", assign_activate=0x0300, sync0_factor=1, shift_ns=2_000_200_000),
 )
 
-# The same as one tool stores it: no AssignActivate, another shift (pollen_Orbita2d.bin).
+# The same modes as stored by another tool: no AssignActivate, another shift (pollen_Orbita2d.bin).
 EASYCAT_STORED = (
     OpMode(name="SM_Sync or Async"),
     OpMode(name="DC_Sync", shift_ns=1_882_234_944),

@@ -1,10 +1,11 @@
-/* The segment on a NIC, or on two where it is a ring: its own small packet loop, apart from `link`,
- * so that the two judge each other. Blocks in poll; the models are stepped after the answer has left.
- * Budget from frame in to frame out: 10 us on an idle core.
+/* The segment on one NIC, or on two for a ring: its own small packet loop. It is independent of
+ * `link`, so that each tests the other. It blocks in poll; the models are stepped after the answer
+ * was sent. Budget from frame in to frame out: 10 us on an idle core.
  *
- * A cable holds no frame: one that was in the socket for longer than `max_age` is lost. Its age is the
- * difference of CLOCK_REALTIME now and when the kernel received it (SO_TIMESTAMPNS, socket(7)). If
- * that clock is set meanwhile, the frames in the socket are too old, or count as new. */
+ * A cable does not store frames: a frame that was in the socket for longer than `max_age` is
+ * dropped. Its age is the difference between CLOCK_REALTIME and the kernel's receive time
+ * (SO_TIMESTAMPNS, socket(7)). If that clock is set meanwhile, frames in the socket are dropped or
+ * count as new. */
 #ifndef CATENARY_VIRTUAL_PACKET_LOOP_H
 #define CATENARY_VIRTUAL_PACKET_LOOP_H
 
@@ -18,7 +19,7 @@
 
 #include "line.h"
 
-/* EEPROM accesses end before the frame that asks; all other models may be stepped after it. */
+/* EEPROM accesses end before the frame that reads them; all other models may be stepped later. */
 static void finish_sii(cat_segment *s) {
     s->sii_due = NEVER;
     for (int n = 0; n < s->count; n++) {
@@ -29,14 +30,14 @@ static void finish_sii(cat_segment *s) {
     }
 }
 
-/* A frame at the interface it leaves by. An interface whose queue is full loses it. */
+/* Send a frame at the interface where it leaves. An interface with a full queue loses it. */
 static int packet_send(const int *fds, int end, const uint8_t *frame, uint32_t length) {
     if (fds[end] < 0 || send(fds[end], frame, length, 0) >= 0)
         return 0;
     return errno == ENOBUFS || errno == EAGAIN ? 0 : -errno;
 }
 
-/* A frame that a fault delays waits in the queue of the interface it leaves by. */
+/* Queue a frame that a fault delays at the interface where it leaves. */
 static void packet_delay(cat_segment *s, int end, const uint8_t *frame, uint32_t length, int64_t delay) {
     segment_end *e = &s->ends[end];
     if (queue_full(e))
@@ -48,11 +49,11 @@ static void packet_delay(cat_segment *s, int end, const uint8_t *frame, uint32_t
     queue_put(e);
 }
 
-/* Works a frame through; 0, or -errno. */
+/* Process a frame; return 0 or -errno. */
 static int packet_through(cat_segment *s, const int *fds, int from, uint8_t *frame, uint32_t length) {
     lock(s);
     s->passage = monotonic_now();
-    if (s->synchronous)               /* what SYNC0 latches was latched before this frame came */
+    if (s->synchronous)               /* latch SYNC0 data from before this frame */
         segment_advance(s, s->passage);
     if (s->passage > s->now)
         s->now = s->passage;
@@ -77,7 +78,7 @@ static int packet_through(cat_segment *s, const int *fds, int from, uint8_t *fra
     return result == 0 && fate.duplicate ? packet_send(fds, end, frame, length) : result;
 }
 
-/* How long a received frame was in the socket [ns]; 0: the kernel gave it no time stamp. */
+/* Return the time a received frame spent in the socket [ns]; 0: it has no time stamp. */
 static int64_t packet_age(struct msghdr *message) {
     for (struct cmsghdr *c = CMSG_FIRSTHDR(message); c; c = CMSG_NXTHDR(message, c)) {
         if (c->cmsg_level != SOL_SOCKET || c->cmsg_type != SCM_TIMESTAMPNS)
@@ -97,7 +98,7 @@ static void packet_expired(cat_segment *s, int from, int64_t age) {
     unlock(s);
 }
 
-/* 1: answered or passed over, 0: nothing there, or -errno. */
+/* Return 1: answered or ignored, 0: no frame, or -errno. */
 static int packet_answer(cat_segment *s, const int *fds, int from, int64_t max_age) {
     static __thread uint8_t frame[65536 + 64];
     union { struct cmsghdr align; uint8_t bytes[CMSG_SPACE(sizeof(struct timespec))]; } control;
@@ -126,7 +127,7 @@ static int packet_answer(cat_segment *s, const int *fds, int from, int64_t max_a
     return 1;
 }
 
-/* Sends what has been delayed long enough; 0, or -errno. *next: when more is. */
+/* Send frames after their delay; return 0 or -errno. *next: time of the next one. */
 static int packets_due(cat_segment *s, const int *fds, int64_t *next) {
     *next = NEVER;
     for (int n = 0; n <= s->ring; n++) {
@@ -142,7 +143,7 @@ static int packets_due(cat_segment *s, const int *fds, int64_t *next) {
     return 0;
 }
 
-/* Both interfaces in turn, at most 64 frames: then the models have their turn. */
+/* Answer at both interfaces in turn, at most 64 frames, so that the models can run. */
 static int packets_answer(cat_segment *s, const int *fds, int64_t max_age) {
     int answered = 1;
     for (int burst = 0; burst < 64 && answered; burst++) {

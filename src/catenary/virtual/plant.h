@@ -1,13 +1,14 @@
-/* A plant: one MuJoCo model that the motors of several servos turn, instead of each its own shaft.
+/* A plant: one MuJoCo model driven by the motors of several servos, instead of a shaft for each.
  *
- * At its own fixed step, on the segment's clock: motor torques in, one mj_step, joint states out. The
- * torque a servo computed at t acts from t on; the servos find the state of t + step at t + step.
- * MuJoCo is called by a function pointer, its arrays by their addresses: nothing of Python, no
- * allocation. Never in the path of frames: in real time one thread alone steps it, and lets the
- * segment go while MuJoCo computes. Budget: 10 us a step of a six-axis arm, nearly all in mj_step.
+ * At its own fixed step, on the segment's clock: motor torques in, one mj_step, joint states out.
+ * The torque that a servo computed at t acts from t on; the servos read the state of t + step at t
+ * + step. MuJoCo is called by a function pointer and its arrays are used by their addresses: no
+ * Python, no allocation. It never runs in the path of frames. In real time only one thread steps
+ * it, and releases the segment while MuJoCo computes. Budget: 10 us per step of a six-axis arm,
+ * nearly all in mj_step.
  *
- * Motor inertia, viscous and dry friction are in the model (armature, damping, frictionloss). A brake
- * is dry friction that comes and goes. */
+ * Motor inertia, viscous and dry friction are in the model (armature, damping, frictionloss). A
+ * brake is dry friction that is switched on and off. */
 #ifndef CATENARY_VIRTUAL_PLANT_H
 #define CATENARY_VIRTUAL_PLANT_H
 
@@ -15,36 +16,36 @@
 
 #include "device_cycle.h"
 
-#define WILD 1e6                      /* a motor does not turn as fast as this [rad/s] */
+#define WILD 1e6                      /* maximum plausible velocity of a motor [rad/s] */
 
 /* A joint of the model and the motor on it: motor angle = ratio (q - zero). */
 typedef struct plant_joint {
-    servo_axis *axis;                 /* NULL: no motor hangs on it */
+    servo_axis *axis;                 /* NULL: no motor is connected */
     double *q, *v, *force, *friction; /* in qpos, qvel, qfrc_applied, dof_frictionloss */
-    double ratio, zero;               /* turns of the motor a turn of the joint, with their sign; rad */
-    double dry, brake;                /* at the joint: dry friction; and what the closed brake adds */
-    int64_t brake_delay, closes;      /* from the end of the motor's torque; when it closes [ns] */
-    double place;                     /* somebody turned it by hand: where to */
+    double ratio, zero;               /* motor turns per joint turn, signed; zero position [rad] */
+    double dry, brake;                /* dry friction at the joint; additional friction of the closed brake */
+    int64_t brake_delay, closes;      /* delay from the end of the motor's torque; closing time [ns] */
+    double place;                     /* position to which the shaft was turned by hand */
     uint8_t placed;
 } plant_joint;
 
-/* How an mjLogMessage begins (MuJoCo 4). */
+/* Start of an mjLogMessage (MuJoCo 4). */
 typedef struct { int level, topic; char subject[1024]; } mujoco_message;
 enum { MUJOCO_WARNING = 2, MUJOCO_ERROR = 3 };
 
 typedef struct plant {
     void (*step)(const void *model, void *data);
-    void (*hear)(void (*)(const mujoco_message *));   /* this thread's messages; NULL: not to be had */
+    void (*hear)(void (*)(const mujoco_message *));   /* sets this thread's message handler; NULL: not available */
     const void *model;
     void *data;
     plant_joint *joints;
     int count;
     int64_t period, due;              /* [ns] */
-    int wild;                         /* the joint, from 1, that went beyond all bounds */
-    int ending;                       /* real time: its thread is to end */
+    int wild;                         /* number, from 1, of the joint that exceeded all bounds */
+    int ending;                       /* real time: its thread must end */
     uint64_t steps;
-    char words[256];                  /* what MuJoCo complained of */
-    jmp_buf escape;                   /* out of a step that failed */
+    char words[256];                  /* error message of MuJoCo */
+    jmp_buf escape;                   /* exit from a failed step */
 } plant;
 
 static inline int plant_braked(plant_joint *j, int64_t now) {
@@ -67,7 +68,7 @@ static void plant_apply(plant *p, int64_t now) {
     }
 }
 
-/* What the encoders see. */
+/* Update the encoder values. */
 static void plant_show(plant *p) {
     for (int k = 0; k < p->count; k++) {
         plant_joint *j = &p->joints[k];
@@ -81,9 +82,9 @@ static void plant_show(plant *p) {
     }
 }
 
-static __thread plant *plant_stepped;  /* by this thread, now */
+static __thread plant *plant_stepped;  /* the plant that this thread is stepping */
 
-/* After an error MuJoCo would end the process; the state it was in is not used again. */
+/* After an error MuJoCo would end the process. Leave the step; its state is not used again. */
 static void plant_hear(const mujoco_message *m) {
     plant *p = plant_stepped;
     if (m->level < MUJOCO_WARNING)
@@ -106,7 +107,8 @@ static void plant_simulate(plant *p) {
     p->hear(NULL);
 }
 
-/* One step, due now. In real time others may pass while MuJoCo computes; they stop before p->due. */
+/* Do the step that is due. In real time other threads run while MuJoCo computes; they stop before
+ * p->due. */
 static void plant_step(cat_segment *s) {
     plant *p = s->plant;
     plant_apply(p, s->now);
@@ -127,7 +129,7 @@ static void plant_step(cat_segment *s) {
     wake_service(s);
 }
 
-/* How far the caller may work: only who steps the plant passes its steps. */
+/* Return how far the caller may work: only the thread that steps the plant may pass its steps. */
 static inline int64_t plant_bound(const cat_segment *s, int64_t until, int steps_plant) {
     return !s->plant || steps_plant || until < s->plant->due ? until : s->plant->due - 1;
 }
@@ -139,7 +141,7 @@ static void plant_hang(plant_joint *j, servo_axis *a) {
     a->velocity = j->ratio * *j->v;
 }
 
-/* The motors of a device that goes come off. */
+/* Disconnect the motors of a device that is removed. */
 static void plant_forget(plant *p, const controller *c) {
     for (int k = 0; p && k < p->count; k++)
         for (int n = 0; n < c->axis_count; n++)
@@ -147,7 +149,7 @@ static void plant_forget(plant *p, const controller *c) {
                 p->joints[k].axis = NULL;
 }
 
-/* Somebody turns the shaft by hand [rad of the motor]. */
+/* Turn the shaft by hand [rad of the motor]. */
 static inline void servo_place(servo_axis *a, double position) {
     plant_joint *j = a->joint;
     a->position = position;

@@ -5,7 +5,7 @@
         plant=Plant("arm.xml", [Joint("shoulder", gear=101), Joint("elbow", gear=50)]),
     )
 
-The compiled segment steps the model (`plant.h`); this is how motors and joints come together.
+The compiled segment steps the model (`plant.h`). This module connects motors and joints.
 """
 
 from __future__ import annotations
@@ -28,22 +28,31 @@ from catenary.virtual.mujoco_model import read_model
 if TYPE_CHECKING:
     import mujoco
 
-# The servos' own cycle: torques change that often. A shorter step shows nothing that they could
-# see, a longer one is a dead time in their velocity loops (80 Hz).
+# The servos' own cycle: their torques change this often. A shorter step adds nothing that they
+# could measure. A longer step is a dead time in their velocity loops (80 Hz).
 STEP = 250e-6
 SHORTEST_STEP, LONGEST_STEP = 20e-6, 1e-3
 SECOND = 1e9
 
 
 class Joint(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A joint of the model and the motor that turns it: motor angle = direction · gear · (joint
-    angle - zero) [rad]; of a slide: · (position - zero) [m], `gear` [rad/m].
+    """A joint of the model and the motor that drives it.
 
-    `start`: where the joint is at first [rad]; None: as the model says.
-    `brake`: what the holding brake holds at the joint [N·m]; None: what the motor can do at most,
-    0: there is none. It closes `brake_delay` [s] after the drive's torque has ended, opens when
-    the drive is in operation enabled, and is closed without power.
-    `axis`: (position of the servo, its axis); None: the next axis on the line.
+    Motor angle = direction · gear · (joint angle - zero) [rad]. For a slide, `gear` is [rad/m] and
+    motor angle = direction · gear · (position - zero).
+
+    The brake closes `brake_delay` [s] after the drive's torque ends. It opens when the drive enters
+    operation enabled, and it is closed without power.
+
+    Attributes:
+        name: Name of the joint in the model.
+        gear: Gear ratio, motor angle per joint angle (slide: [rad/m]).
+        direction: 1 or -1.
+        zero: Joint position at which the motor angle is 0 [rad or m].
+        start: Initial position of the joint [rad or m]; None: that of the model.
+        brake: Holding torque at the joint [N·m]; None: the motor's maximum, 0: no brake.
+        brake_delay: Closing time of the brake [s].
+        axis: (position of the servo, axis number); None: the next axis on the line.
     """
 
     name: str
@@ -59,13 +68,15 @@ class Joint(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if not 0 < self.gear < math.inf:
             raise ValueError(f"joint {self.name!r}: gear must be positive, not {self.gear}")
         if self.direction not in (1, -1):
-            raise ValueError(f"joint {self.name!r}: direction is 1 or -1, not {self.direction}")
+            raise ValueError(
+                f"joint {self.name!r}: direction must be 1 or -1, not {self.direction}"
+            )
         if not math.isfinite(self.zero) or not math.isfinite(self.start or 0.0):
-            raise ValueError(f"joint {self.name!r}: zero and start are numbers")
+            raise ValueError(f"joint {self.name!r}: zero and start must be finite numbers")
         if self.brake is not None and not 0 <= self.brake < math.inf:
-            raise ValueError(f"joint {self.name!r}: brake is 0 or more N·m, not {self.brake}")
+            raise ValueError(f"joint {self.name!r}: brake must be 0 or more N·m, not {self.brake}")
         if not 0 <= self.brake_delay <= 10:
-            raise ValueError(f"joint {self.name!r}: a brake takes 0 to 10 s to close")
+            raise ValueError(f"joint {self.name!r}: brake_delay must be 0 to 10 s")
 
     @property
     def ratio(self) -> float:
@@ -73,14 +84,21 @@ class Joint(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Plant:
-    """Owns a MuJoCo model whose joints the servos of one segment turn.
+    """Owns a MuJoCo model with joints that the servos of one segment drive.
 
-    `path`: an MJCF or URDF file. `joints`: those that motors turn, in the order of the axes on the
-    line; None: all of the model, in its order, without gears. `passive`: joints no motor turns.
-    `step`: of the simulation [s]. `contacts=False`: bodies pass through each other.
+    Args:
+        path: An MJCF or URDF file.
+        joints: The joints with motors, in the order of the axes on the line. None: all joints of
+            the model, in its order, without gears.
+        passive: Names of the joints without a motor.
+        step: Time step of the simulation [s].
+        contacts: False lets bodies pass through each other.
 
-    ConfigurationError: MuJoCo or the file is missing, the model cannot be read or begins in
-    contact; the joints there are, where they are not those asked for.
+    Raises:
+        ConfigurationError: MuJoCo or the file is missing, the model is invalid or starts in
+            contact, or the joints do not match the model. The message lists the joints of the
+            model.
+        ValueError: The step is out of range.
     """
 
     def __init__(
@@ -94,15 +112,15 @@ class Plant:
     ) -> None:
         if not SHORTEST_STEP <= step <= LONGEST_STEP:
             raise ValueError(
-                f"a plant's step is {SHORTEST_STEP:g} to {LONGEST_STEP:g} s, not {step}:"
-                " longer ones are a dead time in the drives' velocity loops"
+                f"a plant's step must be {SHORTEST_STEP:g} to {LONGEST_STEP:g} s, not {step}:"
+                " a longer step is a dead time in the drives' velocity loops"
             )
         self.step = step
         self._model = read_model(path, step=step, contacts=contacts)
         self.joints = self._chosen(joints, passive)
         self._compiled: CompiledPlant | None = None
-        self._wired: list[tuple[Device, int]] = []  # where the motor of each joint is wired to
-        self._inertias: list[float] = []  # what it turns at the start, at its shaft
+        self._wired: list[tuple[Device, int]] = []  # motor (servo, axis) of each joint
+        self._inertias: list[float] = []  # initial inertia at each motor shaft
         self._thread: threading.Thread | None = None
 
     def _chosen(self, joints: Sequence[Joint] | None, passive: Sequence[str]) -> tuple[Joint, ...]:
@@ -121,20 +139,22 @@ class Plant:
 
     @property
     def model(self) -> mujoco.MjModel:
-        """MuJoCo's model, with the motors in it once the segment is made."""
+        """MuJoCo's model. It contains the motors once the segment is made."""
         return self._model.model
 
     @property
     def data(self) -> mujoco.MjData:
-        """MuJoCo's state. To be looked at in virtual time; in real time a thread works on it."""
+        """MuJoCo's state. Read it in virtual time only; in real time a thread changes it."""
         return self._model.data
 
     # -- motors and joints ---------------------------------------------------------------------
 
     def attach(self, core: Core, devices: Sequence[Device]) -> None:
-        """Hangs the joints on the servos; the segment does it when it is made."""
+        """Connect the joints to the servos. The segment calls this when it is made."""
         if self._compiled is not None:
-            raise ValueError(f"{self.path.name} moves in another segment already")
+            raise ValueError(
+                f"{self.path.name} already belongs to another segment; make a new Plant"
+            )
         motors = self._paired(devices)
         for joint, (servo, _axis) in zip(self.joints, motors, strict=True):
             self._model.add_motor(
@@ -162,7 +182,7 @@ class Plant:
         compiled.begin()
 
     def _paired(self, devices: Sequence[Device]) -> list[tuple[Servo, int]]:
-        """The motor of each joint."""
+        """Return the (servo, axis) of each joint."""
         there = {
             (position, axis): device
             for position, device in enumerate(devices)
@@ -176,16 +196,15 @@ class Plant:
             if place is None or place not in there:
                 asked = "axis" if place is None else f"axis {place}"
                 raise ConfigurationError(
-                    f"{self.path.name}: there is no {asked} for joint {joint.name!r};"
-                    f" the axes are {axes}"
+                    f"{self.path.name}: no {asked} for joint {joint.name!r}; the axes are {axes}"
                 )
             if places.count(place) > 1:
-                raise ConfigurationError(f"{self.path.name}: two joints have the axis {place}")
+                raise ConfigurationError(f"{self.path.name}: two joints use the axis {place}")
         if any(rest) and not any(joint.axis for joint in self.joints):
             raise ConfigurationError(
-                f"{self.path.name}: {len(self.joints)} joints are turned, but the segment has"
+                f"{self.path.name}: {len(self.joints)} joints have motors, but the segment has"
                 f" {len(there)} axes",
-                hint="where some axes turn nothing of the model, give each joint its"
+                hint="if some axes do not drive the model, give each joint its"
                 " axis=(position, axis)",
             )
         return [(there[place], place[1]) for place in places if place is not None]
@@ -208,12 +227,12 @@ class Plant:
         )
 
     def _hang(self, compiled: CompiledPlant, n: int, servo: Servo, axis: int) -> None:
-        """The motor comes to the joint, and its loops are tuned for what it has to turn."""
+        """Connect a motor to joint `n` and tune its loops for the joint's inertia."""
         compiled.hang(n, servo.position, axis)
         servo.tune(self._inertias[n], axis)
 
     def replaced(self, old: Device, new: Device) -> None:
-        """Another device stands in the place of one: the motors are wired to it."""
+        """Connect the motors of a replaced device to the new one."""
         for n, (device, axis) in enumerate(self._wired):
             if device is not old:
                 continue
@@ -224,27 +243,27 @@ class Plant:
     # -- time ----------------------------------------------------------------------------------
 
     def check(self) -> None:
-        """ConfigurationError when the simulation went beyond all bounds: it stands still then."""
+        """Raise ConfigurationError if the simulation diverged and therefore stopped."""
         if self._compiled is None or (self._compiled.wild < 0 and not self._compiled.complaint):
             return
-        what = [f"MuJoCo says: {self._compiled.complaint}"] if self._compiled.complaint else []
+        what = [f"MuJoCo reports: {self._compiled.complaint}"] if self._compiled.complaint else []
         if self._compiled.wild >= 0:
             name = self.joints[self._compiled.wild].name
-            what.insert(0, f"joint {name!r} went beyond all bounds")
+            what.insert(0, f"joint {name!r} exceeded all bounds")
         raise ConfigurationError(
-            f"{self.path.name}: the simulation ended after {self.data.time:.4f} s:"
+            f"{self.path.name}: the simulation stopped after {self.data.time:.4f} s:"
             f" {'; '.join(what)}",
-            hint="look for masses and inertias near zero, bodies that overlap, a step (now"
-            f" {self.step:g} s) that is too long for them, too little memory (MJCF: <size memory>)",
+            hint="check for masses and inertias near zero, overlapping bodies, a step (now"
+            f" {self.step:g} s) that is too long, and too little memory (MJCF: <size memory>)",
         )
 
     @property
     def steps(self) -> int:
-        """How many the simulation has made."""
+        """Number of steps simulated so far."""
         return 0 if self._compiled is None else self._compiled.steps
 
     def start(self) -> None:
-        """Real time: a thread steps it from now on, without the GIL."""
+        """Start the thread that steps the plant in real time, without the GIL."""
         if self._compiled is not None:
             self._thread = threading.Thread(
                 target=self._run, args=(self._compiled,), name="virtual-plant", daemon=True
@@ -253,10 +272,10 @@ class Plant:
 
     def _run(self, compiled: CompiledPlant) -> None:
         compiled.run()
-        self.check()  # frames are answered on; a thread's error is printed
+        self.check()  # the thread prints this error; frames are still answered
 
     def stop(self) -> None:
-        """The arm stands still until `start`."""
+        """Stop the thread. The plant stands still until `start`."""
         if self._compiled is not None and self._thread is not None:
             self._compiled.end()
             self._thread.join()

@@ -1,9 +1,9 @@
-/* Ports: light, link, loop control and what they show (ET1100 datasheet, section I chapter 3, and
+/* Ports: light, link, loop control and their registers (ET1100 datasheet, section I chapter 3, and
  * section II 0x0101, 0x0110, 0x0310).
  *
- * A cable carries light while it is plugged and both sides have power. A controller sees the loss
- * of it `detection` later and closes the loop then; until then frames run into the dark. Light that
- * comes is a link at once. */
+ * A cable carries light while it is plugged and both sides have power. A controller detects the
+ * loss of light after `detection` and then closes the loop. Until then frames run into the dark
+ * cable. New light is a link at once. */
 #ifndef CATENARY_VIRTUAL_PORTS_H
 #define CATENARY_VIRTUAL_PORTS_H
 
@@ -35,8 +35,8 @@ static void ports_show(controller *c) {
     c->segment->routes_stale = 1;
 }
 
-/* The loops as mode and link want them. `written`: DL control was written just now, which opens an
- * auto-closed port whose link is there. */
+/* Set the loops from mode and link. `written`: DL control was written just now, which opens an
+ * auto-closed port with a link. */
 static void loops_set(controller *c, int written) {
     int open = 0;
     for (int p = 0; p < PORTS; p++) {
@@ -57,7 +57,7 @@ static void loops_set(controller *c, int written) {
     ports_show(c);
 }
 
-/* A frame that is valid opens the auto-closed port it came to. */
+/* A valid frame opens the auto-closed port at which it arrived. */
 static void loop_opened_by_frame(controller *c, int p) {
     c->ports[p].closed = 0;
     ports_show(c);
@@ -97,7 +97,7 @@ static void port_loses_link(controller *c, int p) {
     loops_set(c, 0);
 }
 
-/* Losses of link and temporary loops that have come due. */
+/* Handle lost links and temporary loops that are due. */
 static void links_check(cat_segment *s) {
     s->link_due = NEVER;
     for (int n = 0; n < s->count; n++) {
@@ -128,7 +128,7 @@ static void end_sees_light(cat_segment *s, cable_end e, int light) {
         port_sees_light(&s->controllers[e.device], e.port, light);
 }
 
-/* Cables were plugged or pulled, or power came or went. 1: somewhere it became dark. */
+/* Handle plugged or pulled cables and changes of power. Return 1 if a cable became dark. */
 static int light_update(cat_segment *s) {
     int darker = 0;
     s->routes_stale = 1;
@@ -145,7 +145,7 @@ static int light_update(cat_segment *s) {
     return darker;
 }
 
-/* As after power-on: no link is seen yet, all loops that exist wait for theirs. */
+/* Reset to the state after power-on: no link detected, all existing loops wait for a link. */
 static void ports_reset(controller *c) {
     for (int p = 0; p < PORTS; p++) {
         c->ports[p].link = 0;

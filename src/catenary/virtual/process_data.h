@@ -1,6 +1,6 @@
 /* Process data of a device: bits of its SyncManager buffers to and from slots, one 64-bit number
- * for each object that can be mapped. The tables are made by the application when it goes to
- * SAFE-OP and checked against the buffers then; here every bit is checked again. */
+ * for each object that can be mapped. The application makes the tables on the way to SAFE-OP and
+ * checks them against the buffers; every bit is checked again here. */
 #ifndef CATENARY_VIRTUAL_PROCESS_DATA_H
 #define CATENARY_VIRTUAL_PROCESS_DATA_H
 
@@ -14,7 +14,7 @@ static inline uint64_t bits_load(const uint8_t *p, uint32_t bit, uint32_t count)
     uint64_t value = 0;
     if ((bit & 7) == 0 && (count & 7) == 0) {
         p += bit / 8;
-        switch (count) {                                     /* what nearly all objects are */
+        switch (count) {                                     /* the sizes of nearly all objects */
         case 8: return p[0];
         case 16: return load16(p);
         case 32: return load32(p);
@@ -90,8 +90,8 @@ static void inputs_put(controller *c) {
     sm_pdi_written(c, m->sm, which);
 }
 
-/* What models made since the last frame goes where the next one reads it: a model that steps four
- * times between two frames is written out once. */
+/* Write the models' new inputs where the next frame reads them. A model that steps four times
+ * between two frames is written only once. */
 static inline void inputs_flush(cat_segment *s) {
     if (!s->inputs_stale)
         return;

@@ -1,6 +1,6 @@
-/* Addresses and bits of the ESC registers the virtual controllers implement
- * (ETG.1000.4 §6 and the ET1100 datasheet, section II). Written here once; the Python side reaches
- * them through the accessors of `_segment` and never by number. */
+/* Addresses and bits of the ESC registers that the virtual controllers implement
+ * (ETG.1000.4 §6 and the ET1100 datasheet, section II). Defined only here; Python uses
+ * the accessors of `_segment`, never a number. */
 #ifndef CATENARY_VIRTUAL_REGISTERS_H
 #define CATENARY_VIRTUAL_REGISTERS_H
 
@@ -81,8 +81,8 @@ enum {
 
 /* bits */
 enum {
-    DL_CONTROL_TEMPORARY = 0x02,     /* of the first byte: loop control lasts a second only */
-    DL_CONTROL_ALIAS = 0x01,         /* of the register's fourth byte: bit 24 */
+    DL_CONTROL_TEMPORARY = 0x02,     /* in the first byte: loop control lasts only one second */
+    DL_CONTROL_ALIAS = 0x01,         /* in the register's fourth byte: bit 24 */
     ECAT_EVENT_DL_STATUS = 0x0004,
     ECAT_EVENT_AL_STATUS = 0x0008,
     ECAT_EVENT_SM0 = 0x0010,

@@ -1,4 +1,4 @@
-"""What the application side has to do later: a heap of actions by time and order of asking."""
+"""Delayed actions of the application side: a heap ordered by due time, then by insertion."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Clock(Protocol):
 
 
 class Agenda:
-    """Owns the actions of a segment that are due later, on its clock [ns]."""
+    """Owns the delayed actions of a segment, on its clock [ns]."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -41,13 +41,13 @@ class Agenda:
         self.at(self._clock.now + delay_ns, action)
 
     def run_due(self) -> None:
-        """Runs what is due now."""
+        """Run all actions that are due."""
         while self._heap and self._heap[0][0] <= self._clock.now:
             heapq.heappop(self._heap)[2]()
 
 
 class Scheduler:
-    """Owns what one device has to do later, until its power goes: then it does none of it."""
+    """Owns the delayed actions of one device. When its power goes off, they are dropped."""
 
     def __init__(self, agenda: Agenda) -> None:
         self._agenda = agenda

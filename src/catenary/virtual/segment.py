@@ -1,4 +1,4 @@
-"""A virtual segment: devices in a tree or a ring, a clock, faults, and links into it."""
+"""A virtual segment: devices in a tree or a ring, a clock, faults, and links to it."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from catenary.virtual.service import Service, ServiceThread
 from catenary.virtual.wiring import Place, Wiring
 
 ClockKind = Literal["virtual", "monotonic"]
-# From the loss of light to the closed loop [s]: enhanced link detection of the ET1100 (datasheet,
-# section I, chapter 6: about 15 us), and what an ordinary PHY takes.
+# Time from the loss of light to the closed loop [s]: enhanced link detection of the ET1100
+# (datasheet, section I, chapter 6: about 15 us), and an ordinary PHY.
 LINK_LOSS_DETECTION: Mapping[str, float] = {"enhanced": 15e-6, "standard": 3e-3}
 
 
 @runtime_checkable
 class SharedClock(Protocol):
-    """What a segment needs of a virtual clock that others live by too."""
+    """A virtual clock that a segment shares with other participants."""
 
     @property
     def capsule(self) -> object:
-        """The C table of native/clock.h."""
+        """Capsule with the C table of native/clock.h."""
 
 
 class FrameCounters(NamedTuple):
@@ -39,11 +39,11 @@ class FrameCounters(NamedTuple):
     malformed: int
     foreign: int
     lost: int
-    expired: int  # of the lost ones: served too late (`max_age`)
+    expired: int  # lost because served too late (`max_age`)
 
 
 class SegmentEnd:
-    """One end of a segment, to be opened by whoever drives it."""
+    """One end of a segment, to which a MainDevice connects."""
 
     def __init__(self, segment: Segment, *, second: bool) -> None:
         self._segment = segment
@@ -51,28 +51,36 @@ class SegmentEnd:
 
     @property
     def segment(self) -> Segment:
-        """The segment that has this end."""
+        """Segment of this end."""
         return self._segment
 
     def open_link(self) -> SegmentLink:
-        """A link into the segment at this end; one at a time."""
+        """Open a link at this end of the segment; one at a time."""
         return self._segment.open_end(second=self._second)
 
 
 class Segment:
     """Owns virtual devices and their cables. `segment[i]` is the device at position i.
 
-    clock="virtual": a discrete-event clock; time advances only while the link waits.
-    clock="monotonic": the machine's, for real time in this process and for `serve`.
-    A `realtime.VirtualClock`, or a place on one (`clock.participate()`): virtual time shared with
-    tasks; the loop on this segment takes that place, in the thread that the place is for.
+    Args:
+        devices: The devices, in the order in which frames are processed.
+        clock: "virtual": a discrete-event clock; time advances only while the link waits.
+            "monotonic": the machine's clock, for real time in this process and for `serve`.
+            A `realtime.VirtualClock`, or a place on one (`clock.participate()`): virtual time
+            shared with tasks. The loop on this segment takes that place, in the thread of the
+            place.
+        plant: A simulated mechanism that the motors of the servos drive.
+        faults: Faults to inject, on the segment's own time (`time`).
+        behind: Maps a device to the (device, port) it is connected to. The default is port 1 of the
+            previous device.
+        ring: True if the last device leads back to a second interface of the MainDevice. Until that
+            end is opened, the segment is a line.
+        link_loss_detection: Time until controllers detect a dark cable: "enhanced" (15 us),
+            "standard" (3 ms) or seconds.
 
-    `plant`: what the motors of its servos turn. `faults`: what happens to it, by its own time
-    (`time`). `behind`: device → (device, port) it
-    hangs on, where that is not port 1 of the one before. `ring`: the last device leads back to a
-    second interface of the MainDevice; until somebody opens that end, it is a line.
-    `link_loss_detection`: how long controllers take to see that a cable is dark: "enhanced"
-    (15 us), "standard" (3 ms) or seconds.
+    Raises:
+        ValueError: An option is out of range or does not fit the devices.
+        ConfigurationError: The plant does not fit the devices.
     """
 
     def __init__(
@@ -87,7 +95,9 @@ class Segment:
         link_loss_detection: float | Literal["enhanced", "standard"] = "enhanced",
     ) -> None:
         if clock not in ("virtual", "monotonic") and not isinstance(clock, SharedClock):
-            raise ValueError(f'clock is "virtual", "monotonic" or a VirtualClock, not {clock!r}')
+            raise ValueError(
+                f'clock must be "virtual", "monotonic" or a VirtualClock, not {clock!r}'
+            )
         self._devices = list(devices)
         self.clock: ClockKind = "monotonic" if clock == "monotonic" else "virtual"
         wiring = Wiring([device.ports for device in devices], behind or {}, ring=ring)
@@ -129,12 +139,12 @@ class Segment:
 
     @property
     def core(self) -> Core:
-        """The compiled side, for `serve` and tests at register level."""
+        """The compiled segment, for `serve` and tests at register level."""
         return self._core
 
     @property
     def wires(self) -> Wires:
-        """The compiled side's cables, for tests of where frames go."""
+        """The compiled cables, for tests of routes."""
         return self._wires
 
     @property
@@ -157,24 +167,24 @@ class Segment:
 
     @property
     def first(self) -> SegmentEnd:
-        """The end towards the first device."""
+        """End at the first device."""
         return SegmentEnd(self, second=False)
 
     @property
     def second(self) -> SegmentEnd:
-        """A ring's other end: `MainDevice(segment.first, segment.second)`."""
+        """Other end of a ring: `MainDevice(segment.first, segment.second)`."""
         if not self.ring:
             raise ValueError("only a ring has a second end: Segment(..., ring=True)")
         return SegmentEnd(self, second=True)
 
     def open_link(self) -> SegmentLink:
-        """A link into the segment, at its first end; one at a time."""
+        """Open a link at the first end of the segment; one at a time."""
         return self.open_end(second=False)
 
     def open_end(self, *, second: bool) -> SegmentLink:
-        """What `first` and `second` open."""
+        """Open a link at one end: the first, or with `second` the other end of a ring."""
         if second in self._links:
-            raise ValueError("the segment has an open link: close it first")
+            raise ValueError("the segment already has an open link at this end: close it first")
         name = "virtual, second end" if second else "virtual"
         link = SegmentLink(self._core, name, lambda: self._link_closed(second), second=second)
         if self.clock == "monotonic" and not self._links:
@@ -197,36 +207,45 @@ class Segment:
 
     @property
     def time(self) -> float:
-        """The time faults go by [s]: virtual time since the segment was made; in real time since
-        its first frame."""
+        """Time of the segment, to which faults refer [s].
+
+        Virtual time counts from the construction of the segment, real time from its first frame.
+        """
         return self._faults.now
 
     def inject(self, fault: Fault) -> None:
-        """Plans a fault for `fault.at` on the segment's time; without one, or with one that has
-        passed, it begins at once. ValueError names the field that does not fit the segment."""
+        """Plan a fault for `fault.at` on the segment's time.
+
+        Without a time, or with one that has passed, it begins at once.
+
+        Raises:
+            ValueError: The fault does not fit this segment. The message names the field.
+        """
         self._faults.add(fault)
 
     @property
     def faults_done(self) -> bool:
-        """No fault is still to begin or to end; those without an end do not count."""
+        """True if no fault is still to begin or to end. Faults without an end are not counted."""
         return self._faults.done
 
     @property
     def fault_log(self) -> tuple[FaultEvent, ...]:
-        """What was injected when."""
+        """Log of the faults injected so far."""
         return tuple(self._faults.log)
 
     def take_losses(self) -> list[Loss]:
-        """The frames that did not come back since the last call, as far as the log goes (4096)."""
+        """Return the frames lost since the last call, at most the latest 4096."""
         return self._faults.take_losses()
 
     def unplug(self) -> None:
-        """Pulls the cable between MainDevice and first device: no frame comes back. Seen by the
-        controllers at once, other than a fault."""
+        """Pull the cable between MainDevice and first device: no frame returns.
+
+        Unlike with a fault, the controllers detect it at once.
+        """
         self._plug_first(0)
 
     def plug(self, devices: int | None = None) -> None:
-        """Plugs all cables in; `devices`: the line is cut behind that many."""
+        """Plug all cables in. With `devices`, the line ends after this number of devices."""
         self._plug_first(len(self._devices) if devices is None else devices)
 
     def _plug_first(self, devices: int) -> None:
@@ -238,13 +257,13 @@ def _detection_ns(given: float | str) -> int:
     seconds = LINK_LOSS_DETECTION.get(given, None) if isinstance(given, str) else given
     if seconds is None or not 0 <= seconds <= 1:
         raise ValueError(
-            f'link_loss_detection is "enhanced", "standard" or 0 to 1 s, not {given!r}'
+            f'link_loss_detection must be "enhanced", "standard" or 0 to 1 s, not {given!r}'
         )
     return round(seconds * 1e9)
 
 
 def demo_segment(*, clock: ClockKind = "virtual", ring: bool = False) -> Segment:
-    """A coupler, a digital output, three servo drives, a digital output."""
+    """Return a segment of a coupler, a digital output, three servo drives and a digital output."""
     devices: list[Device] = [Coupler(), DigitalOutputs()]
     devices += [Servo(name=f"Catenary virtual servo {k}", serial=k) for k in (1, 2, 3)]
     return Segment([*devices, DigitalOutputs()], clock=clock, ring=ring)

@@ -1,4 +1,4 @@
-/* Making and ending a segment: the only place that allocates. */
+/* Creation and end of a segment: the only place that allocates. */
 #ifndef CATENARY_VIRTUAL_SEGMENT_MEMORY_H
 #define CATENARY_VIRTUAL_SEGMENT_MEMORY_H
 
@@ -16,7 +16,7 @@ static int controller_make(controller *c, uint32_t ram, uint32_t sii_words, int 
     return c->memory && c->sii.image && c->slots && c->axes;
 }
 
-/* What is lost with the power: all but what the device is, its EEPROM, its crystal and its shafts. */
+/* Forget what is lost without power: all but the device's properties, EEPROM, crystal and shafts. */
 static void controller_forget(controller *c) {
     memset(c->memory, 0, c->memory_size);
     memset(c->slots, 0, (size_t)c->slot_count * sizeof *c->slots);
@@ -57,7 +57,7 @@ static void controller_power_off(controller *c) {
     controller_forget(c);
 }
 
-/* Everything as after power-on. */
+/* Set the state after power-on. */
 static void controller_power_on(controller *c) {
     uint8_t *m = c->memory;
     int fmmus = c->fmmu_count, sms = c->sm_count, clock_bits = c->has_dc, no_lrw = c->no_lrw;
@@ -95,7 +95,7 @@ static void controller_free(controller *c) {
     free(c->axes);
 }
 
-/* Nothing stands here yet: no work is due, and no port has a cable. */
+/* Initialise an empty position: no work is due, and no port has a cable. */
 static void controller_blank(controller *c) {
     c->sync.due = c->segment->dues[c->position] = NEVER;
     c->outputs.sm = c->inputs.sm = -1;
@@ -105,7 +105,7 @@ static void controller_blank(controller *c) {
     ports_reset(c);
 }
 
-/* The place in the line stays, the device goes. */
+/* Remove a device; its position in the line stays. */
 static void controller_remove(controller *c) {
     controller empty = {.segment = c->segment, .position = c->position};
     memcpy(empty.ports, c->ports, sizeof empty.ports);
@@ -115,7 +115,7 @@ static void controller_remove(controller *c) {
     controller_blank(c);
 }
 
-/* Two devices change places, with all they remember. */
+/* Exchange two devices with their complete state. */
 static void controllers_exchange(controller *a, controller *b) {
     controller was = *a;
     *a = *b;
@@ -123,7 +123,7 @@ static void controllers_exchange(controller *a, controller *b) {
     int position = a->position;
     a->position = b->position;
     b->position = position;
-    a->segment->dues[a->position] = b->segment->dues[b->position] = a->segment->now;   /* look */
+    a->segment->dues[a->position] = b->segment->dues[b->position] = a->segment->now;   /* check both */
     due_at(a, a->segment->now);
     for (int p = 0; p < PORTS; p++) {
         int32_t hung = a->ports[p].cable;
@@ -151,7 +151,7 @@ static void segment_free(cat_segment *s) {
     free(s);
 }
 
-/* An interface of the MainDevice and the way from it. 0: no memory. */
+/* Make an interface of the MainDevice and its route. Return 0 if out of memory. */
 static int end_make(cat_segment *s, int number) {
     segment_end *e = &s->ends[number];
     route *r = &s->routes[number];

@@ -1,4 +1,4 @@
-"""The segment on a NIC: an EtherCAT segment for any MainDevice at the other end of the cable."""
+"""A segment served on a NIC, for any MainDevice at the other end of the cable."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ IFF_UP = 1
 PR_SET_PDEATHSIG = 1
 SIOCGIFFLAGS = 0x8913
 SO_TIMESTAMPNS = 35  # asm-generic/socket.h
-MAX_AGE = 2e-3  # [s]; SOEM gives a frame up after as long (EC_TIMEOUTRET)
+MAX_AGE = 2e-3  # [s]; SOEM gives up a frame after the same time (EC_TIMEOUTRET)
 NEVER_NS = (1 << 63) - 1
 
 
 def _interface_flags(interface: str) -> int:
-    """Asked of the kernel, not of /sys: that may show another network namespace."""
+    """Return the flags from the kernel. /sys may show another network namespace."""
     request = struct.pack("16sH14x", interface.encode(), 0)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as anything:
         try:
@@ -38,21 +38,21 @@ def _interface_flags(interface: str) -> int:
         except OSError:
             raise LinkError(
                 f"there is no network interface {interface!r}",
-                hint="`ip link` lists those there are",
+                hint="list the interfaces with `ip link`",
             ) from None
     return int(struct.unpack_from("16sH", answer)[1])
 
 
 def _open_socket(interface: str) -> socket.socket:
     if "/" in interface or not interface or len(interface) > 15:
-        raise LinkError(f"{interface!r} is no name of a network interface")
+        raise LinkError(f"invalid name of a network interface: {interface!r}")
     if not _interface_flags(interface) & IFF_UP:
         raise LinkError(f"{interface} is down", hint=f"sudo ip link set {interface} up")
     try:
         packet = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, 0)
     except PermissionError:
         raise LinkError(
-            f"raw frames on {interface} are not permitted", hint=permission_advice()
+            f"no permission for raw frames on {interface}", hint=permission_advice()
         ) from None
     try:
         packet.setsockopt(SOL_PACKET, PACKET_IGNORE_OUTGOING, 1)
@@ -66,7 +66,7 @@ def _open_socket(interface: str) -> socket.socket:
 
 
 def stamp_arrivals(packet: socket.socket) -> None:
-    """Make the kernel note when it received each frame: the packet loop reads how old they are."""
+    """Enable kernel receive time stamps, from which the packet loop computes the age of frames."""
     packet.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
 
 
@@ -83,18 +83,25 @@ def _raise_priority(interface: str, priority: int) -> None:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
     except PermissionError:
         raise LinkError(
-            f"the packet loop on {interface} may not run at SCHED_FIFO {priority}",
+            f"the packet loop on {interface} cannot run at SCHED_FIFO {priority}: no permission",
             hint=permission_advice(),
         ) from None
 
 
 class Server:
-    """Owns a served segment: its sockets, the packet loop's thread and the service's.
+    """Owns a served segment: its sockets, the thread of the packet loop and that of the service.
 
-    `second`: the interface of a ring's other end.
-    `priority`: SCHED_FIFO 1 to 99 for the packet loop; None: as the process.
-    `max_age`: frames that waited longer for the packet loop are lost [s], as a cable holds none
-    (`frames.expired` counts them); None: all are answered.
+    Args:
+        segment: The segment, with clock="monotonic".
+        interface: The network interface.
+        second: The interface of a ring's other end.
+        priority: SCHED_FIFO priority of the packet loop, 1 to 99; None: unchanged.
+        max_age: Frames that waited for the packet loop longer than this [s] are dropped and counted
+            in `frames.expired`, because a cable does not store frames. None: answer all frames.
+
+    Raises:
+        LinkError: The interface does not exist, is down, or access is not permitted.
+        ValueError: An option does not fit the segment or is out of range.
     """
 
     def __init__(
@@ -107,11 +114,13 @@ class Server:
         max_age: float | None = MAX_AGE,
     ) -> None:
         if segment.clock != "monotonic":
-            raise ValueError('a served segment needs real time: Segment(..., clock="monotonic")')
+            raise ValueError(
+                'a served segment runs in real time: use Segment(..., clock="monotonic")'
+            )
         if priority is not None and not 1 <= priority <= 99:
-            raise ValueError(f"SCHED_FIFO has priorities 1 to 99, not {priority}")
+            raise ValueError(f"priority must be 1 to 99 (SCHED_FIFO), not {priority}")
         if second is not None and not segment.ring:
-            raise ValueError("the segment is no ring: Segment(..., ring=True) has a second end")
+            raise ValueError("a second interface needs a ring: use Segment(..., ring=True)")
         self.segment = segment
         self.interface = interface
         self._priority = priority
@@ -164,7 +173,7 @@ class Server:
             self._started.set()
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Waits until the packet loop ends [s]; whether it has."""
+        """Wait up to `timeout` [s] for the end of the packet loop; return True if it has ended."""
         return self._ended.wait(timeout)
 
     def raise_failure(self) -> None:
@@ -202,7 +211,7 @@ class Server:
 
 
 def die_with_parent() -> None:
-    """This process gets SIGTERM when its parent ends: for segments served on another's behalf."""
+    """Request SIGTERM for this process when its parent ends."""
     libc = ctypes.CDLL(None, use_errno=True)
     if libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0) != 0:
         raise OSError(ctypes.get_errno(), "prctl(PR_SET_PDEATHSIG) was refused")
@@ -219,12 +228,20 @@ def serve(
     ready: Callable[[], None] | None = None,
     tell: Callable[[FaultEvent], None] | None = None,
 ) -> None:
-    """Answer on `interface` until SIGINT or SIGTERM. Call it in the main thread.
+    """Answer on `interface` until SIGINT or SIGTERM. Call this in the main thread.
 
-    `second`, `priority`, `max_age`: as of `Server`.
-    `with_parent`: ends with the parent process too. `ready` is called once frames are answered,
-    `tell` with each fault that began or ended.
-    LinkError: no such interface, down, or not permitted.
+    Args:
+        segment: The segment, with clock="monotonic".
+        interface: The network interface.
+        second: See `Server`.
+        priority: See `Server`.
+        max_age: See `Server`.
+        with_parent: End when the parent process ends, too.
+        ready: Called once when frames are being answered.
+        tell: Called with each entry of the fault log.
+
+    Raises:
+        LinkError: The interface does not exist, is down, or access is not permitted.
     """
     if with_parent:
         die_with_parent()

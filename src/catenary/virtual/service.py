@@ -1,7 +1,7 @@
-"""The service: runs the applications of all devices, apart from the path of frames.
+"""The service: runs the applications of all devices, outside the path of frames.
 
-In virtual time the compiled clock calls it when an event is there or an action is due. In real
-time a thread does, woken by an event descriptor.
+In virtual time the compiled clock calls it when an event is pending or an action is due. In real
+time a thread runs it, woken by an event descriptor.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from catenary.virtual.scheduler import FOREVER, Agenda
 
 STOP_SIGNALS = {signal.SIGINT, signal.SIGTERM}
 SELECTABLE = 1024
-IDLE_SECONDS = 0.02  # device models are stepped at least this often while no frame comes
+IDLE_SECONDS = 0.02  # step device models at least this often while no frame arrives
 
 
 class Service:
-    """Owns the agenda of a segment and hands events to its devices."""
+    """Owns the agenda of a segment and dispatches events to its devices."""
 
     def __init__(self, core: Core, devices: Sequence[Device], plant: Plant | None = None) -> None:
         self.core = core
@@ -38,14 +38,14 @@ class Service:
         core.use_service(self.run)
 
     def at_first_frame(self, action: Callable[[], None]) -> None:
-        """Runs once, when the segment's time begins to count."""
+        """Run `action` once, when the segment's time starts to count."""
         self._at_first_frame = action
 
     def run(self) -> int:
-        """Everything that is to be done now; returns when the next is due [ns].
+        """Run all pending work and return the time of the next action [ns].
 
-        Signals wait meanwhile: a device does not lose a request because the MainDevice's program
-        was interrupted.
+        Stop signals are blocked meanwhile. Otherwise an interrupt of the MainDevice's program could
+        lose a request inside a device.
         """
         before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
         try:
@@ -77,7 +77,7 @@ class ServiceThread:
 
     def __init__(self, service: Service) -> None:
         self._service = service
-        self.failure: BaseException | None = None  # ended the thread
+        self.failure: BaseException | None = None  # the exception that ended the thread
         self._event = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._stopping = False
         self._thread = threading.Thread(target=self._run, name="virtual-service", daemon=True)
@@ -105,8 +105,11 @@ class ServiceThread:
                 self._drain()
 
     def _woken(self, wait: float) -> bool:
-        """Whether an event came first. Python rounds the timeout of poll() up to milliseconds, and
-        a mailbox is due in a third of one; select() takes no descriptor beyond 1023."""
+        """Return True if an event arrived within `wait` [s].
+
+        select() is preferred: poll() rounds the timeout up to milliseconds, and a mailbox answers
+        within 0.3 ms. select() does not accept descriptors above 1023.
+        """
         if self._event < SELECTABLE:
             return bool(select.select([self._event], [], [], wait)[0])
         poll = select.poll()

@@ -1,20 +1,21 @@
-/* Homing of a servo axis, mode 6 (CiA 402-2 / IEC 61800-7-201 §13): the drive finds its own home.
+/* Homing of a servo axis, mode 6 (CiA 402-2 / IEC 61800-7-201 §13): the drive finds its home
+ * position.
  *
- * Methods: 37 (and its old number 35), the present position is home; and two of the manufacturer's,
- * numbered as Maxon's EPOS4 has them: -3 and -4, against a hard stop in positive and in negative
- * direction, found by the torque (0x2110, which is also the most it pushes with). Zero is home + home
- * offset (0x607C), as the profile says: at home the axis shows -offset. Bit 4 starts, without it the
- * search stops. Included by servo.h. */
+ * Methods: 37 (and its old number 35): the present position is home. Two manufacturer-specific
+ * ones, numbered as in Maxon's EPOS4: -3 and -4, against a hard stop in positive and in negative
+ * direction. The stop is detected by the torque (0x2110, also the maximum torque of the search).
+ * Zero is home + home offset (0x607C), as in the profile: at home the axis shows -offset. Bit 4
+ * starts the search; clearing it stops the search. Included by servo.h. */
 #ifndef CATENARY_VIRTUAL_SERVO_HOMING_H
 #define CATENARY_VIRTUAL_SERVO_HOMING_H
 
-#define HOMING_PRESSED 0.02           /* the torque lasts so long at standstill: a stop [s] */
+#define HOMING_PRESSED 0.02           /* time at full torque and standstill that means a stop [s] */
 
 typedef enum { HOMING_NOT_STARTED, HOMING_SEARCHES, HOMING_ATTAINED, HOMING_FAILED } homing_state;
 
 enum { HOME_HERE_OLD = 35, HOME_HERE = 37, HOME_STOP_POSITIVE = -3, HOME_STOP_NEGATIVE = -4 };
 
-/* The present position becomes home. */
+/* Set home to the present position. */
 static void homing_attain(servo_axis *a, const int64_t *slots) {
     a->zero = llrint(a->position * a->counts_per_radian) + slots[SLOT_HOME_OFFSET];
     servo_hold(a);
@@ -33,7 +34,7 @@ static void homing_start(servo_axis *a, const int64_t *slots) {
         a->homing = HOMING_FAILED;
 }
 
-/* Bit 4 of the controlword, and the mode. */
+/* Handle bit 4 of the controlword, and the mode. */
 static void homing_command(servo_axis *a, const int64_t *slots) {
     int asked = a->mode == HM && a->state == OPERATION_ENABLED && (slots[SLOT_CONTROLWORD] & 0x10);
     if (a->mode != HM)
@@ -45,7 +46,7 @@ static void homing_command(servo_axis *a, const int64_t *slots) {
     a->homing_asked = (uint8_t)asked;
 }
 
-/* The torque of mode 6: towards the stop at 0x6099:01 with the ramp of 0x609A, else standing. */
+/* Return the torque of mode 6: towards the stop at 0x6099:01 with the ramp of 0x609A, or standing. */
 static double homing_drive(servo_axis *a, const int64_t *slots, double limit, double dt) {
     double speed = 0, step = larger(1e-3, (double)slots[SLOT_HOMING_ACCELERATION] * a->radian_per_velocity) * dt;
     if (a->homing == HOMING_SEARCHES) {
@@ -63,7 +64,7 @@ static double homing_drive(servo_axis *a, const int64_t *slots, double limit, do
     return 0;
 }
 
-/* Bits 10, 12 and 13 of the statusword. */
+/* Return bits 10, 12 and 13 of the statusword. */
 static uint16_t homing_status(const servo_axis *a) {
     uint16_t stands = fabs(a->velocity) < 0.05 && a->homing != HOMING_SEARCHES ? 0x0400 : 0;
     if (a->homing == HOMING_ATTAINED)

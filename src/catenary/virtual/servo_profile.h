@@ -58,7 +58,7 @@ static inline double profile_step(const servo_axis *a, int64_t raw, double dt) {
     return larger(1e-3, (double)raw * a->radian_per_velocity) * dt;
 }
 
-/* The velocity of the next step [rad/s]: towards `wanted` within the ramps. */
+/* Return the velocity of the next step [rad/s]: towards `wanted` within the ramps. */
 static double profile_ramp(const servo_axis *a, const int64_t *slots, double wanted, double dt) {
     int halted = (slots[SLOT_CONTROLWORD] & HALT) != 0;
     int quick = halted && slots[SLOT_HALT_OPTION] == HALT_QUICK_STOP_RAMP;
@@ -68,7 +68,7 @@ static double profile_ramp(const servo_axis *a, const int64_t *slots, double wan
     return now + clamp(wanted - now, profile_step(a, raw, dt));
 }
 
-/* The velocity from which the axis still stops at the goal, one step of the ramp ahead. */
+/* Return the velocity from which the axis can still stop at the target, one ramp step ahead. */
 static double profile_approach(const servo_axis *a, const int64_t *slots, double distance, double dt) {
     double step = profile_step(a, slots[SLOT_DECELERATION], dt);
     double braking = sqrt(0.25 * step * step + 2 * step / dt * fabs(distance)) - 0.5 * step;
@@ -88,7 +88,7 @@ static void profile_position(servo_axis *a, const int64_t *slots, double dt) {
     }
 }
 
-/* Bit 10: the motor has been in the window for long enough. */
+/* Bit 10: return 1 if the motor has been in the window for long enough. */
 static int profile_in_window(servo_axis *a, int inside, int64_t milliseconds, double dt) {
     a->profile.in_window = inside ? a->profile.in_window + dt : 0;
     return inside && a->profile.in_window * 1e3 >= (double)milliseconds;
@@ -117,7 +117,7 @@ static void profile_reached(servo_axis *a, const int64_t *slots, double dt) {
     a->profile.reached = (uint8_t)(reached && !a->profile.in_process);
 }
 
-/* The trajectory of one step: command and command_velocity. */
+/* Compute the trajectory of one step: command and command_velocity. */
 static void profile_drive(servo_axis *a, const int64_t *slots, double dt) {
     if (a->mode == PP)
         profile_position(a, slots, dt);
@@ -129,7 +129,7 @@ static void profile_drive(servo_axis *a, const int64_t *slots, double dt) {
     profile_reached(a, slots, dt);
 }
 
-/* Bits 10 to 12 of the statusword. */
+/* Return bits 10 to 12 of the statusword. */
 static uint16_t profile_status(const servo_axis *a, const int64_t *slots) {
     uint16_t word = a->profile.reached ? 0x0400 : 0;
     if (a->mode == PV)

@@ -1,5 +1,5 @@
-/* SII access, ETG.1000.4 §6.4: registers 0x0500 to 0x050F before an EEPROM that takes its time.
- * Reads give 4 or 8 bytes (bit 6), writes take one word; addresses count words. */
+/* SII access, ETG.1000.4 §6.4: registers 0x0500 to 0x050F and an EEPROM with access times.
+ * Reads return 4 or 8 bytes (bit 6), writes store one word; addresses count words. */
 #ifndef CATENARY_VIRTUAL_SII_ACCESS_H
 #define CATENARY_VIRTUAL_SII_ACCESS_H
 
@@ -18,8 +18,8 @@ static uint8_t sii_checksum(const uint8_t *image) {
     return crc;
 }
 
-/* The controller loads its configuration from the first words: at power-on, and by the reload
- * command, which leaves the alias as it is. */
+/* Load the controller's configuration from the first words: at power-on, and by the reload command,
+ * which does not change the alias. */
 static void sii_load(controller *c) {
     uint16_t control = load16(c->memory + REG_SII_CONTROL);
     control &= (uint16_t)~(SII_ERROR_CHECKSUM | SII_ERROR_LOADING);
@@ -57,7 +57,7 @@ static inline void sii_start(controller *c, uint16_t command, int64_t time) {
         c->segment->sii_due = c->sii.due;
 }
 
-/* The control word was written with `value`: one command at a time, else an error bit. */
+/* Handle a write of `value` to the control word: one command at a time, else an error bit. */
 static void sii_command(controller *c, uint16_t value) {
     uint8_t *control = c->memory + REG_SII_CONTROL;
     uint16_t status = load16(control) & (uint16_t)~(SII_ERROR_COMMAND | SII_ERROR_WRITE_ENABLE);
@@ -94,7 +94,7 @@ static void sii_check(controller *c) {
     else if (c->sii.address < c->sii.words)
         store16(c->sii.image + 2 * c->sii.address, c->sii.word);
     else
-        store16(control, status | SII_ERROR_COMMAND);   /* no acknowledge beyond the EEPROM's end */
+        store16(control, status | SII_ERROR_COMMAND);   /* no acknowledge beyond the end of the EEPROM */
     c->sii.pending = 0;
     c->sii.due = NEVER;
     store16(control, load16(control) & (uint16_t)~(SII_BUSY | SII_COMMAND | SII_WRITE_ENABLE));

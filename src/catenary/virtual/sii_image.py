@@ -1,5 +1,5 @@
 """SII images made from a description, ETG.2010: header, strings, general, FMMU, SyncManagers, PDOs,
-clocks. Written apart from `catenary.wire.sii`, which decodes: the two judge each other.
+clocks. Written independently of the decoder `catenary.wire.sii`, so that each tests the other.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ STRINGS, GENERAL, FMMU, SYNC_MANAGER, TX_PDO, RX_PDO, CLOCK, END = (
     60,
     0xFFFF,
 )
-FIXED_CONTENT = 0x0010  # of a PDO's flags
+FIXED_CONTENT = 0x0010  # PDO flag
 COE_PROTOCOL = 0x0004
 # Flags of the general category, byte 0x0B
 NO_LRW, IDENTIFICATION_IN_MEMORY = 0x02, 0x10
@@ -30,7 +30,7 @@ UNUSED = SyncManagerDefault(0, 0, 0, 0, 0)
 
 
 class _Strings:
-    """Owns the string category: each string once, numbered from 1; 0 is none."""
+    """Owns the string category: each string once, numbered from 1; 0 means no string."""
 
     def __init__(self, prefix: str) -> None:
         self.texts: list[bytes] = []
@@ -49,7 +49,7 @@ class _Strings:
 
 
 def checksum(configuration: bytes) -> int:
-    """CRC-8 of the first 14 bytes: x^8 + x^2 + x + 1, start 0xFF."""
+    """Return the CRC-8 of the first 14 bytes: x^8 + x^2 + x + 1, initial value 0xFF."""
     crc = 0xFF
     for byte in configuration[:14]:
         crc ^= byte
@@ -81,7 +81,7 @@ def _header(device: Description, size: int, mailbox_size: int | None) -> bytes:
 
 
 def _general(device: Description, strings: _Strings) -> bytes:
-    name = strings.number(device.name)  # first: SOEM shows string 1 as the name
+    name = strings.number(device.name)  # first, because SOEM shows string 1 as the name
     group, order = strings.number(device.group), strings.number(device.order)
     details = device.mailbox.coe_details if device.mailbox else 0
     flags = IDENTIFICATION_IN_MEMORY if device.identification else 0
@@ -129,7 +129,7 @@ def _category(kind: int, content: bytes) -> bytes:
 
 
 def make_sii_image(device: Description, quirks: SiiQuirks = NO_SII_QUIRKS) -> bytes:
-    """Return the whole EEPROM, a power of two of at least 2 KiB, unused bytes 0xFF."""
+    """Return the whole EEPROM content: a power of two of at least 2 KiB, padded with 0xFF."""
     strings = _Strings(quirks.text_prefix)
     sync_managers = device.sync_managers
     if quirks.sync_managers is not None:
@@ -141,7 +141,7 @@ def make_sii_image(device: Description, quirks: SiiQuirks = NO_SII_QUIRKS) -> by
         for s in sync_managers
     )
     parts.append((SYNC_MANAGER, managers))
-    # All PDOs of a direction in one category, as in real terminals: SOEM reads no second one.
+    # All PDOs of a direction share one category, as in real terminals. SOEM reads only the first.
     flags = FIXED_CONTENT if device.mapping_quirks.fixed_pdos == "declared" else 0
     parts.append((TX_PDO, _pdos(device.tx_pdos, strings, quirks, flags)))
     parts.append((RX_PDO, _pdos(device.rx_pdos, strings, quirks, flags)))

@@ -1,7 +1,7 @@
 """The EtherCAT state machine of a device with a microcontroller, ETG.1000.6 §6.4.
 
-A request is judged, prepared, and answered after the time such a device takes. In an error state
-only INIT is obeyed without an acknowledgement, as in Beckhoff's slave stack code (SSC 5.11 to 5.13,
+A request is checked at once and answered after a typical transition time. In an error state only
+INIT is accepted without an acknowledgement, as in Beckhoff's slave stack code (SSC 5.11 to 5.13,
 ecatslv.c, AL_ControlInd) and in SOES (soes/esc.c, ESC_state).
 """
 
@@ -34,47 +34,47 @@ DC_SYNC0_CYCLE_TIME = 0x0036
 
 UPWARDS = {(INIT, PRE_OP), (PRE_OP, SAFE_OP), (SAFE_OP, OP)}
 MILLISECOND = 1_000_000
-# How long SAFE-OP → OP waits for what it lacks, by the AL status code that ends the wait. SYNC
-# pulses start 100 ms after they are switched on with SOEM and IgH, and later with others.
+# Time limits of SAFE-OP → OP, by the AL status code of what is missing. SYNC pulses start 100 ms
+# after activation with SOEM and IgH, and later with other masters.
 TIMEOUTS_NS = {NO_VALID_OUTPUTS: 200 * MILLISECOND, NO_SYNC_ERROR: 1000 * MILLISECOND}
 
 
 class Controlled(Protocol):
-    """The controller and application a state machine rules."""
+    """The controller and application that a state machine controls."""
 
     def fetch_al_control(self) -> int: ...
 
     def show_al_status(self, status: int, code: int) -> None: ...
 
     def check_state(self, state: int) -> int:
-        """0, or the AL status code why `state` cannot be entered."""
+        """Return 0, or the AL status code for which `state` cannot be entered."""
         ...
 
     def enter_state(self, before: int, state: int) -> None: ...
 
     def lacks_for_op(self) -> int:
-        """0, or the AL status code of what OP cannot be entered without."""
+        """Return 0, or the AL status code of a condition that is missing for OP."""
         ...
 
 
 class StateMachine:
-    """Owns the AL state of one device, and the faults injected into it."""
+    """Owns the AL state of one device and the state faults injected into it."""
 
     def __init__(self, device: Controlled, scheduler: Scheduler, identification: int) -> None:
         self._device = device
         self._scheduler = scheduler
         self._identification = identification
-        self._request = 0  # counts requests: a later one overtakes an earlier
-        self._pending: int | None = None  # the state of a request that is not answered yet
-        self._waiting: tuple[bool, int] | None = None  # for OP: identify, request
+        self._request = 0  # counts requests; a newer one cancels an older one
+        self._pending: int | None = None  # requested state that is not answered yet
+        self._waiting: tuple[bool, int] | None = None  # for OP: identify flag, request
         self.state = INIT
         self.code = 0
         self.transition_ns = MILLISECOND
         self.refused: dict[int, tuple[int, int | None]] = {}  # state → AL status code, times
-        self.delays: dict[int, int | None] = {}  # state → [ns]; None: it is never reached
+        self.delays: dict[int, int | None] = {}  # state → delay [ns]; None: never reached
 
     def obey(self) -> None:
-        """AL control was written."""
+        """Handle a write to AL control."""
         control = self._device.fetch_al_control()
         requested, acknowledged = control & 0x0F, bool(control & ACKNOWLEDGE)
         if self.code and not acknowledged and requested != INIT:
@@ -120,7 +120,7 @@ class StateMachine:
     def _enter(self, state: int, identify: bool) -> None:
         lack = self._device.lacks_for_op() if (self.state, state) == (SAFE_OP, OP) else 0
         if lack:
-            # process data or pulses did not come yet: they take it up, or the time runs out
+            # wait for process data or pulses; `something_arrived` or the time limit ends the wait
             self._waiting = identify, self._request
             self._later(TIMEOUTS_NS[lack], lambda: self.fail(SAFE_OP, lack))
             return
@@ -130,18 +130,22 @@ class StateMachine:
         self._device.show_al_status(state | shown, self._identification if shown else 0)
 
     def something_arrived(self) -> None:
-        """The first process data, or the first SYNC pulse."""
+        """Complete a waiting request for OP: the first process data or SYNC pulse has arrived."""
         waiting, self._waiting = self._waiting, None
         if waiting is not None and waiting[1] == self._request:
             self._request += 1
             self._enter(OP, waiting[0])
 
     def fail(self, state: int, code: int) -> None:
-        """Fall to, or stay in, `state` and show the error.
+        """Enter a lower state, or stay in `state`, and show an error.
 
-        A pending request for `state` or a lower one is answered all the same. Real stacks go down
-        at once (SSC, ecatslv.c, AL_ControlInd, OP_2_INIT), so no local error comes between. IgH
-        waits 5 s for an INIT that got lost (master/fsm_change.c, ec_fsm_change_state_status).
+        A pending request for `state` or a lower one is still answered. Real stacks go down at once
+        (SSC, ecatslv.c, AL_ControlInd, OP_2_INIT), so that a local error cannot come between. IgH
+        would wait 5 s for a lost INIT (master/fsm_change.c, ec_fsm_change_state_status).
+
+        Args:
+            state: The AL state to show.
+            code: The AL status code to show.
         """
         if self._pending is None or self._pending > state:
             self._request += 1

@@ -1,8 +1,8 @@
 /* SyncManagers, ETG.1000.4 §6.8: mailbox (one buffer with handshake) and three-buffer mode.
  *
- * Access to a buffer begins with its first byte and ends with its last; an access that begins in
- * the middle of a buffer nobody opened is refused. Three buffers lie one behind the other; both
- * sides always address the first and the controller redirects. */
+ * Access to a buffer begins with its first byte and ends with its last. An access that begins in
+ * the middle of a buffer that is not open is refused. Three buffers are stored one after the other;
+ * both sides always address the first, and the controller redirects. */
 #ifndef CATENARY_VIRTUAL_SYNC_MANAGER_H
 #define CATENARY_VIRTUAL_SYNC_MANAGER_H
 
@@ -32,7 +32,7 @@ static inline void sm_show_status(controller *c, int n) {
     store16(c->memory + REG_ECAT_EVENT, raised ? events | event : events & (uint16_t)~event);
 }
 
-/* The registers of SyncManager n changed, from either side. */
+/* Apply a change of SyncManager n's registers, from either side. */
 static void sm_configured(controller *c, int n) {
     sync_manager *sm = &c->sm[n];
     const uint8_t *r = sm_registers(c, n);
@@ -63,7 +63,7 @@ static inline uint8_t *sm_buffer(controller *c, const sync_manager *sm, uint8_t 
     return c->memory + sm->start + (sm->mailbox ? 0u : (uint32_t)which * sm->length);
 }
 
-/* A buffer that is neither the last complete one nor held by the other side. */
+/* Return a buffer that is neither the last complete one nor held by the other side. */
 static inline uint8_t sm_free_buffer(uint8_t a, uint8_t b) {
     uint8_t k = 0;
     while (k == a || k == b)
@@ -101,7 +101,7 @@ static inline void sm_write_completed(controller *c, int n) {
     sm_show_status(c, n);
 }
 
-/* EtherCAT side: `size` bytes at `offset` of the buffer. 1: done, 0: refused. */
+/* EtherCAT side: access `size` bytes at `offset` of the buffer. Return 1: done, 0: refused. */
 static inline int sm_ecat_write(controller *c, int n, uint32_t offset, uint32_t size, const uint8_t *data) {
     sync_manager *sm = &c->sm[n];
     if (sm->blocked || !sm->ecat_writes || offset + size > sm->length || (sm->mailbox && sm->full))
@@ -143,7 +143,7 @@ static inline int sm_ecat_read(controller *c, int n, uint32_t offset, uint32_t s
     return 1;
 }
 
-/* PDI side: a complete buffer at once. The number of bytes, or -1 where it is not there. */
+/* PDI side: read a complete buffer. Return the number of bytes, or -1 if there is none. */
 static inline int sm_pdi_read(controller *c, int n, uint8_t *data, uint32_t room) {
     sync_manager *sm = &c->sm[n];
     if (!sm->enabled || !sm->ecat_writes || sm->length > room || (sm->mailbox && !sm->full) || !sm->written)
@@ -159,7 +159,7 @@ static inline int sm_pdi_read(controller *c, int n, uint8_t *data, uint32_t room
     return sm->length;
 }
 
-/* Where the application may write now; NULL: nowhere. `sm_pdi_written` offers it. */
+/* Return where the application may write now; NULL: nowhere. `sm_pdi_written` publishes it. */
 static inline uint8_t *sm_pdi_buffer(controller *c, int n, uint8_t *which) {
     sync_manager *sm = &c->sm[n];
     if (!sm->enabled || sm->blocked || sm->ecat_writes || (sm->mailbox && sm->full))
@@ -190,7 +190,7 @@ static inline int sm_pdi_write(controller *c, int n, const uint8_t *data, uint32
     return (int)size;
 }
 
-/* Which SyncManager guards byte `address`; -1: none, and *run is how far that holds. */
+/* Return the SyncManager that guards byte `address`, -1: none; *run: how far this is valid. */
 static inline int sm_at(const controller *c, uint32_t address, uint32_t *run) {
     uint32_t nearest = c->memory_size;
     for (int n = 0; n < c->sm_top; n++) {
@@ -209,7 +209,7 @@ static inline int sm_at(const controller *c, uint32_t address, uint32_t *run) {
     return -1;
 }
 
-/* EtherCAT access to process RAM; bounded by the caller to the memory. 1: some byte was accessed. */
+/* EtherCAT access to process RAM, bounded by the caller. Return 1 if any byte was accessed. */
 static int ram_access(controller *c, uint32_t address, uint32_t size, uint8_t *data, int write) {
     int done = 0;
     while (size > 0) {
@@ -225,7 +225,7 @@ static int ram_access(controller *c, uint32_t address, uint32_t size, uint8_t *d
         } else {
             uint32_t offset = address - c->sm[n].start;
             uint32_t length = c->sm[n].length;
-            if (offset < length) {       /* buffers two and three are nobody's business */
+            if (offset < length) {       /* buffers two and three are not accessible */
                 run = min32(run, length - offset);
                 done |= write ? sm_ecat_write(c, n, offset, run, data) : sm_ecat_read(c, n, offset, run, data);
             }
@@ -237,7 +237,7 @@ static int ram_access(controller *c, uint32_t address, uint32_t size, uint8_t *d
     return done;
 }
 
-/* The byte a bit-wise write is merged with: the last complete buffer's, without touching anything. */
+/* Return the byte for a bit-wise write: that of the last complete buffer, without side effects. */
 static inline uint8_t ram_peek(controller *c, uint32_t address) {
     uint32_t run;
     int n = sm_at(c, address, &run);

@@ -1,32 +1,32 @@
-/* SYNC0 and SYNC1: pulses at instants of the local copy of the system time, which move with it as
- * the time control loop steers. Beckhoff, EtherCAT Slave Controller, section I §9.2.3, section II
- * §3.49.4; the bits an ET1100 lacks (0x0981.3 to 7) are not there.
+/* SYNC0 and SYNC1: pulses at given values of the local copy of the system time, which the time
+ * control loop steers. Beckhoff, EtherCAT Slave Controller, section I §9.2.3, section II §3.49.4;
+ * bits that an ET1100 lacks (0x0981.3 to 7) are not implemented.
  *
- * The unit compares for "reached": a start time that is past when the unit is activated, or that an
- * offset written meanwhile jumps over, is reached when the clock has gone round: after at most 4.3 s
- * with 32 bits, in no one's lifetime with 64. With a pulse length of 0 the device acknowledges at
+ * The unit compares for "reached". A start time may be in the past when the unit is activated, or a
+ * new offset may jump over it. It is then reached after the clock has wrapped: after at most 4.3 s
+ * with 32 bits, practically never with 64. With a pulse length of 0 the device acknowledges at
  * once, so that 0x098E and 0x098F read 0.
  *
- * A frame writes all these times as it likes. They are counted modulo 2^64; the way to a pulse is
- * their difference, limited to SYNC_HORIZON. A pulse that is awaited is less than 2^63 ns ahead. */
+ * Frames can write any value into these times. They are counted modulo 2^64. The distance to a
+ * pulse is their difference, limited to SYNC_HORIZON. A pending pulse is less than 2^63 ns ahead. */
 #ifndef CATENARY_VIRTUAL_SYNC_UNIT_H
 #define CATENARY_VIRTUAL_SYNC_UNIT_H
 
 #include "distributed_clock.h"
 
 enum {
-    SYNC_ACTIVE = 0x01,              /* of 0x0981 */
+    SYNC_ACTIVE = 0x01,              /* in 0x0981 */
     SYNC_PULSE_0 = 0x02,
     SYNC_PULSE_1 = 0x04,
-    SYNC_BY_PDI = 0x01,              /* of 0x0980 */
-    SYNC_PENDING_0 = 0x01,           /* of 0x0984 */
+    SYNC_BY_PDI = 0x01,              /* in 0x0980 */
+    SYNC_PENDING_0 = 0x01,           /* in 0x0984 */
     SYNC_PENDING_1 = 0x02
 };
 
-#define SYNC_HOLD_MIN 10000           /* no device follows interrupts faster than this [ns] */
-#define SYNC_HORIZON 1000000000000ll  /* a pulse further away is looked for again then [ns] */
+#define SYNC_HOLD_MIN 10000           /* shortest interval of interrupts that a device can follow [ns] */
+#define SYNC_HORIZON 1000000000000ll  /* a pulse farther away is scheduled again at this distance [ns] */
 
-/* May a frame write this byte of 0x0900 to 0x09FF now? */
+/* Return 1 if a frame may write this byte of 0x0900 to 0x09FF now. */
 static inline int clock_register_open(const controller *c, uint32_t address) {
     int upper = (address & 7) >= 4;
     int wide = address < REG_DC_DELAY || (address >= REG_SYNC_START && address < REG_SYNC0_CYCLE);
@@ -40,14 +40,14 @@ static inline int clock_register_open(const controller *c, uint32_t address) {
         || !(c->memory[REG_SYNC_ACTIVATION] & SYNC_ACTIVE);
 }
 
-/* Waits for a counter that stands at `now` to read *time. 1: that is within 2^63 ns. */
+/* Wait until a counter that reads `now` reaches *time. Return 1 if that is within 2^63 ns. */
 static inline uint8_t sync_await(const controller *c, uint64_t *time, uint64_t now) {
     uint64_t ahead = c->has_dc == 64 ? *time - now : (uint32_t)(*time - now);
     *time = now + ahead;
     return ahead <= INT64_MAX;
 }
 
-/* How far `time` is ahead of `now`; 0 or negative: it is reached. */
+/* Return the distance from `now` to `time`; 0 or negative: reached. */
 static inline int64_t sync_ahead(uint64_t time, uint64_t now) {
     int64_t ahead = (int64_t)(time - now);
     return ahead < -SYNC_HORIZON ? -SYNC_HORIZON : ahead > SYNC_HORIZON ? SYNC_HORIZON : ahead;
@@ -57,7 +57,7 @@ static inline int sync_reached(int awaits, uint64_t time, uint64_t now) {
     return awaits && sync_ahead(time, now) <= 0;
 }
 
-/* The instant of the segment's clock for the earlier pulse, at the present rate. */
+/* Compute the segment time of the earlier pulse, at the present rate. */
 static void sync_schedule(controller *c) {
     sync_unit *u = &c->sync;
     u->due = NEVER;
@@ -96,7 +96,7 @@ static void sync_activation_written(controller *c, int64_t when) {
     sync_schedule(c);
 }
 
-/* The local copy of the system time jumped: pulses it jumped over come when it has gone round. */
+/* Handle a jump of the local system time: pulses it jumped over come after the clock has wrapped. */
 static void sync_time_jumped(controller *c, int64_t when) {
     sync_unit *u = &c->sync;
     uint64_t now = (uint64_t)dc_system_time(c, when);
@@ -107,7 +107,7 @@ static void sync_time_jumped(controller *c, int64_t when) {
     sync_schedule(c);
 }
 
-/* SYNC1 comes its cycle time after a SYNC0, and after the first SYNC0 again that follows it. */
+/* Emit SYNC1. It follows a SYNC0 by its cycle time; the next SYNC0 starts this time again. */
 static int sync_pulse1(controller *c) {
     int shown = c->memory[REG_SYNC_ACTIVATION] & SYNC_PULSE_1;
     c->memory[REG_SYNC_ACTIVATION_STATUS] &= (uint8_t)~SYNC_PENDING_1;
@@ -116,8 +116,8 @@ static int sync_pulse1(controller *c) {
     return shown;
 }
 
-/* How long a signal is up. One whose next pulse comes before it is down stays up (section I
- * §9.2.3.1): no further pulse. */
+/* Return how long a signal is active. If its next pulse comes before the end, the signal stays
+ * active (section I §9.2.3.1): no further pulse. */
 static inline int64_t sync_hold(const controller *c) {
     int64_t length = 10 * (int64_t)load16(c->memory + REG_SYNC_PULSE_LENGTH);
     return length > SYNC_HOLD_MIN ? length : SYNC_HOLD_MIN;
@@ -128,7 +128,7 @@ static int sync_pulse0(controller *c) {
     uint32_t cycle = load32(c->memory + REG_SYNC0_CYCLE);
     uint64_t now = u->next0;
     c->memory[REG_SYNC_ACTIVATION_STATUS] &= (uint8_t)~SYNC_PENDING_0;
-    u->awaits0 = cycle > sync_hold(c);                       /* 0: a single shot */
+    u->awaits0 = cycle > sync_hold(c);                       /* 0: single shot */
     u->next0 = now + cycle;
     if (!u->awaits1)
         u->next1 = now + load32(c->memory + REG_SYNC1_CYCLE);
@@ -141,9 +141,9 @@ static int sync_pulse0(controller *c) {
     return u->next1 == now ? shown | sync_pulse1(c) : shown;
 }
 
-/* What is due at the segment's present. Returns the pulses that the device gets: SYNC_PULSE_0, _1.
- * The rate swings and a product of it is rounded, so that a pulse may still be a hair away at the
- * instant computed for it: counted from here on, it is at least 1 ns ahead and comes nearer. */
+/* Handle pulses that are due at the segment's time. Return those for the device: SYNC_PULSE_0, _1.
+ * The rate swings and products of it are rounded, so that a pulse may be slightly ahead at its
+ * computed time. Computed again from here, it is at least 1 ns ahead and comes nearer. */
 static int sync_advance(controller *c) {
     sync_unit *u = &c->sync;
     dc_anchor(c, c->segment->now);
@@ -159,7 +159,7 @@ static int sync_advance(controller *c) {
     return pulses;
 }
 
-/* What a write of [first, end) in the clocks' registers sets going, latched times apart. */
+/* Apply the effects of a write to the clocks' registers [first, end), except latched times. */
 static void clock_registers_written(controller *c, uint32_t first, uint32_t end, const uint8_t *data, int64_t when) {
     if (first <= REG_DC_SYSTEM_TIME && end >= REG_DC_SYSTEM_TIME + 4) {
         dc_receive_time(c, load32(data + (REG_DC_SYSTEM_TIME - first)), when);

@@ -1,7 +1,7 @@
-"""How devices hang together: a tree in the order in which frames are processed, or a ring.
+"""Topology of a segment: a tree in the order in which frames are processed, or a ring.
 
-A frame leaves a controller by port 3, then 1, then 2, as far as something hangs there, and returns
-by port 0 (ET1100 datasheet, section I, 3.2): the positions of devices follow from that.
+A frame leaves a controller by port 3, then 1, then 2, skipping unconnected ports, and returns
+by port 0 (ET1100 datasheet, section I, 3.2). The positions of devices follow from this order.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from typing import Literal, NamedTuple, TypeAlias
 Place: TypeAlias = tuple[int, int]  # device and port
 Neighbour: TypeAlias = int | Literal["main"]  # a device, or the MainDevice
 
-FIRST, SECOND = -1, -2  # the MainDevice's interfaces, as the compiled side numbers them
+FIRST, SECOND = -1, -2  # interfaces of the MainDevice, numbered as in the compiled code
 PORT_ORDER = (3, 1, 2)
 
 
 class Cable(NamedTuple):
-    """Cable n leads up from device n; in a ring the last one leads back to the MainDevice."""
+    """Cable n: the uplink of device n. In a ring the last cable returns to the MainDevice."""
 
     up: Place
     down: Place
@@ -26,9 +26,12 @@ class Cable(NamedTuple):
 class Wiring:
     """The cables of a segment.
 
-    `ports`: the port numbers of each device. `behind`: where a device hangs that does not hang on
-    port 1 of the one before. `ring`: port 1 of the last device leads back: a frame from the first
-    interface has been everywhere when it gets there.
+    Args:
+        ports: Port numbers of each device.
+        behind: Maps a device to the (device, port) it is connected to. The default is port 1 of the
+            previous device.
+        ring: True if port 1 of the last device leads back to the MainDevice. A frame from the first
+            interface has then passed all devices.
     """
 
     def __init__(
@@ -37,7 +40,9 @@ class Wiring:
         self._below: dict[Place, int] = {}
         for device in behind:
             if not 0 < device < len(ports):
-                raise ValueError(f"behind: there is no device {device} that could hang elsewhere")
+                raise ValueError(
+                    f"behind: device {device} cannot be placed; use 1 to {len(ports) - 1}"
+                )
         cables = [Cable((FIRST, 0), (0, 0))] if ports else []
         for device in range(1, len(ports)):
             up = tuple(behind.get(device, (device - 1, 1)))
@@ -53,13 +58,14 @@ class Wiring:
         above, port = up
         if not 0 <= above < device:
             raise ValueError(
-                f"behind: device {device} can hang behind one of 0 to {device - 1}, not {above}"
+                f"behind: device {device} must be behind one of 0 to {device - 1}, not {above}"
             )
         if port not in PORT_ORDER or port not in ports[above]:
             raise ValueError(f"behind: device {above} has no port {port} for device {device}")
         if up in self._below:
             raise ValueError(
-                f"behind: port {port} of device {above} has device {self._below[up]} already"
+                f"behind: port {port} of device {above} is already connected to"
+                f" device {self._below[up]}"
             )
         self._below[up] = device
 
@@ -73,12 +79,20 @@ class Wiring:
             waiting += [child for child in reversed(below) if child >= 0]
         if order != list(range(count)):
             raise ValueError(
-                f"behind: frames come to the devices in the order {order} (ports 3, 1, 2): "
-                "list them so"
+                f"behind: frames reach the devices in the order {order} (ports 3, 1, 2): "
+                "list the devices in this order"
             )
 
     def between(self, one: Neighbour, other: Neighbour) -> int:
-        """The number of the cable between two neighbours; ValueError names those there are."""
+        """Return the number of the cable between two neighbours.
+
+        Args:
+            one: A device, or "main".
+            other: The device at the other end of the cable, or "main".
+
+        Raises:
+            ValueError: No cable connects the two. The message lists the cables.
+        """
         for number, cable in enumerate(self.cables):
             if {_name(cable.up), _name(cable.down)} == {one, other}:
                 return number
@@ -86,15 +100,15 @@ class Wiring:
         raise ValueError(f"between: {one} and {other} are not neighbours (cables: {known})")
 
     def at_port(self, device: int, port: int) -> bool:
-        """Whether a cable hangs there."""
+        """Return True if a cable is connected to this port."""
         return any((device, port) in (cable.up, cable.down) for cable in self.cables)
 
 
 def _last_port(ports: Sequence[Sequence[int]]) -> Place:
     if not ports:
-        raise ValueError("ring: a ring needs a device")
+        raise ValueError("ring: a ring needs at least one device")
     if 1 not in ports[-1]:
-        raise ValueError(f"ring: device {len(ports) - 1} has no port 1 to lead back")
+        raise ValueError(f"ring: device {len(ports) - 1} has no port 1 for the cable back")
     return len(ports) - 1, 1
 
 

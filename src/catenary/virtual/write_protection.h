@@ -1,6 +1,6 @@
 /* Write protection, and the reset by three frames (Beckhoff, EtherCAT Slave Controller, section I
- * §17.3 and §17.4): 0x0021 guards registers, 0x0031 everything, until the enable bit beside it is
- * written in the same frame before. 0x52, 0x45, 0x53 written to 0x0040 reset the device. */
+ * §17.3 and §17.4): 0x0021 protects registers, 0x0031 everything, until the enable register next to
+ * it is written earlier in the same frame. 0x52, 0x45, 0x53 written to 0x0040 reset the device. */
 #ifndef CATENARY_VIRTUAL_WRITE_PROTECTION_H
 #define CATENARY_VIRTUAL_WRITE_PROTECTION_H
 
@@ -10,7 +10,8 @@ static inline int enabled_in_this_frame(const controller *c, uint64_t enabled) {
     return enabled == c->segment->counters.frames;
 }
 
-/* May this byte be written now, as far as protection goes? The enable registers always may. */
+/* Return 1 if write protection permits a write of this byte. The enable registers are always
+ * writable. */
 static inline int byte_unprotected(const controller *c, uint32_t address) {
     if (!c->is_protected || address == REG_WRITE_ENABLE || address == REG_ESC_WRITE_ENABLE)
         return 1;
@@ -20,7 +21,7 @@ static inline int byte_unprotected(const controller *c, uint32_t address) {
         || enabled_in_this_frame(c, c->registers_enabled);
 }
 
-/* May process RAM and what lies beyond the registers? */
+/* Return 1 if write protection permits writes to process RAM and beyond the registers. */
 static inline int ram_unprotected(const controller *c) {
     return !c->is_protected || byte_unprotected(c, REG_USER_RAM);
 }
@@ -35,7 +36,7 @@ static void protection_written(controller *c) {
     c->is_protected = (m[REG_WRITE_PROTECTION] | m[REG_ESC_WRITE_PROTECTION]) & 1;
 }
 
-/* The register shows how far the sequence has come. */
+/* Show the progress of the reset sequence in the register. */
 static void reset_written(controller *c) {
     static const uint8_t sequence[3] = {0x52, 0x45, 0x53};
     uint8_t value = c->memory[REG_RESET];

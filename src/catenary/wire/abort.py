@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class AbortCode:
-    """Why a device refused an SDO service: the standard's text, and what to do."""
+    """An SDO abort code: the text of the standard, and a hint."""
 
     code: int
     text: str
@@ -55,7 +55,7 @@ _CODES = (
     AbortCode(
         0x06070010,
         "Data type does not match, length of service parameter does not match",
-        "check the type: the length written is not the object's",
+        "check the type: the written length differs from the object's",
     ),
     AbortCode(
         0x06070012,
@@ -74,7 +74,7 @@ _CODES = (
     AbortCode(
         0x06090033,
         "Detected and configured module ident lists (0xF050 and 0xF030) do not match",
-        "check the modules plugged",
+        "check the plugged modules",
     ),
     AbortCode(0x06090036, "Maximum value is less than minimum value"),
     AbortCode(0x08000000, "General error"),
@@ -82,7 +82,7 @@ _CODES = (
     AbortCode(
         0x08000021,
         "Data cannot be transferred or stored to the application because of local control",
-        "another program or a panel holds the device",
+        "another program or a panel controls the device",
     ),
     AbortCode(
         0x08000022,
@@ -99,7 +99,7 @@ ABORT_CODES = {entry.code: entry for entry in _CODES}
 
 
 def abort_code(code: int) -> AbortCode:
-    """What SDO abort code `code` means; unknown ones get a text that says so."""
+    """Return the meaning of an SDO abort code; the text of an unknown code says so."""
     return ABORT_CODES.get(code) or AbortCode(
         code, "Unknown abort code", "see the manual of the device"
     )

@@ -1,5 +1,5 @@
-"""The EtherCAT state machine as the application layer registers show it, ETG.1000.6 §5.3 and
-ETG.1020 (AL status codes)."""
+"""The EtherCAT state machine in the application layer registers, ETG.1000.6 §5.3, and the AL status
+codes, ETG.1020."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _IDENTIFICATION = 0x0020
 
 
 class AlState(IntEnum):
-    """The states of a SubDevice, with their code in AL control and AL status."""
+    """States of a SubDevice, with their codes in AL control and AL status."""
 
     INIT = 1
     PRE_OP = 2
@@ -27,7 +27,7 @@ class AlState(IntEnum):
 
     @classmethod
     def from_name(cls, text: str) -> AlState:
-        """Return the state of a name: "SAFE_OP", "SAFE-OP", "safeop", "OPERATIONAL".
+        """Return the state with a name: "SAFE_OP", "SAFE-OP", "safeop", "OPERATIONAL".
 
         Raises:
             ValueError: The text is not the name of a state; the error lists the names.
@@ -50,15 +50,15 @@ _LONG_NAMES = {
 
 @dataclass(frozen=True, slots=True)
 class AlControl:
-    """What the MainDevice asks for (0x0120)."""
+    """AL control (0x0120): the state that the MainDevice requests."""
 
     state: AlState
-    acknowledge: bool = False  # of a pending error
+    acknowledge: bool = False  # acknowledge a pending error
     request_identification: bool = False  # explicit device identification, ETG.1020 §22
 
     @property
     def word(self) -> int:
-        """The register's value."""
+        """Value of the register."""
         word = int(self.state)
         word |= ERROR_FLAG if self.acknowledge else 0
         word |= _IDENTIFICATION if self.request_identification else 0
@@ -66,13 +66,16 @@ class AlControl:
 
     @classmethod
     def from_word(cls, word: int) -> AlControl:
-        """The reverse of `word`. DecodeError if the state is none. Bits 6 to 15 carry nothing."""
+        """Return the decoded register. Raises DecodeError if the state is invalid.
+
+        Bits 6 to 15 are ignored.
+        """
         return cls(_state(word), bool(word & ERROR_FLAG), bool(word & _IDENTIFICATION))
 
 
 @dataclass(frozen=True, slots=True)
 class AlStatus:
-    """The state a SubDevice is in (0x0130)."""
+    """AL status (0x0130): the actual state of a SubDevice."""
 
     state: AlState
     error: bool = False  # the last request failed, or the state was left: see the AL status code
@@ -80,7 +83,7 @@ class AlStatus:
 
     @property
     def word(self) -> int:
-        """The register's value."""
+        """Value of the register."""
         word = int(self.state)
         word |= ERROR_FLAG if self.error else 0
         word |= _IDENTIFICATION if self.identification else 0
@@ -88,21 +91,22 @@ class AlStatus:
 
     @classmethod
     def from_word(cls, word: int) -> AlStatus:
-        """The reverse of `word`. DecodeError if the state is none. Bits 6 to 15 carry nothing.
+        """Return the decoded register. Raises DecodeError if the state is invalid.
 
-        After a broadcast read the states are or-ed together, which may be none: `states_in`.
+        Bits 6 to 15 are ignored. A broadcast read combines the states of all devices with OR. The
+        result may not be a valid state; use `states_in`.
         """
         return cls(_state(word), bool(word & ERROR_FLAG), bool(word & _IDENTIFICATION))
 
 
 def states_in(word: int) -> frozenset[AlState]:
-    """The states that the or of many AL status words can hold. BOOT looks like INIT | PRE-OP."""
+    """Return the states that the OR of many AL status words can contain. BOOT = INIT | PRE-OP."""
     return frozenset(state for state in AlState if word & state == state)
 
 
 @dataclass(frozen=True, slots=True)
 class StatusCode:
-    """An AL status code: the standard's text, and what it most often comes from."""
+    """An AL status code: the text of the standard, and the most frequent cause."""
 
     code: int
     text: str
@@ -110,7 +114,7 @@ class StatusCode:
 
 
 def status_code(code: int) -> StatusCode:
-    """What AL status code `code` means; unknown ones get a text that says so."""
+    """Return the meaning of an AL status code; the text of an unknown code says so."""
     if known := STATUS_CODES.get(code):
         return known
     text = "Vendor specific" if code >= 0x8000 else "Unknown"
@@ -121,27 +125,31 @@ def _state(word: int) -> AlState:
     try:
         return AlState(word & STATE_MASK)
     except ValueError:
-        raise DecodeError(f"no EtherCAT state: {word & STATE_MASK} (word 0x{word:04X})") from None
+        raise DecodeError(
+            f"invalid EtherCAT state {word & STATE_MASK} (word 0x{word:04X})"
+        ) from None
 
 
 _CODES = (
     # ETG.1000.6 table 11 and ETG.1020 table "AL Status Codes"; the causes are ours.
     StatusCode(0x0000, "No error"),
-    StatusCode(0x0001, "Unspecified error", "the device says no more; see its manual"),
+    StatusCode(0x0001, "Unspecified error", "the device gives no details; see its manual"),
     StatusCode(0x0002, "No memory", "the mapping is larger than the device can hold"),
-    StatusCode(0x0003, "Invalid device setup", "the configured modules are not the ones plugged"),
-    StatusCode(0x0004, "Invalid revision", "the description is of another revision of the device"),
     StatusCode(
-        0x0006, "SII/EEPROM information does not match firmware", "the EEPROM needs its new image"
+        0x0003, "Invalid device setup", "the configured modules differ from the plugged ones"
     ),
+    StatusCode(
+        0x0004, "Invalid revision", "the description belongs to another revision of the device"
+    ),
+    StatusCode(0x0006, "SII/EEPROM information does not match firmware", "update the EEPROM image"),
     StatusCode(
         0x0007, "Firmware update not successful, old firmware still running", "repeat the update"
     ),
-    StatusCode(0x000E, "License error", "the device lacks a licence or it ran out"),
+    StatusCode(0x000E, "License error", "the licence is missing or has expired"),
     StatusCode(
         0x0011, "Invalid requested state change", "a state was skipped: INIT, PRE-OP, SAFE-OP, OP"
     ),
-    StatusCode(0x0012, "Unknown requested state", "AL control held no state"),
+    StatusCode(0x0012, "Unknown requested state", "AL control contained no valid state"),
     StatusCode(0x0013, "Bootstrap not supported", "the device has no BOOT state"),
     StatusCode(0x0014, "No valid firmware", "load a firmware in BOOT"),
     StatusCode(
@@ -164,32 +172,34 @@ _CODES = (
         0x0019, "No valid outputs", "no outputs arrived before or in OP: is the loop running?"
     ),
     StatusCode(
-        0x001A, "Synchronization error", "process data and SYNC0 do not arrive in the rhythm agreed"
+        0x001A, "Synchronization error", "process data and SYNC0 do not arrive at the agreed times"
     ),
     StatusCode(
         0x001B,
         "SyncManager watchdog",
-        "no outputs within the watchdog time: the loop stalled, or a cable before it broke",
+        "no outputs within the watchdog time: the loop stalled, or a cable before the device broke",
     ),
-    StatusCode(0x001C, "Invalid SyncManager types", "a SyncManager has the other direction or use"),
+    StatusCode(0x001C, "Invalid SyncManager types", "a SyncManager has the wrong direction or use"),
     StatusCode(
         0x001D,
         "Invalid output configuration",
-        "length of the outputs' SyncManager (2) and the mapping",
+        "the length of SyncManager 2 (outputs) differs from the mapping",
     ),
     StatusCode(
         0x001E,
         "Invalid input configuration",
-        "length of the inputs' SyncManager (3) and the mapping",
+        "the length of SyncManager 3 (inputs) differs from the mapping",
     ),
-    StatusCode(0x001F, "Invalid watchdog configuration", "registers 0x0400, 0x0410, 0x0420"),
+    StatusCode(0x001F, "Invalid watchdog configuration", "check registers 0x0400, 0x0410, 0x0420"),
     StatusCode(0x0020, "Device needs cold start", "switch its power off and on"),
     StatusCode(0x0021, "Device needs INIT", "go through INIT"),
     StatusCode(0x0022, "Device needs PRE-OP", "go through PRE-OP"),
     StatusCode(0x0023, "Device needs SAFE-OP", "go through SAFE-OP"),
-    StatusCode(0x0024, "Invalid input mapping", "objects 0x1A00 and on, and the assignment 0x1C13"),
     StatusCode(
-        0x0025, "Invalid output mapping", "objects 0x1600 and on, and the assignment 0x1C12"
+        0x0024, "Invalid input mapping", "check 0x1A00 and following, and the assignment 0x1C13"
+    ),
+    StatusCode(
+        0x0025, "Invalid output mapping", "check 0x1600 and following, and the assignment 0x1C12"
     ),
     StatusCode(
         0x0026, "Inconsistent settings", "mapping, modes or cycle times contradict each other"
@@ -197,7 +207,9 @@ _CODES = (
     StatusCode(
         0x0027, "Free run not supported", "the device needs SyncManager or DC synchronisation"
     ),
-    StatusCode(0x0028, "Synchronization not supported", "the mode in 0x1C32:01 or 0x1C33:01"),
+    StatusCode(
+        0x0028, "Synchronization not supported", "check the mode in 0x1C32:01 and 0x1C33:01"
+    ),
     StatusCode(
         0x0029, "Free run needs 3-buffer mode", "a process data SyncManager is in mailbox mode"
     ),
@@ -208,24 +220,22 @@ _CODES = (
     StatusCode(
         0x002C, "Fatal synchronization error", "SYNC0 missing, or process data without SYNC0"
     ),
-    StatusCode(0x002D, "No synchronization error", "SYNC signal or process data never came"),
+    StatusCode(
+        0x002D, "No synchronization error", "the SYNC signal or the process data did not arrive"
+    ),
     StatusCode(0x002E, "Cycle time too small", "choose a longer period"),
-    StatusCode(0x0030, "Invalid DC SYNC configuration", "activation 0x0981 and 0x1C32, 0x1C33"),
-    StatusCode(0x0031, "Invalid DC latch configuration", "latch registers 0x09A8, 0x09A9"),
     StatusCode(
-        0x0032, "PLL error", "the loop's jitter or start is outside what the device follows"
+        0x0030, "Invalid DC SYNC configuration", "check activation 0x0981, and 0x1C32, 0x1C33"
     ),
+    StatusCode(0x0031, "Invalid DC latch configuration", "check latch registers 0x09A8, 0x09A9"),
+    StatusCode(0x0032, "PLL error", "the loop's jitter or start is outside the device's tolerance"),
     StatusCode(0x0033, "DC sync I/O error", "the device failed at a SYNC event"),
-    StatusCode(0x0034, "DC sync timeout error", "SYNC0 or process data stopped coming"),
+    StatusCode(0x0034, "DC sync timeout error", "SYNC0 or process data stopped"),
     StatusCode(
-        0x0035, "DC invalid sync cycle time", "the period is no multiple the device accepts"
+        0x0035, "DC invalid sync cycle time", "the period is not a multiple that the device accepts"
     ),
-    StatusCode(
-        0x0036, "DC SYNC0 cycle time", "the SYNC0 cycle time 0x09A0 does not suit the device"
-    ),
-    StatusCode(
-        0x0037, "DC SYNC1 cycle time", "the SYNC1 cycle time 0x09A4 does not suit the device"
-    ),
+    StatusCode(0x0036, "DC SYNC0 cycle time", "the device rejects the SYNC0 cycle time 0x09A0"),
+    StatusCode(0x0037, "DC SYNC1 cycle time", "the device rejects the SYNC1 cycle time 0x09A4"),
     StatusCode(0x0041, "Mailbox AoE", "ADS over EtherCAT failed"),
     StatusCode(0x0042, "Mailbox EoE", "Ethernet over EtherCAT failed"),
     StatusCode(0x0043, "Mailbox CoE", "a start-up object was refused or is missing"),
@@ -235,7 +245,7 @@ _CODES = (
     StatusCode(0x0050, "EEPROM no access", "give the EEPROM to the PDI: register 0x0500"),
     StatusCode(0x0051, "EEPROM error", "the device could not read its EEPROM"),
     StatusCode(0x0052, "External hardware not ready", "is the device's power stage supplied?"),
-    StatusCode(0x0060, "Device restarted locally", "power dip or its own watchdog"),
+    StatusCode(0x0060, "Device restarted locally", "a power dip, or the device's own watchdog"),
     StatusCode(0x0061, "Device identification value updated", "the selector switch was turned"),
     StatusCode(
         0x0070,

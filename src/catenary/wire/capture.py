@@ -1,4 +1,4 @@
-"""Captures in any format that is read: pcapng (wire/pcapng.py) and pcap (wire/pcap.py)."""
+"""Captures in all supported formats: pcapng (wire/pcapng.py) and pcap (wire/pcap.py)."""
 
 from __future__ import annotations
 
@@ -8,11 +8,16 @@ from catenary.wire.pcapng import Capture, decode_pcapng
 
 
 def decode_capture(data: bytes) -> Capture:
-    """Return the capture in a file's bytes, up to the cut. Raises DecodeError if it is not one."""
+    """Return the capture in the bytes of a file. Raises DecodeError if the format is unknown.
+
+    A truncated last packet is left out.
+    """
     if is_pcap(data):
         return decode_pcap(data)
     try:
         return decode_pcapng(data)
     except DecodeError as error:
-        error.hint = error.hint or "captures are read in pcapng and pcap: Wireshark, tcpdump -w"
+        error.hint = (
+            error.hint or "use a capture in pcapng or pcap format, from Wireshark or tcpdump -w"
+        )
         raise

@@ -1,6 +1,6 @@
-"""CiA 402 drives: states, words and modes, IEC 61800-7-201 / CiA 402-2.
+"""CiA 402 drives: states, controlword, statusword and modes, IEC 61800-7-201 / CiA 402-2.
 
-Objects of axis k of a device sit at the index given here + k * SLOT_OFFSET.
+The index of an object of axis k is the index given here + k * SLOT_OFFSET.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from enum import IntEnum, IntFlag
 
 
 class AxisState(IntEnum):
-    """The states of the drive's state machine, in the standard's order."""
+    """States of the drive's state machine, in the order of the standard."""
 
     NOT_READY_TO_SWITCH_ON = 0
     SWITCH_ON_DISABLED = 1
@@ -39,7 +39,7 @@ IN_FAULT = (AxisState.FAULT_REACTION_ACTIVE, AxisState.FAULT)
 
 
 def state_of(statusword: int) -> AxisState | None:
-    """The state a statusword codes; None if its bits code none."""
+    """Return the state in a statusword; None if its bits do not encode a state."""
     for state, (mask, value) in STATE_CODING.items():
         if statusword & mask == value:
             return state
@@ -58,10 +58,10 @@ class Status(IntFlag):
     SWITCH_ON_DISABLED = 1 << 6
     WARNING = 1 << 7
     MANUFACTURER_8 = 1 << 8
-    REMOTE = 1 << 9  # the controlword is obeyed
+    REMOTE = 1 << 9  # the drive follows the controlword
     TARGET_REACHED = 1 << 10
     INTERNAL_LIMIT_ACTIVE = 1 << 11
-    # CSP, CSV, CST: set-points are followed; HM: homing attained; PP: set-point acknowledged
+    # CSP, CSV, CST: drive follows the set-points; HM: homing attained; PP: set-point acknowledged
     MODE_12 = 1 << 12
     MODE_13 = 1 << 13  # CSP: following error; HM: homing error
     MANUFACTURER_14 = 1 << 14
@@ -77,12 +77,12 @@ class Control(IntFlag):
 
     SWITCH_ON = 1 << 0
     ENABLE_VOLTAGE = 1 << 1
-    QUICK_STOP = 1 << 2  # 0: stop quickly
+    QUICK_STOP = 1 << 2  # 0: quick stop
     ENABLE_OPERATION = 1 << 3
     MODE_4 = 1 << 4  # PP: new set-point; HM: start homing
     MODE_5 = 1 << 5  # PP: change set immediately
     MODE_6 = 1 << 6
-    FAULT_RESET = 1 << 7  # at its rising edge
+    FAULT_RESET = 1 << 7  # a rising edge resets the fault
     HALT = 1 << 8
     MODE_9 = 1 << 9
     RESERVED_10 = 1 << 10
@@ -94,23 +94,23 @@ class Control(IntFlag):
 
 
 QUICK_STOP_COMMAND = (0x0086, 0x0002)  # (mask, value) of the controlword, IEC 61800-7-201 table 28
-MODE_CONTROL_BITS = 0xFA70  # bits 4, 5, 6, 9, 11 to 15: free of the state machine and halt
+MODE_CONTROL_BITS = 0xFA70  # bits 4, 5, 6, 9, 11 to 15: not used by the state machine and halt
 
 
 @dataclass(frozen=True, slots=True)
 class Controlword:
-    """A device control command: the bits of the controlword it means, CiA 402-2 table 28."""
+    """A device control command: mask and value in the controlword, CiA 402-2 table 28."""
 
     name: str
     mask: int
     value: int
 
     def matches(self, controlword: int) -> bool:
-        """Whether a controlword is this command."""
+        """Return True if a controlword contains this command."""
         return controlword & self.mask == self.value
 
     def apply(self, controlword: int) -> int:
-        """The controlword with this command and its other bits kept."""
+        """Return the controlword with this command; the other bits are unchanged."""
         return controlword & ~self.mask & 0xFFFF | self.value
 
 
@@ -130,7 +130,7 @@ COMMANDS = (
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """One arrow of the state machine. No command: the drive moves by itself."""
+    """One transition of the state machine. Without a command, it is automatic."""
 
     number: int
     source: AxisState | None  # None: switched off (0) or any state (13)
@@ -155,12 +155,12 @@ TRANSITIONS = (
         10, AxisState.SWITCHED_ON, AxisState.SWITCH_ON_DISABLED, (DISABLE_VOLTAGE, QUICK_STOP)
     ),
     Transition(11, AxisState.OPERATION_ENABLED, AxisState.QUICK_STOP_ACTIVE, (QUICK_STOP,)),
-    # 12 also happens by itself, when the drive stands and 0x605A is 1 to 4
+    # 12 is also automatic, when the drive has stopped and 0x605A is 1 to 4
     Transition(12, AxisState.QUICK_STOP_ACTIVE, AxisState.SWITCH_ON_DISABLED, (DISABLE_VOLTAGE,)),
     Transition(13, None, AxisState.FAULT_REACTION_ACTIVE),
     Transition(14, AxisState.FAULT_REACTION_ACTIVE, AxisState.FAULT),
     Transition(15, AxisState.FAULT, AxisState.SWITCH_ON_DISABLED, (FAULT_RESET,)),
-    # 16 only where 0x605A is 5 to 8
+    # 16 only if 0x605A is 5 to 8
     Transition(16, AxisState.QUICK_STOP_ACTIVE, AxisState.OPERATION_ENABLED, (ENABLE_OPERATION,)),
 )
 
@@ -182,7 +182,7 @@ class Mode(IntEnum):
 
     @property
     def supported_bit(self) -> int:
-        """Its bit in the supported drive modes, object 0x6502; 0 for no mode."""
+        """Bit in the supported drive modes, object 0x6502; 0 for NONE."""
         return 1 << self - 1 if self else 0
 
 
@@ -205,7 +205,7 @@ class Object(IntEnum):
     TARGET_TORQUE = 0x6071
     MAX_TORQUE = 0x6072  # in thousandths of the rated torque
     TORQUE_DEMAND = 0x6074
-    MOTOR_RATED_TORQUE = 0x6076  # [mN·m]; torques are in thousandths of it
+    MOTOR_RATED_TORQUE = 0x6076  # [mN·m]; torques are in thousandths of this value
     TORQUE_ACTUAL = 0x6077
     TARGET_POSITION = 0x607A
     HOME_OFFSET = 0x607C

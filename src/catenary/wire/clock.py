@@ -1,5 +1,5 @@
-"""Distributed clocks, registers 0x0900 to 0x09FF, ETG.1000.4 §6.8: receive times, the time loop and
-the SYNC unit's switches."""
+"""Distributed clocks, registers 0x0900 to 0x09FF, ETG.1000.4 §6.8: receive times, time loop, and
+activation of the SYNC unit."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _SIGN = 1 << 31
 
 
 class CyclicUnit(IntFlag):
-    """Who controls SYNC and LATCH (0x0980). A bit clear: EtherCAT does."""
+    """Control of SYNC and LATCH (0x0980): by the PDI, or by EtherCAT if the bit is clear."""
 
     SYNC_BY_PDI = 0x01
     LATCH0_BY_PDI = 0x10
@@ -45,7 +45,7 @@ class Clock:
     receive_time_processing_unit_ns: int
     offset_ns: int  # modulo 2**64
     delay_ns: int
-    difference_ns: int  # of the local copy of the system time minus the received one
+    difference_ns: int  # local copy of the system time minus the received system time
     speed_counter_start: int
     speed_counter_difference: int
     difference_filter: int
@@ -53,7 +53,7 @@ class Clock:
     latch_mode: int = 0
 
     def encode(self) -> bytes:
-        """Its block. ValueError if a field does not fit."""
+        """Return the encoded block. Raises ValueError if a field does not fit."""
         try:
             return _BLOCK.pack(
                 *self.receive_times_ns,
@@ -67,7 +67,7 @@ class Clock:
 
 
 def decode_clock(data: bytes) -> Clock:
-    """The time loop in the 56 bytes from 0x0900."""
+    """Return the time loop in the 56 bytes from 0x0900."""
     if len(data) != SIZE:
         raise DecodeError(f"distributed clock: needs {SIZE} bytes, received {len(data)}")
     time_0, time_1, time_2, time_3, *rest = _BLOCK.unpack(data)
@@ -80,7 +80,7 @@ def decode_clock(data: bytes) -> Clock:
 
 
 def decode_receive_times(data: bytes) -> tuple[int, int, int, int]:
-    """When the latching write arrived at each of the four ports [ns, local time, 32 bits]."""
+    """Return when the latching write arrived at the four ports [ns, local time, 32 bits]."""
     if len(data) != _RECEIVE_TIMES.size:
         raise DecodeError(f"receive times: needs {_RECEIVE_TIMES.size} bytes, received {len(data)}")
     port_0, port_1, port_2, port_3 = _RECEIVE_TIMES.unpack(data)
@@ -88,7 +88,7 @@ def decode_receive_times(data: bytes) -> tuple[int, int, int, int]:
 
 
 def encode_receive_times(times: tuple[int, int, int, int]) -> bytes:
-    """The reverse. ValueError if one does not fit."""
+    """Return the 16 bytes of four receive times [ns]. Raises ValueError if one does not fit."""
     try:
         return _RECEIVE_TIMES.pack(*times)
     except struct.error as error:
@@ -96,8 +96,11 @@ def encode_receive_times(times: tuple[int, int, int, int]) -> bytes:
 
 
 def decode_difference(raw: int) -> int:
-    """The system time difference [ns] in register 0x092C, which is sign-magnitude: bit 31 set means
-    that the local copy is behind. Negative zero is zero."""
+    """Return the system time difference [ns] in a value of register 0x092C.
+
+    The register is sign-magnitude. If bit 31 is set, the local copy of the system time is behind.
+    Negative zero is zero.
+    """
     if not 0 <= raw <= 0xFFFF_FFFF:
         raise DecodeError(f"system time difference: {raw} has more than 32 bits")
     magnitude = raw & ~_SIGN
@@ -105,7 +108,7 @@ def decode_difference(raw: int) -> int:
 
 
 def encode_difference(difference_ns: int) -> int:
-    """The raw value of register 0x092C. ValueError beyond ±(2**31 - 1) ns."""
+    """Return the raw value of register 0x092C. Raises ValueError beyond ±(2**31 - 1) ns."""
     if abs(difference_ns) >= _SIGN:
         raise ValueError(f"system time difference: {difference_ns} ns is beyond ±{_SIGN - 1}")
     return -difference_ns | _SIGN if difference_ns < 0 else difference_ns

@@ -1,7 +1,7 @@
 """CANopen over EtherCAT, ETG.1000.6 §5.6: CoE header, SDO services, emergency.
 
-Every message is a frozen value with `encode()`; `decode_coe` gives the one in a mailbox's data.
-A message of SDO information is in sdo_information.py.
+Every message is a frozen value with `encode()`. `decode_coe` decodes the data of a mailbox
+message. SDO information messages are in sdo_information.py.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from catenary.wire.sdo_information import SdoInformation, decode_sdo_information
 HEADER_SIZE = 2
 SDO_SIZE = 10  # the shortest SDO message: CoE header, command, index, subindex, 4 bytes
 SEGMENT_HEADER_SIZE = 3  # CoE header, command
-SEGMENT_MINIMUM = 7  # a segment carries at least 7 bytes, filled up
+SEGMENT_MINIMUM = 7  # a segment has at least 7 bytes of data, padded with zeros
 EXPEDITED_MAXIMUM = 4
 
 
@@ -44,7 +44,7 @@ _COMPLETE_ACCESS = 0x10
 _TOGGLE = 0x10
 _LAST_SEGMENT = 0x01
 
-# Command specifiers, bits 5 to 7 of the command, of the client and of the server
+# Command specifiers of the client and of the server, bits 5 to 7 of the command
 _DOWNLOAD_SEGMENT, _DOWNLOAD, _UPLOAD, _UPLOAD_SEGMENT, _ABORT = range(5)
 _SERVER_UPLOAD_SEGMENT, _SERVER_DOWNLOAD_SEGMENT, _SERVER_UPLOAD, _SERVER_DOWNLOAD = range(4)
 
@@ -65,25 +65,29 @@ def _pack_sdo(
 def _pack_initiate(
     service: Service, specifier: int, message: DownloadRequest | UploadResponse
 ) -> bytes:
-    """The data in the four bytes (expedited), else its complete size and what fits (normal)."""
+    """Return an initiate message: up to 4 bytes of data (expedited), or size and data (normal)."""
     command = specifier << 5 | _SIZE_GIVEN
     command |= _COMPLETE_ACCESS if message.complete_access else 0
     size, data = message.size, message.data
     if message.expedited:
         if not 1 <= len(data) <= EXPEDITED_MAXIMUM or size != len(data):
-            raise ValueError(f"expedited SDO: 1 to 4 bytes, all at once, got {len(data)} of {size}")
+            raise ValueError(
+                f"expedited SDO: needs all data in 1 to 4 bytes, got {len(data)} of {size}"
+            )
         command |= _EXPEDITED | (EXPEDITED_MAXIMUM - size) << 2
         return _pack_sdo(service, command, message.index, message.subindex, data)
     if not len(data) <= size <= 0xFFFF_FFFF:
-        raise ValueError(f"SDO: a complete size of {size} bytes, but {len(data)} given")
+        raise ValueError(f"SDO: complete size is {size} bytes, but the message has {len(data)}")
     size_bytes = size.to_bytes(4, "little")
     return _pack_sdo(service, command, message.index, message.subindex, size_bytes, data)
 
 
 @dataclass(frozen=True, slots=True)
 class DownloadRequest:
-    """Initiate download, §5.6.2.1 and §5.6.2.2: write an object. `size` is of the whole; the rest
-    follows in segments where it is more than `data`."""
+    """Initiate download, §5.6.2.1 and §5.6.2.2: write an object.
+
+    `size` is the size of the whole object. If it exceeds `data`, segments with the rest follow.
+    """
 
     index: int
     subindex: int
@@ -93,7 +97,7 @@ class DownloadRequest:
     complete_access: bool = False
 
     def encode(self) -> bytes:
-        """Its bytes. ValueError if a field does not fit."""
+        """Return the encoded bytes. Raises ValueError if a field does not fit."""
         return _pack_initiate(Service.SDO_REQUEST, _DOWNLOAD, self)
 
 
@@ -106,7 +110,7 @@ class DownloadResponse:
     complete_access: bool = False
 
     def encode(self) -> bytes:
-        """Its bytes. ValueError if a field does not fit."""
+        """Return the encoded bytes. Raises ValueError if a field does not fit."""
         command = _SERVER_DOWNLOAD << 5 | (_COMPLETE_ACCESS if self.complete_access else 0)
         return _pack_sdo(Service.SDO_RESPONSE, command, self.index, self.subindex)
 
@@ -120,15 +124,14 @@ class UploadRequest:
     complete_access: bool = False
 
     def encode(self) -> bytes:
-        """Its bytes. ValueError if a field does not fit."""
+        """Return the encoded bytes. Raises ValueError if a field does not fit."""
         command = _UPLOAD << 5 | (_COMPLETE_ACCESS if self.complete_access else 0)
         return _pack_sdo(Service.SDO_REQUEST, command, self.index, self.subindex)
 
 
 @dataclass(frozen=True, slots=True)
 class UploadResponse:
-    """Initiate upload response, §5.6.2.4 and §5.6.2.5. Segments follow where `size` is more than
-    `data`."""
+    """Initiate upload response, §5.6.2.4, §5.6.2.5. If `size` exceeds `data`, segments follow."""
 
     index: int
     subindex: int
@@ -138,14 +141,14 @@ class UploadResponse:
     complete_access: bool = False
 
     def encode(self) -> bytes:
-        """Its bytes. ValueError if a field does not fit."""
+        """Return the encoded bytes. Raises ValueError if a field does not fit."""
         return _pack_initiate(Service.SDO_RESPONSE, _SERVER_UPLOAD, self)
 
 
 def _pack_segment(
     service: Service, specifier: int, message: DownloadSegment | UploadSegment
 ) -> bytes:
-    """§5.6.2.3: fewer than 7 bytes are filled up to 7, and their number is told."""
+    """Return a segment, §5.6.2.3. Less than 7 bytes of data are padded; the command counts them."""
     command = specifier << 5 | (_TOGGLE if message.toggle else 0)
     command |= _LAST_SEGMENT if message.last else 0
     missing = max(SEGMENT_MINIMUM - len(message.data), 0)
@@ -155,14 +158,14 @@ def _pack_segment(
 
 @dataclass(frozen=True, slots=True)
 class DownloadSegment:
-    """Download segment request, §5.6.2.3. `toggle` is clear in the first."""
+    """Download segment request, §5.6.2.3. `toggle` is False in the first segment."""
 
     toggle: bool
     last: bool
     data: bytes
 
     def encode(self) -> bytes:
-        """Its bytes."""
+        """Return the encoded bytes."""
         return _pack_segment(Service.SDO_REQUEST, _DOWNLOAD_SEGMENT, self)
 
 
@@ -173,19 +176,19 @@ class DownloadSegmentResponse:
     toggle: bool
 
     def encode(self) -> bytes:
-        """Its bytes."""
+        """Return the encoded bytes."""
         command = _SERVER_DOWNLOAD_SEGMENT << 5 | (_TOGGLE if self.toggle else 0)
         return _pack_sdo(Service.SDO_RESPONSE, command, 0, 0)
 
 
 @dataclass(frozen=True, slots=True)
 class UploadSegmentRequest:
-    """Upload segment request, §5.6.2.6. `toggle` is clear in the first."""
+    """Upload segment request, §5.6.2.6. `toggle` is False in the first segment."""
 
     toggle: bool
 
     def encode(self) -> bytes:
-        """Its bytes."""
+        """Return the encoded bytes."""
         command = _UPLOAD_SEGMENT << 5 | (_TOGGLE if self.toggle else 0)
         return _pack_sdo(Service.SDO_REQUEST, command, 0, 0)
 
@@ -199,20 +202,20 @@ class UploadSegment:
     data: bytes
 
     def encode(self) -> bytes:
-        """Its bytes."""
+        """Return the encoded bytes."""
         return _pack_segment(Service.SDO_RESPONSE, _SERVER_UPLOAD_SEGMENT, self)
 
 
 @dataclass(frozen=True, slots=True)
 class Abort:
-    """Abort SDO transfer, §5.6.2.7, in either direction: always an SDO request. Texts: abort.py."""
+    """Abort SDO transfer, §5.6.2.7, an SDO request in both directions. Texts: abort.py."""
 
     index: int
     subindex: int
     code: int
 
     def encode(self) -> bytes:
-        """Its bytes. ValueError if a field does not fit."""
+        """Return the encoded bytes. Raises ValueError if a field does not fit."""
         if not 0 <= self.code <= 0xFFFF_FFFF:
             raise ValueError(f"SDO abort: code {self.code} has more than 32 bits")
         code = self.code.to_bytes(4, "little")
@@ -221,14 +224,14 @@ class Abort:
 
 @dataclass(frozen=True, slots=True)
 class Emergency:
-    """Emergency, §5.6.4: a device reports a fault, or with code 0 that it went."""
+    """Emergency, §5.6.4: a device reports a fault, or with code 0 that the fault is gone."""
 
     error_code: int
     error_register: int
     data: bytes = bytes(5)
 
     def encode(self) -> bytes:
-        """Its bytes. ValueError if a field does not fit."""
+        """Return the encoded bytes. Raises ValueError if a field does not fit."""
         if len(self.data) != 5:
             raise ValueError(f"emergency: carries 5 bytes, got {len(self.data)}")
         try:
@@ -249,8 +252,12 @@ Message: TypeAlias = Request | Response | Emergency | SdoInformation
 
 
 def decode_coe(data: bytes) -> Message:
-    """The CoE message in a mailbox's data. PDO services are refused: nobody uses them over the
-    mailbox."""
+    """Return the CoE message in the data of a mailbox message.
+
+    Raises:
+        DecodeError: The message is invalid, or it is a PDO service. PDO services over the mailbox
+            are not supported; they are not used in practice.
+    """
     if len(data) < HEADER_SIZE:
         raise DecodeError(f"CoE: {len(data)} bytes, the header needs {HEADER_SIZE}")
     service = int.from_bytes(data[:HEADER_SIZE], "little") >> 12
@@ -294,7 +301,7 @@ def _decode_response(data: bytes) -> Response:
         return UploadResponse(index, subindex, payload, size, expedited, complete_access)
     if specifier == _SERVER_DOWNLOAD:
         return DownloadResponse(index, subindex, complete_access)
-    if specifier == _ABORT:  # some devices abort with a response
+    if specifier == _ABORT:  # some devices send the abort as a response
         return Abort(index, subindex, int.from_bytes(last, "little"))
     raise DecodeError(f"SDO response: unknown command specifier {specifier}")
 
@@ -312,7 +319,7 @@ def _unpack_initiate(command: int, last: bytes, rest: bytes) -> tuple[bytes, int
         payload = last[: EXPEDITED_MAXIMUM - missing]
         return payload, len(payload), True
     size = int.from_bytes(last, "little")
-    # A message may be longer than its data: what is beyond the size means nothing.
+    # A message may be longer than its data: bytes beyond the size are ignored.
     return rest[:size], size, False
 
 

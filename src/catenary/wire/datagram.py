@@ -10,7 +10,7 @@ from catenary.errors import DecodeError
 
 
 class EcatCommand(IntEnum):
-    """What every controller on the way does with a datagram, ETG.1000.4 §5.4.1."""
+    """Command of a datagram for the controllers on its way, ETG.1000.4 §5.4.1."""
 
     NOP = 0
     APRD = 1  # auto-increment: read, write, both
@@ -25,22 +25,22 @@ class EcatCommand(IntEnum):
     LRD = 10  # logical address, through the FMMUs
     LWR = 11
     LRW = 12
-    ARMW = 13  # read by the one addressed, written by all others
+    ARMW = 13  # the addressed device reads, all others write
     FRMW = 14
 
     @property
     def reads(self) -> bool:
-        """Whether a device puts data into the datagram."""
+        """True if a device puts data into the datagram."""
         return self in _READS
 
     @property
     def writes(self) -> bool:
-        """Whether a device takes data from the datagram."""
+        """True if a device takes data from the datagram."""
         return self in _WRITES
 
     @property
     def is_logical(self) -> bool:
-        """Whether the address is a logical one."""
+        """True if the address is logical."""
         return self in (EcatCommand.LRD, EcatCommand.LWR, EcatCommand.LRW)
 
 
@@ -74,7 +74,7 @@ _WRITES = frozenset(
 HEADER_SIZE = 10
 WORKING_COUNTER_SIZE = 2
 OVERHEAD = HEADER_SIZE + WORKING_COUNTER_SIZE
-MAXIMUM_DATA_SIZE = 0x07FF  # by the 11-bit field; one Ethernet frame holds 1486 bytes
+MAXIMUM_DATA_SIZE = 0x07FF  # limit of the 11-bit field; an Ethernet frame holds 1486 bytes
 
 _HEADER = struct.Struct("<BBIHH")
 _LENGTH_MASK = 0x07FF
@@ -87,8 +87,8 @@ _MORE_FOLLOWS = 0x8000
 class Datagram:
     """One datagram. `address`: the 32 bits as on the wire, ADP | ADO << 16 or the logical address.
 
-    `circulating`: a controller has seen it pass twice (a broken ring). `interrupt`: the ECAT event
-    requests of all devices, or-ed together.
+    `circulating`: it passed a controller twice (a broken ring). `interrupt`: the ECAT event
+    requests of all devices, combined with OR.
     """
 
     command: EcatCommand
@@ -101,7 +101,7 @@ class Datagram:
 
     @property
     def adp(self) -> int:
-        """Position (two's complement, counted up by each device) or station address."""
+        """Position (two's complement, incremented by each device) or station address."""
         return self.address & 0xFFFF
 
     @property
@@ -111,11 +111,11 @@ class Datagram:
 
     @property
     def size(self) -> int:
-        """Its length on the wire in bytes."""
+        """Length on the wire in bytes."""
         return OVERHEAD + len(self.data)
 
     def encode(self, *, more_follows: bool = False) -> bytes:
-        """Its bytes. ValueError if a field does not fit."""
+        """Return the encoded bytes. Raises ValueError if a field does not fit."""
         if len(self.data) > MAXIMUM_DATA_SIZE:
             raise ValueError(f"datagram of {len(self.data)} bytes: at most {MAXIMUM_DATA_SIZE}")
         length = len(self.data)
@@ -129,7 +129,15 @@ class Datagram:
 
 
 def decode_datagram(data: bytes, offset: int = 0) -> tuple[Datagram, bool]:
-    """The datagram at `offset`, and whether another follows it."""
+    """Return the datagram at `offset`, and True if another one follows.
+
+    Args:
+        data: The bytes of a frame.
+        offset: The first byte of the datagram.
+
+    Raises:
+        DecodeError: The datagram is invalid or incomplete.
+    """
     if not 0 <= offset <= len(data) - OVERHEAD:
         raise DecodeError(
             f"datagram at byte {offset}: {max(len(data) - offset, 0)} bytes left, needs {OVERHEAD}"
@@ -143,7 +151,7 @@ def decode_datagram(data: bytes, offset: int = 0) -> tuple[Datagram, bool]:
     end = start + (length & _LENGTH_MASK)
     if end + WORKING_COUNTER_SIZE > len(data):
         raise DecodeError(
-            f"datagram at byte {offset}: says {end - start} bytes of data, "
+            f"datagram at byte {offset}: specifies {end - start} bytes of data, "
             f"{max(len(data) - start - WORKING_COUNTER_SIZE, 0)} received"
         )
     datagram = Datagram(

@@ -9,10 +9,10 @@ PORTS = range(4)
 
 
 class Loop(IntEnum):
-    """What a port does with frames when its link comes and goes."""
+    """Loop setting of a port: its behaviour when the link comes up or goes down."""
 
-    AUTO = 0  # open while there is a link
-    AUTO_CLOSE = 1  # closes without a link, opens by a write only
+    AUTO = 0  # open while the link is up
+    AUTO_CLOSE = 1  # closes when the link goes down, opens only by a write
     OPEN = 2
     CLOSED = 3
 
@@ -25,15 +25,15 @@ class DlControl:
     """DL control (0x0100)."""
 
     destroy_alien_frames: bool = True  # frames that are not EtherCAT; False: forwarded
-    temporary: bool = False  # the settings hold for about a second
+    temporary: bool = False  # the settings are valid for about one second
     loops: tuple[Loop, Loop, Loop, Loop] = _AUTO
-    receive_fifo: int = 7  # 0 to 7: less delay with less
+    receive_fifo: int = 7  # 0 to 7; a smaller FIFO has less delay
     low_jitter: bool = False
-    alias_enabled: bool = False  # the station alias answers to FPxx commands
+    alias_enabled: bool = False  # the device also accepts its alias in FPxx commands
 
     @property
     def word(self) -> int:
-        """The register's value. ValueError if the FIFO's size does not fit."""
+        """Value of the register. Raises ValueError if the FIFO size does not fit."""
         if not 0 <= self.receive_fifo <= 7:
             raise ValueError(f"DL control: receive FIFO is 0 to 7, got {self.receive_fifo}")
         word = self.destroy_alien_frames | self.temporary << 1
@@ -43,7 +43,7 @@ class DlControl:
 
     @classmethod
     def from_word(cls, word: int) -> DlControl:
-        """The reverse of `word`; reserved bits are ignored."""
+        """Return the decoded register. Reserved bits are ignored."""
         loop_0, loop_1, loop_2, loop_3 = (Loop(word >> 8 + 2 * port & 3) for port in PORTS)
         return cls(
             bool(word & 1),
@@ -57,10 +57,10 @@ class DlControl:
 
 @dataclass(frozen=True, slots=True)
 class Port:
-    """What DL status says of one port."""
+    """DL status of one port."""
 
     link: bool = False  # the PHY has a signal
-    loop_closed: bool = True  # frames turn round here
+    loop_closed: bool = True  # frames return here
     communication: bool = False  # a stable connection
 
 
@@ -71,14 +71,14 @@ _CLOSED = Port()
 class DlStatus:
     """DL status (0x0110)."""
 
-    pdi_operational: bool  # the EEPROM is loaded, the device's processor can be reached
-    pdi_watchdog: bool  # triggered in time
+    pdi_operational: bool  # the EEPROM is loaded and the PDI is active
+    pdi_watchdog: bool  # True if it is triggered in time
     enhanced_link_detection: bool = False
     ports: tuple[Port, Port, Port, Port] = (_CLOSED, _CLOSED, _CLOSED, _CLOSED)
 
     @property
     def word(self) -> int:
-        """The register's value."""
+        """Value of the register."""
         word = self.pdi_operational | self.pdi_watchdog << 1 | self.enhanced_link_detection << 2
         for i, port in enumerate(self.ports):
             word |= port.link << 4 + i
@@ -87,7 +87,7 @@ class DlStatus:
 
     @classmethod
     def from_word(cls, word: int) -> DlStatus:
-        """The reverse of `word`; bit 3 is reserved."""
+        """Return the decoded register. Bit 3 is reserved and ignored."""
         port_0, port_1, port_2, port_3 = (_port(word, i) for i in PORTS)
         return cls(bool(word & 1), bool(word & 2), bool(word & 4), (port_0, port_1, port_2, port_3))
 

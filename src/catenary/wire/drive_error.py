@@ -1,7 +1,7 @@
 """Error codes of drives: object 0x603F and emergencies, IEC 61800-7-201 §"Error codes" (CiA 402-1).
-0x8200 to 0x82FF are of CiA 301, 0xA000 to 0xA0FF EtherCAT's own (ETG.1000.6 §5.6.4).
+CiA 301 defines 0x8200 to 0x82FF, EtherCAT defines 0xA000 to 0xA0FF (ETG.1000.6 §5.6.4).
 
-A drive may use 0xFF00 to 0xFFFF as it likes; its manual says what for.
+0xFF00 to 0xFFFF are manufacturer specific; see the manual of the drive.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ ERROR_CODES: dict[int, str] = {
 
 
 def error_text(code: int) -> str:
-    """What an error code means: its own text, or that of its group (0x7380 is a sensor's)."""
+    """Return the text of an error code, or of its group (0x7380 belongs to "sensor")."""
     for known in (code, code & 0xFFF0, code & 0xFF00, code & 0xF000):
         if known in ERROR_CODES:
             return ERROR_CODES[known]

@@ -1,5 +1,5 @@
-"""Error counters, registers 0x0300 to 0x0313; Beckhoff, ESC data sheet I, §14 (what counts where)
-and II, §3.33 to §3.38. All stop at 255; a write clears them."""
+"""Error counters, registers 0x0300 to 0x0313; Beckhoff, ESC data sheet I, §14 (what each one
+counts) and II, §3.33 to §3.38. All stop at 255; a write clears them."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from operator import attrgetter
 from catenary.errors import DecodeError
 from catenary.wire.register import ERROR_COUNTERS, PORT_COUNT
 
-FULL = 255  # where a counter stops
+FULL = 255  # a counter stops here
 _BLOCK = struct.Struct("<8B4BBBxx4B")
 
 
 @dataclass(frozen=True, slots=True)
 class PortErrors:
-    """What one port has counted."""
+    """Error counts of one port."""
 
-    invalid_frames: int = 0  # broken, and first found so here: it happened on the way to this port
-    symbol_errors: int = 0  # of the physical layer (RX_ER), also between frames
-    forwarded: int = 0  # broken, and marked by a device before: it happened somewhere else
+    invalid_frames: int = 0  # broken frames first detected here: broken on the way to this port
+    symbol_errors: int = 0  # physical layer errors (RX_ER), also between frames
+    forwarded: int = 0  # broken frames already marked by an earlier device
     lost_links: int = 0
 
     def __bool__(self) -> bool:
@@ -34,17 +34,17 @@ Ports = tuple[PortErrors, PortErrors, PortErrors, PortErrors]
 
 @dataclass(frozen=True, slots=True)
 class ErrorCounters:
-    """What one device has counted since its power-up or the last write."""
+    """Error counts of one device since its power-up or the last write."""
 
     ports: Ports = (_NONE, _NONE, _NONE, _NONE)
-    processing_unit: int = 0  # broken or malformed frames that reached it (by port 0)
-    pdi: int = 0  # of the interface to the device's processor
+    processing_unit: int = 0  # broken or malformed frames that arrived by port 0
+    pdi: int = 0  # errors of the interface to the device's processor
 
     def __bool__(self) -> bool:
         return any(self.ports) or bool(self.processing_unit or self.pdi)
 
     def encode(self) -> bytes:
-        """Its 20 bytes. ValueError if a counter does not fit."""
+        """Return the 20 encoded bytes. Raises ValueError if a counter does not fit."""
         receive = [n for port in self.ports for n in (port.invalid_frames, port.symbol_errors)]
         forwarded = [port.forwarded for port in self.ports]
         lost = [port.lost_links for port in self.ports]
@@ -54,7 +54,7 @@ class ErrorCounters:
             raise ValueError(f"error counters: {error}") from None
 
     def since(self, before: ErrorCounters) -> ErrorCounters:
-        """What was counted after `before`. Where a counter went down, all began again at 0."""
+        """Return the counts since `before`. If a counter decreased, all had restarted at 0."""
         if self.restarted(before):
             return self
         one, two, three, four = (
@@ -68,12 +68,12 @@ class ErrorCounters:
         )
 
     def restarted(self, before: ErrorCounters) -> bool:
-        """Whether a counter went down: the device was switched off and on, or they were cleared."""
+        """Return True if a counter decreased: a power cycle, or the counters were cleared."""
         return any(a < b for a, b in zip(self.encode(), before.encode(), strict=True))
 
 
 def decode_error_counters(data: bytes) -> ErrorCounters:
-    """The counters in the 20 bytes from 0x0300."""
+    """Return the counters in the 20 bytes from 0x0300."""
     if len(data) != ERROR_COUNTERS.size:
         raise DecodeError(f"{ERROR_COUNTERS}: needs {ERROR_COUNTERS.size} bytes, got {len(data)}")
     numbers = _BLOCK.unpack(data)

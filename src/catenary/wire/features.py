@@ -1,4 +1,4 @@
-"""What a controller is and can, registers 0x0000 to 0x0009, ETG.1000.4 §6.1."""
+"""Type and capabilities of a controller, registers 0x0000 to 0x0009, ETG.1000.4 §6.1."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _BLOCK = struct.Struct("<BBHBBBBH")
 
 
 class Feature(IntFlag):
-    """The ESC features register (0x0008). Mind the two that say what is *not* there."""
+    """The ESC features register (0x0008). NO_LRW and NO_READ_WRITE denote missing features."""
 
     FMMU_BYTE_ORIENTED = 0x0001
     UNUSED_REGISTER_ACCESS = 0x0002
@@ -26,11 +26,11 @@ class Feature(IntFlag):
     ENHANCED_SYNC_ACTIVATION = 0x0100
     NO_LRW = 0x0200
     NO_READ_WRITE = 0x0400  # BRW, APRW and FPRW
-    FIXED_CONFIGURATION = 0x0800  # of FMMUs and SyncManagers
+    FIXED_CONFIGURATION = 0x0800  # FMMUs and SyncManagers cannot be configured
 
 
 class PortKind(IntEnum):
-    """How a port is built, two bits of the port descriptor (0x0007)."""
+    """Kind of a port, two bits of the port descriptor (0x0007)."""
 
     ABSENT = 0
     NOT_CONFIGURED = 1
@@ -53,23 +53,23 @@ class Information:
 
     @property
     def supports_lrw(self) -> bool:
-        """Whether one datagram can read and write its process data."""
+        """True if one datagram can read and write its process data (LRW)."""
         return not self.features & Feature.NO_LRW
 
     @property
     def supports_clocks(self) -> bool:
-        """Whether it has distributed clocks."""
+        """True if it has distributed clocks."""
         return bool(self.features & Feature.DISTRIBUTED_CLOCKS)
 
     @property
     def clock_bits(self) -> int:
-        """The width of its system time; 0 without distributed clocks."""
+        """Width of its system time in bits; 0 without distributed clocks."""
         if not self.supports_clocks:
             return 0
         return 64 if self.features & Feature.DISTRIBUTED_CLOCKS_64_BIT else 32
 
     def encode(self) -> bytes:
-        """Its bytes. ValueError if a field does not fit."""
+        """Return the encoded bytes. Raises ValueError if a field does not fit."""
         descriptor = sum(kind << 2 * port for port, kind in enumerate(self.ports))
         try:
             return _BLOCK.pack(
@@ -81,7 +81,7 @@ class Information:
 
 
 def decode_information(data: bytes) -> Information:
-    """The information in the first ten bytes of the registers."""
+    """Return the information in the first ten bytes of the registers."""
     if len(data) != SIZE:
         raise DecodeError(f"ESC information: needs {SIZE} bytes, received {len(data)}")
     kind, revision, build, fmmus, sync_managers, ram_size, descriptor, features = _BLOCK.unpack(

@@ -1,5 +1,5 @@
-"""FMMU blocks, registers 0x0600 + 16·k, ETG.1000.4 §6.6: which bits of the logical address space
-are which bits of the device's memory."""
+"""FMMU blocks, registers 0x0600 + 16·k, ETG.1000.4 §6.6. They map bits of the logical address space
+to bits of the device's memory."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ _BLOCK = struct.Struct("<IHBBHBBB3x")
 
 @dataclass(frozen=True, slots=True)
 class Fmmu:
-    """One FMMU. `length` counts the logical bytes touched, the first and the last in part:
-    bit `logical_start_bit` of the first to bit `logical_end_bit` of the last, both included.
+    """One FMMU. It maps bit `logical_start_bit` of the first byte to bit `logical_end_bit` of the
+    last byte, both included. `length` is the number of logical bytes, partial ones included.
     """
 
     logical_address: int
@@ -30,14 +30,14 @@ class Fmmu:
 
     @property
     def bit_length(self) -> int:
-        """How many bits it maps."""
+        """Number of mapped bits."""
         return 8 * (self.length - 1) + self.logical_end_bit - self.logical_start_bit + 1
 
     def encode(self) -> bytes:
-        """Its block. ValueError if a field does not fit."""
+        """Return the encoded block. Raises ValueError if a field does not fit."""
         bits = (self.logical_start_bit, self.logical_end_bit, self.physical_start_bit)
         if not all(0 <= bit <= 7 for bit in bits):
-            raise ValueError(f"FMMU: a bit is numbered 0 to 7, got {bits}")
+            raise ValueError(f"FMMU: bit numbers must be 0 to 7, got {bits}")
         try:
             return _BLOCK.pack(
                 *(self.logical_address, self.length, self.logical_start_bit),
@@ -50,7 +50,7 @@ class Fmmu:
 
 
 def decode_fmmu(data: bytes) -> Fmmu:
-    """The FMMU in a block of 16 bytes. Reserved bits are ignored, as controllers do."""
+    """Return the FMMU in a block of 16 bytes. Reserved bits are ignored, as in controllers."""
     if len(data) != SIZE:
         raise DecodeError(f"FMMU: needs {SIZE} bytes, received {len(data)}")
     logical, length, first, last, physical, start, kind, enabled = _BLOCK.unpack(data)
@@ -70,9 +70,20 @@ def bits(
     reads: bool = False,
     writes: bool = False,
 ) -> Fmmu:
-    """The FMMU that maps `bit_length` bits; both places count bits from address 0."""
+    """Return the FMMU that maps consecutive bits.
+
+    Args:
+        logical_bit: First logical bit, counted from address 0.
+        physical_bit: First bit of the device's memory, counted from address 0.
+        bit_length: Number of bits, at least 1.
+        reads: True for inputs, from the device into the frame.
+        writes: True for outputs, from the frame into the device.
+
+    Raises:
+        ValueError: `bit_length` is less than 1.
+    """
     if bit_length < 1:
-        raise ValueError(f"FMMU: maps at least one bit, got {bit_length}")
+        raise ValueError(f"FMMU: bit_length must be at least 1, got {bit_length}")
     last = logical_bit + bit_length - 1
     return Fmmu(
         logical_address=logical_bit // 8,

@@ -1,8 +1,8 @@
 """EtherCAT frames in Ethernet, ETG.1000.4 §5.1 to §5.3: Ethernet header, EtherCAT header of type 1,
-datagrams, padding. The frame check sequence belongs to the network interface.
+datagrams, padding. The network interface adds and checks the frame check sequence.
 
-EtherCAT in UDP (EtherType 0x0800) and VLAN-tagged frames are refused: a raw link to a segment needs
-neither.
+EtherCAT in UDP (EtherType 0x0800) and VLAN-tagged frames are rejected: a raw link to a segment does
+not need them.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from catenary.wire.datagram import OVERHEAD, Datagram, decode_datagram
 
 ETHERTYPE = 0x88A4
 BROADCAST = b"\xff" * 6
-DEFAULT_SOURCE = b"\x10\x10\x10\x10\x10\x10"  # locally unassigned, bit 1 of byte 0 clear
+DEFAULT_SOURCE = b"\x10\x10\x10\x10\x10\x10"  # bit 1 of byte 0, which controllers set, is clear
 ETHERNET_HEADER_SIZE = 14
 ETHERCAT_HEADER_SIZE = 2
 HEADER_SIZE = ETHERNET_HEADER_SIZE + ETHERCAT_HEADER_SIZE
 MINIMUM_SIZE = 60  # without the frame check sequence
 MAXIMUM_SIZE = 1514
-MAXIMUM_PAYLOAD = MAXIMUM_SIZE - HEADER_SIZE  # all datagrams with their headers
-MAXIMUM_DATA = MAXIMUM_PAYLOAD - OVERHEAD  # of a datagram alone in its frame
+MAXIMUM_PAYLOAD = MAXIMUM_SIZE - HEADER_SIZE  # all datagrams including their headers
+MAXIMUM_DATA = MAXIMUM_PAYLOAD - OVERHEAD  # of a single datagram in a frame
 PASSED_CONTROLLER = 0x02  # set in byte 0 of the source address by the first controller
 
 _TYPE_COMMAND = 1
@@ -32,17 +32,20 @@ _VLAN_ETHERTYPES = (0x8100, 0x88A8)
 
 
 def wire_time_ns(size: int) -> int:
-    """How long a frame of `size` bytes, without check sequence, holds a cable of 100 Mbit/s [ns]:
-    preamble, padding, check sequence and the gap behind it included."""
+    """Return the time [ns] that a frame occupies a cable of 100 Mbit/s.
+
+    The time includes preamble, padding, check sequence and inter-frame gap; `size` [bytes] does
+    not include them.
+    """
     return (max(size, MINIMUM_SIZE) + _FRAME_OVERHEAD) * 80
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One frame. `padding` is what follows the last datagram: encode restores every byte.
+    """One frame. `padding` contains the bytes after the last datagram; encode restores them.
 
-    `counted_padding`: how much of it the length in the EtherCAT header counts. None is the rule;
-    TwinCAT counts an even number of bytes, others count Ethernet's minimum.
+    `counted_padding` is the part of the padding that the length in the EtherCAT header includes.
+    Usually it is 0. TwinCAT counts to an even length, other masters to Ethernet's minimum.
     """
 
     datagrams: tuple[Datagram, ...]
@@ -53,19 +56,23 @@ class Frame:
 
     @property
     def has_passed_controller(self) -> bool:
-        """Whether a controller processed it: the first one sets a bit of the source address.
+        """True if a controller processed it: the first one sets a bit of the source address.
 
-        A frame that comes back without it met no device, for instance on `lo`.
+        A frame that returns without this bit did not pass any device, for instance on `lo`.
         """
         return bool(self.source[0] & PASSED_CONTROLLER)
 
     @property
     def sender(self) -> bytes:
-        """Its source address without the bit that controllers set."""
+        """Source address without the bit that controllers set."""
         return bytes((self.source[0] & ~PASSED_CONTROLLER,)) + self.source[1:]
 
     def encode(self) -> bytes:
-        """Its bytes, without a frame check sequence. ValueError if it is too long or empty."""
+        """Return the encoded bytes, without a frame check sequence.
+
+        Raises:
+            ValueError: The frame is too long or empty, or a field does not fit.
+        """
         if not self.datagrams:
             raise ValueError("a frame needs at least one datagram")
         if len(self.source) != 6 or len(self.destination) != 6:
@@ -76,10 +83,12 @@ class Frame:
         )
         if len(payload) + len(self.padding) > MAXIMUM_PAYLOAD:
             raise ValueError(
-                f"datagrams of {len(payload)} bytes: at most {MAXIMUM_PAYLOAD} a frame"
+                f"datagrams of {len(payload)} bytes: a frame holds at most {MAXIMUM_PAYLOAD}"
             )
         if not 0 <= self.counted_padding <= len(self.padding):
-            raise ValueError(f"{self.counted_padding} bytes of padding counted, not all are there")
+            raise ValueError(
+                f"counted_padding is {self.counted_padding}, padding has {len(self.padding)} bytes"
+            )
         length = len(payload) + self.counted_padding
         header = struct.pack("<H", length | _TYPE_COMMAND << 12)
         ethertype = struct.pack(">H", ETHERTYPE)
@@ -89,19 +98,28 @@ class Frame:
 def encode_frame(
     datagrams: Sequence[Datagram], *, source: bytes = DEFAULT_SOURCE, destination: bytes = BROADCAST
 ) -> bytes:
-    """The bytes of a frame with these datagrams, padded with zeros to Ethernet's minimum."""
+    """Return the bytes of a frame, padded with zeros to Ethernet's minimum.
+
+    Args:
+        datagrams: At least one datagram, in order.
+        source: Source MAC address.
+        destination: Destination MAC address.
+
+    Raises:
+        ValueError: The frame is too long or empty, or a field does not fit.
+    """
     return Frame(tuple(datagrams), source, destination).encode().ljust(MINIMUM_SIZE, b"\x00")
 
 
 def decode_frame(data: bytes) -> Frame:
-    """The frame in `data`, or DecodeError saying why it is none."""
+    """Return the frame in `data`. Raises DecodeError with the reason if it is not EtherCAT."""
     if reason := _why_alien(data):
-        raise DecodeError(f"no EtherCAT frame: {reason}")
+        raise DecodeError(f"not an EtherCAT frame: {reason}")
     length = int.from_bytes(data[ETHERNET_HEADER_SIZE:HEADER_SIZE], "little") & 0x07FF
     end = HEADER_SIZE + length
     if end > len(data):
         raise DecodeError(
-            f"EtherCAT header says {length} bytes, {len(data) - HEADER_SIZE} received"
+            f"EtherCAT header specifies {length} bytes, {len(data) - HEADER_SIZE} received"
         )
     datagrams, rest = _decode_datagrams(bytes(data[:end]))
     return Frame(
@@ -114,12 +132,17 @@ def decode_frame(data: bytes) -> Frame:
 
 
 def is_alien(data: bytes) -> bool:
-    """Whether the bytes are no EtherCAT frame of commands at all: other traffic on the cable."""
+    """Return True if the bytes are not an EtherCAT command frame, but other traffic."""
     return _why_alien(data) is not None
 
 
 def is_own(data: bytes, source: bytes) -> bool:
-    """Whether a frame was sent from the MAC address `source`, passed through controllers or not."""
+    """Return True if a frame was sent from a MAC address, even if controllers processed it.
+
+    Args:
+        data: The frame, from the destination address on.
+        source: The MAC address, 6 bytes.
+    """
     mask = 0xFF & ~PASSED_CONTROLLER
     return len(data) >= 12 and data[6] & mask == source[0] & mask and data[7:12] == source[1:]
 
@@ -131,7 +154,7 @@ def _why_alien(data: bytes) -> str | None:
         return f"{len(data)} bytes, at most {MAXIMUM_SIZE}"
     ethertype = int.from_bytes(data[12:14], "big")
     if ethertype in _VLAN_ETHERTYPES:
-        return f"VLAN-tagged (EtherType 0x{ethertype:04X}); a segment takes untagged frames"
+        return f"VLAN-tagged (EtherType 0x{ethertype:04X}); use untagged frames"
     if ethertype != ETHERTYPE:
         return f"EtherType 0x{ethertype:04X}, needs 0x{ETHERTYPE:04X}"
     header = int.from_bytes(data[ETHERNET_HEADER_SIZE:HEADER_SIZE], "little")
@@ -143,7 +166,7 @@ def _why_alien(data: bytes) -> str | None:
 
 
 def _decode_datagrams(data: bytes) -> tuple[tuple[Datagram, ...], int]:
-    """The datagrams, and where the last one ends."""
+    """Return the datagrams, and the offset of the end of the last one."""
     datagrams: list[Datagram] = []
     offset, more_follows = HEADER_SIZE, True
     while more_follows:

@@ -29,18 +29,21 @@ class Type(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Mailbox:
-    """One mailbox message. What follows it in the SyncManager's buffer means nothing."""
+    """One mailbox message. Bytes after it in the SyncManager's buffer are ignored."""
 
     type: Type
     data: bytes
-    counter: int = 0  # 1 to 7, one more with each new message, 7 is followed by 1
+    counter: int = 0  # 1 to 7, incremented with each new message; 1 follows 7
     address: int = 0  # station address of the partner; 0: the MainDevice
     priority: int = 0  # 0 to 3
     channel: int = 0
 
     def encode(self, size: int | None = None) -> bytes:
-        """Its bytes, filled with zeros up to the mailbox's `size`: only a write of the last byte
-        hands the mailbox over. ValueError if it does not fit."""
+        """Return the encoded bytes, padded with zeros to the `size` of the mailbox.
+
+        The device receives the mailbox only when its last byte is written. Raises ValueError if
+        the message does not fit.
+        """
         if not (0 <= self.counter <= 7 and 0 <= self.priority <= 3 and 0 <= self.channel < 64):
             raise ValueError(f"mailbox: counter, priority or channel out of range in {self}")
         try:
@@ -52,17 +55,21 @@ class Mailbox:
             raise ValueError(f"mailbox: {error}") from None
         message = header + self.data
         if size is not None and len(message) > size:
-            raise ValueError(f"mailbox message of {len(message)} bytes: the mailbox has {size}")
+            raise ValueError(
+                f"mailbox message of {len(message)} bytes exceeds the mailbox of {size} bytes"
+            )
         return message.ljust(size or 0, b"\x00")
 
 
 def decode_mailbox(data: bytes) -> Mailbox:
-    """The message at the start of a mailbox's buffer."""
+    """Return the message at the start of a mailbox buffer."""
     if len(data) < HEADER_SIZE:
         raise DecodeError(f"mailbox: {len(data)} bytes, the header needs {HEADER_SIZE}")
     length, address, channel, kind = _HEADER.unpack_from(data)
     if HEADER_SIZE + length > len(data):
-        raise DecodeError(f"mailbox: says {length} bytes, {len(data) - HEADER_SIZE} received")
+        raise DecodeError(
+            f"mailbox: header specifies {length} bytes, {len(data) - HEADER_SIZE} received"
+        )
     try:
         protocol = Type(kind & 0x0F)
     except ValueError:
@@ -72,12 +79,12 @@ def decode_mailbox(data: bytes) -> Mailbox:
 
 
 def next_counter(counter: int) -> int:
-    """The counter of the message after the one with `counter`: 1 to 7, then 1 again."""
+    """Return the counter of the next message after `counter`: 1 to 7, then 1 again."""
     return counter % 7 + 1
 
 
 class ErrorCode(IntEnum):
-    """Detail of a mailbox error reply."""
+    """Error code of a mailbox error reply."""
 
     SYNTAX = 1
     UNSUPPORTED_PROTOCOL = 2
@@ -91,39 +98,39 @@ class ErrorCode(IntEnum):
 
 
 ERROR_TEXTS = {
-    ErrorCode.SYNTAX: "syntax of the 6-byte mailbox header is wrong",
+    ErrorCode.SYNTAX: "the syntax of the 6-byte mailbox header is wrong",
     ErrorCode.UNSUPPORTED_PROTOCOL: "the protocol is not supported",
-    ErrorCode.INVALID_CHANNEL: "the channel field holds a wrong value",
+    ErrorCode.INVALID_CHANNEL: "the channel field has an invalid value",
     ErrorCode.SERVICE_NOT_SUPPORTED: "the service is not supported",
     ErrorCode.INVALID_HEADER: "the header of the protocol is wrong",
     ErrorCode.SIZE_TOO_SHORT: "the message is too short",
-    ErrorCode.NO_MORE_MEMORY: "the device has no memory left for it",
+    ErrorCode.NO_MORE_MEMORY: "the device has no memory left for the message",
     ErrorCode.INVALID_SIZE: "the length does not match the data",
-    ErrorCode.SERVICE_IN_WORK: "the service is in use already",
+    ErrorCode.SERVICE_IN_WORK: "the service is already in use",
 }
 
 
 @dataclass(frozen=True, slots=True)
 class ErrorReply:
-    """The data of a message of type ERROR. `code` may be one that the standard does not know."""
+    """The data of a message of type ERROR. `code` may be one that the standard does not define."""
 
     code: int
 
     @property
     def text(self) -> str:
-        """What the code means."""
+        """Meaning of the code."""
         known = {int(code): text for code, text in ERROR_TEXTS.items()}
         return known.get(self.code, f"unknown mailbox error 0x{self.code:04X}")
 
     def encode(self) -> bytes:
-        """Its bytes. ValueError if the code does not fit."""
+        """Return the encoded bytes. Raises ValueError if the code does not fit."""
         if not 0 <= self.code <= 0xFFFF:
             raise ValueError(f"mailbox error: code {self.code} has more than 16 bits")
         return _ERROR.pack(_ERROR_TYPE, self.code)
 
 
 def decode_error(data: bytes) -> ErrorReply:
-    """The mailbox error in the data of a message of type ERROR."""
+    """Return the mailbox error in the data of a message of type ERROR."""
     if len(data) < _ERROR.size:
         raise DecodeError(f"mailbox error: needs {_ERROR.size} bytes, received {len(data)}")
     kind, code = _ERROR.unpack_from(data)

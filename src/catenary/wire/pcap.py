@@ -1,7 +1,7 @@
-"""Captures of Ethernet frames in pcap (draft-ietf-opsawg-pcap), which `tcpdump -w` writes: reading
-in both byte orders, with times in microseconds or nanoseconds.
+"""Captures of Ethernet frames in pcap (draft-ietf-opsawg-pcap), which `tcpdump -w` writes.
 
-A last record that was cut off is left out: `Capture.cut` counts its bytes.
+Both byte orders can be read, with times in microseconds or nanoseconds. A truncated last record is
+left out; `Capture.cut` counts its bytes.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ _HEADER = "IHHiIII"  # magic, version, time zone, accuracy, snap length, link ty
 _RECORD = "IIII"  # seconds, fraction, bytes captured, bytes on the wire
 _HEADER_SIZE, _RECORD_SIZE = 24, 16
 _UNITS = {0xA1B2C3D4: (1000, 6), 0xA1B23C4D: (1, 9)}  # magic: ns in a tick, resolution
-_LINK_TYPE = 0xFFFF  # the upper half tells of check sequences
+_LINK_TYPE = 0xFFFF  # the upper half describes check sequences
 
 
 class _Format(NamedTuple):
@@ -26,15 +26,15 @@ class _Format(NamedTuple):
 
 
 def is_pcap(data: bytes) -> bool:
-    """True if the bytes begin as a pcap file."""
+    """Return True if the bytes begin with the magic number of pcap."""
     return _format(data) is not None
 
 
 def decode_pcap(data: bytes) -> Capture:
-    """Return the capture in a file's bytes. Raises DecodeError if it is not pcap."""
+    """Return the capture in the bytes of a file. Raises DecodeError if it is not pcap."""
     form = _format(data)
     if form is None:
-        raise DecodeError(f"pcap: its magic number is {data[:4].hex() or 'missing'}")
+        raise DecodeError(f"not a pcap file: magic number {data[:4].hex() or 'missing'}")
     if len(data) < _HEADER_SIZE:
         raise DecodeError(f"pcap: {len(data)} bytes, the header needs {_HEADER_SIZE}")
     link_type = struct.unpack_from(form.order + _HEADER, data)[-1] & _LINK_TYPE

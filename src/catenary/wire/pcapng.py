@@ -1,11 +1,11 @@
-"""Captures of Ethernet frames in pcapng (draft-ietf-opsawg-pcapng): reading of what any tool wrote,
-in both byte orders; writing with one interface and times in ns.
+"""Captures of Ethernet frames in pcapng (draft-ietf-opsawg-pcapng): reading in both byte orders,
+writing with one interface and times in ns.
 
     capture = encode_header("eth0") + b"".join(encode_packet(packet) for packet in packets)
     decode_pcapng(capture).packets == tuple(packets)
 
-A last block that was cut off, by a program that was killed or a full disk, is left out:
-`Capture.cut` counts its bytes. Wireshark reads such files in the same way.
+A truncated last block (killed program, full disk) is left out; `Capture.cut` counts its bytes.
+Wireshark reads such files in the same way.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ _OPTION_RECEIVED = 4  # of statistics
 _OPTION_DROPPED = 5
 _OPTION_RESOLUTION = 9
 _OPTION_TIME_OFFSET = 14
-_MICROSECONDS = 6  # the resolution where none is given
+_MICROSECONDS = 6  # the default resolution
 _NANOSECONDS = 9
 
 
 @dataclass(frozen=True, slots=True)
 class Interface:
-    """Where packets were captured. Bit 7 of `resolution`: a power of 2, else of 10."""
+    """Interface of a capture. `resolution` is a power of 2 if bit 7 is set, else of 10."""
 
     name: str = ""
     link_type: int = ETHERNET
@@ -51,7 +51,7 @@ class Interface:
 
 
 class Direction(IntEnum):
-    """Which way a packet went, as bits 0 and 1 of epb_flags say."""
+    """Direction of a packet, bits 0 and 1 of epb_flags."""
 
     UNKNOWN = 0
     INBOUND = 1
@@ -62,11 +62,11 @@ class Direction(IntEnum):
 class Packet:
     """One captured frame."""
 
-    time_ns: int  # since 1970, or whatever the writer counts from
+    time_ns: int  # since 1970, or since the epoch of the writer
     data: bytes
     comment: str = ""
-    interface: int = 0  # its number in Capture.interfaces
-    original_length: int | None = None  # None: nothing was cut off
+    interface: int = 0  # index in Capture.interfaces
+    original_length: int | None = None  # None: not truncated
     direction: Direction = Direction.UNKNOWN
 
 
@@ -76,11 +76,11 @@ class Capture:
 
     interfaces: tuple[Interface, ...]
     packets: tuple[Packet, ...]
-    cut: int = 0  # bytes at the end, of a block that was cut off
+    cut: int = 0  # bytes of a truncated block at the end
 
 
 def encode_header(interface_name: str = "") -> bytes:
-    """The beginning of a file: the section and its one interface, with times in ns."""
+    """Return the beginning of a file: a section and its one interface, with times in ns."""
     section = struct.pack("<IHHq", _MAGIC, 1, 0, -1)
     options = _option(_OPTION_NAME, interface_name.encode()) if interface_name else b""
     options += _option(_OPTION_RESOLUTION, bytes((_NANOSECONDS,))) + _option(_OPTION_END, b"")
@@ -89,12 +89,14 @@ def encode_header(interface_name: str = "") -> bytes:
 
 
 def encode_packet(packet: Packet) -> bytes:
-    """A packet of the one interface. ValueError if a field does not fit."""
+    """Return the block of a packet. Raises ValueError if a field is out of range."""
     original = len(packet.data) if packet.original_length is None else packet.original_length
     if not 0 <= packet.time_ns < 1 << 64:
         raise ValueError(f"pcapng: time {packet.time_ns} ns is not in 0 to 2**64 - 1")
     if packet.interface or not len(packet.data) <= original < 1 << 32:
-        raise ValueError(f"pcapng: interface {packet.interface}, original length {original}")
+        raise ValueError(
+            f"pcapng: invalid interface {packet.interface} or original length {original}"
+        )
     high, low = packet.time_ns >> 32, packet.time_ns & 0xFFFF_FFFF
     body = struct.pack("<IIIII", 0, high, low, len(packet.data), original) + _pad(packet.data)
     if packet.comment:
@@ -107,7 +109,13 @@ def encode_packet(packet: Packet) -> bytes:
 
 
 def encode_statistics(time_ns: int, *, received: int, dropped: int) -> bytes:
-    """The end of a file: how many packets came, and how many of them the file lacks."""
+    """Return the block at the end of a file.
+
+    Args:
+        time_ns: Time of the statistics [ns].
+        received: Number of received packets.
+        dropped: Number of received packets that the file does not contain.
+    """
     body = struct.pack("<III", 0, time_ns >> 32, time_ns & 0xFFFF_FFFF)
     body += _option(_OPTION_RECEIVED, struct.pack("<Q", received))
     body += _option(_OPTION_DROPPED, struct.pack("<Q", dropped)) + _option(_OPTION_END, b"")
@@ -115,7 +123,10 @@ def encode_statistics(time_ns: int, *, received: int, dropped: int) -> bytes:
 
 
 def decode_pcapng(data: bytes) -> Capture:
-    """Return the capture in a file's bytes, up to the cut. Raises DecodeError if not pcapng."""
+    """Return the capture in the bytes of a file. Raises DecodeError if it is not pcapng.
+
+    A truncated last block is left out.
+    """
     state = _State()
     end = 0
     for block in _blocks(data):
@@ -133,16 +144,19 @@ def decode_pcapng(data: bytes) -> Capture:
 
 @dataclass(slots=True)
 class _State:
-    """Owns what was found so far."""
+    """Owner of the interfaces and packets found so far."""
 
     interfaces: list[Interface] = field(default_factory=list)
     packets: list[Packet] = field(default_factory=list)
-    first_interface: int = 0  # of the section; its packets count from there
+    first_interface: int = 0  # first interface of the section; its packets count from here
 
     def interface(self, number: int) -> int:
+        """Return the index in the file of an interface of the section."""
         found = self.first_interface + number
         if found >= len(self.interfaces):
-            raise DecodeError(f"pcapng: a packet of interface {number}, which was not described")
+            raise DecodeError(
+                f"pcapng: a packet names interface {number}, which the file does not describe"
+            )
         return found
 
 
@@ -150,10 +164,10 @@ class _Block(NamedTuple):
     kind: int
     order: str  # "<" or ">"
     body: bytes
-    end: int  # its end in the file
+    end: int  # offset of its end in the file
 
     def unpack(self, layout: str) -> tuple[int, ...]:
-        """The fields at its start."""
+        """Return the fields at the start of the body."""
         size = struct.calcsize(self.order + layout)
         if size > len(self.body):
             raise DecodeError(f"pcapng: block {self.kind} has {len(self.body)} bytes, needs {size}")
@@ -161,13 +175,13 @@ class _Block(NamedTuple):
 
 
 def _blocks(data: bytes) -> Iterator[_Block]:
-    """Yield every whole block. The first one must be whole."""
+    """Yield every complete block. Raises DecodeError if the first one is incomplete."""
     offset, order = 0, ""
     while offset < len(data):
         if offset + _MINIMUM_BLOCK > len(data):
             if offset:
                 return
-            raise DecodeError(f"pcapng: {len(data)} bytes, no block fits")
+            raise DecodeError(f"pcapng: {len(data)} bytes, a block needs at least {_MINIMUM_BLOCK}")
         if data[offset : offset + 4] == b"\x0a\x0d\x0d\x0a":
             order = _byte_order(data[offset + 8 : offset + 12])
         if not order:
@@ -175,11 +189,13 @@ def _blocks(data: bytes) -> Iterator[_Block]:
         kind, length = struct.unpack_from(order + "II", data, offset)
         end = offset + length
         if length < _MINIMUM_BLOCK or length % 4 or (end > len(data) and not offset):
-            raise DecodeError(f"pcapng: block at byte {offset} says {length} bytes")
+            raise DecodeError(
+                f"pcapng: block at byte {offset} has an invalid length of {length} bytes"
+            )
         if end > len(data):
             return
         if struct.unpack_from(order + "I", data, end - 4)[0] != length:
-            raise DecodeError(f"pcapng: block at byte {offset} ends with another length")
+            raise DecodeError(f"pcapng: block at byte {offset} has two different lengths")
         yield _Block(kind, order, bytes(data[offset + 8 : end - 4]), end)
         offset = end
 
@@ -188,7 +204,7 @@ def _byte_order(magic: bytes) -> str:
     for order in ("<", ">"):
         if magic == struct.pack(order + "I", _MAGIC):
             return order
-    raise DecodeError(f"pcapng: byte-order magic is {magic.hex()}")
+    raise DecodeError(f"pcapng: invalid byte-order magic {magic.hex()}")
 
 
 def _decode_interface(block: _Block) -> Interface:
@@ -198,7 +214,7 @@ def _decode_interface(block: _Block) -> Interface:
     resolution = options.get(_OPTION_RESOLUTION, bytes((_MICROSECONDS,)))
     time_offset = options.get(_OPTION_TIME_OFFSET, bytes(8))
     if len(resolution) != 1 or len(time_offset) != 8:
-        raise DecodeError("pcapng: resolution or time offset of an interface has a wrong length")
+        raise DecodeError("pcapng: resolution or time offset of an interface has the wrong length")
     return Interface(
         name, link_type, resolution[0], struct.unpack(block.order + "q", time_offset)[0]
     )
@@ -210,7 +226,7 @@ def _decode_enhanced(block: _Block, state: _State) -> Packet:
     end = 20 + captured
     if end > len(block.body):
         raise DecodeError(
-            f"pcapng: a packet says {captured} bytes, {len(block.body) - 20} received"
+            f"pcapng: a packet specifies {captured} bytes, its block has {len(block.body) - 20}"
         )
     options = _decode_options(block, end + -end % 4)
     comment = options.get(_OPTION_COMMENT, b"").decode("utf-8", "replace")
@@ -222,7 +238,7 @@ def _decode_enhanced(block: _Block, state: _State) -> Packet:
 
 def _direction(block: _Block, flags: bytes) -> Direction:
     if len(flags) != 4:
-        raise DecodeError(f"pcapng: flags of a packet are {len(flags)} bytes, not 4")
+        raise DecodeError(f"pcapng: flags of a packet have {len(flags)} bytes, not 4")
     bits = struct.unpack(block.order + "I", flags)[0] & 3
     return Direction(bits) if bits < 3 else Direction.UNKNOWN
 
@@ -248,7 +264,7 @@ def _decode_options(block: _Block, offset: int) -> dict[int, bytes]:
             break
         start = offset + 4
         if start + length > len(block.body):
-            raise DecodeError(f"pcapng: option {code} says {length} bytes, beyond its block")
+            raise DecodeError(f"pcapng: option {code} with {length} bytes exceeds its block")
         options.setdefault(code, block.body[start : start + length])
         offset = start + length + -length % 4
     return options

@@ -1,5 +1,5 @@
 """The register map of an EtherCAT SubDevice Controller, ETG.1000.4 §6 and Beckhoff's ESC data sheet
-(section II, register descriptions). Each register is written once, with its format.
+(section II, register descriptions). Each register is defined once, with its format.
 
 Indexed registers are functions: `fmmu(k)`, `sync_manager(k)`, `receive_time(port)`.
 """
@@ -17,15 +17,15 @@ T = TypeVar("T", int, bytes)
 PORT_COUNT = 4
 FMMU_COUNT = 16
 SYNC_MANAGER_COUNT = 16
-PROCESS_RAM = 0x1000  # where the memory for mailboxes and process data begins
+PROCESS_RAM = 0x1000  # start of the memory for mailboxes and process data
 
 
 # No slots: `Register[int](...)` of a frozen class with slots fails in Python 3.11 (cpython#105332).
 @dataclass(frozen=True)
 class Register(Generic[T]):
-    """One register: its address, its format (one value, in the notation of `struct`), its name.
+    """One register: address, format (one value, in the notation of `struct`) and name.
 
-    A register of several fields is `Register[bytes]`, for its own file's encode and decode.
+    A register with several fields is a `Register[bytes]`; its own file encodes and decodes it.
     """
 
     address: int
@@ -34,11 +34,11 @@ class Register(Generic[T]):
 
     @property
     def size(self) -> int:
-        """Its length in bytes."""
+        """Length in bytes."""
         return struct.calcsize(self.format)
 
     def pack(self, value: T) -> bytes:
-        """Its bytes. ValueError if the value does not fit."""
+        """Return the encoded value. Raises ValueError if it does not fit."""
         if isinstance(value, bytes) and len(value) != self.size:
             raise ValueError(f"{self}: needs exactly {self.size} bytes, got {len(value)}")
         try:
@@ -47,7 +47,7 @@ class Register(Generic[T]):
             raise ValueError(f"{self}: {value!r} does not fit: {error}") from None
 
     def unpack(self, data: bytes) -> T:
-        """Its value. DecodeError if `data` is not exactly as long as the register."""
+        """Return the value in `data`. Raises DecodeError if `data` has the wrong length."""
         if len(data) != self.size:
             raise DecodeError(f"{self}: needs {self.size} bytes, received {len(data)}")
         return cast(T, struct.unpack(self.format, data)[0])
@@ -181,7 +181,7 @@ ECAT_BUFFER_CHANGE_TIME = Register[int](0x09F0, "<I", "EtherCAT buffer change ev
 PDI_BUFFER_START_TIME = Register[int](0x09F8, "<I", "PDI buffer start event time")
 PDI_BUFFER_CHANGE_TIME = Register[int](0x09FC, "<I", "PDI buffer change event time")
 
-# Of single kinds of controller
+# Registers that only some kinds of controller have
 PRODUCT_ID = Register[int](0x0E00, "<Q", "product ID")
 VENDOR_ID = Register[int](0x0E08, "<Q", "vendor ID")
 DIGITAL_OUTPUTS = Register[int](0x0F00, "<I", "digital I/O output data")
@@ -190,67 +190,67 @@ GENERAL_PURPOSE_INPUTS = Register[int](0x0F18, "<Q", "general purpose inputs")
 
 
 def watchdog_unit_ns(divider: int) -> int:
-    """Return the unit of the watchdog times (0x0410, 0x0420) for a value of the divider."""
+    """Return the unit [ns] of the watchdog times (0x0410, 0x0420) for a divider (0x0400)."""
     return (divider + 2) * 40
 
 
 def rx_error_counter(port: int) -> Register[int]:
-    """Low byte: invalid frames; high byte: RX errors of the PHY."""
+    """Return the RX error counter of a port. Low byte: invalid frames; high byte: PHY RX errors."""
     return Register(0x0300 + 2 * _checked(port, PORT_COUNT), "<H", f"RX error counter port {port}")
 
 
 def forwarded_rx_error_counter(port: int) -> Register[int]:
-    """Frames that a device before had already marked as broken."""
+    """Return the counter of frames that an earlier device had already marked as broken."""
     address = 0x0308 + _checked(port, PORT_COUNT)
     return Register(address, "<B", f"forwarded RX error counter port {port}")
 
 
 def lost_link_counter(port: int) -> Register[int]:
-    """How often the link of a port went away."""
+    """Return the counter of lost links of a port."""
     return Register(0x0310 + _checked(port, PORT_COUNT), "<B", f"lost link counter port {port}")
 
 
 def phy_port_status(port: int) -> Register[int]:
-    """What the MII management found at a port."""
+    """Return the PHY status that the MII management reports for a port."""
     return Register(0x0518 + _checked(port, PORT_COUNT), "<B", f"PHY port status {port}")
 
 
 def fmmu(k: int) -> Register[bytes]:
-    """The block of FMMU k, see fmmu.py."""
+    """Return the block of FMMU k, see fmmu.py."""
     return Register(0x0600 + 16 * _checked(k, FMMU_COUNT), "16s", f"FMMU {k}")
 
 
 def sync_manager(k: int) -> Register[bytes]:
-    """The block of SyncManager k, see sync_manager.py."""
+    """Return the block of SyncManager k, see sync_manager.py."""
     return Register(0x0800 + 8 * _checked(k, SYNC_MANAGER_COUNT), "8s", f"SyncManager {k}")
 
 
 def sync_manager_control(k: int) -> Register[int]:
-    """The control byte alone: mode, direction, interrupts, watchdog trigger."""
+    """Return the control byte of SyncManager k: mode, direction, interrupts, watchdog trigger."""
     address = 0x0804 + 8 * _checked(k, SYNC_MANAGER_COUNT)
     return Register(address, "<B", f"SyncManager {k} control")
 
 
 def sync_manager_status(k: int) -> Register[int]:
-    """The status byte alone: mailbox full, buffers."""
+    """Return the status byte of SyncManager k: mailbox full, buffers."""
     address = 0x0805 + 8 * _checked(k, SYNC_MANAGER_COUNT)
     return Register(address, "<B", f"SyncManager {k} status")
 
 
 def sync_manager_activation(k: int) -> Register[int]:
-    """The activation byte alone: enable, repeat request."""
+    """Return the activation byte of SyncManager k: enable, repeat request."""
     address = 0x0806 + 8 * _checked(k, SYNC_MANAGER_COUNT)
     return Register(address, "<B", f"SyncManager {k} activation")
 
 
 def sync_manager_pdi_control(k: int) -> Register[int]:
-    """The PDI's byte alone: deactivate, repeat acknowledge."""
+    """Return the PDI control byte of SyncManager k: deactivate, repeat acknowledge."""
     address = 0x0807 + 8 * _checked(k, SYNC_MANAGER_COUNT)
     return Register(address, "<B", f"SyncManager {k} PDI control")
 
 
 def receive_time(port: int) -> Register[int]:
-    """Local time at which the latching write arrived at a port [ns]."""
+    """Return the receive time of a port: local time at which the latching write arrived [ns]."""
     return Register(0x0900 + 4 * _checked(port, PORT_COUNT), "<I", f"receive time port {port}")
 
 

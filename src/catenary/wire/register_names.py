@@ -1,4 +1,4 @@
-"""Registers by what people call them: `AL_STATUS`, "al status", "fmmu0", "SyncManager 2"."""
+"""Registers by name: `AL_STATUS`, "al status", "fmmu0", "SyncManager 2"."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ _INDEXED = (
 
 
 def names() -> tuple[str, ...]:
-    """Return the names of all registers, by address."""
+    """Return the names of all registers, ordered by address."""
     known = sorted(_by_key().values(), key=lambda each: (each.address, each.size))
     return tuple(dict.fromkeys(each.name for each in known))
 
 
 def by_name(name: str) -> AnyRegister:
-    """Return the register of a name; capitals, spaces and underscores do not count.
+    """Return the register with a name. Case, spaces and underscores are ignored.
 
     Raises:
         ValueError: No register has the name. The error lists the nearest names.
@@ -43,7 +43,9 @@ def by_name(name: str) -> AnyRegister:
     if found is not None:
         return found
     guesses = ", ".join(near(name))
-    raise ValueError(f"no register {name!r}" + (f"; near it: {guesses}" if guesses else ""))
+    raise ValueError(
+        f"unknown register {name!r}" + (f"; similar names: {guesses}" if guesses else "")
+    )
 
 
 def near(name: str) -> tuple[str, ...]:
@@ -54,8 +56,13 @@ def near(name: str) -> tuple[str, ...]:
 
 
 def at_address(address: int, size: int | None = None) -> AnyRegister | None:
-    """The register that begins at an address, of that size where one is given. Of several the
-    shortest number: what a read without a size means."""
+    """Return the register at an address; None if there is none.
+
+    Args:
+        address: The address of the first byte.
+        size: The size [bytes]. If it is None and several registers match, the shortest number is
+            returned, as for a read without a size.
+    """
     found = [
         each for each in _by_key().values() if each.address == address and size in (None, each.size)
     ]

@@ -1,4 +1,4 @@
-"""What the content of a register means, in words. None where the number says all there is."""
+"""Text that explains the content of registers."""
 
 from __future__ import annotations
 
@@ -27,7 +27,15 @@ Explain: TypeAlias = Callable[[bytes], str]
 
 
 def explain(of: AnyRegister, data: bytes) -> str | None:
-    """The meaning of `data`, read from a register; also where it is none, with the reason."""
+    """Return the meaning of the content of a register.
+
+    Args:
+        of: The register.
+        data: Its content, as read.
+
+    Returns:
+        The meaning, or the reason why the content is invalid; None if only the number is known.
+    """
     decode = _EXPLANATIONS.get((of.address, of.size))
     if decode is None:
         return None
@@ -43,8 +51,8 @@ def _word(data: bytes) -> int:
 
 def _al_control(data: bytes) -> str:
     control = AlControl.from_word(_word(data))
-    acknowledging = ", the error acknowledged" if control.acknowledge else ""
-    return f"{control.state} asked for{acknowledging}"
+    acknowledging = ", error acknowledged" if control.acknowledge else ""
+    return f"{control.state} requested{acknowledging}"
 
 
 def _al_status(data: bytes) -> str:
@@ -69,10 +77,10 @@ def _dl_status(data: bytes) -> str:
 def _port(status: DlStatus, number: int) -> str:
     port = status.ports[number]
     if port.communication:
-        return "open" if not port.loop_closed else "communication, but closed"
+        return "open" if not port.loop_closed else "communication, but loop closed"
     if port.link:
         return "link, no communication"
-    return "no link" if port.loop_closed else "no link, but open"
+    return "no link" if port.loop_closed else "no link, but loop open"
 
 
 def _dl_control(data: bytes) -> str:
@@ -80,13 +88,13 @@ def _dl_control(data: bytes) -> str:
     loops = ", ".join(f"port {n} {control.loops[n].name}" for n in PORTS)
     alien = "destroyed" if control.destroy_alien_frames else "forwarded"
     alias = "on" if control.alias_enabled else "off"
-    return f"{loops}; alien frames {alien}; station alias {alias}"
+    return f"{loops}; non-EtherCAT frames {alien}; station alias {alias}"
 
 
 def _owner(data: bytes) -> str:
-    who = "the device's processor (PDI)" if data[0] & CONFIGURATION_TO_PDI else "EtherCAT"
+    owner = "the device's processor (PDI)" if data[0] & CONFIGURATION_TO_PDI else "EtherCAT"
     forced = ", forced" if data[0] & CONFIGURATION_FORCE else ""
-    return f"the EEPROM is {who}'s{forced}"
+    return f"EEPROM assigned to {owner}{forced}"
 
 
 def _flags(value: IntFlag) -> str:
@@ -150,7 +158,7 @@ def _error_counters(data: bytes) -> str:
         if each
     ]
     others = (("processing unit", found.processing_unit), ("PDI", found.pdi))
-    parts += [f"{who}: {count}" for who, count in others if count]
+    parts += [f"{name}: {count}" for name, count in others if count]
     return "; ".join(parts) or "no errors"
 
 
@@ -165,7 +173,7 @@ def _times(data: bytes) -> str:
 _SII_BITS = (
     ("write_enable", "write enable"),
     ("emulation", "EEPROM emulated by the processor"),
-    ("eight_bytes", "8 bytes a read"),
+    ("eight_bytes", "8 bytes per read"),
     ("two_byte_address", "2 address bytes"),
     ("checksum_error", "checksum error"),
     ("not_loaded", "not loaded"),

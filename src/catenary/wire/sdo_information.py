@@ -1,7 +1,7 @@
-"""SDO information, ETG.1000.6 §5.6.3: what objects a device has.
+"""SDO information, ETG.1000.6 §5.6.3: the objects of a device.
 
-A reply may come in fragments. `SdoInformation` is one message; its data, joined over the fragments,
-is then decoded: `decode_object_list`, `decode_object_description`, `decode_entry_description`.
+A reply may consist of fragments. `SdoInformation` is one message. Join the data of the fragments,
+then decode it with `decode_object_list`, `decode_object_description` or `decode_entry_description`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _ENTRY = struct.Struct("<HBBHHH")
 
 
 class Opcode(IntEnum):
-    """What a message of SDO information is."""
+    """Kind of an SDO information message."""
 
     LIST_REQUEST = 1
     LIST_RESPONSE = 2
@@ -32,9 +32,9 @@ class Opcode(IntEnum):
 
 
 class ListType(IntEnum):
-    """Which objects are asked for."""
+    """Kind of the requested object list."""
 
-    LENGTHS = 0  # how many of each kind
+    LENGTHS = 0  # number of objects of each kind
     ALL = 1
     RXPDO_MAPPABLE = 2
     TXPDO_MAPPABLE = 3
@@ -54,7 +54,7 @@ class ObjectCode(IntEnum):
 
 
 class ValueInfo(IntFlag):
-    """What else an entry description shall hold."""
+    """Optional fields of an entry description."""
 
     NONE = 0
     ACCESS_RIGHTS = 0x01
@@ -83,7 +83,7 @@ class Access(IntFlag):
 
 @dataclass(frozen=True, slots=True)
 class SdoInformation:
-    """One message, perhaps a fragment of a reply. Bit 7 of the opcode: more fragments follow."""
+    """One message, or a fragment of a reply. `incomplete` (bit 7 of the opcode): more follow."""
 
     opcode: Opcode
     data: bytes
@@ -91,7 +91,7 @@ class SdoInformation:
     incomplete: bool = False
 
     def encode(self) -> bytes:
-        """Its bytes. ValueError if a field does not fit."""
+        """Return the encoded bytes. Raises ValueError if a field does not fit."""
         opcode = self.opcode | (_INCOMPLETE if self.incomplete else 0)
         try:
             return _HEADER.pack(_SERVICE << 12, opcode, 0, self.fragments_left) + self.data
@@ -100,7 +100,7 @@ class SdoInformation:
 
 
 def decode_sdo_information(data: bytes) -> SdoInformation:
-    """The message in a mailbox's data, CoE header included."""
+    """Return the message in the data of a mailbox message, CoE header included."""
     if len(data) < _HEADER.size:
         raise DecodeError(f"SDO information: needs {_HEADER.size} bytes, received {len(data)}")
     header, opcode, _, fragments_left = _HEADER.unpack_from(data)
@@ -115,29 +115,35 @@ def decode_sdo_information(data: bytes) -> SdoInformation:
 
 
 def list_request(kind: ListType) -> SdoInformation:
-    """Asks for the indices of the objects of a kind."""
+    """Return the request for the indices of all objects of a kind."""
     return SdoInformation(Opcode.LIST_REQUEST, struct.pack("<H", kind))
 
 
 def object_request(index: int) -> SdoInformation:
-    """Asks what an object is."""
+    """Return the request for the description of an object."""
     return SdoInformation(Opcode.OBJECT_REQUEST, struct.pack("<H", index))
 
 
 def entry_request(index: int, subindex: int, info: ValueInfo = ValueInfo.NONE) -> SdoInformation:
-    """Asks what an entry is."""
+    """Return the request for the description of an entry.
+
+    Args:
+        index: Index of the object.
+        subindex: Subindex of the entry.
+        info: Optional fields that the description shall contain.
+    """
     return SdoInformation(Opcode.ENTRY_REQUEST, struct.pack("<HBB", index, subindex, info))
 
 
 @dataclass(frozen=True, slots=True)
 class ObjectList:
-    """The objects of a kind. For LENGTHS: how many of each other kind."""
+    """The objects of a kind. For LENGTHS: the number of objects of each other kind."""
 
     kind: ListType
     indices: tuple[int, ...]
 
     def encode(self) -> bytes:
-        """Its bytes. ValueError if an index does not fit."""
+        """Return the encoded bytes. Raises ValueError if an index does not fit."""
         try:
             return struct.pack(f"<{1 + len(self.indices)}H", self.kind, *self.indices)
         except struct.error as error:
@@ -145,10 +151,10 @@ class ObjectList:
 
 
 def decode_object_list(data: bytes) -> ObjectList:
-    """The list in the joined data of LIST_RESPONSEs."""
+    """Return the list in the joined data of all LIST_RESPONSE fragments."""
     if len(data) < 2:
         raise DecodeError(f"object list: {len(data)} bytes, needs at least 2")
-    # The rest of a list that was cut short may be half an index.
+    # A truncated list may end with half an index.
     kind, *indices = struct.unpack_from(f"<{len(data) // 2}H", data)
     try:
         return ObjectList(ListType(kind), tuple(indices))
@@ -163,11 +169,11 @@ class ObjectDescription:
     index: int
     data_type: int
     maximum_subindex: int
-    object_code: int  # an ObjectCode, or what the device says
+    object_code: int  # an ObjectCode, or another number from the device
     name: str = ""
 
     def encode(self) -> bytes:
-        """Its bytes. ValueError if a field does not fit."""
+        """Return the encoded bytes. Raises ValueError if a field does not fit."""
         try:
             head = _OBJECT.pack(self.index, self.data_type, self.maximum_subindex, self.object_code)
             return head + self.name.encode("latin-1")
@@ -176,7 +182,7 @@ class ObjectDescription:
 
 
 def decode_object_description(data: bytes) -> ObjectDescription:
-    """The description in the data of an OBJECT_RESPONSE."""
+    """Return the description in the data of an OBJECT_RESPONSE."""
     if len(data) < _OBJECT.size:
         raise DecodeError(f"object description: needs {_OBJECT.size} bytes, received {len(data)}")
     name = bytes(data[_OBJECT.size :]).decode("latin-1")
@@ -186,7 +192,7 @@ def decode_object_description(data: bytes) -> ObjectDescription:
 
 @dataclass(frozen=True, slots=True)
 class EntryDescription:
-    """An entry of an object. `rest`: what was asked for with `info`, then the name."""
+    """An entry of an object. `rest` contains the fields selected by `info`, then the name."""
 
     index: int
     subindex: int
@@ -197,7 +203,7 @@ class EntryDescription:
     rest: bytes = b""
 
     def encode(self) -> bytes:
-        """Its bytes. ValueError if a field does not fit."""
+        """Return the encoded bytes. Raises ValueError if a field does not fit."""
         try:
             head = _ENTRY.pack(
                 *(self.index, self.subindex, self.info),
@@ -209,7 +215,7 @@ class EntryDescription:
 
     @property
     def name(self) -> str:
-        """Its name: what is left of `rest` behind the values asked for."""
+        """Name of the entry: the part of `rest` after the fields selected by `info`."""
         size = (self.bit_length + 7) // 8
         values = (ValueInfo.DEFAULT, ValueInfo.MINIMUM, ValueInfo.MAXIMUM)
         skipped = (4 if self.info & ValueInfo.UNIT else 0) + size * sum(
@@ -219,7 +225,7 @@ class EntryDescription:
 
 
 def decode_entry_description(data: bytes) -> EntryDescription:
-    """The description in the data of an ENTRY_RESPONSE."""
+    """Return the description in the data of an ENTRY_RESPONSE."""
     if len(data) < _ENTRY.size:
         raise DecodeError(f"entry description: needs {_ENTRY.size} bytes, received {len(data)}")
     index, subindex, info, data_type, bit_length, access = _ENTRY.unpack_from(data)
@@ -230,9 +236,9 @@ def decode_entry_description(data: bytes) -> EntryDescription:
 
 
 def decode_error(data: bytes) -> int | None:
-    """Return the abort code in the data of an ERROR, None if it is not complete.
+    """Return the abort code in the data of an ERROR; None if it is incomplete.
 
-    KickCAT (CoE/mailbox/response.cc, SDOInformationMessage::abort) appends the code and does not
-    count it, so that the message ends before it.
+    KickCAT (CoE/mailbox/response.cc, SDOInformationMessage::abort) appends the code, but does not
+    count it in the length. The message then ends before the code.
     """
     return int.from_bytes(data[:4], "little") if len(data) >= 4 else None

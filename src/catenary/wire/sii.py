@@ -1,8 +1,8 @@
 """SII, the EEPROM of a SubDevice, ETG.1000.6 §5.4 and ETG.2010: header and categories.
 
-`decode_sii` gives the whole image as a frozen value that encodes back byte for byte. Reading word
-by word from a device, `decode_header` and `decode_category_header` tell how far to go. What the
-categories hold is in sii_categories.py.
+`decode_sii` returns the whole image as a frozen value that encodes to the same bytes. To read a
+device word by word, use `decode_header` and `decode_category_header`: they give the remaining
+length. The contents of the categories are in sii_categories.py.
 """
 
 from __future__ import annotations
@@ -30,14 +30,12 @@ T = TypeVar("T")
 
 HEADER_SIZE = 128
 CATEGORY_HEADER_SIZE = 4
-MAXIMUM_SIZE = (
-    0x20000  # 64 k words: all that the header's size field can say, and more than is sold
-)
+MAXIMUM_SIZE = 0x20000  # 64 k words: limit of the size field, larger than any EEPROM on sale
 MAXIMUM_CATEGORIES = 512
 END_OF_CATEGORIES = 0xFFFF
 
 # Addresses in words, for single reads and writes
-CONFIGURATION_WORDS = 0x0008  # what a controller loads at power-up; the last is the checksum
+CONFIGURATION_WORDS = 0x0008  # loaded by the controller at power-up; the last word is the checksum
 STATION_ALIAS_WORD = 0x0004
 CHECKSUM_WORD = 0x0007
 IDENTITY_WORD = 0x0008
@@ -52,7 +50,7 @@ CHECKSUM_DISABLED = 0x88A4  # controllers accept it in place of a checksum, for 
 
 
 class CategoryType(IntEnum):
-    """The kinds of categories that have a meaning for a MainDevice."""
+    """Types of categories that a MainDevice uses."""
 
     NOP = 0
     STRINGS = 10
@@ -68,7 +66,7 @@ class CategoryType(IntEnum):
 
 
 class MailboxProtocol(IntFlag):
-    """The protocols a device speaks (word 0x001C)."""
+    """Mailbox protocols that a device supports (word 0x001C)."""
 
     AOE = 0x0001
     EOE = 0x0002
@@ -80,7 +78,7 @@ class MailboxProtocol(IntFlag):
 
 @dataclass(frozen=True, slots=True)
 class MailboxArea:
-    """Where one direction of a mailbox lies. Size 0: there is none."""
+    """Memory area of one direction of a mailbox. A size of 0 means no mailbox."""
 
     offset: int = 0
     size: int = 0
@@ -114,7 +112,7 @@ class Header:
     reserved: bytes = bytes(78)  # words 0x05-0x06, 0x10-0x13, 0x1D-0x3D, verbatim
 
     def encode(self) -> bytes:
-        """Its 128 bytes. ValueError if a field does not fit."""
+        """Return the 128 encoded bytes. Raises ValueError if a field does not fit."""
         areas = (
             *(self.bootstrap_receive, self.bootstrap_send),
             *(self.standard_receive, self.standard_send),
@@ -137,8 +135,12 @@ class Header:
 
 
 def decode_header(data: bytes) -> Header:
-    """The header in the first 128 bytes. DecodeError also where the checksum is wrong: then the
-    controller has not loaded its configuration either."""
+    """Return the header in the first 128 bytes.
+
+    Raises:
+        DecodeError: The data is too short, or the checksum is wrong. With a wrong checksum, the
+            controller does not load its configuration either.
+    """
     if len(data) < HEADER_SIZE:
         raise DecodeError(f"SII: {len(data)} bytes, the header needs {HEADER_SIZE}")
     (pdi_control, pdi_configuration, pulse_length, pdi_configuration_2, alias, *rest) = (
@@ -166,12 +168,12 @@ def _verify(checksum: int, expected: int) -> None:
     if checksum & 0xFF != expected and checksum != CHECKSUM_DISABLED:
         raise DecodeError(
             f"SII: checksum 0x{checksum:04X}, expected 0x{expected:04X}",
-            hint="the EEPROM is empty or was written in part: write the vendor's image again",
+            hint="the EEPROM is empty or only partly written: write the vendor's image again",
         )
 
 
 def checksum_of(data: bytes) -> int:
-    """CRC-8 of the first 14 bytes: polynomial x^8 + x^2 + x + 1, start value 0xFF."""
+    """Return the CRC-8 of the first 14 bytes: polynomial x^8 + x^2 + x + 1, start value 0xFF."""
     crc = 0xFF
     for byte in data[:_CHECKSUM_SIZE]:
         crc ^= byte
@@ -182,15 +184,17 @@ def checksum_of(data: bytes) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Category:
-    """One category, as bytes. Bit 15 of the type: the vendor's own."""
+    """One category as bytes. Bit 15 of the type marks vendor-specific categories."""
 
     type: int
     data: bytes
 
     def encode(self) -> bytes:
-        """Its bytes with header. ValueError if it does not fit or has an odd length."""
+        """Return its bytes with header. Raises ValueError if the length is odd or too large."""
         if len(self.data) % 2:
-            raise ValueError(f"SII category {self.type}: {len(self.data)} bytes are no whole words")
+            raise ValueError(
+                f"SII category {self.type}: length must be even, got {len(self.data)} bytes"
+            )
         try:
             return _CATEGORY.pack(self.type, len(self.data) // 2) + self.data
         except struct.error as error:
@@ -198,83 +202,91 @@ class Category:
 
 
 def decode_category_header(data: bytes) -> tuple[int, int]:
-    """Type and length in bytes of the category that begins here. The end mark has no length."""
+    """Return type and length [bytes] of the category that begins here.
+
+    The length of the end mark is 0.
+    """
     if data[:2] == b"\xff\xff":
         return END_OF_CATEGORIES, 0
     if len(data) < CATEGORY_HEADER_SIZE:
-        raise DecodeError(f"SII: a category's header needs 4 bytes, {len(data)} left")
+        raise DecodeError(f"SII: a category header needs 4 bytes, {len(data)} left")
     kind, words = _CATEGORY.unpack_from(data)
     return kind, 2 * words
 
 
 @dataclass(frozen=True, slots=True)
 class Sii:
-    """A whole image: header, categories as found, and decoded those that have a meaning."""
+    """A whole image: header and categories. The properties decode the known categories."""
 
     header: Header
     categories: tuple[Category, ...] = ()
     trailing: bytes = b"\xff\xff"  # from the end mark on, verbatim
 
     def encode(self, size: int | None = None) -> bytes:
-        """Its bytes, filled up with 0xFF to `size`. ValueError if it does not fit."""
+        """Return its bytes, padded with 0xFF to `size`. Raises ValueError if it does not fit."""
         body = b"".join(category.encode() for category in self.categories)
         image = self.header.encode() + body + self.trailing
         if size is not None and len(image) > size:
-            raise ValueError(f"SII: {len(image)} bytes, the EEPROM has {size}")
+            raise ValueError(f"SII: {len(image)} bytes exceed the EEPROM of {size} bytes")
         return image.ljust(size or 0, b"\xff")
 
     @property
     def strings(self) -> tuple[str, ...]:
-        """Texts, in order; others name them by number, from 1. See `string`."""
+        """Texts in order. Other categories refer to them by number, from 1; see `string`."""
         return self._join(CategoryType.STRINGS, decode_strings)
 
     def string(self, number: int) -> str:
-        """The text with a number; empty for 0 and for one that is not there."""
+        """Return the text with a number; empty for 0 and for a number that does not exist."""
         strings = self.strings
         return strings[number - 1] if 0 < number <= len(strings) else ""
 
     @property
     def general(self) -> General | None:
-        """Names, mailbox details, current."""
+        """General category: names, mailbox details, current; None if it is missing."""
         found = (each.data for each in self.categories if each.type == CategoryType.GENERAL)
         data = next(found, None)
         return None if data is None else decode_general(data)
 
     @property
     def fmmus(self) -> tuple[int, ...]:
-        """What each FMMU is meant for, a `FmmuUse` or a vendor's number."""
+        """Intended use of each FMMU, a `FmmuUse` or a vendor's number."""
         return self._join(CategoryType.FMMU, tuple)
 
     @property
     def sync_managers(self) -> tuple[SyncManagerEntry, ...]:
-        """The SyncManagers, by number."""
+        """SyncManagers, by number."""
         return self._join(CategoryType.SYNC_MANAGER, decode_sync_managers)
 
     @property
     def transmit_pdos(self) -> tuple[Pdo, ...]:
-        """What the device can send: inputs of the MainDevice."""
+        """PDOs that the device can send: inputs of the MainDevice."""
         return self._join(CategoryType.TXPDO, decode_pdos)
 
     @property
     def receive_pdos(self) -> tuple[Pdo, ...]:
-        """What the device can receive: outputs of the MainDevice."""
+        """PDOs that the device can receive: outputs of the MainDevice."""
         return self._join(CategoryType.RXPDO, decode_pdos)
 
     @property
     def clock_modes(self) -> tuple[ClockMode, ...]:
-        """Ways to use distributed clocks; the first is the default."""
+        """Modes of distributed clocks; the first is the default."""
         return self._join(CategoryType.DISTRIBUTED_CLOCKS, decode_clock_modes)
 
     def _join(self, kind: CategoryType, decode: Callable[[bytes], tuple[T, ...]]) -> tuple[T, ...]:
-        # Vendors split one category into several (pollen: a TXPDO category for each PDO).
+        # Some vendors split a category into several (pollen: one TXPDO category per PDO).
         return tuple(
             item for each in self.categories if each.type == kind for item in decode(each.data)
         )
 
 
 def decode_sii(image: bytes) -> Sii:
-    """The image of an EEPROM, or DecodeError with the reason. Every category with a meaning is
-    decoded once here, so that the properties of the result do not raise."""
+    """Return the decoded image of an EEPROM.
+
+    All known categories are decoded once here, so that the properties of the result do not raise.
+
+    Raises:
+        DecodeError: The image is invalid.
+    """
     if len(image) > MAXIMUM_SIZE:
         raise DecodeError(f"SII: {len(image)} bytes, at most {MAXIMUM_SIZE}")
     header = decode_header(image)
@@ -296,7 +308,7 @@ def _split(image: bytes) -> tuple[tuple[Category, ...], int]:
         if start + size > len(image):
             left = len(image) - start
             raise DecodeError(
-                f"SII: category {kind} at byte {offset} says {size} bytes, {left} left"
+                f"SII: category {kind} at byte {offset} specifies {size} bytes, {left} left"
             )
         found.append(Category(kind, bytes(image[start : start + size])))
         if len(found) > MAXIMUM_CATEGORIES:

@@ -1,8 +1,8 @@
-"""What the categories of the SII hold, ETG.1000.6 §5.4 tables 18 to 27 and ETG.2010.
+"""Contents of the SII categories, ETG.1000.6 §5.4 tables 18 to 27 and ETG.2010.
 
-Each has `encode_...` and `decode_...`. Categories are filled up to whole words; the number of a
-string counts from 1, 0 means none. What is left at a category's end and shorter than one of its
-records is filling.
+Each category has `encode_...` and `decode_...`. Categories are padded to whole words. String
+numbers count from 1; 0 means no string. Bytes at the end of a category that are shorter than one
+record are padding.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _CLOCK_MODE = struct.Struct("<IiihHhBB4s")
 
 
 class CoeDetails(IntFlag):
-    """What CoE of the device can, general category byte 5."""
+    """CoE capabilities of the device, general category byte 5."""
 
     SDO = 0x01
     SDO_INFORMATION = 0x02
@@ -34,7 +34,7 @@ class CoeDetails(IntFlag):
 
 
 class FmmuUse(IntEnum):
-    """What an FMMU is meant for."""
+    """Intended use of an FMMU."""
 
     UNUSED = 0
     OUTPUTS = 1
@@ -44,7 +44,7 @@ class FmmuUse(IntEnum):
 
 
 class SyncManagerUse(IntEnum):
-    """What a SyncManager is meant for."""
+    """Intended use of a SyncManager."""
 
     UNUSED = 0
     MAILBOX_OUT = 1
@@ -66,14 +66,14 @@ class GeneralFlags(IntFlag):
     """The flags of the general category, byte 0x0B."""
 
     SAFE_OP = 0x01
-    NO_LRW = 0x02  # one datagram that reads and writes is not for this device
+    NO_LRW = 0x02  # the device does not support LRW
     MAILBOX_DATA_LINK_LAYER = 0x04
     IDENTIFICATION_BY_AL_STATUS = 0x08
     IDENTIFICATION_BY_MEMORY = 0x10  # at General.identification_address
 
 
 class PdoFlags(IntFlag):
-    """The flags of a PDO; the last four are reserved, but named in ETG.2010."""
+    """The flags of a PDO. The last four are reserved; ETG.2010 names them."""
 
     MANDATORY = 0x0001
     DEFAULT = 0x0002
@@ -111,12 +111,12 @@ class General:
     sysman_class: int = 0
     flags: int = 0
     current_ma: int = 0  # drawn from the E-bus; negative: fed into it [mA]
-    physical_ports: int = 0  # four bits a port: 1 MII, 3 E-bus
-    identification_address: int = 0  # where the device shows its identification
+    physical_ports: int = 0  # four bits per port: 1 MII, 3 E-bus
+    identification_address: int = 0  # address of the device identification
     reserved: bytes = bytes(15)  # bytes 4, 14, 15 and the last 12, verbatim
 
     def encode(self) -> bytes:
-        """Its 32 bytes. ValueError if a field does not fit."""
+        """Return the 32 encoded bytes. Raises ValueError if a field does not fit."""
         reserved = self.reserved
         try:
             return _GENERAL.pack(
@@ -130,7 +130,7 @@ class General:
 
 
 def decode_general(data: bytes) -> General:
-    """The general category. A shorter one, of an early edition, is filled up with zeros."""
+    """Return the general category. A short one of an early edition is padded with zeros."""
     if len(data) < 16:
         raise DecodeError(f"SII general category: needs at least 16 bytes, received {len(data)}")
     fields = _GENERAL.unpack(data[: _GENERAL.size].ljust(_GENERAL.size, b"\x00"))
@@ -143,7 +143,12 @@ def decode_general(data: bytes) -> General:
 
 
 def encode_strings(strings: Sequence[str]) -> bytes:
-    """The strings category. ValueError for more than 255 strings or a string of more than 255."""
+    """Return the strings category.
+
+    Raises:
+        ValueError: More than 255 strings, a string of more than 255 characters, or a character
+            outside Latin-1.
+    """
     if len(strings) > 255:
         raise ValueError(f"SII strings: {len(strings)}, at most 255")
     parts = [bytes((len(strings),))]
@@ -157,7 +162,7 @@ def encode_strings(strings: Sequence[str]) -> bytes:
 
 
 def decode_strings(data: bytes) -> tuple[str, ...]:
-    """The texts of the strings category; characters beyond ASCII are read as Latin-1."""
+    """Return the texts of the strings category, decoded as Latin-1."""
     strings: list[str] = []
     offset = 1
     for _ in range(data[0] if data else 0):
@@ -173,24 +178,24 @@ def decode_strings(data: bytes) -> tuple[str, ...]:
 
 
 def encode_fmmus(uses: Sequence[int]) -> bytes:
-    """The FMMU category."""
+    """Return the FMMU category."""
     data = bytes(uses)
     return data + (b"\xff" if len(data) % 2 else b"")
 
 
 @dataclass(frozen=True, slots=True)
 class SyncManagerEntry:
-    """How a SyncManager is to be set: see sync_manager.Control for the control byte."""
+    """Settings of a SyncManager; see sync_manager.Control for the control byte."""
 
     address: int
     length: int
     control: int
     status: int = 0
     enable: SyncManagerEnable = SyncManagerEnable.ENABLED
-    use: int = SyncManagerUse.UNUSED  # a SyncManagerUse, or what the device says
+    use: int = SyncManagerUse.UNUSED  # a SyncManagerUse, or another number from the device
 
     def encode(self) -> bytes:
-        """Its 8 bytes. ValueError if a field does not fit."""
+        """Return the 8 encoded bytes. Raises ValueError if a field does not fit."""
         try:
             return _SYNC_MANAGER.pack(
                 *(self.address, self.length, self.control, self.status, self.enable, self.use)
@@ -200,12 +205,12 @@ class SyncManagerEntry:
 
 
 def encode_sync_managers(entries: Sequence[SyncManagerEntry]) -> bytes:
-    """The SyncManager category."""
+    """Return the SyncManager category."""
     return b"".join(entry.encode() for entry in entries)
 
 
 def decode_sync_managers(data: bytes) -> tuple[SyncManagerEntry, ...]:
-    """The SyncManager category."""
+    """Return the entries of the SyncManager category."""
     return tuple(
         SyncManagerEntry(address, length, control, status, SyncManagerEnable(enable), use)
         for address, length, control, status, enable, use in _records(_SYNC_MANAGER, data)
@@ -214,7 +219,7 @@ def decode_sync_managers(data: bytes) -> tuple[SyncManagerEntry, ...]:
 
 @dataclass(frozen=True, slots=True)
 class PdoEntry:
-    """One object in a PDO. Index 0: a gap."""
+    """One object in a PDO. Index 0 marks a gap."""
 
     index: int
     subindex: int
@@ -224,7 +229,7 @@ class PdoEntry:
     flags: int = 0
 
     def encode(self) -> bytes:
-        """Its 8 bytes. ValueError if a field does not fit."""
+        """Return the 8 encoded bytes. Raises ValueError if a field does not fit."""
         try:
             return _PDO_ENTRY.pack(
                 *(self.index, self.subindex, self.name),
@@ -247,11 +252,11 @@ class Pdo:
 
     @property
     def bit_length(self) -> int:
-        """The sum over its entries."""
+        """Sum of the lengths of its entries."""
         return sum(entry.bit_length for entry in self.entries)
 
     def encode(self) -> bytes:
-        """Its bytes. ValueError if a field does not fit."""
+        """Return the encoded bytes. Raises ValueError if a field does not fit."""
         try:
             head = _PDO.pack(
                 *(self.index, len(self.entries), self.sync_manager),
@@ -263,12 +268,12 @@ class Pdo:
 
 
 def encode_pdos(pdos: Sequence[Pdo]) -> bytes:
-    """A TXPDO or RXPDO category."""
+    """Return a TXPDO or RXPDO category."""
     return b"".join(pdo.encode() for pdo in pdos)
 
 
 def decode_pdos(data: bytes) -> tuple[Pdo, ...]:
-    """The PDOs of a TXPDO or RXPDO category."""
+    """Return the PDOs of a TXPDO or RXPDO category."""
     pdos: list[Pdo] = []
     offset = 0
     while offset + _PDO.size <= len(data):
@@ -292,7 +297,7 @@ def decode_pdos(data: bytes) -> tuple[Pdo, ...]:
 
 @dataclass(frozen=True, slots=True)
 class ClockMode:
-    """One way to use distributed clocks (category 60). Cycle time 0: that of the loop."""
+    """One mode of distributed clocks (category 60). Cycle time 0: the period of the loop."""
 
     cycle_time_ns: int = 0
     shift_time_ns: int = 0
@@ -305,7 +310,7 @@ class ClockMode:
     reserved: bytes = bytes(4)
 
     def encode(self) -> bytes:
-        """Its 24 bytes. ValueError if a field does not fit."""
+        """Return the 24 encoded bytes. Raises ValueError if a field does not fit."""
         try:
             return _CLOCK_MODE.pack(
                 *(self.cycle_time_ns, self.shift_time_ns, self.shift_time_1_ns),
@@ -317,12 +322,12 @@ class ClockMode:
 
 
 def encode_clock_modes(modes: Sequence[ClockMode]) -> bytes:
-    """The distributed clocks category."""
+    """Return the distributed clocks category."""
     return b"".join(mode.encode() for mode in modes)
 
 
 def decode_clock_modes(data: bytes) -> tuple[ClockMode, ...]:
-    """The distributed clocks category."""
+    """Return the modes in the distributed clocks category."""
     return tuple(ClockMode(*fields) for fields in _records(_CLOCK_MODE, data))
 
 

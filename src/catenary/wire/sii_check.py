@@ -1,4 +1,4 @@
-"""Whether bytes may become the image of an EEPROM, ETG.2010: what a device would choke on."""
+"""Checks of an EEPROM image before it is written, ETG.2010."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ _END = b"\xff\xff"
 
 
 class Objection(NamedTuple):
-    """Why an image should not be written, and what to do about it."""
+    """A reason not to write an image, and a hint."""
 
     text: str
     hint: str
-    insist: bool = False  # somebody who knows better may write it all the same
+    insist: bool = False  # True: the user may override it
 
 
 def objections(image: bytes) -> tuple[Objection, ...]:
-    """What is wrong with an image by itself. None: it may be written."""
+    """Return the faults of an image; empty if it may be written."""
     if len(image) < HEADER_SIZE or len(image) > MAXIMUM_SIZE or len(image) % 2:
         return (_length(image),)
     found = [each for each in (_checksum(image), _size(image), _categories(image)) if each]
@@ -37,12 +37,12 @@ def objections(image: bytes) -> tuple[Objection, ...]:
 
 def _length(image: bytes) -> Objection:
     if len(image) % 2:
-        what = f"{len(image)} bytes are no whole words"
+        what = f"{len(image)} bytes: the length must be even"
     elif len(image) < HEADER_SIZE:
-        what = f"{len(image)} bytes are less than a header, which has {HEADER_SIZE}"
+        what = f"{len(image)} bytes: the header alone needs {HEADER_SIZE}"
     else:
-        what = f"{len(image)} bytes are more than any EEPROM has ({MAXIMUM_SIZE})"
-    return Objection(what, "an image is binary, not Intel hex and not ESI (XML): make one of those")
+        what = f"{len(image)} bytes: an EEPROM has at most {MAXIMUM_SIZE}"
+    return Objection(what, "the image must be binary: convert Intel hex or ESI (XML) first")
 
 
 def _checksum(image: bytes) -> Objection | None:
@@ -51,21 +51,21 @@ def _checksum(image: bytes) -> Objection | None:
     if checksum & 0xFF == right or checksum == CHECKSUM_DISABLED:
         return None
     return Objection(
-        f"the checksum in word 7 is 0x{checksum:04X}, the first seven words make 0x{right:04X}",
-        "the device would not load its configuration; after a change by hand put "
-        f"0x{right:02X} into byte 14",
+        f"the checksum in word 7 is 0x{checksum:04X}, the first seven words give 0x{right:04X}",
+        "the device would not load its configuration; if you edited the image, write "
+        f"0x{right:02X} to byte 14",
     )
 
 
 def _size(image: bytes) -> Objection | None:
-    said = (int.from_bytes(image[2 * _SIZE_WORD : 2 * _SIZE_WORD + 2], "little") + 1) * (
+    specified = (int.from_bytes(image[2 * _SIZE_WORD : 2 * _SIZE_WORD + 2], "little") + 1) * (
         BYTES_PER_KBIT
     )
-    if len(image) <= said:
+    if len(image) <= specified:
         return None
     return Objection(
-        f"the image has {len(image)} bytes, but says of itself that the EEPROM has {said}",
-        "word 0x3E holds the size of the EEPROM in kbit, less one",
+        f"the image has {len(image)} bytes, but its header specifies an EEPROM of {specified}",
+        "word 0x3E must contain the size of the EEPROM in kbit, minus one",
         insist=True,
     )
 
@@ -78,13 +78,13 @@ def _categories(image: bytes) -> Objection | None:
     except DecodeError as error:
         return Objection(
             error.message,
-            "the file is cut short or damaged; compare it with its maker's",
+            "the file is truncated or damaged; compare it with the vendor's file",
             insist=True,
         )
     if sii.trailing[:2] != _END:
         return Objection(
             "the categories have no end mark (0xFFFF)",
-            "append ff ff: without it a MainDevice reads on into what was there before",
+            "append ff ff: without it, a MainDevice also reads the old content after the image",
             insist=True,
         )
     return None

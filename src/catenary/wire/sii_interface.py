@@ -1,4 +1,4 @@
-"""Reading and writing the SII EEPROM, registers 0x0500 to 0x050F, ETG.1000.4 §6.4."""
+"""The interface to the SII EEPROM, registers 0x0500 to 0x050F, ETG.1000.4 §6.4."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from enum import IntEnum
 from catenary.errors import DecodeError
 
 CONFIGURATION_TO_PDI = 0x01  # of 0x0500: the device's processor owns the EEPROM
-CONFIGURATION_FORCE = 0x02  # of 0x0500: take it back whatever the processor does
+CONFIGURATION_FORCE = 0x02  # of 0x0500: take the EEPROM back even during an access of the PDI
 PDI_ACCESS_ACTIVE = 0x01  # of 0x0501
 
 
 class SiiCommand(IntEnum):
     """Bits 8 to 10 of control/status."""
 
-    IDLE = 0  # written: clears error bits
+    IDLE = 0  # a write clears the error bits
     READ = 1
     WRITE = 2
     RELOAD = 4
@@ -23,12 +23,12 @@ class SiiCommand(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class ControlStatus:
-    """SII control/status (0x0502). Everything but `write_enable` and `command` is read only."""
+    """SII control/status (0x0502). Only `write_enable` and `command` can be written."""
 
     command: SiiCommand = SiiCommand.IDLE
     write_enable: bool = False  # valid for the datagram that also writes the command
-    emulation: bool = False  # the device's processor plays the EEPROM
-    eight_bytes: bool = False  # a read gives 8 bytes, else 4
+    emulation: bool = False  # the device's processor emulates the EEPROM
+    eight_bytes: bool = False  # a read returns 8 bytes, else 4
     two_byte_address: bool = False  # EEPROMs above 16 kbit
     checksum_error: bool = False
     not_loaded: bool = False
@@ -38,17 +38,17 @@ class ControlStatus:
 
     @property
     def read_size(self) -> int:
-        """How many bytes one read command brings."""
+        """Number of bytes per read command."""
         return 8 if self.eight_bytes else 4
 
     @property
     def failed(self) -> bool:
-        """Whether the last command failed; writing IDLE clears it."""
+        """True if the last command failed; writing IDLE clears it."""
         return self.command_error or self.write_enable_error
 
     @property
     def word(self) -> int:
-        """The register's value."""
+        """Value of the register."""
         return (
             self.write_enable
             | self.emulation << 5
@@ -64,12 +64,12 @@ class ControlStatus:
 
     @classmethod
     def from_word(cls, word: int) -> ControlStatus:
-        """The reverse of `word`. DecodeError for a command that does not exist."""
+        """Return the decoded register. Raises DecodeError if the command is invalid."""
         try:
             command = SiiCommand(word >> 8 & 7)
         except ValueError:
             raise DecodeError(
-                f"SII control/status 0x{word:04X}: no command {word >> 8 & 7}"
+                f"SII control/status 0x{word:04X}: invalid command {word >> 8 & 7}"
             ) from None
         return cls(
             command,

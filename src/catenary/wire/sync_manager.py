@@ -14,21 +14,21 @@ _BLOCK = struct.Struct("<HHBBBB")
 
 
 class Buffering(IntEnum):
-    """How a SyncManager hands memory over."""
+    """Buffering mode of a SyncManager."""
 
-    THREE_BUFFERS = 0  # process data: the newest, never waiting
-    MAILBOX = 2  # one buffer: handshake, nothing is lost
+    THREE_BUFFERS = 0  # process data: always the newest, access without waiting
+    MAILBOX = 2  # one buffer with a handshake: no message is lost
 
 
 class Direction(IntEnum):
-    """Who writes, seen from the MainDevice."""
+    """Direction of transfer, seen from the MainDevice."""
 
     READ = 0  # the device writes, EtherCAT reads
     WRITE = 1
 
 
 class Status(IntFlag):
-    """The status byte (offset 5). Bits 4 and 5: the buffer written last, in three-buffer mode."""
+    """The status byte (offset 5). Bits 4 and 5: last written buffer in three-buffer mode."""
 
     INTERRUPT_WRITE = 0x01
     INTERRUPT_READ = 0x02
@@ -49,7 +49,7 @@ class Activation(IntFlag):
 
 
 class PdiControl(IntFlag):
-    """The PDI's byte (offset 7); the MainDevice only reads it."""
+    """The PDI control byte (offset 7); read-only for the MainDevice."""
 
     DEACTIVATED = 0x01
     REPEAT_ACKNOWLEDGE = 0x02
@@ -67,7 +67,7 @@ class Control:
 
     @property
     def byte(self) -> int:
-        """The register's value."""
+        """Value of the register."""
         return (
             self.buffering
             | self.direction << 2
@@ -78,7 +78,7 @@ class Control:
 
     @classmethod
     def from_byte(cls, byte: int) -> Control:
-        """The reverse of `byte`. DecodeError for a mode that does not exist. Bit 7 is ignored."""
+        """Return the decoded byte; bit 7 is ignored. Raises DecodeError if the mode is invalid."""
         try:
             buffering, direction = Buffering(byte & 0x03), Direction(byte >> 2 & 0x03)
         except ValueError as error:
@@ -99,7 +99,7 @@ _UNTOUCHED = PdiControl(0)
 
 @dataclass(frozen=True, slots=True)
 class SyncManager:
-    """One SyncManager: the memory it guards, and how."""
+    """One SyncManager: its memory area, mode and status."""
 
     address: int
     length: int
@@ -109,7 +109,7 @@ class SyncManager:
     pdi_control: PdiControl = _UNTOUCHED
 
     def encode(self) -> bytes:
-        """Its block. ValueError if a field does not fit."""
+        """Return the encoded block. Raises ValueError if a field does not fit."""
         try:
             return _BLOCK.pack(
                 *(self.address, self.length, self.control.byte),
@@ -120,7 +120,7 @@ class SyncManager:
 
 
 def decode_sync_manager(data: bytes) -> SyncManager:
-    """The SyncManager in a block of 8 bytes."""
+    """Return the SyncManager in a block of 8 bytes."""
     if len(data) != SIZE:
         raise DecodeError(f"SyncManager: needs {SIZE} bytes, received {len(data)}")
     address, length, control, status, activation, pdi_control = _BLOCK.unpack(data)

@@ -1,4 +1,4 @@
-"""A device's object dictionary, ETG.1000.6 §5.6.7, with the access rules of its entries."""
+"""Object dictionary of a device, ETG.1000.6 §5.6.7, with the access rules of its entries."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ WRONG_STATE = 0x08000022
 
 
 class Abort(Exception):
-    """An SDO abort the device answers with."""
+    """An SDO abort that the device answers with."""
 
     def __init__(self, code: int) -> None:
         super().__init__(f"SDO abort 0x{code:08X}")
@@ -52,7 +52,7 @@ class Abort(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One subindex. `read` gives its bytes, `write` takes them or raises Abort."""
+    """One subindex. `read` returns its bytes; `write` stores bytes or raises Abort."""
 
     name: str
     data_type: int
@@ -60,7 +60,7 @@ class Entry:
     access: int
     read: Callable[[], bytes]
     write: Callable[[bytes], None] | None = None
-    slot: int = -1  # where its value sits for process data, -1: nowhere
+    slot: int = -1  # slot of the process data, -1: none
 
 
 @dataclass(slots=True)
@@ -110,14 +110,14 @@ class Variable:
 
 
 def stored(name: str, data_type: int, value: bytes, *, variable_length: bool = False) -> Entry:
-    """An entry that keeps what is written into it."""
+    """Return an entry that stores the bytes written to it."""
     variable = Variable(value, variable_length=variable_length)
     access = READ_ANY | WRITE_ANY
     return Entry(name, data_type, 8 * len(value), access, variable.read, variable.write)
 
 
 class Dictionary:
-    """Owns a device's objects. `state` tells the AL state access rights depend on."""
+    """Owns the objects of a device. `state` returns the AL state for access checks."""
 
     def __init__(self, state: Callable[[], int]) -> None:
         self._state = state
@@ -133,7 +133,7 @@ class Dictionary:
     def add_record(
         self, index: int, name: str, entries: list[Entry], *, code: int = RECORD
     ) -> None:
-        """Entries from subindex 1 on; subindex 0 counts them."""
+        """Add entries from subindex 1 on; subindex 0 is their number."""
         counted = {0: number("Number of entries", UNSIGNED8, len(entries))}
         self.add(index, name, counted | dict(enumerate(entries, 1)), code=code)
 
@@ -164,7 +164,7 @@ class Dictionary:
         entry.write(data)
 
     def read_complete(self, index: int, first: int) -> bytes:
-        """All subindices from `first` (0 or 1) on; subindex 0 takes 16 bits."""
+        """Return all subindices from `first` (0 or 1) on; subindex 0 takes 16 bits."""
         if index not in self.objects:
             raise Abort(NO_OBJECT)
         entries = self.objects[index].entries
@@ -181,7 +181,7 @@ class Dictionary:
         return value.to_bytes((bit + 7) // 8, "little")
 
     def write_complete(self, index: int, first: int, data: bytes) -> None:
-        """Subindex 0 is cleared first and written last, as PDO objects need it."""
+        """Write all subindices. Clear subindex 0 first and set it last, as PDO objects require."""
         if index not in self.objects:
             raise Abort(NO_OBJECT)
         entries = self.objects[index].entries

@@ -1,6 +1,6 @@
 """PDO assignment (0x1C12, 0x1C13) and mapping (0x1600.., 0x1A00..), ETG.1000.6 §5.6.7.4.
 
-Both are written in PRE-OP only, with subindex 0 cleared first and set last; what results must fit.
+Both are writable in PRE-OP only: subindex 0 is cleared first and set last. The result must fit.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ LOCAL_CONTROL = 0x0800_0021
 
 
 class _Table:
-    """Owns the numbers of one assignment or mapping: a count and its places."""
+    """Owns the entries of one assignment or mapping: a count and the values."""
 
     def __init__(self, form: str, values: Sequence[int], places: int) -> None:
         self._form = form
@@ -65,7 +65,7 @@ class Placed:
 
 
 class PdoObjects:
-    """Owns which objects are in the process data of a device, and where."""
+    """Owns the selection and order of the objects in a device's process data."""
 
     def __init__(
         self,
@@ -184,7 +184,7 @@ class PdoObjects:
             raise Abort(MAPPING_TOO_LONG)
 
     def placed(self, assignment: int) -> list[Placed]:
-        """The objects of one direction in the order of the buffer, gaps left out."""
+        """Return the objects of one direction in the order of the buffer, without gaps."""
         placed: list[Placed] = []
         bit = 0
         for pdo in self._assigned[assignment].values:
@@ -195,7 +195,7 @@ class PdoObjects:
         return placed
 
     def size(self, assignment: int) -> int:
-        """Bytes of one direction's buffer."""
+        """Return the size of one direction's buffer [bytes]."""
         pdos = self._assigned[assignment].values
         bits = sum(value & 0xFF for pdo in pdos for value in self._mappings[pdo].values)
         return (bits + 7) // 8

@@ -1,5 +1,7 @@
-"""SDO services, the server's side: ETG.1000.6 §5.6.2 (upload and download, expedited, normal,
-segmented, complete access, abort). Written apart from `catenary.wire.coe`, the client's side.
+"""SDO services on the server side: ETG.1000.6 §5.6.2.
+
+Upload and download, expedited, normal, segmented, complete access, abort. Written independently of
+`catenary.wire.coe`, the client side.
 """
 
 from __future__ import annotations
@@ -31,7 +33,7 @@ DOWNLOAD_MAX = 1 << 20
 
 @dataclass(slots=True)
 class _Transfer:
-    """Owns a segmented transfer between its segments."""
+    """State of a segmented transfer between two segments."""
 
     index: int
     subindex: int
@@ -51,7 +53,7 @@ def _aborted(index: int, subindex: int, code: int) -> bytes:
 
 
 class SdoServer:
-    """Owns the one transfer a device has under way. `size`: of the mailbox without its header."""
+    """Owns the active transfer of a device. `size`: mailbox size without its header."""
 
     def __init__(
         self, dictionary: Dictionary, *, size: int, quirks: MailboxQuirks = NO_MAILBOX_QUIRKS
@@ -62,7 +64,7 @@ class SdoServer:
         self._transfer: _Transfer | None = None
 
     def serve(self, payload: bytes) -> Iterable[bytes]:
-        """The answers to one SDO request (its CoE header taken off)."""
+        """Return the answers to one SDO request, given without its CoE header."""
         command, index, subindex = struct.unpack_from("<BHB", payload.ljust(SDO_HEADER, b"\0"))
         kind = command >> 5
         if kind in (DOWNLOAD_SEGMENT, UPLOAD_SEGMENT) and self._transfer is not None:

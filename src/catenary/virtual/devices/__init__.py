@@ -1,4 +1,4 @@
-"""The kinds of virtual devices, one file each."""
+"""Kinds of virtual devices, one file each."""
 
 from catenary.virtual.devices.analog_inputs import AnalogInputs
 from catenary.virtual.devices.coupler import Coupler

@@ -1,4 +1,4 @@
-"""Analogue inputs with CoE: 0x60n0:11 the value, status bits before it, as such terminals have."""
+"""Analogue inputs with CoE: value in 0x60n0:11, status bits before it, as in real terminals."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from catenary.virtual.mapping_quirks import NO_MAPPING_QUIRKS, MappingQuirks
 from catenary.virtual.scheduler import Scheduler
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 
-SLOTS = 4  # of one channel: underrange, overrange, error, value
+SLOTS = 4  # per channel: underrange, overrange, error, value
 UNDERRANGE, OVERRANGE, ERROR, VALUE = range(SLOTS)
 FULL_SCALE = 0x7FFF
 CONVERSION_NS = 500_000
@@ -54,11 +54,30 @@ class AnalogInputs(AppliedDevice):
         mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS,
         sii_quirks: SiiQuirks = NO_SII_QUIRKS,
     ) -> None:
-        """`second_pdo` of each channel, 0x1A10 on. "compact": the value alone, not assigned, as in
-        Beckhoff's EL30xx. "twice": assigned as well, and the value has 8 bits there; the EL3632
-        maps 0x6000:02 twice with different sizes. `mapping_quirks`: quirks of its PDOs."""
+        """Initialise the terminal.
+
+        Args:
+            channels: Number of channels, 1 to 8.
+            name: Device name; empty: a default.
+            alias: Station alias.
+            serial: Serial number.
+            lrw: True if the device supports LRW.
+            mailbox_bytes: Size of each mailbox.
+            mailbox_delay: Time until a request is answered [s].
+            crystal: Frequency error of its clock.
+            clock_bits: Width of its clock.
+            second_pdo: Second PDO of each channel, from 0x1A10 on. "compact": the value alone, not
+                assigned, as in Beckhoff's EL30xx. "twice": assigned too, with a value of 8 bits;
+                the EL3632 maps 0x6000:02 twice with different sizes.
+            mapping_quirks: Quirks of its PDOs.
+            mailbox_quirks: Quirks of its mailbox.
+            sii_quirks: Quirks of its SII.
+
+        Raises:
+            ValueError: A value is out of range.
+        """
         if not 1 <= channels <= 8:
-            raise ValueError(f"analogue inputs have 1 to 8 channels, not {channels}")
+            raise ValueError(f"analogue inputs must have 1 to 8 channels, not {channels}")
         super().__init__(
             name=name or f"Catenary virtual {channels}-channel analogue input",
             alias=alias,
@@ -141,9 +160,17 @@ class AnalogInputs(AppliedDevice):
             )
 
     def apply_volts(self, channel: int, volts: float) -> None:
-        """What lies at the terminals of one channel [V], ±10 full scale."""
+        """Apply a voltage to the terminals of one channel.
+
+        Args:
+            channel: Channel from 0.
+            volts: Voltage [V]; full scale is ±10 V.
+
+        Raises:
+            IndexError: The channel does not exist.
+        """
         if not 0 <= channel < self.channels:
-            raise IndexError(f"no channel {channel}")
+            raise IndexError(f"no channel {channel}; use 0 to {self.channels - 1}")
         raw = round(volts / 10 * FULL_SCALE)
         clamped = max(-FULL_SCALE - 1, min(FULL_SCALE, raw))
         at = SLOTS * channel
@@ -157,5 +184,5 @@ class AnalogInputs(AppliedDevice):
         self.core.refresh_inputs(self.position)
 
     def volts(self, channel: int) -> float:
-        """What the terminal measures [V]."""
+        """Return the measured voltage [V]."""
         return self.core.slot(self.position, SLOTS * channel + VALUE) / FULL_SCALE * 10

@@ -1,6 +1,6 @@
-"""The microcontroller behind a controller: state machine, mailbox, CoE and process data together.
+"""The microcontroller of a device: state machine, mailbox, CoE and process data together.
 
-It runs in the segment's service, never in the path of a frame.
+It runs in the segment's service, not in the path of frames.
 """
 
 from __future__ import annotations
@@ -60,8 +60,8 @@ from catenary.virtual.state_machine import (
 )
 
 EMERGENCY = 1
-ENABLE_AND_MODE = 0x0F  # of a SyncManager's control: direction and mode
-WATCHDOG_TRIGGER = 0x40  # likewise
+ENABLE_AND_MODE = 0x0F  # mask of a SyncManager's control byte: direction and mode
+WATCHDOG_TRIGGER = 0x40  # bit of the same byte
 WATCHDOG_DIVIDER, WATCHDOG_TIME = 0x0400, 0x0420  # registers
 RAM_START, RAM_END = 0x1000, 0x3000
 BLOB_BYTES = 2048  # an object larger than any usual mailbox
@@ -72,7 +72,10 @@ def mailbox_of(size: int, coe_details: int = 0x2F) -> MailboxDefault:
 
 
 def process_data_areas(mailbox_size: int) -> tuple[int, int, int]:
-    """(start of SM2, start of SM3, most bytes of each): three buffers each share what is left."""
+    """Return the start of SM2, the start of SM3 and the maximum size of each [bytes].
+
+    Each of them takes three buffers; the two share the RAM after the mailboxes.
+    """
     outputs = RAM_START + (2 * mailbox_size + 0xFF & ~0xFF)
     room = (RAM_END - outputs) // 6 & ~0x7F
     return outputs, outputs + 3 * room, room
@@ -99,7 +102,7 @@ def sync_managers_of(
 
 
 class Application:
-    """Owns the microcontroller's side of one device."""
+    """Owns the microcontroller side of one device."""
 
     def __init__(
         self,
@@ -113,13 +116,13 @@ class Application:
     ) -> None:
         box = description.mailbox
         if box is None:
-            raise ValueError("an application needs a mailbox")
+            raise ValueError("an application needs a mailbox, but the description has none")
         self._core = core
         self._buffers = Buffers(core)
         self._position = position
         self._box = box
-        self.synchronisation: Synchronisation | None = None  # a device that can keep time by SYNC0
-        self.checks_watchdog = False  # refuses SAFE-OP with 0x001F (ServoQuirks)
+        self.synchronisation: Synchronisation | None = None  # only for devices that support SYNC0
+        self.checks_watchdog = False  # True: refuse SAFE-OP with 0x001F (ServoQuirks)
         self.states = StateMachine(self, scheduler, description.identification)
         self.dictionary = Dictionary(lambda: self.states.state)
         self._add_communication_objects(description, quirks.text_prefix)
@@ -197,7 +200,12 @@ class Application:
             self.states.fail(SAFE_OP, code)
 
     def send_emergency(self, code: int, data: bytes = b"") -> None:
-        """An emergency message, ETG.1000.6 §5.6.4; code 0: the error is gone."""
+        """Send an emergency message, ETG.1000.6 §5.6.4.
+
+        Args:
+            code: Error code; 0: error reset.
+            data: Up to 5 manufacturer-specific bytes.
+        """
         if self.states.state == INIT:
             return
         register = 1 if code else 0
@@ -212,7 +220,7 @@ class Application:
             return self._information.serve(payload[2:])
         return []
 
-    # -- what the mailbox needs ----------------------------------------------------------------
+    # -- for the mailbox -----------------------------------------------------------------------
 
     def fetch_request(self) -> bytes | None:
         return self._buffers.read(self._position, 0)
@@ -226,7 +234,7 @@ class Application:
     def acknowledge_repeat(self) -> None:
         self._buffers.acknowledge_repeat(self._position, 1)
 
-    # -- what the state machine needs ----------------------------------------------------------
+    # -- for the state machine -----------------------------------------------------------------
 
     def fetch_al_control(self) -> int:
         return self._core.fetch_al_control(self._position)
@@ -250,9 +258,9 @@ class Application:
         return 0
 
     def _watchdog_is_consistent(self) -> bool:
-        """Return True if the trigger bit of SyncManager 2 is set exactly if the watchdog is on.
+        """Return True if the trigger bit of SyncManager 2 is set if and only if the watchdog is on.
 
-        The rule of Beckhoff's slave stack code, ecatslv.c, StartInputHandler.
+        This is the rule of Beckhoff's slave stack code, ecatslv.c, StartInputHandler.
         """
         [divider] = struct.unpack("<H", self._core.peek(self._position, WATCHDOG_DIVIDER, 2))
         [time] = struct.unpack("<H", self._core.peek(self._position, WATCHDOG_TIME, 2))
@@ -321,7 +329,15 @@ class Application:
             self._core.map_process_data(self._position, n == 2, n if entries else -1, entries)
 
     def slot_entry(self, name: str, data_type: int, bits: int, slot: int, access: int) -> Entry:
-        """A dictionary entry whose value is the model's own."""
+        """Return a dictionary entry with a slot of the model as its value.
+
+        Args:
+            name: Name of the entry.
+            data_type: CANopen data type.
+            bits: Size of the value.
+            slot: Number of the slot.
+            access: Access flags.
+        """
         signed, size = data_type in SIGNED, (bits + 7) // 8
 
         def read() -> bytes:

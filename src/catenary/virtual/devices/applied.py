@@ -1,4 +1,4 @@
-"""A device with a microcontroller: what servos and analogue terminals have in common."""
+"""Common base of devices with a microcontroller: servos and analogue terminals."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from catenary.virtual.sii_quirks import SiiQuirks
 
 
 class AppliedDevice(Device):
-    """Owns a device that has an application with mailbox and objects."""
+    """Owns a device with an application: mailbox and object dictionary."""
 
     def __init__(
         self,
@@ -37,9 +37,9 @@ class AppliedDevice(Device):
             sii_quirks=sii_quirks,
         )
         if not 32 <= mailbox_bytes <= 1024 or mailbox_bytes % 2:
-            raise ValueError(f"a mailbox has 32 to 1024 bytes, an even number, not {mailbox_bytes}")
+            raise ValueError(f"mailbox_bytes must be even and 32 to 1024, not {mailbox_bytes}")
         if not 0 <= mailbox_delay <= 10:
-            raise ValueError(f"a mailbox answers after 0 to 10 s, not {mailbox_delay}")
+            raise ValueError(f"mailbox_delay must be 0 to 10 s, not {mailbox_delay}")
         self.mailbox_bytes = mailbox_bytes
         self.mailbox_quirks = mailbox_quirks
         self._mailbox_delay_ns = round(mailbox_delay * 1e9)
@@ -48,7 +48,7 @@ class AppliedDevice(Device):
     @property
     def application(self) -> Application:
         if self._application is None:
-            raise ValueError(f"{self.name} stands in no segment yet: Segment([...]) places it")
+            raise ValueError(f"{self.name} is not in a segment yet: add it with Segment([...])")
         return self._application
 
     def started(self, scheduler: Scheduler) -> None:
@@ -63,15 +63,20 @@ class AppliedDevice(Device):
         self.add_objects(self._application)
 
     def add_objects(self, application: Application) -> None:
-        """The objects of the profile."""
+        """Add the objects of the device profile."""
         raise NotImplementedError
 
     def handle(self, events: int) -> None:
         self.application.handle(events)
 
     def refuse_state(self, state: int, code: int | None, times: int | None = None) -> None:
-        """The next requests of `state`, `times` of them or all, end in an error with `code`;
-        None: no longer."""
+        """Refuse requests of a state.
+
+        Args:
+            state: AL state number.
+            code: AL status code of the refusal; None: accept the state again.
+            times: Number of requests to refuse; None: all.
+        """
         refused = self.application.states.refused
         if code is None:
             refused.pop(state, None)
@@ -79,7 +84,12 @@ class AppliedDevice(Device):
             refused[state] = code, times
 
     def delay_state(self, state: int, seconds: float | None) -> None:
-        """How long `state` takes [s]; None: it is never reached."""
+        """Set the duration of a state transition.
+
+        Args:
+            state: AL state number.
+            seconds: Time until the state is reached [s]; None: never.
+        """
         delay = None if seconds is None else round(seconds * 1e9)
         self.application.states.delays[state] = delay
 
@@ -89,11 +99,11 @@ class AppliedDevice(Device):
 
     @mailbox_silent.setter
     def mailbox_silent(self, silent: bool) -> None:
-        """Requests are taken no longer: SM0 stays full, SM1 empty."""
+        """Stop or resume the mailbox; while it is stopped, SM0 stays full and SM1 stays empty."""
         self.application.mailbox.silence(silent)
 
     def delay_mailbox(self, seconds: float) -> None:
-        """Answers take that much longer from now on [s]; negative: less, but no less than 0."""
+        """Change the answer time of the mailbox by `seconds` [s]; the result is at least 0."""
         self.application.mailbox.delay(round(seconds * 1e9))
 
     def send_emergency(self, code: int, data: bytes = b"") -> None:

@@ -1,7 +1,7 @@
-"""A device on the segment: its description, its place, and the switches tests turn.
+"""A device on the segment: its description, its position, and its switches for tests.
 
-Devices whose AL status merely follows AL control (couplers, simple terminals) need nothing more;
-those with a microcontroller add an `Application`.
+This class suffices for devices whose AL status follows AL control (couplers, simple terminals).
+Devices with a microcontroller add an `Application`.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from catenary.virtual.sii_image import make_sii_image
 from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 
 INIT, PRE_OP, SAFE_OP, OP = 1, 2, 4, 8
-RESET_DELAY_NS, RESET_NS = 100_000, 20_000_000  # the EEPROM is loaded again
+RESET_DELAY_NS, RESET_NS = 100_000, 20_000_000  # the EEPROM is reloaded
 AL_STATUS, RX_ERRORS, LOST_LINKS, ALIAS = 0x0130, 0x0300, 0x0310, 0x0012
 
 
 class Device:
-    """Owns one virtual device; its place in the segment is given when the segment is made."""
+    """Owns one virtual device. The segment assigns its position."""
 
     kind: ClassVar[str]
     ports: tuple[int, ...] = (0, 1)
@@ -39,9 +39,9 @@ class Device:
         sii_quirks: SiiQuirks = NO_SII_QUIRKS,
     ) -> None:
         if not 0 <= alias <= 0xFFFF:
-            raise ValueError(f"alias {alias} is no 16-bit number")
+            raise ValueError(f"alias must be 0 to 65535, not {alias}")
         if clock_bits not in (32, 64):
-            raise ValueError(f"a clock has 32 or 64 bits, not {clock_bits}")
+            raise ValueError(f"clock_bits must be 32 or 64, not {clock_bits}")
         self.name = name
         self.alias = alias
         self.serial = serial
@@ -58,24 +58,33 @@ class Device:
         raise NotImplementedError
 
     def sii_image(self) -> bytes:
-        """Return the content of its EEPROM."""
+        """Return the content of the EEPROM."""
         return make_sii_image(self.whole_description(), self.sii_quirks)
 
     def whole_description(self) -> Description:
-        """Return the description with what the SII adds to it: a revision of its own."""
+        """Return the description with the SII variant, which changes the revision."""
         variant = "" if self.sii_quirks == NO_SII_QUIRKS else repr(self.sii_quirks)
         return replace(self.description(), sii_variant=variant)
 
     @property
     def core(self) -> Core:
         if self._core is None:
-            raise ValueError(f"{self.name} stands in no segment yet: Segment([...]) places it")
+            raise ValueError(f"{self.name} is not in a segment yet: add it with Segment([...])")
         return self._core
 
     def attach(self, core: Core, position: int, agenda: Agenda) -> None:
-        """Puts it into its place and switches it on."""
+        """Add the device to a segment and switch it on.
+
+        Args:
+            core: The compiled segment.
+            position: Position in the segment.
+            agenda: Delayed actions of the segment.
+
+        Raises:
+            ValueError: The device is already in a segment.
+        """
         if self._core is not None:
-            raise ValueError(f"{self.name} stands in a segment already")
+            raise ValueError(f"{self.name} is already in a segment; make a new device")
         description = self.description()
         core.make_controller(
             position,
@@ -97,13 +106,13 @@ class Device:
         self.switch_on()
 
     def detach(self) -> None:
-        """It is taken out, without power; another segment may have it."""
+        """Switch the device off and remove it from its segment. It can be added to another one."""
         self.switch_off()
         self._core = self._agenda = None
         self.position = -1
 
     def switch_on(self) -> None:
-        """Power: it boots with its stored defaults."""
+        """Switch the power on. The device boots with its stored defaults."""
         if self._agenda is None or self._scheduler is not None:
             return
         self._scheduler = Scheduler(self._agenda)
@@ -111,7 +120,7 @@ class Device:
         self.started(self._scheduler)
 
     def switch_off(self) -> None:
-        """No power: what it was about to do is not done, what it knew is gone."""
+        """Switch the power off. Pending actions are dropped and volatile values are lost."""
         if self._scheduler is None:
             return
         self._scheduler.end()
@@ -119,34 +128,36 @@ class Device:
         self.core.switch_power(self.position, False)
 
     def reset(self) -> None:
-        """The MainDevice's reset: off, as soon as the frame that asked has left, and on."""
+        """Reset the device after the requesting frame has left: power off, then on."""
         if self._scheduler is None or self._agenda is None:
             return
         self._scheduler.after(RESET_DELAY_NS, self.switch_off)
         self._agenda.after(RESET_DELAY_NS + RESET_NS, self.switch_on)
 
     def started(self, scheduler: Scheduler) -> None:
-        """The controller has power; now what the device adds to it."""
+        """Initialise the device after power-on. Subclasses add their part."""
 
     def handle(self, events: int) -> None:
-        """Events of the controller, on the service's thread."""
+        """Handle events of the controller. Called in the service's thread."""
 
     @property
     def state(self) -> int:
-        """The AL state shown: 1 INIT, 2 PRE-OP, 4 SAFE-OP, 8 OP; bit 4 is the error flag; 0: it
-        has no power."""
+        """Displayed AL state: 1 INIT, 2 PRE-OP, 4 SAFE-OP, 8 OP; bit 4 error flag; 0: no power."""
         return self.core.peek(self.position, AL_STATUS, 1)[0] & 0x1F
 
     @property
     def outputs_taken_ns(self) -> int | None:
-        """When it last took its outputs over, on the segment's clock (`segment.now_ns`): with the
-        frame, at its own cycle, or at SYNC0; None: not since it was switched on."""
+        """Time of the last update of the outputs on the segment's clock (`segment.now_ns`) [ns].
+
+        Outputs change with the frame, at the device's own cycle, or at SYNC0. None: not since
+        power-on.
+        """
         when = self.core.outputs_at(self.position)
         return None if when == FOREVER else when
 
     @property
     def crystal(self) -> Crystal:
-        """What its clock counts by; it may be changed while the segment runs."""
+        """Frequency error of the clock. It can be changed while the segment runs."""
         return self._crystal
 
     @crystal.setter
@@ -158,13 +169,22 @@ class Device:
             self._core.tune_crystal(self.position, error, swing, period, scatter)
 
     def freeze(self, frozen: bool = True) -> None:
-        """The device's model stands still; its controller goes on answering frames."""
+        """Freeze the device's model (or resume it). Its controller continues to answer frames."""
         self.core.freeze(self.position, frozen)
 
     def count_errors(self, port: int, *, invalid_frames: int = 0, lost_links: int = 0) -> None:
-        """What a bad cable would leave in the error counters of one port."""
+        """Add to the error counters of one port, as a bad cable would.
+
+        Args:
+            port: Port number, 0 to 3.
+            invalid_frames: Number of invalid frames to add.
+            lost_links: Number of lost links to add.
+
+        Raises:
+            ValueError: The port does not exist.
+        """
         if not 0 <= port <= 3:
-            raise ValueError(f"a controller has ports 0 to 3, not {port}")
+            raise ValueError(f"port must be 0 to 3, not {port}")
         for address, number in (
             (RX_ERRORS + 2 * port, invalid_frames),
             (LOST_LINKS + port, lost_links),
@@ -173,5 +193,5 @@ class Device:
             self.core.poke(self.position, address, bytes([min(before + number, 255)]))
 
     def write_alias(self, alias: int) -> None:
-        """What a rotary switch on the device would say, in the register at once."""
+        """Set the alias register at once, as a rotary switch on the device would."""
         self.core.poke(self.position, ALIAS, alias.to_bytes(2, "little"))

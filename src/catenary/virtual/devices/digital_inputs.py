@@ -25,7 +25,7 @@ class DigitalInputs(Device):
         lrw: bool = True,
     ) -> None:
         if not 1 <= bits <= 16:
-            raise ValueError(f"digital inputs have 1 to 16 bits, not {bits}")
+            raise ValueError(f"digital inputs must have 1 to 16 bits, not {bits}")
         super().__init__(
             name=name or f"Catenary virtual {bits}-channel input",
             alias=alias,
@@ -73,7 +73,7 @@ class DigitalInputs(Device):
 
     @property
     def inputs(self) -> int:
-        """What lies at the terminals: bit 0 is channel 1."""
+        """Levels at the terminals; bit 0 is channel 1."""
         return self.core.slot(self.position, 0)
 
     @inputs.setter

@@ -1,4 +1,4 @@
-"""A junction: where the line branches. No process data, no mailbox."""
+"""Junction: a device where the line branches. No process data, no mailbox."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from catenary.virtual.devices.device import Device
 
 
 class Junction(Device):
-    """Owns a junction of 3 or 4 ports: 0 towards the MainDevice, 1 and 2, with four also 3."""
+    """Owns a junction of 3 or 4 ports: port 0 towards the MainDevice, 1 and 2, optionally 3."""
 
     kind = "junction"
 

@@ -1,8 +1,8 @@
 """A servo drive, CiA 402 (IEC 61800-7-201): PP, PV, homing, CSP, CSV, CST; 1 to 8 axes at 0x800·k.
 
 The motor, its loops and the drive's state machine are compiled (`servo.h`) and stepped at the
-device's own cycle. Positions count `counts_per_turn` a turn; velocities are counts a second;
-torques per mille of the rated one.
+device's own cycle. Position unit: `counts_per_turn` counts per turn. Velocity unit: counts per
+second. Torque unit: per mille of the rated torque.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ from catenary.virtual.sii_quirks import NO_SII_QUIRKS, SiiQuirks
 
 STEP_NS = 250_000
 MINIMUM_CYCLE_NS = 62_500  # of SYNC0
-COPY_NS = 20_000  # outputs have to be there so long before SYNC0
+COPY_NS = 20_000  # outputs must arrive this long before SYNC0
 BOOT_SECONDS = 0.02
 SUPPORTED_MODES = {0, 1, 3, 6, 8, 9, 10}
 SUPPORTED_MODES_MASK = sum(1 << mode - 1 for mode in SUPPORTED_MODES - {0})  # 0x6502
@@ -82,7 +82,7 @@ def _pdo(index: int, name: str, objects: tuple[int, ...], axis: int, sync_manage
 
 
 class Received(NamedTuple):
-    """Outputs of one axis: raw numbers of its objects."""
+    """Outputs of one axis as raw numbers of its objects."""
 
     controlword: int  # 0x6040
     position: int  # 0x607A, counts
@@ -131,11 +131,39 @@ class Servo(AppliedDevice):
         mailbox_quirks: MailboxQuirks = NO_MAILBOX_QUIRKS,
         sii_quirks: SiiQuirks = NO_SII_QUIRKS,
     ) -> None:
-        """Units: kg·m², N·m·s/rad, N·m, rad/s, rad; `max_torque_ratio` of the rated torque;
-        `velocity_counts_per_turn`: the unit of 0x606C and 0x60FF, a turn a second;
-        `sync_missed_limit`: SYNC0 pulses in a row without new outputs that are an error;
-        `quirks`: how the drive differs from the profile; `mapping_quirks`: quirks of its PDOs;
-        `mailbox_quirks`, `sii_quirks`: how its mailbox and its SII differ from the standard."""
+        """Initialise the drive.
+
+        Args:
+            name: Device name.
+            alias: Station alias.
+            serial: Serial number.
+            axes: Number of axes, 1 to 8.
+            counts_per_turn: Position counts per turn of the motor.
+            velocity_counts_per_turn: Velocity unit of 0x606C and 0x60FF: counts per second at one
+                turn per second; None: `counts_per_turn`.
+            inertia: Motor inertia [kg·m²].
+            viscous_friction: Viscous friction [N·m·s/rad].
+            coulomb_friction: Dry friction [N·m].
+            rated_torque: Rated torque [N·m].
+            max_torque_ratio: Maximum torque divided by rated torque.
+            max_velocity: Maximum velocity [rad/s].
+            following_error_turns: Following error window [turns].
+            position_limits: Software position limits [rad].
+            mailbox_bytes: Size of each mailbox.
+            mailbox_delay: Time until a request is answered [s].
+            crystal: Frequency error of its clock.
+            clock_bits: Width of its clock.
+            lrw: True if the device supports LRW.
+            sync_missed_limit: Number of consecutive SYNC0 pulses without new outputs that is an
+                error.
+            quirks: Differences of the drive from the profile.
+            mapping_quirks: Quirks of its PDOs.
+            mailbox_quirks: Quirks of its mailbox.
+            sii_quirks: Quirks of its SII.
+
+        Raises:
+            ValueError: A value is out of range.
+        """
         super().__init__(
             name=name,
             alias=alias,
@@ -159,11 +187,11 @@ class Servo(AppliedDevice):
             if not 0 < value < math.inf:
                 raise ValueError(f"{field} must be positive, not {value}")
         if not 1 <= axes <= _segment.AXES_MAX:
-            raise ValueError(f"a servo has 1 to {_segment.AXES_MAX} axes, not {axes}")
+            raise ValueError(f"axes must be 1 to {_segment.AXES_MAX}, not {axes}")
         if not 1 <= sync_missed_limit <= 0xFFFF:
-            raise ValueError(f"sync_missed_limit is 1 to 65535, not {sync_missed_limit}")
+            raise ValueError(f"sync_missed_limit must be 1 to 65535, not {sync_missed_limit}")
         if viscous_friction < 0 or coulomb_friction < 0:
-            raise ValueError("friction cannot be negative")
+            raise ValueError("friction must be 0 or more")
         self.axes = axes
         self.counts_per_turn = counts_per_turn
         self.velocity_counts_per_turn = velocity_counts_per_turn or counts_per_turn
@@ -178,7 +206,7 @@ class Servo(AppliedDevice):
         self.sync_missed_limit = sync_missed_limit
         self.quirks = quirks
         self.mapping_quirks = mapping_quirks
-        self._inertias = [inertia] * axes  # what the loops are tuned for
+        self._inertias = [inertia] * axes  # for which the loops are tuned
 
     def _pdos(
         self, base: int, default: tuple[int, ...], others: tuple[tuple[int, ...], ...]
@@ -259,7 +287,12 @@ class Servo(AppliedDevice):
         return velocity_gain, velocity_gain * VELOCITY_BANDWIDTH / 5
 
     def tune(self, inertia: float, axis: int = 0) -> None:
-        """Tunes the velocity loop for what the motor turns, its own inertia included [kg·m²]."""
+        """Tune the velocity loop.
+
+        Args:
+            inertia: Total inertia at the motor shaft, motor included [kg·m²].
+            axis: Axis number.
+        """
         self._inertias[axis] = inertia
         velocity_gain, integral_gain = self._gains(axis)
         self._motors.tune(
@@ -379,55 +412,79 @@ class Servo(AppliedDevice):
     def _motors(self) -> Motors:
         return Motors(self.core)
 
-    # -- what tests look at and turn -----------------------------------------------------------
+    # -- for tests and plants ------------------------------------------------------------------
 
     def axis_position(self, axis: int = 0) -> float:
-        """The motor's true position [rad]."""
+        """Return the true position of the motor [rad]."""
         return self._motors.state(self.position, axis)[0]
 
     @property
     def position_rad(self) -> float:
-        """The first axis' true position [rad]."""
+        """True position of the first axis [rad]."""
         return self.axis_position()
 
     @property
     def velocity_rad_s(self) -> float:
-        """The first axis' true velocity [rad/s]."""
+        """True velocity of the first axis [rad/s]."""
         return self._motors.state(self.position, 0)[1]
 
     @property
     def torque_nm(self) -> float:
-        """The first axis' motor torque [N·m]."""
+        """Motor torque of the first axis [N·m]."""
         return self._motors.state(self.position, 0)[2]
 
     def received(self, axis: int = 0) -> Received:
-        """Return the outputs that the axis works with now, as raw numbers."""
+        """Return the outputs that the axis currently uses, as raw numbers."""
         first = _segment.SLOTS_PER_AXIS * axis
         return Received(*(self.core.slot(self.position, first + slot) for slot in RECEIVED_SLOTS))
 
     def drive_state(self, axis: int = 0) -> str:
-        """The state of the CiA 402 machine, in the standard's words."""
+        """Return the name of the CiA 402 state."""
         return STATES[self._motors.state(self.position, axis)[3]]
 
     def move_to(self, position: float, axis: int = 0) -> None:
-        """Turns the shaft by hand [rad]."""
+        """Move the shaft to a position, as if turned by hand.
+
+        Args:
+            position: New position [rad].
+            axis: Axis number.
+        """
         self._motors.place(self.position, axis, position)
 
     def apply_load(self, torque: float, axis: int = 0) -> None:
-        """A torque on the shaft from outside [N·m]."""
+        """Apply an external torque to the shaft.
+
+        Args:
+            torque: Torque [N·m].
+            axis: Axis number.
+        """
         self._motors.load(self.position, axis, torque)
 
     def inject_fault(self, code: int, axis: int = 0) -> None:
-        """A fault with this error code (0x603F); 0: its cause is gone and it can be reset."""
+        """Inject a fault.
+
+        Args:
+            code: Error code (0x603F); 0 ends the cause, so that the fault can be reset.
+            axis: Axis number.
+        """
         self._motors.inject(self.position, axis, code)
 
     def hide_bit_12(self, seconds: float, axis: int = 0) -> None:
-        """Hide bit 12 of the statusword for this time [s], from the next step on (`inf`: for good).
+        """Hide bit 12 of the statusword from the next step on.
 
         Meanwhile the drive holds its last demand, or follows its targets if `quirks` says so.
+
+        Args:
+            seconds: Duration [s]; `inf`: for ever.
+            axis: Axis number.
         """
         self._motors.hide_bit_12(self.position, axis, seconds)
 
     def switch_sto(self, active: bool, axis: int = 0) -> None:
-        """Safe torque off."""
+        """Switch safe torque off on (True) or off (False).
+
+        Args:
+            active: True removes the torque.
+            axis: Axis number.
+        """
         self._motors.stop_torque(self.position, axis, active)

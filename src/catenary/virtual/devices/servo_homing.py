@@ -1,4 +1,4 @@
-"""The objects of mode 6, homing (CiA 402-2), of one axis; what they do is in `servo_homing.h`."""
+"""Objects of mode 6, homing (CiA 402-2), of one axis; the behaviour is in `servo_homing.h`."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from catenary.virtual.coe.dictionary import (
 from catenary.virtual.devices.servo_objects import RW
 
 HERE = 37
-TORQUE = 300  # per mille of the rated torque: a stop
+TORQUE = 300  # per mille of the rated torque: a stop was hit
 
 
 def add_homing(
     dictionary: Dictionary, base: int, slot: Callable[[str, int, int, int], Entry]
 ) -> None:
-    """Objects at `base` + index; `slot` makes an entry of the model's own values."""
+    """Add the homing objects at `base` + index. `slot` makes an entry with a value of the model."""
     add = dictionary.add_variable
     add(0x607C + base, slot("Home offset", INTEGER32, _segment.SLOT_HOME_OFFSET, RW))
     add(0x6098 + base, slot("Homing method", INTEGER8, _segment.SLOT_HOMING_METHOD, RW))
@@ -38,7 +38,7 @@ def add_homing(
 
 
 def homing_presets(velocity_per_radian: float) -> tuple[tuple[int, int], ...]:
-    """(slot, value) before anybody writes: method 37, 1 rad/s, 0.2 rad/s, 10 rad/s²."""
+    """Return the defaults as (slot, value): method 37, 1 rad/s, 0.2 rad/s, 10 rad/s²."""
     return (
         (_segment.SLOT_HOMING_METHOD, HERE),
         (_segment.SLOT_HOMING_SPEED, round(velocity_per_radian)),

@@ -1,4 +1,4 @@
-"""The objects of one CiA 402 axis and the slots they share with the compiled model (`servo.h`)."""
+"""Objects of one CiA 402 axis and the slots they share with the compiled model (`servo.h`)."""
 
 from __future__ import annotations
 
@@ -95,13 +95,13 @@ OBJECTS = (
 )
 OBJECT_BY_INDEX = {o.index: o for o in OBJECTS}
 
-# The default process data, 13 bytes each way, in this order.
+# The default process data in this order, 13 bytes per direction.
 DEFAULT_RX = (0x6040, 0x6060, 0x60FF, 0x607A, 0x6071)
 DEFAULT_TX = (0x6041, 0x6061, 0x606C, 0x6064, 0x6077)
 
 
 def profile_presets(counts: int, velocity_counts: int) -> tuple[tuple[int, int], ...]:
-    """Return (slot, value) of the profile modes as the drive boots: 10 rad/s, 100 rad/s².
+    """Return the power-on defaults of the profile modes as (slot, value): 10 rad/s, 100 rad/s².
 
     Args:
         counts: Position counts per turn.

@@ -17,53 +17,55 @@ OPTION_CODES = range(-(1 << 15), 1 << 15)
 
 
 class ServoQuirks(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Differences of one drive from the profile; all axes have them. Without arguments: none."""
+    """Differences of a drive, with all its axes, from the profile. The default has none."""
 
-    # Statusword bit 12 of the cyclic modes. "never": leducp/KickCAT,
+    # Statusword bit 12 of the cyclic modes. "never": always 0; leducp/KickCAT,
     # lib/simulation/include/kickcat/simulation/devices/Ds402Motor.h shows 0x37 when enabled.
     bit_12: Literal["standard", "never"] = "standard"
 
-    # The drive follows its targets although bit 12 is not shown, as Ds402Motor.h does. False: it
-    # ignores them and holds its last demand, as IEC 61800-7-201 says of bit 12 = 0.
+    # True: the drive follows its targets although bit 12 is 0, as Ds402Motor.h does. False: it
+    # ignores them and holds its last demand, as specified in IEC 61800-7-201 for bit 12 = 0.
     follows_without_bit_12: bool = False
 
     # Controlword 0x02 is ignored while enabled: Ds402Motor.h, "any other command: hold the
     # current state". See also `quick_stop_option`.
     ignores_quick_stop: bool = False
 
-    # Controlword 0x07 is ignored while enabled. No report is known. This is the device that the
-    # last step of a stop (disable voltage) exists for.
+    # Controlword 0x07 is ignored while enabled. No report is known. The last step of a stop
+    # (disable voltage) exists for such a device.
     ignores_disable: bool = False
 
-    # Initial value of 0x605A. 0: torque off at once. Negative: the quick stop is disabled, as -1 of
-    # Beckhoff's AX8000 (infosys.beckhoff.com, ax8xxx_object, 605A "Disable_quick_stop").
-    # "absent": the object does not exist (abort 0x06020000) and the drive ramps down as with 2; so
-    # wangpinganliuyang/GDC16, SSC/Src/cia402appl.c, which obeys a quick stop without 0x605A.
+    # Initial value of 0x605A. 0: torque off at once. Negative: the quick stop is disabled, like -1
+    # of Beckhoff's AX8000 (infosys.beckhoff.com, ax8xxx_object, 605A "Disable_quick_stop").
+    # "absent": the object does not exist (abort 0x06020000) and the drive ramps down as with 2,
+    # like wangpinganliuyang/GDC16, SSC/Src/cia402appl.c, which supports a quick stop without
+    # 0x605A.
     quick_stop_option: int | Literal["absent"] = 2
 
-    # Initial value of 0x6007 (IEC 61800-7-201), the reaction to process data that stops.
-    # 0: none, 1: fault, 2: disable voltage, 3: quick stop as 0x605A says.
+    # Initial value of 0x6007 (IEC 61800-7-201), the reaction to a loss of process data.
+    # 0: none, 1: fault, 2: disable voltage, 3: quick stop as set in 0x605A.
     abort_connection_option: int = 1
 
-    # Time from 0x6060 to 0x6061 [s]; the old mode goes on until then. ipa320/ipa_canopen#29 and
-    # jia-xie/python-damiao-driver#4 changed their timing for drives that need longer than a cycle.
+    # Delay from 0x6060 to 0x6061 [s], during which the old mode continues. ipa320/ipa_canopen#29
+    # and jia-xie/python-damiao-driver#4 changed their timing for drives that need longer than a
+    # cycle.
     mode_delay: float = 0.0
 
-    # Modes that 0x6061 never shows, though 0x6060 accepts them. ipa320/ipa_canopen#29: a drive that
-    # changes its mode only before operation enabled.
+    # Modes that 0x6061 never shows, although 0x6060 accepts them. ipa320/ipa_canopen#29: a drive
+    # that changes its mode only before operation enabled.
     refused_modes: tuple[int, ...] = ()
 
-    # Category 60 of the SII: the device's ways to use distributed clocks. `virtual.op_modes` has
-    # those of an EL3702 (SYNC1 with a negative factor), of a device with SYNC1 alone, and of an
+    # Category 60 of the SII: the device's modes of distributed clocks. `virtual.op_modes` contains
+    # those of an EL3702 (SYNC1 with a negative factor), of a device with SYNC1 only, and of an
     # EasyCAT (a shift of 2.0 s), with sources.
     op_modes: tuple[OpMode, ...] = STANDARD
 
-    # The signal that the drive keeps time by. "sync1": clocks without SYNC1 are refused, 0x1C32:04
-    # shows DC Sync1 alone; robert-burger/libethercat#21: OP is reached with 0x0500 only.
+    # The signal that the drive synchronises to. "sync1": clocks without SYNC1 are refused and
+    # 0x1C32:04 shows only DC Sync1; robert-burger/libethercat#21: OP is reached with 0x0500 only.
     sync_signal: Literal["sync0", "sync1"] = "sync0"
 
-    # Its ports can be closed by loop control, 0x0101. False: DL status never shows it;
-    # leducp/KickCAT, lib/slave/src/ESC/EmulatedESC.cc evaluates bit 24 of DL control alone.
+    # True: loop control (0x0101) can close its ports. False: DL status never shows a closed port;
+    # leducp/KickCAT, lib/slave/src/ESC/EmulatedESC.cc evaluates only bit 24 of DL control.
     closes_ports: bool = True
 
     # SyncManager 2 triggers the watchdog: control byte 0x64 in the SII. False: 0x24, as in three
@@ -72,8 +74,8 @@ class ServoQuirks(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     watchdog_trigger: bool = True
 
     # SAFE-OP is refused with AL status code 0x001F, "invalid watchdog configuration", unless the
-    # trigger bit is set if and only if the watchdog time is not 0: Beckhoff's slave stack code (SSC
-    # 5.11 to 5.13), ecatslv.c, StartInputHandler.
+    # trigger bit is set if and only if the watchdog time is not 0. Source: Beckhoff's slave stack
+    # code (SSC 5.11 to 5.13), ecatslv.c, StartInputHandler.
     checks_watchdog: bool = False
 
     def __post_init__(self) -> None:
@@ -81,7 +83,7 @@ class ServoQuirks(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
             raise ValueError(f"mode_delay must be 0 or more seconds, not {self.mode_delay}")
         for mode in self.refused_modes:
             if mode not in MODES:
-                raise ValueError(f"refused_modes: {mode} is not one of the servo's {MODES}")
+                raise ValueError(f"refused_modes: mode {mode} is not one of the servo's {MODES}")
         if self.quick_stop_option != "absent" and self.quick_stop_option not in OPTION_CODES:
             raise ValueError(
                 f"quick_stop_option {self.quick_stop_option}: use a 16-bit number, or 'absent'"
@@ -93,7 +95,7 @@ class ServoQuirks(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
     @property
     def refused_mask(self) -> int:
-        """Bit n is set if mode n is refused."""
+        """Bit mask of the refused modes: bit n for mode n."""
         return sum(1 << mode for mode in set(self.refused_modes))
 
 

@@ -1,9 +1,11 @@
-"""How a device keeps time with the bus: 0x1C32 outputs, 0x1C33 inputs (ETG.1020 §5.2.1, "sync
-manager parameters"), 0x10F1 the limit of missed events; and what it demands of the SYNC unit.
+"""Synchronisation of a device with the bus, ETG.1020 §5.2.1, "sync manager parameters".
 
-Two types: 0 free run, 2 DC Sync0; or 3 DC Sync1 instead, as a quirk. Unless 0x1C32:01 was
-written, the SYNC unit decides: a device whose signal is switched on when it goes to SAFE-OP keeps
-time by it, as common device stacks do.
+0x1C32 describes outputs, 0x1C33 inputs; 0x10F1 limits missed events. Also the device's
+requirements on the SYNC unit.
+
+Two types are supported: 0 free run, and 2 DC Sync0 (as a quirk 3 DC Sync1). Unless 0x1C32:01
+was written, the SYNC unit decides. A device whose signal is active on the way to SAFE-OP
+synchronises to it, as in common device stacks.
 """
 
 from __future__ import annotations
@@ -33,18 +35,18 @@ from catenary.virtual.state_machine import (
 )
 
 FREE_RUN, DC_SYNC0, DC_SYNC1 = 0, 2, 3
-# 0x1C32:04: free run; bits 2 to 4: DC, 1: SYNC0, 2: SYNC1
+# 0x1C32:04: bit 0 free run; bits 2 to 4 DC: 1 SYNC0, 2 SYNC1
 SUPPORTED = {DC_SYNC0: 0x0001 | 0x0004, DC_SYNC1: 0x0001 | 0x0008}
 OUTPUTS, INPUTS, ERROR_SETTINGS = 0x1C32, 0x1C33, 0x10F1
 SYNC_CONTROL, ACTIVATION, SYNC0_CYCLE, SYNC1_CYCLE = 0x0980, 0x0981, 0x09A0, 0x09A4
 ACTIVE = 0x01
-PULSES = {DC_SYNC0: 0x02, DC_SYNC1: 0x04}  # of 0x0981
+PULSES = {DC_SYNC0: 0x02, DC_SYNC1: 0x04}  # bit in 0x0981
 CYCLE_MAX_NS = 0xFFFF_FFFF
-_, _, MISSED, EXCEEDED, SHIFT_SHORT, ERROR = range(6)  # of Core.synchronous
+_, _, MISSED, EXCEEDED, SHIFT_SHORT, ERROR = range(6)  # fields of Core.synchronous
 
 
 class Synchronisation:
-    """Owns a device's type of synchronisation and the objects that show it."""
+    """Owns the synchronisation type of a device and the objects that show it."""
 
     def __init__(
         self,
@@ -58,9 +60,18 @@ class Synchronisation:
         missed_limit: int,
         synchronous_type: int = DC_SYNC0,
     ) -> None:
-        """`step_ns`: the device's own cycle; `minimum_cycle_ns` of SYNC0; `copy_ns`: how long
-        before a pulse outputs have to be there; `missed_limit`: pulses in a row without new ones;
-        `synchronous_type`: which signal it keeps time by."""
+        """Add the objects to the dictionary.
+
+        Args:
+            core: The compiled segment.
+            position: Position of the device.
+            dictionary: The device's objects.
+            step_ns: The device's own cycle.
+            minimum_cycle_ns: Shortest SYNC0 cycle.
+            copy_ns: How long before a pulse outputs must arrive.
+            missed_limit: Number of consecutive pulses without new outputs that is an error.
+            synchronous_type: The signal that the device synchronises to.
+        """
         self._core = core
         self._position = position
         self._step_ns = step_ns
@@ -71,7 +82,7 @@ class Synchronisation:
         self._pulses = PULSES[synchronous_type]
         self._written: int | None = None  # 0x1C32:01
         self._cycle_written = 0  # 0x1C32:02
-        self._checked_ns = 0  # the pulses' cycle as it was checked; 0: not by pulses
+        self._checked_ns = 0  # cycle of the pulses when checked; 0: free run
         self._tune()
         for index, name, copy in (
             (OUTPUTS, "SM output parameter", copy_ns),
@@ -89,10 +100,10 @@ class Synchronisation:
             ],
         )
 
-    # -- what the state machine asks -----------------------------------------------------------
+    # -- for the state machine -----------------------------------------------------------------
 
     def check(self) -> int:
-        """PRE-OP → SAFE-OP: 0, or the AL status code why the clocks do not allow it."""
+        """Return 0, or the AL status code if the clocks do not allow PRE-OP → SAFE-OP."""
         self._checked_ns = 0
         by_pdi, activation = self._core.peek(self._position, SYNC_CONTROL, 2)
         switched_on = bool(activation & ACTIVE)
@@ -102,7 +113,7 @@ class Synchronisation:
             return INVALID_DC_CONFIGURATION
         if self.sync0_cycle_ns < self._minimum_ns:
             return DC_SYNC0_CYCLE_TIME
-        own = self._step_ns  # read from 0x1C32:02 in free run, it may be written back
+        own = self._step_ns  # the free-run value of 0x1C32:02 may be written back
         cycle_ns = self.cycle_ns
         if cycle_ns > CYCLE_MAX_NS:
             return INVALID_DC_CONFIGURATION
@@ -112,7 +123,7 @@ class Synchronisation:
         return 0
 
     def begin(self) -> None:
-        """Enter SAFE-OP as it was checked: frames may have changed the registers meanwhile."""
+        """Enter SAFE-OP with the checked values; frames may have changed registers meanwhile."""
         if self._checked_ns:
             self._core.run_model_by_pulses(
                 self._position, self._pulses, self._checked_ns, self._step_ns
@@ -123,11 +134,11 @@ class Synchronisation:
             self._core.run_model(self._position, self._step_ns)
 
     def awaits_pulses(self) -> bool:
-        """True if it keeps time by pulses, and none has arrived."""
+        """Return True if the device synchronises to pulses and none has arrived."""
         active, seen = self._core.synchronous(self._position)[:2]
         return active and not seen
 
-    # -- what the objects show -----------------------------------------------------------------
+    # -- for the objects -----------------------------------------------------------------------
 
     @property
     def sync0_cycle_ns(self) -> int:
@@ -135,8 +146,11 @@ class Synchronisation:
 
     @property
     def cycle_ns(self) -> int:
-        """Time between two pulses of its signal: SYNC1 comes with the first SYNC0 after the time
-        that its register says (Beckhoff, ESC data sheet I §9.2.3.5)."""
+        """Period of the device's signal [ns].
+
+        SYNC1 follows with the first SYNC0 after the time in its register (Beckhoff, ESC data sheet
+        I §9.2.3.5).
+        """
         sync0_ns = self.sync0_cycle_ns
         if self._synchronous == DC_SYNC0 or not sync0_ns:
             return sync0_ns
