@@ -143,7 +143,7 @@ def test_a_share_of_another_user_is_refused_unless_asked_for(machine: Machine) -
         assert machine.run(ALICE, asked, group=True) == ["done"]
         taken = f'{SAY}\nsaid(lambda: cat.Share("arm").__enter__())'
         [line] = machine.run(ALICE, taken, group=True)
-        assert "is in the way" in line
+        assert "exists and cannot be replaced" in line
 
 
 def test_roots_share_needs_no_word(machine: Machine) -> None:

@@ -68,7 +68,7 @@ def test_a_deadline_that_can_be_missed_is_exit_status_1(file, capsys):
         (EXAMPLE.replace("0.020", "0"), "task 'tau2': period of 0.0 s is not positive"),
         (EXAMPLE.replace("0.005", "-1.0"), "task 'tau2': execution of -1.0 s is negative"),
         (EXAMPLE.replace("priority = 20\n", ""), "task 'tau2' has no priority"),
-        (EXAMPLE.replace("tau2", "tau1"), "two tasks are called 'tau1'"),
+        (EXAMPLE.replace("tau2", "tau1"), "two tasks have the name 'tau1'"),
         (EXAMPLE.replace("0.020", "1e300"), "task 'tau2': period of 1e+300 s is beyond"),
         (EXAMPLE.replace("0.020", "nan"), "task 'tau2': period of nan s is beyond"),
         ("task = []", "there are no tasks"),

@@ -63,7 +63,7 @@ def test_applied_and_undone(state):
 def test_twice_applied_goes_back_to_what_was_there_first(state):
     ground = Ground(a="1")
     list(apply([Change("a", "8")], ground, state))
-    assert list(apply([Change("a", "8")], ground, state)) == ["as it should be already: a = 8"]
+    assert list(apply([Change("a", "8")], ground, state)) == ["already set: a = 8"]
     list(apply([Change("a", "9")], ground, state))
     list(undo(ground, state))
     assert ground.values == {"a": "1"}
@@ -84,7 +84,7 @@ def test_what_somebody_else_changed_since_is_left(state):
     ground = Ground(a="1")
     list(apply([Change("a", "8")], ground, state))
     ground.values["a"] = "5"
-    assert list(undo(ground, state)) == ["left, since it was changed by somebody else: a"]
+    assert list(undo(ground, state)) == ["not undone, because it was changed since: a"]
     assert ground.values == {"a": "5"}
 
 
@@ -130,7 +130,7 @@ def test_where_nothing_can_be_noted_nothing_is_changed(state, monkeypatch):
 def test_a_damaged_note_is_an_error_and_not_silence(state):
     state.path.parent.mkdir()
     state.path.write_text('{"boot": "boot 1", "made": [{"target": 1}]}')
-    with pytest.raises(StateError, match="does not tell what was changed"):
+    with pytest.raises(StateError, match="cannot be read"):
         state.load()
 
 
@@ -224,7 +224,7 @@ def test_a_link_is_not_followed(state, tmp_path):
     victim.write_text("mine")
     state.path.parent.mkdir()
     state.path.symlink_to(victim)
-    with pytest.raises(StateError, match="does not tell what was changed"):
+    with pytest.raises(StateError, match="cannot be read"):
         state.load()
     state.path.unlink()
     state.path.with_suffix(".new").symlink_to(victim)

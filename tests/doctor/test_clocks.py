@@ -1,4 +1,4 @@
-"""The clocks' checks: what a source costs, and who may bend the clock by how much."""
+"""The clocks' checks: what a source costs, and who may slew the clock by how much."""
 
 from __future__ import annotations
 

@@ -109,6 +109,6 @@ def test_a_cpu_that_does_not_exist():
 def test_this_machine_is_judged_whatever_it_is():
     checks = examine(this_machine("lo")).checks
     statuses = {check.id: check.status for check in checks}
-    assert statuses["nic-driver"] == "FAIL"  # lo is no Ethernet
+    assert statuses["nic-driver"] == "FAIL"  # lo is not an Ethernet card
     assert statuses["latency"] == "SKIP"
     assert len(statuses) == len(VERDICTS)

@@ -50,8 +50,8 @@ IRQ = "/proc/irq/131/effective_affinity_list"
     [
         ({}, "safe on CPU 3: the answers come by CPU 2"),
         ({IRQ: "3"}, "unsafe: CPU 3, the loop's, also carries the card's answers"),
-        ({f"{CPU}/isolated": "", "/proc/self/status": ""}, "unsafe: CPU 3 is also everybody"),
-        ({"/proc/interrupts": ""}, "who carries the answers is not known"),
+        ({f"{CPU}/isolated": "", "/proc/self/status": ""}, "unsafe: other programs also use CPU 3"),
+        ({"/proc/interrupts": ""}, "the CPU that handles answers is unknown"),
         ({f"{CPU}/online": "3"}, "one CPU"),
     ],
 )

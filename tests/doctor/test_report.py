@@ -23,14 +23,14 @@ def test_a_line_a_check_with_the_advice_below(tmp_path):
 def test_the_summary_is_last(tmp_path):
     bad = as_text(examine(machines.laptop(tmp_path / "a"))).splitlines()
     assert bad[-5] == "29 checks: 7 passed, 16 warnings, 4 failed, 2 not known"
-    assert bad[-4].startswith("Not fit for a real-time loop as it is; first: kernel-preemption")
+    assert bad[-4].startswith("Not fit for a real-time loop yet; fix first: kernel-preemption")
     assert bad[-2] == "--apply can change 12 settings, until the next start"
     watched = replace(machines.controller(tmp_path / "b"), watched=3.0, sent=0)
     good = as_text(examine(watched, latency(30e-6))).splitlines()
     assert good[-3] == "29 checks: 29 passed, 0 warnings, 0 failed, 0 not known"
-    assert good[-2] == "Fit for a real-time loop, as far as can be seen."
+    assert good[-2] == "Fit for a real-time loop: no check failed or warned."
     unmeasured = as_text(examine(machines.controller(tmp_path / "c"))).splitlines()
-    assert unmeasured[-2].endswith("how late threads wake was not measured.")
+    assert unmeasured[-2].endswith("the wake-up latency was not measured.")
 
 
 def test_a_narrow_terminal(tmp_path):

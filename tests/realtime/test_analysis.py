@@ -118,7 +118,7 @@ def test_processors_are_apart():
     ("demands", "words"),
     [
         ([], "no tasks"),
-        ([demand("a", 1, 0.1), demand("a", 2, 0.1)], "two tasks are called 'a'"),
+        ([demand("a", 1, 0.1), demand("a", 2, 0.1)], "two tasks have the name 'a'"),
         ([demand("a", 1, 0.1, priority=1), demand("b", 2, 0.1)], "'b' has no priority"),
         ([demand("a", 1, 0.1, cpu=1), demand("b", 2, 0.1)], "'b' has no cpu"),
     ],

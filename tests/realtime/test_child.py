@@ -101,5 +101,5 @@ def test_ends_with_its_parent_however_that_ends(script):
 def test_nothing_to_run_is_an_error(arguments):
     with pytest.raises(ValueError, match="arguments are"):
         start_python(arguments)
-    with pytest.raises(ValueError, match="no program named"):
+    with pytest.raises(ValueError, match="command is empty"):
         start_program([])

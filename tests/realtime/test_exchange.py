@@ -124,9 +124,9 @@ def test_one_writer_one_producer_one_consumer():
     queue.put(1)
     queue.take()
     again = copy.copy(value), copy.copy(queue)  # as another task has them
-    assert "a writer already" in str(in_a_thread(lambda: again[0].write(2)))
-    assert "a producer already" in str(in_a_thread(lambda: again[1].put(2)))
-    assert "a consumer already" in str(in_a_thread(again[1].take))
+    assert "already has a writer" in str(in_a_thread(lambda: again[0].write(2)))
+    assert "already has a producer" in str(in_a_thread(lambda: again[1].put(2)))
+    assert "already has a consumer" in str(in_a_thread(again[1].take))
 
 
 def test_the_successor_of_a_writer_that_died_may_write():

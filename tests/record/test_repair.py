@@ -227,7 +227,7 @@ def test_others_files_are_not_touched(tmp_path: Path) -> None:
         writer.start()
         writer.add_metadata("camera", {})
     before = path.read_bytes()
-    with pytest.raises(RecordingError, match="no recording of Catenary's") as caught:
+    with pytest.raises(RecordingError, match="not a recording of Catenary") as caught:
         repair(path)
     assert "mcap recover" in caught.value.hint
     assert path.read_bytes() == before

@@ -31,7 +31,7 @@ def shared() -> Iterator[tuple[str, Path]]:
 def assert_refused(name: str, said: str) -> None:
     with pytest.raises(ShareError, match=f"the share '{name}': .*{said}"):
         cat.attach(name, stale=True)
-    with pytest.raises(ShareError, match="is in the way"), cat.Share(name):
+    with pytest.raises(ShareError, match="exists and cannot be replaced"), cat.Share(name):
         pass
 
 
@@ -47,7 +47,7 @@ def test_another_version(shared: tuple[str, Path]) -> None:
 def test_cut_off(shared: tuple[str, Path], kept: int) -> None:
     name, path = shared
     path.write_bytes(path.read_bytes()[:kept])
-    assert_refused(name, "cut off" if kept != 5 else "no share")
+    assert_refused(name, "truncated" if kept != 5 else "not a Catenary share")
 
 
 def test_a_description_that_is_broken(shared: tuple[str, Path]) -> None:

@@ -271,9 +271,9 @@ def test_a_name_in_use_is_refused(name: str) -> None:
     with cat.MainDevice(segment) as main:
         arm = cat.Drives(main.scan().drives, counts_per_turn=TURN, velocity_limit=100.0)
         with cat.Share(name) as share, cat.Loop(arm, sink=share):
-            with pytest.raises(ShareError, match="which lives"), cat.Share(name):
+            with pytest.raises(ShareError, match="which is running"), cat.Share(name):
                 pass
-            with pytest.raises(RuntimeError, match="belongs to a loop already"):
+            with pytest.raises(RuntimeError, match="already belongs to a loop"):
                 share.open(None)  # type: ignore[arg-type]
 
 

@@ -42,7 +42,7 @@ class NaturalAdmittance:
 
     @property
     def parameters(self) -> Row:
-        """(1 + 5 · axes,)"""
+        """Row of parameters, shape (1 + 5 · axes,)."""
         n = axis_count(self.axes)
         names = ("damping", "stiffness", "velocity_gain")
         inertia = checked("inertia", self.inertia, n, above=True)
@@ -51,7 +51,7 @@ class NaturalAdmittance:
 
     @property
     def memory(self) -> Row:
-        """(2 · axes,) zeros: the model begins at the axis' velocity."""
+        """Initial memory: zeros, shape (2 · axes,); the model begins at the axis' velocity."""
         return np.zeros(STATES * self.axes)
 
 

@@ -37,12 +37,12 @@ class Cascade:
 
     @property
     def parameters(self) -> Row:
-        """(1 + 14 · axes,)"""
+        """Row of parameters, shape (1 + 14 · axes,)."""
         return table(KIND, *self.position.columns(), *self.velocity.columns())
 
     @property
     def memory(self) -> Row:
-        """(10 · axes,) zeros: begins at its first step."""
+        """Initial memory: zeros, shape (10 · axes,)."""
         return np.zeros(2 * STATES * self.axes)
 
 

@@ -46,7 +46,7 @@ class Residual:
 
     @property
     def memory(self) -> Row:
-        """(3 · axes,) zeros."""
+        """Initial memory: zeros, shape (3 · axes,)."""
         return np.zeros(RESIDUAL_STATES * self.axes)
 
 
@@ -124,13 +124,13 @@ class Threshold:
 
     @property
     def memory(self) -> Row:
-        """(axes,) [s] for how long it has been beyond."""
+        """Initial memory: time beyond the limit [s], shape (axes,)."""
         return np.zeros(self.axes)
 
 
 @compiles
 def threshold(memory: Row, parameters: Row, i: int, value: float, dt: float) -> bool:
-    """Whether axis `i` has collided: `value` either way beyond its limit, for its time."""
+    """Return True if `value` of axis `i` is beyond its limit, either way, for its time."""
     if parameters[0] != THRESHOLD:
         raise ValueError("threshold: these are not the parameters of a Threshold")
     p = 1 + THRESHOLD_GAINS * i

@@ -1,4 +1,4 @@
-"""Which functions of this package Numba compiles inside a law, and how Numba learns of them.
+"""Functions of this package that Numba compiles inside a law, and their registration.
 
 Numba asks for them when it compiles for the first time in a process (its entry point
 `numba_extensions`, named in pyproject.toml): `import catenary.control` costs no Numba, and without
@@ -28,13 +28,13 @@ MARK = "__catenary_compiles__"
 
 
 def compiles(function: Callable[P, R]) -> Callable[P, R]:
-    """Marks a function that laws may call: numbers and rows in, no allocation, nothing hidden."""
+    """Mark a function that laws may call: numbers and rows as input, no allocation, no state."""
     setattr(function, MARK, True)
     return function
 
 
 def register() -> None:
-    """Called by Numba, once a process: tells it the functions that are marked."""
+    """Register the marked functions; Numba calls this once in a process."""
     extending: Any = import_module("numba.extending")
     import_module("catenary.control.pointers_compiled")
     for name in MODULES:

@@ -57,7 +57,7 @@ class Dynamics:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """The names of the axes' joints."""
+        """Names of the axes' joints."""
         return self._model.joints
 
     @property
@@ -75,11 +75,11 @@ class Dynamics:
         return np.array([KIND, *addresses, *counts, *np.ravel(model.places)], dtype=np.float64)
 
     def gravity(self, position: Vector) -> Row:
-        """(n,) [N·m] that holds the arm still at `position` (n,) [rad]."""
+        """Return the torque (n,) [N·m] that holds the arm still at `position` (n,) [rad]."""
         return self._solve(self._checked("position", position), 0.0, 0.0)
 
     def inverse(self, position: Vector, velocity: Vector, acceleration: Vector) -> Row:
-        """(n,) [N·m] for this motion: (n,) [rad], [rad/s], [rad/s²]."""
+        """Return the torque (n,) [N·m] for a motion: (n,) [rad], [rad/s], [rad/s²]."""
         named = {"position": position, "velocity": velocity, "acceleration": acceleration}
         return self._solve(*(self._checked(name, values) for name, values in named.items()))
 

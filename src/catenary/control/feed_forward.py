@@ -1,4 +1,4 @@
-"""Torques that are known beforehand: of a motion, and of friction."""
+"""Feed-forward torques: of a motion, and of friction."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class FeedForward:
 
     @property
     def parameters(self) -> Row:
-        """(1 + 2 · axes,)"""
+        """Row of parameters, shape (1 + 2 · axes,)."""
         n = axis_count(self.axes)
         return table(
             FEED_FORWARD, checked("inertia", self.inertia, n), checked("damping", self.damping, n)
@@ -34,7 +34,7 @@ class FeedForward:
 
 @compiles
 def feed_forward(parameters: Row, i: int, velocity: float, acceleration: float) -> float:
-    """The torque [N·m] of axis `i` for a wanted motion [rad/s], [rad/s²]: J q̈ + b q̇."""
+    """Return the torque [N·m] of axis `i` for a motion [rad/s], [rad/s²]: J q̈ + b q̇."""
     if parameters[0] != FEED_FORWARD:
         raise ValueError("feed_forward: these are not the parameters of a FeedForward")
     torque: float = parameters[1 + 2 * i] * acceleration + parameters[2 + 2 * i] * velocity
@@ -61,7 +61,7 @@ class Friction:
 
     @property
     def parameters(self) -> Row:
-        """(1 + 3 · axes,)"""
+        """Row of parameters, shape (1 + 3 · axes,)."""
         n = axis_count(self.axes)
         both = [checked(name, getattr(self, name), n) for name in ("viscous", "coulomb")]
         return table(FRICTION, *both, checked("transition", self.transition, n, above=True))

@@ -52,7 +52,7 @@ class Homing:
 
     @property
     def parameters(self) -> Row:
-        """(1 + 5 · axes,)"""
+        """Row of parameters, shape (1 + 5 · axes,)."""
         n = axis_count(self.axes)
         velocity = checked("velocity", self.velocity, n, least=-np.inf, above=True)
         for i in np.flatnonzero(velocity == 0).tolist():
@@ -63,7 +63,7 @@ class Homing:
 
     @property
     def memory(self) -> Row:
-        """(6 · axes,) zeros."""
+        """Initial memory: zeros, shape (6 · axes,)."""
         return np.zeros(STATES * self.axes)
 
 
@@ -90,13 +90,13 @@ def homing(
 
 @compiles
 def homed(memory: Row) -> bool:
-    """Whether homing has ended: all axes have met, or one has failed."""
+    """Return True if homing has ended: all axes have met, or one has failed."""
     least = lowest(memory, 0, len(memory) // STATES)
     return bool(least in (DONE, FAILED))
 
 
 def stops(memory: Row) -> Stops:
-    """What has been found so far, from the memory of a `Homing`."""
+    """Return the results so far, from the memory of a `Homing`."""
     rows = memory.reshape(-1, STATES)
     passed = [OPENING, CLOSING, MEETING]
     reached = np.where(rows[:, :1] == FAILED, rows[:, 1:2], rows[:, :1]) > passed
@@ -108,7 +108,7 @@ def stops(memory: Row) -> Stops:
 def following(
     memory: Row, parameters: Row, i: int, n: int, position: float, torque: float, dt: float
 ) -> float:
-    """The stage that axis `i` is in now."""
+    """Return the current stage of axis `i`."""
     m, p = STATES * i, 1 + NUMBERS * i
     stage: float = memory[m]
     way = way_of(stage)
@@ -134,7 +134,7 @@ def following(
 
 @compiles
 def way_of(stage: float) -> float:
-    """1: opening, -1: closing, 0: it stands."""
+    """Return the direction of a stage: 1 opening, -1 closing, 0 standing."""
     if stage in (OPENING, RETURNING):
         return 1.0
     return -1.0 if stage in (CLOSING, MEETING) else 0.0
@@ -142,7 +142,7 @@ def way_of(stage: float) -> float:
 
 @compiles
 def pressed(memory: Row, m: int, parameters: Row, p: int, forward: float, dt: float) -> bool:
-    """Whether a torque in the way of motion (`forward`: times the velocity) has lasted."""
+    """Return True if a torque in the direction of motion (`forward`) has lasted long enough."""
     if forward < parameters[p + 1] * abs(parameters[p]):
         memory[m + 1] = 0.0
         return False
@@ -152,7 +152,7 @@ def pressed(memory: Row, m: int, parameters: Row, p: int, forward: float, dt: fl
 
 @compiles
 def lowest(memory: Row, first: int, last: int) -> float:
-    """The lowest stage of some axes; `DONE` of none."""
+    """Return the lowest stage of some axes; `DONE` for no axes."""
     found = DONE
     for i in range(first, last):
         found = min(found, memory[STATES * i])

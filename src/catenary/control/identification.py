@@ -1,4 +1,4 @@
-"""Finding out what an axis is: a logarithmic chirp, and the frequency response from its record."""
+"""Identification of an axis: a logarithmic chirp, and the frequency response from its record."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Chirp:
 
     @property
     def parameters(self) -> Row:
-        """(1 + 4 · axes,)"""
+        """Row of parameters, shape (1 + 4 · axes,)."""
         n = axis_count(self.axes)
         amplitude = checked("amplitude", self.amplitude, n)
         names = ("first", "last", "duration")
@@ -52,7 +52,7 @@ class Chirp:
 
 @compiles
 def chirp(parameters: Row, i: int, time: float) -> float:
-    """The value of axis `i` at `time` [s]: A sin(2π f₀ T / ln(f₁/f₀) ((f₁/f₀)^(t/T) - 1))."""
+    """Return the value of axis `i` at `time`: A sin(2π f₀ T / ln(f₁/f₀) ((f₁/f₀)^(t/T) - 1))."""
     if parameters[0] != KIND:
         raise ValueError("chirp: these are not the parameters of a Chirp")
     p = 1 + NUMBERS * i
@@ -76,13 +76,13 @@ class FrequencyResponse:
 
     @property
     def magnitude_db(self) -> Row:
-        """(k,) [dB]"""
+        """Magnitude [dB], shape (k,)."""
         decibels: Row = 20 * np.log10(abs(self.response))
         return decibels
 
     @property
     def phase_deg(self) -> Row:
-        """(k,) [degrees], without jumps."""
+        """Phase [degrees], shape (k,), unwrapped."""
         degrees: Row = np.degrees(np.unwrap(np.angle(self.response)))
         return degrees
 

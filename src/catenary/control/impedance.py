@@ -1,4 +1,4 @@
-"""An axis that behaves as a spring and a damper, its friction found by a disturbance observer."""
+"""Impedance control: spring and damper, with a disturbance observer for friction."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Impedance:
 
     @property
     def memory(self) -> Row:
-        """(3 · axes,) zeros: begins with no disturbance."""
+        """Initial memory: zeros, shape (3 · axes,); no disturbance."""
         return np.zeros(STATES * self.axes)
 
 

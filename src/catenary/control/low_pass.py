@@ -34,7 +34,7 @@ class LowPass:
 
     @property
     def parameters(self) -> Row:
-        """(1 + 5 · axes,)"""
+        """Row of parameters, shape (1 + 5 · axes,)."""
         if not self.period > 0:
             raise ValueError(f"period={self.period} s: must be positive")
         cutoff = checked("cutoff", self.cutoff, axis_count(self.axes), above=True)
@@ -51,13 +51,13 @@ class LowPass:
 
     @property
     def memory(self) -> Row:
-        """(3 · axes,) zeros: begins at rest at its first input."""
+        """Initial memory: zeros, shape (3 · axes,); begins at rest at its first input."""
         return np.zeros(STATES * self.axes)
 
 
 @compiles
 def low_pass(memory: Row, parameters: Row, i: int, value: float) -> float:
-    """The next output of axis `i`, in the unit of `value`."""
+    """Return the next output of axis `i`, in the unit of `value`."""
     if parameters[0] != KIND:
         raise ValueError("low_pass: these are not the parameters of a LowPass")
     m, p = STATES * i, 1 + COEFFICIENTS * i

@@ -38,7 +38,7 @@ class Model:
 def load_model(
     path: Path, joints: Sequence[str] | None, axes: int | None, armature: PerAxis
 ) -> Model:
-    """ConfigurationError: MuJoCo is not there, or the file, or the joints."""
+    """Load a model. Raises ConfigurationError if MuJoCo, the file or a joint is missing."""
     mujoco = _mujoco()
     native = _native(mujoco, path)
     flags = mujoco.mjtDisableBit
@@ -69,7 +69,7 @@ def _native(mujoco: Any, path: Path) -> Any:
     except OSError as error:
         raise ConfigurationError(f"{path}: {error.strerror}") from error
     except ElementTree.ParseError as error:
-        raise ConfigurationError(f"{path} is no XML: {error}", hint=XACRO) from error
+        raise ConfigurationError(f"{path} is not XML: {error}", hint=XACRO) from error
     try:
         if root.tag != "robot":
             return mujoco.MjModel.from_xml_path(str(path))

@@ -14,7 +14,7 @@ PerAxis = float | Sequence[float] | npt.NDArray[np.float64]
 
 
 def join(*parts: Sequence[float] | Row) -> Row:
-    """One row of several, each found again by `part(row, k)`. Parts may be empty."""
+    """Join several rows into one; `part(row, k)` returns part k. Parts may be empty."""
     rows = [np.asarray(part, dtype=np.float64).ravel() for part in parts]
     first = len(rows) + 2  # count, where each begins, the end
     begins = first + np.cumsum([0, *map(len, rows)])
@@ -23,7 +23,7 @@ def join(*parts: Sequence[float] | Row) -> Row:
 
 @compiles
 def part(row: Row, k: int) -> Row:
-    """Part `k` of a row made by `join`: a view, in a law too."""
+    """Return part `k` of a row made by `join`: a view, also in a law."""
     if k < 0 or k >= row[0]:
         raise IndexError("the row has no such part: see control.join")
     return row[int(row[1 + k]) : int(row[2 + k])]
@@ -74,5 +74,5 @@ def axis_count(axes: int) -> int:
 
 
 def table(kind: float, *columns: Row) -> Row:
-    """A block's parameters: its kind, then one line of numbers for each axis."""
+    """Return a block's parameters: its kind, then one line of numbers for each axis."""
     return np.concatenate([[kind], np.column_stack(columns).ravel()])

@@ -44,12 +44,12 @@ class Pid:
 
     @property
     def parameters(self) -> Row:
-        """(1 + 7 · axes,)"""
+        """Row of parameters, shape (1 + 7 · axes,)."""
         return table(KIND, *self.columns())
 
     @property
     def memory(self) -> Row:
-        """(5 · axes,) zeros: begins at its first step."""
+        """Initial memory: zeros, shape (5 · axes,)."""
         return np.zeros(STATES * self.axes)
 
     def columns(self) -> list[Row]:
@@ -76,7 +76,7 @@ def pid(
     feed_forward: float,
     dt: float,
 ) -> float:
-    """One step of axis `i`: the output, `feed_forward` within it. `dt` [s]."""
+    """Compute one step of axis `i`; the output includes `feed_forward`. `dt` [s]."""
     if parameters[0] != KIND:
         raise ValueError("pid: these are not the parameters of a Pid")
     return pid_step(

@@ -171,7 +171,7 @@ class _Bounds:
         self._check_position("goal", q)
 
     def check_way(self, lowest: Row, highest: Row) -> None:
-        """ValueError: the motion has to pass a position limit."""
+        """Raise ValueError if the motion exceeds a position limit."""
         self._check_position("the way there: its lowest position", lowest)
         self._check_position("the way there: its highest position", highest)
 
@@ -185,7 +185,7 @@ class _Bounds:
 
 
 def _raise_first(what: str, row: Row, wrong: npt.NDArray[np.bool_], *why: object) -> None:
-    """ValueError for the first axis that is wrong."""
+    """Raise ValueError for the first axis with an invalid value."""
     for i in np.flatnonzero(wrong).tolist():
         limit, name = why[0], why[1] if len(why) > 1 else "limit"
         said = limit if isinstance(limit, str) else f"beyond its {name} {np.asarray(limit)[i]:g}"
@@ -219,7 +219,7 @@ def _ruckig() -> Any:
 
 
 def _piece(ruckig: Any, begin: tuple[Row, Row, Row], goal: Row, bounds: _Bounds) -> Any:
-    """ruckig's trajectory from one state to rest."""
+    """Return ruckig's trajectory from one state to rest."""
     n = len(goal)
     wanted = ruckig.InputParameter(n)
     q, v, a = begin

@@ -1,11 +1,11 @@
-"""Whether this machine is fit for a real-time EtherCAT loop: `catenary doctor`, docs/doctor.md.
+"""Checks whether this machine suits a real-time EtherCAT loop: `catenary doctor`, docs/doctor.md.
 
     machine = this_machine("eth0")              # asks the kernel and the driver, changes nothing
     machine, latency = watch(machine, 3.0, cpu=None)
     examination = examine(machine, latency)     # pure: from a Machine to verdicts
     print(as_text(examination))
 
-It sends no frame and changes nothing; `apply` and `undo` are called by those who were asked.
+It sends no frame and changes nothing; only `apply` and `undo` change settings.
 """
 
 from catenary.doctor.change import (

@@ -1,4 +1,4 @@
-"""Card: what the driver of a network card says of it. A value; `ethtool.read_card` asks."""
+"""Card: the settings that a network driver reports. A value; `ethtool.read_card` makes it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ ARPHRD_ETHER = 1  # linux/if_arp.h
 
 @dataclass(frozen=True, slots=True)
 class Coalescing:
-    """How long the card holds back its interrupt: `ethtool -c`."""
+    """Delay of the card's interrupts: `ethtool -c`."""
 
     rx_usecs: int
     rx_frames: int
@@ -35,10 +35,10 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class Card:
-    """None: the driver does not answer that question; `refusals` has its words for it.
+    """A network card. None: the driver does not report the value; `refusals` has its error.
 
-    index, hardware_type (ARPHRD_...), up, running: as the interface's own network namespace has
-    them, which /sys need not show. running: there is a carrier.
+    index, hardware_type (ARPHRD_...), up, running: from the interface's own network namespace,
+    which /sys may not show. running: there is a carrier.
     """
 
     name: str

@@ -1,9 +1,8 @@
 """Changes of `--apply`, and how `--undo` takes them back.
 
-Only what is reversible: a value of /proc or /sys, a setting of the card's driver, or the folder of
-shares, which is read before it is written. The old values are on disk before anything is changed.
-A reboot undoes everything, too. Nothing outside of `TARGETS` is written, whatever the state file
-contains.
+All changes are reversible: values of /proc or /sys, settings of the card's driver, and the folder
+of shares. The old values are saved on disk before anything is changed. A reboot undoes everything,
+too. Only `TARGETS` are written, whatever the state file contains.
 """
 
 from __future__ import annotations
@@ -41,7 +40,7 @@ TARGETS = (
 
 
 class StateError(CatenaryError):
-    """What was changed cannot be noted down, or what is noted down cannot be read."""
+    """The state file of changes cannot be written or read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +55,7 @@ class Change:
 
 
 class Made(msgspec.Struct, frozen=True):
-    """A change that was made, and what was there before."""
+    """A change that was made, and the previous value."""
 
     target: str
     before: str
@@ -71,7 +70,7 @@ class Noted(msgspec.Struct, frozen=True):
 
 
 class Ground(Protocol):
-    """What changes are made to."""
+    """The target of changes: this machine, or a simulated one."""
 
     def read(self, target: str) -> str: ...
     def write(self, target: str, value: str) -> None: ...
@@ -79,7 +78,7 @@ class Ground(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class MachineGround:
-    """This machine; `root` is another place for its files. OSError: refused."""
+    """This machine; `root` is the folder of its files. Raises OSError if refused."""
 
     root: Path = Path("/")
 
@@ -120,13 +119,13 @@ def whole_number(value: str, target: str) -> int:
 
 
 def chosen(text: str) -> str:
-    """The word in brackets, where a file lists all that it could hold."""
+    """Return the word in brackets if a file lists all possible values, else the text."""
     words = [word for word in text.split() if word.startswith("[") and word.endswith("]")]
     return words[0][1:-1] if words else text
 
 
 class HostState:
-    """Owns the file of what was changed since the machine was started."""
+    """Owner of the state file: the changes since the machine was started."""
 
     def __init__(self, path: Path, boot: str) -> None:
         self.path = path
@@ -144,7 +143,7 @@ class HostState:
             return []
         except (OSError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
             raise StateError(
-                f"{self.path} does not tell what was changed: {error}",
+                f"{self.path} cannot be read: {error}",
                 hint="a reboot undoes everything that --apply did; then delete the file",
             ) from error
         return noted.made if noted.boot == self.boot else []
@@ -162,7 +161,7 @@ class HostState:
             return file.read()
 
     def save(self, made: Sequence[Made]) -> None:
-        """Write it whole or not at all. Raises StateError: a full disk, or no permission."""
+        """Write the file atomically. Raises StateError if the disk is full or access is denied."""
         text = msgspec.json.format(msgspec.json.encode(Noted(self.boot, list(made))), indent=2)
         new = self.path.with_suffix(".new")
         try:
@@ -203,13 +202,13 @@ def open_state() -> HostState:
 
 
 def apply(changes: Sequence[Change], ground: Ground, state: HostState) -> Iterator[str]:
-    """Makes them one by one, and says of each what became of it."""
+    """Make the changes one by one, and yield a line with the result of each."""
     made = state.load()
     for change in changes:
         try:
             before = ground.read(change.target)
             if before == change.after:
-                yield f"as it should be already: {change}"
+                yield f"already set: {change}"
                 continue
             state.save([*made, Made(change.target, before, change.after)])
             ground.write(change.target, change.after)
@@ -222,13 +221,15 @@ def apply(changes: Sequence[Change], ground: Ground, state: HostState) -> Iterat
 
 
 def undo(ground: Ground, state: HostState) -> Iterator[str]:
-    """Takes all back, the last first. What somebody changed since is left as it is; what is refused
-    stays noted."""
+    """Undo all changes, the last first, and yield a line with the result of each.
+
+    Keep values that were changed since. Refused changes stay in the state file.
+    """
     left: list[Made] = []
     for made in reversed(state.load()):
         try:
             if ground.read(made.target) != made.after:
-                yield f"left, since it was changed by somebody else: {made.target}"
+                yield f"not undone, because it was changed since: {made.target}"
                 continue
             ground.write(made.target, made.before)
         except OSError as error:

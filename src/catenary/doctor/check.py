@@ -1,4 +1,4 @@
-"""Check: one question about this machine, its verdict, and what to type."""
+"""Check: one property of this machine, its verdict, and the commands that improve it."""
 
 from __future__ import annotations
 
@@ -12,11 +12,13 @@ Status: TypeAlias = Literal["PASS", "WARN", "FAIL", "SKIP"]
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """PASS: as it should be. WARN: cycles may come late. FAIL: they will, or nothing runs at all.
-    SKIP: it cannot be known here, and `found` says why.
+    """Result of one check.
 
-    id: its heading in docs/doctor.md. advice: what to type; empty where nothing is to be done.
-    changes: what `--apply` would do about it; all of them can be undone.
+    PASS: good. WARN: cycles may be late. FAIL: cycles will be late, or nothing runs at all.
+    SKIP: unknown on this machine; `found` has the reason.
+
+    id: its heading in docs/doctor.md. advice: commands to type; empty if there is nothing to do.
+    changes: what `--apply` would change; all of them can be undone.
     """
 
     id: str

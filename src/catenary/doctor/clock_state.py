@@ -1,4 +1,4 @@
-"""How the kernel's clock is being adjusted: adjtimex(2), asked without changing anything."""
+"""Adjustment of the kernel's clock: adjtimex(2), read-only."""
 
 from __future__ import annotations
 
@@ -13,8 +13,11 @@ STA_NANO = 0x2000  # linux/timex.h: offset in ns
 
 @dataclass(frozen=True, slots=True)
 class ClockState:
-    """slew_ppm: by how much CLOCK_MONOTONIC runs fast of the crystal at this moment.
-    offset: [s] still to be slewed away. resolution: [s] of timers."""
+    """Adjustment of the clock.
+
+    slew_ppm: present rate of CLOCK_MONOTONIC relative to the crystal; positive: fast.
+    offset: time still to be slewed [s]. resolution: resolution of timers [s].
+    """
 
     slew_ppm: float
     offset: float
@@ -22,7 +25,7 @@ class ClockState:
 
 
 class Timex(ctypes.Structure):
-    """`struct timex` of linux/timex.h, as far as it is needed."""
+    """The used part of `struct timex` of linux/timex.h."""
 
     _fields_ = (
         ("modes", ctypes.c_uint),
@@ -41,7 +44,7 @@ class Timex(ctypes.Structure):
 
 
 def read_clock_state() -> ClockState | None:
-    """None: the kernel refuses to say."""
+    """Return the state of the clock; None if the kernel refuses the call."""
     timex = Timex(modes=0)
     if ctypes.CDLL(None).adjtimex(ctypes.byref(timex)) < 0:
         return None

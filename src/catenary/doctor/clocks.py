@@ -1,7 +1,7 @@
-"""The machine's clocks: how dear they are to read, and who bends them.
+"""Checks of the machine's clocks: the cost of reading them, and the daemons that slew them.
 
-A loop keeps its period by CLOCK_MONOTONIC, which steps of the time of day leave alone; its rate,
-though, is bent (slewed) by whoever corrects the time of day.
+A loop keeps its period by CLOCK_MONOTONIC. Steps of the time of day do not affect this clock, but
+a daemon that corrects the time of day slews its rate.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from catenary.doctor.machine import Machine
 
 SOURCE = "/sys/devices/system/clocksource/clocksource0/current_clocksource"
 FAST_SOURCES = {"tsc", "arch_sys_counter", "kvm-clock", "hyperv_clocksource_tsc_page", "riscv"}
-HARMLESS_PPM = 500.0  # the most that the kernel's own correction does: 0.5 us in 1 ms
-LARGEST_SLEW = {  # [ppm] that each daemon may do, as it comes
+HARMLESS_PPM = 500.0  # maximum of the kernel's own correction: 0.5 us in 1 ms
+LARGEST_SLEW = {  # [ppm] default maximum of each daemon
     "chronyd": 83_333.333,  # maxslewrate, chrony.conf(5)
     "ptp4l": 900_000.0,  # max_frequency, ptp4l(8)
     "phc2sys": 900_000.0,
@@ -46,7 +46,7 @@ def slewing(machine: Machine) -> Check:
     if now is not None and abs(now.slew_ppm) > HARMLESS_PPM:
         return warned(
             id,
-            f"the clock is being bent by {now.slew_ppm:+.0f} ppm at this moment: a period of 1 ms "
+            f"the clock is being slewed by {now.slew_ppm:+.0f} ppm now: a period of 1 ms "
             f"is {1.0 + now.slew_ppm * 1e-6:.6f} ms of the crystal",
             "wait until it has settled, or correct the time before the loop starts",
         )
@@ -57,13 +57,13 @@ def slewing(machine: Machine) -> Check:
     if strong:
         return warned(
             id,
-            f"{' and '.join(strong)} may bend the clock by up to {daemons[strong[0]]:.0f} ppm",
+            f"{' and '.join(strong)} may slew the clock by up to {daemons[strong[0]]:.0f} ppm",
             "chrony: `maxslewrate 100` in /etc/chrony/chrony.conf; sudo systemctl restart chrony"
             if "chronyd" in strong
             else "`max_frequency 500000` (ppb) in its configuration file",
         )
     if now is None:
-        return skipped(id, "the kernel does not tell how its clock is adjusted")
+        return skipped(id, "the kernel does not report how its clock is adjusted")
     who = (
         f"{' and '.join(daemons)}, at most {HARMLESS_PPM:.0f} ppm" if daemons else "no daemon seen"
     )
@@ -71,7 +71,7 @@ def slewing(machine: Machine) -> Check:
 
 
 def chrony_limit(machine: Machine) -> float:
-    """[ppm] of the last `maxslewrate`; chrony's own where none is set."""
+    """Return the last `maxslewrate` of the configuration [ppm]; chrony's default if not set."""
     files = [path for pattern in CHRONY_FILES for path in machine.matching(pattern)]
     text = "\n".join(machine.text(path) or "" for path in files)
     found = re.findall(r"^\s*maxslewrate\s+([\d.]+)", text, re.MULTILINE | re.IGNORECASE)

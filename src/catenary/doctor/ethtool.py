@@ -1,7 +1,7 @@
 """The ethtool requests of a network driver (linux/ethtool.h), without the ethtool program.
 
-Questions need no privilege. The two changes there are (coalescing, EEE) read the whole structure,
-change one field and write it back, as ethtool does.
+Reading needs no privilege. The two changes (coalescing, EEE) read the whole structure, change one
+field and write it back, as ethtool does.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ IFF_UP, IFF_RUNNING = 1 << 0, 1 << 6  # linux/if.h
 GDRVINFO, GCOALESCE, SCOALESCE = 0x03, 0x0E, 0x0F
 GFLAGS, GGRO, GEEE, SEEE, GLINKSETTINGS = 0x25, 0x2B, 0x44, 0x45, 0x4C
 DRVINFO_SIZE, COALESCE_SIZE, EEE_SIZE = 196, 23 * 4, 10 * 4
-LINK_SETTINGS_SIZE = 48  # and three masks of link modes behind it
+LINK_SETTINGS_SIZE = 48  # three masks of link modes follow
 MODE_WORDS_AT = 15  # link_mode_masks_nwords, a signed byte
 FLAG_LRO = 1 << 15
 DUPLEX = {0: False, 1: True}  # 0xFF: unknown
@@ -36,7 +36,17 @@ Answer = TypeVar("Answer")
 
 
 def request(name: str, command: int, size: int, start: bytes = b"") -> bytes:
-    """The driver's answer. OSError: it has none, or refuses."""
+    """Send a request to the driver, and return its answer.
+
+    Args:
+        name: network interface.
+        command: ETHTOOL_... command.
+        size: size of the structure [bytes].
+        start: content of the structure after the command.
+
+    Raises:
+        OSError: the driver does not support the request, or refuses it.
+    """
     buffer = array.array("B", (struct.pack("=I", command) + start).ljust(size, b"\0"))
     interface = struct.pack("16sP16x", name.encode(), buffer.buffer_info()[0])  # struct ifreq
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
@@ -45,7 +55,7 @@ def request(name: str, command: int, size: int, start: bytes = b"") -> bytes:
 
 
 def read_card(name: str) -> Card:
-    """Everything the driver of a network interface says; what it does not is in `refusals`."""
+    """Return all settings that the driver of an interface reports; `refusals` has the errors."""
     refusals: dict[str, str] = {}
 
     def ask(what: str, question: Callable[[str], Answer]) -> Answer | None:
@@ -75,7 +85,7 @@ def read_card(name: str) -> Card:
 
 
 def interface_word(name: str, command: int) -> int:
-    """The first 16 bits of an answer to one of the SIOCGIF* requests (`struct ifreq`)."""
+    """Return the first 16 bits of the answer to a SIOCGIF* request (`struct ifreq`)."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
         answer = fcntl.ioctl(asking, command, struct.pack("16s24x", name.encode()))
     return int(struct.unpack_from("=H", answer, 16)[0])
@@ -87,7 +97,7 @@ def refusal(error: OSError) -> str:
 
 
 def read_driver(name: str) -> tuple[str, str]:
-    """The driver's name and where the card is: `struct ethtool_drvinfo`."""
+    """Return the driver's name and the card's bus address: `struct ethtool_drvinfo`."""
     answer = request(name, GDRVINFO, DRVINFO_SIZE)
     return c_string(answer, 4), c_string(answer, 100)
 
@@ -97,7 +107,7 @@ def c_string(answer: bytes, at: int) -> str:
 
 
 def read_link(name: str) -> Link:
-    """`struct ethtool_link_settings`: asked twice, since the kernel first says how long it is."""
+    """Read `struct ethtool_link_settings`: the first request returns the length of its masks."""
     first = request(name, GLINKSETTINGS, LINK_SETTINGS_SIZE)
     words = abs(struct.unpack_from("b", first, MODE_WORDS_AT)[0])
     start = bytes(MODE_WORDS_AT - 4) + struct.pack("b", words)
@@ -128,7 +138,7 @@ def decode_eee(answer: bytes) -> Eee:
 
 
 def flag(answer: bytes, mask: int) -> bool:
-    """`struct ethtool_value`."""
+    """Return a flag of `struct ethtool_value`."""
     return bool(struct.unpack_from("=2I", answer)[1] & mask)
 
 
@@ -138,7 +148,7 @@ def read_setting(name: str, setting: str) -> int:
 
 
 def write_setting(name: str, setting: str, value: int) -> None:
-    """OSError: the driver refuses."""
+    """Change one setting of the driver. Raises OSError if the driver refuses."""
     read, write, size, at = SETTINGS[setting]
     answer = bytearray(request(name, read, size))
     struct.pack_into("=I", answer, at, value)

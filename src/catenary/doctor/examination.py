@@ -1,4 +1,4 @@
-"""All checks, in the order in which they are shown: the ground first, the measurement last."""
+"""All checks, in the order of the report: machine first, measurement last."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ CHANGES_THE_PORT = "nic-"  # ids whose changes touch the card
 
 @dataclass(frozen=True, slots=True)
 class Examination:
-    """groups: title and checks, in order. latency: what was measured; None: nothing."""
+    """Results of all checks. groups: titles and checks, in order. latency: None if not measured."""
 
     groups: tuple[tuple[str, tuple[Check, ...]], ...]
     latency: Latency | None = None
@@ -44,7 +44,7 @@ class Examination:
 
     @property
     def changes(self) -> tuple[Change, ...]:
-        """What `--apply` may do. A port that carries this machine's network is left alone."""
+        """Changes that `--apply` may make; none to a port that carries this machine's network."""
         in_use = any(check.id == "nic-use" and check.status == "FAIL" for check in self.checks)
         return tuple(
             change
@@ -55,7 +55,7 @@ class Examination:
 
 
 def examine(machine: Machine, latency: Latency | None = None) -> Examination:
-    """Judges a machine by its files and answers; `latency` as it was measured there."""
+    """Run all checks on a machine. `latency`: as measured on it; None: not measured."""
     groups = [(title, tuple(check(machine) for check in checks)) for title, checks in GROUPS]
     card = machine.card
     if card is None:
@@ -75,7 +75,16 @@ def no_card(machine: Machine) -> Check:
 
 
 def watch(machine: Machine, seconds: float, *, cpu: int | None) -> tuple[Machine, Latency]:
-    """Measures how late threads wake, and what goes out on the port meanwhile."""
+    """Measure how late threads wake, and count the frames sent on the port meanwhile.
+
+    Args:
+        machine: the machine to measure.
+        seconds: duration [s].
+        cpu: processor of the measuring thread; None: any.
+
+    Returns:
+        The machine with `watched` and `sent`, and the latency.
+    """
     before = machine.frames_sent()
     latency = measure(seconds, period=machine.period, priority=machine.priority, cpu=cpu)
     after = machine.frames_sent()
@@ -86,7 +95,18 @@ def watch(machine: Machine, seconds: float, *, cpu: int | None) -> tuple[Machine
 def this_machine(
     nic: str | None, *, cpu: int | None = None, period: float = 1e-3, priority: int = 80
 ) -> Machine:
-    """LinkError: there is no such network interface. ValueError: no such CPU."""
+    """Return this machine as the checks need it.
+
+    Args:
+        nic: network interface; None: no card is checked.
+        cpu: processor of the loop; None: chosen by the doctor.
+        period: period of the loop [s].
+        priority: SCHED_FIFO priority of the loop's thread.
+
+    Raises:
+        LinkError: the network interface does not exist.
+        ValueError: the CPU does not exist.
+    """
     card = None if nic is None else known_card(nic)
     machine = Machine(
         root=Path("/"),

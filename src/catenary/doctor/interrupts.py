@@ -1,4 +1,4 @@
-"""Who carries the card's interrupts, and whether a loop may therefore spin."""
+"""Checks of the CPUs that handle the card's interrupts, and whether a loop may busy-wait."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from catenary.doctor.machine import Machine, as_list, cpu_list
 
 
 def card_interrupts(machine: Machine, card: Card) -> list[int]:
-    """Numbers of its lines in /proc/interrupts, by its name or its device's; else its MSI ones."""
+    """Return its interrupt numbers in /proc/interrupts, by name or device; else the MSI ones."""
     place = f"/sys/class/net/{card.name}"
     names = [card.name, *filter(None, [device_name(machine, place)])]
     known = "|".join(map(re.escape, names))
@@ -23,13 +23,13 @@ def card_interrupts(machine: Machine, card: Card) -> list[int]:
 
 
 def device_name(machine: Machine, place: str) -> str:
-    """virtio3 for a paravirtual card, whose interrupts have that name."""
+    """Return the device name of a paravirtual card, such as virtio3: its interrupts have it."""
     device = machine.path(f"{place}/device")
     return device.resolve().name if device.exists() else ""
 
 
 def carriers(machine: Machine, numbers: list[int]) -> dict[int, frozenset[int]]:
-    """The CPUs each interrupt may go to; those that do not tell are left out."""
+    """Return the CPUs that each interrupt may go to, without interrupts of unknown affinity."""
     lists = {
         number: machine.text(f"/proc/irq/{number}/effective_affinity_list")
         or machine.text(f"/proc/irq/{number}/smp_affinity_list")
@@ -39,7 +39,7 @@ def carriers(machine: Machine, numbers: list[int]) -> dict[int, frozenset[int]]:
 
 
 def interrupts(machine: Machine, card: Card) -> Check:
-    """Documentation/core-api/irq/irq-affinity.rst"""
+    """Check the affinity of interrupts: Documentation/core-api/irq/irq-affinity.rst."""
     id = "nic-interrupts"
     affinities = carriers(machine, card_interrupts(machine, card))
     if not affinities:
@@ -66,14 +66,16 @@ def interrupts(machine: Machine, card: Card) -> Check:
 
 
 def spinning(machine: Machine, card: Card) -> Check:
-    """A loop that spins (`receive="busy"`) on the CPU that is to bring the answer loses every
-    frame: the interrupt's work never gets its turn."""
+    """Check whether a loop may busy-wait (`receive="busy"`).
+
+    On the CPU that handles the answers it would lose every frame: the interrupt's work never runs.
+    """
     id, cpu = "spin", machine.loop_cpu
     if len(machine.cpus) < 2:
         return warned(id, "unsafe: one CPU", 'the default, receive="wait"')
     affinities = carriers(machine, card_interrupts(machine, card))
     if not affinities:
-        return warned(id, "unsafe: who carries the answers is not known", 'receive="wait"')
+        return warned(id, "unsafe: the CPU that handles answers is unknown", 'receive="wait"')
     if any(cpu in cpus for cpus in affinities.values()):
         return warned(
             id,
@@ -83,7 +85,7 @@ def spinning(machine: Machine, card: Card) -> Check:
     if cpu not in machine.isolated_cpus:
         return warned(
             id,
-            f"unsafe: CPU {cpu} is also everybody else's (cpu-isolated)",
+            f"unsafe: other programs also use CPU {cpu} (cpu-isolated)",
             'receive="wait" (the default)',
         )
     return passed(id, f"safe on CPU {cpu}: the answers come by CPU {others(affinities)}")

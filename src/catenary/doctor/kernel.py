@@ -1,5 +1,4 @@
-"""The kernel: how it lets a thread go first, limits real-time threads, keeps time; and what is
-below it."""
+"""Checks of the kernel: preemption, limits of real-time threads, timers, virtualisation."""
 
 from __future__ import annotations
 
@@ -20,7 +19,7 @@ SHARP_TIMERS = 1e-6  # [s]
 
 
 def preemption_model(machine: Machine) -> str:
-    """rt, full, lazy, voluntary or none; empty where the kernel does not tell."""
+    """Return rt, full, lazy, voluntary or none; "" if the kernel does not report it."""
     version = machine.text("/proc/version") or ""
     if machine.number("/sys/kernel/realtime") == 1 or re.search(r"PREEMPT[_ ]RT", version):
         return "rt"
@@ -48,7 +47,7 @@ def preemption(machine: Machine) -> Check:
 
 
 def realtime_kernel(machine: Machine) -> str:
-    """How this distribution gives one."""
+    """Return how to get a real-time kernel on this distribution."""
     if machine.virtual or machine.container:
         return "a PREEMPT_RT kernel on the host; figures of a guest or container follow its host's"
     found = re.search(r'^ID="?(\w+)', machine.text("/etc/os-release") or "", re.MULTILINE)
@@ -62,7 +61,7 @@ def realtime_kernel(machine: Machine) -> str:
 
 
 def throttling(machine: Machine) -> Check:
-    """sched(7): real-time threads together get `runtime` of each `period`."""
+    """Check throttling: real-time threads together get `runtime` of each `period`, sched(7)."""
     id, path = "kernel-rt-throttling", "/proc/sys/kernel/sched_rt_runtime_us"
     runtime = machine.number(path)
     if runtime is None:
@@ -87,7 +86,7 @@ def throttling(machine: Machine) -> Check:
 def timers(machine: Machine) -> Check:
     id = "kernel-timers"
     if machine.clock is None:
-        return skipped(id, "the kernel does not tell its timers' resolution")
+        return skipped(id, "the kernel does not report its timers' resolution")
     resolution = machine.clock.resolution
     if resolution <= SHARP_TIMERS:
         return passed(id, f"high resolution ({resolution * 1e9:.0f} ns)")

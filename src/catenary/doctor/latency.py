@@ -1,7 +1,7 @@
-"""How late this machine wakes a thread, as cyclictest measures it: absolute instants, a histogram.
+"""Wake-up latency of this machine, measured as cyclictest does: absolute times, a histogram.
 
-The thread is a `realtime.Task` in a `realtime.session()`, as a user's would be: SCHED_FIFO, locked
-memory, processors kept awake. What of that was refused is said, and the figures are those without.
+The thread is a `realtime.Task` in a `realtime.session()`, as in a user's program: SCHED_FIFO,
+locked memory, processors kept awake. `scheduling` lists the settings that were refused.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ GOOD_SHARE, BAD_SHARE = 0.1, 0.5  # of the period
 
 @dataclass(frozen=True, slots=True)
 class Latency:
-    """Of every wake-up: [s] from its instant until the thread ran (Python included).
+    """Latency of all wake-ups: time from the planned wake-up until the thread ran, Python included.
 
-    histogram: (from, to, wake-ups), the buckets that are not empty.
+    Times in [s]. histogram: (from, to, wake-ups) of all buckets that are not empty.
     """
 
     seconds: float
@@ -41,7 +41,17 @@ def wake_up(task: Running) -> None:
 
 
 def measure(seconds: float, *, period: float, priority: int, cpu: int | None) -> Latency:
-    """Wakes a thread for so long [s]. ValueError: there is no such CPU."""
+    """Wake a thread periodically, and measure how late it runs.
+
+    Args:
+        seconds: duration [s].
+        period: period of the wake-ups [s].
+        priority: SCHED_FIFO priority of the thread.
+        cpu: processor of the thread; None: any.
+
+    Raises:
+        ValueError: the CPU does not exist.
+    """
     task = Task(wake_up, period=period, priority=priority, cpu=cpu, name="latency")
     with (
         session(best_effort=True) as prepared,
@@ -62,13 +72,13 @@ def measure(seconds: float, *, period: float, priority: int, cpu: int | None) ->
 
 
 def obtainable_cpu(machine: Machine) -> int | None:
-    """The loop's CPU; None where this container is not given it."""
+    """Return the loop's CPU; None if this container may not use it."""
     cpu, ours = machine.loop_cpu, os.sched_getaffinity(0)
     return cpu if cpu in ours or may_have(cpu, ours) else None
 
 
 def judge(latency: Latency | None, machine: Machine) -> Check:
-    """The worst against the period of the loop this machine is judged for."""
+    """Compare the worst latency with the period of the loop."""
     id = "latency"
     if latency is None or latency.lateness.count == 0:
         return skipped(id, "not measured", "catenary doctor --seconds 3")

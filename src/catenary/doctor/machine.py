@@ -1,4 +1,4 @@
-"""Machine: what the kernel says of itself in files, below a root that a test can make."""
+"""Machine: properties that the kernel reports in files, below a root that a test can create."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ CAP_NET_RAW, CAP_IPC_LOCK, CAP_SYS_NICE = 13, 14, 23  # linux/capability.h
 
 @dataclass(frozen=True)
 class Machine:
-    """Reads, and changes nothing.
+    """A read-only view of a machine.
 
-    card: what the driver of the network card answered; None: none was asked for.
-    clock: how the kernel's clock is being adjusted; None: it does not say.
-    wanted_cpu: the CPU the loop is to run on, where the user said so.
-    period: [s] of the loop this machine is judged for. priority: SCHED_FIFO of its thread.
-    watched: [s] for which the card's port was watched, and sent: frames that went out meanwhile.
+    card: the settings of the network card; None: no card was named.
+    clock: adjustment of the kernel's clock; None: not reported.
+    wanted_cpu: the CPU of the loop, if the user named one.
+    period: period of the loop [s]. priority: SCHED_FIFO priority of its thread.
+    watched: time for which the card's port was watched [s]. sent: frames sent meanwhile.
     """
 
     root: Path = Path("/")
@@ -46,7 +46,7 @@ class Machine:
         return self.root / path.lstrip("/")
 
     def text(self, path: str) -> str | None:
-        """Without white space around it; None: `lack(path)` says why."""
+        """Return the text of a file, stripped; None if it cannot be read (see `lack`)."""
         try:
             return self.path(path).read_text(errors="replace").strip()
         except OSError:
@@ -57,7 +57,7 @@ class Machine:
         return int(text) if text is not None and re.fullmatch(r"-?\d+", text) else None
 
     def lack(self, path: str) -> str:
-        """Why a file has no text."""
+        """Return why a file has no usable text."""
         try:
             self.path(path).read_bytes()
         except PermissionError:
@@ -69,24 +69,24 @@ class Machine:
         return f"{path} holds {self.text(path)!r}"
 
     def matching(self, pattern: str) -> list[str]:
-        """Paths, as the kernel names them, in their natural order."""
+        """Return the matching paths, as the kernel names them, in natural order."""
         found = (f"/{path.relative_to(self.root)}" for path in self.root.glob(pattern.lstrip("/")))
         return sorted(found, key=natural)
 
     def exists(self, path: str) -> bool:
         return self.path(path).exists()
 
-    # what several checks ask for
+    # properties that several checks use
 
     @cached_property
     def command_line(self) -> dict[str, str]:
-        """The kernel's, `name=value`; a bare word has the value ""."""
+        """Command line of the kernel, `name=value`; a bare word has the value ""."""
         words = (self.text("/proc/cmdline") or "").split()
         return {name: value for name, _, value in (word.partition("=") for word in words)}
 
     @cached_property
     def configuration(self) -> dict[str, str]:
-        """CONFIG_... of the kernel; empty where it is not kept."""
+        """CONFIG_... options of the kernel; empty if not available."""
         release = self.text("/proc/sys/kernel/osrelease") or ""
         text = self.text(f"/boot/config-{release}") or self._packed("/proc/config.gz")
         return dict(re.findall(r"^(CONFIG_\w+)=(\S+)", text, re.MULTILINE))
@@ -99,12 +99,12 @@ class Machine:
 
     @cached_property
     def processes(self) -> frozenset[str]:
-        """Names of the programs that run, those that this container sees."""
+        """Names of the running programs that are visible in this container."""
         names = (self.text(path) for path in self.matching("/proc/[0-9]*/comm"))
         return frozenset(name for name in names if name)
 
     def frames_sent(self) -> int | None:
-        """By the card, until now: /proc/net/dev of this network namespace, proc(5)."""
+        """Return the number of frames that the card has sent: /proc/net/dev, proc(5)."""
         if self.card is None:
             return None
         name = re.escape(self.card.name)
@@ -119,7 +119,7 @@ class Machine:
 
     @cached_property
     def allowed_cpus(self) -> frozenset[int]:
-        """Those this process is scheduled on; isolated ones have to be asked for by number."""
+        """CPUs that this process is scheduled on; isolated CPUs must be requested by number."""
         return cpu_list(self.status_field("Cpus_allowed_list"))
 
     @cached_property
@@ -129,14 +129,14 @@ class Machine:
 
     @cached_property
     def loop_cpu(self) -> int:
-        """Where the loop would run best: as wanted, else the last isolated CPU, else the last."""
+        """Best CPU for the loop: the one named, else the last isolated CPU, else the last CPU."""
         if self.wanted_cpu is not None:
             return self.wanted_cpu
         return max(self.isolated_cpus or self.allowed_cpus or self.cpus)
 
     @cached_property
     def other_cpus(self) -> frozenset[int]:
-        """For everything but the loop; empty where there is one CPU."""
+        """CPUs for everything except the loop; empty if there is only one CPU."""
         return self.cpus - self.isolated_cpus - {self.loop_cpu}
 
     def status_field(self, name: str) -> str | None:
@@ -144,7 +144,7 @@ class Machine:
         return found[1].strip() if found else None
 
     def limit(self, name: str) -> str | None:
-        """The soft limit of /proc/self/limits, as it stands there."""
+        """Return the soft limit of /proc/self/limits as text."""
         text = self.text("/proc/self/limits") or ""
         found = re.search(rf"^{re.escape(name)}\s+(\S+)", text, re.MULTILINE)
         return found[1] if found else None
@@ -154,13 +154,13 @@ class Machine:
 
     @cached_property
     def in_user_namespace(self) -> bool:
-        """Capabilities there are none for the machine's processors and memory."""
+        """True in a user namespace: its capabilities do not cover processors and memory."""
         text = self.text("/proc/self/uid_map")
         return text is not None and tuple(map(int, text.split())) != INITIAL_USER_NAMESPACE
 
     @cached_property
     def virtual(self) -> str:
-        """The hypervisor's name or kind; empty on real hardware."""
+        """Name or kind of the hypervisor; empty on real hardware."""
         if kind := self.text("/sys/hypervisor/type"):
             return kind
         if self.exists("/proc/device-tree/hypervisor"):
@@ -172,7 +172,7 @@ class Machine:
 
     @cached_property
     def container(self) -> str:
-        """What kind of container this is; empty: none that can be seen."""
+        """Kind of this container; empty if none is detected."""
         for path, kind in CONTAINER_FILES.items():
             if self.exists(path):
                 return kind or self.text(path) or "of some kind"
@@ -181,7 +181,7 @@ class Machine:
 
 
 DMI_NAMES = ("sys_vendor", "product_name")
-CONTAINER_FILES = {  # systemd's detect-virt looks at the same; "" : its text names the kind
+CONTAINER_FILES = {  # as in systemd-detect-virt; "": the file's text names the kind
     "/run/systemd/container": "",
     "/run/.containerenv": "podman",
     "/.dockerenv": "docker",
@@ -189,12 +189,12 @@ CONTAINER_FILES = {  # systemd's detect-virt looks at the same; "" : its text na
 
 
 def natural(text: str) -> list[tuple[int, str]]:
-    """cpu2 before cpu10."""
+    """Return a sort key that puts cpu2 before cpu10."""
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", text)]
 
 
 def cpu_list(text: str | None) -> frozenset[int]:
-    """`0-3,8` as cpuset(7) writes it. Empty where there is none, and for nohz_full's `(null)`."""
+    """Parse `0-3,8` of cpuset(7). Return an empty set for no text and for nohz_full's `(null)`."""
     cpus: set[int] = set()
     for part in (text or "").split(","):
         if found := re.fullmatch(r"\s*(\d+)(?:-(\d+))?\s*", part):
@@ -203,7 +203,7 @@ def cpu_list(text: str | None) -> frozenset[int]:
 
 
 def as_list(cpus: Iterable[int]) -> str:
-    """Shortest, as the kernel takes it: `0-3,8`."""
+    """Return the shortest list for the kernel: `0-3,8`."""
     runs: list[list[int]] = []
     for cpu in sorted(cpus):
         if runs and cpu == runs[-1][1] + 1:

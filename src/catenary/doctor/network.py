@@ -1,4 +1,4 @@
-"""The network card: what it is, what its driver does to frames, and who else sends on its port."""
+"""Checks of the network card: its driver, its settings, and other traffic on its port."""
 
 from __future__ import annotations
 
@@ -37,7 +37,10 @@ def directory(card: Card) -> str:
 
 
 def is_virtual(machine: Machine, card: Card) -> bool:
-    """No device behind it. /sys may be another network namespace's, and not have it at all."""
+    """Return True if no hardware is behind the interface.
+
+    /sys may belong to another network namespace and lack the interface.
+    """
     if card.driver in VIRTUAL_DRIVERS:
         return True
     return machine.exists(directory(card)) and not machine.exists(f"{directory(card)}/device")
@@ -47,7 +50,7 @@ def driver(machine: Machine, card: Card) -> Check:
     id, place = "nic-driver", directory(card)
     name = card.driver or "no driver named"
     if card.hardware_type != ARPHRD_ETHER:
-        words = f"{card.name} is no Ethernet (ARPHRD type {card.hardware_type})"
+        words = f"{card.name} is not an Ethernet card (ARPHRD type {card.hardware_type})"
         return failed(id, words, "a wired card")
     if machine.exists(f"{place}/wireless") or machine.exists(f"{place}/phy80211"):
         return failed(id, f"{card.name} is wireless ({name})", "a wired card: Intel i210 or i226")
@@ -90,14 +93,14 @@ def link(machine: Machine, card: Card) -> Check:
     if speed > ETHERCAT_SPEED:
         return warned(
             id,
-            f"{words}: EtherCAT devices have {ETHERCAT_SPEED}, so the other end is none",
+            f"{words}: EtherCAT devices have {ETHERCAT_SPEED}, so the other end is not one",
             "plug the cable into IN of the first device, without a switch",
         )
     return passed(id, words)
 
 
 def use(machine: Machine, card: Card) -> Check:
-    """/proc/net/route: a line for each IPv4 route, with the destination in hexadecimal."""
+    """Check for other use: /proc/net/route has a line for each IPv4 route, in hexadecimal."""
     id = "nic-use"
     lines = (machine.text("/proc/net/route") or "").splitlines()[1:]
     routes = [words[1] for line in lines if (words := line.split()) and words[0] == card.name]
@@ -146,7 +149,7 @@ def managed(machine: Machine, card: Card) -> Check:
 
 
 def traffic(machine: Machine, card: Card) -> Check:
-    """What really went out while nobody had a reason to send."""
+    """Check the frames that were sent while the doctor sent none."""
     id = "nic-traffic"
     if machine.sent is None or not machine.watched:
         return skipped(id, "not watched", f"catenary doctor {card.name} --seconds 60")
@@ -196,7 +199,7 @@ def eee(machine: Machine, card: Card) -> Check:
 def coalescing(machine: Machine, card: Card) -> Check:
     id, now = "nic-coalescing", card.coalescing
     if now is None:
-        return skipped(id, f"the driver does not say ({card.refusals.get('coalescing', '')})")
+        return skipped(id, f"the driver does not report it ({card.refusals.get('coalescing', '')})")
     if now.rx_usecs == 0 and not now.adaptive_rx:
         return passed(id, "every frame interrupts at once")
     place = f"{ETHTOOL}{card.name}"
@@ -212,7 +215,7 @@ def coalescing(machine: Machine, card: Card) -> Check:
 
 
 def offloads(machine: Machine, card: Card) -> Check:
-    """Documentation/networking/napi.rst, "IRQ suspension" and "Software IRQ coalescing"."""
+    """Check Documentation/networking/napi.rst, "IRQ suspension", "Software IRQ coalescing"."""
     id, place = "nic-offloads", directory(card)
     waits = {
         path: value

@@ -1,5 +1,4 @@
-"""What this user and this interpreter may do: memory, priorities, raw frames; and what a container
-takes away."""
+"""Checks of permissions: locked memory, priorities, raw frames; and limits of a container."""
 
 from __future__ import annotations
 
@@ -45,7 +44,7 @@ def memory_lock(machine: Machine) -> Check:
 
 
 def priority(machine: Machine) -> Check:
-    """RLIMIT_RTPRIO and RLIMIT_RTTIME, setrlimit(2)."""
+    """Check RLIMIT_RTPRIO and RLIMIT_RTTIME, setrlimit(2)."""
     id = "limit-rtprio"
     if machine.in_user_namespace:
         return namespace(machine, id, "Max realtime priority", machine.priority)
@@ -58,7 +57,7 @@ def priority(machine: Machine) -> Check:
     if limit != UNLIMITED and int(limit) < machine.priority:
         return failed(
             id,
-            f"priorities up to {limit}, and the loop wants SCHED_FIFO {machine.priority}",
+            f"priorities up to {limit}, but the loop needs SCHED_FIFO {machine.priority}",
             f"once: {machine.permission_command}; or {limits_line('rtprio 95')}",
         )
     if timeout != UNLIMITED:
@@ -71,13 +70,16 @@ def priority(machine: Machine) -> Check:
 
 
 def namespace(machine: Machine, id: str, limit: str, wanted: int) -> Check:
-    """user_namespaces(7): root there has no capability over the machine; its limits hold."""
+    """Check a limit in a user namespace: its root has no capability over the machine.
+
+    Only the limits apply: user_namespaces(7).
+    """
     value = machine.limit(limit) or "0"
     if value == UNLIMITED or int(value) >= wanted:
         return passed(id, f"{value}, by a limit (user namespace)")
     return failed(
         id,
-        f"this is a user namespace, whose root is none for this ({limit.lower()}: {value})",
+        f"this is a user namespace: its root lacks the permission ({limit.lower()}: {value})",
         "run outside of it; rootful containers: --cap-add SYS_NICE --cap-add IPC_LOCK",
     )
 
@@ -94,7 +96,7 @@ def raw_frames(machine: Machine) -> Check:
 
 
 def huge_pages(machine: Machine) -> Check:
-    """Documentation/admin-guide/mm/transhuge.rst"""
+    """Check transparent huge pages: Documentation/admin-guide/mm/transhuge.rst."""
     id = "memory-huge-pages"
     text = machine.text(HUGE_PAGES)
     if text is None:
@@ -110,7 +112,7 @@ def huge_pages(machine: Machine) -> Check:
 
 
 def container(machine: Machine) -> Check:
-    """The limits that a control group puts on processors."""
+    """Check the processor limits of the control group."""
     id = "container"
     if quota := processor_quota(machine):
         return failed(
@@ -135,7 +137,7 @@ def container(machine: Machine) -> Check:
 
 
 def groups(machine: Machine, controller: str) -> list[str]:
-    """Folders of this process's control group and those above, cgroups(7): version 2, then 1."""
+    """Return the folders of this process's control group and its parents, cgroups(7)."""
     folders = []
     for line in (machine.text("/proc/self/cgroup") or "").splitlines():
         number, controllers, path = line.split(":", 2)
@@ -151,7 +153,7 @@ def groups(machine: Machine, controller: str) -> list[str]:
 
 
 def processor_quota(machine: Machine) -> str:
-    """In words; empty: none."""
+    """Return the processor quota as text; "" if there is none."""
     for folder in groups(machine, "cpu"):
         quota, _, period = (machine.text(f"{folder}/cpu.max") or "max").partition(" ")
         if quota != "max":
@@ -164,7 +166,7 @@ def processor_quota(machine: Machine) -> str:
 
 
 def realtime_runtime(machine: Machine) -> int | None:
-    """[us] of the process's own group, version 1; None: it does not say."""
+    """Return the real-time runtime of the group [us], cgroups version 1; None if unknown."""
     for folder in groups(machine, "cpu"):
         runtime = machine.number(f"{folder}/cpu.rt_runtime_us")
         if runtime is not None:
@@ -208,7 +210,7 @@ def share_folder(machine: Machine) -> Check:
 
 
 def in_memory(machine: Machine, folder: str) -> bool:
-    """True if it is a tmpfs: a cycle must not wait for a disk."""
+    """Return True if the folder is a tmpfs: a cycle must not wait for a disk."""
     mounts = (line.split() for line in (machine.text("/proc/mounts") or "").splitlines())
     return any(words[1:3] == [folder, "tmpfs"] for words in mounts)
 

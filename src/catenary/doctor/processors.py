@@ -1,4 +1,4 @@
-"""The processors: one kept for the loop, at a steady speed, awake."""
+"""Checks of the processors: isolation of the loop's CPU, steady speed, idle states."""
 
 from __future__ import annotations
 
@@ -12,7 +12,13 @@ REBOOT = "in GRUB_CMDLINE_LINUX of /etc/default/grub; sudo update-grub; reboot"
 
 
 def boot_words(machine: Machine, *names: str, **others: str) -> str:
-    """What to add to the kernel's command line: `names` for the loop's CPU, and others."""
+    """Return the options to add to the kernel's command line.
+
+    Args:
+        machine: the machine.
+        names: options whose value is the loop's CPU.
+        others: options with their values.
+    """
     words = [f"{name}={machine.loop_cpu}" for name in names]
     words += [f"{name}={cpus}" for name, cpus in others.items()]
     return f"`{' '.join(words)}` {REBOOT}"
@@ -26,7 +32,7 @@ def isolated(machine: Machine) -> Check:
             return passed(id, f"CPU {cpus} kept free; run the loop on CPU {machine.loop_cpu}")
         return warned(
             id,
-            f"CPU {cpus} is kept free, and the loop is to run on CPU {machine.loop_cpu}",
+            f"CPU {cpus} is kept free, but the loop would run on CPU {machine.loop_cpu}",
             f"run it on CPU {max(machine.isolated_cpus)}: taskset -c {max(machine.isolated_cpus)}",
         )
     if not machine.other_cpus:
@@ -94,7 +100,7 @@ def governor(machine: Machine) -> Check:
 
 
 def idle_states(machine: Machine) -> Check:
-    """Documentation/admin-guide/pm/cpuidle.rst: `latency` is [us] to wake up from a state."""
+    """Check idle states: `latency` is [us] to wake up, Documentation/admin-guide/pm/cpuidle.rst."""
     id = "cpu-idle-states"
     if machine.command_line.get("idle") == "poll":
         return passed(id, "idle=poll: CPUs never sleep")

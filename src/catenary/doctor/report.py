@@ -1,4 +1,4 @@
-"""The examination for people (a line a check, the advice below it) and for programs."""
+"""Report of an examination: as text, one line for each check with its advice below, or as JSON."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ BAR = 40  # characters
 STEPS_US = (2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 50_000)
 COMMAND = re.compile(r"`[^`]*`|(?:\bsudo|\becho) [^;]*")
 UNBROKEN = "\0"
-BEYOND = 10**9  # the step of all that is above the last
+BEYOND = 10**9  # the step of all values above the last
 NOUNS: dict[Status, str] = {
     "PASS": "passed",
     "WARN": "warnings",
@@ -55,14 +55,14 @@ def check_lines(check: Check, colour: bool, width: int) -> Iterator[str]:
 
 
 def wrap(text: str, width: int) -> list[str]:
-    """Commands and what is quoted stay on one line, however long: they are to be copied."""
+    """Wrap a text, but keep commands and quoted parts on one line, so that they can be copied."""
     kept = COMMAND.sub(lambda found: found[0].replace(" ", UNBROKEN), text)
     lines = textwrap.wrap(kept, width, break_long_words=False, break_on_hyphens=False) or [""]
     return [line.replace(UNBROKEN, " ") for line in lines]
 
 
 def histogram_lines(latency: Latency) -> Iterator[str]:
-    """Wake-ups by how late they were, in steps of 1, 2, 5."""
+    """Yield a histogram of latencies, in steps of 1, 2, 5."""
     counts = by_steps(latency)
     most = max(counts.values(), default=0)
     for step in sorted(counts):
@@ -78,7 +78,7 @@ def step_words(step: int) -> str:
 
 
 def by_steps(latency: Latency) -> dict[int, int]:
-    """Each bucket counts where its upper end lies."""
+    """Sum the buckets by steps; the upper edge of a bucket selects its step."""
     counts: dict[int, int] = {}
     for _, above, count in latency.histogram:
         step = next((step for step in STEPS_US if above * 1e6 <= step), BEYOND)
@@ -91,14 +91,14 @@ def summary_lines(examination: Examination, width: int) -> Iterator[str]:
     counts = ", ".join(f"{counted[status]} {noun}" for status, noun in NOUNS.items())
     yield f"{len(examination.checks)} checks: {counts}"
     if failed := [check.id for check in examination.checks if check.status == "FAIL"]:
-        words = f"Not fit for a real-time loop as it is; first: {', '.join(failed)}"
+        words = f"Not fit for a real-time loop yet; fix first: {', '.join(failed)}"
         yield from wrap(words, width)
     elif counted["WARN"]:
-        yield "A loop will run here; the warnings are where its late cycles may come from."
+        yield "A loop will run here; the warnings show possible causes of late cycles."
     elif examination.latency is None:
-        yield "Nothing is against a real-time loop; how late threads wake was not measured."
+        yield "No obstacle to a real-time loop found; the wake-up latency was not measured."
     else:
-        yield "Fit for a real-time loop, as far as can be seen."
+        yield "Fit for a real-time loop: no check failed or warned."
     if examination.changes:
         settings = (
             "1 setting" if len(examination.changes) == 1 else f"{len(examination.changes)} settings"
@@ -108,7 +108,7 @@ def summary_lines(examination: Examination, width: int) -> Iterator[str]:
 
 
 def change_lines(changes: Sequence[Change], ground: Ground) -> Iterator[str]:
-    """Each with what is there now."""
+    """Yield a line for each change, with the current value."""
     for change in changes:
         try:
             now = ground.read(change.target)
@@ -118,7 +118,10 @@ def change_lines(changes: Sequence[Change], ground: Ground) -> Iterator[str]:
 
 
 def as_json(examination: Examination) -> str:
-    """`latency_us` is empty where nothing was measured; its times are in us, but for `seconds`."""
+    """Return the examination as JSON.
+
+    `latency_us` is empty if nothing was measured. Its times are in us, except `seconds`.
+    """
     return json.dumps(
         {
             "checks": [

@@ -1,6 +1,6 @@
-"""The folder in which a group of users shares memory: as a value that is read, written, undone.
+"""The folder in which a group of users shares memory, as a value that can be read and written.
 
-"absent"                    there is none
+"absent"                    it does not exist
 "3771 root:catenary"        permissions, owner, group
 """
 

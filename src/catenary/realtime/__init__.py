@@ -1,8 +1,9 @@
-"""Real time from Python: tasks with fixed priorities, their analysis, a clock that can be virtual;
-private networks, scheduling, children. Imports no NumPy before it is used.
+"""Real time from Python: tasks with fixed priorities, their analysis, machine and virtual clocks.
+
+Also private networks, scheduling and child processes. NumPy is imported on first use.
 
     def control(task, gain):
-        for job in task:            # every 2 ms, until it is to end
+        for job in task:            # every 2 ms, until the task is stopped
             ...
 
     with realtime.Tasks(realtime.Task(control, (0.5,), period=2e-3, priority=90)) as tasks:

@@ -1,4 +1,4 @@
-"""Clocks of tasks: the machine's and the virtual one. What waits, waits without the GIL."""
+"""Clocks of tasks: the machine's and the virtual one. Waiting releases the GIL."""
 
 from typing_extensions import Buffer
 
@@ -9,51 +9,51 @@ MACHINE_TIMER_SIZE: int
 VIRTUAL_TIME_SIZE: int
 
 class Timer:
-    """One waiter on a clock. One thread uses it; only `wake` may be called by others."""
+    """One waiter on a clock. It belongs to one thread; other threads may only call `wake`."""
 
     @property
     def capsule(self) -> object:
-        """The table of native/clock.h, for compiled code."""
+        """Clock table of native/clock.h, for compiled code."""
 
     @property
     def now_ns(self) -> int: ...
     @property
     def is_virtual(self) -> bool: ...
     def wait_until(self, deadline_ns: int) -> bool:
-        """True: the deadline has passed; False: woken before."""
+        """Wait. Return True if the deadline has passed, False if woken before."""
 
     def spend(self, duration_ns: int) -> None:
-        """Execution time: virtual: lets it pass; the machine's: computes that long."""
+        """Consume execution time: simulated on a virtual clock, computed on the machine's."""
 
     def wake(self) -> None:
-        """Ends the running or the next wait."""
+        """End the current or the next wait."""
 
 class MachineTimer(Timer):
     def __init__(self, memory: Buffer, offset: int = 0) -> None: ...
 
 class VirtualTime:
-    """The table of participants of a virtual clock, in shared memory."""
+    """Table of the participants of a virtual clock, in shared memory."""
 
     def __init__(self, memory: Buffer) -> None: ...
     def reset(self) -> None:
-        """Makes a table of memory that is all zeros."""
+        """Initialise the table. The memory must be all zeros."""
 
     @property
     def now_ns(self) -> int: ...
     def join(self, priority: int, cpu: int) -> int:
-        """A slot for somebody who is expected: time stands still until then."""
+        """Return a slot for a new participant. Time stands still until it first waits."""
 
     def expect(self, slot: int) -> None:
-        """As after `join`: somebody will come to this slot, again."""
+        """Reset the slot to its state after `join`: its participant is restarted."""
 
     def run(self, slot: int) -> None:
-        """The participant runs: time stands still until it waits."""
+        """Mark the participant as running: time stands still until it waits."""
 
     def step_aside(self, slot: int) -> None:
-        """Time goes on without the participant, until it runs or waits again."""
+        """Let time advance without the participant until it runs or waits again."""
 
     def remove(self, slot: int) -> None:
-        """The participant is gone; its slot is free."""
+        """Remove the participant and free its slot."""
 
 class VirtualTimer(Timer):
     slot: int

@@ -1,5 +1,5 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""Clocks of tasks: the machine's and the virtual one. What waits, waits without the GIL."""
+"""Clocks of tasks: the machine's and the virtual one. Waiting releases the GIL."""
 
 from cpython.buffer cimport PyBUF_CONTIG, PyBuffer_Release, PyObject_GetBuffer
 from cpython.exc cimport PyErr_CheckSignals
@@ -40,7 +40,7 @@ MACHINE_TIMER_SIZE = sizeof(machine_time)
 VIRTUAL_TIME_SIZE = sizeof(virtual_time)
 
 cdef enum:
-    SPENT_AT_ONCE_NS = 10_000_000        # between two looks at Python's signals
+    SPENT_AT_ONCE_NS = 10_000_000        # between two checks for Python's signals
 
 
 cdef class Memory:
@@ -102,7 +102,7 @@ cdef class Timer:
 
 
 cdef class MachineTimer(Timer):
-    """`memory` is zeros at first, and shared by all who wake this waiter."""
+    """A waiter on CLOCK_MONOTONIC. `memory` starts as zeros; all threads that wake it share it."""
 
     def __init__(self, memory, size_t offset=0):
         self.memory = Memory(memory)
@@ -114,7 +114,7 @@ cdef class MachineTimer(Timer):
 
 
 cdef class VirtualTime:
-    """Owns the view of a table of participants; `memory` is shared by all of them."""
+    """A view of the participants' table; all participants share its `memory`."""
     cdef Memory memory
     cdef virtual_time *time
 
@@ -170,7 +170,7 @@ cdef int virtual_wait_until(void *owner, int64_t deadline) noexcept nogil:
 
 
 cdef int virtual_spend(void *owner, int64_t duration) noexcept nogil:
-    """Goes on after a signal: Python sees it when the time is spent, which is soon."""
+    """Continue after a signal. Python handles it once the time is spent, which is soon."""
     cdef participant_t *p = <participant_t *>owner
     cdef int error = vt_spend(p.time, p.slot, duration)
     while error == -EINTR:

@@ -1,4 +1,4 @@
-"""Values and queues between tasks, as bytes: neither side ever waits for the other."""
+"""Wait-free values and queues between tasks, as bytes."""
 
 from typing import TypeAlias
 
@@ -9,13 +9,13 @@ from typing_extensions import Buffer
 Array: TypeAlias = npt.NDArray[np.generic]
 
 def value_size(size: int) -> int:
-    """Bytes of memory for a value of `size` bytes."""
+    """Return the memory size [bytes] for a value of `size` bytes."""
 
 def queue_size(size: int, length: int) -> int:
-    """Bytes of memory for a queue of `length` records of `size` bytes."""
+    """Return the memory size [bytes] for a queue of `length` records of `size` bytes."""
 
 class ValueCore:
-    """A value in shared memory that was zeros at first; ValueError: bytes of another size."""
+    """A value in shared memory that starts as zeros. Raises ValueError if the size differs."""
 
     writer: int
     def __init__(self, memory: Buffer, size: int) -> None: ...
@@ -23,10 +23,10 @@ class ValueCore:
     def number(self) -> int: ...
     def write(self, data: Array | bytes) -> None: ...
     def read(self, into: Array | bytearray) -> int:
-        """The number of the value copied; -1: overwritten at every try."""
+        """Return the number of the copied value, or -1 if every attempt was overwritten."""
 
 class QueueCore:
-    """A queue in shared memory that was zeros at first; ValueError: bytes of another size."""
+    """A queue in shared memory that starts as zeros. Raises ValueError if the size differs."""
 
     producer: int
     consumer: int

@@ -1,5 +1,5 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""Values and queues between tasks, as bytes: neither side ever waits for the other."""
+"""Wait-free values and queues between tasks, as bytes."""
 
 from cpython.buffer cimport PyBUF_CONTIG, PyBUF_CONTIG_RO, PyBuffer_Release, PyObject_GetBuffer
 from libc.stdint cimport int32_t, int64_t, uint8_t, uint32_t, uint64_t
@@ -41,7 +41,7 @@ cdef int check_size(Py_buffer *view, uint32_t size) except -1:
 
 
 cdef class ValueCore:
-    """Owns the view of a value's memory."""
+    """A view of a value's memory."""
     cdef Memory memory
     cdef latest_value *c
 
@@ -82,7 +82,7 @@ cdef class ValueCore:
 
 
 cdef class QueueCore:
-    """Owns the view of a queue's memory."""
+    """A view of a queue's memory."""
     cdef Memory memory
     cdef record_queue *c
 

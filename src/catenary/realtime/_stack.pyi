@@ -1,4 +1,4 @@
-"""The stack of the calling thread, touched: its pages are there before they are needed."""
+"""Pre-fault the stack of the calling thread."""
 
 def touch_stack(size: int) -> None:
-    """The next `size` bytes; there must be room for them."""
+    """Touch the next `size` bytes of the stack, which must have room for them."""

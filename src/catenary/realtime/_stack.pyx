@@ -1,4 +1,4 @@
-"""The stack of the calling thread, touched: its pages are there before they are needed."""
+"""Pre-fault the stack of the calling thread."""
 
 cdef extern from *:
     """

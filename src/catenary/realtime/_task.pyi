@@ -1,4 +1,4 @@
-"""Tasks, compiled: their memory, seen by whoever started them; their releases, by themselves."""
+"""Compiled part of tasks: the memory that supervisor and task share, and the task's releases."""
 
 from typing_extensions import Buffer
 
@@ -12,27 +12,30 @@ BLOCK_SIZE: int
 FIGURE_NAMES: tuple[str, ...]
 
 class Block:
-    """One task's memory. The task's thread writes the job and the figures; others stop it, change
-    its period and signal it."""
+    """One task's memory.
+
+    The task's thread writes the job and the figures. Other threads stop it, change its period and
+    signal it.
+    """
 
     def __init__(self, memory: Buffer, offset: int = 0) -> None: ...
     def prepare(self, period_ns: int, deadline_ns: int, sporadic: bool, skip: bool) -> None:
-        """Also touches every page."""
+        """Initialise the block, and pre-fault its pages."""
 
     def restart(self) -> None:
-        """As new, but for the figures and the release reached."""
+        """Reset the block, but keep the figures and the last release."""
 
     def start_at(self, origin_ns: int) -> None:
-        """The first release."""
+        """Set the time of the first release."""
 
     def wait_for_start(self, deadline_ns: int) -> bool:
-        """Until `start_at` or `stop` is called; False: not by the deadline (CLOCK_MONOTONIC)."""
+        """Wait for `start_at` or `stop`. Return False at the deadline (CLOCK_MONOTONIC)."""
 
     def skip_to(self, now_ns: int) -> None:
-        """The next release is the first one that has not passed: after a restart."""
+        """Skip all releases that have passed, after a restart."""
 
     def wait_while(self, state: int, deadline_ns: int) -> None:
-        """Until the state is another, or the deadline (CLOCK_MONOTONIC); may return sooner."""
+        """Wait until the state changes, or the deadline (CLOCK_MONOTONIC). May return early."""
 
     state: int
     process: int
@@ -55,33 +58,36 @@ class Block:
     def release_ns(self) -> int: ...
     @property
     def counts(self) -> tuple[int, int, int, int]:
-        """Jobs released, deadlines missed, releases skipped, signals refused."""
+        """Numbers of jobs released, deadlines missed, releases skipped and signals refused."""
 
     def stop(self) -> None:
-        """The task ends when it waits; wake its timer too."""
+        """Request a stop: the task ends when it next waits. The caller also wakes its timer."""
 
     def signal(self, now_ns: int) -> bool:
-        """Releases a sporadic task once; wake its timer too. False: too many wait already."""
+        """Release a sporadic task once. The caller also wakes its timer.
+
+        Return False if too many releases are pending.
+        """
 
     def figure(self, number: int) -> tuple[int, float, int, int, float, float, float, float]:
-        """count, mean, min, max, sd, p50, p99, p99.9 of a figure, in the order of FIGURE_NAMES."""
+        """Return count, mean, min, max, sd, p50, p99, p99.9 of figure `number` of FIGURE_NAMES."""
 
     def buckets(self, number: int) -> list[tuple[int, int, int]]:
-        """(lowest, lowest above, count) of every bucket that is not empty."""
+        """Return (lower edge, upper edge, count) of every bucket that is not empty."""
 
 class Releases:
     """The releases of one task, in its own thread."""
 
     def __init__(self, block: Block, timer: Timer) -> None: ...
     def wait(self) -> bool:
-        """Until the next release; False: asked to stop."""
+        """Wait for the next release. Return False if a stop was requested."""
 
     def finish(self) -> bool:
-        """Ends the running job, if there is one; True: after its deadline."""
+        """End the current job, if any. Return True if it missed its deadline."""
 
     def spend(self, duration_ns: int) -> None: ...
     def count_collection(self, phase: str, info: dict[str, int]) -> None:
-        """For gc.callbacks."""
+        """Count a run of the garbage collector; for gc.callbacks."""
 
     @property
     def number(self) -> int: ...

@@ -1,6 +1,7 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""Tasks, compiled: their memory, seen by whoever started them; their releases, seen by themselves.
-Waiting, the computation of releases and all statistics happen here, without the GIL where it waits.
+"""Compiled part of tasks: the memory that supervisor and task share, and the task's releases.
+
+This module waits (without the GIL), computes releases and updates all statistics.
 """
 
 from cpython.exc cimport PyErr_CheckSignals
@@ -65,7 +66,7 @@ cdef void write_text(char *text, str value, size_t size):
 
 
 cdef class Block:
-    """Owns the view of one task's memory."""
+    """A view of one task's memory."""
     cdef Memory memory
     cdef task_block *c
 
@@ -102,7 +103,7 @@ cdef class Block:
         return True
 
     def skip_to(self, int64_t now_ns):
-        """The next release is the first one that has not passed: after a restart."""
+        """Skip all releases that have passed, after a restart."""
         cdef int64_t passed
         if self.c.sporadic or now_ns <= self.c.origin:
             return
@@ -231,7 +232,7 @@ cdef class Block:
 
 
 cdef class Releases:
-    """Owns the releases of one task, in its own thread."""
+    """The releases of one task, in its own thread."""
     cdef Block block
     cdef Timer timer
 
@@ -258,7 +259,7 @@ cdef class Releases:
         self.block.c.spent += duration_ns
 
     def count_collection(self, str phase, dict info):
-        """For gc.callbacks."""
+        """Count a run of the garbage collector; for gc.callbacks."""
         self.block.c.collections += phase == "stop"
 
     @property

@@ -7,8 +7,8 @@ approach for analysing fixed priority hard real-time tasks", 1994, equations 12 
     w(q) = (q + 1) C + B + sum over j, of no lower priority: ceil((w(q) + Jj) / Tj) Cj
     R    = max over q = 0, 1, ... of  J + w(q) - q T,  until job q ends before its next release
 
-Tasks of equal priority count as if each were the higher one: SCHED_FIFO serves them in the order
-of their releases, so none waits longer than that. All sums are integers, in nanoseconds.
+Tasks of equal priority count as if each had the higher one. SCHED_FIFO serves them in the order
+of their releases, so this is an upper bound. All sums are integers, in nanoseconds.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 LONGEST = 1e9  # [s]
-MOST_STEPS = 1_000_000  # of the iteration, for one task; reached only where load is close to 1
+MOST_STEPS = 1_000_000  # iterations for one task; reached only if the load is close to 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Demand:
-    """What a task asks of its processor. Times in [s].
+    """The load that a task puts on its processor. Times in [s].
 
-    execution: the longest of one job.
-    deadline: after the release; None: the period. It may be longer than the period.
-    blocking: the longest time a task of lower priority keeps it waiting.
-    jitter: the longest delay of its release behind the period's instants.
-    priority: greater is higher; None for all tasks: the shorter the deadline, the higher.
-    cpu: its processor; None for all: there is one.
+    execution: longest execution time of one job.
+    deadline: relative to the release; None: the period. It may be longer than the period.
+    blocking: longest time for which a task of lower priority blocks it.
+    jitter: longest delay of a release after its nominal time.
+    priority: greater is higher; None for all tasks: deadline-monotonic.
+    cpu: its processor; None for all tasks: they share one.
     """
 
     name: str
@@ -61,7 +61,7 @@ class Demand:
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """The longest response of one task [s]; None: there is no bound."""
+    """Longest response of one task. Times in [s]; `response` is None if there is no bound."""
 
     name: str
     priority: int
@@ -72,12 +72,13 @@ class Response:
 
     @property
     def in_time(self) -> bool:
+        """True if the longest response is within the deadline."""
         return self.response is not None and self.response <= self.deadline
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Whether all deadlines hold. `utilisation`: of the busiest processor; `hyperperiod` [s]."""
+    """Result of an analysis. `utilisation`: of the busiest processor; `hyperperiod` in [s]."""
 
     utilisation: float
     hyperperiod: float
@@ -85,6 +86,7 @@ class Verdict:
 
     @property
     def schedulable(self) -> bool:
+        """True if every task meets its deadline."""
         return all(response.in_time for response in self.responses)
 
     def __str__(self) -> str:
@@ -123,8 +125,11 @@ class Load:
 
 
 def analyse(demands: Sequence[Demand]) -> Verdict:
-    """The verdict on tasks that share a processor, or each have theirs. ValueError: no tasks, two
-    of one name, or a priority or processor given for some and not for others."""
+    """Analyse tasks that share one processor, or are bound to several.
+
+    Raises ValueError if there are no tasks, if two have the same name, or if only some have a
+    priority or a processor.
+    """
     check(demands)
     ranked = sorted(with_priorities(demands), key=lambda demand: -rank(demand))
     responses = []
@@ -154,17 +159,20 @@ def check(demands: Sequence[Demand]) -> None:
     names = [demand.name for demand in demands]
     for name in names:
         if names.count(name) > 1:
-            raise ValueError(f"two tasks are called {name!r}")
+            raise ValueError(f"two tasks have the name {name!r}")
     for what in ("priority", "cpu"):
         missing = [demand.name for demand in demands if getattr(demand, what) is None]
         if missing and len(missing) < len(demands):
             raise ValueError(
-                f"task {missing[0]!r} has no {what}, others have one: give all of them one, or none"
+                f"task {missing[0]!r} has no {what}, but others have one: give it to all or to none"
             )
 
 
 def with_priorities(demands: Sequence[Demand]) -> list[Demand]:
-    """Deadline-monotonic where none are given: optimal for deadlines up to the period."""
+    """Assign deadline-monotonic priorities if none are given.
+
+    This is optimal for deadlines up to the period.
+    """
     if demands[0].priority is not None:
         return list(demands)
     deadlines = sorted({deadline_of(demand) for demand in demands}, reverse=True)
@@ -194,7 +202,7 @@ def as_load(demand: Demand) -> Load:
 
 
 def utilisation(demands: Sequence[Demand]) -> float:
-    """Of the busiest processor, from 0 to 1 and above."""
+    """Return the utilisation of the busiest processor: 1.0 is full, above is overload."""
     processors = {demand.cpu for demand in demands}
     return max(
         math.fsum(demand.execution / demand.period for demand in demands if demand.cpu == cpu)
@@ -203,7 +211,7 @@ def utilisation(demands: Sequence[Demand]) -> float:
 
 
 def hyperperiod(demands: Sequence[Demand]) -> float:
-    """[s] after which the pattern of releases repeats; infinite where no float is that long."""
+    """Return the time [s] after which the releases repeat; infinite if a float overflows."""
     try:
         return math.lcm(*(as_load(demand).period for demand in demands)) / 1e9
     except OverflowError:
@@ -211,7 +219,7 @@ def hyperperiod(demands: Sequence[Demand]) -> float:
 
 
 def longest_response(task: Load, above: Sequence[Load]) -> int | None:
-    """[ns]; None: no bound, or none found within a million steps."""
+    """Return the longest response [ns]; None if no bound is found within MOST_STEPS."""
     loads = (task, *above)
     if not bounded(loads):
         return None
@@ -234,7 +242,7 @@ def longest_response(task: Load, above: Sequence[Load]) -> int | None:
 
 
 def demand_within(window: int, job: int, task: Load, above: Sequence[Load]) -> int:
-    """What must be computed before the job of this number is done."""
+    """Return the execution time [ns] needed within `window` to finish job number `job`."""
     return (
         (job + 1) * task.execution
         + task.blocking
@@ -243,7 +251,7 @@ def demand_within(window: int, job: int, task: Load, above: Sequence[Load]) -> i
 
 
 def bounded(loads: Sequence[Load]) -> bool:
-    """Load up to 1, exactly."""
+    """Return True if the load is at most 1, computed exactly."""
     span = repeat_after(loads)
     return sum(span // load.period * load.execution for load in loads) <= span
 

@@ -36,7 +36,12 @@ class TaskFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 def read_demands(path: str | Path) -> list[Demand]:
-    """ConfigurationError names the file, the task and the field; OSError: it cannot be read."""
+    """Read the tasks of a TOML file.
+
+    Raises:
+        ConfigurationError: the file is invalid; the message names the file, task and field.
+        OSError: the file cannot be read.
+    """
     try:
         file = msgspec.toml.decode(Path(path).read_bytes(), type=TaskFile)
         return [table.demand() for table in file.task]

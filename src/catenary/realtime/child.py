@@ -1,6 +1,7 @@
-"""Children that end with us: a session of their own, a parent-death signal, an end by deadline.
+"""Child processes that end with this process: own session, parent-death signal, end by deadline.
 
-Their own session keeps a Ctrl-C in our terminal from them: we end them, after what needs them.
+The own session keeps a Ctrl-C in the terminal away from them. This process ends them after
+everything that depends on them.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
 
 class Child:
-    """Owns one running child process. Its standard output is ours to read."""
+    """Owner of one running child process; reads its standard output."""
 
     def __init__(self, process: subprocess.Popen[bytes]) -> None:
         self.process = process
@@ -37,7 +38,7 @@ class Child:
         return self.process.poll() is None
 
     def read_line(self, seconds: float) -> str | None:
-        """The next line of its output; None: it ended, or wrote none within `seconds`."""
+        """Return the next line of output; None if it ended or wrote none within `seconds`."""
         output = self.process.stdout
         assert output is not None
         deadline = time.monotonic() + seconds
@@ -52,7 +53,7 @@ class Child:
         return line.decode(errors="replace")
 
     def end(self, seconds: float = 3.0) -> int:
-        """SIGTERM, and SIGKILL after `seconds`; its exit status."""
+        """Send SIGTERM, and SIGKILL after `seconds`. Return the exit status."""
         if self.running:
             with contextlib.suppress(ProcessLookupError):
                 self.process.terminate()
@@ -83,26 +84,26 @@ def wait_readable(output: IO[bytes], deadline: float) -> bool:
 
 
 def start_python(arguments: Sequence[str]) -> Child:
-    """Starts this interpreter with `-m module ...` or `script.py ...` as a child."""
+    """Start this interpreter with `-m module ...` or `script.py ...` as a child."""
     if not arguments or (arguments[0] == "-m" and len(arguments) < 2):
-        raise ValueError("arguments are `-m module ...` or `script.py ...`")
+        raise ValueError("arguments must be `-m module ...` or `script.py ...`")
     command = [sys.executable, "-m", "catenary.realtime.child", str(os.getpid()), *arguments]
     return Child(subprocess.Popen(command, stdout=subprocess.PIPE, start_new_session=True))
 
 
 def start_program(command: Sequence[str]) -> Child:
-    """Starts any program as a child."""
+    """Start any program as a child."""
     if not command:
-        raise ValueError("no program named")
+        raise ValueError("command is empty: name a program")
     own = [sys.executable, "-m", "catenary.realtime.child", str(os.getpid()), "--exec", *command]
     return Child(subprocess.Popen(own, stdout=subprocess.PIPE, start_new_session=True))
 
 
 def end_with_parent(parent: int) -> None:
-    """Has the kernel send us SIGTERM when `parent` ends.
+    """Let the kernel send SIGTERM to this process when `parent` ends.
 
-    Called in the child itself: a parent-death signal set before the start of an interpreter with
-    file capabilities (our advice to ordinary users) is cleared by that start, prctl(2).
+    Called in the child itself: executing an interpreter with file capabilities, as advised to
+    ordinary users, clears a parent-death signal that was set before. prctl(2).
     """
     if ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM) != 0 or os.getppid() != parent:
         sys.exit("the parent process has ended")

@@ -1,8 +1,8 @@
-"""The virtual clock of tasks, and whoever takes part in it.
+"""The virtual clock of tasks, and its participants.
 
-Time stands still while anybody runs and advances when every participant waits or spends execution
-time. A participant is what a loop's segment needs of a clock: `now_ns`, `wait_until`, `spend`, and
-`capsule` with the same as a C table (native/clock.h).
+Time stands still while any participant runs. It advances when every participant waits or spends
+execution time. A participant has the clock interface of a loop's segment: `now_ns`, `wait_until`,
+`spend`, and `capsule` with the same functions as a C table (native/clock.h).
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from catenary.realtime._clock import (
 )
 from catenary.realtime.memory import SharedMemory
 
-FIRST = 100  # before every task: they have 0 (ordinary scheduling) to 99
+FIRST = 100  # precedes every task: these have 0 (ordinary scheduling) to 99
 
 
 class Participant:
-    """Owns one place on a virtual clock; one thread of one process uses it."""
+    """Owner of one slot of a virtual clock; one thread of one process uses it."""
 
     def __init__(self, memory: SharedMemory, slot: int) -> None:
         self._memory = memory
@@ -38,31 +38,31 @@ class Participant:
 
     @property
     def capsule(self) -> object:
-        """The C table of native/clock.h; it lives as long as this object."""
+        """C table of native/clock.h; valid while this object exists."""
         return self.timer.capsule
 
     def wait_until(self, deadline_ns: int) -> bool:
-        """True: the deadline has come; False: woken before it."""
+        """Wait. Return True if the deadline has passed, False if woken before."""
         return self.timer.wait_until(deadline_ns)
 
     def spend(self, seconds: float) -> None:
-        """Execution time [s], preempted by whoever precedes on the same processor."""
+        """Spend execution time [s]. Higher priorities on the same processor preempt it."""
         self.timer.spend(round(seconds * 1e9))
 
     def wake(self) -> None:
-        """Ends the running or the next wait; from any thread or process."""
+        """End the current or the next wait. Any thread or process may call it."""
         self.timer.wake()
 
     def expect(self) -> None:
-        """Somebody will come, again: time stands still until then."""
+        """Keep time still until the restarted participant first waits."""
         self._time.expect(self.timer.slot)
 
     def step_aside(self) -> None:
-        """Time goes on without the participant, until it returns or waits."""
+        """Let time advance without the participant until it returns or waits."""
         self._time.step_aside(self.timer.slot)
 
     def return_to(self) -> None:
-        """Time stands still until the participant waits: it runs."""
+        """Mark the participant as running: time stands still until it waits."""
         self._time.run(self.timer.slot)
 
     def leave(self) -> None:
@@ -70,8 +70,11 @@ class Participant:
 
 
 class VirtualClock:
-    """Owns a clock that advances only while all who take part in it wait. The thread that makes it
-    takes part from the start: time passes in its `wait_until`, `spend` and in `Tasks.join`."""
+    """Owner of a clock that advances only while all of its participants wait.
+
+    The thread that creates it participates from the start. Time passes in its `wait_until` and
+    `spend`, and in `Tasks.join`.
+    """
 
     def __init__(self) -> None:
         self._memory = SharedMemory(VIRTUAL_TIME_SIZE)
@@ -81,10 +84,14 @@ class VirtualClock:
         self.home.return_to()
 
     def participate(self, *, priority: int = 0, cpu: int | None = None) -> Participant:
-        """A place for a loop or task; time stands still until it first waits.
+        """Return a participant for a loop or task. Time stands still until it first waits.
 
-        `cpu`: the simulated processor whose time it spends, shared with others by fixed priority
-        (greater is higher); None: one of its own. ValueError: 64 take part already.
+        Args:
+            priority: fixed priority on the simulated processor; greater is higher.
+            cpu: simulated processor, shared with others by priority; None: its own.
+
+        Raises:
+            ValueError: the clock already has 64 participants.
         """
         slot = self._time.join(priority, OWN_PROCESSOR if cpu is None else cpu)
         return Participant(self._memory, slot)
@@ -95,19 +102,22 @@ class VirtualClock:
 
     @property
     def capsule(self) -> object:
-        """The C table of native/clock.h, of the thread that made the clock."""
+        """C table of native/clock.h of the thread that created the clock."""
         return self.home.capsule
 
     def wait_until(self, deadline_ns: int) -> bool:
-        """Lets time pass for everybody, as the thread that made the clock. False: woken before."""
+        """Let time pass for all participants, as the thread that created the clock.
+
+        Return False if woken before the deadline.
+        """
         return self.home.wait_until(deadline_ns)
 
     def spend(self, seconds: float) -> None:
-        """Lets time pass as if this thread computed that long [s], on a processor of its own."""
+        """Let time pass as if this thread computed for `seconds`, on its own processor."""
         self.home.spend(seconds)
 
     def close(self) -> None:
-        """Time goes on without the thread that made the clock."""
+        """Let time advance without the thread that created the clock."""
         self.home.leave()
 
     def __enter__(self) -> Self:

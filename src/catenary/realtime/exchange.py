@@ -1,8 +1,8 @@
-"""Values and queues between tasks, in threads or processes: neither side ever waits for the other.
+"""Wait-free values and queues between tasks, in threads or processes.
 
-A `Value` is the latest of something, from one writer to any number of readers. A `Queue` is every
-record of something, from one producer to one consumer. Both are made before the tasks start and
-handed to them as arguments; they hold NumPy arrays of one type and shape.
+A `Value` holds the latest array, from one writer to any number of readers. A `Queue` passes every
+record from one producer to one consumer. Create both before the tasks start, and pass them as
+arguments. They hold NumPy arrays of one type and shape.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Full: TypeAlias = Literal["refuse", "overwrite"]
 
 
 class Form:
-    """The type and shape of what is exchanged; checks arrays."""
+    """Type and shape of the exchanged arrays."""
 
     def __init__(self, dtype: npt.DTypeLike, shape: int | tuple[int, ...]) -> None:
         import numpy as np
@@ -32,7 +32,7 @@ class Form:
         self.dtype = np.dtype(dtype)
         self.shape = (shape,) if isinstance(shape, int) else tuple(shape)
         if self.dtype.hasobject:
-            raise TypeError(f"{self.dtype} holds Python objects, which other processes cannot see")
+            raise TypeError(f"{self.dtype} holds Python objects, which processes cannot share")
         self.size = int(self.dtype.itemsize * np.prod(self.shape, dtype=int))
         if self.size <= 0:
             raise ValueError(f"{self} has no bytes")
@@ -44,15 +44,15 @@ class Form:
         return f"{self.dtype} of shape {self.shape}"
 
     def conforming(self, data: npt.ArrayLike) -> Array:
-        """As an array of this form. ValueError: of another shape, or not such numbers."""
+        """Return `data` as an array of this form. Raises ValueError if it does not fit."""
         import numpy as np
 
         try:
             array = np.asarray(data, self.dtype, order="C")
         except (TypeError, ValueError) as error:
-            raise ValueError(f"{data!r} is no {self}: {error}") from error
+            raise ValueError(f"{data!r} does not fit {self}: {error}") from error
         if array.shape != self.shape:
-            raise ValueError(f"an array of shape {array.shape} is given, {self} is expected")
+            raise ValueError(f"received an array of shape {array.shape}, expected {self}")
         return array
 
     def empty(self) -> Array:
@@ -62,11 +62,22 @@ class Form:
 
 
 class Value:
-    """Owns the latest array of one writer, for any number of readers. A writer that is killed in
-    mid-write leaves the value before; the task that replaces it goes on writing."""
+    """The latest array of one writer, for any number of readers.
+
+    If a writer is killed during a write, readers keep the previous value. The task that replaces
+    it can continue to write.
+    """
 
     def __init__(self, dtype: npt.DTypeLike = "f8", shape: int | tuple[int, ...] = ()) -> None:
-        """`dtype` may be structured. Zeros until the first write. ValueError: no bytes."""
+        """Allocate the value; it reads as zeros until the first write.
+
+        Args:
+            dtype: NumPy type; may be structured.
+            shape: shape of the array.
+
+        Raises:
+            ValueError: the array has no bytes.
+        """
         self._bind(Form(dtype, shape), None)
 
     def __getstate__(self) -> tuple[Form, SharedMemory]:
@@ -83,28 +94,34 @@ class Value:
 
     @property
     def number(self) -> int:
-        """How many were written."""
+        """Number of writes."""
         return self._core.number
 
     def write(self, data: npt.ArrayLike) -> None:
-        """Publishes an array, whole. ValueError: another shape. RuntimeError: another thread that
-        lives writes this value."""
+        """Publish an array as a whole.
+
+        Raises:
+            ValueError: the shape differs.
+            RuntimeError: another running thread writes this value.
+        """
         if not self._writes:
             self._core.writer = claim("value", "writer", self._core.writer)
             self._writes = True
         self._core.write(self._form.conforming(data))
 
     def read(self) -> Array:
-        """A copy of the latest one, whole. RuntimeError: it is written faster than it can be read,
-        1000 times over."""
+        """Return a consistent copy of the latest array.
+
+        Raises RuntimeError if 1000 attempts were overwritten while reading.
+        """
         array = self._form.empty()
         if self._core.read(array) < 0:
-            raise RuntimeError(f"a value of {self._form.size} bytes is written too fast to be read")
+            raise RuntimeError(f"cannot read a value of {self._form.size} bytes: written too fast")
         return array
 
 
 class Silence:
-    """Counts how often a periodic reader finds nothing new in a value: its writer may be gone."""
+    """Counter of consecutive reads of a value without a new write: the writer may have ended."""
 
     def __init__(self, value: Value) -> None:
         self._value = value
@@ -112,15 +129,18 @@ class Silence:
         self._looks = 0
 
     def look(self) -> int:
-        """Looks since the last that found a new value; 0 before the first value."""
+        """Return the number of calls since the last new value; 0 before the first value."""
         before, self._number = self._number, self._value.number
         self._looks = self._looks + 1 if before == self._number > 0 else 0
         return self._looks
 
 
 class Queue:
-    """Owns a bounded row of records, from one producer to one consumer. A producer that is killed
-    in mid-put leaves no record; a consumer that is killed in mid-take finds its record again."""
+    """A bounded queue of records, from one producer to one consumer.
+
+    A producer that is killed during `put` leaves no record. A consumer that is killed during
+    `take` finds its record again.
+    """
 
     def __init__(
         self,
@@ -130,12 +150,21 @@ class Queue:
         length: int,
         full: Full = "refuse",
     ) -> None:
-        """`length` records at most. When they are there, `put` refuses the newest, or overwrites
-        the oldest. ValueError: no records or no bytes."""
+        """Allocate the queue.
+
+        Args:
+            dtype: NumPy type of a record; may be structured.
+            shape: shape of a record.
+            length: capacity in records.
+            full: a `put` to a full queue can "refuse" the new record or "overwrite" the oldest.
+
+        Raises:
+            ValueError: a record has no bytes, or `length` or `full` is out of range.
+        """
         if not 0 < length < 2**31:
-            raise ValueError(f"a length of {length} records is not positive, or too much")
+            raise ValueError(f"a length of {length} records is not within 1 to 2**31 - 1")
         if full not in ("refuse", "overwrite"):
-            raise ValueError(f'full is "refuse" or "overwrite", not {full!r}')
+            raise ValueError(f'full must be "refuse" or "overwrite", not {full!r}')
         self._bind(Form(dtype, shape), length, full, None)
 
     def __getstate__(self) -> tuple[Form, int, Full, SharedMemory]:
@@ -151,30 +180,36 @@ class Queue:
         self._produces = self._consumes = False
 
     def __len__(self) -> int:
-        """Records that wait to be taken."""
+        """Return the number of records that can be taken."""
         return self._core.waiting
 
     @property
     def refused(self) -> int:
-        """Records that `put` did not take."""
+        """Number of records that `put` refused."""
         return self._core.refused
 
     @property
     def lost(self) -> int:
-        """Records that were overwritten before they were taken, as far as the consumer has seen."""
+        """Number of overwritten records that the consumer has noticed."""
         return self._core.lost
 
     def put(self, record: npt.ArrayLike) -> bool:
-        """False: the queue is full, the record is refused and counted. ValueError: another shape.
-        RuntimeError: another thread that lives puts into this queue."""
+        """Append a record. Return False if the queue is full: the record is refused and counted.
+
+        Raises:
+            ValueError: the shape differs.
+            RuntimeError: another running thread is the producer.
+        """
         if not self._produces:
             self._core.producer = claim("queue", "producer", self._core.producer)
             self._produces = True
         return self._core.put(self._form.conforming(record))
 
     def take(self) -> Array | None:
-        """The oldest record; None: there is none. RuntimeError: another thread that lives takes
-        from this queue."""
+        """Remove and return the oldest record; None if the queue is empty.
+
+        Raises RuntimeError if another running thread is the consumer.
+        """
         if not self._consumes:
             self._core.consumer = claim("queue", "consumer", self._core.consumer)
             self._consumes = True
@@ -183,8 +218,8 @@ class Queue:
 
 
 def claim(what: str, role: str, holder: int) -> int:
-    """The calling thread, which takes a role that nobody has who lives."""
+    """Return the calling thread's id; it takes a role that no running thread has."""
     me = threading.get_native_id()
     if holder not in (0, me) and os.path.exists(f"/proc/{holder}"):
-        raise RuntimeError(f"this {what} has a {role} already, thread {holder}: it takes one only")
+        raise RuntimeError(f"this {what} already has a {role}, thread {holder}; it takes only one")
     return me

@@ -1,4 +1,4 @@
-"""Handle: one running task, seen by whoever started it."""
+"""Handle: one running task, as its starter controls it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from catenary.realtime.task_memory import Place
 
 
 class Handle:
-    """Owns the memory of one task."""
+    """Owner of the memory of one task."""
 
     def __init__(self, task: Task, clock: VirtualClock | None) -> None:
         participant = None
@@ -41,12 +41,12 @@ class Handle:
 
     @property
     def process(self) -> int:
-        """Its process; 0 before it has started."""
+        """Id of its process; 0 before the start."""
         return self.block.process
 
     @property
     def period(self) -> float:
-        """[s]. Set it to change the time between releases while the task runs."""
+        """Time between releases [s]. Set it to change the period while the task runs."""
         return self.block.period_ns * 1e-9
 
     @period.setter
@@ -59,30 +59,30 @@ class Handle:
         return read_statistics(self.name, self.block)
 
     def histogram(self, figure: str) -> list[tuple[float, float, int]]:
-        """(lowest, lowest above, jobs) of each bucket of a figure of `statistics`; times in [s]."""
+        """Return (lower edge, upper edge, jobs) of each bucket of a figure; times in [s]."""
         return read_histogram(self.block, figure)
 
     def stop(self) -> None:
-        """The task ends when it next waits."""
+        """Request a stop: the task ends when it next waits."""
         self.block.stop()
         self._timer.wake()
 
     def make_ready_again(self) -> None:
-        """For a restart: the next release is the first that has not passed."""
+        """Prepare a restart: skip all releases that have passed."""
         self.block.restart()
         self.block.skip_to(self._timer.now_ns)
         if self.place.participant is not None:
             self.place.participant.expect()
 
     def leave(self) -> None:
-        """Its worker is gone, or will never be."""
+        """Leave the clock: the worker has ended, or was never started."""
         if self.place.participant is not None:
             self.place.participant.leave()
         if self.running:
             self.block.state = FAILED
 
     def failure(self, exit_code: int | None) -> TaskError | None:
-        """Why its worker ended, if it should not have."""
+        """Return the error with which its worker ended; None if it ended normally."""
         if self.block.state == ENDED:
             return None
         if self.block.state == FAILED:
@@ -94,15 +94,15 @@ class Handle:
                 f"{self.task}: its process {how_it_died(exit_code)} before it could start",
                 task=self.name,
                 exit_code=exit_code,
-                hint="what it printed says why; it imports the program's file, so whatever starts "
-                'the program belongs under `if __name__ == "__main__":`',
+                hint="its output shows the cause; it imports the program's file, so put the code "
+                'that starts the program under `if __name__ == "__main__":`',
             )
         return TaskError(
             f"{self.task} (process {self.process}) {how_it_died(exit_code)}{self._where()}",
             task=self.name,
             exit_code=exit_code,
             hint='on_failure="restart" starts such a task again; '
-            "SIGKILL comes from somebody, or from the kernel out of memory (dmesg)",
+            "SIGKILL comes from another process, or from the kernel out of memory (dmesg)",
         )
 
     def _where(self) -> str:

@@ -6,7 +6,7 @@ from catenary.realtime._task import Releases
 
 
 class Job:
-    """The job that runs: one release of a task. The same object every time: note what you keep."""
+    """The current job: one release of a task. The object is reused: copy the values you keep."""
 
     __slots__ = ("_origin_ns", "_releases")
 
@@ -16,22 +16,22 @@ class Job:
 
     @property
     def number(self) -> int:
-        """0 for the first job; releases that are skipped leave gaps in `time` alone."""
+        """Number of the job, from 0. Skipped releases leave gaps only in `time`."""
         return self._releases.number
 
     @property
     def time(self) -> float:
-        """[s] of its release, since the first release of all tasks."""
+        """Time of its release [s], since the first release of all tasks."""
         return (self._releases.release_ns - self._origin_ns) * 1e-9
 
     @property
     def release_ns(self) -> int:
-        """Its release on the task's clock."""
+        """Time of its release [ns] on the task's clock."""
         return self._releases.release_ns
 
     @property
     def jitter(self) -> float:
-        """[s] from its release to its start."""
+        """Time from its release to its start [s]."""
         return (self._releases.start_ns - self._releases.release_ns) * 1e-9
 
     def __repr__(self) -> str:

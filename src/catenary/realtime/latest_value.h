@@ -1,9 +1,9 @@
-/* The latest value, from one writer to any number of readers in any process; nobody waits.
+/* The latest value, from one writer to any number of readers in any process; neither side waits.
  *
- * Four slots in turn, each with a sequence number that is odd while it is written (a seqlock). A
- * reader copies the slot published last and tries again where it was overwritten meanwhile, which
- * takes a writer three values during one copy. A writer killed in mid-write leaves the value
- * before it; the next writer goes on from there.
+ * The writer uses four slots in turn. Each has a sequence number that is odd during a write (a
+ * seqlock). A reader copies the slot published last. It tries again if that slot was overwritten
+ * meanwhile: the writer must publish three values during one copy for that. A writer that is killed
+ * during a write leaves the previous value; the next writer continues from there.
  */
 #ifndef CATENARY_LATEST_VALUE_H
 #define CATENARY_LATEST_VALUE_H
@@ -17,7 +17,7 @@
 #define VALUE_TRIES 1000
 
 typedef struct latest_value {
-    uint64_t number;                  /* values published; the last lies in slot number % SLOTS */
+    uint64_t number;                  /* values published; the last is in slot number % SLOTS */
     uint64_t sequence[VALUE_SLOTS];
     int32_t writer;                   /* the thread that writes, 0: none yet */
     uint32_t size;
@@ -38,7 +38,7 @@ static void value_write(latest_value *v, const void *bytes) {
     __atomic_store_n(&v->number, number, __ATOMIC_RELEASE);
 }
 
-/* The number of the value copied; -1: overwritten at every try. */
+/* Return the number of the copied value, or -1 if every attempt was overwritten. */
 static int64_t value_read(latest_value *v, void *bytes) {
     for (int k = 0; k < VALUE_TRIES; k++) {
         uint64_t number = cat_load_acquire64(&v->number);

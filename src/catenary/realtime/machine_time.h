@@ -12,7 +12,7 @@
 
 typedef struct machine_time {
     uint32_t wakes;                   /* futex word */
-    uint32_t seen;                    /* the waiter's: those it has noticed */
+    uint32_t seen;                    /* wake-ups that the waiter has consumed */
 } machine_time;
 
 static inline int64_t machine_read(clockid_t clock) {
@@ -43,7 +43,7 @@ static void machine_wake(void *self) {
     cat_futex_wake_shared(&m->wakes);
 }
 
-/* Computes until this thread has had `duration` of its processor. */
+/* Compute until this thread has used `duration` of processor time. */
 static int machine_spend(void *self, int64_t duration) {
     (void)self;
     int64_t end = machine_read(CLOCK_THREAD_CPUTIME_ID) + duration;

@@ -1,5 +1,4 @@
-"""Memory that tasks in other processes see too: anonymous, so that nothing is left behind by
-whoever is killed."""
+"""Anonymous memory shared with tasks in other processes: a killed process leaves no file."""
 
 from __future__ import annotations
 
@@ -11,14 +10,16 @@ from typing import Protocol
 
 
 class Descriptor(Protocol):
-    """What multiprocessing makes of a file descriptor on its way to a child."""
+    """The form in which multiprocessing passes a file descriptor to a child."""
 
     def detach(self) -> int: ...
 
 
 class SharedMemory:
-    """Owns one piece of memory, zeros at first, every page there. It is handed to a child process
-    as an argument, and ends with the last process that has it."""
+    """Owner of pre-faulted memory that starts as zeros.
+
+    Pass it to a child process as an argument. It is freed with the last process that has it.
+    """
 
     def __init__(self, size: int, *, descriptor: int | None = None) -> None:
         if size <= 0:
@@ -33,10 +34,10 @@ class SharedMemory:
 
     def __reduce__(self) -> tuple[object, tuple[object, int]]:
         if context.get_spawning_popen() is None:
-            raise TypeError("shared memory goes to another process only as an argument of its task")
+            raise TypeError("shared memory can only be passed as an argument of a process's task")
         return attach, (reduction.DupFd(self._descriptor), self.size)
 
 
 def attach(descriptor: Descriptor, size: int) -> SharedMemory:
-    """The same memory, in the child."""
+    """Map the same memory in the child."""
     return SharedMemory(size, descriptor=descriptor.detach())

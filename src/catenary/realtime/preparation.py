@@ -1,4 +1,4 @@
-"""`with realtime.session():` a process prepared for real time; all is undone at the end."""
+"""`with realtime.session():` prepare a process for real time, and undo all changes at the end."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from catenary.realtime import libc
 from catenary.realtime._stack import touch_stack
 from catenary.realtime.scheduling import lock_all_memory, locked_kilobytes
 
-TOUCHED_STACK = 128 * 1024  # [bytes], as the core's own thread does
+TOUCHED_STACK = 128 * 1024  # [bytes], as in the core's own thread
 LATENCY_DEVICE = "/dev/cpu_dma_latency"
 SET_CAPABILITIES = permission_advice()
 
@@ -26,15 +26,15 @@ HOW_TO_GET = {
     "memlock line in /etc/security/limits.d",
     "CPU latency": f"run as root, or let a udev rule open {LATENCY_DEVICE}: KERNEL=="
     '"cpu_dma_latency", MODE="0660", GROUP="realtime"',
-    "heap": "glibc has the calls it takes",
-    "timer slack": "Linux 2.6.28 or newer has it",
+    "heap": "use glibc, which has mallopt and malloc_trim",
+    "timer slack": "use Linux 2.6.28 or newer",
 }
 
 Undo = contextlib.ExitStack
 
 
 class Session:
-    """Owns what a process has asked of the machine, from `with` to its end."""
+    """Owner of the real-time settings of a process inside a `with` block."""
 
     def __init__(self, heap_size: int, switch_interval: float, best_effort: bool) -> None:
         if heap_size < 0:
@@ -52,14 +52,14 @@ class Session:
 
     def __enter__(self) -> Self:
         if self._undo is not None:
-            raise RuntimeError("this session has begun already")
+            raise RuntimeError("this session has already begun; make one session for each block")
         with contextlib.ExitStack() as undo:
             refused = list(filter(None, (attempt(*step, undo) for step in self._steps())))
             if refused and not self.best_effort:
                 raise RealtimeError(
                     "; ".join(f"{what} refused ({why})" for what, why in refused),
                     hint="; ".join(f"{what}: {HOW_TO_GET[what]}" for what, _ in refused)
-                    + "; or best_effort=True does without",
+                    + "; or continue without them by best_effort=True",
                 )
             self.refusals = tuple(f"{what} refused ({why})" for what, why in refused)
             self._undo = undo.pop_all()
@@ -86,13 +86,13 @@ class Session:
         ]
 
     def _change_switch_interval(self, undo: Undo) -> None:
-        """How long a Python thread may keep the interpreter from another: 5 ms at first."""
-        # Python keeps whole microseconds and rounds down: half of one brings the same back.
+        """Set how long a Python thread may keep the interpreter from others (default 5 ms)."""
+        # Python rounds down to whole microseconds: adding half of one restores the same value.
         undo.callback(sys.setswitchinterval, sys.getswitchinterval() + 0.5e-6)
         sys.setswitchinterval(self.switch_interval)
 
     def _keep_heap(self, undo: Undo) -> None:
-        """What is freed stays ours, and is touched once: no page faults from malloc."""
+        """Keep freed memory in the heap and pre-fault it: malloc causes no page faults."""
         undo.callback(libc.trim_heap)
         undo.callback(libc.change_malloc, libc.TRIM_THRESHOLD, libc.MMAP_MAX)
         libc.change_malloc(-1, 0)
@@ -102,18 +102,26 @@ class Session:
 def session(
     *, heap_size: int = 16 * 2**20, switch_interval: float = 1e-4, best_effort: bool = False
 ) -> Session:
-    """Prepares this process: memory locked and touched, the garbage collector frozen and off,
-    precise timers of this thread and those it starts, processors kept from deep sleep, a short
-    switch interval [s], `heap_size` bytes of heap that malloc keeps.
+    """Return a context manager that prepares this process for real time.
 
-    What could not be had is a RealtimeError that says how to get it; with `best_effort` it is in
-    `refusals`. All that it changed is undone at the end.
+    It locks and pre-faults memory, freezes and disables the garbage collector, and keeps the
+    processors from deep sleep. Timers become precise for this thread and the threads it starts.
+    The end of the block undoes all changes.
+
+    Args:
+        heap_size: heap that malloc keeps [bytes].
+        switch_interval: how long a Python thread may keep the interpreter from others [s].
+        best_effort: list refused settings in `refusals` instead of raising.
+
+    Raises:
+        RealtimeError: on entering, if a setting is refused; the hint says how to get it.
+        ValueError: `heap_size` or `switch_interval` is out of range.
     """
     return Session(heap_size, switch_interval, best_effort)
 
 
 def attempt(what: str, step: Callable[[Undo], None], undo: Undo) -> tuple[str, str] | None:
-    """What was refused and why; nothing is left of a step that failed."""
+    """Run a step. If it is refused, undo it and return its name and the reason."""
     try:
         with contextlib.ExitStack() as own:
             step(own)
@@ -124,7 +132,7 @@ def attempt(what: str, step: Callable[[Undo], None], undo: Undo) -> tuple[str, s
 
 
 def freeze_collector(undo: Undo) -> None:
-    """What is there now is never looked at again, and nothing is collected until the end."""
+    """Freeze all present objects and disable the garbage collector until the end."""
     if gc.isenabled():
         undo.callback(gc.enable)
     if gc.get_freeze_count() == 0:
@@ -140,7 +148,7 @@ def sharpen_timers(undo: Undo) -> None:
 
 
 def hold_latency(undo: Undo) -> None:
-    """Processors stay awake for as long as the device is open: kernel's PM QoS interface."""
+    """Keep processors from deep sleep while the device is open: the kernel's PM QoS interface."""
     device = os.open(LATENCY_DEVICE, os.O_WRONLY)
     undo.callback(os.close, device)
     os.write(device, struct.pack("=i", 0))

@@ -1,10 +1,10 @@
-"""A network namespace of our own: real frames over veth pairs, without hardware or harm.
+"""Private network namespace: real frames over veth pairs, without hardware or side effects.
 
     state = private_network.enter()         # runs this program again, inside
     if isinstance(state, Refused):
         print(f"no real frames: {state.reason}")
 
-Call `enter` first thing in `main`, before anything is started or opened. From a shell:
+Call `enter` at the start of `main`, before anything is started or opened. From a shell:
 `python -m catenary.realtime.private_network -m pytest`.
 """
 
@@ -24,26 +24,26 @@ from pathlib import Path
 VARIABLE = "CATENARY_PRIVATE_NETWORK"  # in the environment of a program run by `enter`
 INSIDE = "inside"
 MODULE = "catenary.realtime.private_network"
-PROBE_SECONDS = 30.0  # a refusal is prompt, a busy machine is not
+PROBE_SECONDS = 30.0  # a refusal is prompt, but a busy machine is slow
 ETHERTYPE = 0x88A4
-CARRIER_SECONDS, LOOK_SECONDS = 2.0, 0.001  # at most; between two looks
+CARRIER_SECONDS, LOOK_SECONDS = 2.0, 0.001  # timeout; between two checks
 STATE_UP = " state UP "
 
 
 @dataclass(frozen=True, slots=True)
 class Private:
-    """This process is alone in its network namespace."""
+    """State of a process that runs in its own network namespace."""
 
 
 @dataclass(frozen=True, slots=True)
 class Refused:
-    """The machine gives no namespace in which real frames work."""
+    """State of a process for which the machine provides no namespace with real frames."""
 
     reason: str
 
 
 def state() -> Private | Refused:
-    """Where this process is, without changing it."""
+    """Return whether this process is in a private network, without changing it."""
     value = os.environ.get(VARIABLE, "")
     if value == INSIDE:
         return Private()
@@ -51,15 +51,15 @@ def state() -> Private | Refused:
 
 
 def enter(command: Sequence[str] | None = None) -> Private | Refused:
-    """Replaces this process by `command` (default: this program again) in a namespace of its own.
+    """Replace this process by `command` (default: this program again) in its own namespace.
 
-    Returns only where that has happened already, or is refused.
+    Return only if this process is already inside, or if the namespace is refused.
     """
     if VARIABLE in os.environ:
         return state()
     way = find_way()
     if isinstance(way, Refused):
-        os.environ[VARIABLE] = way.reason  # asked once, for our children too
+        os.environ[VARIABLE] = way.reason  # probe only once; children inherit the result
         return way
     command = command or [sys.executable, *sys.orig_argv[1:]]
     sys.stdout.flush()
@@ -68,9 +68,9 @@ def enter(command: Sequence[str] | None = None) -> Private | Refused:
 
 
 def find_way() -> list[str] | Refused:
-    """The `unshare` command that gives a working namespace, found by trying."""
+    """Return the `unshare` command that gives a working namespace, found by probing."""
     if sys.platform != "linux":
-        return Refused("private network namespaces are Linux's")
+        return Refused("private network namespaces exist only on Linux")
     for tool, package in (("unshare", "util-linux"), ("ip", "iproute2")):
         if shutil.which(tool) is None:
             return Refused(f"`{tool}` is not installed (package {package})")
@@ -86,9 +86,9 @@ def find_way() -> list[str] | Refused:
 
 
 def probe(way: Sequence[str]) -> str:
-    """Why real frames do not work there; empty: they do.
+    """Return why real frames do not work in this namespace; "" if they do.
 
-    Ubuntu 24.04's AppArmor lets `unshare` pass and refuses what comes after, so all of it is tried.
+    AppArmor of Ubuntu 24.04 permits `unshare` but refuses the next steps, so probe all of them.
     """
     command = [*way, *inside_command([sys.executable, "-m", MODULE, "--probe"])]
     try:
@@ -101,12 +101,12 @@ def probe(way: Sequence[str]) -> str:
 
 
 def inside_command(command: Sequence[str]) -> list[str]:
-    """`command`, preceded by what a fresh namespace lacks."""
+    """Return `command`, preceded by the setup that a new namespace needs."""
     return ["sh", "-c", 'ip link set lo up; exec "$0" "$@"', *command]
 
 
 def try_real_frames() -> None:
-    """Sends one frame over a veth pair of our own; OSError: refused."""
+    """Send one frame over a new veth pair. Raises OSError if refused."""
     frame = b"\xff" * 6 + bytes(6) + ETHERTYPE.to_bytes(2, "big") + bytes(46)
     with (
         veth_pair() as (first, second),
@@ -122,7 +122,7 @@ def try_real_frames() -> None:
 
 @contextlib.contextmanager
 def veth_pair() -> Iterator[tuple[str, str]]:
-    """Two names of connected interfaces, up and silent (no IPv6); removed at the end."""
+    """Create two connected interfaces, up and without IPv6; yield their names, then remove them."""
     first, second = make_veth_pair()
     try:
         yield first, second
@@ -131,7 +131,7 @@ def veth_pair() -> Iterator[tuple[str, str]]:
 
 
 def make_veth_pair() -> tuple[str, str]:
-    """As `veth_pair`, for as long as the namespace lives. What is sent on either is taken."""
+    """Create a pair as `veth_pair` does; it exists as long as the namespace. Return the names."""
     taken = {name for _, name in socket.if_nameindex()}
     number = next(n for n in range(len(taken) + 1) if f"cat{n}a" not in taken)
     names = f"cat{number}a", f"cat{number}b"
@@ -145,21 +145,24 @@ def make_veth_pair() -> tuple[str, str]:
 
 
 def await_carrier(name: str) -> None:
-    """The kernel notices beside us that both ends are up; until then it drops what is sent on the
-    first, without a word. Where it does not say so in time, it may do without."""
+    """Wait until the interface is up, at most CARRIER_SECONDS.
+
+    The kernel notices asynchronously that both ends are up, and silently drops frames until then.
+    After the timeout, continue: some kernels never report the state.
+    """
     until = time.monotonic() + CARRIER_SECONDS
     while STATE_UP not in run_ip("-o", "link", "show", name) and time.monotonic() < until:
         time.sleep(LOOK_SECONDS)
 
 
 def silence(name: str) -> None:
-    """Turns IPv6 off: a real EtherCAT cable carries no router solicitations."""
+    """Disable IPv6: a real EtherCAT cable carries no router solicitations."""
     with contextlib.suppress(OSError):  # no IPv6 in this kernel, or /proc/sys is read-only
         Path("/proc/sys/net/ipv6/conf", name, "disable_ipv6").write_text("1")
 
 
 def run_ip(*arguments: str) -> str:
-    """What it prints. OSError: it failed, in its words."""
+    """Run `ip` and return its output. Raises OSError with its error output if it fails."""
     done = subprocess.run(["ip", *arguments], capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise OSError(f"ip {' '.join(arguments)}: {done.stderr.strip()}")
@@ -167,7 +170,7 @@ def run_ip(*arguments: str) -> str:
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Runs Python with `arguments` inside, or says why not and runs it here."""
+    """Run Python with `arguments` inside; if refused, print the reason and run it here."""
     if list(arguments) == ["--probe"]:
         try:
             try_real_frames()

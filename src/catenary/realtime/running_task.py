@@ -1,4 +1,4 @@
-"""A task seen by its own function: `for job in task:`."""
+"""The task object that the task's own function receives: `for job in task:`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from catenary.realtime.task import Task, check_period
 
 
 class Running:
-    """Owns the releases of the task that its function runs in."""
+    """The running task, as its own function sees it."""
 
     def __init__(self, task: Task, block: Block, timer: Timer) -> None:
         self._task = task
@@ -27,12 +27,12 @@ class Running:
 
     @property
     def now_ns(self) -> int:
-        """The task's clock: CLOCK_MONOTONIC, or virtual time."""
+        """Time of the task's clock [ns]: CLOCK_MONOTONIC, or virtual time."""
         return self._timer.now_ns
 
     @property
     def period(self) -> float:
-        """[s]. Set it to change the time from this release to the next ones."""
+        """Time between releases [s]. Set it to change the period from this release on."""
         return self._block.period_ns * 1e-9
 
     @period.setter
@@ -44,34 +44,36 @@ class Running:
             yield self._job
 
     def wait(self) -> bool:
-        """Ends the job that runs and waits for the next release. False: the task is to end."""
+        """End the current job and wait for the next release. Return False if the task must end."""
         self.finish()
         return self._releases.wait()
 
     def finish(self) -> None:
-        """Ends the job that runs, and does what `on_miss` says."""
+        """End the current job, and apply `on_miss` if it missed its deadline."""
         if not self._releases.finish():
             return
         if callable(self._task.on_miss):
             self._task.on_miss(self._job)
         elif self._task.on_miss == "stop":
             raise TaskError(
-                f"it ended after its deadline of {self._block.deadline_ns * 1e-6:.3f} ms",
+                f"the job ended after its deadline of {self._block.deadline_ns * 1e-6:.3f} ms",
                 task=self.name,
-                hint='its statistics say how long jobs take; on_miss="count" goes on',
+                hint='its statistics show how long jobs take; on_miss="count" continues',
             )
 
     def spend(self, seconds: float) -> None:
-        """Spends this much execution time [s]. On a virtual clock it is declared: time passes, and
-        tasks of higher priority preempt it. On the machine's the thread computes that long, without
-        the interpreter's lock."""
+        """Spend execution time [s].
+
+        On a virtual clock, time passes and tasks of higher priority preempt this one. On the
+        machine's clock, the thread computes that long without the GIL.
+        """
         self._releases.spend(round(seconds * 1e9))
 
     def stop(self) -> None:
-        """The task ends when it next waits."""
+        """Request a stop: the task ends when it next waits."""
         self._block.stop()
 
     @property
     def releases(self) -> Releases:
-        """The compiled side."""
+        """Compiled object that computes the releases."""
         return self._releases

@@ -1,4 +1,4 @@
-"""Real-time scheduling of the calling thread: asked for, and what was obtained, said."""
+"""Real-time scheduling of the calling thread: the request, and the settings obtained."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ POLICIES = {
 
 @dataclass(frozen=True, slots=True)
 class Scheduling:
-    """How a thread is scheduled. `refusals`: what was asked for and not given, and why."""
+    """Scheduling of a thread. `refusals`: the requests that were refused, and why."""
 
     policy: str
     priority: int
@@ -31,6 +31,7 @@ class Scheduling:
 
     @property
     def real_time(self) -> bool:
+        """True if the policy is SCHED_FIFO or SCHED_RR."""
         return self.policy in ("SCHED_FIFO", "SCHED_RR")
 
     def __str__(self) -> str:
@@ -41,7 +42,7 @@ class Scheduling:
 
 
 def what_scheduling() -> Scheduling:
-    """How the calling thread is scheduled now."""
+    """Return the current scheduling of the calling thread."""
     policy = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK
     return Scheduling(
         policy=POLICIES.get(policy, f"policy {policy}"),
@@ -54,9 +55,20 @@ def what_scheduling() -> Scheduling:
 def request_scheduling(
     *, priority: int = 80, lock_memory: bool = True, cpu: int | None = None
 ) -> Scheduling:
-    """Asks for SCHED_FIFO at `priority` (1..99), locked memory, and one CPU where `cpu` is given.
+    """Request SCHED_FIFO, locked memory and one CPU for the calling thread.
 
-    What is refused is said in the answer, not raised. Threads started afterwards inherit it.
+    Threads that it starts afterwards inherit these settings.
+
+    Args:
+        priority: SCHED_FIFO priority, 1..99.
+        lock_memory: lock all pages of the process in memory.
+        cpu: processor to bind the thread to; None: any.
+
+    Returns:
+        The scheduling obtained. Refused requests are listed in `refusals`, not raised.
+
+    Raises:
+        ValueError: `priority` is out of range.
     """
     if not 1 <= priority <= 99:
         raise ValueError(f"priority {priority} is not within 1..99")
@@ -82,7 +94,7 @@ def refusal(what: str, ask: Callable[[], object]) -> list[str]:
 
 
 def lock_all_memory() -> None:
-    """Keeps every page, present and future, in memory (mlockall)."""
+    """Lock every present and future page in memory (mlockall)."""
     libc = ctypes.CDLL(None, use_errno=True)
     if libc.mlockall(MCL_CURRENT | MCL_FUTURE) != 0:
         number = ctypes.get_errno()
@@ -90,6 +102,6 @@ def lock_all_memory() -> None:
 
 
 def locked_kilobytes() -> int:
-    """VmLck of this process, proc(5)."""
+    """Return VmLck of this process, proc(5)."""
     found = re.search(r"^VmLck:\s*(\d+) kB", Path("/proc/self/status").read_text(), re.MULTILINE)
     return int(found[1]) if found else 0

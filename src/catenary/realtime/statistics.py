@@ -1,4 +1,4 @@
-"""What the jobs of a task took: values read from its memory, by whoever has it."""
+"""Statistics of the jobs of a task, read from its shared memory."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from catenary.realtime._task import FIGURE_NAMES, Block
 from catenary.realtime.analysis import Demand
 from catenary.realtime.task import Task
 
-TIMES = ("period", "jitter", "response", "execution")  # in [s]; the others are counts
+TIMES = ("period", "jitter", "response", "execution")  # in [s]; other figures are counts
 
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """One quantity over all jobs that ended."""
+    """Summary of one quantity over all jobs that have ended."""
 
     count: int
     mean: float
@@ -28,18 +28,18 @@ class Figure:
 
 @dataclass(frozen=True, slots=True)
 class Statistics:
-    """Of one task. Figures of a running task may lack the job that is being counted."""
+    """Statistics of one task. While the task runs, figures may lack the newest job."""
 
     name: str
     jobs: int  # released
     misses: int  # ended after the deadline
     skipped: int  # releases that did not happen
     signals_refused: int
-    scheduling: str  # what its thread obtained, and what it was refused
+    scheduling: str  # settings that its thread obtained, and those refused
     period: Figure  # [s] from start to start
     jitter: Figure  # [s] from release to start
     response: Figure  # [s] from release to end
-    execution: Figure  # [s] of the thread's processor time; on a virtual clock what it spent
+    execution: Figure  # [s] processor time of the thread; on a virtual clock, the time spent
     page_faults: Figure  # per job
     switches: Figure  # involuntary ones, per job
     collections: Figure  # runs of the garbage collector in its process, per job
@@ -58,17 +58,19 @@ def read_figure(block: Block, number: int) -> Figure:
 
 
 def read_histogram(block: Block, figure: str) -> list[tuple[float, float, int]]:
-    """(lowest, lowest above, jobs) of every bucket that is not empty; times in [s]."""
+    """Return (lower edge, upper edge, jobs) of every non-empty bucket; times in [s]."""
     if figure not in FIGURE_NAMES:
-        raise ValueError(f"there is no figure {figure!r}; there are {', '.join(FIGURE_NAMES)}")
+        raise ValueError(f"unknown figure {figure!r}; use one of {', '.join(FIGURE_NAMES)}")
     scale = 1e-9 if figure in TIMES else 1
     buckets = block.buckets(FIGURE_NAMES.index(figure))
     return [(low * scale, above * scale, count) for low, above, count in buckets]
 
 
 def measured_demand(task: Task, statistics: Statistics) -> Demand:
-    """For the analysis: the longest execution that was measured, as it was declared otherwise.
-    ValueError: no job has ended yet."""
+    """Return the demand of a task with its longest measured execution time.
+
+    Raises ValueError if no job has ended yet.
+    """
     if statistics.execution.count == 0:
         raise ValueError(f"{task}: no job has ended yet, so there is no execution time")
     return Demand(
@@ -82,7 +84,7 @@ def measured_demand(task: Task, statistics: Statistics) -> Demand:
 
 
 def as_table(all_statistics: Iterable[Statistics]) -> str:
-    """Per task a line of each time, mean / max / min / sd, as the published tables have it."""
+    """Format one line per task; times as mean/max/min/sd, as in the published tables."""
     lines = [
         f"{'task':14}{'jobs':>8}{'missed':>8}"
         + "".join(f"{name + ' [ms]: mean/max/min/sd':>36}" for name in ("period", "response"))

@@ -1,8 +1,8 @@
-"""Supervisor: notices when a task ends, by whatever way, and does what its policy says.
+"""Supervisor: detect the end of tasks, for whatever reason, and apply their failure policies.
 
-Processes are watched by their sentinels, which become readable when a process is gone, also by
-SIGKILL. One thread starts and watches them: the signal that a process gets when its parent ends is
-bound to the life of the thread that started it, prctl(2).
+The sentinel of a process becomes readable when the process ends, also after SIGKILL. One thread
+starts and watches all processes, because a parent-death signal is bound to the lifetime of the
+thread that started the process, prctl(2).
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from catenary.realtime._task import FAILED
 from catenary.realtime.handle import Handle
 from catenary.realtime.worker import ProcessWorker, Worker
 
-RESTARTS = 3  # of one task; the next failure stops all
-KILL_SECONDS = 2.0  # from SIGTERM to SIGKILL, and from there to the end
+RESTARTS = 3  # of one task; its next failure stops all tasks
+KILL_SECONDS = 2.0  # from SIGTERM to SIGKILL, and from SIGKILL to the end
 
 
 class Supervisor:
-    """Owns the workers of all tasks of a set."""
+    """Owner of the workers of a set of tasks."""
 
     def __init__(
         self,
@@ -30,7 +30,13 @@ class Supervisor:
         make_worker: Callable[[Handle, Supervisor], Worker],
         on_failure: Callable[[], None],
     ) -> None:
-        """`on_failure` is called after a failure that stops all."""
+        """Create the workers; `start` starts them.
+
+        Args:
+            handles: the tasks by name.
+            make_worker: creates the worker of a task.
+            on_failure: called after a failure that stops all tasks.
+        """
         self._handles = handles
         self._make_worker = make_worker
         self._on_failure = on_failure
@@ -51,7 +57,7 @@ class Supervisor:
         return tuple(self._failures)
 
     def start(self) -> None:
-        """Starts all workers."""
+        """Start all workers."""
         self._started = True
         if any(isinstance(worker, ProcessWorker) for worker in self._workers.values()):
             threading.Thread(target=self._watch, name="task supervisor", daemon=True).start()
@@ -60,29 +66,28 @@ class Supervisor:
             self._start(name)
 
     def wait(self, seconds: float | None) -> bool:
-        """True: all have ended."""
+        """Wait until all tasks have ended; return False after `seconds`."""
         return self._all_ended.wait(seconds)
 
     def raise_failure(self) -> None:
-        """What stopped all tasks, if something did: once."""
+        """Raise the failure that stopped all tasks, if any; only once."""
         if self._fatal is not None and not self._raised:
             self._raised = True
             raise self._fatal
 
     def thread_ended(self, name: str) -> None:
-        """Called by a task's thread, last of all."""
+        """Handle the end of a task's thread; its last action."""
         if self._take_note(name):
             self._start(name)
 
     def ask_to_stop(self) -> None:
-        """Every task ends when it next waits."""
+        """Request a stop: each task ends when it next waits."""
         self._stopping = True
         for handle in self._handles.values():
             handle.stop()
 
     def end(self, seconds: float) -> None:
-        """Waits for the ends of all tasks, and brings those about that have not come after
-        `seconds`."""
+        """Wait until all tasks have ended; kill the processes left after `seconds`."""
         if not self._started:
             for handle in self._handles.values():
                 handle.leave()
@@ -93,7 +98,10 @@ class Supervisor:
                 ended = self._all_ended.wait(KILL_SECONDS)
 
     def _kill(self, number: signal.Signals, seconds: float) -> bool:
-        """Notes who would not end. False: threads are among them, which nothing ends."""
+        """Record the tasks that did not end, and send them a signal.
+
+        Return False if threads are among them: a thread cannot be killed.
+        """
         with self._lock:
             alive = sorted(self._alive)
             for name in alive:
@@ -103,7 +111,7 @@ class Supervisor:
         return all([self._workers[name].kill(number) for name in alive])
 
     def _watch(self) -> None:
-        """The thread that starts processes and waits for their ends."""
+        """Start the processes and wait for their ends; body of the supervisor thread."""
         to_start = list(self._workers)
         running: dict[int, str] = {}
         while to_start or running:
@@ -119,20 +127,20 @@ class Supervisor:
                     to_start.append(name)
 
     def _start(self, name: str) -> Worker | None:
-        """None: it could not be started, and that was noted."""
+        """Start a worker. Return None if that failed; the failure is recorded."""
         worker = self._workers[name]
         try:
             worker.start()
-        except Exception as error:  # of pickling the user's arguments, or of the system's limits
+        except Exception as error:  # from pickling the arguments, or from limits of the system
             block = self._handles[name].block
-            block.failure = f"it could not be started: {' '.join(str(error).split())}"
+            block.failure = f"the task could not be started: {' '.join(str(error).split())}"
             block.state = FAILED
             self._take_note(name, may_restart=False)
             return None
         return worker
 
     def _take_note(self, name: str, *, may_restart: bool = True) -> bool:
-        """A task has ended. True: its new worker is to be started."""
+        """Record the end of a task. Return True if its new worker must be started."""
         handle = self._handles[name]
         with self._lock:
             failure = handle.failure(self._workers[name].wait())
@@ -166,7 +174,7 @@ class Supervisor:
 
 def would_not_end(handle: Handle, seconds: float) -> TaskError:
     return TaskError(
-        f"{handle.task} did not end within {seconds:g} s of being asked to",
+        f"{handle.task} did not end within {seconds:g} s after the stop request",
         task=handle.name,
-        hint="a task sees that it is to end when it waits: `for job in task`",
+        hint="a task notices a stop request when it waits: use `for job in task`",
     )

@@ -1,4 +1,4 @@
-"""Task: what is to run, how often and how important it is. A value; `Tasks` runs it."""
+"""Task: a function with a period, a priority and policies. A value; `Tasks` runs it."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ PAGE = 4096
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A function that is run as a task: `function(task, *arguments)` with `for job in task:`.
+    """A function that runs as a task: `function(task, *arguments)` with `for job in task:`.
 
-    period: [s] from release to release; with a `trigger`: the least time between two.
-    name: in reports and errors; the function's where not given.
+    period: [s] from release to release; with a `trigger`, the minimum time between two releases.
+    name: name in reports and errors; default: the function's name.
     priority: 1..99, greater is higher (SCHED_FIFO); None: ordinary scheduling.
     cpu: the processor it is bound to; None: any.
     stack_size: [bytes], a multiple of 4096 from 32 KiB.
     deadline: [s] after its release; None: the period.
     trigger: a Signal makes the task sporadic: it sleeps until the signal is set.
-    on_miss: "count" the job and go on with the next release, late or not; "skip" the releases that
-        have passed; "stop" the task with an error; or call this with the job that ended late.
-    on_failure: when the task raises or its process dies: "stop" all tasks with an error, "restart"
+    on_miss: "count" the job and continue with the next release, late or not; "skip" the releases
+        that have passed; "stop" the task with an error; or a function, called with the late job.
+    on_failure: if the task raises or its process dies: "stop" all tasks with an error, "restart"
         it at its next release, or "continue" without it.
     """
 
@@ -52,9 +52,9 @@ class Task:
 
     def __post_init__(self) -> None:
         if not callable(self.function):
-            raise TypeError(f"the task's function is {self.function!r}, which cannot be called")
+            raise TypeError(f"the task's function is {self.function!r}, which is not callable")
         if not isinstance(self.arguments, tuple):
-            raise TypeError(f"arguments is a tuple, not {self.arguments!r}; one is (x,)")
+            raise TypeError(f"arguments must be a tuple such as (x,), not {self.arguments!r}")
         if not self.name:
             name = getattr(self.function, "__name__", type(self.function).__name__)
             object.__setattr__(self, "name", name)
@@ -69,15 +69,25 @@ class Task:
 
 
 def check_period(task: str, what: str, seconds: float) -> int:
-    """In ns; ValueError: not positive, or beyond the machine."""
+    """Return a time in ns.
+
+    Args:
+        task: name of the task, for errors.
+        what: name of the quantity, for errors.
+        seconds: the time [s].
+
+    Raises:
+        TypeError: not a number.
+        ValueError: not positive, too short or too long.
+    """
     if isinstance(seconds, bool) or not isinstance(seconds, int | float):
-        raise TypeError(f"task {task!r}: {what} is a number of seconds, not {seconds!r}")
+        raise TypeError(f"task {task!r}: {what} must be a number of seconds, not {seconds!r}")
     if not math.isfinite(seconds) or seconds <= 0:
         raise ValueError(f"task {task!r}: a {what} of {seconds} s is not positive")
     if seconds < SHORTEST_PERIOD:
         raise ValueError(
-            f"task {task!r}: a {what} of {seconds * 1e6:g} us is beyond this machine, whose "
-            f"wake-ups take microseconds: the shortest is {SHORTEST_PERIOD * 1e6:g} us"
+            f"task {task!r}: a {what} of {seconds * 1e6:g} us is too short, because wake-ups "
+            f"take microseconds: use at least {SHORTEST_PERIOD * 1e6:g} us"
         )
     if seconds > LONGEST_PERIOD:
         raise ValueError(
@@ -88,7 +98,7 @@ def check_period(task: str, what: str, seconds: float) -> int:
 
 
 def check_place(task: Task) -> None:
-    """Priority, processor and stack: what no machine has."""
+    """Check priority, processor and stack size. Raises ValueError if no machine has them."""
     if task.priority is not None and task.priority not in PRIORITIES:
         raise ValueError(
             f"{task}: priority {task.priority} is not within 1..99; None is ordinary scheduling"
@@ -98,16 +108,16 @@ def check_place(task: Task) -> None:
     size = task.stack_size
     if size is not None and (size < SMALLEST_STACK or size % PAGE):
         raise ValueError(
-            f"{task}: a stack of {size} bytes: it takes a multiple of {PAGE} from {SMALLEST_STACK}"
+            f"{task}: invalid stack of {size} bytes: use a multiple of {PAGE} from {SMALLEST_STACK}"
         )
 
 
 def check_policies(task: Task) -> None:
     if task.on_miss not in ("count", "skip", "stop") and not callable(task.on_miss):
         raise ValueError(
-            f'{task}: on_miss is "count", "skip", "stop" or a function, not {task.on_miss!r}'
+            f'{task}: on_miss must be "count", "skip", "stop" or a function, not {task.on_miss!r}'
         )
     if task.on_failure not in ("stop", "restart", "continue"):
         raise ValueError(
-            f'{task}: on_failure is "stop", "restart" or "continue", not {task.on_failure!r}'
+            f'{task}: on_failure must be "stop", "restart" or "continue", not {task.on_failure!r}'
         )

@@ -1,6 +1,6 @@
-/* A periodic or sporadic task: its releases, their deadlines and what they took, in memory that
- * processes share. The task's own thread writes the job and the figures; others write `stop`,
- * `period` and signals. Per job: two readings of three clocks and of getrusage, about 2 us.
+/* A periodic or sporadic task: its releases, deadlines and statistics, in memory that processes
+ * share. The task's own thread writes the job and the figures; other threads write `stop`, `period`
+ * and signals. Budget per job: two readings of three clocks and of getrusage, about 2 us.
  */
 #ifndef CATENARY_TASK_BLOCK_H
 #define CATENARY_TASK_BLOCK_H
@@ -13,18 +13,18 @@
 #include "histogram.h"
 #include "machine_time.h"
 
-#define TASK_SIGNALS 64               /* that can wait for their job */
+#define TASK_SIGNALS 64               /* maximum of pending signals */
 #define TASK_FAILURE_SIZE 4096
 #define TASK_SCHEDULING_SIZE 256
 
 enum { TASK_NEW, TASK_STARTED, TASK_ENDED, TASK_FAILED };
 
-/* what is counted of every job, each in a histogram */
+/* quantities of each job; one histogram for each */
 enum {
     FIGURE_PERIOD,                    /* from start to start [ns] */
     FIGURE_JITTER,                    /* from the release to the start [ns] */
     FIGURE_RESPONSE,                  /* from the release to the end [ns] */
-    FIGURE_EXECUTION,                 /* the thread's processor time [ns]; virtual: spent */
+    FIGURE_EXECUTION,                 /* the thread's processor time [ns]; on a virtual clock the time spent */
     FIGURE_PAGE_FAULTS,
     FIGURE_SWITCHES,                  /* involuntary ones */
     FIGURE_COLLECTIONS,               /* of Python's garbage collector, in its process */
@@ -43,21 +43,21 @@ typedef struct task_block {
     uint32_t state;
     uint32_t stop;
     uint32_t sporadic;
-    uint32_t skip;                    /* after a miss: releases that have passed do not happen */
+    uint32_t skip;                    /* after a miss, skip the releases that have passed */
     int64_t origin;                   /* the first release; 0: not known yet */
     uint32_t origin_set;              /* futex word */
     int32_t process;
     int64_t period;
     int64_t deadline;                 /* 0: the period */
 
-    uint64_t signalled;               /* sporadic: how often, and when */
+    uint64_t signalled;               /* sporadic: number of signals; their times below */
     uint64_t signals_refused;
     uint64_t taken;
     int64_t signal_times[TASK_SIGNALS];
 
     uint64_t number;                  /* of the running or last job */
     uint32_t busy;                    /* between its start and its end */
-    uint32_t missed;                  /* the last one ended after its deadline */
+    uint32_t missed;                  /* the last job ended after its deadline */
     int64_t release;
     int64_t start;
     int64_t spent;
@@ -90,7 +90,7 @@ static int64_t task_deadline(const task_block *b) {
     return deadline ? deadline : task_load(&b->period);
 }
 
-/* A sporadic task is released by a signal, but not sooner than a period after its last release. */
+/* A signal releases a sporadic task, at the earliest one period after its last release. */
 static int64_t task_next_signal(const task_block *b) {
     if (cat_load_acquire64(&b->signalled) == b->taken) return CAT_CLOCK_FOREVER;
     int64_t signalled = task_load(&b->signal_times[b->taken % TASK_SIGNALS]);
@@ -127,7 +127,8 @@ static void task_begin(task_block *b, const cat_clock *clock, int64_t release) {
     cat_store_release32(&b->busy, 1);
 }
 
-/* Waits for the next release. 1: a job begins; 0: asked to stop; -EINTR: a signal came first. */
+/* Wait for the next release. Return 1 if a job begins, 0 after a stop request, -EINTR if a signal
+ * interrupted the wait. */
 static int task_wait(task_block *b, const cat_clock *clock) {
     for (;;) {
         if (cat_load_acquire32(&b->stop)) return 0;
@@ -142,7 +143,7 @@ static int task_wait(task_block *b, const cat_clock *clock) {
     }
 }
 
-/* Ends the running job, if there is one. 1: after its deadline. */
+/* End the current job, if any. Return 1 if it missed its deadline. */
 static int task_finish(task_block *b, const cat_clock *clock) {
     if (!b->busy) return 0;
     int64_t response = clock->now(clock->self) - b->release;
@@ -158,7 +159,7 @@ static int task_finish(task_block *b, const cat_clock *clock) {
     return (int)b->missed;
 }
 
-/* Releases a sporadic task once. 0: so many signals wait already that this one is not kept. */
+/* Release a sporadic task once. Return 0 if too many signals are pending: this one is dropped. */
 static int task_signal(task_block *b, int64_t now) {
     uint64_t waiting = cat_load_acquire64(&b->signalled) - cat_load_relaxed64(&b->taken);
     if (waiting >= TASK_SIGNALS) {

@@ -1,4 +1,4 @@
-"""A task from its first instruction to its last, in its own thread or process."""
+"""Main function of a task, in its own thread or process."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from catenary.realtime.scheduling import Scheduling, refusal, what_scheduling
 from catenary.realtime.task import Task
 from catenary.realtime.task_memory import Place
 
-START_SECONDS = 60.0  # at most, from one task's start to that of all
-STACK_LEFT = 32 * 1024  # [bytes] not touched: what runs already lies there
+START_SECONDS = 60.0  # maximum from the start of one task to the start of all
+STACK_LEFT = 32 * 1024  # [bytes] not touched: already in use
 
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """What a worker is handed."""
+    """Arguments of a worker."""
 
     task: Task
     place: Place
@@ -38,8 +38,8 @@ class Work:
 
 
 def run_in_process(work: Work, session: Session | None, parent: int) -> None:
-    """The main function of a task's process. Exit status 1: it failed, and its block says why."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a Ctrl-C is the parent's, who then stops us
+    """Run a task in its process. Exit with status 1 if it fails; its block has the reason."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C and stops its tasks
     signal.signal(signal.SIGTERM, end_now)
     libc.signal_on_parents_death(signal.SIGTERM)
     if os.getppid() != parent:
@@ -53,12 +53,12 @@ def run_in_process(work: Work, session: Session | None, parent: int) -> None:
 
 
 def end_now(number: int, frame: object) -> None:
-    """SIGTERM: our parent has ended or lost patience. `finally` blocks still run."""
+    """Handle SIGTERM: the parent has ended, or its timeout has passed. `finally` blocks run."""
     sys.exit(128 + number)
 
 
 def start_thread(work: Work, ended: Callable[[str], None]) -> threading.Thread:
-    """The task in a thread of its own, which calls `ended` last."""
+    """Start the task in its own thread, which calls `ended` at its end."""
 
     def body() -> None:
         run(work)
@@ -72,7 +72,7 @@ def start_thread(work: Work, ended: Callable[[str], None]) -> threading.Thread:
 
 @contextlib.contextmanager
 def stack_size(size: int | None) -> Iterator[None]:
-    """Of threads that are started meanwhile; Python has one setting for all."""
+    """Set the stack size of threads started in this block; Python has one setting for all."""
     if size is None:
         yield
         return
@@ -84,7 +84,7 @@ def stack_size(size: int | None) -> Iterator[None]:
 
 
 def run(work: Work) -> bool:
-    """False: it failed, and its block says why."""
+    """Run a task. Return False if it failed; its block has the reason."""
     block = Block(work.place.memory.buffer)
     try:
         block.scheduling = prepare(work)
@@ -104,7 +104,7 @@ def run(work: Work) -> bool:
 
 
 def prepare(work: Work) -> str:
-    """How the calling thread is scheduled, in words."""
+    """Prepare the calling thread, and return a description of its scheduling."""
     task = work.task
     if task.stack_size is not None:
         touch_stack(max(task.stack_size - STACK_LEFT, 0) // 2)
@@ -116,7 +116,7 @@ def prepare(work: Work) -> str:
 
 
 def schedule(task: Task, best_effort: bool) -> Scheduling:
-    """Priority and processor of the calling thread."""
+    """Set priority and processor of the calling thread. Raises RealtimeError if refused."""
     refusals = []
     if task.cpu is not None:
         cpus = {task.cpu}
@@ -130,21 +130,23 @@ def schedule(task: Task, best_effort: bool) -> Scheduling:
         raise RealtimeError(
             "; ".join(refusals),
             hint=f"run as root, or once: {SET_CAPABILITIES}; or an rtprio line in "
-            "/etc/security/limits.d; or best_effort=True does without",
+            "/etc/security/limits.d; or continue without it by best_effort=True",
         )
     return replace(what_scheduling(), refusals=tuple(refusals))
 
 
 def leave_priority() -> None:
-    """A task's last job is done: what ending a process takes (100 ms) is not to keep others from
-    their instants."""
+    """Return to ordinary scheduling after the last job.
+
+    Ending a process takes 100 ms, which must not delay the releases of other tasks.
+    """
     with contextlib.suppress(OSError):
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
 def iterate(work: Work, block: Block) -> None:
     timer = work.place.open_timer()
-    timer.wait_until(block.origin_ns)  # on a virtual clock: takes its place among the others
+    timer.wait_until(block.origin_ns)  # on a virtual clock, this is the participant's first wait
     running = Running(work.task, block, timer)
     with counted_collections(running.releases):
         work.task.function(running, *work.task.arguments)
@@ -161,7 +163,7 @@ def counted_collections(releases: Releases) -> Iterator[None]:
 
 
 def reason(error: Exception) -> str:
-    """What a person reads: our own errors as they are, others with the line that raised them."""
+    """Return the text of an error, for errors outside of Catenary with the line that raised it."""
     if isinstance(error, CatenaryError):
         return str(error)
     frames = traceback.extract_tb(error.__traceback__)

@@ -1,4 +1,4 @@
-"""Place: where a task lives: its memory, and its waiter on a clock. Handed to its process."""
+"""Place: the memory of a task and its participant on a clock. Passed to its process."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Place:
     participant: Participant | None  # on a virtual clock
 
     def open_timer(self) -> Timer:
-        """The task's waiter; in any process: to be woken."""
+        """Return the task's timer; any process can use it to wake the task."""
         if self.participant is not None:
             return self.participant.timer
         return MachineTimer(self.memory.buffer)

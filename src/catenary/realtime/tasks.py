@@ -1,7 +1,7 @@
 """Tasks: a set of tasks that run together, from their common start to their end.
 
-More than one task: each runs in a process of its own, because under one interpreter lock a task of
-low priority keeps one of high priority waiting, up to 5 ms for every hand-over.
+Several tasks run in one process each. Under a common interpreter lock, a task of low priority
+would delay one of high priority by up to 5 ms at every switch.
 """
 
 from __future__ import annotations
@@ -30,19 +30,21 @@ from catenary.realtime.worker import ProcessWorker, ThreadWorker, Worker, Worker
 
 LEAD_SECONDS = 0.01  # from the last task's start to the first release of all
 STOP_SECONDS = 5.0
-LOOK_NS = 1_000_000_000  # of virtual time
+LOOK_NS = 1_000_000_000  # [ns] of virtual time, between two checks
 
 T = TypeVar("T")
 
 
 class Tasks:
-    """Owns running tasks: `with Tasks(a, b) as tasks:` starts them together, the end of the block
-    ends them. `tasks["a"]` is one of them; `print(tasks)` shows what their jobs took.
+    """A set of running tasks.
 
-    workers: "processes" or "threads"; None: processes for more than one.
-    clock: a VirtualClock simulates them, by priority and processor (`cpu`; None counts as 0).
+    `with Tasks(a, b) as tasks:` starts them together; the end of the block ends them. `tasks["a"]`
+    is one of them; `print(tasks)` shows the statistics of their jobs.
+
+    workers: "processes" or "threads"; None: processes for more than one task.
+    clock: a VirtualClock simulates them by priority and processor (`cpu`; None counts as 0).
     session: `realtime.session()`, entered in each process, or in this one for threads.
-    best_effort: priorities and processors that are refused are done without.
+    best_effort: continue without the priorities and processors that are refused.
     """
 
     def __init__(
@@ -63,12 +65,12 @@ class Tasks:
         self._best_effort = best_effort
         self._handles: Mapping[str, Handle] = {}
         self._supervisor: Supervisor | None = None
-        self._undo = contextlib.ExitStack()  # what this process changed for its tasks
+        self._undo = contextlib.ExitStack()  # undoes the changes to this process
 
     def __getitem__(self, name: str) -> Handle:
         if name not in self._handles:
-            known = ", ".join(self._handles) or "none is running"
-            raise KeyError(f"there is no task {name!r}: {known}")
+            known = ", ".join(self._handles) or "none"
+            raise KeyError(f"unknown task {name!r}; running tasks: {known}")
         return self._handles[name]
 
     def __iter__(self) -> Iterator[Handle]:
@@ -79,13 +81,13 @@ class Tasks:
 
     @property
     def failures(self) -> tuple[TaskError, ...]:
-        """What went wrong so far, oldest first; also what was restarted or done without."""
+        """Failures so far, oldest first, including those of restarted or abandoned tasks."""
         return self._supervisor.failures if self._supervisor else ()
 
     def start(self) -> None:
-        """Starts all tasks; their first release is at one instant, once all have started."""
+        """Start all tasks. Once all have started, their first releases are at the same time."""
         if self._supervisor is not None:
-            raise RuntimeError("these tasks have been started already")
+            raise RuntimeError("these tasks have already been started")
         if self.workers == "processes":
             for task in self._tasks:
                 check_importable(task)
@@ -109,8 +111,17 @@ class Tasks:
             handle.block.start_at(origin)
 
     def join(self, seconds: float | None = None) -> bool:
-        """Waits until all tasks have ended, at most so long [s of the tasks' clock]. True: they
-        have. On a virtual clock this is where time passes. TaskError: a task failed."""
+        """Wait until all tasks have ended. On a virtual clock, time passes in this call.
+
+        Args:
+            seconds: timeout on the tasks' clock [s]; None: no timeout.
+
+        Returns:
+            True if all tasks have ended.
+
+        Raises:
+            TaskError: a task failed.
+        """
         supervisor = self._started()
         if self._clock is None:
             ended = supervisor.wait(seconds)
@@ -125,8 +136,15 @@ class Tasks:
         return ended
 
     def stop(self, seconds: float = STOP_SECONDS, *, raising: bool = True) -> None:
-        """Ends all tasks: they see it when they next wait. Processes that do not within `seconds`
-        are ended by SIGTERM, then SIGKILL. TaskError: a task failed, or would not end."""
+        """End all tasks: each one ends when it next waits.
+
+        Args:
+            seconds: processes that have not ended after this time get SIGTERM, then SIGKILL.
+            raising: raise the failure that stopped the tasks.
+
+        Raises:
+            TaskError: a task failed, or did not end in time.
+        """
         supervisor = self._started()
         supervisor.ask_to_stop()
         if self._clock is not None:
@@ -147,14 +165,24 @@ class Tasks:
         priority: int = 0,
         cpu: int | None = None,
     ) -> T:
-        """Runs `function(place, *arguments)` beside the tasks until it returns; its result.
+        """Run `function(place, *arguments)` in parallel to the tasks, and return its result.
 
-        On the machine's clock it runs here, and `place` is None; where the tasks are processes,
-        this one is in the session too meanwhile. On a virtual clock it runs in a thread of its
-        own, at `place` on the clock, with that priority and processor (`Segment(...,
-        clock=place)`), and time passes meanwhile. What it raises comes out; a task
-        that failed meanwhile is a TaskError afterwards, and in `failures` at once. Ctrl-C is told
-        once the function has ended: a thread cannot be ended against its will.
+        On the machine's clock, it runs in this thread and `place` is None. If the tasks are
+        processes, this process is in the session, too. On a virtual clock, it runs in its own
+        thread, `place` is its participant (`Segment(..., clock=place)`), and time passes. Ctrl-C
+        takes effect after the function has ended, because a thread cannot be killed.
+
+        Args:
+            function: the function to run; its exceptions are passed on.
+            arguments: further arguments of the function.
+            priority: priority on the virtual clock.
+            cpu: simulated processor on the virtual clock; None: its own.
+
+        Returns:
+            The result of the function.
+
+        Raises:
+            TaskError: a task failed meanwhile; `failures` has it at once.
         """
         supervisor = self._started()
         if self._clock is not None:
@@ -166,8 +194,10 @@ class Tasks:
         return result
 
     def verdict(self, *others: Demand) -> Verdict:
-        """Whether these tasks are schedulable, by the longest execution times measured so far;
-        `others`: what else runs beside them, a loop for one."""
+        """Analyse these tasks with the longest execution times measured so far.
+
+        `others` are further demands on the processors, for example a loop.
+        """
         measured = [measured_demand(handle.task, handle.statistics) for handle in self]
         return analyse([*measured, *others])
 
@@ -187,7 +217,7 @@ class Tasks:
         self.stop(raising=error is None)
 
     def _own_session(self) -> contextlib.AbstractContextManager[object]:
-        """What prepares this process, where the tasks have theirs elsewhere; threads have it."""
+        """Return the session for this process if the tasks are processes; threads have it."""
         if self._session is None or self.workers == "threads":
             return contextlib.nullcontext()
         return self._session
@@ -219,7 +249,7 @@ class Tasks:
         return time.monotonic_ns() if self._clock is None else self._clock.now_ns
 
     def _wake_clock(self) -> None:
-        """A failure ends `join`."""
+        """Wake the clock's thread: a failure ends `join`."""
         if self._clock is not None:
             self._clock.home.wake()
 
@@ -231,7 +261,7 @@ def run_at(
     function: Callable[..., T],
     arguments: tuple[object, ...],
 ) -> T:
-    """Runs the function in a thread of its own while time passes."""
+    """Run the function in its own thread while virtual time passes."""
     place = clock.participate(priority=priority, cpu=cpu)
 
     def work() -> T:
@@ -246,7 +276,7 @@ def run_at(
         try:
             while not future.done():
                 clock.wait_until(clock.now_ns + LOOK_NS)
-        except BaseException:  # Ctrl-C: time goes on, so that the function can come to its end
+        except BaseException:  # Ctrl-C: let time pass, so that the function can end
             clock.home.step_aside()
             wait([future])
             clock.home.return_to()
@@ -255,8 +285,11 @@ def run_at(
 
 
 def share_one_cpu(undo: contextlib.ExitStack) -> None:
-    """This thread, and those and the processes it starts: on a virtual clock one runs at a time,
-    and handing over within one processor takes half as long as waking another (8 us, not 18)."""
+    """Bind this thread, and the threads and processes it starts, to one processor.
+
+    On a virtual clock only one of them runs at a time. A switch within one processor takes half as
+    long as waking another (8 us, not 18).
+    """
     thread = threading.get_native_id()
     undo.callback(os.sched_setaffinity, thread, os.sched_getaffinity(thread))
     os.sched_setaffinity(thread, {libc.call("sched_getcpu")})
@@ -271,7 +304,7 @@ def check_set(tasks: tuple[Task, ...], workers: Workers | None) -> None:
     names = [task.name for task in tasks]
     for name in names:
         if names.count(name) > 1:
-            raise ValueError(f"two tasks are called {name!r}: give them a `name`")
+            raise ValueError(f"two tasks have the name {name!r}: give each its own `name`")
     triggers = [task.trigger for task in tasks if task.trigger is not None]
     if len(set(map(id, triggers))) < len(triggers):
         raise ValueError("two tasks have the same trigger: a Signal releases one task")
@@ -280,7 +313,7 @@ def check_set(tasks: tuple[Task, ...], workers: Workers | None) -> None:
 
 
 def make_handles(tasks: tuple[Task, ...], clock: VirtualClock | None) -> dict[str, Handle]:
-    """All or none: a virtual clock waits for everybody who has a place on it."""
+    """Create the handles, or none if one fails: a virtual clock waits for all participants."""
     handles: dict[str, Handle] = {}
     try:
         for task in tasks:
@@ -297,13 +330,13 @@ def check_cpus(tasks: tuple[Task, ...]) -> None:
     for task in tasks:
         if task.cpu is not None and task.cpu not in ours and not may_have(task.cpu, ours):
             raise ValueError(
-                f"{task}: CPU {task.cpu} does not exist or is not ours; this process may use "
+                f"{task}: CPU {task.cpu} does not exist or is not allowed; this process may use "
                 + ", ".join(map(str, sorted(ours)))
             )
 
 
 def may_have(cpu: int, ours: set[int]) -> bool:
-    """A CPU kept free (isolcpus) is in nobody's set, and is had by asking for it."""
+    """Return True if the process may use `cpu`: an isolated one (isolcpus) is in no default set."""
     thread = threading.get_native_id()
     try:
         os.sched_setaffinity(thread, {cpu})

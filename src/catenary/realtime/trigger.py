@@ -1,4 +1,4 @@
-"""Signal: what a sporadic task sleeps for. Anybody who has it can set it: any task, any process."""
+"""Signal: releases a sporadic task. Any task or process that has the signal can set it."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from catenary.realtime.task_memory import Place
 
 
 class Signal:
-    """Owns the way to one sporadic task. `Task(..., trigger=signal)` waits for it; whoever else
-    has it, by its own arguments, sets it."""
+    """Trigger of one sporadic task.
+
+    `Task(..., trigger=signal)` waits for it. Tasks that get it as an argument can set it.
+    """
 
     def __init__(self) -> None:
         self._place: Place | None = None
@@ -22,12 +24,15 @@ class Signal:
         self._place, self._ends = place, None
 
     def bind(self, place: Place) -> None:
-        """Called by `Tasks` before the tasks start."""
+        """Connect the signal to its task. `Tasks` calls this before the tasks start."""
         self._place, self._ends = place, None
 
     def set(self) -> bool:
-        """Releases the task once, as soon as its period allows. False: 64 releases wait already,
-        and this one is not kept (counted). Never waits. RuntimeError: no task has this trigger."""
+        """Release the task once, as soon as its period allows. Never waits.
+
+        Return False if 64 releases are already pending: this one is dropped and counted.
+        Raises RuntimeError if no task has this trigger.
+        """
         if self._ends is None:
             if self._place is None:
                 raise RuntimeError("no task was started with this signal as its trigger")

@@ -1,17 +1,18 @@
 /* Virtual time: a discrete-event simulation of fixed priorities, for threads and processes alike.
  *
- * The table lies in shared memory. Of all participants exactly one runs, in no time; it blocks by
- * waiting for an instant or by spending execution time. Whoever blocks last decides who is next:
- *  - who has just spent its time runs before anything is released at the same instant: a job that
- *    is done when another begins was not preempted by it, as response-time analysis has it;
- *  - what is due is released;
- *  - on every processor the ready one of the highest priority is served, and stays so until it
- *    waits or a higher one is released; equals are served in the order of their release
- *    (SCHED_FIFO, sched(7));
- *  - of those served that have nothing left to spend, the one of the highest priority runs;
+ * The table is in shared memory. Exactly one participant runs at a time, and virtual time stands
+ * still meanwhile. A participant blocks by waiting for a time or by spending execution time. The
+ * participant that blocks last selects the next one:
+ *  - a participant that has just spent its time runs before any release at the same time: a job
+ *    that ends when another begins was not preempted by it, as in response-time analysis;
+ *  - participants that are due are released;
+ *  - each processor serves its ready participant of highest priority until that one waits or a
+ *    higher one is released; equal priorities are served in the order of their release (SCHED_FIFO,
+ *    sched(7));
+ *  - of those served with no time left to spend, the one of the highest priority runs;
  *  - if there is none, time advances to the next release or end of spending.
- * A robust mutex guards the table: a participant killed inside leaves it usable, and whoever
- * notices the death calls vt_remove.
+ * A robust mutex guards the table: a participant that is killed while it holds the mutex leaves the
+ * table usable. The supervisor that notices the death frees the slot (VT_FREE).
  */
 #ifndef CATENARY_VIRTUAL_TIME_H
 #define CATENARY_VIRTUAL_TIME_H
@@ -28,28 +29,28 @@
 
 #define VT_PARTICIPANTS 64
 #define VT_OWN_PROCESSOR (-1)
-#define VT_SIGNALS_NS 500000000       /* of the machine's time: longest sleep between looks at signals */
+#define VT_SIGNALS_NS 500000000       /* machine time: longest sleep between checks for signals */
 
 enum {
-    VT_FREE,                          /* the slot is nobody's */
-    VT_EXPECTED,                      /* will come: time stands still until then */
+    VT_FREE,                          /* the slot is unused */
+    VT_EXPECTED,                      /* will start: time stands still until then */
     VT_WAITING,                       /* for `due`, or to be woken */
-    VT_READY,                         /* wants its processor: to spend `remaining`, then to run */
-    VT_RUNNING,                       /* its code runs: time stands still */
-    VT_ASIDE,                         /* does other things; time goes on without it */
+    VT_READY,                         /* needs its processor: to spend `remaining`, then to run */
+    VT_RUNNING,                       /* its code runs; time stands still */
+    VT_ASIDE,                         /* does not participate at present; time advances without it */
 };
 
 typedef struct vt_participant {
-    uint32_t turn;                    /* futex word: counts the turns it was given */
-    uint32_t seen;                    /* the turns it has taken */
+    uint32_t turn;                    /* futex word: number of turns given */
+    uint32_t seen;                    /* number of turns taken */
     uint32_t state;
     uint32_t woken;
-    uint32_t spent;                   /* its time at this very instant: runs before any release */
+    uint32_t spent;                   /* finished spending at this time: runs before any release */
     int32_t priority;
-    int32_t cpu;                      /* VT_OWN_PROCESSOR: competes with nobody */
+    int32_t cpu;                      /* VT_OWN_PROCESSOR: does not compete */
     int64_t due;
     int64_t remaining;
-    uint64_t order;                   /* of becoming ready, among equals */
+    uint64_t order;                   /* order of becoming ready, among equal priorities */
 } vt_participant;
 
 typedef struct virtual_time {
@@ -88,7 +89,7 @@ static int vt_precedes(const vt_participant *a, const vt_participant *b) {
     return a->order < b->order;
 }
 
-/* Is this one served by its processor? */
+/* Return 1 if this participant is served by its processor. */
 static int vt_served(const virtual_time *v, const vt_participant *p) {
     if (p->state != VT_READY) return 0;
     if (p->cpu == VT_OWN_PROCESSOR) return 1;
@@ -122,7 +123,7 @@ static vt_participant *vt_next(virtual_time *v) {
     return next;
 }
 
-/* Advances to the next event. 0: there is none, until somebody is woken from outside. */
+/* Advance to the next event. Return 0 if there is none until a participant is woken. */
 static int vt_advance(virtual_time *v) {
     int64_t step = INT64_MAX;
     int served[VT_PARTICIPANTS];
@@ -143,8 +144,8 @@ static int vt_advance(virtual_time *v) {
     return 1;
 }
 
-/* Gives the turn to whoever is next, unless somebody runs. Every round releases somebody or ends
- * a spending, so there are at most two for each participant. */
+/* Give the turn to the next participant, unless one runs. Each round releases a participant or
+ * ends a spending, so there are at most two rounds for each participant. */
 static void vt_schedule(virtual_time *v) {
     if (vt_time_stands(v)) return;
     do {
@@ -159,8 +160,8 @@ static void vt_schedule(virtual_time *v) {
     } while (vt_advance(v));
 }
 
-/* Sleeps until the turn comes. -EINTR: a signal came first; it stays blocked. A signal that came just
- * before the sleep, or to another thread, does not end it: so it ends by itself now and then. */
+/* Sleep until the turn comes. Return -EINTR after a signal; the participant stays blocked. A signal
+ * just before the sleep, or to another thread, does not end it, so the sleep has a timeout. */
 static int vt_sleep(vt_participant *p) {
     struct timespec t;
     clock_gettime(CLOCK_MONOTONIC, &t);
@@ -173,7 +174,8 @@ static int vt_sleep(vt_participant *p) {
     return 0;
 }
 
-/* A slot for somebody who will come: time stands still until then. -ENOSPC: all are taken. */
+/* Return a slot for a participant that will start; time stands still until then. Return -ENOSPC if
+ * all slots are taken. */
 static int vt_join(virtual_time *v, int32_t priority, int32_t cpu) {
     int found = -ENOSPC;
     vt_lock(v);
@@ -188,7 +190,7 @@ static int vt_join(virtual_time *v, int32_t priority, int32_t cpu) {
     return found;
 }
 
-/* The same for one whose place is kept: its process died and is started again. */
+/* Reset a slot that is kept: its process died and is started again. */
 static void vt_expect(virtual_time *v, int slot) {
     vt_lock(v);
     v->who[slot].state = VT_EXPECTED;
@@ -203,10 +205,10 @@ static void vt_change(virtual_time *v, int slot, uint32_t state) {
     vt_unlock(v);
 }
 
-/* Blocks until `deadline`. 0: it need not; 1: it has to sleep until its turn. */
+/* Block until `deadline`. Return 0 if no wait is necessary, 1 if it must sleep until its turn. */
 static int vt_begin_waiting(virtual_time *v, vt_participant *p, int64_t deadline) {
-    int goes_on = p->state == VT_WAITING || p->state == VT_READY;     /* a signal came first */
-    int has_turn = p->state == VT_RUNNING && p->turn != p->seen;      /* meanwhile */
+    int goes_on = p->state == VT_WAITING || p->state == VT_READY;     /* continues after a signal */
+    int has_turn = p->state == VT_RUNNING && p->turn != p->seen;      /* turn given meanwhile */
     if (goes_on || has_turn) return 1;
     if (p->state == VT_RUNNING && (p->woken || deadline <= v->now)) return 0;
     p->due = p->woken ? v->now : deadline;
@@ -215,7 +217,7 @@ static int vt_begin_waiting(virtual_time *v, vt_participant *p, int64_t deadline
     return 1;
 }
 
-/* 0: the deadline has passed; 1: woken before; -EINTR: a signal came first: call again. */
+/* Return 0 if the deadline has passed, 1 if woken before, -EINTR after a signal: call again. */
 static int vt_wait_until(virtual_time *v, int slot, int64_t deadline) {
     vt_participant *p = &v->who[slot];
     vt_lock(v);
@@ -229,13 +231,13 @@ static int vt_wait_until(virtual_time *v, int slot, int64_t deadline) {
     return woken;
 }
 
-/* 0: spent; -EINTR: a signal came first: call vt_sleep to go on. */
+/* Return 0 if the time is spent, -EINTR after a signal: call vt_sleep to continue. */
 static int vt_spend(virtual_time *v, int slot, int64_t duration) {
     vt_participant *p = &v->who[slot];
     if (duration <= 0) return 0;
     vt_lock(v);
     vt_make_ready(v, p, duration);
-    p->order = 0;                     /* it is served already: ahead of its equals */
+    p->order = 0;                     /* already served: before participants of equal priority */
     vt_schedule(v);
     vt_unlock(v);
     return vt_sleep(p);

@@ -1,4 +1,4 @@
-"""Workers: the thread or the process that a task runs in, started, watched and ended alike."""
+"""Workers: a common interface to the threads and processes that tasks run in."""
 
 from __future__ import annotations
 
@@ -19,20 +19,22 @@ Workers: TypeAlias = Literal["processes", "threads"]
 
 
 class Worker(Protocol):
-    """Owns what one task runs in."""
+    """Owner of the thread or process of one task."""
 
     def start(self) -> None: ...
 
     def wait(self) -> int | None:
-        """Until it is gone, which was noticed already. Its exit status, negative: the signal that
-        killed it; None: a thread has none."""
+        """Join the worker, which has already ended.
+
+        Return its exit status, negative for the signal that killed it; None for a thread.
+        """
 
     def kill(self, number: signal.Signals) -> bool:
-        """False: it cannot be ended against its will."""
+        """Send a signal. Return False if the worker cannot be killed."""
 
 
 class ProcessWorker:
-    """A process of its own, started afresh (spawn): it shares no interpreter with anybody."""
+    """Worker in its own process, started afresh (spawn), so that it shares no interpreter."""
 
     def __init__(self, work: Work, session: Session | None) -> None:
         arguments = (work, session, os.getpid())
@@ -62,7 +64,7 @@ class ProcessWorker:
 
 
 class ThreadWorker:
-    """A thread of this process: the interpreter serves one of them at a time."""
+    """Worker in a thread of this process; the interpreter runs one thread at a time."""
 
     def __init__(self, work: Work, ended: Callable[[str], None]) -> None:
         self._work = work
@@ -79,7 +81,7 @@ class ThreadWorker:
 
 
 def check_importable(task: Task) -> None:
-    """A process imports the task's function by its name. TypeError: it cannot."""
+    """Check that a process can import the task's functions by name. Raises TypeError if not."""
     functions = (task.function, task.on_miss)
     for function in filter(callable, functions):
         try:
@@ -87,5 +89,5 @@ def check_importable(task: Task) -> None:
         except (pickle.PicklingError, AttributeError, TypeError) as error:
             raise TypeError(
                 f"{task}: its process cannot import {function!r}: {error}. Define it at the top of "
-                'a module, or take workers="threads"'
+                'a module, or use workers="threads"'
             ) from error

@@ -1,6 +1,6 @@
-"""Recordings of a loop, by another process, as MCAP files that PlotJuggler and Foxglove open.
+"""Recordings of a loop by another process, as MCAP files for PlotJuggler and Foxglove.
 
-    catenary record arm arm.mcap            # beside the running program
+    catenary record arm arm.mcap            # next to the running program
 
     from catenary import record
 
@@ -8,7 +8,7 @@
     recording["position"], recording.time   # (cycles, axes) [rad], (cycles,) [s]
     record.plot(recording, "arm.png")
 
-It stands above `share` like the dashboard: it attaches to a loop and knows nothing else of it.
+The package builds on `share`, like the dashboard: its only access to a loop is to attach to it.
 """
 
 from catenary.record.figure import plot

@@ -1,9 +1,8 @@
-"""CDR of messages whose size never changes: laid out once, then encoded by NumPy for all rows of a
-batch together.
+"""CDR of messages of constant size: one layout, then NumPy encodes all rows of a batch together.
 
 OMG DDS-XTypes 1.3 §7.4.3, version 1 (what ROS 2 writes): little endian, every primitive aligned to
-its own size, counted from behind the four bytes of encapsulation. Strings count their final zero;
-a sequence is its length and its elements; an array has no length.
+its own size, counted from the end of the four bytes of encapsulation. The length of a string
+includes its final zero; a sequence is its length and its elements; an array has no length.
 """
 
 from __future__ import annotations
@@ -22,26 +21,25 @@ Rows = npt.NDArray[np.void]
 
 @dataclass(frozen=True, slots=True)
 class CdrMessage:
-    """One kind of message. `constant` are its bytes with every field zero; `dtype` places the
-    fields in them."""
+    """A message type. `constant`: its bytes with zero fields; `dtype`: offsets of its fields."""
 
     dtype: np.dtype[np.void]
     constant: bytes
 
     def encode(self, columns: Mapping[str, npt.NDArray[Any]], count: int) -> bytes:
-        """`count` messages, one behind the other; of each column one value per message."""
+        """Return `count` consecutive messages; each column has one value per message."""
         out = np.frombuffer(bytearray(self.constant * count), self.dtype)
         for name, values in columns.items():
             out[name] = values
         return out.tobytes()
 
     def decode(self, messages: bytes) -> Rows:
-        """The fields of messages, one behind the other."""
+        """Return the fields of consecutive messages."""
         return np.frombuffer(messages, self.dtype)
 
 
 class CdrLayout:
-    """Owns the layout of a message while fields are added to it, in their order."""
+    """Builder of a message layout, to which fields are added in their order."""
 
     def __init__(self) -> None:
         self._constant = bytearray(ENCAPSULATION)
@@ -50,7 +48,7 @@ class CdrLayout:
         self._offsets: list[int] = []
 
     def field(self, name: str, dtype: str, shape: tuple[int, ...] = ()) -> None:
-        """A primitive, or an array of them."""
+        """Add a primitive, or an array of primitives."""
         size = np.dtype(dtype).itemsize
         self._align(size)
         self._names.append(name)
@@ -59,19 +57,19 @@ class CdrLayout:
         self._constant += bytes(size * prod(shape))
 
     def sequence(self, name: str, dtype: str, length: int) -> None:
-        """A sequence that always has as many elements."""
+        """Add a sequence with a constant number of elements."""
         self._count(length)
         if length:
             self.field(name, dtype, (length,))
 
     def text(self, value: str) -> None:
-        """A string that is always the same."""
+        """Add a constant string."""
         coded = value.encode() + b"\0"
         self._count(len(coded))
         self._constant += coded
 
     def texts(self, values: Sequence[str]) -> None:
-        """A sequence of strings that are always the same."""
+        """Add a constant sequence of strings."""
         self._count(len(values))
         for value in values:
             self.text(value)

@@ -1,4 +1,4 @@
-"""Which channel of the file carries which fields of the rows.
+"""The channels of a file, and the fields of the rows that each one carries.
 
     /NAME/joint_states    sensor_msgs/JointState    position, velocity, effort as measured
     /NAME/joint_commands  sensor_msgs/JointState    the same as sent to the drives
@@ -45,8 +45,11 @@ INFO, WARNING, ERROR = 20, 30, 40  # of rcl_interfaces/Log
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """One message of every row. `fields`: of the message → of the row; `instants`: those that are
-    a builtin_interfaces/Time."""
+    """A channel with one message for each row.
+
+    `fields`: field of the message → field of the row. `instants`: the same for fields of type
+    builtin_interfaces/Time.
+    """
 
     topic: str
     definition: Definition
@@ -55,7 +58,7 @@ class Channel:
     instants: dict[str, str]
 
     def encode(self, rows: Rows, times_ns: np.ndarray[tuple[int], np.dtype[np.int64]]) -> bytes:
-        """One message of each row, one behind the other. times_ns: UTC, one of each row."""
+        """Return one message for each row. `times_ns`: UTC times, one for each row."""
         columns = {name: rows[source] for name, source in self.fields.items()}
         columns["sec"], columns["nanosec"] = np.divmod(times_ns, SECOND_NS)
         for name, source in self.instants.items():
@@ -63,7 +66,7 @@ class Channel:
         return self.message.encode(columns, len(rows))
 
     def decode(self, messages: bytes, rows: Rows) -> None:
-        """Puts the fields of messages back into rows, as many as there are messages."""
+        """Write the fields of messages into rows, one row for each message."""
         values = self.message.decode(messages)
         for name, source in self.fields.items():
             rows[source] = values[name]
@@ -77,13 +80,16 @@ def topic(layout: Layout, name: str) -> str:
 
 
 def is_event(topic: str) -> bool:
-    """Whether it is no topic of the cycles."""
+    """Return True if the topic carries events rather than cycles."""
     return topic.endswith(("/log", "/events"))
 
 
 def make_channels(layout: Layout, format_: str = FORMAT) -> list[Channel]:
-    """The channels that carry every field of the layout, each in one of them. In format 1 instants
-    were integers: PlotJuggler refuses those beyond 2^53, of a machine that is up for 104 days."""
+    """Return the channels of a layout; each field is in exactly one channel.
+
+    In format 1, times were integers. PlotJuggler refuses integers beyond 2^53, which a machine
+    reaches after 104 days.
+    """
     joints = [
         _joint_channel(layout, name, fields)
         for name, wanted in JOINT_CHANNELS.items()
@@ -95,12 +101,12 @@ def make_channels(layout: Layout, format_: str = FORMAT) -> list[Channel]:
 
 
 def encode_log(time_ns: int, level: int, name: str, message: str, number: int) -> bytes:
-    """rcl_interfaces/Log. `line` is the cycle's number, as far as 32 bits go."""
+    """Encode a rcl_interfaces/Log. `line` is the cycle's number, limited to 32 bits."""
     layout = CdrLayout()
     layout.field("sec", "<i4")
     layout.field("nanosec", "<u4")
     layout.field("level", "u1")
-    for text in (name, message, "", ""):  # no file, no function: nobody wrote it there
+    for text in (name, message, "", ""):  # file and function are empty
         layout.text(text)
     layout.field("line", "<u4")
     sec, nanosec = divmod(time_ns, SECOND_NS)
@@ -109,14 +115,14 @@ def encode_log(time_ns: int, level: int, name: str, message: str, number: int) -
 
 
 def encode_text(text: str) -> bytes:
-    """std_msgs/String."""
+    """Encode a std_msgs/String."""
     layout = CdrLayout()
     layout.text(text)
     return layout.make().constant
 
 
 def decode_text(message: bytes) -> str:
-    """The text of a std_msgs/String."""
+    """Return the text of a std_msgs/String."""
     return message[8:-1].decode()
 
 
@@ -176,7 +182,7 @@ def _comment(field: Field) -> str:
 
 
 def _ros_name(name: str) -> str:
-    """A name as ROS allows it: lower case, digits, single underscores, a letter first."""
+    """Return a valid ROS name: lower case, digits, single underscores, a letter first."""
     plain = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
     usable = plain[:1].isalpha() and not keyword.iskeyword(plain)  # messages become classes
     return plain if usable else f"x_{plain}".rstrip("_")

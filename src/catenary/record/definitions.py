@@ -1,5 +1,8 @@
-"""ROS 2 message definitions as MCAP stores them (schema encoding `ros2msg`): the message first,
-then those it is made of. Those with names of ROS are ROS's own, word by word, without comments."""
+"""ROS 2 message definitions as MCAP stores them (schema encoding `ros2msg`).
+
+The message comes first, then the types that it contains. Definitions with names of ROS are exact
+copies of ROS's own, without comments.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,7 @@ string frame_id
 
 @dataclass(frozen=True, slots=True)
 class Definition:
-    """A message type by its name, and all that is needed to read its bytes."""
+    """A message type: its name, and the definition needed to decode it."""
 
     name: str
     text: str
@@ -76,7 +79,12 @@ TYPES = {  # NumPy's to ROS's
 
 
 def make_definition(name: str, fields: list[tuple[str, str, int | None, str]]) -> Definition:
-    """A message of our own: a header, then fields as (name, type, length of the array, comment)."""
+    """Return the definition of a message with a header and fields.
+
+    Args:
+        name: name of the type.
+        fields: (name, type, length of the array, comment) of each field.
+    """
     lines = ["std_msgs/Header header"]
     for field, kind, length, comment in fields:
         array = "" if length is None else f"[{length}]"

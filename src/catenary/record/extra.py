@@ -1,5 +1,4 @@
-"""What `pip install 'catenary[log]'` brings: asked for when it is needed, and named when it is
-missing."""
+"""Modules of the extra `catenary[log]`: imported on first use; the error names a missing one."""
 
 from __future__ import annotations
 
@@ -10,7 +9,7 @@ from catenary.errors import RecordingError
 
 
 def require(module: str) -> ModuleType:
-    """The module, of a package that the extra brings."""
+    """Import a module of a package of the extra. Raises RecordingError if it is missing."""
     try:
         return import_module(module)
     except ImportError as error:

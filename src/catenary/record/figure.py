@@ -1,6 +1,6 @@
-"""Draws a recording with matplotlib: one row for each axis, the timing of the cycles below.
+"""Figures of a recording with matplotlib: one row for each axis, the timing of the cycles below.
 
-Figures are made without pyplot: nothing global, no window.
+They do not use pyplot, so there is no global state and no window.
 """
 
 from __future__ import annotations
@@ -86,15 +86,25 @@ def plot(
     reference: str | None = None,
     unit: str = "rad",
 ) -> None:
-    """Draws a recording into a .png, .svg, .pdf or .html file. `axes`: only these, by name;
-    `reference`: the field that positions are compared with (else the commanded ones, in CSP);
-    `unit`: of angles, "rad" or "deg"."""
+    """Plot a recording into a .png, .svg, .pdf or .html file.
+
+    Args:
+        recording: the recording.
+        path: the file; its suffix selects the format.
+        axes: names of the axes to plot; None: all.
+        reference: field to compare positions with; None: the commanded positions, in CSP.
+        unit: unit of angles, "rad" or "deg".
+
+    Raises:
+        RecordingError: unknown axis or field.
+        ValueError: unknown unit or file format.
+    """
     from catenary.record.page import as_html
 
     reference = checked_reference(recording, reference)
     kind = Path(path).suffix.lower()
     if kind not in (".png", ".svg", ".pdf", ".html"):
-        raise ValueError(f"{path}: a plot is a .png, .svg, .pdf or .html file")
+        raise ValueError(f"{path}: a plot must be a .png, .svg, .pdf or .html file")
     with style():
         figure = draw(recording, axes=axes, reference=reference, unit=unit)
         if kind == ".html":
@@ -104,7 +114,7 @@ def plot(
 
 
 def style() -> Any:
-    """The context in which figures are made and saved."""
+    """Return the context in which figures are created and saved."""
     return require("matplotlib").rc_context(STYLE)
 
 
@@ -115,7 +125,7 @@ def draw(
     reference: str | None = None,
     unit: str = "rad",
 ) -> Any:
-    """A matplotlib Figure."""
+    """Return a matplotlib Figure."""
     chosen = choose(recording, axes)
     reference = checked_reference(recording, reference)
     columns = make_columns(recording, reference, unit)
@@ -138,7 +148,7 @@ def draw(
 
 
 def choose(recording: Recording, axes: Sequence[str] | None) -> list[int]:
-    """The numbers of the axes asked for; of all without a choice."""
+    """Return the numbers of the selected axes; of all if None."""
     if axes is None:
         return list(range(len(recording.axes)))
     unknown = [name for name in axes if name not in recording.axes]
@@ -151,7 +161,7 @@ def choose(recording: Recording, axes: Sequence[str] | None) -> list[int]:
 
 
 def checked_reference(recording: Recording, reference: str | None) -> str | None:
-    """The field asked for, or the one that suits the recording."""
+    """Return the requested reference field, or the default for the recording."""
     if reference is None:
         return reference_of(recording)
     if not recording.layout.of_axes(reference):
@@ -164,9 +174,12 @@ def checked_reference(recording: Recording, reference: str | None) -> str | None
 
 
 def make_columns(recording: Recording, reference: str | None, unit: str) -> list[Column]:
-    """What was recorded of position, tracking error and torque. ValueError: no such unit."""
+    """Return the recorded columns of position, tracking error and torque.
+
+    Raises ValueError for an unknown unit.
+    """
     if unit not in ("rad", "deg"):
-        raise ValueError(f"angles are drawn in rad or deg, not in {unit!r}")
+        raise ValueError(f"unit of angles must be rad or deg, not {unit!r}")
     length = recording.unit("position")
     if length in ("", "rad"):
         factor, name = (1.0, "rad") if unit == "rad" else (degrees(1.0), "°")
@@ -198,7 +211,7 @@ def make_columns(recording: Recording, reference: str | None, unit: str) -> list
 
 
 def was_commanded(values: Floats | None) -> bool:
-    """A quantity that is zero throughout, or unknown, was not."""
+    """Return True if a quantity is known and not always zero."""
     return values is not None and bool(np.nan_to_num(values).any())
 
 
@@ -224,7 +237,7 @@ def _top(values: Floats) -> float:
 
 
 def headline(recording: Recording) -> str:
-    """What the recording is, in two lines."""
+    """Return a description of the recording in two lines."""
     seconds = float(np.ptp(recording.time)) if len(recording) else 0.0
     lost = f"{recording.lost} lost" if recording.lost else "none lost"
     count = len(recording.events)
@@ -239,7 +252,7 @@ def headline(recording: Recording) -> str:
 def _draw_axes(
     part: Any, recording: Recording, columns: list[Column], chosen: list[int], marks: list[Mark]
 ) -> None:
-    """A row of plots for each axis, a column for each quantity."""
+    """Plot one row for each axis, one column for each quantity."""
     grid = part.subplots(len(chosen), len(columns), sharex=True, squeeze=False)
     points = POINTS if len(chosen) <= MANY else FEW_POINTS
     for place, column in enumerate(columns):
@@ -266,7 +279,7 @@ def _draw_axes(
 
 
 def _head(plot: Any, column: Column) -> None:
-    """The title of a column with its legend beside it."""
+    """Draw the title of a column with its legend next to it."""
     plot.set_title(column.title, loc="left", fontsize=10.0)
     plot.legend(
         loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(column.lines), fontsize=8.0,
@@ -275,7 +288,7 @@ def _head(plot: Any, column: Column) -> None:
 
 
 def _draw_timing(part: Any, recording: Recording) -> None:
-    """Histograms, with counts in decades so that a single late cycle is seen."""
+    """Plot histograms with logarithmic counts, so that a single late cycle is visible."""
     phases = ("period", "lateness", "in_controller")
     known = {phase: values for phase in phases for values in [timing_us(recording, phase)]}
     for plot, (phase, values) in zip(

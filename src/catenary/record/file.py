@@ -1,6 +1,6 @@
-"""Rows and events to an MCAP file: chunks of half a second, compressed with zstd, with an index.
+"""Writer of rows and events to an MCAP file: chunks of 0.5 s, compressed with zstd, with an index.
 
-Written by the library of MCAP's authors; ours are the bytes of the messages.
+The MCAP library writes the file; this module encodes the messages.
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ from catenary.record.output import Output
 from catenary.share import SharedEvent
 
 GOOD_NEWS = ("DeviceReturned", "LinkRestored", "ClockLocked", "Marker")
-CHUNK_SECONDS = 0.5  # what a killed recorder loses at most
+CHUNK_SECONDS = 0.5  # maximum loss if the recorder is killed
 SMALLEST_CHUNK, LARGEST_CHUNK = 1 << 14, 1 << 22  # [bytes]
 SEQUENCE_MASK = 0xFFFFFFFF
 
 
 class RecordingFile:
-    """Owns an MCAP file that is being written.
+    """Owner of an MCAP file that is being written.
 
-    OSError from `write`, `write_event` and `finish`
-    is the disk's: the file then ends in the middle of something, `repair` makes it whole.
+    `write`, `write_event` and `finish` raise OSError if the disk fails. The file is then
+    truncated; `repair` makes it complete.
     """
 
     def __init__(
@@ -53,7 +53,10 @@ class RecordingFile:
         *,
         force: bool = False,
     ) -> None:
-        """RecordingError: the file exists (without `force`), or the extra is not installed."""
+        """Create the file.
+
+        Raises RecordingError if it exists (without `force`), or if the extra is not installed.
+        """
         library: Any = require("mcap.writer")
         self.layout = layout
         self._channels = make_channels(layout)
@@ -71,7 +74,7 @@ class RecordingFile:
         self._events = self._register(topic(layout, "events"), STRING)
 
     def write(self, rows: Rows) -> None:
-        """All messages of these rows, in the order of time."""
+        """Write all messages of these rows, in the order of time."""
         times = rows[TIME].astype(np.int64) + self.layout.utc_offset_ns
         parts = [
             (number, channel.encode(rows, times), len(channel.message.constant))
@@ -86,7 +89,7 @@ class RecordingFile:
                 add(number, time, message, time, sequence & SEQUENCE_MASK)
 
     def write_event(self, event: SharedEvent) -> None:
-        """In words for people, and whole for programs."""
+        """Write an event: as a log message for people, and as JSON for programs."""
         time_ns = round(event.time * 1e9) + self.layout.utc_offset_ns
         level, number = level_of(event.kind), event.number
         words = encode_log(time_ns, level, self.layout.name, event.message, number)
@@ -95,13 +98,13 @@ class RecordingFile:
             self._writer.add_message(channel, time_ns, message, time_ns, number & SEQUENCE_MASK)
 
     def finish(self, end: Mapping[str, object]) -> None:
-        """Writes what ends the file: `end` as metadata, then the index; and closes it."""
+        """Write `end` as metadata, then the index, and close the file."""
         self._writer.add_metadata(END_RECORD, {key: str(value) for key, value in end.items()})
         self._writer.finish()
         self._output.close()
 
     def close(self) -> None:
-        """Closes the file as it is; after `finish` there is nothing to do."""
+        """Close the file as it is; a no-op after `finish`."""
         self._output.close()
 
     def _describe(self) -> dict[str, str]:
@@ -120,14 +123,14 @@ class RecordingFile:
 
 
 def level_of(kind: str) -> int:
-    """How bad an event is, by its kind: an error ended the loop, what comes back is good news."""
+    """Return the log level of an event by its kind: errors end a loop; a return is only info."""
     if kind.endswith("Error"):
         return ERROR
     return INFO if kind in GOOD_NEWS else WARNING
 
 
 def chunk_size(layout: Layout, channels: list[Channel]) -> int:
-    """Bytes, before compression, that half a second of cycles takes."""
+    """Return the size of CHUNK_SECONDS of cycles [bytes], before compression."""
     record = 31  # MCAP's own bytes before each message
     cycle = sum(len(channel.message.constant) + record for channel in channels)
     return min(max(int(cycle * CHUNK_SECONDS / layout.period), SMALLEST_CHUNK), LARGEST_CHUNK)
@@ -138,5 +141,5 @@ def _create(path: str | os.PathLike[str], force: bool) -> Output:
         return Output(path, force=force)
     except FileExistsError as error:
         raise RecordingError(
-            f"{Path(path)} exists", hint="another name, or --force (force=True) to replace it"
+            f"{Path(path)} exists", hint="use another name, or --force (force=True) to replace it"
         ) from error

@@ -1,16 +1,16 @@
-"""What a row of a recording holds: stored in the file, so that a reader needs nothing else."""
+"""Layout of a recording's rows; stored in the file, so that a reader needs nothing else."""
 
 from __future__ import annotations
 
 import msgspec
 import numpy as np
 
-TIME = "scheduled_ns"  # the field that says when a cycle was: its instant, in the loop's clock
+TIME = "scheduled_ns"  # field with the time of a cycle: its cycle start, on the loop's clock
 NUMBER = "number"
 
 
 class Field(msgspec.Struct, frozen=True):
-    """One quantity of every cycle. `dtype` as NumPy writes it (`<f8`); `unit` is SI, or empty."""
+    """One quantity of every cycle. `dtype`: NumPy's notation (`<f8`); `unit`: SI, or empty."""
 
     name: str
     dtype: str
@@ -20,7 +20,7 @@ class Field(msgspec.Struct, frozen=True):
 
 
 class Layout(msgspec.Struct, frozen=True):
-    """The rows of one loop."""
+    """Layout of the rows of one loop."""
 
     name: str
     period: float  # [s]
@@ -37,6 +37,6 @@ class Layout(msgspec.Struct, frozen=True):
         return next((field for field in self.fields if field.name == name), None)
 
     def of_axes(self, name: str) -> bool:
-        """Whether there is such a field, with one float64 for each axis."""
+        """Return True if there is such a field, with one float64 for each axis."""
         field = self.field(name)
         return field is not None and field.per_axis and np.dtype(field.dtype) == np.float64

@@ -1,7 +1,7 @@
-"""What is whole in an MCAP file, however it ends.
+"""Reader of the complete records of an MCAP file, also of a truncated one.
 
-The library's readers stop with an error where a file does: here the end is where the last whole
-record ends. MCAP: https://mcap.dev/spec
+The library's readers raise an error at a truncated end. This module reads up to the last complete
+record. MCAP: https://mcap.dev/spec
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX = range(0x01, 0x0
 METADATA, DATA_END = 0x0C, 0x0F
 LAYOUT_RECORD = "catenary.layout"  # the metadata that begins a recording
 END_RECORD = "catenary.end"  # and the one that ends it
-LARGEST_CHUNK = 1 << 28  # [bytes] what is longer is no chunk of ours, but damage
+LARGEST_CHUNK = 1 << 28  # [bytes] a longer chunk indicates damage
 
 
 @contextmanager
@@ -43,7 +43,7 @@ def refusing_damage(name: str) -> Iterator[None]:
 
 
 class Place(NamedTuple):
-    """A whole record in a file."""
+    """A complete record in a file."""
 
     opcode: int
     offset: int  # of its first byte, the opcode
@@ -61,7 +61,7 @@ class ChunkMessage(NamedTuple):
 
 
 def places(stream: BinaryIO) -> Iterator[Place]:
-    """The whole records of the data section, in their order. RecordingError: not an MCAP file."""
+    """Yield the complete records of the data section. Raises RecordingError if not an MCAP file."""
     size = os.fstat(stream.fileno()).st_size
     stream.seek(0)
     if stream.read(len(MAGIC)) != MAGIC:
@@ -80,7 +80,7 @@ def places(stream: BinaryIO) -> Iterator[Place]:
 
 
 def read_record(stream: BinaryIO, place: Place) -> Any:
-    """The library's record at a place of the file: Metadata or Chunk; None where it is damaged."""
+    """Return the Metadata or Chunk record at a place of the file; None if it is damaged."""
     exceptions: Any = require("mcap.exceptions")
     stream.seek(place.offset)
     try:
@@ -90,7 +90,7 @@ def read_record(stream: BinaryIO, place: Place) -> Any:
 
 
 def decode_record(data: bytes) -> Any:
-    """The library's record of these bytes: Metadata, Chunk, Schema or Channel."""
+    """Return the library's record of these bytes: Metadata, Chunk, Schema or Channel."""
     records: Any = require("mcap.records")
     streams: Any = require("mcap.data_stream")
     kinds = {
@@ -103,7 +103,7 @@ def decode_record(data: bytes) -> Any:
 
 
 def chunk_bytes(chunk: Any) -> bytes | None:
-    """What a chunk holds; None where it is damaged."""
+    """Return the content of a chunk; None if it is damaged."""
     reader: Any = require("mcap.stream_reader")
     unknown: Any = require("mcap.exceptions").McapError
     damage = (ValueError, RuntimeError, MemoryError, unknown, require("zstandard").ZstdError)
@@ -117,7 +117,7 @@ def chunk_bytes(chunk: Any) -> bytes | None:
 
 
 def chunk_records(data: bytes) -> Iterator[tuple[int, int, int]]:
-    """(opcode, offset, end) of each record within a chunk's bytes."""
+    """Yield (opcode, offset, end) of each record within a chunk's bytes."""
     at = 0
     while at + HEAD.size <= len(data):
         opcode, length = HEAD.unpack_from(data, at)
@@ -126,7 +126,7 @@ def chunk_records(data: bytes) -> Iterator[tuple[int, int, int]]:
 
 
 def chunk_messages(data: bytes) -> Iterator[ChunkMessage]:
-    """The messages within a chunk's bytes, in their order."""
+    """Yield the messages within a chunk's bytes, in their order."""
     for opcode, at, end in chunk_records(data):
         if opcode == MESSAGE:
             _, _, channel, sequence, time_ns, _ = MESSAGE_HEAD.unpack_from(data, at)

@@ -1,5 +1,4 @@
-"""Bytes to a file, all or an error: nothing is kept back, so that a killed recorder has written all
-that it was given."""
+"""Unbuffered output to a file: a killed recorder has written all the bytes that it was given."""
 
 from __future__ import annotations
 
@@ -11,11 +10,15 @@ from catenary.errors import RecordingError
 
 
 class Output:
-    """Owns the descriptor of a file that is written from its beginning, and its lock."""
+    """Owner of the descriptor and the lock of a file that is written from its beginning."""
 
     def __init__(self, path: str | os.PathLike[str], *, force: bool = False) -> None:
-        """FileExistsError unless `force`, which begins the file anew. RecordingError: another
-        recorder writes it."""
+        """Create the file; `force` replaces an existing one.
+
+        Raises:
+            FileExistsError: the file exists (without `force`).
+            RecordingError: another recorder writes it.
+        """
         new = 0 if force else os.O_EXCL
         self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC | new, 0o666)
         self._position = 0
@@ -44,8 +47,10 @@ class Output:
 
 
 def lock(fd: int, path: str | os.PathLike[str]) -> None:
-    """Until the descriptor is closed nobody else writes a recording here. RecordingError: somebody
-    does already."""
+    """Lock the file for writing until the descriptor is closed.
+
+    Raises RecordingError if another process has the lock.
+    """
     try:
         fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:

@@ -1,5 +1,7 @@
-"""A recording as one self-contained page: the figure as SVG, the figures of every axis, the events.
-Nothing is fetched, nothing is executed."""
+"""A recording as a self-contained HTML page: plots as SVG, results for each axis, events.
+
+The page fetches and executes nothing.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +34,7 @@ tbody th, .words td, .words th { text-align: left; }
 
 
 def as_html(recording: Recording, figure: Any, *, reference: str | None, unit: str) -> str:
-    """`figure`: as `draw` made it of the same recording."""
+    """Return the HTML page. `figure`: the result of `draw` for the same recording."""
     return f"""<!doctype html>
 <html lang="en">
 <head>

@@ -1,7 +1,7 @@
-"""Takes every cycle of a share into a file.
+"""Recorder: write every cycle of a share into a file.
 
-It attaches like any other reader: the loop does not know of it and cannot be delayed. What it is
-too late for is counted and said, in the file and at its end.
+It attaches like any other reader, so it cannot delay the loop. Cycles that it misses are counted;
+the file has events for these gaps and their total number.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from catenary.record.layout import NUMBER, TIME, Field, Layout
 from catenary.record.repair import repair
 from catenary.share import Reader, SharedEvent, ShareLayout, attach
 
-PACE = 0.05  # [s] between two looks: what came meanwhile is encoded together
-LOOKS_PER_HISTORY = 8  # at least, where the share remembers less than half a second
-PATIENCE = 0.25  # [s] without a cycle, before it is asked whether more will come
+PACE = 0.05  # [s] between two reads; the cycles of one read are encoded together
+LOOKS_PER_HISTORY = 8  # minimum reads per history, for a share that keeps less than 0.5 s
+PATIENCE = 0.25  # [s] without a cycle, before checking whether the writer is alive
 ENDINGS = {
     "running": "stopped",
     "ended": "the loop ended",
@@ -35,16 +35,16 @@ T = TypeVar("T")
 
 
 class Recorder:
-    """Owns a recording while it is made.
+    """Owner of a recording that is being written.
 
         with record.Recorder("arm", "arm.mcap") as recorder:
             recorder.run(seconds=60.0)
 
-    It begins with the oldest cycle that the share remembers. `take` writes what is new; `run` does
-    so until the loop ends. `share`: a name, or what `cat.attach` gave; `stale`: also one whose
-    process has died, for its last cycles; `uid`: of another user (`cat.attach`). RecordingError:
-    the file exists (without `force`), or the extra is not installed; OSError: the file cannot be
-    made.
+    It begins with the oldest cycle that the share keeps. `take` writes the new cycles; `run` does
+    so until the loop ends. `share`: a name, or a Reader of `cat.attach`; `stale`: accept a share
+    whose process has died; `uid`: user of the share (`cat.attach`). Raises RecordingError if the
+    file exists (without `force`) or the extra is not installed, OSError if the file cannot be
+    created.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class Recorder:
         self.path = Path(path)
         self.cycles = 0  # written
         self.lost = 0  # overwritten before they were taken
-        self.ended = ""  # why, once it has
+        self.ended = ""  # reason of the end, once it has ended
         self._share = attach(share, stale=stale, uid=uid) if isinstance(share, str) else share
         self._own = isinstance(share, str)
         self._number = 0  # of the last cycle taken
@@ -68,7 +68,7 @@ class Recorder:
         try:
             self._file = RecordingFile(path, describe(self._share.layout), force=force)
             (rows, _), (events, _) = self._share.rows(0), self._share.events()
-            self._write(rows, events)  # what is forgotten already was before our time
+            self._write(rows, events)  # older cycles do not count as lost
         except BaseException:
             self._let_go()
             raise
@@ -89,8 +89,10 @@ class Recorder:
         return f"{layout.name} ({len(layout.axes)} axes at {1.0 / layout.period:.6g} Hz)"
 
     def take(self) -> int:
-        """Writes every cycle and event since the last time; how many cycles. RecordingError: the
-        disk is full, or fails otherwise; the file was made whole as far as it got."""
+        """Write every cycle and event since the last call. Return the number of cycles.
+
+        Raises RecordingError if the disk is full or fails; the file is repaired up to that point.
+        """
         rows, lost = self._share.rows(self._number)
         events, events_lost = self._share.events(self._serial)
         if lost:
@@ -102,7 +104,12 @@ class Recorder:
         return len(rows)
 
     def run(self, *, seconds: float | None = None, stop: threading.Event | None = None) -> None:
-        """Records until the loop ends, for so long, or until `stop` is set."""
+        """Record until the loop ends, for `seconds` [s], or until `stop` is set.
+
+        Args:
+            seconds: maximum duration; None: no limit.
+            stop: event that ends the recording.
+        """
         stop = stop or threading.Event()
         alarm = threading.Timer(seconds or 0.0, stop.set)
         alarm.daemon = True
@@ -119,11 +126,11 @@ class Recorder:
             alarm.cancel()
 
     def close(self) -> None:
-        """Takes what is left and ends the file. RecordingError: as `take`."""
+        """Write the remaining cycles and finish the file. Raises RecordingError as `take` does."""
         if self._file is None:
             return
         try:
-            state = self._share.state  # before what is left is taken: that is all of it then
+            state = self._share.state  # read first: after an end no more cycles can follow
             self.take()
             self.ended = ENDINGS[state]
             words = {"ended": self.ended, "cycles": self.cycles, "lost": self.lost}
@@ -146,7 +153,7 @@ class Recorder:
             self.cycles += len(rows)
 
     def _tell_lost_cycles(self, rows: Rows) -> None:
-        """An event of our own in each gap, before the rows or among them."""
+        """Write an event for each gap before or within the rows."""
         numbers = rows[NUMBER].astype(np.int64)
         missing = np.diff(numbers, prepend=self._number) - 1
         for row in np.flatnonzero(missing).tolist():
@@ -166,7 +173,7 @@ class Recorder:
         self._on_disk(RecordingFile.write_event, event)
 
     def _on_disk(self, write: Callable[[RecordingFile, T], None], value: T) -> None:
-        """What may find the disk full."""
+        """Run a write that may fail on a full disk."""
         assert self._file is not None, "the recorder is closed"
         try:
             write(self._file, value)
@@ -200,7 +207,7 @@ class Recorder:
 
 
 def describe(layout: ShareLayout) -> Layout:
-    """What of a share's layout is the recording's."""
+    """Return the recording's layout of a share."""
     fields = tuple(
         Field(each.name, each.dtype, each.shape, each.unit, each.per_axis) for each in layout.fields
     )

@@ -1,4 +1,4 @@
-"""A recording read back: rows as they were in the loop, by the names of their fields."""
+"""Recording: the rows of a loop, read from a file, by the names of their fields."""
 
 from __future__ import annotations
 
@@ -51,9 +51,8 @@ LONGEST = 1e9  # [s]
 class Recording:
     """The cycles of a loop, oldest first. `recording["position"]` has the shape (cycles, axes).
 
-    `events`: what happened beside the cycles; `lost`: cycles that were not recorded, since the
-    recorder was late; `ended`: why the recording ended, "cut off" if nobody wrote that down (the
-    recorder was killed).
+    `events`: events of the loop; `lost`: number of cycles that the recorder missed; `ended`: why
+    the recording ended, "cut off" if the file does not have a reason (the recorder was killed).
     """
 
     layout: Layout
@@ -61,7 +60,7 @@ class Recording:
     events: tuple[SharedEvent, ...]
     lost: int
     ended: str
-    began_ns: int | None = None  # of a part: the first cycle of the whole, in the loop's clock
+    began_ns: int | None = None  # of a part: first cycle of the whole, on the loop's clock
 
     def __getitem__(self, field: str) -> npt.NDArray[Any]:
         if self.layout.field(field) is None:
@@ -78,36 +77,44 @@ class Recording:
 
     @property
     def period(self) -> float:
-        """Of the loop [s]."""
+        """Period of the loop [s]."""
         return self.layout.period
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """Their names, in the order of the columns."""
+        """Names of the axes, in the order of the columns."""
         return self.layout.axes
 
     @property
     def time(self) -> npt.NDArray[np.float64]:
-        """Of each cycle, from the recording's first one on, also in a part of it [s]."""
+        """Time of each cycle [s] since the first cycle of the whole recording."""
         return np.asarray((self.rows[TIME] - self.start_ns) * 1e-9)
 
     @property
     def start_ns(self) -> int:
-        """When its first cycle was, in the loop's clock; + layout.utc_offset_ns: UTC."""
+        """Time of its first cycle [ns] on the loop's clock; + layout.utc_offset_ns: UTC."""
         if self.began_ns is not None:
             return self.began_ns
         return int(self.rows[TIME][0]) if len(self.rows) else 0
 
     def unit(self, field: str) -> str:
-        """The unit of a field, empty for a number without one."""
+        """Return the unit of a field; "" for a number without a unit."""
         found = self.layout.field(field)
         return found.unit if found is not None else ""
 
 
 def read(path: str | os.PathLike[str], *, start: float = 0.0, end: float = np.inf) -> Recording:
-    """Reads a recording, or the part between `start` and `end` seconds after its first cycle. One
-    that was cut off is read as far as it is whole. RecordingError: it is none of ours, or cannot be
-    read."""
+    """Read a recording, or a part of it. A truncated file is read up to its last complete chunk.
+
+    Args:
+        path: the file.
+        start: begin of the part, after the first cycle [s].
+        end: end of the part, after the first cycle [s].
+
+    Raises:
+        RecordingError: not a recording of Catenary, or damaged.
+        ValueError: `start` or `end` is not a valid time.
+    """
     if not start <= LONGEST or math.isnan(end):
         raise ValueError(f"start={start} s, end={end} s: numbers of seconds")
     with Path(path).open("rb") as stream, refusing_damage(stream.name):
@@ -115,7 +122,7 @@ def read(path: str | os.PathLike[str], *, start: float = 0.0, end: float = np.in
 
 
 class _Reader:
-    """Owns what was found in a file so far."""
+    """Collector of the content of a file."""
 
     def __init__(self, stream: BinaryIO, start: float, end: float) -> None:
         self._stream = stream
@@ -142,7 +149,7 @@ class _Reader:
         return self._make()
 
     def _read_chunk(self, chunk: Any) -> bool:
-        """False: the chunk is damaged, and with it what follows."""
+        """Read a chunk. Return False if it is damaged: the rest of the file is then ignored."""
         first, last = self._wanted
         if chunk.message_start_time > last or chunk.message_end_time < first:
             return True
@@ -175,7 +182,7 @@ class _Reader:
         head = self._metadata.get(LAYOUT_RECORD)
         if head is None or head.get("format") not in (FORMAT, OLD_FORMAT):
             raise RecordingError(
-                f"{self._stream.name} is no recording of Catenary's (format {FORMAT})",
+                f"{self._stream.name} is not a recording of Catenary (format {FORMAT})",
                 hint="other MCAP files are read with the packages mcap and mcap-ros2-support",
             )
         layout = self._layout(head.get("layout", ""))
@@ -211,7 +218,7 @@ class _Reader:
 
 
 def _rows(layout: Layout, messages: Mapping[str, list[ChunkMessage]], format_: str) -> Rows:
-    """The cycles that are there with all their messages: a cut may divide one."""
+    """Return the cycles that have all their messages; a truncation may divide one."""
     channels = make_channels(layout, format_)
     numbers = [
         np.array([message.sequence for message in messages[channel.topic]], np.int64)

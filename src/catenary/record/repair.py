@@ -1,8 +1,8 @@
-"""Makes a recording whole that was cut off: by a full disk, or because the recorder was killed.
+"""Repair of a truncated recording, after a full disk or if the recorder was killed.
 
-In place, since a full disk has no room for a second file. What is not whole at the end is dropped;
-behind the rest go the index and the summary that programs ask for (PlotJuggler opens nothing
-without them). Where even these find no room, chunks are dropped from the end until they do.
+The repair is in place, because a full disk has no room for a second file. It drops the incomplete
+end, and writes the index and the summary that PlotJuggler needs. If these do not fit, it drops
+chunks from the end until they do.
 """
 
 from __future__ import annotations
@@ -22,8 +22,11 @@ CUT_OFF = {"ended": "cut off, and repaired"}
 
 @dataclass(frozen=True, slots=True)
 class Repaired:
-    """What became of a file. `repaired`: False, it was whole; `dropped`: bytes at its end that were
-    not whole or found no room; `chunks`: how many are left; `seconds`: how long these last."""
+    """Result of a repair.
+
+    `repaired`: False if the file was complete; `dropped`: number of bytes dropped from its end;
+    `chunks`: number of chunks left; `seconds`: their duration [s].
+    """
 
     repaired: bool
     dropped: int
@@ -32,7 +35,7 @@ class Repaired:
 
 
 def is_whole(path: str | os.PathLike[str]) -> bool:
-    """Whether the file ends as an MCAP file does."""
+    """Return True if the file ends as an MCAP file must."""
     with Path(path).open("rb") as stream:
         size = os.fstat(stream.fileno()).st_size
         stream.seek(max(size - len(MAGIC), 0))
@@ -40,8 +43,16 @@ def is_whole(path: str | os.PathLike[str]) -> bool:
 
 
 def repair(path: str | os.PathLike[str], *, end: Mapping[str, object] | None = None) -> Repaired:
-    """Makes a cut-off recording whole, in place. `end`: what to say of its end. RecordingError: it
-    is no recording, or is being made; OSError: there is no room even for a summary of nothing."""
+    """Repair a truncated recording in place.
+
+    Args:
+        path: the file.
+        end: entries of the end record; None: as for a truncated file.
+
+    Raises:
+        RecordingError: not a recording, or it is being recorded.
+        OSError: no room even for an empty summary.
+    """
     with Path(path).open("r+b", buffering=0) as stream:
         lock(stream.fileno(), path)
         before = os.fstat(stream.fileno()).st_size
@@ -57,7 +68,7 @@ def repair(path: str | os.PathLike[str], *, end: Mapping[str, object] | None = N
 
 
 def _write_end(stream: BinaryIO, summary: Summary, words: dict[str, str]) -> bool:
-    """False: there is no room for it, and there is a chunk whose room it could have."""
+    """Write the summary. Return False if it does not fit, but dropping a chunk would help."""
     data = memoryview(encode_end(summary, words))
     try:
         stream.truncate(summary.end)

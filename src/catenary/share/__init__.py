@@ -1,4 +1,4 @@
-"""Shared memory: what a loop does, for other processes to read; their commands; a mutex.
+"""Shared memory: a loop's cycles for other processes, commands from them, and a mutex.
 
 with cat.Share("arm") as share, cat.Loop(arm, sink=share) as loop: ...      # one process
 with cat.attach("arm") as arm: ...                                          # any others

@@ -1,17 +1,23 @@
-"""64-bit words in shared memory, stored and loaded in an order that holds on every processor."""
+"""64-bit words in shared memory with acquire/release ordering."""
 
 class Words:
-    """`count` words of a buffer, `stride` bytes apart from `offset` on. ValueError: they cannot lie
-    there; IndexError: there is no such word."""
+    """`count` words of a buffer from `offset` on, `stride` bytes apart.
+
+    Raises ValueError if they do not fit in the buffer, IndexError for a word out of range.
+    """
 
     def __init__(self, memory: object, offset: int, count: int, stride: int = 8) -> None: ...
     def load(self, k: int) -> int:
-        """The word. What was written before it was stored is there now; and what was read before is
-        of the time before this."""
+        """Load a word (acquire), after a full fence for earlier reads.
+
+        Data that was written before the store of this value is visible afterwards.
+        """
 
     def load_all(self) -> list[int]:
-        """Every word."""
+        """Load every word."""
 
     def store(self, k: int, value: int) -> None:
-        """Publishes what was written before. What is written from now on is seen by nobody who still
-        loads the old value behind it."""
+        """Store a word (release), and then a full fence for later writes.
+
+        This publishes the data that was written before.
+        """

@@ -1,10 +1,10 @@
 # cython: boundscheck=False, wraparound=False
-"""64-bit words in shared memory that one process publishes and another looks at without a lock.
+"""64-bit words in shared memory that one process publishes and another reads without a lock.
 
-Between a store and the load that sees it lies an order, on every processor: what was written
-before the store is there behind the load, and what is written behind the store is not seen by
-whom a later load still shows the old value. x86 keeps the first half by itself; AArch64 neither.
-Budget: 0.1 us a call from Python, all words of a desk 0.3 us.
+Release stores pair with acquire loads: data written before the store is visible after a load of
+the new value. Full fences give the converse: while a later load still returns the old value, data
+written after the store was not read before it. x86 guarantees the first half itself, AArch64
+neither. Budget: 0.1 us for a call from Python, 0.3 us for all words of a desk.
 """
 
 from cpython.buffer cimport PyBUF_WRITABLE, PyBuffer_Release, PyObject_GetBuffer

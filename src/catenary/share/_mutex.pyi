@@ -3,12 +3,15 @@
 MUTEX_SIZE: int
 
 class SharedMutex:
-    """A mutex at `offset` of a buffer; `fresh`: it is made there. ValueError: there is none."""
+    """A mutex at `offset` of a buffer; `fresh`: initialise it. Raises ValueError if invalid."""
 
     def __init__(self, memory: object, offset: int, *, fresh: bool = False) -> None: ...
     def lock(self, timeout_ns: int) -> bool | None:
-        """Waits without the GIL. False: it is ours; True: and whoever had it has died; None: the time
-        has passed. RuntimeError: this thread has it already. Signal handlers run meanwhile."""
+        """Wait for the mutex without the GIL. Signal handlers run meanwhile.
+
+        Return False if acquired, True if acquired from an owner that died, None at the timeout.
+        Raises RuntimeError if this thread already has it.
+        """
 
     def unlock(self) -> None:
-        """RuntimeError: this thread does not have it."""
+        """Release the mutex. Raises RuntimeError if this thread does not have it."""

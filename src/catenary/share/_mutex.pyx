@@ -18,7 +18,7 @@ cdef extern from "mutex.h" nogil:
     int mutex_unlock(share_mutex *m)
 
 cdef enum:
-    SLICE_NS = 100_000_000     # between looks at signals
+    SLICE_NS = 100_000_000     # between checks for signals
 
 MUTEX_SIZE = (sizeof(share_mutex) + 63) // 64 * 64
 
@@ -72,6 +72,6 @@ cdef class SharedMutex:
             raise OSError(-rc, os.strerror(-rc))
 
     def __dealloc__(self):
-        # Memory of a mutex that is held stays: the kernel looks there when its owner ends.
+        # Keep the memory of a held mutex: the kernel reads it when the owner ends.
         if not self.held:
             PyBuffer_Release(&self.buffer)

@@ -43,7 +43,7 @@ cdef extern from "sink.h" nogil:
                     const void *target) noexcept nogil
 
 cdef class Ring:
-    """Holds a buffer of somebody's memory, and knows the ring in it."""
+    """A buffer and the view of a ring in it."""
     cdef Py_buffer buffer
     cdef ring_view view
 
@@ -56,6 +56,6 @@ cdef struct cycle_rows:
     uint64_t target_at
 
 cdef class CycleWriter(Ring):
-    """Owns the table a cycle calls."""
+    """Owner of the sink table that a cycle calls."""
     cdef cat_sink sink
     cdef cycle_rows rows

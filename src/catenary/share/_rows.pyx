@@ -1,8 +1,8 @@
 # cython: boundscheck=False, wraparound=False, cdivision=True
-"""Rings of rows in shared memory (ring.h): who writes, who reads, and the table the cycle calls.
+"""Rings of rows in shared memory (ring.h): writing, reading, and the sink table of a cycle.
 
-Budget of a put: two copies of some kilobytes into memory that is out of the caches, and one system
-call: about 1 us for 33 axes.
+Budget of a put: copies of some kilobytes into uncached memory and one system call, about 1 us for
+33 axes.
 """
 
 from cpython.buffer cimport PyBUF_SIMPLE, PyBUF_WRITABLE, PyBuffer_Release, PyObject_GetBuffer
@@ -31,7 +31,7 @@ def row_parts(uint64_t record_size, uint64_t actual_size, uint64_t target_size):
 
 cdef class Ring:
     def __cinit__(self, memory, uint64_t offset, uint64_t count, uint64_t size, *args, writable=False):
-        """A ring of `count` rows of `size` bytes at `offset` of a buffer. ValueError: it cannot be."""
+        """Map a ring of `count` rows of `size` bytes. Raises ValueError if it does not fit."""
         PyObject_GetBuffer(memory, &self.buffer, PyBUF_WRITABLE if writable else PyBUF_SIMPLE)
         if not (1 <= count <= COUNT_MAX and 1 <= size <= SIZE_MAX) or count & (count - 1):
             raise ValueError(f"a ring of {count} rows of {size} bytes")
@@ -79,7 +79,7 @@ cdef class Ring:
         with nogil:
             copied = ring_copy_rows(&self.view, first, newest - first + 1, place, &end)
         del rows[copied * self.view.size :]
-        # What was overwritten behind the last row copied is for the next call to count.
+        # The next call counts the rows that were overwritten after the last one copied.
         return rows, end - after - copied if copied else 0
 
     def wait(self, uint64_t seen, int64_t deadline_ns):
@@ -152,7 +152,7 @@ cdef class CycleWriter(Ring):
 
     @property
     def capsule(self):
-        """The capsule keeps the writer and its memory."""
+        """Capsule of the sink table; it keeps the writer and its memory alive."""
         capsule = PyCapsule_New(&self.sink, CAT_SINK_CAPSULE, release_owner)
         PyCapsule_SetContext(capsule, <void *><PyObject *>self)
         Py_INCREF(self)

@@ -40,13 +40,13 @@ QUANTITIES = ("position", "velocity", "torque")
 
 PLACE = np.dtype(
     [
-        # Words: both sides look at them, the loop without the mutex.
+        # Atomic words: both sides read them, the loop without the mutex.
         ("lease", "<u8"),  # serial; 0: the place is free. Publishes the client and its axes.
         ("ended", "<u8"),  # the lease that the loop has ended. Publishes the reason.
         ("taken", "<u8"),  # commands that the loop has read
         ("deadline_ns", "<u8"),  # CLOCK_MONOTONIC
         # The rest is published by them.
-        ("last", "<u8"),  # the lease before, and why it ended
+        ("last", "<u8"),  # the previous lease; `reason`: why it ended
         ("reason", "<u8"),
         ("start_time", "<u8"),  # the client
         ("pid", "<i8"),
@@ -58,7 +58,7 @@ Values = npt.NDArray[np.float64]
 
 
 class Reason(IntEnum):
-    """Why a lease has ended."""
+    """The reason for which a lease has ended."""
 
     RELEASED = 1
     EXPIRED = 2  # not renewed in time
@@ -89,7 +89,7 @@ class Geometry(NamedTuple):
 
 
 def row_dtype(axes: int) -> np.dtype[np.void]:
-    """Of a command: NaN where an axis is not meant."""
+    """Return the type of a command's row; NaN marks an axis without a command."""
     return np.dtype(
         [("lease", "<u8"), ("quantities", "<u8"), *((q, "<f8", (axes,)) for q in QUANTITIES)]
     )
@@ -109,7 +109,7 @@ def memory_aligned(offset: int) -> int:
 
 
 class Desk:
-    """Owns one process' sight of the desk of a loop."""
+    """One process's view of the desk of a loop."""
 
     def __init__(self, memory: mmap.mmap, layout: ShareLayout, *, fresh: bool = False) -> None:
         axes = len(layout.axes)
@@ -136,7 +136,7 @@ class Desk:
         ]
 
     def client(self, place: int) -> Process:
-        """Who has the place, or had it last."""
+        """Return the client that has the place, or that had it last."""
         entry = self.places[place]
         return Process(
             int(entry["pid"]),
@@ -146,7 +146,7 @@ class Desk:
         )
 
     def is_valid(self, place: int, serial: int) -> bool:
-        """Whether the lease still stands, as far as anybody has looked."""
+        """Return True if the lease is valid and neither side has ended it."""
         return (
             self.leases.load(place) == serial
             and self.ended.load(place) != serial
@@ -154,30 +154,33 @@ class Desk:
         )
 
     def reason(self, place: int, serial: int) -> Reason:
-        """Why a lease of the place is over."""
+        """Return why a lease of the place has ended."""
         if self._closed.load(0):
             return Reason.LOOP_ENDED
-        told = serial in (self.ended.load(place), int(self.places[place]["last"]))
+        is_recorded = serial in (self.ended.load(place), int(self.places[place]["last"]))
         reason = int(self.places[place]["reason"])
-        return Reason(reason) if told and reason in tuple(Reason) else Reason.EXPIRED
+        return Reason(reason) if is_recorded and reason in tuple(Reason) else Reason.EXPIRED
 
     def end(self, place: int, serial: int, reason: Reason) -> None:
-        """The loop's side: the lease cannot be renewed any more."""
+        """End a lease; called by the loop. The lease cannot be renewed afterwards."""
         self.places[place]["reason"] = reason
         self.ended.store(place, serial)
 
     def end_all(self) -> None:
-        """The loop's side: no lease can be renewed or taken any more."""
+        """End all leases; called by the loop. No lease can be renewed or taken afterwards."""
         self._closed.store(0, 1)
 
     def ending(self, place: int, now_ns: int) -> Reason | None:
-        """Why the lease of a place is over; None: it is not. Asks the kernel for the process."""
+        """Return why the lease of a place is over; None if it is not.
+
+        Ask the kernel whether the client's process is alive.
+        """
         if self.deadlines_ns.load(place) <= now_ns:
             return Reason.EXPIRED if self.client(place).is_alive else Reason.DIED
         return None if self.client(place).is_alive else Reason.DIED
 
     def _words(self, places: int, name: str) -> Words:
-        """A field of every place."""
+        """Return one field of every place."""
         assert PLACE.fields is not None
         return Words(self._memory, places + PLACE.fields[name][1], PLACES, PLACE.itemsize)
 
@@ -209,7 +212,7 @@ def open_desk(layout: ShareLayout, path: Path, owner: int) -> Desk:
     magic, version, axes, run = HEAD.unpack(memory[: HEAD.size])
     if (magic, version, axes, run) != (MAGIC, VERSION, len(layout.axes), layout.run.encode()):
         raise ShareError(
-            f"the loop of the share {layout.name!r} is another one by now", hint="attach again"
+            f"the share {layout.name!r} now belongs to another loop", hint="attach again"
         )
     try:
         return Desk(memory, layout)

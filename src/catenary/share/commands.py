@@ -14,11 +14,11 @@ from catenary.share.command_table import QUANTITIES, Desk, Reason, Values
 from catenary.share.layout import ShareLayout
 from catenary.share.process import Process
 
-LOOK_NS = 20_000_000  # between two questions whether the clients' processes live
+LOOK_NS = 20_000_000  # between two checks whether the clients' processes are alive
 
 
 class Targets(Protocol):
-    """What commands are written to: the `target` of `Drives`."""
+    """The arrays that commands are written to: the `target` of `Drives`."""
 
     @property
     def position(self) -> Values: ...
@@ -29,7 +29,7 @@ class Targets(Protocol):
 
 
 class Commanded(Protocol):
-    """What `Drives` have of it."""
+    """The part of `Drives` that commands need."""
 
     @property
     def names(self) -> tuple[str, ...]: ...
@@ -39,7 +39,7 @@ class Commanded(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class AxisCommand:
-    """Set-points of a client; None: not said."""
+    """Set-points of a client; None: not commanded."""
 
     axes: tuple[int, ...]  # in the layout's order
     position: Values | None  # [rad], one for each of `axes`
@@ -50,7 +50,7 @@ class AxisCommand:
 
 @dataclass(frozen=True, slots=True)
 class LeaseEnd:
-    """A lease that is over; nobody commands its axes now."""
+    """A lease that is over; no client commands its axes now."""
 
     axes: tuple[str, ...]
     reason: Reason
@@ -70,7 +70,7 @@ class _Known:
 
 
 class CommandReader:
-    """Owns what the loop knows of its clients. Called by the thread that iterates; never waits."""
+    """The loop's record of its clients. Only the iterating thread calls it; it never waits."""
 
     def __init__(self, desk: Desk, layout: ShareLayout) -> None:
         self._desk = desk
@@ -80,14 +80,14 @@ class CommandReader:
         self._look_ns = 0
 
     def commands(self) -> list[AxisCommand]:
-        """Those of valid leases that have come since the last call; by client, oldest first."""
+        """Return the commands of valid leases since the last call; by client, oldest first."""
         self._follow_leases()
         return [
             command for place, known in self._known.items() for command in self._read(place, known)
         ]
 
     def ended(self) -> list[LeaseEnd]:
-        """Leases whose end `commands` has seen since the last call."""
+        """Return the leases whose end `commands` has detected since the last call."""
         ended, self._ended = self._ended, []
         return ended
 
@@ -111,7 +111,7 @@ class CommandReader:
         return AxisCommand(known.axes, position, velocity, torque, known.client)
 
     def _follow_leases(self) -> None:
-        """Notes new leases, and ends those that are over."""
+        """Record new leases, and end those that are over."""
         leases = self._desk.leases.load_all()
         if not self._known and not any(leases):
             return
@@ -127,13 +127,13 @@ class CommandReader:
                 self._end_if_over(place, serial, now, ask)
 
     def _knows(self, place: int, serial: int) -> bool:
-        """Whether the lease is known, or can be now."""
+        """Record a lease if it is new. Return False if it was released meanwhile."""
         if place in self._known:
             return True
         axes = tuple(np.flatnonzero(self._desk.holders == serial).tolist())
         client = self._desk.client(place)
         if self._desk.leases.load(place) != serial:
-            return False  # given back just now: what was read may be another one's
+            return False  # released just now: the data read may belong to another lease
         self._known[place] = _Known(serial, axes, client)
         return True
 
@@ -158,8 +158,18 @@ def apply(
     axes: Sequence[str],
     commanded: npt.NDArray[np.float64],
 ) -> None:
-    """Axes whose lease has ended hold: positions as `commanded`, no velocity, no torque. Then the
-    newest command of each axis is written into the targets: another client may have them by now."""
+    """Write commands into the targets of drives.
+
+    Axes whose lease has ended hold their commanded position, without velocity or torque. Then the
+    newest command of each axis is written, because another client may already have the axis.
+
+    Args:
+        commands: new commands, oldest first.
+        ended: leases that have ended.
+        drives: the drives to command.
+        axes: names of the axes, in the order of the layout.
+        commanded: commanded positions [rad], shape (axes,); NaN keeps the target.
+    """
     places = {name: (each.target, k) for each in drives for k, name in enumerate(each.names)}
     for name in (name for end in ended for name in end.axes if name in places):
         target, k = places[name]

@@ -1,4 +1,4 @@
-"""What happens beside the cycle, as lines of JSON in a ring."""
+"""Events of a loop, as lines of JSON in a ring."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ CUT_OFF = " ..."
 
 
 class SharedEvent(msgspec.Struct, frozen=True):
-    """Something that happened."""
+    """An event of a loop."""
 
     serial: int  # of the event, from 1
     number: int  # of the last cycle before it; 0: before the first
@@ -29,7 +29,7 @@ class SharedEvent(msgspec.Struct, frozen=True):
 
 
 def encode_event(incident: Incident, serial: int, number: int) -> bytes:
-    """A line that fits its row, whatever is in it: details go first, then the message's end."""
+    """Encode an event into one row. If it is too long, drop details, then truncate the message."""
     event = SharedEvent(
         serial,
         number,
@@ -51,7 +51,7 @@ def encode_event(incident: Incident, serial: int, number: int) -> bytes:
 
 
 def encodable(value: object) -> object:
-    """Texts that no UTF-8 has become '?': what a device says must not end who passes it on."""
+    """Replace characters that UTF-8 cannot encode by '?': a device's text must not stop a loop."""
     return value.encode(errors="replace").decode() if isinstance(value, str) else value
 
 

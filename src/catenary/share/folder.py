@@ -59,7 +59,7 @@ def user_folder(uid: int) -> Path:
 def prepare(folder: Path, mode: int) -> None:
     """Create this user's folder if it is missing, for files of `mode`.
 
-    Raises ShareError if another user has created it: /dev/shm is open to everybody.
+    Raises ShareError if another user has created it: all users can write in /dev/shm.
     """
     if folder == GROUP_FOLDER:
         return
@@ -170,7 +170,7 @@ def _outside(uid: int) -> int:
 
 
 def _is_group_folder() -> bool:
-    """True if the folder belongs to root, not all users can write in it, and it is sticky.
+    """Return True if the folder belongs to root, is sticky, and not all users can write in it.
 
     Without the sticky bit, its group could rename and remove the files of others.
     """

@@ -1,11 +1,11 @@
-"""What lies in a segment, said by the segment itself.
+"""Layout of a segment, described by the segment itself.
 
 0   8 bytes  "CATSHARE"
-8   u32      version of all that follows
+8   u32      version of the format
 12  u32      bytes of the description
 16  u64      bytes of the segment
 24           the description: a ShareLayout as JSON
-...          the ring of cycles and the ring of events (ring.h), where the description says
+...          the ring of cycles and the ring of events (ring.h), at the offsets in the description
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ EVENT_SIZE = 1024  # bytes of an event
 EVENT_COUNT = 256
 ROWS_MIN = 64
 NUMBERS = frozenset("biuf")  # kinds of NumPy's types
-# What msgspec and NumPy raise for a description that cannot be.
+# Errors of msgspec and NumPy for an invalid description.
 DAMAGE = (
     msgspec.MsgspecError,
     MemoryError,
@@ -52,7 +52,7 @@ class ShareField(msgspec.Struct, frozen=True):
     name: str
     dtype: str  # of one number, NumPy's: "<f8"
     shape: tuple[int, ...]  # (): a single number
-    unit: str  # "rad", "rad/s", "N·m", "ns"; "": a count, a code, or as the device has it
+    unit: str  # "rad", "rad/s", "N·m", "ns"; "": a count, a code, or the device's own unit
     offset: int  # in the row [bytes]
     per_axis: bool  # one number for each of the layout's axes
 
@@ -66,11 +66,11 @@ class RingPlace(msgspec.Struct, frozen=True):
 
 
 class ShareLayout(msgspec.Struct, frozen=True):
-    """What one run of a loop shares."""
+    """Description of the data that one run of a loop shares."""
 
     name: str
     version: int
-    run: str  # a number no other run of a loop has
+    run: str  # unique identifier of this run of a loop
     period: float  # [s]
     axes: tuple[str, ...]  # names, in the order of the fields that are per axis
     fields: tuple[ShareField, ...]
@@ -83,7 +83,7 @@ class ShareLayout(msgspec.Struct, frozen=True):
 
     @property
     def dtype(self) -> np.dtype[np.void]:
-        """Of a cycle's record."""
+        """NumPy type of a cycle's record."""
         return np.dtype(
             {
                 "names": [field.name for field in self.fields],
@@ -95,14 +95,22 @@ class ShareLayout(msgspec.Struct, frozen=True):
 
     @property
     def size(self) -> int:
-        """Of the segment [bytes]."""
+        """Size of the segment [bytes]."""
         return self.events.offset + _rows.memory_size(self.events.count, self.events.size)
 
 
 def make_layout(
     name: str, sink: SinkLayout, *, history: float, opened: float, writer: Process
 ) -> ShareLayout:
-    """Room for the cycles of `history` seconds."""
+    """Return a layout for a loop.
+
+    Args:
+        name: name of the share.
+        sink: the loop's description of its data.
+        history: time whose cycles the ring keeps [s].
+        opened: time of opening, UTC [s].
+        writer: process of the loop.
+    """
     blocks = (sink.record_size, sink.actual_size, sink.target_size)
     *starts, row_size = _rows.row_parts(*blocks)
     places = dict(zip(("record", "actual", "target"), starts, strict=True))
@@ -146,24 +154,27 @@ def power_of_two(least: int) -> int:
 
 
 def encode_head(layout: ShareLayout) -> bytes:
-    """The bytes a segment begins with."""
+    """Return the first bytes of a segment: header and description."""
     description = msgspec.json.encode(layout)
     return HEADER.pack(MAGIC, layout.version, len(description), layout.size) + description
 
 
 def decode_head(memory: mmap.mmap | bytes, size: int) -> ShareLayout:
-    """The layout of a segment of `size` bytes. ShareError: it is none, or of another version."""
+    """Return the layout of a segment of `size` bytes.
+
+    Raises ShareError if it is not a share, is damaged, or has another version.
+    """
     head = memory[: HEADER.size]
     if len(head) < HEADER.size or not head.startswith(MAGIC):
-        raise ShareError("it is no share: it does not begin as one")
+        raise ShareError("not a Catenary share (bad magic number)")
     _, version, length, whole = HEADER.unpack(head)
     if version != VERSION:
         raise ShareError(
-            f"it has the layout of version {version}, this program reads version {VERSION}",
-            hint="let both programs use the same release of catenary",
+            f"its layout has version {version}, this program reads version {VERSION}",
+            hint="use the same release of catenary in both programs",
         )
     if whole > size or HEADER.size + length > size:
-        raise ShareError(f"it is cut off: {size} bytes of {whole}")
+        raise ShareError(f"it is truncated: {size} bytes of {whole}")
     try:
         layout = msgspec.json.decode(memory[HEADER.size : HEADER.size + length], type=ShareLayout)
         fits = layout.size <= size and layout.dtype.itemsize == layout.rows.size

@@ -1,4 +1,4 @@
-"""Lease: the right to command some axes of a loop in another process, for a while."""
+"""Lease: the right to command some axes of a loop in another process, for a limited time."""
 
 from __future__ import annotations
 
@@ -16,12 +16,13 @@ from catenary.share.command_table import COMMANDS, PLACES, QUANTITIES, Desk, Rea
 from catenary.share.layout import ShareLayout
 from catenary.share.process import this_process
 
-PATIENCE_NS = 2_000_000_000  # a dead owner's lock is recovered, a living one's block is short
+PATIENCE_NS = 2_000_000_000  # a dead owner's lock is recovered; a living owner is quick
 
 
 class Lease:
-    """The right to command some axes, until it is released, not renewed in time, or its process
-    has ended. `Reader.lease` makes it.
+    """The right to command some axes. `Reader.lease` creates it.
+
+    It ends when it is released, when it is not renewed in time, or when its process ends.
 
         with arm.lease(axes=["1 Servo"], for_=0.5) as command:
             command.send(position=[0.3])       # renews it, too
@@ -51,9 +52,20 @@ class Lease:
         velocity: npt.ArrayLike | None = None,
         torque: npt.ArrayLike | None = None,
     ) -> None:
-        """Set-points for the axes of the lease, in their order: [rad], [rad/s], [N·m]; for the next
-        cycle that looks. Renews the lease. LeaseError: it is over, or the loop does not take
-        commands. ValueError: another shape, NaN or infinity."""
+        """Send set-points for the axes of the lease, and renew the lease.
+
+        The loop applies them in its next cycle that reads commands. Each value is a scalar or has
+        shape (axes,), in the order of the lease.
+
+        Args:
+            position: positions [rad]; None: not commanded.
+            velocity: velocities [rad/s]; None: not commanded.
+            torque: torques [N·m]; None: not commanded.
+
+        Raises:
+            LeaseError: the lease is over, or the loop does not read commands.
+            ValueError: another shape, NaN or infinity, or nothing to send.
+        """
         row = np.zeros((), self._desk.row)
         given_values = zip(QUANTITIES, (position, velocity, torque), strict=True)
         for bit, (name, given) in enumerate(given_values):
@@ -67,12 +79,11 @@ class Lease:
         self._renew(row.tobytes())
 
     def renew(self) -> None:
-        """Keeps the lease for as long again. LeaseError: it is over."""
+        """Renew the lease for its full time. Raises LeaseError if it is over."""
         self._renew(None)
 
     def release(self) -> None:
-        """Gives the axes back; harmless when the lease is over, and in a child by fork: it is not
-        the child's."""
+        """Release the axes. A no-op if the lease is over, or in a forked child."""
         if os.getpid() != self._pid:
             return
         with locked(self._desk):
@@ -91,7 +102,7 @@ class Lease:
         self.release()
 
     def _renew(self, row: bytes | None) -> None:
-        """All of it under the mutex: a place that has gone to another client is not written to."""
+        """Renew the lease and write a row; the mutex ensures that the place is still its own."""
         desk, place = self._desk, self._place
         with locked(desk):
             now = time.monotonic_ns()
@@ -109,7 +120,10 @@ class Lease:
             desk.rings[place].write(row)
 
     def _check_taken(self) -> None:
-        """Whether somebody takes the commands. The kernel is asked only where some are waiting."""
+        """Raise LeaseError if the loop does not read commands.
+
+        Check the loop's process only if commands are waiting.
+        """
         waiting = self._desk.rings[self._place].newest - self._desk.taken.load(self._place)
         if waiting and not self._layout.writer.is_alive:
             raise LeaseError(f"the loop's process has died: {self._layout.writer}")
@@ -127,11 +141,11 @@ class Lease:
         if values.shape not in ((), (len(self.axes),)):
             raise ValueError(f"{name}: one for each of {len(self.axes)} axes, not {values.shape}")
         if not np.isfinite(values).all():
-            raise ValueError(f"{name}: NaN or infinity is no set-point")
+            raise ValueError(f"{name}: NaN or infinity is not a set-point")
         return values
 
     def _take_place(self) -> int:
-        """A free place, or one whose lease is over. Under the mutex."""
+        """Return a free place, or one whose lease is over. The caller holds the mutex."""
         desk, now = self._desk, time.monotonic_ns()
         for place, serial in enumerate(desk.leases.load_all()):
             if serial and not desk.is_valid(place, serial):
@@ -139,14 +153,14 @@ class Lease:
             elif serial and (reason := desk.ending(place, now)):
                 free(desk, place, reason)
         leases = desk.leases.load_all()
-        orphans = ~np.isin(desk.holders, leases)  # of a client killed while it took or gave back
+        orphans = ~np.isin(desk.holders, leases)  # of a client killed meanwhile
         desk.holders[orphans] = 0
         if 0 in leases:
             return leases.index(0)
         raise LeaseError(f"{PLACES} clients command the share {self._layout.name!r} already")
 
     def _take_axes(self) -> int:
-        """The serial of the new lease. Under the mutex."""
+        """Take the axes and return the serial of the new lease. The caller holds the mutex."""
         desk = self._desk
         for axis in self._numbers:
             if holder := desk.holders[axis]:
@@ -163,13 +177,13 @@ class Lease:
         entry["command"] = me.command.encode()[:64]
         desk.holders[self._numbers] = serial
         desk.deadlines_ns.store(self._place, time.monotonic_ns() + self._for_ns)
-        desk.leases.store(self._place, serial)  # from here on the loop sees it, and all of it
+        desk.leases.store(self._place, serial)  # publishes the complete lease to the loop
         return serial
 
 
 @contextmanager
 def locked(desk: Desk) -> Iterator[None]:
-    """The desk for this client alone. LeaseError: another one was stopped while it had it."""
+    """Lock the desk. Raises LeaseError if a client that was stopped holds the lock."""
     try:
         taken = desk.mutex.lock(PATIENCE_NS)
     except OSError as error:
@@ -177,7 +191,7 @@ def locked(desk: Desk) -> Iterator[None]:
     if taken is None:
         raise LeaseError(
             f"another client has held the desk for {PATIENCE_NS * 1e-9:g} s",
-            hint="it was stopped, by a debugger or SIGSTOP: let it go on, or end it",
+            hint="it was stopped by a debugger or SIGSTOP: continue or end it",
         )
     try:
         yield
@@ -186,16 +200,16 @@ def locked(desk: Desk) -> Iterator[None]:
 
 
 def free(desk: Desk, place: int, reason: Reason) -> None:
-    """The place and its axes are nobody's. Under the mutex."""
+    """Free a place and its axes. The caller holds the mutex."""
     entry, serial = desk.places[place], desk.leases.load(place)
     entry["reason"] = reason
     entry["last"] = serial
-    desk.leases.store(place, 0)  # before the axes: whoever saw them looks at this again
+    desk.leases.store(place, 0)  # before the axes: a reader of the axes checks this again
     desk.holders[desk.holders == serial] = 0
 
 
 def axis_numbers(layout: ShareLayout, axes: Sequence[str | int] | None) -> list[int]:
-    """The places of axes in the layout. ValueError: names what is not there."""
+    """Return the indices of axes in the layout. Raises ValueError if unknown or repeated."""
     if axes is None:
         return list(range(len(layout.axes)))
     if isinstance(axes, str):

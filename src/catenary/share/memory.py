@@ -22,7 +22,7 @@ SEALS = fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL
 
 
 class Segment:
-    """Owns a mapping of a file, and knows the user who owns the file."""
+    """Owner of a mapping of a file; has the file's size, inode and owner."""
 
     def __init__(self, path: Path, descriptor: int, *, writable: bool) -> None:
         try:

@@ -1,6 +1,6 @@
-/* A mutex in shared memory for slow paths: robust (a dead owner's lock goes on to the next), with
- * priority inheritance (a waiter of high priority lends it to the owner), error-checking.
- * pthread_mutexattr_setrobust(3), _setprotocol(3). 20 ns to lock and unlock where nobody waits. */
+/* A mutex in shared memory for slow paths: robust (the next waiter gets a dead owner's lock), with
+ * priority inheritance (the owner inherits the priority of its waiters), error-checking.
+ * pthread_mutexattr_setrobust(3), _setprotocol(3). 20 ns to lock and unlock without contention. */
 #ifndef CATENARY_MUTEX_H
 #define CATENARY_MUTEX_H
 
@@ -13,14 +13,14 @@
 typedef struct share_mutex {
     char magic[8];
     uint32_t version;
-    uint32_t size;                    /* of the library's mutex: all who share it must agree */
+    uint32_t size;                    /* of the library's mutex: must be the same in all processes */
     pthread_mutex_t mutex;
 } share_mutex;
 
 #define MUTEX_MAGIC "CATMUTEX"
 #define MUTEX_VERSION 1u
 
-/* Once, before anybody else sees it. 0 or -errno. */
+/* Initialise once, before other processes map it. Return 0 or -errno. */
 static int mutex_init(share_mutex *m) {
     pthread_mutexattr_t attributes;
     int rc = pthread_mutexattr_init(&attributes);
@@ -40,8 +40,8 @@ static int mutex_is_ours(const share_mutex *m) {
         && m->size == sizeof(pthread_mutex_t);
 }
 
-/* Waits at most `timeout` [ns]. 0: it is ours; 1: ours, and its owner had died; -ETIMEDOUT,
- * -EDEADLK (it is ours already), -ENOTRECOVERABLE. */
+/* Wait at most `timeout` [ns]. Return 0 if acquired, 1 if acquired from an owner that died,
+ * -ETIMEDOUT, -EDEADLK (this thread already has it) or -ENOTRECOVERABLE. */
 static int mutex_lock(share_mutex *m, int64_t timeout) {
     struct timespec until;
     int rc = pthread_mutex_trylock(&m->mutex);

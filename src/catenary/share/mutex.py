@@ -1,4 +1,4 @@
-"""Mutex: one at a time, among processes, for slow paths."""
+"""Mutex: mutual exclusion among processes, for slow paths."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FOR_EVER_NS = 1 << 62
 
 
 class Mutex:
-    """Owns a lock that all threads of all processes share by its name.
+    """A lock that all threads of all processes share by its name.
 
         with share.Mutex("tool") as mutex:
             if mutex.recovered:       # the owner died in its block: its work may be half done
@@ -31,7 +31,7 @@ class Mutex:
     def __init__(self, name: str, *, mode: int = 0o600, uid: int | None = None) -> None:
         self.name = name
         self._file = folder.file_name(folder.MUTEX, name)
-        self.recovered = False  # whether the last lock was taken from an owner that had died
+        self.recovered = False  # True if the last lock was taken from an owner that had died
         try:
             self.path, self._mutex = self._attached(mode, uid)
         except PermissionError as error:
@@ -45,7 +45,10 @@ class Mutex:
             raise ShareError(f"the mutex {name!r}: {error}") from error
 
     def acquire(self, timeout: float | None = None) -> bool:
-        """Waits for it, at most `timeout` [s]; whether it is ours. RuntimeError: it was already."""
+        """Acquire the lock. Return False after `timeout` [s].
+
+        Raises RuntimeError if this thread already has it.
+        """
         recovered = self._mutex.lock(FOR_EVER_NS if timeout is None else round(timeout * 1e9))
         if recovered is None:
             return False
@@ -53,11 +56,11 @@ class Mutex:
         return True
 
     def release(self) -> None:
-        """RuntimeError: it is not this thread's."""
+        """Release the lock. Raises RuntimeError if this thread does not have it."""
         self._mutex.unlock()
 
     def unlink(self) -> None:
-        """Takes the name away; those who have the mutex keep it."""
+        """Remove the name. Processes that have the mutex keep it."""
         self.path.unlink(missing_ok=True)
 
     def __enter__(self) -> Mutex:

@@ -1,4 +1,4 @@
-"""Who a process is, so that another one that got its number later is not taken for it."""
+"""Identity of a process, distinguished from a later process with the same number."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 
 BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
-STATE, START_TIME = 0, 19  # fields of /proc/PID/stat behind the command, proc(5)
+STATE, START_TIME = 0, 19  # fields of /proc/PID/stat after the command, proc(5)
 DEAD = ("Z", "X")
 
 
@@ -22,7 +22,7 @@ class Process(msgspec.Struct, frozen=True):
 
     @property
     def is_alive(self) -> bool:
-        """Whether it runs, as the same process. Seen from another PID namespace: False."""
+        """True if this same process still runs; False in another PID namespace."""
         return _start_time(self.pid) == self.start_time and self.boot_id == _boot_id()
 
     def __str__(self) -> str:
@@ -32,7 +32,7 @@ class Process(msgspec.Struct, frozen=True):
 
 
 def is_running(pid: int) -> bool:
-    """True if a process has this number now."""
+    """Return True if a process has this number now."""
     return _start_time(pid) is not None
 
 
@@ -55,12 +55,12 @@ def _start_time(pid: int) -> int | None:
 def _boot_id() -> str:
     try:
         return BOOT_ID.read_text().strip()
-    except OSError:  # /proc is not whole in some containers
+    except OSError:  # /proc is incomplete in some containers
         return ""
 
 
 def _command(pid: int) -> str:
-    """Its program, and where that is Python, the script."""
+    """Return the name of its program; for Python, of the script or module."""
     try:
         words = Path(f"/proc/{pid}/cmdline").read_bytes().decode(errors="replace").split("\0")
     except OSError:

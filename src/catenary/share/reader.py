@@ -1,4 +1,4 @@
-"""Reading along: what another process' loop does, cycle by cycle."""
+"""Reader: the cycles and events of a loop in another process."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from catenary.share.layout import ShareLayout, decode_head
 from catenary.share.lease import Lease, lease_of
 from catenary.share.memory import Segment
 
-LOOK_NS = 250_000_000  # between two looks whether the writer still lives
+LOOK_NS = 250_000_000  # between two checks whether the writer is alive
 FOR_EVER = 1 << 62
 CYCLES, EVENTS = 0, 1
 END = object()
@@ -31,18 +31,18 @@ State = Literal["running", "ended", "dead"]
 def attach(
     name: str, *, stale: bool = False, uid: int | None = None, patience: Iterable[object] = ()
 ) -> Reader:
-    """Map the cycles that another process shares as `name`, for reading; leave it by `with`.
+    """Map the cycles that another process shares as `name`, for reading. Use it in a `with` block.
 
     Args:
-        name: of the share.
-        stale: accept one whose writer has died, to see its last cycles.
+        name: name of the share.
+        stale: accept a share whose writer has died, to read its last cycles.
         uid: the user whose share it is. None: this user or root; others are refused, because the
             owner of a share can crash its readers.
-        patience: try again after each item, a task's jobs for one (`attach(name, patience=task)`).
+        patience: try again after each item, such as a task's jobs (`attach(name, patience=task)`).
 
     Raises:
-        ShareError: there is none, it may not be read, it belongs to another user, its writer is
-            dead, or it has the layout of another version.
+        ShareError: the share does not exist, may not be read, belongs to another user, has a dead
+            writer, or has the layout of another version.
     """
     waiting = iter(patience)
     while True:
@@ -62,8 +62,8 @@ def _attached(name: str, stale: bool, uid: int | None) -> Reader:
         others = ", ".join(map(repr, folder.names(uid))) or "none"
         raise ShareError(
             f"there is no share {name!r}; there are: {others}",
-            hint="it is there while a Loop with sink=cat.Share(...) is open; name the user of "
-            "another user's share: uid= (--uid)",
+            hint="it exists while a Loop with sink=cat.Share(...) is open; for another user's "
+            "share, pass uid= (--uid)",
         ) from error
     except PermissionError as error:
         raise ShareError(
@@ -86,7 +86,7 @@ def _attached(name: str, stale: bool, uid: int | None) -> Reader:
 
 
 class Reader:
-    """Owns one process' sight of a share; `catenary.attach` makes it.
+    """One process's read-only view of a share; `catenary.attach` creates it.
 
         with cat.attach("arm") as arm:
             while arm.wait(timeout=1.0):
@@ -122,39 +122,44 @@ class Reader:
         self.close()
 
     def close(self) -> None:
-        """Lets go of the memory; what was read stays. The share is there for others."""
+        """Unmap the memory. Data already read stays valid, and the share stays for others."""
         self._rings = None
 
     @property
     def state(self) -> State:
-        """Of the writer: "running"; "ended": its loop was left; "dead": killed, or crashed."""
+        """State of the writer: "running"; "ended": its loop ended; "dead": killed or crashed."""
         if self._ring(CYCLES).ended:
             return "ended"
         return "running" if self.layout.writer.is_alive else "dead"
 
     @property
     def alive(self) -> bool:
-        """Whether there may be more cycles."""
+        """True if more cycles may come."""
         return self.state == "running"
 
     @property
     def number(self) -> int:
-        """Of the newest cycle; 0: there is none yet."""
+        """Number of the newest cycle; 0 before the first."""
         return self._ring(CYCLES).newest
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Sleeps until there is a cycle newer than the last one that `read` or `wait` has seen.
-        False: `timeout` [s] has passed, or no more will come: see `alive`."""
+        """Sleep until there is a cycle newer than the last one that `read` or `wait` has seen.
+
+        Return False if `timeout` [s] has passed, or if no more cycles will come (see `alive`).
+        """
         deadline = FOR_EVER if timeout is None else time.monotonic_ns() + round(timeout * 1e9)
         while not self._has_news(min(deadline, time.monotonic_ns() + LOOK_NS)):
             if time.monotonic_ns() >= deadline:
                 return False
             if not self.alive:
-                return self._has_news(0)  # the last ones may have come before we asked
+                return self._has_news(0)  # the last cycles may have come before the check
         return True
 
     def read(self) -> np.void:
-        """The newest cycle: a record of `dtype`, copied whole. ShareError: there is none yet."""
+        """Return a consistent copy of the newest cycle, a record of `dtype`.
+
+        Raises ShareError if there is none yet.
+        """
         number, row = self._ring(CYCLES).copy()
         if number == 0:
             raise ShareError(
@@ -165,22 +170,34 @@ class Reader:
         return record
 
     def rows(self, after: int) -> tuple[Rows, int]:
-        """Every cycle behind number `after` that is still there, oldest first, as an array of
-        `dtype`; and how many are missing before the last of them, since they were overwritten."""
+        """Return every cycle after number `after` that still exists, oldest first.
+
+        The result is an array of `dtype`, and the number of overwritten cycles before its last.
+        """
         rows, lost = self._ring(CYCLES).copy_after(after)
         return np.frombuffer(rows, self.dtype), lost
 
     def events(self, after: int = 0) -> tuple[list[SharedEvent], int]:
-        """Every event behind serial `after` that is still there, oldest first; and how many are
-        missing before the last of them, since they were overwritten."""
+        """Return every event after serial `after` that still exists, oldest first.
+
+        The result also has the number of overwritten events before the last of them.
+        """
         rows, lost = self._ring(EVENTS).copy_after(after)
         size = self.layout.events.size
         return [decode_event(rows[at : at + size]) for at in range(0, len(rows), size)], lost
 
     def lease(self, axes: Sequence[str | int] | None = None, *, for_: float = 0.5) -> Lease:
-        """The right to command some axes, by name or number (None: all), for `for_` seconds after
-        each command. LeaseError: another client has one of them. ShareError: the loop has ended, or
-        may not be commanded."""
+        """Return a lease: the right to command some axes.
+
+        Args:
+            axes: names or numbers of the axes; None: all.
+            for_: time that the lease lasts after each command [s].
+
+        Raises:
+            LeaseError: another client has one of the axes.
+            ShareError: the loop has ended, or may not be commanded.
+            ValueError: unknown axes, or `for_` out of range.
+        """
         if not self.alive:
             raise ShareError(f"the loop of the share {self.layout.name!r} has ended")
         if self._desk is None:
@@ -188,7 +205,7 @@ class Reader:
         return lease_of(self._desk, self.layout, axes, for_)
 
     def _has_news(self, deadline_ns: int) -> bool:
-        """Waits so long for a cycle that was not seen yet."""
+        """Wait for a new cycle. Return False at the deadline."""
         if not self._ring(CYCLES).wait(self._seen, deadline_ns):
             return False
         self._seen = self.number

@@ -1,13 +1,14 @@
-/* The last rows of somebody's work, from one writer to any number of readers in any process.
+/* The last rows of a writer, for any number of readers in any process.
  *
- * Row `number` lies in slot number % count, behind a sequence number that is odd while it is
- * written (a seqlock): a reader copies and looks whether it was overwritten meanwhile. The writer
- * never looks at a reader; readers map the memory read-only, so they can neither delay nor break it.
- * A writer that is killed in mid-write leaves an odd number behind, and all other rows whole.
+ * Row `number` is in slot number % count, after a sequence number that is odd while it is written
+ * (a seqlock). A reader copies the row and then checks whether it was overwritten meanwhile. The
+ * writer never reads from readers. Readers map the memory read-only, so they can neither delay nor
+ * damage the writer. A writer that is killed during a write leaves an odd number in that slot; all
+ * other rows stay valid.
  *
- * Waking: one system call of the writer wakes one sleeper, and each reader that has news wakes two
- * more: a hundred readers cost the writer what one costs. Where a reader dies with its wake-up,
- * the others sleep one row longer.
+ * Waking: one system call of the writer wakes one sleeper, and each reader with a new row wakes two
+ * more. The cost for the writer does not depend on the number of readers. If a reader dies with its
+ * wake-up, the others sleep one row longer.
  */
 #ifndef CATENARY_RING_H
 #define CATENARY_RING_H
@@ -27,11 +28,11 @@ typedef struct share_ring {           /* shared */
     uint8_t slots[] __attribute__((aligned(64)));
 } share_ring;
 
-typedef struct ring_view {            /* private: what one process has checked */
+typedef struct ring_view {            /* private: values that one process has checked */
     share_ring *ring;
     uint64_t count;                   /* of slots, a power of two */
     uint64_t stride;                  /* from slot to slot [bytes] */
-    uint64_t size;                    /* of a row [bytes], behind the slot's sequence number */
+    uint64_t size;                    /* of a row [bytes], after the slot's sequence number */
 } ring_view;
 
 static inline uint64_t ring_stride(uint64_t size) { return (sizeof(uint64_t) + size + 63) / 64 * 64; }
@@ -44,11 +45,11 @@ static inline uint64_t ring_newest(const ring_view *v) {
     return __atomic_load_n(&v->ring->newest, __ATOMIC_ACQUIRE);
 }
 
-/* Read before `newest`: then that was the last. */
+/* Read this before `newest`: if it is set, `newest` is the last row. */
 static inline int ring_is_ended(const ring_view *v) { return cat_load_acquire32(&v->ring->ended) != 0; }
 
-/* Where the bytes of row `number` go, by cat_copy_to_shared; a reader drops what it copies between
- * this and ring_publish. */
+/* Begin row `number`, and return the address for its bytes (cat_copy_to_shared). A reader discards
+ * any copy that it makes between this and ring_publish. */
 static inline uint8_t *ring_begin(const ring_view *v, uint64_t number) {
     uint64_t *slot = ring_slot(v, number);
     __atomic_store_n(slot, 2 * number + 1, __ATOMIC_RELAXED);
@@ -69,7 +70,7 @@ static inline void ring_end(const ring_view *v) {
     cat_futex_wake_shared(&v->ring->tick);
 }
 
-/* Whether row `number` is there and was copied whole. */
+/* Return 1 if row `number` exists and the copy is consistent. */
 static inline int ring_copy(const ring_view *v, uint64_t number, uint8_t *bytes) {
     const uint64_t *slot = ring_slot(v, number);
     uint64_t whole = 2 * number + 2;
@@ -79,8 +80,8 @@ static inline int ring_copy(const ring_view *v, uint64_t number, uint8_t *bytes)
     return __atomic_load_n(slot, __ATOMIC_RELAXED) == whole;
 }
 
-/* Copies the newest row; its number, 0: there is none. The writer would have to write `count` rows
- * during one copy for a second try. */
+/* Copy the newest row. Return its number, or 0 if there is none. A second attempt is only necessary
+ * if the writer writes `count` rows during one copy. */
 static inline uint64_t ring_copy_newest(const ring_view *v, uint8_t *bytes) {
     for (int k = 0; k < RING_TRIES; k++) {
         uint64_t number = ring_newest(v);
@@ -89,9 +90,9 @@ static inline uint64_t ring_copy_newest(const ring_view *v, uint8_t *bytes) {
     return 0;
 }
 
-/* Rows `first` to `first + rows - 1`, one behind the other, those that are still there; how many.
- * `end`: the number of the last one copied, first - 1 where there was none. The loop is bounded by
- * a count: `number` comes from shared memory, where a client can write 2^64 - 1. */
+/* Copy those of the rows `first` to `first + rows - 1` that still exist, and return their count.
+ * `end`: the number of the last row copied, or first - 1. A count bounds the loop, because `number`
+ * comes from shared memory, where a client can write 2^64 - 1. */
 static inline uint64_t ring_copy_rows(const ring_view *v, uint64_t first, uint64_t rows, uint8_t *bytes,
                                       uint64_t *end) {
     uint64_t copied = 0;
@@ -105,8 +106,8 @@ static inline uint64_t ring_copy_rows(const ring_view *v, uint64_t first, uint64
     return copied;
 }
 
-/* Waits for a row behind `seen`, until `deadline` [ns, CLOCK_MONOTONIC]. 1: it is there; 0: the
- * deadline has passed or nothing more will come; -EINTR. */
+/* Wait for a row after `seen`, until `deadline` [ns, CLOCK_MONOTONIC]. Return 1 if it exists, 0 if
+ * the deadline has passed or no more rows will come, or -EINTR. */
 static inline int ring_wait(const ring_view *v, uint64_t seen, int64_t deadline) {
     for (;;) {
         uint32_t tick = __atomic_load_n(&v->ring->tick, __ATOMIC_SEQ_CST);

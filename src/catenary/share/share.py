@@ -1,4 +1,4 @@
-"""Share: what a loop does, for other processes to read."""
+"""Share: publish the cycles of a loop for other processes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ OTHERS_WRITE = 0o022  # of the cycles: a reader that could truncate them would e
 
 
 class Share:
-    """Owns a name under which other processes find the cycles of a loop.
+    """Owner of a name under which other processes find the cycles of a loop.
 
         with cat.Share("arm") as share, cat.Loop(arm, period=1e-3, sink=share) as loop:
             for cycle in loop: ...
@@ -36,8 +36,8 @@ class Share:
     `mode`: permissions as of chmod: 0o600, this user alone; 0o640, the group may read; 0o660, and
     command. Only this user can write into the file of the cycles, whatever `mode` is.
 
-    One loop at a time. Each loop that is opened with the share begins a segment of its own, whose
-    cycles count from 1. Readers of the segment before see its end, and attach again.
+    One loop at a time. Each loop that is opened with the share begins a new segment, whose cycles
+    count from 1. Readers of the previous segment see its end, and attach again.
     Raises ShareError if the name belongs to a running process.
     """
 
@@ -85,14 +85,14 @@ class Share:
     # Commands of other processes, for the thread that iterates
 
     def apply(self, *drives: Commanded) -> list[LeaseEnd]:
-        """Writes what clients command into the targets of drives: of each axis the newest command.
+        """Write the newest command of each axis into the targets of drives. Never waits.
 
             for cycle in loop:
                 for end in share.apply(arm):
                     print(end)
 
-        Axes whose lease has ended hold where they are commanded to be, and are returned: the
-        application decides what else is to become of them. Never waits.
+        Axes whose lease has ended hold their commanded position. The method returns these leases;
+        the application decides what else to do with their axes.
         """
         reader = self._reader()
         commands, ended = reader.commands(), reader.ended()
@@ -101,12 +101,14 @@ class Share:
         return ended
 
     def commands(self) -> list[AxisCommand]:
-        """The commands that have come since the last call, of leases that are valid; of each client
-        oldest first. Never waits."""
+        """Return the commands of valid leases since the last call; by client, oldest first.
+
+        Never waits.
+        """
         return self._reader().commands()
 
     def ended(self) -> list[LeaseEnd]:
-        """The leases whose end the last `commands` has found: nobody commands their axes."""
+        """Return the leases whose end the last `commands` has detected."""
         return self._reader().ended()
 
     def _reader(self) -> CommandReader:
@@ -115,7 +117,7 @@ class Share:
         return self._commands
 
     def _commanded_position(self) -> Values:
-        """Of the newest cycle [rad]."""
+        """Return the commanded positions of the newest cycle [rad], shape (axes,)."""
         if self._cycles is None:
             return np.full(len(self.layout.axes), np.nan)
         _, row = self._cycles.copy()
@@ -124,7 +126,7 @@ class Share:
 
     @property
     def layout(self) -> ShareLayout:
-        """Of the loop that is, or was last, open."""
+        """Layout of the loop that is, or was last, open."""
         if self._layout is None:
             raise RuntimeError(f"the share {self.name!r} has no layout before a Loop is open")
         return self._layout
@@ -132,11 +134,13 @@ class Share:
     # plan.sink.Sink
 
     def open(self, layout: SinkLayout) -> object:
-        """The segment of a loop that opens. Called by the loop."""
+        """Create the segment of a loop, and return its sink capsule. Called by the loop."""
         if not self._entered:
             raise RuntimeError(f"use the share in a with block: with cat.Share({self.name!r}) ...")
         if self._cycles is not None:
-            raise RuntimeError(f"the share {self.name!r} belongs to a loop already: one for each")
+            raise RuntimeError(
+                f"the share {self.name!r} already belongs to a loop: use one share for each loop"
+            )
         made = make_layout(
             self.name,
             layout,
@@ -159,15 +163,17 @@ class Share:
         return cycles.capsule
 
     def tell(self, incident: Incident) -> None:
-        """Something happened beside the cycle. Called by the loop; from any thread."""
+        """Append an event. Called by the loop, from any thread."""
         with self._telling:
             if self._events is not None and self._cycles is not None:
                 number = self._events.newest + 1
                 self._events.write(encode_event(incident, number, self._cycles.newest))
 
     def close(self) -> None:
-        """The loop has ended; what it shared stays readable until the next one, or the block's
-        end. Called by the loop."""
+        """End the segment. Called by the loop.
+
+        Its data stays readable until the next loop opens, or until the end of the block.
+        """
         if self._is_a_copy():
             return
         with self._telling:
@@ -182,7 +188,7 @@ class Share:
                 self._socket = None
 
     def _is_a_copy(self) -> bool:
-        """Of the process that owns it, in a child by fork: its leaving ends nothing."""
+        """Return True in a forked child, which must not end the share of its parent."""
         return self._pid != os.getpid()
 
     def _make_files(self, made: ShareLayout) -> tuple[Segment, Desk, DeskSocket]:
@@ -229,12 +235,12 @@ class Share:
             raise self._belongs_to_another(path) from error
         except ShareError as error:
             raise ShareError(
-                f"{path} is in the way: {error.message}",
+                f"{path} exists and cannot be replaced: {error.message}",
                 hint="choose another name, or remove it",
             ) from error
         if layout.writer.is_alive:
             raise ShareError(
-                f"the share {self.name!r} belongs to {layout.writer}, which lives",
+                f"the share {self.name!r} belongs to {layout.writer}, which is running",
                 hint="choose another name, or end that process",
             )
 
