@@ -88,13 +88,8 @@ def test_a_cpu_there_is_none_of(capsys):
     [
         (["--apply", "--undo"], "not allowed with"),
         (["--seconds", "-1"], "is not between"),
-<<<<<<< HEAD
-        (["--period", "1e-9"], "the shortest is 20 us"),
-        (["--priority", "100"], "priority 100 is outside 1 to 99"),
-=======
         (["--period", "1e-9"], "use at least 20 us"),
-        (["--priority", "100"], "priority 100 is not within 1 to 99"),
->>>>>>> 9a3933b39248bd880b8d34bb7058a25798093fb4
+        (["--priority", "100"], "priority 100 is outside 1 to 99"),
     ],
 )
 def test_usage(capsys, arguments, words):
