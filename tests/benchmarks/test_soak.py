@@ -22,7 +22,7 @@ from benchmarks.soak.run import as_text, soak, soaked_minute
 from benchmarks.soak.setting import Mode, Setting, setting_of, settings
 from benchmarks.soak.witness import Witness
 from catenary.loop.device_watch import Watch
-from catenary.loop.session import Running
+from catenary.loop.session import Session
 from catenary.virtual import DigitalOutputs, Fault, Segment, Servo
 from catenary.virtual import faults as f
 from catenary.virtual.devices.servo import Received
@@ -224,7 +224,7 @@ def test_a_cycle_that_a_cut_ring_loses_later_is_found(monkeypatch: pytest.Monkey
 
 
 def test_a_stop_without_an_event_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Running, "_announce_axes", lambda self, **_: [])
+    monkeypatch.setattr(Session, "_announce_axes", lambda self, **_: [])
     minute = soaked(monkeypatch, f.SafeTorqueOff(device=TOOL, at=0.3, for_=0.1))
     assert "no silent stop" in invariants(minute)
 

@@ -7,8 +7,8 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from catenary.bench.tables import TABLES
 
+from benchmarks.tables import TABLES
 from catenary.cli.main import main
 
 
@@ -17,7 +17,7 @@ def test_the_help_explains_each(capsys: pytest.CaptureFixture[str]) -> None:
         main(["bench", "table", "--help"])
     text = capsys.readouterr().out
     for name, table in TABLES.items():
-        assert find_spec(f"catenary.bench.tables.{name}"), name
+        assert find_spec(f"benchmarks.tables.{name}"), name
         assert any(line.split()[:1] == [name] and table.help in line for line in text.splitlines())
 
 

@@ -22,7 +22,7 @@ import pytest
 
 import catenary as cat
 from catenary.errors import CatenaryError, DriveError, LoopError, MoveError
-from catenary.loop.session import Running
+from catenary.loop.session import Session
 from catenary.realtime import VirtualClock
 from catenary.types import SINT
 from catenary.virtual import Segment, Servo
@@ -671,10 +671,10 @@ def test_a_loop_that_cannot_run_in_the_background_keeps_its_late_limits(
 def test_an_exit_in_the_thread_stops_the_axes(monkeypatch: pytest.MonkeyPatch) -> None:
     cell = Cell("csp", servos=1)
 
-    def leave(self: Running, flags: int, *, faults: bool) -> None:
+    def leave(self: Session, flags: int, *, faults: bool) -> None:
         raise SystemExit(1)
 
-    monkeypatch.setattr(Running, "judge", leave)
+    monkeypatch.setattr(Session, "judge", leave)
     cell.loop.run_in_background()
     cell.segment[0].inject_fault(0x2310)
     until(lambda: cell.loop.error is not None)

@@ -13,7 +13,7 @@ from catenary.bus import MainDevice
 from catenary.core import CYCLE_STOPPED
 from catenary.drive import Drives, ProcessData
 from catenary.loop.safe_outputs import confirm_safe
-from catenary.loop.session import Running
+from catenary.loop.session import Session
 from catenary.loop.signals import SignalGuard
 from catenary.plan.cycle import ExecutionMode
 from catenary.plan.request import Views
@@ -102,15 +102,15 @@ def test_a_divided_device_gets_them_too(cell: Cell, divider: int) -> None:
 
 def test_while_the_axes_still_brake(cell: Cell, monkeypatch: pytest.MonkeyPatch) -> None:
     """Outputs need not wait for the axes: a laser is off at once."""
-    stop_axes = Running._stop_axes
+    stop_axes = Session._stop_axes
     lamps: list[int] = []
 
-    def observed(running: Running, guard: SignalGuard) -> None:
+    def observed(running: Session, guard: SignalGuard) -> None:
         lamps.append(cell.sensor.lamp)
         stop_axes(running, guard)
         lamps.append(cell.sensor.lamp)
 
-    monkeypatch.setattr(Running, "_stop_axes", observed)
+    monkeypatch.setattr(Session, "_stop_axes", observed)
     with cell.main as main:
         main.scan()
         arm = Drives(main.subs.drives, counts_per_turn=2**20, velocity_limit=10.0)
