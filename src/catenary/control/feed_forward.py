@@ -69,8 +69,14 @@ class Friction:
 
 @compiles
 def friction(parameters: Row, i: int, velocity: float) -> float:
-    """The torque [N·m] that axis `i` loses at this velocity [rad/s]: b q̇ + T_c tanh(q̇ / v_t). Give
-    it the wanted velocity: compensating the measured one makes an axis at rest tremble."""
+    """Return the torque [N·m] that axis `i` loses at a velocity: b q̇ + T_c tanh(q̇ / v_t).
+
+    Args:
+        parameters: of a `Friction`.
+        i: number of the axis.
+        velocity: wanted velocity [rad/s]. Compensating the measured one makes an axis at rest
+            tremble.
+    """
     if parameters[0] != FRICTION:
         raise ValueError("friction: these are not the parameters of a Friction")
     p = 1 + 3 * i

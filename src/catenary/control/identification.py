@@ -90,9 +90,14 @@ class FrequencyResponse:
 def frequency_response(
     given: Vector, measured: Vector, period: float, *, segment: int | None = None
 ) -> FrequencyResponse:
-    """What a record of one axis says: `given` and `measured` (k,), one every `period` [s], in any
-    units. `segment`: samples of each of the half-overlapping pieces that are averaged (None: an
-    eighth of the record); the resolution is 1 / (segment · period) [Hz].
+    """Estimate the frequency response of one axis from a record.
+
+    Args:
+        given: input (k,), in any unit.
+        measured: output (k,), in any unit.
+        period: between two samples [s].
+        segment: samples of each of the half-overlapping pieces that are averaged. None: an eighth
+            of the record. The resolution is 1 / (segment · period) [Hz].
 
     Source: H₁ = S_xy / S_xx by Welch's averaged periodograms with Hann windows, each piece's mean
     taken away; coherence |S_xy|² / (S_xx S_yy). Bendat and Piersol, Random Data, ch. 6 and 9.

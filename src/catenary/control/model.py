@@ -29,7 +29,7 @@ class Model:
     function: int  # address of mj_inverse
 
     def workspace(self) -> Any:
-        """A new mjData, all joints where the model has them."""
+        """Return a new mjData with all joints at the positions of the model."""
         data = self.mujoco.MjData(self.native)
         self.mujoco.mj_inverse(self.native, data)
         return data
@@ -62,8 +62,11 @@ def _mujoco() -> Any:
 
 
 def _native(mujoco: Any, path: Path) -> Any:
-    """The mjModel. A URDF's shapes are left out: its masses and inertias are what moves, and its
-    meshes need not be there."""
+    """Return the mjModel of a file.
+
+    The shapes of a URDF are left out, so that its meshes need not be there. Masses and inertias
+    determine the motion.
+    """
     try:
         root = ElementTree.fromstring(path.read_bytes())
     except OSError as error:

@@ -53,7 +53,7 @@ class Pid:
         return np.zeros(STATES * self.axes)
 
     def columns(self) -> list[Row]:
-        """The gains, each (axes,)."""
+        """Return the gains, each (axes,)."""
         n = axis_count(self.axes)
         names = ("proportional", "integral", "derivative", "derivative_time")
         first = [checked(name, getattr(self, name), n) for name in names]
@@ -104,8 +104,10 @@ def pid_step(
     begin: float,
     dt: float,
 ) -> float:
-    """The same with its numbers from `m` and `p` on. `begin`: what the output was before the first
-    step."""
+    """Run one step with the state from `memory[m]` on and the gains from `parameters[p]` on.
+
+    `begin` is the output before the first step.
+    """
     # float(): Python's own numbers are several times faster than NumPy's; compiled it is nothing
     measured, limit = float(measured), float(parameters[p + 4])
     if memory[m] == 0.0:

@@ -103,12 +103,19 @@ def trajectory(
     limits: MotionLimits,
     period: float,
 ) -> Trajectory:
-    """The fastest motion from `start` (n,) [rad] to rest at `goal` (n,), all axes arriving
-    together, sampled every `period` [s]. Several goals (m, n): one after the other, at rest in
-    each.
+    """Return the fastest motion to rest at `goal`; all axes arrive together.
 
-    ValueError names the axis and the limit: a goal outside them, a start beyond them or that cannot
-    stop within them, NaN. Needs ruckig: pip install 'catenary[traj]'.
+    Needs ruckig: pip install 'catenary[traj]'.
+
+    Args:
+        start: positions (n,) [rad], or a `MotionState`.
+        goal: positions (n,) [rad]. Several goals (m, n): one after the other, at rest in each.
+        limits: of the motion.
+        period: between two rows [s].
+
+    Raises:
+        ValueError: A goal is outside the limits, or the start cannot stop within them, or a number
+            is NaN. The message names the axis and the limit.
 
     Source: Berscheid and Kröger, Jerk-limited real-time trajectory generation with arbitrary target
     states, RSS 2021.

@@ -68,7 +68,7 @@ def expected_identity(device: DeviceTable) -> str:
 
 
 def agrees(expected: IdentityTable, found: Identity) -> bool:
-    """True if an identity has all numbers that the file gives."""
+    """Return True if an identity has all numbers that the file gives."""
     return not differences(expected, found)
 
 

@@ -70,7 +70,11 @@ class Summary:
 
 
 def find_whole(stream: BinaryIO) -> Summary:
-    """Reads a file up to where it is damaged, or ends. RecordingError: it is none of ours."""
+    """Read a file up to its end, or to the first damage.
+
+    Raises:
+        RecordingError: It is not a recording of Catenary.
+    """
     records: Any = require("mcap.records")
     summary = Summary()
     for group in groups(places(stream)):
@@ -112,7 +116,7 @@ def groups(found: Iterable[Place]) -> Iterator[list[Place]]:
 
 
 def _add_chunk(summary: Summary, stream: BinaryIO, place: Place, indexes: list[Place]) -> bool:
-    """False: the chunk is not whole, or the index behind it, so that nothing else can follow."""
+    """Add a chunk. Return False if the chunk or its index is not whole: nothing can follow."""
     records: Any = require("mcap.records")
     chunk = read_record(stream, place)
     data = chunk_bytes(chunk) if chunk is not None else None
@@ -145,8 +149,11 @@ def _add_chunk(summary: Summary, stream: BinaryIO, place: Place, indexes: list[P
 
 
 def _index_anew(data: bytes, start: int) -> tuple[dict[int, int], bytes]:
-    """The index of a chunk as it will stand at `start`: where each channel's begins, and all of
-    it."""
+    """Return the index of a chunk for the position `start`.
+
+    Returns:
+        The position of the index of each channel, and the bytes of all.
+    """
     records: Any = require("mcap.records")
     entries: dict[int, list[tuple[int, int]]] = {}
     for message in chunk_messages(data):
@@ -159,7 +166,7 @@ def _index_anew(data: bytes, start: int) -> tuple[dict[int, int], bytes]:
 
 
 def _first_cycle(summary: Summary, data: bytes) -> int | None:
-    """The log time of the first message that is no event."""
+    """Return the log time of the first message that is not an event."""
     cycles = {each.id for each in summary.channels.values() if not is_event(each.topic)}
     times = (each.time_ns for each in chunk_messages(data) if each.channel in cycles)
     return next(times, None)

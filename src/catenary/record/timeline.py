@@ -68,7 +68,7 @@ def draw_marks(plot: Any, marks: list[Mark]) -> None:
 
 
 def draw_timeline(plot: Any, recording: Recording, marks: list[Mark], points: int) -> None:
-    """The greatest values of each pixel, so that a single late cycle is seen."""
+    """Draw the greatest value of each pixel, so that a single late cycle is visible."""
     for phase, color in COLORS.items():
         values = phase_us(recording, phase)
         if values is not None and len(recording):
