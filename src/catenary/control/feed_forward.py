@@ -14,7 +14,7 @@ FRICTION = 6.0
 
 @dataclass(frozen=True)
 class FeedForward:
-    """What a motion takes of each axis: `inertia` [kg·m²], `damping` [N·m·s/rad]. Has no memory."""
+    """Feed-forward torque of a motion: `inertia` [kg·m²], `damping` [N·m·s/rad]. Has no memory."""
 
     axes: int
     inertia: PerAxis

@@ -19,8 +19,10 @@ FAILED = -1.0
 
 @dataclass(frozen=True, slots=True)
 class Stops:
-    """What homing has found: (n,) [rad] of each axis, NaN where it has not been yet. `failed`: (n,)
-    which have gone their whole travel without a stop, or were stopped on their return."""
+    """Results of homing: (n,) [rad] of each axis, NaN before its result is known.
+
+    `failed`: (n,) True for an axis that reached no stop within its travel, or met one on its return.
+    """
 
     open: Row
     closed: Row

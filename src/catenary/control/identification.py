@@ -20,8 +20,9 @@ Vector = npt.NDArray[np.float64] | Sequence[float]
 
 @dataclass(frozen=True)
 class Chirp:
-    """A sine whose frequency rises from `first` to `last` [Hz] by the same factor in the same time,
-    for `duration` [s], then nothing; `amplitude` in whatever unit it is used. Has no memory.
+    """Sine sweep from `first` to `last` [Hz] in `duration` [s], then zero. Has no memory.
+
+    The frequency rises exponentially. `amplitude` has the unit of the quantity it is added to.
 
     Source: Farina, Simultaneous measurement of impulse response and distortion with a swept-sine
     technique, AES 108, 2000.

@@ -46,8 +46,10 @@ def every(step: Callable[..., float], rows: Sequence[Row], *inputs: PerAxis) -> 
 
 @compiles
 def restart(memory: Row, i: int, n: int) -> None:
-    """Lets the block whose memory this is begin anew for axis `i` of `n`, as for an axis that is
-    not enabled: integrators empty, filters at their next input."""
+    """Reset a block for axis `i` of `n`: integrators are empty, filters start at their next input.
+
+    `memory` is the block's own. An axis that is not enabled is reset in this way.
+    """
     width = len(memory) // n
     for k in range(i * width, (i + 1) * width):
         memory[k] = 0.0

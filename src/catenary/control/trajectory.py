@@ -26,8 +26,7 @@ SLACK = 1e-9  # of a limit: what rounding may take
 
 @dataclass(frozen=True, slots=True)
 class MotionLimits:
-    """What no sample exceeds; each one value for all axes, or one for each. [rad/s], [rad/s²],
-    [rad/s³], [rad]."""
+    """Limits of every sample, each one value or one per axis: [rad/s], [rad/s²], [rad/s³], [rad]."""
 
     velocity: PerAxis
     acceleration: PerAxis
@@ -38,7 +37,7 @@ class MotionLimits:
 
 @dataclass(frozen=True, slots=True)
 class MotionState:
-    """Where a motion begins when the axes do not stand: (n,) [rad], [rad/s], [rad/s²]."""
+    """Start of a motion from axes that move: (n,) [rad], [rad/s], [rad/s²]."""
 
     position: Vector
     velocity: Vector
