@@ -21,7 +21,7 @@ FAILED = -1.0
 class Stops:
     """Results of homing: (n,) [rad] of each axis, NaN before its result is known.
 
-    `failed`: (n,) True for an axis that reached no stop within its travel, or met one on its return.
+    `failed`: (n,) True for an axis that reached no stop in its travel, or met one on its return.
     """
 
     open: Row

@@ -26,7 +26,7 @@ SLACK = 1e-9  # of a limit: what rounding may take
 
 @dataclass(frozen=True, slots=True)
 class MotionLimits:
-    """Limits of every sample, each one value or one per axis: [rad/s], [rad/s²], [rad/s³], [rad]."""
+    """Limits of a motion, one value or one per axis: [rad/s], [rad/s²], [rad/s³], [rad]."""
 
     velocity: PerAxis
     acceleration: PerAxis
