@@ -1,4 +1,5 @@
-"""`catenary bench table`: each table in a line of the help, an unknown one answered by the list."""
+"""`python -m benchmarks table`: each table in a line of the help, an unknown one answered by the
+list."""
 
 from __future__ import annotations
 
@@ -8,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.cli.main import main
 from benchmarks.tables import TABLES
-from catenary.cli.main import main
 
 
 def test_the_help_explains_each(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
-        main(["bench", "table", "--help"])
+        main(["table", "--help"])
     text = capsys.readouterr().out
     for name, table in TABLES.items():
         assert find_spec(f"benchmarks.tables.{name}"), name
@@ -22,13 +23,13 @@ def test_the_help_explains_each(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_an_unknown_one_is_answered_by_the_list(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["bench", "table", "rteml2"]) == 2
+    assert main(["table", "rteml2"]) == 2
     assert f"there are {', '.join(TABLES)}" in capsys.readouterr().err
 
 
 def test_all_of_it_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "skew.json"
-    assert main(["bench", "table", "skew", "--seconds", "0.01", "--json", str(file)]) == 0
+    assert main(["table", "skew", "--seconds", "0.01", "--json", str(file)]) == 0
     text = capsys.readouterr().out
     assert "other machines: compare ratios" in text
     assert f"wrote {file}" in text
@@ -39,5 +40,5 @@ def test_all_of_it_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 
 def test_rates_are_numbers(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit, match="2"):
-        main(["bench", "table", "tocabi", "--rates", "4000,x"])
+        main(["table", "tocabi", "--rates", "4000,x"])
     assert "'x' is not a number" in capsys.readouterr().err

@@ -50,7 +50,7 @@ def test_a_write_that_breaks_off_says_what_the_device_is_now(
 
     with pytest.raises(EepromError) as caught:
         write_eeprom(main, station, wanted, progress=pull_the_cable)
-    assert f"of {len(wanted)} words 32 are written" in caught.value.message
+    assert f"32 of {len(wanted)} words are written" in caught.value.message
     assert "mixture of old and new" in caught.value.message
     assert caught.value.hint.endswith("Write the same file again when that is done")
     segment.plug()
@@ -64,7 +64,7 @@ CATEGORY, PDI, CHECKSUM = Change(0x50, 1), Change(0, 2), Change(7, 3)
 @pytest.mark.parametrize(
     ("done", "begun", "text"),
     [
-        (0, 1, "of 3 words 0 are written, perhaps a few more"),
+        (0, 1, "0 of 3 words are written, perhaps a few more"),
         (0, 1, "mixture of old and new"),
         (1, 2, "may not load its configuration"),
         (2, 3, "may not load its configuration"),

@@ -51,7 +51,7 @@ def test_down_and_without_a_cable_are_two_things(tmp_path):
         ({"driver": "ax88179_178a", "bus": "usb-0000:00:14.0-2"}, {}, "WARN", "on USB"),
         ({"driver": "unheard_of"}, {}, "WARN", "not known to this list"),
         ({"driver": "iwlwifi"}, {f"{PLACE}/phy80211/": ""}, "FAIL", "wireless"),
-        ({"hardware_type": 772}, {}, "FAIL", "no Ethernet"),
+        ({"hardware_type": 772}, {}, "FAIL", "not an Ethernet card"),
         ({"driver": "veth"}, {}, "WARN", "software"),
     ],
 )

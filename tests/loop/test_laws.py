@@ -194,7 +194,7 @@ def test_refused_before_anything_moves(law: Callable, said: str) -> None:
 
 
 def test_an_argument_no_law_has() -> None:
-    with pytest.raises(LawError, match=r"no argument 'speed'"):
+    with pytest.raises(LawError, match=r"invalid argument 'speed'"):
 
         @cat.law
         def drive(actual, speed):

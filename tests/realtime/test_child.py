@@ -99,7 +99,7 @@ def test_ends_with_its_parent_however_that_ends(script):
 
 @pytest.mark.parametrize("arguments", [[], ["-m"]])
 def test_nothing_to_run_is_an_error(arguments):
-    with pytest.raises(ValueError, match="arguments are"):
+    with pytest.raises(ValueError, match="arguments must be"):
         start_python(arguments)
     with pytest.raises(ValueError, match="command is empty"):
         start_program([])

@@ -25,7 +25,7 @@ from tests.realtime.bodies import idle
         ({"priority": 100}, r"priority 100 is not within 1\.\.99"),
         ({"cpu": -1}, "CPU -1 does not exist"),
         ({"cpu": 5000}, "CPU 5000 does not exist"),
-        ({"stack_size": 1000}, "a stack of 1000 bytes"),
+        ({"stack_size": 1000}, "invalid stack of 1000 bytes"),
         ({"stack_size": 65537}, "a multiple of 4096 from 32768"),
         ({"on_miss": "ignore"}, 'on_miss must be "count", "skip", "stop" or a function'),
         ({"on_failure": "ignore"}, 'on_failure must be "stop", "restart" or "continue"'),
@@ -40,7 +40,7 @@ def test_refuses(options, words):
     ("make", "words"),
     [
         (lambda: Task(3, period=1e-3), "not callable"),
-        (lambda: Task(idle, 3.0, period=1e-3), r"one is \(x,\)"),
+        (lambda: Task(idle, 3.0, period=1e-3), r"a tuple such as \(x,\)"),
         (lambda: Task(idle, period="1 ms"), "a number of seconds"),
         (lambda: Task(idle, period=True), "a number of seconds"),
     ],

@@ -164,7 +164,7 @@ def test_statistics_of_the_published_experiment():
     [(low, above, count)] = running["tau3"].histogram("response")
     assert low <= 29e-3 < above
     assert count == 10
-    with pytest.raises(ValueError, match="no figure 'delay'; there are period, jitter"):
+    with pytest.raises(ValueError, match="unknown figure 'delay'; use one of period, jitter"):
         running["tau3"].histogram("delay")
     assert [round(one.response * 1e3) for one in running.verdict().responses] == [3, 8, 29]
     assert str(running).splitlines()[3].split()[:3] == ["tau3", "10", "0"]

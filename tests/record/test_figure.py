@@ -199,7 +199,7 @@ def test_what_cannot_be_drawn_is_said(tmp_path: Path) -> None:
         record.plot(recording, tmp_path / "x.png", reference="target_position")
     with pytest.raises(ValueError, match=r"\.png, \.svg, \.pdf or \.html"):
         record.plot(recording, tmp_path / "x.bmp")
-    with pytest.raises(ValueError, match="not in 'turns'"):
+    with pytest.raises(ValueError, match="not 'turns'"):
         record.plot(recording, tmp_path / "x.png", unit="turns")
     assert not list(tmp_path.iterdir())
 

@@ -81,4 +81,4 @@ def test_something_else(content: bytes) -> None:
     with own_name("else") as name:
         own_folder().mkdir(0o700, exist_ok=True)
         state_file(name).write_bytes(content)
-        assert_refused(name, "is empty" if not content else "no share")
+        assert_refused(name, "is empty" if not content else "not a Catenary share")

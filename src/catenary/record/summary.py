@@ -97,8 +97,8 @@ def find_whole(stream: BinaryIO) -> Summary:
         summary.end = first.end
     if LAYOUT_RECORD not in [each.name for each in summary.metadata]:
         raise RecordingError(
-            f"{stream.name} is no recording of Catenary's",
-            hint="`mcap recover`, of MCAP's authors, mends others",
+            f"{stream.name} is not a recording of Catenary",
+            hint="repair other MCAP files with `mcap recover`, by MCAP's authors",
         )
     return summary
 
