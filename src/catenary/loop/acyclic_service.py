@@ -49,6 +49,11 @@ class Service:
         """Work for the iterating thread before every cycle; None if a thread does it."""
         return self.step if self._thread is None else None
 
+    def step_without_thread(self) -> None:
+        """Do the work between two cycles if no service thread does it."""
+        if self._thread is None:
+            self.step()
+
     def step(self) -> None:
         """Do the work of the service thread between two cycles, in virtual time.
 

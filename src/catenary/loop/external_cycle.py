@@ -90,8 +90,7 @@ class CarriedExchange:
             while not answer.done:
                 if self._session.cycle() & FATAL:
                     return None
-                if self._session.service.beside is not None:
-                    self._session.service.step()
+                self._session.service.step_without_thread()
             return answer.result()
         except CatenaryError:
             return None  # a drive in trouble may not answer: the error then shows no code

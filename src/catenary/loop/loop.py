@@ -369,7 +369,7 @@ class Loop:
         if not compiled:
             return self._run_as_python(made_law(law), memory, parameters)
         run = running.laws.start(made_law(law), memory, parameters, budget, overruns)
-        running.laws.run(run, ENDING, self._advance)
+        running.laws.run(run, ENDING, self._networks[0].advance)
         return run.memory
 
     def _run_as_python(
@@ -478,13 +478,6 @@ class Loop:
                 "`with loop.update():`, wait with loop.wait(move), start laws with loop.start()"
             )
         self._opened.require_open()
-
-    def _advance(self, flags: int) -> None:
-        """Do the work that belongs to a cycle without an iteration, and raise its error, if any."""
-        running = self._opened
-        if running.service.beside is not None:
-            running.service.step()
-        self._networks[0].check(flags)
 
     def _only(self, what: str) -> Session:
         """Return the session of the only network.

@@ -177,11 +177,12 @@ class Network:
             log_axes=its.log_axes,
         )
 
-    def check(self, flags: int) -> None:
-        """Raise the error of a cycle in trouble, if any."""
-        running = self.session
-        if flags & TROUBLE or running.engine.al_status != AlState.OP:
-            running.judge(flags, faults=self._settings.stop.raise_faults)
+    def advance(self, flags: int) -> None:
+        """Do the work that belongs to a cycle without an iteration, and raise its error, if any."""
+        session = self.session
+        session.service.step_without_thread()
+        if flags & TROUBLE or session.engine.al_status != AlState.OP:
+            session.judge(flags, faults=self._settings.stop.raise_faults)
 
     def wait_locked(self, within: float, timeout: float) -> None:
         """Wait until the clocks are locked: see `Loop.wait_locked`.
@@ -190,15 +191,8 @@ class Network:
             within: Bound [s].
             timeout: Longest wait [s].
         """
-        running = self.session
-
-        def advance(flags: int) -> None:
-            if running.service.beside is not None:
-                running.service.step()
-            self.check(flags)
-
-        self.clocks.wait(within, timeout, advance)
-        running.judge(CYCLE_CLOCKS, faults=self._settings.stop.raise_faults)
+        self.clocks.wait(within, timeout, self.advance)
+        self.session.judge(CYCLE_CLOCKS, faults=self._settings.stop.raise_faults)
 
 
 def leave_method(loop_leave: Callable[[], None]) -> Callable[[], object]:

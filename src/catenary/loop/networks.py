@@ -84,8 +84,7 @@ class NetworksIteration:
 
     def __next__(self) -> NetworksCycle:
         for one in self._runnings:
-            if one.service.beside is not None:
-                one.service.step()
+            one.service.step_without_thread()
         if self._cycle is None:
             flags = [one.engine.run(1) for one in self._runnings]
             self._cycle = NetworksCycle(self._runnings, self._quorum)
