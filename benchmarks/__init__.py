@@ -187,8 +187,14 @@ def measure_table(
     short: bool = False,
     file: Path | None = None,
 ) -> None:
-    """Prints a published table with ours beside it; `None`: as the table has it. What this machine
-    lacks is left out, and said. `ValueError`: no such table."""
+    """Print a published table next to our figures.
+
+    An option that is None has the value of the table. Parts that this machine cannot run are left
+    out, and the output names them.
+
+    Raises:
+        ValueError: There is no such table.
+    """
     from benchmarks import tables
 
     tables.check(name)

@@ -1,5 +1,7 @@
-"""`python -m benchmarks tasks`: what a busy task of low priority does to one of high priority,
-where each has a process of its own and where both are threads under one interpreter lock."""
+"""`python -m benchmarks tasks`: effect of a busy task of low priority on one of high priority.
+
+The tasks run in separate processes, then as threads under one interpreter lock.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""`python -m benchmarks table`: published tables, each with ours beside it. One module a table,
-with `measure(options) -> Sheet`.
+"""`python -m benchmarks table`: published tables next to our figures. Each table has a module with
+`measure(options) -> Sheet`.
 
 `catenary.bench.enter_private_network` may run the program anew before NumPy is imported, so nothing
 is imported here before it is used.

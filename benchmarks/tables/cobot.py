@@ -82,7 +82,11 @@ def why_not(options: Options) -> str:
 
 
 def run(path: Path, words: Sequence[str]) -> dict[str, Any]:
-    """What the program wrote: `benchmarks.cobot.report`. CatenaryError: it failed."""
+    """Run the program and return its report, see `benchmarks.cobot.report`.
+
+    Raises:
+        CatenaryError: The program failed.
+    """
     with tempfile.TemporaryDirectory(prefix="catenary-bench-") as name:
         command = [str(path), *words, "--out", name]
         if "--realtime" in words:

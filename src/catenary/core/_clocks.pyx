@@ -27,7 +27,7 @@ cdef enum:
     ADP = 2                    # offset in a datagram's header
     ADO = 4
     DATA = 10
-    NOBODY = 0xFFFF            # as in IgH; 0 is the address of a device just switched on
+    NO_STATION = 0xFFFF        # as in IgH; 0 is the address of a device just switched on
     SYSTEM_TIME = 0x0910
     DIFFERENCE = 0x092C
     SETTLE = 16                # cycles within the bound, in addition to one round of all followers
@@ -158,7 +158,7 @@ cdef void clock_emit(clock_t *k, int64_t now) noexcept nogil:
     """
     k.payload = <uint32_t>expected_time(k, now)
     put32(k.time_header + DATA, k.payload)
-    put16(k.time_header + ADP, NOBODY if k.holding else k.reference)
+    put16(k.time_header + ADP, NO_STATION if k.holding else k.reference)
     if k.main_header != NULL:
         put32(k.main_header + DATA, <uint32_t>(now + k.epoch))
     if k.watch_header != NULL:
