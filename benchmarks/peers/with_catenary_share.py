@@ -17,7 +17,7 @@ from catenary.bench.job import Job, Round
 from catenary.bench.python_loop import body_of, measure, opened
 from catenary.errors import ShareError
 from catenary.realtime.child import Child, start_python
-from catenary.realtime.libc import signal_on_parents_death
+from catenary.realtime.system.libc import signal_on_parents_death
 
 READERS = 16
 PAUSE = 0.010  # [s]

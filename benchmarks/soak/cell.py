@@ -122,7 +122,7 @@ class Part:
         return [int(k) for k in np.flatnonzero(self.drives.present & ~self.drives.enabled)]
 
 
-class Wishes:
+class Requests:
     """Owns what one loop exchanges."""
 
     def __init__(self, main: cat.MainDevice, setting: Setting) -> None:

@@ -14,7 +14,7 @@ from math import inf
 from random import Random
 
 import catenary as cat
-from benchmarks.soak.cell import PERIOD, Wishes, make_segment
+from benchmarks.soak.cell import PERIOD, Requests, make_segment
 from benchmarks.soak.effects import may_end
 from benchmarks.soak.faults import Incident, draw
 from benchmarks.soak.objects import Objects
@@ -110,7 +110,7 @@ class Minute:
                 failures = 0 if self._session() else failures + 1
                 self._wait_until_over()
         if failures:
-            self.witness.tell("all back", f"{failures} times in a row no loop could be opened")
+            self.witness.violate("all back", f"{failures} times in a row no loop could be opened")
         self.figures.losses = self.witness.losses
 
     def _note(self, *what: object) -> None:
@@ -138,18 +138,18 @@ class Minute:
         self._main.scan(expected=self._expected)
         if self._incident is None and any(device.state != PRE_OP for device in self.segment):
             states = [device.state for device in self.segment]
-            self.witness.tell("in PRE-OP after a scan", f"the states are {states}")
-        wishes = Wishes(self._main, self.setting)
+            self.witness.violate("in PRE-OP after a scan", f"the states are {states}")
+        requests = Requests(self._main, self.setting)
         list(self._main.events)  # of the last loop
-        for positions in wishes.parts:
+        for positions in requests.parts:
             self.witness.ask(positions)
         with cat.Loop(
-            *wishes.all, period=PERIOD, stop=cat.StopPolicy(on_axis_stopped="event")
+            *requests.all, period=PERIOD, stop=cat.StopPolicy(on_axis_stopped="event")
         ) as loop:
             self.figures.loops += 1
             self.witness.enter(Phase.RUNNING)
             try:
-                self._run(loop, wishes)
+                self._run(loop, requests)
             finally:
                 self._last = self.segment.time
                 self.witness.enter(Phase.STARTING)
@@ -166,7 +166,7 @@ class Minute:
         faults = list(self.witness.injected.between(since - 0.1, self.segment.time))
         excused = faults if running is None else may_end(faults, ring=self.segment.ring)
         if not excused:
-            self.witness.tell("no end without a reason", f"{kind}: {error.message}")
+            self.witness.violate("no end without a reason", f"{kind}: {error.message}")
 
     def _wait_until_over(self) -> None:
         """Let time pass without a loop until all faults are over."""
@@ -184,7 +184,7 @@ class Minute:
 
     # While the loop runs
 
-    def _run(self, loop: cat.Loop, wishes: Wishes) -> None:
+    def _run(self, loop: cat.Loop, requests: Requests) -> None:
         objects = Objects(self._main.subs, self.witness, self._random)
         incidents = 0
         # Not in the first cycle: what is enabled there holds until the first targets are committed.
@@ -193,20 +193,22 @@ class Minute:
             self._cycled = now = self.segment.time
             self.figures.cycles += 1
             self.figures.not_ok += not cycle.ok
-            self.witness.judge_cycle(cycle.ok, wishes.present)
+            self.witness.judge_cycle(cycle.ok, requests.present)
             if cycle.number % 100 == 0:
-                self._note([part.drives.actual.position.tolist() for part in wishes.parts.values()])
-            wishes.step(cycle.time)
-            self._hear(wishes)
+                self._note(
+                    [part.drives.actual.position.tolist() for part in requests.parts.values()]
+                )
+            requests.step(cycle.time)
+            self._take_events(requests)
             self.figures.objects += objects.step(cycle.number)
             if self._incident is not None:
-                if not self._is_over(loop, wishes, now):
+                if not self._is_over(loop, requests, now):
                     return
             elif now >= self._next_at:
                 if incidents == SESSION or now > self._seconds:
                     return
                 incidents += 1
-                self._be_late(self._inject(), cycle, wishes)
+                self._be_late(self._inject(), cycle, requests)
 
     def _inject(self, within: float = 0.0) -> Incident:
         incident = draw(self._random, self.segment.time + within, self.setting)
@@ -220,7 +222,7 @@ class Minute:
             self.segment.inject(fault)
         return incident
 
-    def _be_late(self, incident: Incident, cycle: cat.Cycle, wishes: Wishes) -> None:
+    def _be_late(self, incident: Incident, cycle: cat.Cycle, requests: Requests) -> None:
         """Keep the application from running for a while."""
         if not incident.late:
             return
@@ -228,23 +230,23 @@ class Minute:
         cycle.spend(incident.late)
         self.witness.late_since = float("inf")
 
-    def _hear(self, wishes: Wishes) -> None:
+    def _take_events(self, requests: Requests) -> None:
         for event in self._main.events:
             self._note(str(event))
             if isinstance(event, (DeviceHeld, DeviceReplaced)) and event.sub is not None:
                 self._held.add(event.sub)
             if isinstance(event, AxisStopped) and event.sub is not None:
-                self._hear_stop(event.sub.position, wishes)
+                self._take_stop(event.sub.position, requests)
 
-    def _hear_stop(self, position: int, wishes: Wishes) -> None:
-        for positions, part in wishes.parts.items():
+    def _take_stop(self, position: int, requests: Requests) -> None:
+        for positions, part in requests.parts.items():
             if position in positions:
                 reason = part.drives.stopped[positions.index(position)]
-                self.witness.hear_stop(position, reason=reason is not None)
+                self.witness.take_stop(position, reason=reason is not None)
 
     # After an incident
 
-    def _is_over(self, loop: cat.Loop, wishes: Wishes, now: float) -> bool:
+    def _is_over(self, loop: cat.Loop, requests: Requests, now: float) -> bool:
         """Restore what waits for the application; return False if it took too long."""
         if not self.segment.faults_done:
             return True
@@ -255,7 +257,7 @@ class Minute:
         for sub in self._held:
             loop.restore(sub)
         self._held.clear()
-        wrong = self._wrong(wishes)
+        wrong = self._wrong(requests)
         since = now - self._over_at
         if not wrong:
             self._returned = min(self._returned, since)
@@ -264,11 +266,11 @@ class Minute:
             self._end_incident(now, since)
             return True
         if since > (CLOCK_RECOVERY if self._returned < since else RECOVERY):
-            self.witness.tell("all back", f"{since:.1f} s after the last fault: {wrong}")
+            self.witness.violate("all back", f"{since:.1f} s after the last fault: {wrong}")
             return False
         if now > self._asked_at + ASK_AGAIN:
             self._asked_at = now
-            for positions, part in wishes.parts.items():
+            for positions, part in requests.parts.items():
                 idle = part.idle
                 self.witness.ask(tuple(positions[k] for k in idle))
                 part.drives.enable(idle)
@@ -293,13 +295,13 @@ class Minute:
         locked = "locked" if loop.clocks.locked else "not locked"
         return f"clocks {locked}, device {position} is {difference * 1e6:+.3f} us off"
 
-    def _wrong(self, wishes: Wishes) -> str:
+    def _wrong(self, requests: Requests) -> str:
         """Return what is not back; empty: all is."""
         states = [device.state for device in self.segment]
         if any(state != OP for state in states):
             return f"states {states}"
-        gone = [position for position, there in wishes.present.items() if not there]
+        gone = [position for position, there in requests.present.items() if not there]
         if gone:
             return f"devices {gone} are not present"
-        idle = [positions[k] for positions, part in wishes.parts.items() for k in part.idle]
+        idle = [positions[k] for positions, part in requests.parts.items() for k in part.idle]
         return f"devices {idle} are not enabled" if idle else ""

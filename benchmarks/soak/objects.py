@@ -50,7 +50,7 @@ class Objects:
         for asked in self._pending:
             if now - asked.time > ANSWERED:
                 what = f"device {asked.position}: no answer and no error for {ANSWERED:g} s"
-                self._witness.tell("every request ends", what, about=str(asked.position))
+                self._witness.violate("every request ends", what, about=str(asked.position))
         return len(done)
 
     def _judge(self, asked: Asked) -> None:
@@ -61,8 +61,8 @@ class Objects:
             raise error
         if error is not None and self._witness.quiet_since(asked.time - 0.5):
             what = f"device {asked.position}: {error}"
-            self._witness.tell("objects are read", what, about=str(asked.position))
+            self._witness.violate("objects are read", what, about=str(asked.position))
         garbled = any(isinstance(fault, f.Garble) for fault in faults)
         if error is None and asked.answer.result() != asked.expected and not garbled:
             what = f"device {asked.position}: {asked.answer.result():#x}, not {asked.expected:#x}"
-            self._witness.tell("answers are right", what, about=str(asked.position))
+            self._witness.violate("answers are right", what, about=str(asked.position))

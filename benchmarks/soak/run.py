@@ -124,7 +124,7 @@ def soaked_minute(seed: int, seconds: float, setting: Setting) -> Minute:
     try:
         minute.run()
     except Exception:
-        minute.witness.tell("errors are CatenaryErrors", traceback.format_exc())
+        minute.witness.violate("errors are CatenaryErrors", traceback.format_exc())
     return minute
 
 

@@ -93,7 +93,7 @@ class Witness:
         self._told: set[tuple[str, str]] = set()
         self._look()
 
-    def tell(self, invariant: str, what: str, *, about: str = "") -> None:
+    def violate(self, invariant: str, what: str, *, about: str = "") -> None:
         """Note a violation, once for each `about` until all devices are back."""
         if (invariant, about) not in self._told:
             self._told.add((invariant, about))
@@ -115,13 +115,13 @@ class Witness:
         self._asked.update(positions)
         self._announced.difference_update(positions)
 
-    def hear_stop(self, position: int, *, reason: bool) -> None:
+    def take_stop(self, position: int, *, reason: bool) -> None:
         """The application received the event of a stop; `reason`: `Drives.stopped` has one."""
         self._announced.add(position)
         self._unannounced.pop(position, None)
         if not reason:
             what = f"device {position}: an event, but no reason in `stopped`"
-            self.tell("no silent stop", what, about=str(position))
+            self.violate("no silent stop", what, about=str(position))
 
     def all_well(self) -> None:
         """All devices are back after an incident."""
@@ -163,7 +163,7 @@ class Witness:
         position, difference = self.worst_clock()
         if abs(difference) > CLOCK_BOUND:
             what = f"device {position} is {difference * 1e6:+.3f} us off without a fault"
-            self.tell("clocks within bound", what, about=str(position))
+            self.violate("clocks within bound", what, about=str(position))
 
     def worst_clock(self) -> tuple[int, float]:
         """Return the drive whose clock is furthest off the reference's, and its difference [s]."""
@@ -183,7 +183,7 @@ class Witness:
             self._op_since[position] = inf
             if self.calm and self.phase is Phase.RUNNING:
                 what = f"device {position} is in state 0x{state:02X} without a fault"
-                self.tell("in OP", what, about=str(position))
+                self.violate("in OP", what, about=str(position))
         elif self._op_since[position] == inf:
             self._op_since[position] = now
 
@@ -191,9 +191,9 @@ class Witness:
         device = self.segment[position]
         what = f"device {position}, {silent:.4f} s without outputs"
         if isinstance(device, DigitalOutputs) and device.outputs:
-            self.tell("outputs safe", f"{what}: 0x{device.outputs:02X}", about=str(position))
+            self.violate("outputs safe", f"{what}: 0x{device.outputs:02X}", about=str(position))
         if isinstance(device, Servo) and self._is_enabled(device) and not self._is_frozen(position):
-            self.tell("outputs safe", f"{what}: {device.drive_state()}", about=str(position))
+            self.violate("outputs safe", f"{what}: {device.drive_state()}", about=str(position))
 
     def _look_at_drive(self, position: int, state: int, now: float) -> None:
         servo = self.segment[position]
@@ -213,19 +213,19 @@ class Witness:
                     self._unannounced[position] = 0
             if velocity > STILL and now - self._idle_since[position] > BRAKING:
                 what = f"device {position} turns at {velocity:.3f} rad/s, {servo.drive_state()}"
-                self.tell("nothing moves unasked", what, about=str(position))
+                self.violate("nothing moves unasked", what, about=str(position))
             return
         self._enabled.add(position)
         if position not in self._asked:
             what = f"device {position} is enabled without a request"
-            self.tell("nothing moves unasked", what, about=str(position))
+            self.violate("nothing moves unasked", what, about=str(position))
         if velocity > FASTEST and not self._is_garbled(now):
             what = f"device {position} jumps at {velocity:.3f} rad/s"
-            self.tell("nothing moves unasked", what, about=str(position))
+            self.violate("nothing moves unasked", what, about=str(position))
         if now - self.late_since > self._late_limit + BRAKING:
             late = now - self.late_since
             what = f"device {position} is enabled {late:.3f} s after the last set-points"
-            self.tell("outputs safe", what, about=str(position))
+            self.violate("outputs safe", what, about=str(position))
 
     def _look_at_commands(self, position: int, servo: Servo, state: int, now: float) -> None:
         commands, drive = self._commands[position], servo.drive_state() if state else ""
@@ -234,7 +234,7 @@ class Witness:
             commands.reset()
             return
         for invariant, what in commands.look(servo, drive):
-            self.tell(invariant, f"device {position}: {what}", about=str(position))
+            self.violate(invariant, f"device {position}: {what}", about=str(position))
 
     def _is_enabled(self, servo: Servo) -> bool:
         return servo.state != 0 and servo.drive_state() == "OPERATION ENABLED"
@@ -266,17 +266,17 @@ class Witness:
         if excused & REQUIRED:
             excused |= REQUIRED  # they share a sync unit
         if not ok and not spoiled and not excused & REQUIRED:
-            self.tell("no undeclared loss", "a cycle was not ok, and nothing was injected")
+            self.violate("no undeclared loss", "a cycle was not ok, and nothing was injected")
         self._judge_stops(present)
         for position, there in present.items():
             steady = now - self._op_since[position] > FLIGHT
             if not there and steady and not spoiled and position not in excused:
                 what = f"device {position} is in OP, and its answer is missing"
-                self.tell("no undeclared loss", what, about=str(position))
+                self.violate("no undeclared loss", what, about=str(position))
             gone = now - self.injected.isolated_since(position) > FLIGHT
             if gone and not garbled and (there or (ok and position in REQUIRED)):
                 what = f"device {position} is out of reach, and its inputs are given for good"
-                self.tell("no silent loss", what, about=str(position))
+                self.violate("no silent loss", what, about=str(position))
 
     def _judge_stops(self, present: Mapping[int, bool]) -> None:
         """An axis that was stopped is announced while its device answers."""
@@ -285,14 +285,16 @@ class Witness:
             if self._unannounced[position] > ANNOUNCED:
                 del self._unannounced[position]
                 what = f"device {position} left OPERATION ENABLED: no event in {ANNOUNCED} cycles"
-                self.tell("no silent stop", what, about=str(position))
+                self.violate("no silent stop", what, about=str(position))
 
     def _take_losses(self, now: float) -> None:
         for loss in self.segment.take_losses():
             self.losses[loss.cause] += 1
             self._spoiled = max(self._spoiled, loss.time)
             if not self._declared(loss.time, loss.cause):
-                self.tell("no undeclared loss", f"a frame sent at {loss.time:.6f} s: {loss.cause}")
+                self.violate(
+                    "no undeclared loss", f"a frame sent at {loss.time:.6f} s: {loss.cause}"
+                )
 
     def _declared(self, sent: float, cause: str) -> bool:
         faults = list(self.injected.between(sent - self._detected(cause), sent + FLIGHT))
@@ -316,4 +318,4 @@ class Witness:
         out_of_reach = disturbed(self.injected.between(since, now), ring=self.segment.ring)
         for position, device in enumerate(self.segment):
             if device.state & AL_STATE == OP and position not in out_of_reach:
-                self.tell("no device left in OP", f"device {position} is", about=str(position))
+                self.violate("no device left in OP", f"device {position} is", about=str(position))

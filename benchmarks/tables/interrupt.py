@@ -28,7 +28,7 @@ from catenary.bench.statistics import summarise
 from catenary.errors import CatenaryError
 from catenary.realtime import Running, Signal, Task, Tasks, session
 from catenary.realtime.child import start_python
-from catenary.realtime.scheduling import request_scheduling
+from catenary.realtime.system.scheduling import request_scheduling
 
 SECONDS, PERIOD = 2.0, 1e-3
 PRIORITY, BELOW = 80, 10  # of who waits; who makes the events is so much lower

@@ -13,7 +13,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from catenary.bench.report import machine
-from catenary.realtime.scheduling import what_scheduling
+from catenary.realtime.system.scheduling import what_scheduling
 
 RATIOS = "other machines: compare ratios, not microseconds"
 PACKAGES = ("catenary", "numpy", "numba", "pysoem")

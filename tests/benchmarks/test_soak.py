@@ -21,8 +21,8 @@ from benchmarks.soak.minute import Minute
 from benchmarks.soak.run import as_text, soak, soaked_minute
 from benchmarks.soak.setting import Mode, Setting, setting_of, settings
 from benchmarks.soak.witness import Witness
-from catenary.loop.device_watch import Watch
 from catenary.loop.session import Session
+from catenary.loop.watches.device import Watch
 from catenary.virtual import DigitalOutputs, Fault, Segment, Servo
 from catenary.virtual import faults as f
 from catenary.virtual.devices.servo import Received

@@ -11,7 +11,7 @@ import pytest
 import catenary as cat
 from catenary.bus.event_queue import Callbacks, Events
 from catenary.bus.event_types import DeviceLost, Emergency, Event
-from catenary.procedure.mailbox import Heard
+from catenary.procedure.mailbox import ReceivedEmergency
 from catenary.virtual import Servo, demo_segment
 from catenary.wire import coe
 
@@ -108,7 +108,7 @@ def test_callbacks_are_called_in_a_thread_and_in_order() -> None:
     main = threading.current_thread()
     callbacks.add(lambda event: told.append((event.time, threading.current_thread() is main)))
     for event in numbered(100):
-        callbacks.tell(event)
+        callbacks.report(event)
     callbacks.close()
     assert told == [(float(number), False) for number in range(100)]
 
@@ -126,7 +126,7 @@ def test_a_callback_that_raises_is_logged_and_the_others_are_called(
     callbacks.add(fails)
     callbacks.add(told.append)
     [event] = numbered(1)
-    callbacks.tell(event)
+    callbacks.report(event)
     with caplog.at_level(logging.ERROR, logger="catenary"):
         callbacks.deliver()
     assert told == [event]
@@ -140,7 +140,7 @@ def test_slow_callbacks_lose_the_oldest_and_nobody_waits() -> None:
     told: list[float] = []
     callbacks.add(lambda event: told.append(event.time))
     for event in numbered(5):
-        callbacks.tell(event)
+        callbacks.report(event)
     callbacks.deliver()
     assert told == [3.0, 4.0]
     assert callbacks.dropped == 3
@@ -155,11 +155,11 @@ def test_an_event_told_by_a_callback_comes_after_the_one_before() -> None:
     def callback(event: Event) -> None:
         told.append(event)
         if event is first:
-            callbacks.tell(second)
+            callbacks.report(second)
             callbacks.deliver()
 
     callbacks.add(callback)
-    callbacks.tell(first)
+    callbacks.report(first)
     callbacks.deliver()
     assert told == [first, second]
 
@@ -171,8 +171,10 @@ def test_an_emergency_is_an_event_with_its_text() -> None:
         assert drive.channel.listener is not None
         told: list[Event] = []
         main.on_event(told.append)
-        heard = Heard(coe.Emergency(0x8611, 0x21, b"\x01\x00\x00\x00\x00"), 1_500_000_000)
-        drive.channel.listener(heard)
+        received = ReceivedEmergency(
+            coe.Emergency(0x8611, 0x21, b"\x01\x00\x00\x00\x00"), 1_500_000_000
+        )
+        drive.channel.listener(received)
         [event] = main.events
         assert isinstance(event, cat.events.Emergency)
         assert (event.sub, event.time, event.error_code) == (drive, 1.5, 0x8611)

@@ -16,7 +16,7 @@ from catenary.errors import (
     SegmentError,
     StateError,
 )
-from catenary.plan import ObjectReference, PdoWish, make_plan
+from catenary.plan import DeviceRequest, ObjectReference, make_plan
 from catenary.types import INT, UDINT, UINT, USINT, VISIBLE_STRING
 from catenary.virtual import (
     AnalogInputs,
@@ -232,12 +232,12 @@ def test_the_default_mapping_is_read_from_the_dictionary_and_kept() -> None:
         main.configure(plan)
 
 
-def test_a_wish_beyond_the_default_is_mapped_and_verified() -> None:
+def test_a_request_beyond_the_default_is_mapped_and_verified() -> None:
     segment = demo_segment()
     with MainDevice(segment) as main:
         subs = main.scan()
-        wish = asks(3, inputs=((0x60F4, 0, 32), (0x6064, 0, 32)), outputs=((0x60B1, 0, 32),))
-        plan = main.plan(wish)
+        asked = asks(3, inputs=((0x60F4, 0, 32), (0x6064, 0, 32)), outputs=((0x60B1, 0, 32),))
+        plan = main.plan(asked)
         assert plan.devices[3].mapping_changed
         main.configure(plan)
         assert segment[3].state == AlState.SAFE_OP
@@ -249,16 +249,16 @@ def test_a_wish_beyond_the_default_is_mapped_and_verified() -> None:
 def test_a_changed_mapping_is_the_default_of_the_next_plan() -> None:
     with MainDevice(demo_segment()) as main:
         main.scan()
-        wish = asks(3, inputs=((0x60F4, 0, 32),))
-        main.configure(main.plan(wish))
+        asked = asks(3, inputs=((0x60F4, 0, 32),))
+        main.configure(main.plan(asked))
         main.leave()
-        again = main.plan(wish)
+        again = main.plan(asked)
         assert not again.devices[3].mapping_changed
         main.configure(again)
 
 
 @pytest.mark.parametrize(
-    ("wish", "match"),
+    ("asked", "match"),
     [
         (asks(3, inputs=((0x5FFF, 0, 32),)), r"(?s)device 3 .*0x5FFF:00.*does not exist"),
         (asks(3, inputs=((0x605A, 0, 16),)), r"(?s)device 3 .*0x605A:00.*cannot be mapped"),
@@ -267,11 +267,13 @@ def test_a_changed_mapping_is_the_default_of_the_next_plan() -> None:
         (asks(0, inputs=((0x6000, 1, 1),)), r"device 0 .*0x6000:01"),
     ],
 )
-def test_an_impossible_wish_is_refused_before_anything_is_written(wish: Asking, match: str) -> None:
+def test_an_impossible_request_is_refused_before_anything_is_written(
+    asked: Asking, match: str
+) -> None:
     with MainDevice(demo_segment()) as main:
         main.scan()
         with pytest.raises(MappingError, match=match):
-            main.plan(wish)
+            main.plan(asked)
 
 
 def test_start_up_values_are_written_before_safe_op() -> None:
@@ -279,7 +281,7 @@ def test_start_up_values_are_written_before_safe_op() -> None:
     start_up = ((0x6065, 0, UDINT.encode(1234)), (0x605A, 0, INT.encode(6)))
     with MainDevice(segment) as main:
         drive = main.scan()[2]
-        main.configure(main.plan(Asking({2: PdoWish(start_up=start_up)})))
+        main.configure(main.plan(Asking({2: DeviceRequest(start_up=start_up)})))
         assert drive.sdo.read(0x6065, 0, type=UDINT) == 1234
         assert drive.sdo.read(0x605A, 0, type=INT) == 6
 
@@ -357,9 +359,9 @@ def test_a_closed_main_device_says_so() -> None:
 def test_a_reference_is_checked_for_its_length() -> None:
     with MainDevice(demo_segment()) as main:
         main.scan()
-        wish = Asking({2: PdoWish(inputs=(ObjectReference(0x60F4, 0, 16),))})
+        asked = Asking({2: DeviceRequest(inputs=(ObjectReference(0x60F4, 0, 16),))})
         with pytest.raises(MappingError, match="has 32 bits, 16 were asked for"):
-            main.plan(wish)
+            main.plan(asked)
 
 
 def scan_and_interrupt(main: MainDevice) -> None:

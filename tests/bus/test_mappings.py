@@ -10,7 +10,7 @@ import pytest
 from catenary.bus import MainDevice
 from catenary.errors import MappingError
 from catenary.model.device import DeviceDescription, Direction
-from catenary.plan import ObjectReference, PdoWish
+from catenary.plan import DeviceRequest, ObjectReference
 from catenary.plan.request import DistributedClock, WrittenPdo
 from catenary.types import UINT, USINT
 from catenary.virtual import AnalogInputs, Coupler, MappingQuirks, Segment, Servo
@@ -32,7 +32,7 @@ def scanned(**quirks: object) -> Iterator[MainDevice]:
 
 
 def asking(*inputs: ObjectReference, pdos: tuple[WrittenPdo, ...] = ()) -> Asking:
-    return Asking({1: PdoWish(inputs=inputs, pdos=pdos)})
+    return Asking({1: DeviceRequest(inputs=inputs, pdos=pdos)})
 
 
 def assigned(main: MainDevice, index: int) -> list[int]:
@@ -166,15 +166,15 @@ def test_optional_objects_do_not_force_what_the_device_refuses() -> None:
 
 def test_a_plan_shows_what_would_change_with_old_and_new_values() -> None:
     with scanned() as main:
-        wish = PdoWish(inputs=(FOLLOWING_ERROR,), start_up=((0x6060, 0, b"\x08"),))
-        plan = main.plan(Asking({1: wish}))
+        request = DeviceRequest(inputs=(FOLLOWING_ERROR,), start_up=((0x6060, 0, b"\x08"),))
+        plan = main.plan(Asking({1: request}))
         assert "0x1C13  0x1A00 → 0x1A00, 0x1A02" in str(plan)
         assert "0x6060:00  00 → 08" in str(plan)
 
 
 def test_a_plan_shows_how_a_device_will_keep_time() -> None:
     with scanned() as main:
-        plan = main.plan(Asking({1: PdoWish(clock=DistributedClock())}))
+        plan = main.plan(Asking({1: DeviceRequest(clock=DistributedClock())}))
         changes = {c.what: (c.old, c.new) for c in plan.devices[1].changes}
         assert changes["0x1C32:01"] == ("00 00", "02 00")
         assert all(old for old, _ in changes.values())
@@ -186,7 +186,7 @@ def test_a_plan_shows_how_a_device_will_keep_time() -> None:
 def test_an_object_mapped_twice_has_a_place_for_each_pdo() -> None:
     with MainDevice(Segment([Coupler(), AnalogInputs(channels=1, second_pdo="twice")])) as main:
         main.scan()
-        wish = asking(ObjectReference(0x6000, 0x11, 16), ObjectReference(0x6000, 0x11, 8))
-        plan = main.plan(wish)
+        request = asking(ObjectReference(0x6000, 0x11, 16), ObjectReference(0x6000, 0x11, 8))
+        plan = main.plan(request)
         assert plan.devices[1].downloads == ()
         main.configure(plan)

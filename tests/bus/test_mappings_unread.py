@@ -11,7 +11,7 @@ import pytest
 import catenary as cat
 from catenary.bus import MainDevice
 from catenary.errors import ResponseTimeout
-from catenary.plan import ObjectReference, PdoWish
+from catenary.plan import DeviceRequest, ObjectReference
 from catenary.virtual import Coupler, Segment, Servo
 from tests.plan.devices import Asking
 
@@ -57,7 +57,7 @@ def drip_lists(payload: bytes) -> list[bytes] | None:
 
 
 def asking(position: int, *inputs: ObjectReference, **more: object) -> Asking:
-    return Asking({position: PdoWish(inputs=inputs, **more)})  # type: ignore[arg-type]
+    return Asking({position: DeviceRequest(inputs=inputs, **more)})  # type: ignore[arg-type]
 
 
 def test_a_list_of_pdos_that_is_never_sent_does_not_end_a_scan() -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 import catenary as cat
-from catenary.plan.request import ObjectReference, PdoWish
+from catenary.plan.request import DeviceRequest, ObjectReference
 from catenary.virtual import DigitalOutputs, ServoQuirks
 from tests.plan.devices import Asking
 
@@ -44,7 +44,7 @@ def test_a_drive_in_cst_has_10_ms() -> None:
     segment = cat.Segment([cat.virtual.Servo(), cat.virtual.Servo()])
     with cat.MainDevice(segment) as main:
         main.scan()
-        main.configure(main.plan(Asking({1: PdoWish(outputs=(TORQUE,))})))
+        main.configure(main.plan(Asking({1: DeviceRequest(outputs=(TORQUE,))})))
         assert [registers(segment, k)[1] for k in range(2)] == [1000, 100]
 
 

@@ -9,8 +9,8 @@ import time
 import pytest
 
 from catenary.cli.main import main
-from catenary.realtime import scheduling
 from catenary.realtime.child import start_python
+from catenary.realtime.system import scheduling
 from catenary.wire.datagram import Datagram, EcatCommand
 from catenary.wire.frame import encode_frame
 

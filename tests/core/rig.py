@@ -339,8 +339,8 @@ class Bench:
             setattr(self, name, np.asarray(buffer))
         self.engine.start()
 
-    def ask(self, goal: int) -> None:
-        self.goal[:] = goal
+    def ask(self, requested_state: int) -> None:
+        self.requested_state[:] = requested_state
         self.request[:] += 1
 
     def enable(self) -> None:

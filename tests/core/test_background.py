@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from catenary.core import CYCLE_DROPPED, GOAL_ENABLED, Stream
+from catenary.core import CYCLE_DROPPED, REQUEST_ENABLED, Stream
 from catenary.plan.stop_reason import StopReason
 from tests.core.rig import CSP, CST, CSV, MS, Bench, ScriptedDrive, axis, bench
 from tests.core.test_fallback import OE, QUICK_STOP, Recorder, moving, working
@@ -14,7 +14,7 @@ def in_background(mode: int, **more: object) -> Bench:
     """One axis that follows the updates of a program in the background."""
     b = bench(axis(0, mode=mode, **more), drives=[ScriptedDrive()])
     b.engine.background = True
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     update(b)
     b.steps(12)
     assert b.axis_flags[0] & 1
@@ -69,7 +69,7 @@ def test_an_update_does_not_revive_a_velocity_that_has_timed_out() -> None:
 def test_the_first_update_stays_while_it_enables_the_axis(mode: int) -> None:
     b = bench(axis(0, mode=mode), drives=[ScriptedDrive()])
     b.engine.background = True
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.steps(5)
     b.target_velocity[0] = b.target_torque[0] = 1.0
     update(b)
@@ -94,7 +94,7 @@ def test_targets_stay_as_they_are_written_during_an_update() -> None:
 def test_an_update_begun_before_an_axis_was_enabled_does_not_move_it() -> None:
     b = bench(axis(0, mode=CSP), drives=[ScriptedDrive()])
     b.engine.background = True
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.engine.next()
     b.engine.begin_update()
     b.target_position[0] = 0.05
@@ -111,7 +111,7 @@ def test_an_update_begun_before_an_axis_was_enabled_does_not_move_it() -> None:
 def test_what_such_an_update_wrote_is_not_committed_later(complete: bool) -> None:
     b = bench(axis(0, mode=CSP), drives=[ScriptedDrive()])
     b.engine.background = True
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.engine.next()
     b.engine.begin_update()
     b.target_position[0] = 0.05
@@ -157,7 +157,7 @@ def test_cst_counts_for_20_ms_then_quick_stop() -> None:
 def test_an_axis_is_not_enabled_before_the_first_update(mode: int) -> None:
     b = bench(axis(0, mode=mode), drives=[ScriptedDrive()])
     b.engine.background = True
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.steps(50)
     assert b.drives[0].state == 1
     update(b)

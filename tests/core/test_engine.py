@@ -89,10 +89,10 @@ def test_the_lane_and_its_waiting_thread(engine: Engine) -> None:
 
     def serve() -> None:
         for _ in range(5):
-            engine.lane_push(frame)
-            while not engine.lane_wait(1_000_000_000):
+            engine.acyclic_push(frame)
+            while not engine.acyclic_wait(1_000_000_000):
                 pass
-            answers.append(engine.lane_pop())
+            answers.append(engine.acyclic_pop())
 
     service = threading.Thread(target=serve)
     service.start()

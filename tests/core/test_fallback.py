@@ -10,9 +10,9 @@ from catenary.core import (
     AXIS_MODE_REFUSED,
     CYCLE_DROPPED,
     CYCLE_REFUSED,
-    GOAL_DISABLED,
-    GOAL_ENABLED,
-    GOAL_QUICK_STOP,
+    REQUEST_DISABLED,
+    REQUEST_ENABLED,
+    REQUEST_QUICK_STOP,
     Stream,
 )
 from catenary.plan.cycle import AxisLimits, SyncUnit
@@ -68,7 +68,7 @@ def working(mode: int, *, drive: ScriptedDrive | None = None, **more: object) ->
     """One axis that follows the committed set-points."""
     cycle = {k: more.pop(k) for k in ("input_columns", "output_columns") if k in more}
     b = bench(axis(0, mode=mode, **more), drives=[drive or ScriptedDrive()], **cycle)
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.steps(12)
     assert b.axis_flags[0] & 1
     return b
@@ -105,7 +105,7 @@ def test_after_the_late_limit_the_axis_stops_with_a_reason() -> None:
     assert flags & CYCLE_DROPPED
     assert b.stop_reason[0] == StopReason.UNDERRUN
     assert 0 < b.engine.number - b.stop_cycle[0] < 15
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.steps(12)
     assert b.stop_reason[0] == StopReason.NONE
 
@@ -282,7 +282,7 @@ def test_an_empty_stream_is_an_underrun() -> None:
 
 def test_the_command_is_frozen_where_operation_enabled_was_reached() -> None:
     b = bench(axis(0), drives=[ScriptedDrive(position=500, follows=False, moves=False)])
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     log = Recorder(b)
     for _ in range(300):
         b.engine.run(1)
@@ -423,7 +423,7 @@ def test_a_quick_stop_without_effect_ends_in_disable_voltage(mode: int, patience
         b.target_torque[0] = 0.5
         b.steps(2)
     log = Recorder(b)
-    b.ask(GOAL_QUICK_STOP)
+    b.ask(REQUEST_QUICK_STOP)
     b.steps(100)
     runs = [
         word & 0x0F
@@ -443,7 +443,7 @@ def test_a_drive_that_ramps_down_shows_it_by_bit_12_and_has_time() -> None:
     drive = Stubborn()
     b = working(CSP, drive=drive)
     log = Recorder(b)
-    b.ask(GOAL_DISABLED)
+    b.ask(REQUEST_DISABLED)
     b.steps(2)
     drive.follows = False
     b.steps(500)
@@ -455,7 +455,7 @@ def test_standstill_does_not_depend_on_the_velocity_limit(velocity_limit: float 
     b = working(CSP, limits=AxisLimits(velocity=velocity_limit))
     b.drives[0].stays_in_quick_stop = True
     b.drives[0].velocity = 60  # 0.06 rad/s: not at rest
-    b.ask(GOAL_QUICK_STOP)
+    b.ask(REQUEST_QUICK_STOP)
     b.steps(50)
     assert b.drives[0].state == 5
     b.drives[0].velocity = 40
@@ -486,7 +486,7 @@ def test_on_loss_csp_hold_holds_the_position_until_a_new_request() -> None:
     assert log.modes[-1] == CSP
     assert log.positions[-1] == 321
     assert not b.axis_flags[0] & 1
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.steps(20)
     assert log.modes[-1] == CST
     assert b.axis_flags[0] & 1
@@ -511,12 +511,14 @@ def test_reasons_of_faults_and_of_drives_that_leave_by_themselves() -> None:
 # ---- stops: repeated, of lost devices, without a velocity
 
 
-@pytest.mark.parametrize("goal", [GOAL_QUICK_STOP, GOAL_DISABLED])
+@pytest.mark.parametrize("requested_state", [REQUEST_QUICK_STOP, REQUEST_DISABLED])
 @pytest.mark.parametrize("all_axes", [False, True])
-def test_a_stop_that_is_requested_in_every_cycle_still_ends(goal: int, all_axes: bool) -> None:
+def test_a_stop_that_is_requested_in_every_cycle_still_ends(
+    requested_state: int, all_axes: bool
+) -> None:
     b = working(CST, drive=Stubborn())
     for _ in range(100):
-        b.ask(goal)
+        b.ask(requested_state)
         if all_axes:
             b.engine.quick_stop_all()
         b.engine.next()
@@ -541,12 +543,12 @@ def test_quick_stop_active_ends_where_a_standstill_is_not_seen(measured: bool) -
     b = working(CST, **({} if measured else nothing))
     b.drives[0].stays_in_quick_stop = True
     b.drives[0].velocity = 100
-    b.ask(GOAL_QUICK_STOP)
+    b.ask(REQUEST_QUICK_STOP)
     b.steps(1990)
     assert b.drives[0].state == 5
     b.steps(20)
     assert b.drives[0].state == 1
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.steps(10)
     assert b.axis_flags[0] & 1
 
@@ -557,7 +559,7 @@ def test_a_stop_during_a_change_to_cst_keeps_the_torque_that_holds(cycles_before
     if cycles_before:
         b.steps(cycles_before)
     b.drives[0].after = lambda before: OE  # type: ignore[method-assign]
-    b.ask(GOAL_QUICK_STOP)
+    b.ask(REQUEST_QUICK_STOP)
     b.steps(10)
     stop = log.words.index(QUICK_STOP)
     assert set(log.torques[stop:]) == {700}
@@ -607,9 +609,9 @@ def test_a_powered_axis_without_any_torque_value_does_not_enter_cst() -> None:
     assert flags & CYCLE_DROPPED
     assert b.axis_flags[0] & AXIS_MODE_REFUSED
     assert set(log.modes) == {CSP}
-    b.ask(GOAL_DISABLED)
+    b.ask(REQUEST_DISABLED)
     b.steps(5)
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.steps(10)
     assert log.modes[-1] == CST  # not powered, it may
 
@@ -618,10 +620,10 @@ def test_a_refused_mode_is_tried_again_with_the_next_request() -> None:
     b, log = switching(CSP, CST)
     b.steps(110)
     assert b.axis_flags[0] & AXIS_MODE_REFUSED
-    b.ask(GOAL_DISABLED)
+    b.ask(REQUEST_DISABLED)
     b.steps(10)
     b.drives[0].mode_shown = None
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.steps(10)
     assert log.modes[-1] == CST
     assert not b.axis_flags[0] & AXIS_MODE_REFUSED
@@ -655,7 +657,7 @@ def test_a_change_of_mode_has_time_for_some_exchanges_of_the_device(
     frames = (frame_plan([al_status(1)]), replace(frame_plan([lrw(0)]), divider=divider))
     units = (SyncUnit("slow", (0,), divider=divider),)
     b = bench(axis(0, mode=first), drives=[OneExchangeLater()], frames=frames, sync_units=units)
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.steps(8 * divider)
     assert b.axis_flags[0] & 1
     b.mode_target[0] = then
@@ -681,7 +683,7 @@ def test_homing_does_not_judge_the_torque_set_point() -> None:
 def test_a_late_commit_does_not_open_the_brake_without_torque(late: int) -> None:
     b = bench(axis(0, mode=CST), drives=[ScriptedDrive()])
     log = Recorder(b)
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     for k in range(12):
         b.target_torque[0] = 0.5
         if k == late:

@@ -419,7 +419,7 @@ def test_al_status_is_the_or_of_all_and_how_many_answered() -> None:
     assert (b.engine.al_status, b.engine.al_counter) == (0x14, 2)
     b.segment.spoil = lambda frame: []
     b.engine.run(1)
-    assert (b.engine.al_status, b.engine.al_counter) == (0x14, 0)  # the last that was heard
+    assert (b.engine.al_status, b.engine.al_counter) == (0x14, 0)  # the last that was received
 
 
 def test_a_link_that_does_not_send_is_counted_and_the_cycle_is_lost() -> None:

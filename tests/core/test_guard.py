@@ -16,10 +16,10 @@ from catenary.core import (
     CYCLE_LIMITED,
     CYCLE_REFUSED,
     CYCLE_UNCOMMITTED,
-    GOAL_DISABLED,
-    GOAL_ENABLED,
-    GOAL_QUICK_STOP,
-    GOAL_RESET,
+    REQUEST_DISABLED,
+    REQUEST_ENABLED,
+    REQUEST_QUICK_STOP,
+    REQUEST_RESET,
 )
 from catenary.plan.cycle import AxisLimits, SyncUnit
 from catenary.plan.stop_reason import StopReason
@@ -44,7 +44,7 @@ def dropped(b: Bench) -> bool:
 def driving(mode: int, *, execution: str = "threaded", **more: object) -> Bench:
     """One axis, enabled and followed by an application that has committed once."""
     b = bench(axis(0, mode=mode, **more), execution=execution)
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.steps(12)
     assert followed(b)
     return b
@@ -56,11 +56,11 @@ def driving(mode: int, *, execution: str = "threaded", **more: object) -> Bench:
 @pytest.mark.parametrize("execution", EXECUTION_MODES)
 def test_until_it_is_followed_the_target_is_the_actual_position(execution: str) -> None:
     b = bench(axis(0), drives=[ScriptedDrive(position=1234, moves=False)], execution=execution)
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     for _ in range(10):
         b.target_position[0] = 99.0  # committed before anyone could see that it is followed
         b.engine.next()
-        assert b.drives[0].target_position in (0, 1234)  # 0: nothing was heard yet
+        assert b.drives[0].target_position in (0, 1234)  # 0: nothing was received yet
         if followed(b):
             break
     b.engine.next()
@@ -73,7 +73,7 @@ def test_until_it_is_followed_the_target_is_the_actual_position(execution: str) 
 
 def test_a_target_counts_only_when_its_writer_had_seen_that_it_is_followed() -> None:
     b = bench(axis(0), drives=[ScriptedDrive(position=500, moves=False)])
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.engine.next()
     b.target_position[0] = 99.0
     b.engine.spend(20 * MS)  # it gets enabled meanwhile
@@ -97,7 +97,7 @@ def test_run_holds_and_hands_the_held_position_over(execution: str) -> None:
 @pytest.mark.parametrize("mode", [CSV, CST])
 def test_velocity_and_torque_enable_at_the_first_committed_target(mode: int) -> None:
     b = bench(axis(0, mode=mode))
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.engine.run(20)
     assert b.drives[0].state == 1
     b.steps(5)
@@ -106,7 +106,7 @@ def test_velocity_and_torque_enable_at_the_first_committed_target(mode: int) -> 
 
 def test_a_torque_is_there_when_the_brake_opens() -> None:
     b = bench(axis(0, mode=CST))
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     seen = {}
     for _ in range(8):
         b.target_torque[0] = 0.5
@@ -117,7 +117,7 @@ def test_a_torque_is_there_when_the_brake_opens() -> None:
 
 def test_no_velocity_before_it_is_followed() -> None:
     b = bench(axis(0, mode=CSV), drives=[ScriptedDrive(follows=False)])
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     for _ in range(10):
         b.target_velocity[0] = 1.0
         b.engine.next()
@@ -127,7 +127,7 @@ def test_no_velocity_before_it_is_followed() -> None:
 
 def test_the_torque_goes_on_while_an_open_brake_waits_for_bit_12() -> None:
     b = bench(axis(0, mode=CST), drives=[ScriptedDrive(follows=False)])
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     sent = []
     for _ in range(20):
         b.target_torque[0] = 1.0
@@ -142,7 +142,7 @@ def test_the_torque_goes_on_while_an_open_brake_waits_for_bit_12() -> None:
 def test_bit_12_and_the_mode_shown_are_needed(drive: ScriptedDrive) -> None:
     drive.moves = False
     b = bench(axis(0), drives=[drive])
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.steps(10)
     assert b.drives[0].state == OE
     assert not followed(b)
@@ -154,7 +154,7 @@ def test_bit_12_and_the_mode_shown_are_needed(drive: ScriptedDrive) -> None:
 def mute_drive() -> Bench:
     """In the second after OPERATION_ENABLED its drive has not shown bit 12 (as KickCAT's)."""
     b = bench(axis(0), drives=[ScriptedDrive(position=300, follows=False)])
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.steps(900)
     assert not followed(b)
     b.steps(200)
@@ -172,10 +172,10 @@ def test_a_drive_that_never_shows_bit_12_is_followed_after_a_second() -> None:
 
 def test_a_drive_that_is_known_to_lack_bit_12_need_not_be_waited_for_again() -> None:
     b = mute_drive()
-    b.ask(GOAL_DISABLED)
+    b.ask(REQUEST_DISABLED)
     b.steps(20)
     assert not followed(b)
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.steps(12)
     assert followed(b)
 
@@ -186,7 +186,7 @@ def test_bit_12_that_comes_after_all_drops_the_goal_once() -> None:
     b.steps(2)
     assert dropped(b)
     assert not followed(b)
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.steps(12)
     assert followed(b)
     b.drives[0].follows = False
@@ -234,7 +234,7 @@ def test_a_change_of_mode_does_not_send_the_position_written_long_ago(execution:
 
 def test_a_mode_without_its_target_mapped_is_never_followed() -> None:
     b = bench(axis(0, mode=CST, target_torque=None))
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.steps(10)
     assert b.drives[0].state == OE
     assert not followed(b)
@@ -243,11 +243,11 @@ def test_a_mode_without_its_target_mapped_is_never_followed() -> None:
 def test_a_request_that_is_not_fulfilled_lapses() -> None:
     b = bench(axis(0), drives=[ScriptedDrive(state=0)], late_limit_position_ns=0)
     b.drives[0].after = lambda before: 0  # type: ignore[method-assign]
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.engine.run(9_000)
-    assert goal_in_force(b) == GOAL_ENABLED
+    assert goal_in_force(b) == REQUEST_ENABLED
     b.engine.run(1_100)
-    assert goal_in_force(b) == GOAL_DISABLED
+    assert goal_in_force(b) == REQUEST_DISABLED
     assert dropped(b)
 
 
@@ -261,16 +261,16 @@ def test_what_leaves_operation_by_itself_needs_a_new_request(state: int) -> None
     b.drives[0].after = lambda before: state  # type: ignore[method-assign]
     flags = b.engine.next()
     assert flags & CYCLE_DROPPED
-    assert goal_in_force(b) == GOAL_DISABLED
+    assert goal_in_force(b) == REQUEST_DISABLED
     assert dropped(b)
     del b.drives[0].after  # it could move on
     b.drives[0].state = 1
     b.steps(20)
     assert b.drives[0].state in (1, 2)  # disabled
-    b.goal[0] = GOAL_ENABLED  # the same goal without a new request
+    b.requested_state[0] = REQUEST_ENABLED  # the same requested_state without a new request
     b.steps(20)
     assert b.drives[0].state in (1, 2)
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.steps(8)
     assert followed(b)
     assert not dropped(b)
@@ -282,7 +282,7 @@ def test_a_fault_is_reset_by_a_new_request_only() -> None:
     b.steps(20)
     assert b.drives[0].state == FAULT
     assert not b.drives[0].controlword & 0x80
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.steps(10)
     assert followed(b)
 
@@ -290,10 +290,10 @@ def test_a_fault_is_reset_by_a_new_request_only() -> None:
 def test_a_reset_acknowledges_without_enabling() -> None:
     b = bench(axis(0), drives=[ScriptedDrive(state=FAULT)])
     b.engine.run(2)
-    b.ask(GOAL_RESET)
+    b.ask(REQUEST_RESET)
     b.engine.run(10)
     assert b.drives[0].state == 1
-    assert goal_in_force(b) == GOAL_DISABLED
+    assert goal_in_force(b) == REQUEST_DISABLED
 
 
 def test_every_request_makes_an_edge_of_its_own() -> None:
@@ -306,7 +306,7 @@ def test_every_request_makes_an_edge_of_its_own() -> None:
 
     b.drives[0].after = stubborn  # type: ignore[method-assign]
     for _ in range(3):
-        b.ask(GOAL_RESET)
+        b.ask(REQUEST_RESET)
         b.engine.run(4)
     edges = sum(a & 0x80 == 0 and c & 0x80 != 0 for a, c in pairwise(words))
     assert edges == 3
@@ -337,7 +337,7 @@ def test_a_request_made_while_nobody_could_hear_it_is_forgotten() -> None:
     b.engine.run(1)
     b.segment.silent = {0}
     b.engine.run(5)
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.engine.run(5)
     assert dropped(b)
     b.segment.silent = set()
@@ -353,34 +353,34 @@ def test_quick_stop_waits_for_standstill_before_the_voltage_goes() -> None:
     b.drives[0].stays_in_quick_stop = True
     b.drives[0].velocity = 900
     b.steps(2)
-    b.ask(GOAL_QUICK_STOP)
+    b.ask(REQUEST_QUICK_STOP)
     b.steps(30)
     assert b.drives[0].state == QUICK_STOPPED
     b.drives[0].velocity = 0
     b.steps(10)
     assert b.drives[0].state == 1
-    assert goal_in_force(b) == GOAL_DISABLED
+    assert goal_in_force(b) == REQUEST_DISABLED
 
 
-@pytest.mark.parametrize("goal", [GOAL_ENABLED, GOAL_RESET])
-def test_a_request_during_a_quick_stop_waits_for_standstill(goal: int) -> None:
+@pytest.mark.parametrize("requested_state", [REQUEST_ENABLED, REQUEST_RESET])
+def test_a_request_during_a_quick_stop_waits_for_standstill(requested_state: int) -> None:
     b = driving(CSP)
     b.drives[0].stays_in_quick_stop = True
     b.drives[0].velocity = 900
     b.steps(2)
-    b.ask(GOAL_QUICK_STOP)
+    b.ask(REQUEST_QUICK_STOP)
     b.steps(5)
-    b.ask(goal)
+    b.ask(requested_state)
     b.steps(30)
     assert b.drives[0].state == QUICK_STOPPED
     b.drives[0].velocity = 0
     b.steps(20)
-    assert b.drives[0].state == (OE if goal == GOAL_ENABLED else 1)
+    assert b.drives[0].state == (OE if requested_state == REQUEST_ENABLED else 1)
 
 
 def test_disabling_goes_by_disable_operation() -> None:
     b = driving(CSP)
-    b.ask(GOAL_DISABLED)
+    b.ask(REQUEST_DISABLED)
     b.engine.next()
     assert b.drives[0].controlword & 0x0F == 0x07
     b.steps(5)
@@ -409,7 +409,7 @@ def test_quick_stop_all_and_the_native_end(execution: str) -> None:
 
 def test_a_request_in_the_same_commit_does_not_beat_quick_stop_all() -> None:
     b = driving(CSP)
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.engine.quick_stop_all()
     b.steps(20)
     assert b.drives[0].state == 1

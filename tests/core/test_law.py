@@ -16,7 +16,6 @@ from catenary.core import (
     CYCLE_LAW_DONE,
     CYCLE_LAW_FAILED,
     CYCLE_LIMITED,
-    GOAL_ENABLED,
     LAW_FINISHED,
     LAW_NEVER_RETURNED,
     LAW_NOT_FINITE,
@@ -24,6 +23,7 @@ from catenary.core import (
     LAW_RAISED,
     LAW_RUNNING,
     LAW_STOPPED,
+    REQUEST_ENABLED,
     Engine,
     Law,
 )
@@ -121,7 +121,7 @@ def spring(frame: Frame) -> int:
 @pytest.mark.parametrize("execution", EXECUTION_MODES)
 def test_a_law_acts_on_the_inputs_of_its_own_cycle_and_no_cycle_is_lost(execution: str) -> None:
     b = bench(axis(0, mode=CST), execution=execution)
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.engine.run(10)
     assert b.drives[0].state == 1  # a brake does not open before somebody holds the load
     b.engine.start_law(make_law(b, spring))
@@ -162,7 +162,7 @@ def test_the_limits_hold_for_laws_too(execution: str) -> None:
 
     limits = AxisLimits(torque=2.0)
     b = bench(axis(0, mode=CST, limits=limits, torque_slope=100.0), execution=execution)
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.engine.start_law(make_law(b, wild))
     assert b.steps(20) & CYCLE_LIMITED
     assert b.drives[0].target_torque == 2000
@@ -489,7 +489,7 @@ def test_the_last_targets_of_a_law_are_sent_as_they_are(execution: str) -> None:
         return frame.time > 0.015
 
     b = bench(axis(0, mode=CST, torque_slope=10.0), execution=execution)
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.engine.start_law(make_law(b, body))
     b.steps(25)
     assert b.drives[0].target_torque == 800

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from catenary.core import AXIS_FALLBACK, CYCLE_DROPPED, GOAL_ENABLED, GOAL_QUICK_STOP
+from catenary.core import AXIS_FALLBACK, CYCLE_DROPPED, REQUEST_ENABLED, REQUEST_QUICK_STOP
 from catenary.plan.cycle import AxisLimits
 from catenary.plan.stop_reason import StopReason
 from tests.core.rig import COUNTS, CSP, MS, Bench, ScriptedDrive, axis, bench
@@ -17,7 +17,7 @@ OE = 4
 def driving(mode: int, *, limits: AxisLimits | None = None, **more: object) -> Bench:
     """One axis in a profile mode, enabled, with a committed target."""
     b = bench(axis(0, mode=mode, limits=limits), drives=[ScriptedDrive(moves=False)], **more)
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.steps(12)
     assert b.axis_flags[0] & 1
     return b
@@ -67,7 +67,7 @@ def test_bits_of_the_handshake_and_halt_reach_an_enabled_drive_only() -> None:
     b.controlword_bits[0] = HALT | NEW_SET_POINT
     b.steps(2)
     assert b.drives[0].controlword == 0x0F | HALT | NEW_SET_POINT
-    b.ask(GOAL_QUICK_STOP)
+    b.ask(REQUEST_QUICK_STOP)
     b.steps(1)
     assert b.drives[0].controlword == 0x02
 
@@ -118,7 +118,7 @@ def test_a_stop_that_finds_bit_12_of_pp_does_not_wait_for_it() -> None:
         return exchange(b"\x0f\x00" + outputs[2:])
 
     drive.exchange = ignoring  # type: ignore[method-assign]
-    b.ask(GOAL_QUICK_STOP)
+    b.ask(REQUEST_QUICK_STOP)
     b.steps(120)
     assert words[5] == 0x02
     assert words[-1] == 0x00  # after the patience, not after the stop deadline
@@ -126,7 +126,7 @@ def test_a_stop_that_finds_bit_12_of_pp_does_not_wait_for_it() -> None:
 
 def test_csp_begins_where_pp_has_stopped() -> None:
     b = bench(axis(0, mode=PP), drives=[ScriptedDrive(position=700, moves=False)])
-    b.ask(GOAL_ENABLED)
+    b.ask(REQUEST_ENABLED)
     b.steps(12)
     b.target_position[0] = 5.0
     b.steps(2)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from catenary.demo import server
-from catenary.realtime.scheduling import Scheduling
+from catenary.realtime.system.scheduling import Scheduling
 from catenary.virtual import demo_segment
 from catenary.virtual.server import MAX_AGE
 

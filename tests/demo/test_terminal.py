@@ -11,14 +11,14 @@ from catenary.demo.terminal import on_enter
 
 def test_enter_at_a_terminal_is_heard_and_leaving_does_not_wait() -> None:
     person, program = pty.openpty()
-    heard = threading.Semaphore(0)
-    with on_enter(heard.release, source=program) as listening:
+    received = threading.Semaphore(0)
+    with on_enter(received.release, source=program) as listening:
         assert listening
         for _ in range(2):
             os.write(person, b"\n")
-            assert heard.acquire(timeout=20)
+            assert received.acquire(timeout=20)
     os.write(person, b"\n")
-    assert not heard.acquire(blocking=False)
+    assert not received.acquire(blocking=False)
     os.close(person)
     os.close(program)
 
@@ -34,6 +34,6 @@ def test_letters_are_no_key_and_a_terminal_that_hangs_up_ends_it() -> None:
 
 
 def test_without_a_terminal_nothing_is_read() -> None:
-    heard = threading.Event()
-    with on_enter(heard.set) as listening:  # pytest's standard input is none
+    received = threading.Event()
+    with on_enter(received.set) as listening:  # pytest's standard input is none
         assert not listening

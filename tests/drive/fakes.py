@@ -11,7 +11,7 @@ from catenary.errors import SdoAbort
 from catenary.model.device import Direction
 from catenary.plan.cycle import Number, NumberKind
 from catenary.plan.numbers import ANY, Which
-from catenary.plan.request import PdoWish, Views, WishTables
+from catenary.plan.request import DeviceRequest, RequestTables, Views
 
 
 @dataclass
@@ -22,13 +22,13 @@ class FakeLayout:
     inputs: dict[int, dict[tuple[int, int], int]] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, wishes: dict[int, PdoWish]) -> FakeLayout:
+    def of(cls, requests: dict[int, DeviceRequest]) -> FakeLayout:
         def sizes(references: tuple) -> dict[tuple[int, int], int]:
             return {(r.index, r.subindex): r.bit_length for r in references}
 
         return cls(
-            {device: sizes(wish.outputs) for device, wish in wishes.items()},
-            {device: sizes(wish.inputs) for device, wish in wishes.items()},
+            {device: sizes(request.outputs) for device, request in requests.items()},
+            {device: sizes(request.inputs) for device, request in requests.items()},
         )
 
     def output(self, device: int, index: int, subindex: int, which: Which = ANY) -> Number | None:
@@ -116,7 +116,7 @@ def fake_sub(
     )
 
 
-def views_of(tables: WishTables) -> Views:
+def views_of(tables: RequestTables) -> Views:
     """Zeroed arrays of the right sizes."""
     n = len(tables.axes)
 
@@ -136,7 +136,7 @@ def views_of(tables: WishTables) -> Views:
         target_velocity=reals[4],
         target_torque=reals[5],
         mode_target=np.zeros(n, np.int8),
-        goal=np.zeros(n, np.uint8),
+        requested_state=np.zeros(n, np.uint8),
         request=np.zeros(n, np.uint32),
         controlword_bits=np.zeros(n, np.uint16),
         input_reals=np.zeros(count(tables.input_columns, 0)),

@@ -40,16 +40,16 @@ def test_a_misspelt_name_fails_with_the_nearest_one(
     main: cat.MainDevice, case: str, is_open: bool
 ) -> None:
     choose, wrong, right = CASES[case]
-    wishes = parts(main)
+    requests = parts(main)
 
     def check() -> None:
         for use in (getattr, lambda owner, name: setattr(owner, name, 1)):
             with pytest.raises(AttributeError, match=f"no attribute '{wrong}'.*'{right}'"):
-                use(choose(*wishes), wrong)
+                use(choose(*requests), wrong)
 
     if not is_open:
         return check()
-    with cat.Loop(*wishes, period=1e-3):
+    with cat.Loop(*requests, period=1e-3):
         check()
 
 

@@ -1,4 +1,4 @@
-"""Drives as a wish: objects, tables, arrays, requests."""
+"""Drives as a request: objects, tables, arrays, requests."""
 
 import math
 import warnings
@@ -33,11 +33,11 @@ def opened(drives: Drives) -> Drives:
     return drives
 
 
-def test_csp_wishes_for_what_it_needs_and_no_more() -> None:
-    wish = Drives([fake_sub(3)], counts_per_turn=2**20).pdos(MILLISECOND)[3]
-    assert [r.index for r in wish.outputs] == [0x6040, 0x6060, 0x607A]
-    assert [r.index for r in wish.inputs] == [0x6041, 0x6061, 0x6064, 0x606C, 0x6077]
-    assert [r.bit_length for r in wish.outputs] == [16, 8, 32]
+def test_csp_requests_for_what_it_needs_and_no_more() -> None:
+    request = Drives([fake_sub(3)], counts_per_turn=2**20).pdos(MILLISECOND)[3]
+    assert [r.index for r in request.outputs] == [0x6040, 0x6060, 0x607A]
+    assert [r.index for r in request.inputs] == [0x6041, 0x6061, 0x6064, 0x606C, 0x6077]
+    assert [r.bit_length for r in request.outputs] == [16, 8, 32]
 
 
 def test_the_interpolation_time_follows_the_period() -> None:
@@ -81,8 +81,8 @@ def test_without_a_rated_torque_the_torque_is_absent() -> None:
 
 def test_what_a_drive_may_lack_is_not_required() -> None:
     def required(drives: Drives) -> list[int]:
-        wish = drives.pdos(MILLISECOND)[3]
-        return [r.index for r in wish.outputs + wish.inputs if r.required]
+        request = drives.pdos(MILLISECOND)[3]
+        return [r.index for r in request.outputs + request.inputs if r.required]
 
     assert required(Drives([fake_sub(3)], counts_per_turn=1)) == [0x6040, 0x607A, 0x6041, 0x6064]
     switching = Drives(
@@ -106,9 +106,9 @@ def test_slots_are_axes_of_their_own() -> None:
     drives = Drives(
         [(sub, 0), (sub, 1)], counts_per_turn=2**20, mode=["csp", "cst"], velocity_limit=3.0
     )
-    wish = drives.pdos(MILLISECOND)[2]
-    assert [r.index for r in wish.outputs] == [0x6040, 0x6060, 0x607A, 0x6840, 0x6860, 0x6871]
-    first, second = drives.tables(FakeLayout.of({2: wish})).axes
+    request = drives.pdos(MILLISECOND)[2]
+    assert [r.index for r in request.outputs] == [0x6040, 0x6060, 0x607A, 0x6840, 0x6860, 0x6871]
+    first, second = drives.tables(FakeLayout.of({2: request})).axes
     assert (first.slot, second.slot) == (0, 1)
     assert first.target_torque is None
     assert second.target_torque is not None

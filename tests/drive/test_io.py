@@ -56,11 +56,11 @@ def test_a_lamp_goes_by_its_name_and_by_its_bit() -> None:
     assert lamps["Channel 1 Output"] == 1
 
 
-def test_inputs_wish_for_what_is_mapped_only() -> None:
+def test_inputs_request_for_what_is_mapped_only() -> None:
     buttons = Inputs(terminal(2, Direction.INPUT, 2, "Input"))
-    wish = buttons.pdos(1_000_000)[2]
-    assert wish.outputs == ()
-    assert [(r.index, r.subindex, r.bit_length) for r in wish.inputs] == [
+    request = buttons.pdos(1_000_000)[2]
+    assert request.outputs == ()
+    assert [(r.index, r.subindex, r.bit_length) for r in request.inputs] == [
         (0x7000, 1, 1),
         (0x7010, 1, 1),
     ]

@@ -9,7 +9,7 @@ from catenary.drive.port import AxisPort, Steps
 from catenary.drive.profile import Rates
 from catenary.drive.units import AxisUnits
 from catenary.errors import MoveError, SdoAbort
-from catenary.plan.request import WishTables
+from catenary.plan.request import RequestTables
 from catenary.wire.cia402 import Mode
 from tests.core.rig import axis
 from tests.drive.fakes import views_of
@@ -35,7 +35,7 @@ class Rig:
     """Owns one axis without a drive: the test sets its statusword."""
 
     def __init__(self, *, refused: dict[int, int] | None = None) -> None:
-        self.views = views_of(WishTables(axes=(axis(0),)))
+        self.views = views_of(RequestTables(axes=(axis(0),)))
         self.views.axis_flags[0] = 1 | 1 << 6
         self.writes: list[tuple[int, int]] = []
         self.refused = refused or {}

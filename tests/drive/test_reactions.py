@@ -116,10 +116,10 @@ def test_a_refused_axis_is_read_again() -> None:
 def test_each_plan_reads_the_drive_once() -> None:
     values = {(0x6076, 0): 640, (0x605A, 0): 2}
     drives = Drives([fake_sub(3, values)], counts_per_turn=1, velocity_limit=1.0)
-    wishes = dict(drives.pdos(MILLISECOND))
+    requests = dict(drives.pdos(MILLISECOND))
     values[0x605A, 0] = 6
     drives.pdos(MILLISECOND)
-    layout = FakeLayout.of(wishes)
+    layout = FakeLayout.of(requests)
     assert "0x605A = 2" in str(drives.tables(layout).axis_reports)
     drives.pdos(MILLISECOND)
     assert "0x605A = 6" in str(drives.tables(layout).axis_reports)
@@ -128,8 +128,8 @@ def test_each_plan_reads_the_drive_once() -> None:
 def test_csp_hold_maps_the_position_and_the_mode() -> None:
     def required(**options: object) -> list[int]:
         drives = Drives([fake_sub(3)], counts_per_turn=1, velocity_limit=1.0, **options)  # type: ignore[arg-type]
-        wish = drives.pdos(MILLISECOND)[3]
-        return [r.index for r in wish.outputs + wish.inputs if r.required]
+        request = drives.pdos(MILLISECOND)[3]
+        return [r.index for r in request.outputs + request.inputs if r.required]
 
     assert required(mode="cst") == [0x6040, 0x6071, 0x6041, 0x6064]
     hold = [0x6040, 0x6060, 0x6071, 0x607A, 0x6041, 0x6061, 0x6064]
@@ -140,9 +140,9 @@ def test_csp_hold_maps_the_position_and_the_mode() -> None:
 
 def test_demand_values_are_used_where_they_are_mapped_and_never_requested() -> None:
     drives = Drives([fake_sub(3)], counts_per_turn=1, velocity_limit=1.0, other_modes=["cst"])
-    wishes = dict(drives.pdos(MILLISECOND))
-    assert not {0x6062, 0x6074} & {r.index for r in wishes[3].inputs}
-    layout = FakeLayout.of(wishes)
+    requests = dict(drives.pdos(MILLISECOND))
+    assert not {0x6062, 0x6074} & {r.index for r in requests[3].inputs}
+    layout = FakeLayout.of(requests)
     (axis,) = drives.tables(layout).axes
     assert (axis.position_demand, axis.torque_demand) == (None, None)
     layout.inputs[3] |= {(0x6062, 0): 32, (0x6074, 0): 16}

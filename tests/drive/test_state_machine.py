@@ -3,7 +3,7 @@
 import pytest
 
 from catenary import core
-from catenary.drive.state_machine import Goal, controlword_towards
+from catenary.drive.state_machine import RequestedState, controlword_towards
 from catenary.wire.cia402 import COMMANDS, TRANSITIONS, AxisState, state_of
 
 # The drive's side, by the standard's own table of transitions (IEC 61800-7-201 table 29).
@@ -27,11 +27,11 @@ def obey(state: AxisState, controlword: int, previous: int) -> AxisState:
     return state
 
 
-def walk(state: AxisState, goal: Goal, previous: int) -> list[AxisState]:
-    """The states a drive goes through when it is led towards a goal."""
+def walk(state: AxisState, requested_state: RequestedState, previous: int) -> list[AxisState]:
+    """The states a drive goes through when it is led towards a requested_state."""
     path = [state]
     for _ in range(12):
-        word = controlword_towards(state, goal, previous)
+        word = controlword_towards(state, requested_state, previous)
         state, previous = obey(state, word, previous), word
         if state is not path[-1]:
             path.append(state)
@@ -43,48 +43,52 @@ def walk(state: AxisState, goal: Goal, previous: int) -> list[AxisState]:
 def test_every_state_can_be_enabled(state: AxisState, previous: int) -> None:
     if state is AxisState.FAULT and previous == 0x0080:
         pytest.skip("bit 7 was set before the fault: the core clears it while the fault reacts")
-    assert walk(state, Goal.ENABLED, previous)[-1] is AxisState.OPERATION_ENABLED
+    assert walk(state, RequestedState.ENABLED, previous)[-1] is AxisState.OPERATION_ENABLED
 
 
 @pytest.mark.parametrize(
     "state", set(AxisState) - {AxisState.FAULT, AxisState.FAULT_REACTION_ACTIVE}
 )
 def test_disabled_ends_without_power(state: AxisState) -> None:
-    end = walk(state, Goal.DISABLED, 0)[-1]
+    end = walk(state, RequestedState.DISABLED, 0)[-1]
     assert end in (AxisState.SWITCH_ON_DISABLED, AxisState.READY_TO_SWITCH_ON)
 
 
 def test_a_fault_is_kept_until_somebody_asks() -> None:
-    assert walk(AxisState.FAULT_REACTION_ACTIVE, Goal.DISABLED, 0x000F)[-1] is AxisState.FAULT
-    assert walk(AxisState.FAULT, Goal.QUICK_STOP, 0x000F)[-1] is AxisState.FAULT
-    assert walk(AxisState.FAULT, Goal.RESET, 0x000F)[-1] is AxisState.SWITCH_ON_DISABLED
+    assert (
+        walk(AxisState.FAULT_REACTION_ACTIVE, RequestedState.DISABLED, 0x000F)[-1]
+        is AxisState.FAULT
+    )
+    assert walk(AxisState.FAULT, RequestedState.QUICK_STOP, 0x000F)[-1] is AxisState.FAULT
+    assert walk(AxisState.FAULT, RequestedState.RESET, 0x000F)[-1] is AxisState.SWITCH_ON_DISABLED
 
 
 def test_quick_stop_stays_until_told_otherwise() -> None:
     assert (
-        walk(AxisState.OPERATION_ENABLED, Goal.QUICK_STOP, 0x000F)[-1]
+        walk(AxisState.OPERATION_ENABLED, RequestedState.QUICK_STOP, 0x000F)[-1]
         is AxisState.QUICK_STOP_ACTIVE
     )
     assert (
-        walk(AxisState.QUICK_STOP_ACTIVE, Goal.DISABLED, 0x0002)[-1] is AxisState.SWITCH_ON_DISABLED
+        walk(AxisState.QUICK_STOP_ACTIVE, RequestedState.DISABLED, 0x0002)[-1]
+        is AxisState.SWITCH_ON_DISABLED
     )
 
 
 def test_enabling_out_of_a_quick_stop_goes_through_the_whole_machine() -> None:
-    path = walk(AxisState.QUICK_STOP_ACTIVE, Goal.ENABLED, 0x0002)
+    path = walk(AxisState.QUICK_STOP_ACTIVE, RequestedState.ENABLED, 0x0002)
     assert path[1] is AxisState.SWITCH_ON_DISABLED
     assert path[-1] is AxisState.OPERATION_ENABLED
 
 
 def test_only_commands_of_the_standard_are_given() -> None:
     for state in AxisState:
-        for goal in Goal:
-            word = controlword_towards(state, goal, 0)
+        for requested_state in RequestedState:
+            word = controlword_towards(state, requested_state, 0)
             assert any(command.matches(word) for command in COMMANDS)
 
 
 def test_an_unknown_state_gets_no_voltage() -> None:
-    assert controlword_towards(None, Goal.ENABLED, 0x000F) == 0
+    assert controlword_towards(None, RequestedState.ENABLED, 0x000F) == 0
 
 
 def test_the_compiled_twin_agrees_on_states() -> None:
@@ -93,11 +97,11 @@ def test_the_compiled_twin_agrees_on_states() -> None:
         assert core.state_of(statusword) == (255 if state is None else state)
 
 
-@pytest.mark.parametrize("goal", Goal)
-def test_the_compiled_twin_agrees_on_commands(goal: Goal) -> None:
+@pytest.mark.parametrize("requested_state", RequestedState)
+def test_the_compiled_twin_agrees_on_commands(requested_state: RequestedState) -> None:
     for previous in range(256):
         for state in AxisState:
-            assert core.controlword_towards(state, goal, previous) == controlword_towards(
-                state, goal, previous
-            )
-        assert core.controlword_towards(255, goal, previous) == 0
+            assert core.controlword_towards(
+                state, requested_state, previous
+            ) == controlword_towards(state, requested_state, previous)
+        assert core.controlword_towards(255, requested_state, previous) == 0

@@ -34,11 +34,11 @@ class Subject:
         """A MainDevice that reserves it in its `with` block."""
         return cat.MainDevice(self.make())
 
-    def loop(self, *wishes: object, **options: object) -> cat.Loop:
+    def loop(self, *requests: object, **options: object) -> cat.Loop:
         """One that no stalled machine stops."""
         calm = {"watchdog": max(0.1, 50 * self.period), "late_limit": 0, "lost_limit": 100}
         settings = {"period": self.period, "enable": False, **calm, **options}
-        return cat.Loop(*wishes, **grouped(settings))  # type: ignore[arg-type]
+        return cat.Loop(*requests, **grouped(settings))  # type: ignore[arg-type]
 
     def inputs(self, main: cat.MainDevice) -> list[cat.Inputs]:
         """All inputs of all devices."""

@@ -143,7 +143,7 @@ def test_a_ring_without_its_main_interface_is_not_waited_for(doubles: dict[str, 
 
 
 def test_slow_answers_of_devices_that_need_not_be_there_are_found(doubles: dict[str, Path]) -> None:
-    """Nobody is waited for long who was away before; but who is only slow must be heard."""
+    """Nobody is waited for long who was away before; but who is only slow must be received."""
     double = Double(doubles["1.6.1"])
     double.delay(20_000)
     with cat.MainDevice(Master(library=double.path)) as main:

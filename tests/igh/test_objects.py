@@ -86,8 +86,8 @@ def test_emergencies_are_events(main: cat.MainDevice, double: Double) -> None:
         double.emergency(1, bytes.fromhex("10 42 09 01 02 03 04 05"))
         for _ in range(30):
             next(loop)
-    [heard] = [event for event in main.events if isinstance(event, cat.events.Emergency)]
-    assert (heard.sub, heard.error_code, heard.error_register) == (main.subs[1], 0x4210, 9)
+    [received] = [event for event in main.events if isinstance(event, cat.events.Emergency)]
+    assert (received.sub, received.error_code, received.error_register) == (main.subs[1], 0x4210, 9)
     assert main.subs[1].emergencies[0].data == b"\1\2\3\4\5"
 
 

@@ -9,15 +9,15 @@ from catenary.core import (
     AXIS_MODE_REFUSED,
     CYCLE_DRY,
     CYCLE_UNCOMMITTED,
-    GOAL_DISABLED,
-    GOAL_ENABLED,
     RECORD_FIELDS,
+    REQUEST_DISABLED,
+    REQUEST_ENABLED,
 )
 from catenary.errors import DriveError
-from catenary.loop.axis_watch import AxisWatch, StoppedAxis
 from catenary.loop.stop_error import stopped_error
+from catenary.loop.watches.axis import AxisWatch, StoppedAxis
 from catenary.plan.cycle import AxisPlan, CyclePlan, Number, NumberKind
-from catenary.plan.request import Views, WishTables
+from catenary.plan.request import RequestTables, Views
 from catenary.plan.stop_reason import UNASKED, StopReason
 from tests.drive.fakes import views_of
 from tests.loop_options import grouped
@@ -30,8 +30,8 @@ def axes(count: int) -> tuple[AxisPlan, ...]:
 
 
 def watched(count: int = 2) -> tuple[AxisWatch, Views]:
-    views = views_of(WishTables(axes(count)))
-    views.goal[:] = GOAL_ENABLED
+    views = views_of(RequestTables(axes(count)))
+    views.requested_state[:] = REQUEST_ENABLED
     return AxisWatch(views, axes(count)), views
 
 
@@ -67,7 +67,7 @@ def test_a_new_request_is_not_a_stop() -> None:
 
 def test_a_stop_that_the_application_requested_is_marked() -> None:
     watch, views = watched()
-    views.goal[0] = GOAL_DISABLED
+    views.requested_state[0] = REQUEST_DISABLED
     for axis in range(2):
         stop(views, axis, StopReason.STOP_REQUEST, 7)
     assert [each.requested for each in watch.new_stops()] == [True, False]

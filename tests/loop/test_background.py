@@ -299,11 +299,11 @@ def test_an_update_that_ends_while_the_loop_is_left_changes_nothing(cell: Cell) 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("catenary.loop.background.LEAVE_TIMEOUT", 0.01)
         cell.loop.close()
-    goals = cell.loop._runnings[0].views.goal.tolist()
+    goals = cell.loop._sessions[0].views.requested_state.tolist()
     written.set()
     thread.join(PATIENCE)
     assert errors == ["the loop is closed: open it again, or use it in a with block"]
-    assert cell.loop._runnings[0].views.goal.tolist() == goals
+    assert cell.loop._sessions[0].views.requested_state.tolist() == goals
 
 
 def test_a_with_block_raises_the_error_at_its_end() -> None:
@@ -472,7 +472,7 @@ def test_ctrl_c_while_closing_only_hurries(cell: Cell) -> None:
             os.kill(os.getpid(), signal.SIGINT)
 
     mine = signal.signal(signal.SIGINT, signal.default_int_handler)  # as a notebook does
-    cell.loop._runnings[0]._publisher = Interrupting()  # type: ignore[assignment]
+    cell.loop._sessions[0]._publisher = Interrupting()  # type: ignore[assignment]
     cell.loop.close()
     assert cell.segment[0].state & 0x0F == 2
     signal.signal(signal.SIGINT, mine)

@@ -1,16 +1,16 @@
-"""The engine's buffers, cut for each wish."""
+"""The engine's buffers, cut for each request."""
 
 import numpy as np
 
-from catenary.loop.buffers import AXIS_BUFFERS, COLUMN_BUFFERS, bind_wishes
+from catenary.loop.buffers import AXIS_BUFFERS, COLUMN_BUFFERS, bind_requests
 from catenary.plan.cycle import AxisPlan, Bank, Column, ImageArea, Number, NumberKind
-from catenary.plan.request import Views, WishTables
+from catenary.plan.request import RequestTables, Views
 
 WORD = Number(0, 16, NumberKind.UNSIGNED)
 
 
 class Bound:
-    """A wish that remembers what it was given."""
+    """A request that remembers what it was given."""
 
     views: Views
 
@@ -26,8 +26,8 @@ def column(name: str, bank: Bank) -> Column:
     return Column(name, WORD, bank, 0, 0)
 
 
-def buffers_of(tables: list[WishTables]) -> dict[str, memoryview]:
-    """As the engine makes them: everything of all wishes, one behind the other."""
+def buffers_of(tables: list[RequestTables]) -> dict[str, memoryview]:
+    """As the engine makes them: everything of all requests, one behind the other."""
     n = sum(len(table.axes) for table in tables)
     sizes = dict.fromkeys(AXIS_BUFFERS, n)
     for (output, bank), name in COLUMN_BUFFERS.items():
@@ -39,42 +39,42 @@ def buffers_of(tables: list[WishTables]) -> dict[str, memoryview]:
     return {name: memoryview(np.arange(size, dtype=np.float64)) for name, size in sizes.items()}
 
 
-def test_each_wish_gets_its_own_part() -> None:
+def test_each_request_gets_its_own_part() -> None:
     tables = [
-        WishTables((axis("a"), axis("b")), (), (column("x", Bank.REAL),)),
-        WishTables(
+        RequestTables((axis("a"), axis("b")), (), (column("x", Bank.REAL),)),
+        RequestTables(
             (), (column("lamp", Bank.BIT),), (column("y", Bank.REAL), column("z", Bank.BIT))
         ),
-        WishTables((axis("c"),), (column("valve", Bank.BIT),), ()),
+        RequestTables((axis("c"),), (column("valve", Bank.BIT),), ()),
     ]
-    wishes = [Bound(), Bound(), Bound()]
-    whole = bind_wishes(wishes, tables, buffers_of(tables), lambda: True)  # type: ignore[arg-type]
-    arm, io, last = (wish.views for wish in wishes)
+    requests = [Bound(), Bound(), Bound()]
+    whole = bind_requests(requests, tables, buffers_of(tables), lambda: True)  # type: ignore[arg-type]
+    arm, io, last = (request.views for request in requests)
     assert arm.actual_position.tolist() == [0, 1]
     assert last.target_torque.tolist() == [2]
     assert (arm.input_reals.tolist(), io.input_reals.tolist()) == ([0], [1])
     assert io.input_bits.tolist() == [0]
     assert (io.output_bits.tolist(), last.output_bits.tolist()) == ([0], [1])
-    assert io.goal.size == 0
-    last.goal[0] = 7
-    assert whole.goal.tolist() == [0, 1, 7]
+    assert io.requested_state.size == 0
+    last.requested_state[0] = 7
+    assert whole.requested_state.tolist() == [0, 1, 7]
 
 
 def test_views_are_no_copies() -> None:
-    tables = [WishTables((axis("a"),))]
-    wish = Bound()
+    tables = [RequestTables((axis("a"),))]
+    request = Bound()
     buffers = buffers_of(tables)
-    bind_wishes([wish], tables, buffers, lambda: True)  # type: ignore[list-item]
-    wish.views.target_position[0] = 1.5
+    bind_requests([request], tables, buffers, lambda: True)  # type: ignore[list-item]
+    request.views.target_position[0] = 1.5
     assert buffers["target_position"][0] == 1.5
 
 
-def test_areas_of_two_wishes_lie_one_after_the_other() -> None:
+def test_areas_of_two_requests_lie_one_after_the_other() -> None:
     first = ImageArea("a", 8, 3, 0, 0, bytes(3))
     second = ImageArea("b", 0, 2, 1, 0, bytes(2))
-    tables = [WishTables(output_areas=(first,)), WishTables(output_areas=(second,))]
-    wishes = [Bound(), Bound()]
-    whole = bind_wishes(wishes, tables, buffers_of(tables), lambda: True)  # type: ignore[arg-type]
-    assert [wish.views.output_bytes.tolist() for wish in wishes] == [[0, 1, 2], [3, 4]]
+    tables = [RequestTables(output_areas=(first,)), RequestTables(output_areas=(second,))]
+    requests = [Bound(), Bound()]
+    whole = bind_requests(requests, tables, buffers_of(tables), lambda: True)  # type: ignore[arg-type]
+    assert [request.views.output_bytes.tolist() for request in requests] == [[0, 1, 2], [3, 4]]
     assert whole.output_bytes.size == 5
     assert whole.input_bytes.size == 0

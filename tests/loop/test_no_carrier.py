@@ -68,8 +68,8 @@ def test_optional_devices_alone_are_left_without_a_link(
             iterate_until(loop, lambda: not any(lamps.present))
 
 
-def run_without_link(wish: cat.Outputs, veth: tuple[str, str], server: Server) -> None:
-    with cat.Loop(wish, period=PERIOD) as loop:
+def run_without_link(request: cat.Outputs, veth: tuple[str, str], server: Server) -> None:
+    with cat.Loop(request, period=PERIOD) as loop:
         pull(veth, server)
         iterate_until(loop, lambda: False)
 

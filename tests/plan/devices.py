@@ -14,7 +14,7 @@ from catenary.model.device import (
     Pdo,
     SyncManager,
 )
-from catenary.plan.request import ImageLayout, ObjectReference, PdoWish, Views, WishTables
+from catenary.plan.request import DeviceRequest, ImageLayout, ObjectReference, RequestTables, Views
 from catenary.wire.features import Feature, Information, PortKind
 from catenary.wire.sii import MailboxProtocol
 from catenary.wire.sii_categories import SyncManagerUse
@@ -143,15 +143,15 @@ def demo() -> list[DeviceDescription]:
 
 @dataclass
 class Asking:
-    """A wish that only asks."""
+    """A request that only asks."""
 
-    asked: Mapping[int, PdoWish] = field(default_factory=dict)
+    asked: Mapping[int, DeviceRequest] = field(default_factory=dict)
 
-    def pdos(self, period_ns: int) -> Mapping[int, PdoWish]:
+    def pdos(self, period_ns: int) -> Mapping[int, DeviceRequest]:
         return self.asked
 
-    def tables(self, layout: ImageLayout) -> WishTables:
-        return WishTables()
+    def tables(self, layout: ImageLayout) -> RequestTables:
+        return RequestTables()
 
     def bind(self, views: Views) -> None:
         raise AssertionError("nobody runs this")
@@ -166,7 +166,7 @@ def asks(
     """Objects as (index, subindex, bits)."""
     return Asking(
         {
-            position: PdoWish(
+            position: DeviceRequest(
                 tuple(ObjectReference(*each) for each in outputs),
                 tuple(ObjectReference(*each) for each in inputs),
             )

@@ -6,15 +6,15 @@ import pytest
 
 from catenary.plan.axis_report import AxisReport
 from catenary.plan.planner import make_plan
-from catenary.plan.request import ImageLayout, WishTables
+from catenary.plan.request import ImageLayout, RequestTables
 from tests.plan.devices import Asking, demo
 
 
 class Reports(Asking):
     """A request that only reports axes."""
 
-    def tables(self, layout: ImageLayout) -> WishTables:
-        return WishTables(
+    def tables(self, layout: ImageLayout) -> RequestTables:
+        return RequestTables(
             axes=(),
             axis_reports=(
                 AxisReport("2 Servo", (8, 10), ("on_loss: disable",)),

@@ -12,7 +12,7 @@ from catenary.model.device import DeviceDescription, OpMode
 from catenary.plan.clocks import SyncPlan, make_sync, start_time_ns
 from catenary.plan.cycle import DatagramKind
 from catenary.plan.planner import Plan, make_plan
-from catenary.plan.request import DistributedClock, PdoWish
+from catenary.plan.request import DeviceRequest, DistributedClock
 from catenary.wire.datagram import EcatCommand, decode_datagram
 from catenary.wire.features import Feature
 from tests.plan.devices import Asking, coupler, lamps, servo
@@ -31,12 +31,14 @@ def cell() -> list[DeviceDescription]:
     return [clocked(coupler(0)), lamps(1), clocked(servo(2)), clocked(servo(3))]
 
 
-def wishing(*positions: int, clock: DistributedClock | None = None) -> Asking:
-    return Asking({position: PdoWish(clock=clock or DistributedClock()) for position in positions})
+def asking(*positions: int, clock: DistributedClock | None = None) -> Asking:
+    return Asking(
+        {position: DeviceRequest(clock=clock or DistributedClock()) for position in positions}
+    )
 
 
 def planned(devices: list[DeviceDescription], *positions: int, **options: object) -> Plan:
-    return make_plan(devices, [wishing(*positions)], **options)  # type: ignore[arg-type]
+    return make_plan(devices, [asking(*positions)], **options)  # type: ignore[arg-type]
 
 
 def clock_datagrams(plan: Plan) -> list[tuple[EcatCommand, int, int, int]]:
@@ -50,7 +52,7 @@ def clock_datagrams(plan: Plan) -> list[tuple[EcatCommand, int, int, int]]:
     return found
 
 
-def test_nobody_wishes_for_clocks() -> None:
+def test_nobody_requests_for_clocks() -> None:
     plan = make_plan(cell())
     assert plan.cycle.clock is None
     assert clock_datagrams(plan) == []
@@ -139,15 +141,15 @@ def test_a_clock_that_only_stamps() -> None:
         planned(devices, 2)
 
 
-def test_two_wishes_for_one_clock() -> None:
-    one, other = wishing(2), wishing(2, clock=DistributedClock(shift=1e-4))
+def test_two_requests_for_one_clock() -> None:
+    one, other = asking(2), asking(2, clock=DistributedClock(shift=1e-4))
     with pytest.raises(ConfigurationError, match="device 2: two requests"):
         make_plan(cell(), [one, other])
-    assert make_plan(cell(), [one, one, Asking({2: PdoWish()})]).devices[2].sync is not None
+    assert make_plan(cell(), [one, one, Asking({2: DeviceRequest()})]).devices[2].sync is not None
 
 
-def sync(wish: DistributedClock, *modes: OpMode) -> SyncPlan:
-    return make_sync(clocked(servo(0), *modes), wish, PERIOD_NS)
+def sync(asked: DistributedClock, *modes: OpMode) -> SyncPlan:
+    return make_sync(clocked(servo(0), *modes), asked, PERIOD_NS)
 
 
 def test_sync_without_any_knowledge_is_sync0_at_the_beat() -> None:
@@ -227,7 +229,7 @@ def test_sync1_alone() -> None:
     assert sync(DistributedClock(assign_activate=0x0500)) == SyncPlan(0x0500, PERIOD_NS, 0, 0)
 
 
-def test_sync_as_wished() -> None:
+def test_sync_as_requested() -> None:
     mode = OpMode(shift_ns=-20_000, assign_activate=0x0300)
     assert sync(DistributedClock(shift=1e-4, sync1=2e-5), mode) == SyncPlan(
         0x0700, PERIOD_NS, 20_000, 100_000
@@ -239,7 +241,7 @@ def test_sync_as_wished() -> None:
 
 
 @pytest.mark.parametrize(
-    ("wish", "mode", "message"),
+    ("asked", "mode", "message"),
     [
         (
             DistributedClock(assign_activate=0x0100),
@@ -260,9 +262,9 @@ def test_sync_as_wished() -> None:
         ),
     ],
 )
-def test_sync_that_cannot_be(wish: DistributedClock, mode: OpMode, message: str) -> None:
+def test_sync_that_cannot_be(asked: DistributedClock, mode: OpMode, message: str) -> None:
     with pytest.raises(ConfigurationError, match=message):
-        sync(wish, mode)
+        sync(asked, mode)
 
 
 def test_an_implausible_shift_is_the_eeproms_and_can_be_overridden() -> None:
@@ -281,13 +283,13 @@ def test_an_implausible_shift_is_the_eeproms_and_can_be_overridden() -> None:
 def test_the_image_of_an_easycat_tells_each_step() -> None:
     """As EasyConfigurator leaves it: its OpMode lacks AssignActivate, and the shift is one too."""
     mode = OpMode("DC_Sync", "DC_Sync", shift_ns=1_882_234_944)  # pollen_Orbita2d.bin
-    wish = DistributedClock(op_mode="DC_Sync")
+    asked = DistributedClock(op_mode="DC_Sync")
     with pytest.raises(ConfigurationError, match="starts no SYNC signal") as refused:
-        sync(wish, FREE, mode)
+        sync(asked, FREE, mode)
     assert "DistributedClock(op_mode='DC_Sync', assign_activate=0x0300)" in refused.value.hint
-    wish = DistributedClock(op_mode="DC_Sync", assign_activate=0x0300)
+    asked = DistributedClock(op_mode="DC_Sync", assign_activate=0x0300)
     with pytest.raises(ConfigurationError, match=r"a shift of 1\.882 s"):
-        sync(wish, FREE, mode)
+        sync(asked, FREE, mode)
     assert sync(DistributedClock(), FREE, mode) == SyncPlan(0x0300, PERIOD_NS, 0, 0)
 
 

@@ -19,7 +19,7 @@ from catenary.model.device import (
 )
 from catenary.plan import make_plan
 from catenary.plan.mapping import make_mapping
-from catenary.plan.request import ObjectReference, PdoWish, WrittenPdo
+from catenary.plan.request import DeviceRequest, ObjectReference, WrittenPdo
 from catenary.plan.start_up import Download, mapping_downloads
 from tests.plan.devices import SERVO_INPUTS, Asking, asks, coupler, demo, lamps, servo
 
@@ -177,8 +177,8 @@ def test_an_object_mapped_twice_with_different_sizes_is_accepted() -> None:
 
 
 def test_fixed_pdos_keep_what_they_have_where_the_rest_is_not_required() -> None:
-    wished = [POSITION, replace(FOLLOWING_ERROR, required=False)]
-    assert not make_mapping(servo(0, fixed=True), Direction.INPUT, wished).changed
+    requested = [POSITION, replace(FOLLOWING_ERROR, required=False)]
+    assert not make_mapping(servo(0, fixed=True), Direction.INPUT, requested).changed
 
 
 def test_without_coe_nothing_changes() -> None:
@@ -232,9 +232,9 @@ def test_a_mandatory_pdo_is_rewritten_rather_than_exchanged() -> None:
 
 
 def test_too_much_for_a_datagram() -> None:
-    wished = [ObjectReference(0x2000 + k, 0, 64) for k in range(190)]
+    requested = [ObjectReference(0x2000 + k, 0, 64) for k in range(190)]
     with pytest.raises(MappingError, match="do not fit"):
-        make_mapping(servo(0), Direction.INPUT, wished)
+        make_mapping(servo(0), Direction.INPUT, requested)
 
 
 def test_a_changed_mapping_moves_what_follows() -> None:
@@ -269,10 +269,10 @@ def test_optional_objects_are_taken_one_by_one() -> None:
 def test_a_plan_shows_old_and_new_values() -> None:
     devices = demo()
     devices[3] = replace(devices[3], values=(ObjectValue(0x6060, 0, b"\x01"),))
-    wish = PdoWish(
+    request = DeviceRequest(
         inputs=(FOLLOWING_ERROR,), start_up=((0x6060, 0, b"\x08"), (0x6065, 0, b"\x01\x02"))
     )
-    plan = make_plan(devices, [Asking({3: wish})])
+    plan = make_plan(devices, [Asking({3: request})])
     before = "0x6041:00/16, 0x6061:00/8, 0x606C:00/32, 0x6064:00/32, 0x6077:00/16"
     assert plan.devices[3].changes == (
         ("0x1A00", before, f"{before}, 0x60F4:00/32"),
@@ -284,8 +284,8 @@ def test_a_plan_shows_old_and_new_values() -> None:
 
 
 def test_two_requests_may_not_write_down_different_pdos() -> None:
-    first = Asking({3: PdoWish(pdos=(WrittenPdo(0x1A00), WrittenPdo(0x1600)))})
-    second = Asking({3: PdoWish(pdos=(WrittenPdo(0x1A01),))})
+    first = Asking({3: DeviceRequest(pdos=(WrittenPdo(0x1A00), WrittenPdo(0x1600)))})
+    second = Asking({3: DeviceRequest(pdos=(WrittenPdo(0x1A01),))})
     with pytest.raises(ConfigurationError, match="different PDOs for inputs"):
         make_plan(demo(), [first, second])
     make_plan(demo(), [first, first])

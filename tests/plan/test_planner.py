@@ -13,7 +13,7 @@ from catenary.model.device import Direction
 from catenary.plan import Number, NumberKind, make_plan
 from catenary.plan.cycle import Copy, DatagramKind, DatagramPlan
 from catenary.plan.layout import MailboxFmmu
-from catenary.plan.request import PdoWish, WishTables
+from catenary.plan.request import DeviceRequest, RequestTables
 from catenary.wire.datagram import EcatCommand
 from catenary.wire.features import Feature
 from catenary.wire.frame import decode_frame
@@ -173,9 +173,12 @@ def test_outputs_alone_need_no_lrw() -> None:
 
 
 @pytest.mark.parametrize("required", [True, False])
-def test_devices_in_no_wish_are_required_if_any_other_is(required: bool) -> None:
-    wishes = [Asking({2: PdoWish(required=required)}), Asking({3: PdoWish(required=False)})]
-    units = make_plan(demo(), wishes).cycle.sync_units
+def test_devices_in_no_request_are_required_if_any_other_is(required: bool) -> None:
+    requests = [
+        Asking({2: DeviceRequest(required=required)}),
+        Asking({3: DeviceRequest(required=False)}),
+    ]
+    units = make_plan(demo(), requests).cycle.sync_units
     optional = {position: unit.optional for unit in units for position in unit.devices}
     assert optional[3]
     assert all(optional[position] is not required for position in optional if position != 3)
@@ -192,17 +195,17 @@ def test_an_optional_device_is_a_unit_of_its_own() -> None:
 
 
 class Slow:
-    """A wish that only says how often."""
+    """A request that only says how often."""
 
     def __init__(self, divider: int, *positions: int, required: bool = True) -> None:
-        self.wish = PdoWish(divider=divider, required=required)
+        self.request = DeviceRequest(divider=divider, required=required)
         self.positions = positions
 
-    def pdos(self, period_ns: int) -> dict[int, PdoWish]:
-        return dict.fromkeys(self.positions, self.wish)
+    def pdos(self, period_ns: int) -> dict[int, DeviceRequest]:
+        return dict.fromkeys(self.positions, self.request)
 
-    def tables(self, layout: object) -> WishTables:
-        return WishTables()
+    def tables(self, layout: object) -> RequestTables:
+        return RequestTables()
 
     def bind(self, views: object) -> None:
         raise NotImplementedError
@@ -221,14 +224,14 @@ def test_units_of_a_divisor_take_turns() -> None:
     assert [(f.divider, f.phase) for f in cycle.frames] == [(1, 0), (4, 0), (4, 1), (4, 2)]
 
 
-def test_wishes_for_one_device_meet_in_the_greatest_common_divisor() -> None:
+def test_requests_for_one_device_meet_in_the_greatest_common_divisor() -> None:
     units = make_plan(demo(), [Slow(4, 2), Slow(6, 2, 3)]).cycle.sync_units
     assert [(u.devices, u.divider) for u in units] == [((1, 4, 5), 1), ((2,), 2), ((3,), 6)]
 
 
-def test_one_wish_that_requires_a_device_is_enough() -> None:
-    wishes = [Slow(1, 2, 3, required=False), Slow(1, 3)]
-    units = make_plan(demo(), wishes).cycle.sync_units
+def test_one_request_that_requires_a_device_is_enough() -> None:
+    requests = [Slow(1, 2, 3, required=False), Slow(1, 3)]
+    units = make_plan(demo(), requests).cycle.sync_units
     assert [(u.devices, u.optional) for u in units] == [((1, 3, 4, 5), False), ((2,), True)]
 
 
@@ -318,7 +321,7 @@ def test_acyclic_frames_get_what_the_cyclic_ones_and_the_guard_leave() -> None:
     assert "one frame for acyclic frames" in str(full)
 
 
-def test_a_wish_for_a_device_that_is_not_there() -> None:
+def test_a_request_for_a_device_that_is_not_there() -> None:
     with pytest.raises(ConfigurationError, match="device 9; the segment has 6"):
         make_plan(demo(), [asks(9)])
 

@@ -10,19 +10,19 @@ from catenary import types
 from catenary.errors import ConfigurationError
 from catenary.model.device import ObjectInformation, ObjectValue
 from catenary.plan.planner import Plan, make_plan
-from catenary.plan.request import ObjectReference, PdoWish
+from catenary.plan.request import DeviceRequest, ObjectReference
 from catenary.plan.start_up_object import StartUp
 from tests.plan.devices import Asking, demo
 
 FOLLOWING_ERROR = ObjectReference(0x60F4, 0, 32)
 
 
-def plan_of(*wishes: PdoWish, objects: tuple[ObjectInformation, ...] = ()) -> Plan:
+def plan_of(*requests: DeviceRequest, objects: tuple[ObjectInformation, ...] = ()) -> Plan:
     """Return a plan for the demo's servo at position 3, with these objects in its dictionary."""
     devices = demo()
     value = ObjectValue(0x6065, 0, b"\x88\x13\x00\x00")
     devices[3] = replace(devices[3], objects=objects, values=(value,))
-    return make_plan(devices, [Asking({3: wish}) for wish in wishes])
+    return make_plan(devices, [Asking({3: request}) for request in requests])
 
 
 def places(plan: Plan) -> list[tuple[int, int]]:
@@ -31,7 +31,7 @@ def places(plan: Plan) -> list[tuple[int, int]]:
 
 def test_the_order_of_writing() -> None:
     plan = plan_of(
-        PdoWish(
+        DeviceRequest(
             inputs=(FOLLOWING_ERROR,),
             start_up=((0x6060, 0, b"\x08"),),
             objects=(
@@ -52,17 +52,17 @@ def test_the_order_of_writing() -> None:
 
 
 def test_a_value_that_is_there_already_is_shown_as_such() -> None:
-    plan = plan_of(PdoWish(objects=(StartUp(0x6065, 0, 5000, type=types.UDINT),)))
+    plan = plan_of(DeviceRequest(objects=(StartUp(0x6065, 0, 5000, type=types.UDINT),)))
     assert "0x6065:00  5000 (UDINT) (as it is)" in str(plan)
 
 
 def test_without_downloads_there_is_no_section() -> None:
-    assert "start-up:" not in str(plan_of(PdoWish()))
+    assert "start-up:" not in str(plan_of(DeviceRequest()))
 
 
 def test_the_type_comes_from_the_dictionary() -> None:
     known = ObjectInformation(0x6065, 0, 32, types.UDINT.index)
-    plan = plan_of(PdoWish(objects=(StartUp(0x6065, 0, 20_000),)), objects=(known,))
+    plan = plan_of(DeviceRequest(objects=(StartUp(0x6065, 0, 20_000),)), objects=(known,))
     [download] = plan.devices[3].downloads
     assert (download.data, download.text) == (b"\x20\x4e\x00\x00", "20000 (UDINT)")
     assert download.verify
@@ -82,18 +82,18 @@ def test_a_type_that_is_not_known(objects: tuple[ObjectInformation, ...], why: s
         ConfigurationError,
         match=rf"device 3 .*type of start-up object 0x6065:00 is unknown: .*{why}",
     ) as caught:
-        plan_of(PdoWish(objects=(StartUp(0x6065, 0, 1),)), objects=objects)
+        plan_of(DeviceRequest(objects=(StartUp(0x6065, 0, 1),)), objects=objects)
     assert "type=types.UDINT" in str(caught.value.hint)
 
 
 def test_bytes_need_no_type() -> None:
-    plan = plan_of(PdoWish(objects=(StartUp(0x6065, 0, b"\x01\x02"),)))
+    plan = plan_of(DeviceRequest(objects=(StartUp(0x6065, 0, b"\x01\x02"),)))
     assert plan.devices[3].downloads[0].data == b"\x01\x02"
 
 
 def test_write_only_objects_are_not_verified() -> None:
     known = ObjectInformation(0x2100, 0, 16, types.UINT.index, readable=False)
-    plan = plan_of(PdoWish(objects=(StartUp(0x2100, 0, 1),)), objects=(known,))
+    plan = plan_of(DeviceRequest(objects=(StartUp(0x2100, 0, 1),)), objects=(known,))
     assert not plan.devices[3].downloads[0].verify
 
 
@@ -125,18 +125,18 @@ def test_objects_next_to_the_mapping_are_free() -> None:
 
 
 def test_a_device_without_objects_cannot_have_any() -> None:
-    wish = PdoWish(objects=(StartUp(0x2000, 0, b"\x01"),))
+    request = DeviceRequest(objects=(StartUp(0x2000, 0, b"\x01"),))
     with pytest.raises(
         ConfigurationError, match=r"device 0 .*start-up object 0x2000:00 .*has no CoE mailbox"
     ):
-        make_plan(demo(), [Asking({0: wish})])
+        make_plan(demo(), [Asking({0: request})])
 
 
 def test_two_requests_may_agree_but_not_contradict() -> None:
     first = StartUp(0x6065, 0, 5, type=types.UDINT)
-    twice = PdoWish(objects=(first,))
+    twice = DeviceRequest(objects=(first,))
     assert len(plan_of(twice, twice).devices[3].downloads) == 1
-    other = PdoWish(objects=(replace(first, value=6),))
+    other = DeviceRequest(objects=(replace(first, value=6),))
     with pytest.raises(
         ConfigurationError, match=r"different values to start-up object 0x6065:00: 5 and 6"
     ):
@@ -146,5 +146,5 @@ def test_two_requests_may_agree_but_not_contradict() -> None:
 def test_one_list_may_write_an_object_twice() -> None:
     """Some devices are unlocked by two values, one after the other."""
     keys = (StartUp(0x2100, 0, b"\x01"), StartUp(0x2100, 0, b"\x02"))
-    plan = plan_of(PdoWish(objects=keys))
+    plan = plan_of(DeviceRequest(objects=keys))
     assert [d.data for d in plan.devices[3].downloads] == [b"\x01", b"\x02"]

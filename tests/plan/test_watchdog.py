@@ -8,7 +8,7 @@ import pytest
 
 from catenary.model.device import DeviceDescription
 from catenary.plan.planner import make_plan
-from catenary.plan.request import ObjectReference, PdoWish
+from catenary.plan.request import DeviceRequest, ObjectReference
 from tests.plan.devices import Asking, lamps, servo
 
 MILLISECOND = 1_000_000
@@ -28,8 +28,8 @@ def with_control(device: DeviceDescription, control: int) -> DeviceDescription:
 def watchdog_ns(
     *outputs: ObjectReference, divider: int = 1, period: float = 1e-3, watchdog: float | None = None
 ) -> int:
-    wish = Asking({0: PdoWish(outputs=outputs, divider=divider)})
-    return make_plan([servo(0)], [wish], period=period, watchdog=watchdog).devices[0].watchdog_ns
+    request = Asking({0: DeviceRequest(outputs=outputs, divider=divider)})
+    return make_plan([servo(0)], [request], period=period, watchdog=watchdog).devices[0].watchdog_ns
 
 
 def test_100_ms_unless_torques_are_commanded() -> None:
@@ -54,7 +54,9 @@ def test_an_optional_torque_is_not_cst() -> None:
 
 
 def test_only_the_device_in_cst_has_the_short_watchdog() -> None:
-    plan = make_plan([servo(0), servo(1), lamps(2)], [Asking({1: PdoWish(outputs=(TORQUE,))})])
+    plan = make_plan(
+        [servo(0), servo(1), lamps(2)], [Asking({1: DeviceRequest(outputs=(TORQUE,))})]
+    )
     assert [device.watchdog_ns for device in plan.devices] == [
         100 * MILLISECOND,
         10 * MILLISECOND,

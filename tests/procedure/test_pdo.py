@@ -9,7 +9,7 @@ import pytest
 from catenary.errors import MappingError
 from catenary.model.device import Assignment, DeviceDescription, Direction, Entry, ObjectValue, Pdo
 from catenary.plan.planner import make_plan
-from catenary.plan.request import ObjectReference, PdoWish
+from catenary.plan.request import DeviceRequest, ObjectReference
 from catenary.procedure.pdo import read_mapping, write_downloads
 from catenary.procedure.pdo_offers import read_first_mapping, read_offers, read_values
 from catenary.wire.coe import Abort, DownloadRequest, decode_coe
@@ -111,8 +111,8 @@ class Refusing(Dictionary):
 
 def test_a_refused_mapping_is_taken_back_step_by_step() -> None:
     device = servo(0)
-    wish = PdoWish(inputs=(ObjectReference(0x60F4, 0, 32),))
-    [plan] = make_plan([device], [Asking({0: wish})]).devices
+    request = DeviceRequest(inputs=(ObjectReference(0x60F4, 0, 32),))
+    [plan] = make_plan([device], [Asking({0: request})]).devices
     dictionary = Refusing({})
     with pytest.raises(MappingError, match="the entries of PDO 0x1A00 cannot be changed"):
         play(write_downloads(channel(), device, plan), MailboxDevice(dictionary))

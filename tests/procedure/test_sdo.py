@@ -62,7 +62,7 @@ def test_an_emergency_on_the_way_is_put_aside() -> None:
     device = MailboxDevice(lambda message: [coe(emergency), *dictionary(message)])
     lane = channel()
     assert play(upload(lane, 0x1000, 0), device) == b"\x92\x01\x02\x00"
-    assert [heard.emergency for heard in lane.emergencies] == [emergency]
+    assert [received.emergency for received in lane.emergencies] == [emergency]
     assert lane.dropped == 0
 
 

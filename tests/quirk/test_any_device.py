@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import catenary as cat
 from catenary.errors import CatenaryError
-from catenary.plan import ObjectReference, PdoWish
+from catenary.plan import DeviceRequest, ObjectReference
 from catenary.types import UDINT
 from catenary.virtual import Coupler, DigitalOutputs, Segment, Servo
 from catenary.virtual.devices.application import Application
@@ -166,13 +166,13 @@ def assert_others_are_found(segment: Segment) -> None:
 
 def assert_planned(main: cat.MainDevice, position: int) -> None:
     """A plan is made in a bounded time, or the error names the strange device."""
-    wish = PdoWish(
+    request = DeviceRequest(
         inputs=(ObjectReference(0x6041, 0, 16), ObjectReference(0x60F4, 0, 32, required=False)),
         start_up=((0x6060, 0, b"\x08"),),
     )
     before = main.link.now()
     try:
-        main.plan(Asking({position: wish}))
+        main.plan(Asking({position: request}))
     except CatenaryError as error:
         assert_named(error)
     assert main.link.now() - before < PLAN_MAX * 1e9

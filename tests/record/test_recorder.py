@@ -146,7 +146,7 @@ def test_each_gap_is_said_where_it_is(name: str, tmp_path: Path) -> None:
 def test_events_that_were_overwritten_are_counted_and_said(name: str, tmp_path: Path) -> None:
     with shared_loop(name) as shared, record.Recorder(name, tmp_path / "x.mcap"):
         for number in range(EVENT_COUNT + 44):
-            shared.share.tell(Incident("Emergency", f"the {number}th", 1.0))
+            shared.share.report(Incident("Emergency", f"the {number}th", 1.0))
     back = record.read(tmp_path / "x.mcap")
     assert len(back.events) == 1 + EVENT_COUNT
     assert (back.events[0].kind, back.events[0].details) == ("EventsLost", {"events": 44})

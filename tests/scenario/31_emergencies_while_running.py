@@ -39,10 +39,10 @@ def test_the_bit_in_the_cycle_tells_at_once(cell: Cell, run: str) -> None:
     arm = cell.drives()
     with cat.Loop(arm, execution=run, stop=cat.StopPolicy(raise_faults=False)) as loop:  # type: ignore[arg-type]
         assert loop.plan.mailboxes.devices == (2, 3)
-        sent = loop.timing.counters["lane_sent"]
+        sent = loop.timing.counters["acyclic_sent"]
         [(when, event)] = emergencies(loop, cell, cycles=60)
         assert loop.timing.counters["lost"] == 0
-        assert loop.timing.counters["lane_sent"] - sent < 10
+        assert loop.timing.counters["acyclic_sent"] - sent < 10
     assert 20 < when <= 28
     assert event.sub is cell.subs[3]
     assert (event.error_code, event.text) == (0x7305, "incremental sensor 1 fault")
@@ -96,7 +96,7 @@ def test_nothing_is_asked_where_nothing_is_said(cell: Cell) -> None:
     with cat.Loop(arm) as loop:
         for cycle in loop:
             if cycle.number == 0:
-                sent = loop.timing.counters["lane_sent"]
+                sent = loop.timing.counters["acyclic_sent"]
             if cycle.number == 1000:
                 break
-        assert loop.timing.counters["lane_sent"] - sent <= 11  # a register each 100 ms
+        assert loop.timing.counters["acyclic_sent"] - sent <= 11  # a register each 100 ms

@@ -47,7 +47,7 @@ def cell() -> Iterator[Cell]:
         yield cell
 
 
-def wishes(cell: Cell) -> tuple[cat.Drives, cat.Drives, cat.Outputs]:
+def requests(cell: Cell) -> tuple[cat.Drives, cat.Drives, cat.Outputs]:
     arm = cat.Drives([cell.subs[1], cell.subs[2]], counts_per_turn=2**20, velocity_limit=100.0)
     tool = cat.Drives(
         [cell.subs[TOOL]], counts_per_turn=2**20, velocity_limit=100.0, required=False
@@ -65,7 +65,7 @@ def run(
     **options: object,
 ) -> list[event_types.Event]:
     """The arm moves throughout and never misses a cycle; what happened meanwhile."""
-    arm, tool, gripper = wishes(cell)
+    arm, tool, gripper = requests(cell)
     with cat.Loop(arm, tool, gripper, **grouped(options)) as loop:  # type: ignore[arg-type]
         cell.main.events.get()
         for fault in faults:
@@ -182,7 +182,7 @@ def test_unplugged_it_keeps_its_address_and_comes_back_all_the_same(cell: Cell) 
 )
 def test_optional_devices_alone_survive_a_silent_bus(cell: Cell, faults: list[Fault]) -> None:
     """No device is required, so none is missing: not even the coupler before them."""
-    _, tool, gripper = wishes(cell)
+    _, tool, gripper = requests(cell)
     with cat.Loop(tool, gripper) as loop:
         cell.main.events.get()
         for fault in faults:
@@ -203,7 +203,7 @@ def test_optional_devices_alone_survive_a_silent_bus(cell: Cell, faults: list[Fa
 
 def test_optional_devices_alone_may_be_left_behind(cell: Cell) -> None:
     """The devices are still silent when the loop is left."""
-    _, tool, gripper = wishes(cell)
+    _, tool, gripper = requests(cell)
     with cat.Loop(tool, gripper) as loop:
         cell.segment.inject(unplug(0, at=0.1))
         for cycle in loop:

@@ -43,7 +43,7 @@ def positions(run: str, *, storm: bool) -> list[tuple[float, ...]]:
                     break
             assert loop.timing.counters["lost"] == 0
             assert loop.timing.counters["late"] == 0
-            lane = loop.timing.counters["lane_sent"]
+            lane = loop.timing.counters["acyclic_sent"]
         assert not storm or answered >= 4 * CYCLES / 4.1
         assert lane <= CYCLES + 50  # one frame a cycle for all
         cell.assert_safe()

@@ -92,7 +92,7 @@ def test_a_reference_of_32_bits() -> None:
         assert loop.clocks.jumps == 0
 
 
-def test_without_a_wish_drives_run_freely() -> None:
+def test_without_a_request_drives_run_freely() -> None:
     with clocked_cell(2) as cell, cat.Loop(cell.drives(), period=1e-3) as loop:
         run_for(loop, 0.1)
         assert cell.segment.core.pulses(2) == (0, 0)

@@ -11,8 +11,8 @@ from tests.loop_options import grouped
 from tests.scenario.cell import PRE_OP, Cell
 
 
-def enter(cell: Cell, *wishes: object, **options: object) -> None:
-    with cat.Loop(*wishes, period=1e-3, **grouped(options)):  # type: ignore[arg-type]
+def enter(cell: Cell, *requests: object, **options: object) -> None:
+    with cat.Loop(*requests, period=1e-3, **grouped(options)):  # type: ignore[arg-type]
         raise AssertionError("this loop cannot be")
 
 
@@ -38,7 +38,7 @@ def test_frames_that_do_not_fit_before_the_beat(cell: Cell) -> None:
         enter(cell, cell.drives(dc=True), margin=0.99e-3)
 
 
-def test_two_wishes_that_disagree(cell: Cell) -> None:
+def test_two_requests_that_disagree(cell: Cell) -> None:
     one = cat.Drives(
         cell.subs.drives,
         counts_per_turn=2**20,

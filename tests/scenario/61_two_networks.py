@@ -23,7 +23,7 @@ class Body:
     upper_main: cat.MainDevice
     lower_main: cat.MainDevice
 
-    def wishes(self) -> tuple[cat.Drives, cat.Drives]:
+    def requests(self) -> tuple[cat.Drives, cat.Drives]:
         return tuple(
             cat.Drives(main.subs.drives, counts_per_turn=2**20, velocity_limit=100.0)
             for main in (self.upper_main, self.lower_main)
@@ -51,7 +51,7 @@ def bodies(upper_axes: int, lower_axes: int) -> Iterator[Body]:
 
 
 def test_both_follow_in_every_cycle(body: Body) -> None:
-    upper, lower = body.wishes()
+    upper, lower = body.requests()
     with cat.Loop(upper, lower, period=1e-3) as loop:
         homes = upper.actual.position.copy(), lower.actual.position.copy()
         for cycle in loop:
@@ -75,7 +75,7 @@ def test_both_follow_in_every_cycle(body: Body) -> None:
 def test_the_axes_of_a_humanoid_at_four_and_eight_kilohertz(hertz: int) -> None:
     """18 + 15 axes, as TOCABI has them: all complete."""
     for body in bodies(18, 15):
-        upper, lower = body.wishes()
+        upper, lower = body.requests()
         with cat.Loop(upper, lower, period=1 / hertz) as loop:
             for cycle in loop:
                 assert cycle.ok
@@ -88,7 +88,7 @@ def test_the_axes_of_a_humanoid_at_four_and_eight_kilohertz(hertz: int) -> None:
 
 
 def test_one_that_dies_ends_the_loop_and_the_other_is_stopped(body: Body) -> None:
-    upper, lower = body.wishes()
+    upper, lower = body.requests()
     with pytest.raises(WorkingCounterError, match="no device answers"):
         run_and_kill(body, upper, lower)
     assert all(device.state & 0x0F < 8 for device in body.lower)
@@ -114,7 +114,7 @@ def run_and_kill(
 
 
 def test_with_a_quorum_the_other_goes_on(body: Body) -> None:
-    upper, lower = body.wishes()
+    upper, lower = body.requests()
     seen = run_and_kill(body, upper, lower, quorum=1)
     assert seen[50] == (True, True, True)
     assert seen[-1] == (True, False, True)
@@ -125,7 +125,7 @@ def test_with_a_quorum_the_other_goes_on(body: Body) -> None:
 
 def test_one_that_is_plugged_in_again_does_not_stop_the_other(body: Body) -> None:
     """Its devices are out of OP by their watchdogs. They are led back, and stand until asked."""
-    upper, lower = body.wishes()
+    upper, lower = body.requests()
     with cat.Loop(upper, lower, scheduling=cat.Scheduling(quorum=1)) as loop:
         home = lower.actual.position.copy()
         for cycle in loop:
@@ -149,7 +149,7 @@ def test_one_that_is_plugged_in_again_does_not_stop_the_other(body: Body) -> Non
 @pytest.mark.parametrize("quorum", [1, 2])
 def test_a_network_that_answers_out_of_op_does_not_count(body: Body, quorum: int) -> None:
     """Unplugged for so long only that watchdogs stop its drives, and nobody calls it lost."""
-    upper, lower = body.wishes()
+    upper, lower = body.requests()
     with (
         pytest.raises((WorkingCounterError, StateError)),
         cat.Loop(upper, lower, scheduling=cat.Scheduling(quorum=quorum)) as loop,
@@ -170,7 +170,7 @@ def test_a_device_that_refuses_op_brings_both_down(body: Body) -> None:
     from catenary.virtual.faults import refuse_state
 
     body.lower.inject(refuse_state(1, "OP", code=0x001B, at=0))
-    upper, lower = body.wishes()
+    upper, lower = body.requests()
     with pytest.raises(StateError, match="device 1"), cat.Loop(upper, lower):
         raise AssertionError("it opened")
     body.assert_safe()
@@ -182,11 +182,11 @@ def test_their_clocks_follow_the_main_device() -> None:
         crystals = [Crystal(ppm=100.0), Crystal(ppm=-60.0)]
         segments = [Segment([Coupler(crystal=c), Servo()], clock=clock) for c in crystals]
         with cat.MainDevice(segments[0]) as first, cat.MainDevice(segments[1]) as second:
-            wishes = [
+            requests = [
                 cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0, dc=True)
                 for main in (first, second)
             ]
-            with cat.Loop(*wishes) as loop:
+            with cat.Loop(*requests) as loop:
                 loop.wait_locked(within=1e-6, timeout=2.0)
                 assert [network.clocks.locked for network in loop.networks] == [True, True]
                 for cycle in loop:
@@ -197,12 +197,12 @@ def test_their_clocks_follow_the_main_device() -> None:
                         break
                 assert [network.clocks.locked for network in loop.networks] == [True, True]
             with pytest.raises(ValueError, match='lead="main"'):
-                cat.Loop(*wishes, clocks=cat.ClockOptions(lead="reference"))
+                cat.Loop(*requests, clocks=cat.ClockOptions(lead="reference"))
 
 
 def test_clocks_that_nobody_wished_for_cannot_be_waited_for(body: Body) -> None:
     with (
-        cat.Loop(*body.wishes()) as loop,
+        cat.Loop(*body.requests()) as loop,
         pytest.raises(RuntimeError, match="dc=True"),
     ):
         loop.wait_locked()
@@ -233,7 +233,7 @@ def test_a_device_is_released_in_its_own_network(body: Body) -> None:
 
 
 def test_what_several_networks_cannot_have(body: Body) -> None:
-    upper, lower = body.wishes()
+    upper, lower = body.requests()
     with pytest.raises(ValueError, match="threaded"):
         cat.Loop(upper, lower, execution="inline")
     with pytest.raises(ValueError, match="quorum"):
@@ -246,9 +246,9 @@ def test_what_several_networks_cannot_have(body: Body) -> None:
 def test_segments_with_clocks_of_their_own_are_refused() -> None:
     segments = Segment([Servo()]), Segment([Servo(), Servo()])
     with cat.MainDevice(segments[0]) as first, cat.MainDevice(segments[1]) as second:
-        wishes = [
+        requests = [
             cat.Drives(main.scan().drives, counts_per_turn=2**20, velocity_limit=100.0)
             for main in (first, second)
         ]
-        with pytest.raises(ValueError, match="VirtualClock"), cat.Loop(*wishes):
+        with pytest.raises(ValueError, match="VirtualClock"), cat.Loop(*requests):
             raise AssertionError("it opened")

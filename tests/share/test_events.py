@@ -39,10 +39,10 @@ def test_the_oldest_give_way(name: str) -> None:
         with cat.Loop(arm, sink=share) as loop, cat.attach(name) as reader:
             next(loop)
             for k in range(EVENT_COUNT + 10):
-                share.tell(Incident("Test", f"number {k}", 0.0))
+                share.report(Incident("Test", f"number {k}", 0.0))
             events, lost = reader.events()
             assert (len(events), lost) == (EVENT_COUNT, 10)
             assert events[-1].message == f"number {EVENT_COUNT + 9}"
             assert events[0].number == reader.number
             assert "number 10" in str(events[0])
-        share.tell(Incident("Test", "behind the end", 0.0))  # goes nowhere
+        share.report(Incident("Test", "behind the end", 0.0))  # goes nowhere

@@ -17,7 +17,7 @@ from importlib import import_module
 from pathlib import Path
 
 from catenary.bench.job import Job, Round, read_job, write_round
-from catenary.realtime.scheduling import Scheduling, request_scheduling, what_scheduling
+from catenary.realtime.system.scheduling import Scheduling, request_scheduling, what_scheduling
 
 
 def main(arguments: Sequence[str]) -> None:

@@ -1,7 +1,7 @@
 """MainDevice and SubDevice, and the runners of procedures."""
 
+from catenary.bus.acyclic_runner import AcyclicQueue, AcyclicRunner
 from catenary.bus.external_master import Carrier, CycleClock
-from catenary.bus.lane_runner import Lane, LaneRunner
 from catenary.bus.main_device import MainDevice
 from catenary.bus.pending import Pending
 from catenary.bus.runner import BlockingRunner, FrameCounts, Runner
@@ -11,12 +11,12 @@ from catenary.bus.sub_devices import SubDevices
 from catenary.wire.sdo_information import ListType
 
 __all__ = [
+    "AcyclicQueue",
+    "AcyclicRunner",
     "BlockingRunner",
     "Carrier",
     "CycleClock",
     "FrameCounts",
-    "Lane",
-    "LaneRunner",
     "ListType",
     "MainDevice",
     "Pending",

@@ -20,8 +20,8 @@ from catenary.link import RingLink
 from catenary.model.device import DeviceDescription, Direction, mapped_pdos
 from catenary.plan.clocks import SYNC_OBJECTS
 from catenary.plan.pdo_search import any_carries
-from catenary.plan.planner import Plan, gather_wishes
-from catenary.plan.request import ObjectReference, PdoWish, Wish
+from catenary.plan.planner import Plan, gather_requests
+from catenary.plan.request import DeviceRequest, ObjectReference, ProcessDataRequest
 from catenary.plan.start_up import DevicePlan
 from catenary.plan.start_up_object import StartUp
 from catenary.procedure.al_state import request_state
@@ -42,7 +42,10 @@ WRITE_TIMEOUT = 60.0  # [s] to write and verify the objects of one device
 
 
 def describe_mappings(
-    runner: BlockingRunner, subs: Sequence[SubDevice], wishes: Sequence[Wish], period_ns: int
+    runner: BlockingRunner,
+    subs: Sequence[SubDevice],
+    requests: Sequence[ProcessDataRequest],
+    period_ns: int,
 ) -> None:
     """Update the descriptions of all CoE devices: the mapping, and the requested objects.
 
@@ -51,10 +54,10 @@ def describe_mappings(
     Args:
         runner: Runner of the procedures.
         subs: Devices of the segment.
-        wishes: Process-data requests.
+        requests: Process-data requests.
         period_ns: Period of the cycle.
     """
-    asked = gather_wishes(wishes, period_ns)
+    asked = gather_requests(requests, period_ns)
     with_coe = [sub for sub in subs if sub.description.coe]
     found = runner.run_all([_renewed(sub, asked.get(sub.position)) for sub in with_coe])
     for sub, description in zip(with_coe, found, strict=True):
@@ -112,36 +115,39 @@ def bring_to_safe_op(
     return measured
 
 
-def _renewed(sub: SubDevice, wish: PdoWish | None) -> Procedure[DeviceDescription]:
+def _renewed(sub: SubDevice, request: DeviceRequest | None) -> Procedure[DeviceDescription]:
     """Return the present description.
 
     If a device that no request names does not answer, return its description from the scan.
     """
-    reading = within(READ_TIMEOUT, sub.station, _describe(sub, wish or PdoWish()))
+    reading = within(READ_TIMEOUT, sub.station, _describe(sub, request or DeviceRequest()))
     try:
         return (yield from reading)
     except (MailboxError, MappingError, ResponseTimeout):
-        if wish is not None:
+        if request is not None:
             raise
         return sub.description
 
 
-def _describe(sub: SubDevice, wish: PdoWish) -> Procedure[DeviceDescription]:
+def _describe(sub: SubDevice, request: DeviceRequest) -> Procedure[DeviceDescription]:
     channel = _channel(sub)
     device = yield from read_mapping(channel, sub.description)
     device = yield from name_entries(channel, device)
-    written = [(index, subindex) for index, subindex, _ in wish.start_up]
-    written += [(each.index, each.subindex) for each in wish.objects]
-    if wish.clock is not None:
+    written = [(index, subindex) for index, subindex, _ in request.start_up]
+    written += [(each.index, each.subindex) for each in request.objects]
+    if request.clock is not None:
         written += [(index, subindex) for index in SYNC_OBJECTS for subindex in (1, 2)]
     device = yield from read_values(channel, device, written)
-    for direction, references in ((Direction.OUTPUT, wish.outputs), (Direction.INPUT, wish.inputs)):
+    for direction, references in (
+        (Direction.OUTPUT, request.outputs),
+        (Direction.INPUT, request.inputs),
+    ):
         missing = _unmapped(device, direction, references)
-        if missing or wish.written(direction):
+        if missing or request.written(direction):
             device = yield from read_offers(channel, device, direction)
         required = [each for each in missing if each.required]
         device = yield from _with_objects(channel, device, required)
-    return (yield from _with_objects(channel, device, wish.objects))
+    return (yield from _with_objects(channel, device, request.objects))
 
 
 def _with_objects(

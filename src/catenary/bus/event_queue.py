@@ -154,7 +154,7 @@ class Callbacks:
     def add(self, callback: Callback) -> None:
         self._callbacks.append(callback)
 
-    def tell(self, event: Event) -> None:
+    def report(self, event: Event) -> None:
         """Queue an event for all callbacks. Never waits for them."""
         if not self._callbacks:
             return

@@ -16,7 +16,7 @@ from catenary.errors import LinkError
 from catenary.link import ring_of
 from catenary.model.device import DeviceDescription
 from catenary.procedure.live_outputs import Running, find_refreshed, find_running
-from catenary.procedure.mailbox import Heard
+from catenary.procedure.mailbox import ReceivedEmergency
 from catenary.procedure.stations import (
     StationRegisters,
     assign,
@@ -31,7 +31,7 @@ if TYPE_CHECKING:  # plan needs NumPy, a scan does not
     from catenary.bus.diagnosis import Diagnosis
     from catenary.bus.states import Outcome
     from catenary.plan.planner import Plan
-    from catenary.plan.request import Wish
+    from catenary.plan.request import ProcessDataRequest
 
 
 class FrameMaster:
@@ -130,11 +130,11 @@ class FrameMaster:
         ring = ring_of(self._main.link) is not None
         return self._main.converse(diagnose(subs, since=since, lost_frames=lost_frames, ring=ring))
 
-    def read_mappings(self, wishes: Sequence[Wish], period_ns: int) -> None:
+    def read_mappings(self, requests: Sequence[ProcessDataRequest], period_ns: int) -> None:
         """Read what is mapped, and what the dictionaries say of other objects."""
         from catenary.bus.bring_up import describe_mappings
 
-        describe_mappings(self._main.runner, self._main.subs, wishes, period_ns)
+        describe_mappings(self._main.runner, self._main.subs, requests, period_ns)
 
     def read_objects(self, wanted: Mapping[int, Sequence[tuple[int, int]]]) -> dict[int, Objects]:
         """Read objects of several devices, all devices at the same time."""
@@ -174,10 +174,12 @@ class FrameMaster:
             known = SubDevice(self._main, found.description, found.channel)
         known.description, known.channel = found.description, found.channel
         if known.channel is not None:
-            known.channel.listen(partial(self._hear, known))
+            known.channel.listen(partial(self._on_emergency, known))
         known.error = found.error
         known.state = AlState.PRE_OP if found.error is None else None
         return known
 
-    def _hear(self, sub: SubDevice, heard: Heard) -> None:
-        self._main.events.put(event_types.emergency(heard.time_ns * 1e-9, sub, heard.emergency))
+    def _on_emergency(self, sub: SubDevice, received: ReceivedEmergency) -> None:
+        self._main.events.put(
+            event_types.emergency(received.time_ns * 1e-9, sub, received.emergency)
+        )

@@ -37,7 +37,7 @@ if TYPE_CHECKING:  # plan needs NumPy, a scan does not
     from catenary.bus.states import Outcome
     from catenary.plan.cycle import ExecutionMode, ReceiveMode
     from catenary.plan.planner import Plan
-    from catenary.plan.request import Wish
+    from catenary.plan.request import ProcessDataRequest
 
 T = TypeVar("T")
 
@@ -65,7 +65,7 @@ class MainDevice:
         self.clock_epoch_ns = 0  # system time of the clocks minus link time
         self.events = events = Events()  # iterate, or get(timeout=)
         self._callbacks = callbacks = Callbacks()
-        events.listen(lambda each: callbacks.tell(events.stamped(each)))
+        events.listen(lambda each: callbacks.report(events.stamped(each)))
         self._source = source
         self._force = force
         self._ownership: Ownership | None = None
@@ -303,7 +303,7 @@ class MainDevice:
 
     def plan(
         self,
-        *wishes: Wish,
+        *requests: ProcessDataRequest,
         period: float = 1e-3,
         execution: ExecutionMode = "threaded",
         receive_mode: ReceiveMode = "wait",
@@ -316,7 +316,7 @@ class MainDevice:
         then `catenary.plan.make_plan`.
 
         Args:
-            wishes: `Drives`, `Inputs`, `Outputs` and other process-data requests.
+            requests: `Drives`, `Inputs`, `Outputs` and other process-data requests.
             period: Period of the cycle [s].
             execution: "threaded" or "inline", as for `Loop`.
             receive_mode: "poll", "wait" or "busy", as `Scheduling.receive`.
@@ -328,10 +328,10 @@ class MainDevice:
         """
         from catenary.plan.planner import make_plan
 
-        self.read_mappings(*wishes, period=period)
+        self.read_mappings(*requests, period=period)
         return make_plan(
             [sub.description for sub in self.subs],
-            wishes,
+            requests,
             period=period,
             execution=execution,
             receive_mode=receive_mode,
@@ -339,11 +339,11 @@ class MainDevice:
             watchdog=watchdog,
         )
 
-    def read_mappings(self, *wishes: Wish, period: float = 1e-3) -> None:
+    def read_mappings(self, *requests: ProcessDataRequest, period: float = 1e-3) -> None:
         """Update the descriptions of the devices: mappings, and requested objects.
 
         Args:
-            *wishes: Process-data requests.
+            *requests: Process-data requests.
             period: Period of the cycle [s].
 
         Raises:
@@ -352,7 +352,7 @@ class MainDevice:
         self._raise_errors()
         from catenary.plan.planner import period_in_ns
 
-        self.master.read_mappings(wishes, period_in_ns(period))
+        self.master.read_mappings(requests, period_in_ns(period))
 
     def configure(self, plan: Plan) -> None:
         """Configure every device as planned and bring all to SAFE-OP."""

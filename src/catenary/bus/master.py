@@ -18,7 +18,7 @@ if TYPE_CHECKING:  # plan needs NumPy, a scan does not
     from catenary.bus.diagnosis import Diagnosis
     from catenary.bus.states import Outcome
     from catenary.plan.planner import Plan
-    from catenary.plan.request import Wish
+    from catenary.plan.request import ProcessDataRequest
 
 
 class MasterOwner(DeviceOwner, Protocol):
@@ -60,7 +60,7 @@ class Master(Protocol):
         self, subs: Sequence[SubDevice], *, since: Diagnosis | None, lost_frames: int
     ) -> Diagnosis: ...
 
-    def read_mappings(self, wishes: Sequence[Wish], period_ns: int) -> None: ...
+    def read_mappings(self, requests: Sequence[ProcessDataRequest], period_ns: int) -> None: ...
 
     def read_objects(
         self, wanted: Mapping[int, Sequence[tuple[int, int]]]

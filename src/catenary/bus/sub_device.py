@@ -94,8 +94,8 @@ class SubDevice:
     @property
     def emergencies(self) -> tuple[Emergency, ...]:
         """Last emergencies that the device sent, oldest first."""
-        heard = self.channel.emergencies if self.channel is not None else ()
-        return tuple(each.emergency for each in heard)
+        received = self.channel.emergencies if self.channel is not None else ()
+        return tuple(each.emergency for each in received)
 
     @property
     def station(self) -> Station:

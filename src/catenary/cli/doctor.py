@@ -127,7 +127,7 @@ def apply(changes: tuple[Change, ...], *, ask: bool) -> int:
     if ask and not agreed():
         print("Nothing was changed.")
         return 0
-    return tell(make(changes, ground, open_state()))
+    return print_report(make(changes, ground, open_state()))
 
 
 def agreed() -> bool:
@@ -146,10 +146,10 @@ def undo() -> int:
     if not state.load():
         print(f"Nothing to undo: {state.path} contains no change since this machine was started.")
         return 0
-    return tell(take_back(MachineGround(), state))
+    return print_report(take_back(MachineGround(), state))
 
 
-def tell(lines: Iterable[str]) -> int:
+def print_report(lines: Iterable[str]) -> int:
     refused = False
     for line in lines:
         print(line)

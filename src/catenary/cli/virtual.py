@@ -66,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
     def say() -> None:
         print(f"{len(segment)} devices answer on {interfaces}; Ctrl-C ends", flush=True)
 
-    def tell(event: FaultEvent) -> None:
+    def print_fault(event: FaultEvent) -> None:
         print(f"{event.time:.3f} s: {event.fault} {event.what}", flush=True)
 
     serve(
@@ -75,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
         second=arguments.ring,
         max_age=arguments.max_age,
         ready=say,
-        tell=tell,
+        on_fault=print_fault,
     )
     _report_expired(segment.frames.expired, arguments.max_age, arguments.priority)
     return 0
@@ -85,7 +85,7 @@ def _raise_priority(interface: str, priority: int) -> None:
     """Request real-time scheduling for this process and its later threads."""
     from catenary.errors import LinkError
     from catenary.interpreter import permission_advice
-    from catenary.realtime.scheduling import request_scheduling
+    from catenary.realtime.system.scheduling import request_scheduling
 
     scheduling = request_scheduling(priority=priority)
     if not scheduling.real_time:

@@ -14,10 +14,10 @@ from catenary.core._axes import (
 )
 from catenary.core._axis_log import AXIS_FIELDS
 from catenary.core._cia402 import (
-    GOAL_DISABLED,
-    GOAL_ENABLED,
-    GOAL_QUICK_STOP,
-    GOAL_RESET,
+    REQUEST_DISABLED,
+    REQUEST_ENABLED,
+    REQUEST_QUICK_STOP,
+    REQUEST_RESET,
     controlword_towards,
     state_of,
 )
@@ -74,10 +74,6 @@ __all__ = [
     "CYCLE_STOPPED",
     "CYCLE_UNCOMMITTED",
     "CYCLE_WORKING_COUNTER",
-    "GOAL_DISABLED",
-    "GOAL_ENABLED",
-    "GOAL_QUICK_STOP",
-    "GOAL_RESET",
     "LAW_ABORTED",
     "LAW_FINISHED",
     "LAW_NEVER_RETURNED",
@@ -87,6 +83,10 @@ __all__ = [
     "LAW_RUNNING",
     "LAW_STOPPED",
     "RECORD_FIELDS",
+    "REQUEST_DISABLED",
+    "REQUEST_ENABLED",
+    "REQUEST_QUICK_STOP",
+    "REQUEST_RESET",
     "Clock",
     "Cycle",
     "Engine",

@@ -12,7 +12,7 @@ cdef enum:  # bits of axis_flags; 6 and 7: the requested state in force
     REFUSED = 8
     FALLBACK = 16
     MODE_REFUSED = 32
-    GOAL_SHIFT = 6
+    REQUESTED_SHIFT = 6
 
 cdef enum:
     BANK_REAL = 0
@@ -69,7 +69,7 @@ cdef struct axis_t:
     double demand_torque
     # requested
     uint32_t request           # number of the last request taken over
-    uint8_t goal               # requested state in force
+    uint8_t requested_state               # requested state in force
     uint16_t command           # command bits of the last controlword sent
     int8_t mode                # in force: the drive follows set-points of this mode
     int8_t mode_wanted         # requested mode, sent in 0x6060
@@ -80,7 +80,7 @@ cdef struct axis_t:
     uint8_t clear_reset        # keep bit 7 clear for one cycle, to create an edge
     uint8_t followed
     uint8_t worked             # was followed since OPERATION_ENABLED or since a mode change
-    uint8_t tells              # bit 12 was seen: the drive implements it
+    uint8_t shows_following              # bit 12 was seen: the drive implements it
     uint8_t followed_at_stop   # bit 12 was set when the stop began
     uint8_t flags
     uint8_t stop_reason
@@ -166,7 +166,7 @@ cdef struct axes_t:
     uint8_t torque_counts
     uint32_t stop_asked        # number of stop requests, from any thread
     uint32_t stop_seen
-    uint32_t told              # flags of the cycle that its axes set
+    uint32_t cycle_flags              # flags of the cycle that its axes set
     uint32_t moving
 
 cdef class Axes:
@@ -178,6 +178,6 @@ cdef void axes_read(axes_t *x, actual_t *out, uint64_t number, int64_t instant) 
 cdef void axes_write(axes_t *x, const target_t *target, bint fresh, uint64_t number) noexcept nogil
 cdef void axes_hand_over(axes_t *x) noexcept nogil
 cdef bint axes_apply_late(axes_t *x, const target_t *target, bint fresh) noexcept nogil
-cdef void axes_tell(axes_t *x, actual_t *out) noexcept nogil
+cdef void axes_report(axes_t *x, actual_t *out) noexcept nogil
 cdef void axes_follow(const axes_t *x, const actual_t *actual, target_t *target) noexcept nogil
 cdef void axes_follow_now(const axes_t *x, target_t *target) noexcept nogil

@@ -6,8 +6,8 @@ quantity, or that it is absent. `axes_read` runs after the inputs of a cycle. It
 values and unwraps position counters of any width to 64 bits (`counts`, `last_raw`); then _guard.pyx
 judges the axis. `axes_write` runs before the outputs: requests (_guard.pyx), set-points
 (_setpoints.pyx), controlword, bytes. A number is written only if it differs from the image (`put_t`).
-`axes_apply_late` applies late stop requests to outputs that a law has computed. `axes_tell` reports
-the axes after the frames. `told` collects the flags of the cycle, `handed_over` counts the cycles of a
+`axes_apply_late` applies late stop requests to outputs that a law has computed. `axes_report` reports
+the axes after the frames. `cycle_flags` collects the flags of the cycle, `handed_over` counts the cycles of a
 hand-over, and `stop_asked` counts stop requests of any thread. Areas are bytes of an image that the
 application uses unchanged: copied, never interpreted. _axes.pxd defines every word of an axis.
 
@@ -162,7 +162,7 @@ cdef inline void read_areas(const axes_t *x, actual_t *out) noexcept nogil:
 cdef void axes_read(axes_t *x, actual_t *out, uint64_t number, int64_t instant) noexcept nogil:
     """Decode the input image into the actual values of cycle `number`, after its collect.
 
-    `instant`: its cycle start [ns]. `axes_tell` follows later, in the post-processing.
+    `instant`: its cycle start [ns]. `axes_report` follows later, in the post-processing.
     """
     cdef const uint8_t *inputs = x.image.inputs
     cdef axis_t *a
@@ -184,7 +184,7 @@ cdef void axes_read(axes_t *x, actual_t *out, uint64_t number, int64_t instant) 
     read_areas(x, out)
 
 
-cdef void axes_tell(axes_t *x, actual_t *out) noexcept nogil:
+cdef void axes_report(axes_t *x, actual_t *out) noexcept nogil:
     """Report the state of the axes and what was sent last, next to the values of `axes_read`."""
     cdef const axis_t *a
     cdef uint32_t i
@@ -205,7 +205,7 @@ cdef void axes_tell(axes_t *x, actual_t *out) noexcept nogil:
         out.enabled[i] = a.followed
         out.stop_reason[i] = a.stop_reason
         out.stop_cycle[i] = a.stop_cycle
-        out.flags[i] = a.flags | (FOLLOWED if a.followed else 0) | (a.goal << GOAL_SHIFT)
+        out.flags[i] = a.flags | (FOLLOWED if a.followed else 0) | (a.requested_state << REQUESTED_SHIFT)
 
 
 # ---- outputs
@@ -260,12 +260,12 @@ cdef void write_columns(axes_t *x, const target_t *t) noexcept nogil:
         c = &x.output_columns[k]
         if c.bank == BANK_REAL:
             if not isfinite(t.output_reals[c.rank]):
-                x.told |= REFUSED_SOME
+                x.cycle_flags |= REFUSED_SOME
             elif number_put_value(&c.number, x.image.outputs, t.output_reals[c.rank]):
-                x.told |= LIMITED_SOME
+                x.cycle_flags |= LIMITED_SOME
         elif c.bank == BANK_INTEGER:
             if number_put_integer(&c.number, x.image.outputs, t.output_integers[c.rank]):
-                x.told |= LIMITED_SOME
+                x.cycle_flags |= LIMITED_SOME
         else:
             number_put_bits(&c.number, x.image.outputs, t.output_bits[c.rank] != 0)
 
@@ -327,9 +327,9 @@ cdef void axes_write(axes_t *x, const target_t *target, bint fresh, uint64_t num
         axis_setpoints(x, a, target, i, fresh)
         lead_axis(x, a, target.controlword_bits[i])
         if a.flags & LIMITED:
-            x.told |= LIMITED_SOME
+            x.cycle_flags |= LIMITED_SOME
         if a.flags & REFUSED:
-            x.told |= REFUSED_SOME
+            x.cycle_flags |= REFUSED_SOME
     write_columns(x, target)
     write_velocity_offsets(x)
     write_areas(x, target)
@@ -343,7 +343,7 @@ cdef void axes_hand_over(axes_t *x) noexcept nogil:
 
 
 cdef inline bint removes_power(const target_t *target, uint32_t i) noexcept nogil:
-    return target.goal[i] != ENABLED and target.goal[i] != RESET
+    return target.requested_state[i] != ENABLED and target.requested_state[i] != RESET
 
 
 cdef bint axes_apply_late(axes_t *x, const target_t *target, bint fresh) noexcept nogil:

@@ -21,4 +21,4 @@ cdef enum:
     FAULT_RESET = 0x80  # controlword bit 7
 
 cdef uint8_t cia402_state(uint16_t statusword) noexcept nogil
-cdef uint16_t cia402_command(uint8_t state, uint8_t goal, uint16_t previous) noexcept nogil
+cdef uint16_t cia402_command(uint8_t state, uint8_t requested_state, uint16_t previous) noexcept nogil

@@ -1,9 +1,9 @@
 """CiA 402: the state from a statusword, and the controlword towards a requested state."""
 
-GOAL_DISABLED: int  # 0
-GOAL_ENABLED: int  # 1
-GOAL_QUICK_STOP: int  # 2
-GOAL_RESET: int  # 3: as disabled, and acknowledge a fault
+REQUEST_DISABLED: int  # 0
+REQUEST_ENABLED: int  # 1
+REQUEST_QUICK_STOP: int  # 2
+REQUEST_RESET: int  # 3: as disabled, and acknowledge a fault
 CODING: tuple[tuple[int, int, int], ...]  # mask, value, state
 COMMANDS: tuple[tuple[int, int, int, int], ...]  # by state: command bits for each requested state
 
@@ -14,7 +14,7 @@ def state_of(statusword: int) -> int:
     enabled, 5 quick stop active, 6 fault reaction active, 7 fault.
     """
 
-def controlword_towards(state: int, goal: int, previous: int) -> int:
+def controlword_towards(state: int, requested_state: int, previous: int) -> int:
     """Return the command bits (0 to 3 and 7) that lead from `state` towards a requested state.
 
     A fault is reset by a rising edge of bit 7. Before it, the commands of an enabled drive are
@@ -22,9 +22,9 @@ def controlword_towards(state: int, goal: int, previous: int) -> int:
 
     Args:
         state: The drive's state, as `state_of` returns it.
-        goal: Requested state, a GOAL_* number.
+        requested_state: Requested state, a REQUEST_* number.
         previous: The controlword sent last.
 
     Raises:
-        ValueError: `goal` is not 0 to 3.
+        ValueError: `requested_state` is not 0 to 3.
     """

@@ -7,10 +7,10 @@ _setpoints.pyx which set-points are valid.
 
 from libc.stdint cimport uint8_t, uint16_t
 
-GOAL_DISABLED = DISABLED
-GOAL_ENABLED = ENABLED
-GOAL_QUICK_STOP = QUICK_STOP
-GOAL_RESET = RESET
+REQUEST_DISABLED = DISABLED
+REQUEST_ENABLED = ENABLED
+REQUEST_QUICK_STOP = QUICK_STOP
+REQUEST_RESET = RESET
 
 CODING = (
     # mask, value of the statusword, state: IEC 61800-7-201 table 30
@@ -44,11 +44,11 @@ cdef uint8_t cia402_state(uint16_t statusword) noexcept nogil:
     return STATE_OF[statusword & 0x7F]
 
 
-cdef uint16_t cia402_command(uint8_t state, uint8_t goal, uint16_t previous) noexcept nogil:
+cdef uint16_t cia402_command(uint8_t state, uint8_t requested_state, uint16_t previous) noexcept nogil:
     cdef uint16_t command
-    if state > FAULT or goal > RESET:
+    if state > FAULT or requested_state > RESET:
         return 0
-    command = COMMAND_OF[state][goal]
+    command = COMMAND_OF[state][requested_state]
     if command == FAULT_RESET and previous & 0x0F:
         return 0  # fault of an enabled drive: clear its commands first
     return command
@@ -58,10 +58,10 @@ def state_of(int statusword):
     return cia402_state(<uint16_t>(statusword & 0xFFFF))
 
 
-def controlword_towards(int state, int goal, int previous):
-    if not 0 <= goal <= RESET:
-        raise ValueError(f"goal {goal}: 0 disabled, 1 enabled, 2 quick stop, 3 reset")
-    return cia402_command(<uint8_t>(state & 0xFF), <uint8_t>goal, <uint16_t>(previous & 0xFFFF))
+def controlword_towards(int state, int requested_state, int previous):
+    if not 0 <= requested_state <= RESET:
+        raise ValueError(f"requested state {requested_state}: 0 disabled, 1 enabled, 2 quick stop, 3 reset")
+    return cia402_command(<uint8_t>(state & 0xFF), <uint8_t>requested_state, <uint16_t>(previous & 0xFFFF))
 
 
 def _fill():
@@ -71,8 +71,8 @@ def _fill():
             if bits & mask == value:
                 STATE_OF[bits] = state
     for state in range(8):
-        for goal in range(4):
-            COMMAND_OF[state][goal] = COMMANDS[state][goal]
+        for requested_state in range(4):
+            COMMAND_OF[state][requested_state] = COMMANDS[state][requested_state]
 
 
 _fill()

@@ -5,7 +5,7 @@ from catenary.core._axis_log cimport axis_log_t
 from catenary.core._clocks cimport clock_t
 from catenary.core._handover cimport actual_t, handover_t, target_t
 from catenary.core._histogram cimport histogram_t
-from catenary.core._lane cimport lane_t
+from catenary.core._acyclic_queue cimport acyclic_queue_t
 from catenary.core._law cimport law_t
 from catenary.core._native cimport cat_image, cat_law_monitor, cat_link, cat_pointer, cat_sink
 from catenary.core._stream cimport stream_t
@@ -56,7 +56,7 @@ cdef struct cycle_t:
     const cat_link *link
     cat_image *image
     axes_t *axes
-    lane_t *lane
+    acyclic_queue_t *acyclic
     handover_t *handover
     clock_t *clock             # NULL: no distributed clocks
     law_t *law                 # NULL: no law runs
@@ -103,7 +103,7 @@ cdef struct cycle_t:
 
 cdef void cycle_start(cycle_t *c, int64_t origin) noexcept nogil
 cdef int cycle_wait(cycle_t *c) noexcept nogil
-cdef void cycle_await_lane(cycle_t *c, int64_t until) noexcept nogil
+cdef void cycle_await_acyclic(cycle_t *c, int64_t until) noexcept nogil
 cdef void cycle_native(cycle_t *c) noexcept nogil
 cdef int64_t cycle_law_reserve(const cycle_t *c, int64_t budget) noexcept nogil
 cdef bint cycle_wants_native(cycle_t *c) noexcept nogil

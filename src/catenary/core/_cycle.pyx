@@ -38,7 +38,7 @@ from catenary.core._axes cimport (
     axes_follow_now,
     axes_hand_over,
     axes_read,
-    axes_tell,
+    axes_report,
     axes_write,
 )
 from catenary.core._axis_log cimport axis_log_put
@@ -67,7 +67,7 @@ from catenary.core._handover cimport (
     handover_wake,
 )
 from catenary.core._histogram cimport histogram_add
-from catenary.core._lane cimport lane_send
+from catenary.core._acyclic_queue cimport acyclic_send
 from catenary.core._law cimport (
     FINISHED,
     RUNNING,
@@ -77,7 +77,7 @@ from catenary.core._law cimport (
     law_monitor_park,
     law_run,
     law_t,
-    law_tell,
+    law_report,
     law_took,
 )
 from catenary.core._native cimport (
@@ -201,7 +201,7 @@ cdef int cycle_wait(cycle_t *c) noexcept nogil:
     cdef int64_t present
     cdef int rc
     skip_missed(c, now(c))
-    cycle_await_lane(c, c.next - c.busy_wait)
+    cycle_await_acyclic(c, c.next - c.busy_wait)
     rc = c.link.wait_until(c.link.self, c.next - c.busy_wait, 0)
     if rc < 0:
         return rc
@@ -216,13 +216,13 @@ cdef int cycle_wait(cycle_t *c) noexcept nogil:
     return 0
 
 
-cdef void cycle_await_lane(cycle_t *c, int64_t until) noexcept nogil:
+cdef void cycle_await_acyclic(cycle_t *c, int64_t until) noexcept nogil:
     """threaded: take acyclic frames as they arrive, so that the next request leaves with the next
     cycle. An inline loop collects them at the next cycle start.
     """
     if c.execution != THREADED:
         return
-    while c.lane.under_way > 0 and now(c) < until:
+    while c.acyclic.under_way > 0 and now(c) < until:
         if c.link.wait_until(c.link.self, until, 1) <= 0:
             return
         c.image.drain(c.image.self)
@@ -285,14 +285,14 @@ cdef inline void judge(cycle_t *c) noexcept nogil:
             c.flags |= WORKING_COUNTER
 
 
-cdef void tell(cycle_t *c, actual_t *actual, const target_t *target) noexcept nogil:
+cdef void report(cycle_t *c, actual_t *actual, const target_t *target) noexcept nogil:
     """Report the cycle in addition to its values: axes, header, log, sticky flags."""
     cdef actual_header_t *header = actual.header
     cdef record_t *record = record_of(c)
     cdef uint32_t unit
-    axes_tell(c.axes, actual)
-    c.flags |= c.axes.told
-    c.axes.told = 0
+    axes_report(c.axes, actual)
+    c.flags |= c.axes.cycle_flags
+    c.axes.cycle_flags = 0
     header.ok = c.flags & OK
     header.number = c.number
     header.time_ns = c.scheduled - c.origin
@@ -353,7 +353,7 @@ cdef bint take_streamed(cycle_t *c, target_t *target, bint fresh, uint64_t numbe
     elif stream != NULL and stream.taken > 0:
         target.header.hold = 0
         target.header.streamed = 1
-        c.axes.told |= DRY
+        c.axes.cycle_flags |= DRY
         c.underruns += 1
         fresh = False
     cat_pointer_release(&c.stream)
@@ -376,7 +376,7 @@ cdef void post_process(cycle_t *c, int64_t since, const actual_t *actual,
     cdef record_t *record
     cdef histogram_t *h = <histogram_t *>cat_load_acquire_pointer(<void **>&c.histograms)
     cdef int64_t took
-    lane_send(c.lane, c.link, since - c.scheduled)
+    acyclic_send(c.acyclic, c.link, since - c.scheduled)
     if c.number == 0:
         return
     record = record_of(c)
@@ -466,7 +466,7 @@ cdef void take_orders(cycle_t *c, const target_t *committed) noexcept nogil:
     memcpy(target.request, committed.request, axes * sizeof(uint32_t))
     memcpy(target.controlword_bits, committed.controlword_bits, axes * sizeof(uint16_t))
     memcpy(target.mode, committed.mode, axes)
-    memcpy(target.goal, committed.goal, axes)
+    memcpy(target.requested_state, committed.requested_state, axes)
     memcpy(target.output_bytes, committed.output_bytes, c.handover.counts.output_bytes)
 
 
@@ -507,7 +507,7 @@ cdef void compute_next(cycle_t *c, actual_t *actual, target_t *target) noexcept 
         c.image.fill(c.image.self)
     c.computed = 1
     if c.law != NULL:
-        law_tell(c.law)
+        law_report(c.law)
     else:
         axes_hand_over(c.axes)
 
@@ -590,7 +590,7 @@ cdef void cycle_native(cycle_t *c) noexcept nogil:
         target = &c.handover.target[OF_LAW]
         record_of(c).receive_ns = short_ns(now(c) - c.image.frame_stamp[0])
         compute_next(c, actual, target)
-    tell(c, actual, target)
+    report(c, actual, target)
     handover_publish(c.handover)
     published = now(c)
     handover_wake(c.handover)
@@ -609,7 +609,7 @@ cdef bint cycle_wants_native(cycle_t *c) noexcept nogil:
 cdef void cycle_inputs(cycle_t *c, actual_t *actual) noexcept nogil:
     """inline: read the inputs after the wait."""
     collect(c, actual, 0)
-    tell(c, actual, &c.handover.target[PRIVATE])
+    report(c, actual, &c.handover.target[PRIVATE])
 
 
 cdef void cycle_usable(cycle_t *c) noexcept nogil:
@@ -634,5 +634,5 @@ cdef void cycle_outputs(cycle_t *c, target_t *target, bint application) noexcept
         if application:
             c.process = done - c.usable
     if c.sink != NULL:
-        axes_tell(c.axes, actual)
+        axes_report(c.axes, actual)
     post_process(c, c.sent, actual, target)

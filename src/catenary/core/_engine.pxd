@@ -6,7 +6,7 @@ from catenary.core._cycle cimport cycle_t
 from catenary.core._figures cimport Figures
 from catenary.core._frames cimport Frames
 from catenary.core._handover cimport Handover, actual_header_t, handover_t
-from catenary.core._lane cimport Lane
+from catenary.core._acyclic_queue cimport AcyclicQueue
 from catenary.core._law cimport Law
 from catenary.core._native cimport cat_image, cat_link
 from catenary.core._stream cimport Stream
@@ -25,7 +25,7 @@ cdef class Engine:
     cdef cat_image *image
     cdef const cat_link *link
     cdef tuple owners          # owners of the two tables
-    cdef Lane lane
+    cdef AcyclicQueue acyclic
     cdef Axes axes
     cdef readonly Clock clock  # None: no distributed clocks
     cdef Handover handover

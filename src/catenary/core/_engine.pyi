@@ -30,11 +30,11 @@ class Engine:
         actual_position, actual_velocity, actual_torque, statusword, mode_actual, axis_state,
         axis_flags, input_reals, input_integers, input_bits, input_bytes, and unit_valid ("B"),
         unit_counter ("H") per sync unit. Writable: target_position, target_velocity, target_torque,
-        mode_target, goal, request, controlword_bits, output_reals, output_integers, output_bits,
+        mode_target, requested_state, request, controlword_bits, output_reals, output_integers, output_bits,
         output_bytes.
 
         A quantity that is not mapped reads NaN (velocity: estimated from the position).
-        A requested state is taken over when `request` of its axis has changed: goal[i] = 1;
+        A requested state is taken over when `request` of its axis has changed: requested_state[i] = 1;
         request[i] += 1.
         Until an axis is followed, each `next` and `run` overwrites its targets with what is sent to
         it: the actual position (powered: the held one), velocity and torque.
@@ -200,8 +200,8 @@ class Engine:
         cycles; lost: cycles not ok; late: cycles skipped; uncommitted: cycles without new targets;
         underrun: cycles that found the stream empty; missed_sync: frames that left later than the
         margin before SYNC0; page_faults: of the native thread in runs that have ended; frames:
-        stale, alien, corrupt, duplicate, repeated, unprocessed; lane_sent, lane_received,
-        lane_dropped; send_errors, receive_errors.
+        stale, alien, corrupt, duplicate, repeated, unprocessed; acyclic_sent, acyclic_received,
+        acyclic_dropped; send_errors, receive_errors.
         """
 
     def histograms(self) -> dict[str, dict[str, float]]:
@@ -235,7 +235,7 @@ class Engine:
         """
 
     # The acyclic queue.
-    def lane_push(self, frame: bytes) -> bool:
+    def acyclic_push(self, frame: bytes) -> bool:
         """Queue one Ethernet frame, to be sent after the cyclic ones.
 
         The index of its first datagram must be 0x80 to 0xFF.
@@ -247,10 +247,10 @@ class Engine:
             ValueError: The frame is not EtherCAT, or its index belongs to the cycle.
         """
 
-    def lane_pop(self) -> bytes | None:
+    def acyclic_pop(self) -> bytes | None:
         """Return the oldest acyclic frame that has returned, or None."""
 
-    def lane_wait(self, timeout_ns: int) -> bool:
+    def acyclic_wait(self, timeout_ns: int) -> bool:
         """Wait, without the GIL, until an acyclic frame has returned.
 
         In virtual time, the thread that iterates calls it. Time then passes up to the next cycle

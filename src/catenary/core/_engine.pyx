@@ -27,7 +27,7 @@ from catenary.core._clocks cimport Clock
 from catenary.core._cycle cimport (
     INLINE,
     INTERPRETER,
-    cycle_await_lane,
+    cycle_await_acyclic,
     cycle_inputs,
     cycle_law_reserve,
     cycle_native,
@@ -59,7 +59,7 @@ from catenary.core._handover cimport (
     target_t,
 )
 from catenary.core._histogram cimport histogram_add
-from catenary.core._lane cimport Lane
+from catenary.core._acyclic_queue cimport AcyclicQueue
 from catenary.core._law cimport WAITING, Law, law_monitor_start, law_monitor_stop
 from catenary.core._memory cimport (
     cat_memory_add_state,
@@ -159,7 +159,7 @@ cdef class Engine:
         else:
             self.image = image_in(image, plan)
             self.link = link_in(link)
-        self.lane = Lane(plan.acyclic_ns)
+        self.acyclic = AcyclicQueue(plan.acyclic_ns)
         self.axes = Axes(plan)
         if plan.clock is not None:
             self.clock = Clock(plan.clock, plan.period_ns)
@@ -184,7 +184,7 @@ cdef class Engine:
         cdef int slot
         self.figures.attach(c, plan.log_cycles, len(plan.axes) if plan.log_axes else 0)
         if self.frames is not None:
-            self.frames.c.lane = &self.lane.c
+            self.frames.c.acyclic = &self.acyclic.c
         self.axes.c.image = self.image
         if self.clock is not None:
             self.frames.carry_time(&self.clock.c)
@@ -193,7 +193,7 @@ cdef class Engine:
         c.link = self.link
         c.image = self.image
         c.axes = &self.axes.c
-        c.lane = &self.lane.c
+        c.acyclic = &self.acyclic.c
         c.handover = &self.handover.c
         self.virtual = c.link.flags & CAT_LINK_VIRTUAL_TIME != 0
         self.alone = self.virtual and not c.link.flags & CAT_LINK_SHARED_TIME
@@ -741,7 +741,7 @@ cdef class Engine:
             cat_memory_settle(&self.clock.memory)
         cat_memory_settle(&self.axes.memory)
         cat_memory_settle(&self.handover.memory)
-        cat_memory_settle(&self.lane.memory)
+        cat_memory_settle(&self.acyclic.memory)
         cat_memory_settle(&self.figures.memory)
         cat_memory_settle(&self.figures.log_memory)
 
@@ -756,7 +756,7 @@ cdef class Engine:
             cat_memory_add_state(&self.clock.memory, &state)
         cat_memory_add_state(&self.axes.memory, &state)
         cat_memory_add_state(&self.handover.memory, &state)
-        cat_memory_add_state(&self.lane.memory, &state)
+        cat_memory_add_state(&self.acyclic.memory, &state)
         cat_memory_add_state(&self.figures.memory, &state)
         cat_memory_add_state(&self.figures.log_memory, &state)
         for law in self.laws:
@@ -875,9 +875,9 @@ cdef class Engine:
             "duplicate": 0,
             "unprocessed": 0,
             "repeated": 0,
-            "lane_sent": self.lane.c.sent,
-            "lane_received": self.lane.c.received,
-            "lane_dropped": self.lane.c.dropped,
+            "acyclic_sent": self.acyclic.c.sent,
+            "acyclic_received": self.acyclic.c.received,
+            "acyclic_dropped": self.acyclic.c.dropped,
             "send_errors": 0,
             "receive_errors": 0,
             **frames,
@@ -897,20 +897,20 @@ cdef class Engine:
 
     # ---- the acyclic queue
 
-    def lane_push(self, bytes frame not None):
-        return self.lane.push(frame)
+    def acyclic_push(self, bytes frame not None):
+        return self.acyclic.push(frame)
 
-    def lane_pop(self):
-        return self.lane.pop()
+    def acyclic_pop(self):
+        return self.acyclic.pop()
 
-    def lane_wait(self, int64_t timeout_ns):
+    def acyclic_wait(self, int64_t timeout_ns):
         cdef int64_t until
         if not self.virtual:
-            return self.lane.wait(timeout_ns)
+            return self.acyclic.wait(timeout_ns)
         until = min(self.e.cycle.next, self.e.cycle.link.now(self.e.cycle.link.self) + timeout_ns)
         with nogil:
-            cycle_await_lane(&self.e.cycle, until)
-        return self.lane.wait(0)
+            cycle_await_acyclic(&self.e.cycle, until)
+        return self.acyclic.wait(0)
 
     def __dealloc__(self):
         with nogil:

@@ -3,7 +3,7 @@ from libc.stdint cimport int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 from catenary.core._clocks cimport clock_t
 from catenary.core._memory cimport cat_memory
 from catenary.core._native cimport cat_image, cat_link
-from catenary.core._lane cimport lane_t
+from catenary.core._acyclic_queue cimport acyclic_queue_t
 
 cdef enum:
     FRAMES_MAX = 1024          # in a plan, all dividers and phases together
@@ -77,7 +77,7 @@ cdef struct frames_t:
     # constant after construction
     cat_image image
     const cat_link *link
-    lane_t *lane
+    acyclic_queue_t *acyclic
     clock_t *clock             # NULL: no distributed clocks
     int receive_mode
     uint32_t frame_count

@@ -28,7 +28,7 @@ from libc.stdint cimport int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 from libc.string cimport memcpy
 
 from catenary.core._clocks cimport clock_emit, clock_t, clock_take
-from catenary.core._lane cimport lane_received
+from catenary.core._acyclic_queue cimport acyclic_received
 from catenary.core._memory cimport cat_memory, cat_memory_free, memory_take
 from catenary.core._native cimport (
     CAT_AL_ERROR,
@@ -271,7 +271,7 @@ cdef void take(frames_t *f, const uint8_t *bytes, uint32_t length) noexcept nogi
         f.counters.corrupt += 1
         return
     if bytes[DATAGRAMS + 1] >= CYCLE_INDICES:
-        lane_received(f.lane, bytes, length, stamp_of(f))
+        acyclic_received(f.acyclic, bytes, length, stamp_of(f))
         return
     sent = &f.sent[bytes[DATAGRAMS + 1]]
     if sent.serial == 0:

@@ -4,11 +4,11 @@ docs/explanation/safety.md has the table of reactions and their scenarios; _setp
 the outputs.
 
 Theory of operation. `guard_observe` runs after the inputs of a cycle, the other functions before its
-outputs. `goal` is the requested state in force, `mode` the mode of operation in force, `mode_wanted`
+outputs. `requested_state` is the requested state in force, `mode` the mode of operation in force, `mode_wanted`
 the one requested in 0x6060. The set-points of the application are valid only while the axis is
 *followed*: requested state enabled, OPERATION_ENABLED, the mode shown is the one in force, statusword
 bit 12 if the mode defines it, and its unit answers. `worked` is set once the axis was followed since
-OPERATION_ENABLED or since a mode change; `tells` once its drive has shown bit 12. `gap_cycles` counts
+OPERATION_ENABLED or since a mode change; `shows_following` once its drive has shown bit 12. `gap_cycles` counts
 since bit 12 was lost, `mute_cycles` while it was never shown, `climbing_cycles` since the request.
 
 A stop (`stop_axis`) needs a new request afterwards; `stop_reason` and `stop_cycle` keep its cause. It
@@ -47,20 +47,20 @@ cdef enum:
 cdef inline void begin_stop(axis_t *a) noexcept nogil:
     """Start the sequence of a stop. A repeated request or a second reason does not restart it."""
     a.stop_cycles = 0
-    a.followed_at_stop = (a.tells and a.status & FOLLOWS_COMMAND != 0
+    a.followed_at_stop = (a.shows_following and a.status & FOLLOWS_COMMAND != 0
                           and a.mode in (CSP, CSV, CST))  # in other modes the bit has another meaning
 
 
 cdef void stop_axis(axes_t *x, axis_t *a, uint8_t reason) noexcept nogil:
     """Stop an axis for a reason; only a new request enables it again."""
-    if a.goal != DISABLED:
+    if a.requested_state != DISABLED:
         a.flags |= DROPPED
-        x.told |= DROPPED_SOME
+        x.cycle_flags |= DROPPED_SOME
         a.stop_reason = reason
         a.stop_cycle = x.number
-    if a.goal == ENABLED:
+    if a.requested_state == ENABLED:
         begin_stop(a)
-    a.goal = DISABLED
+    a.requested_state = DISABLED
     a.stopping = 1
     a.armed = 0
     a.followed = 0
@@ -69,11 +69,11 @@ cdef void stop_axis(axes_t *x, axis_t *a, uint8_t reason) noexcept nogil:
 
 cdef void lose_axis(axes_t *x, axis_t *a, uint8_t reason) noexcept nogil:
     """Stop an axis without set-points, according to its option `on_loss`."""
-    if a.on_loss != LOSS_CSP_HOLD or a.mode != CST or a.goal != ENABLED or a.holding:
+    if a.on_loss != LOSS_CSP_HOLD or a.mode != CST or a.requested_state != ENABLED or a.holding:
         stop_axis(x, a, reason)
         return
     a.flags |= DROPPED
-    x.told |= DROPPED_SOME
+    x.cycle_flags |= DROPPED_SOME
     a.stop_reason = reason
     a.stop_cycle = x.number
     a.holding = 1              # a new request ends it
@@ -109,13 +109,13 @@ cdef void take_mode(axes_t *x, axis_t *a, int8_t mode) noexcept nogil:
 
 cdef void take_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nogil:
     """Take a new request over; count how long it has been waiting."""
-    cdef uint8_t goal
+    cdef uint8_t requested_state
     if t.request[i] != a.request:
         a.request = t.request[i]
-        goal = t.goal[i] if t.goal[i] <= RESET else DISABLED
-        if a.goal == ENABLED and goal != ENABLED:
+        requested_state = t.requested_state[i] if t.requested_state[i] <= RESET else DISABLED
+        if a.requested_state == ENABLED and requested_state != ENABLED:
             begin_stop(a)
-        a.goal = goal
+        a.requested_state = requested_state
         a.clear_reset = a.state == FAULT
         a.flags &= ~(DROPPED | MODE_REFUSED)
         a.stop_reason = STOP_NONE
@@ -124,11 +124,11 @@ cdef void take_request(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noex
         a.holding = 0
         a.armed = 0
         a.climbing_cycles = 0
-        if a.goal != ENABLED:
+        if a.requested_state != ENABLED:
             a.followed = 0
         if a.lost:
             stop_axis(x, a, STOP_DEVICE_LOST)  # the request must not take effect later
-    if a.goal == ENABLED and not a.followed and not a.holding:
+    if a.requested_state == ENABLED and not a.followed and not a.holding:
         if not t.header.hold:
             if is_commanded(x, a.mode):
                 a.armed = 1
@@ -161,7 +161,7 @@ cdef uint16_t stop_command(axes_t *x, axis_t *a) noexcept nogil:
     may return within that time, still powered: its first frame must not remove the voltage.
     """
     cdef uint32_t patience = max(x.stop_patience, 4 * a.divider)
-    cdef bint quick = a.goal == QUICK_STOP or (a.stopping and a.on_loss != LOSS_DISABLE)
+    cdef bint quick = a.requested_state == QUICK_STOP or (a.stopping and a.on_loss != LOSS_DISABLE)
     if quantity_of(a.mode) == TORQUE:
         patience = max(x.stop_patience_torque, 4 * a.divider)
     if a.lost or (a.followed_at_stop and not a.status & FOLLOWS_COMMAND):
@@ -180,23 +180,23 @@ cdef inline bint may_lose_voltage(const axes_t *x, const axis_t *a) noexcept nog
 
 cdef uint16_t guard_lead(axes_t *x, axis_t *a, uint16_t bits) noexcept nogil:
     """Return the controlword that leads an axis to its requested state, or keeps it there."""
-    cdef uint8_t goal = a.goal
+    cdef uint8_t requested_state = a.requested_state
     cdef uint16_t command
-    if goal == ENABLED and not a.armed and quantity_of(a.mode) in (VELOCITY, TORQUE):
+    if requested_state == ENABLED and not a.armed and quantity_of(a.mode) in (VELOCITY, TORQUE):
         # A brake must not open before a set-point holds the load.
         if not a.followed and a.state != OPERATION_ENABLED:
-            goal = DISABLED
-    if a.state == OPERATION_ENABLED and goal != ENABLED:
+            requested_state = DISABLED
+    if a.state == OPERATION_ENABLED and requested_state != ENABLED:
         command = stop_command(x, a)
     else:
         if a.state == QUICK_STOP_ACTIVE and not may_lose_voltage(x, a):
-            goal = QUICK_STOP  # every other exit disables, and the axis would coast
-        command = cia402_command(a.state, goal, a.command)
+            requested_state = QUICK_STOP  # every other exit disables, and the axis would coast
+        command = cia402_command(a.state, requested_state, a.command)
     if a.clear_reset:
         command &= ~FAULT_RESET
         a.clear_reset = 0
     a.command = command
-    if a.state == OPERATION_ENABLED and goal == ENABLED:
+    if a.state == OPERATION_ENABLED and requested_state == ENABLED:
         command |= bits & MODE_BITS
     return command | (bits & FREE_BITS)
 
@@ -263,7 +263,7 @@ cdef void refuse_mode(axes_t *x, axis_t *a, int8_t mode) noexcept nogil:
     a.mode_wanted = a.mode
     a.waiting_cycles = 0
     a.flags |= MODE_REFUSED
-    x.told |= DROPPED_SOME
+    x.cycle_flags |= DROPPED_SOME
 
 
 # ---- after the inputs
@@ -280,7 +280,7 @@ cdef bint is_mapped(const axis_t *a) noexcept nogil:
 
 cdef bint is_trusted(axes_t *x, axis_t *a) noexcept nogil:
     """Return True if the drive follows its targets: mode in force, bit 12 or no need of it."""
-    if (a.goal != ENABLED or a.state != OPERATION_ENABLED or a.lost or a.holding
+    if (a.requested_state != ENABLED or a.state != OPERATION_ENABLED or a.lost or a.holding
             or a.mode_wanted != a.mode or not is_mapped(a) or not shows_mode(a)):
         if a.mute_cycles < x.mute_limit:
             a.mute_cycles = 0
@@ -288,33 +288,33 @@ cdef bint is_trusted(axes_t *x, axis_t *a) noexcept nogil:
     if a.mode not in (CSP, CSV, CST):
         return True
     if a.status & FOLLOWS_COMMAND:
-        if a.followed and not a.tells:
+        if a.followed and not a.shows_following:
             stop_axis(x, a, STOP_NOT_FOLLOWING)  # it has the bit: it followed nothing until now
-        a.tells = 1
+        a.shows_following = 1
         a.gap_cycles = 0
-        return a.goal == ENABLED
-    if a.worked and a.tells:
+        return a.requested_state == ENABLED
+    if a.worked and a.shows_following:
         a.gap_cycles += 1
         return a.gap_cycles <= BIT_12_GAP * a.divider
     if a.mute_cycles < x.mute_limit:
         a.mute_cycles += 1
-    return not a.tells and a.mute_cycles >= x.mute_limit
+    return not a.shows_following and a.mute_cycles >= x.mute_limit
 
 
 cdef void observe_requested_state(axes_t *x, axis_t *a, uint8_t state_before) noexcept nogil:
     """Adapt the requested state to what the drive did by itself."""
-    if a.goal == ENABLED:
+    if a.requested_state == ENABLED:
         if a.state >= FAULT_REACTION_ACTIVE and state_before < FAULT_REACTION_ACTIVE:
             stop_axis(x, a, STOP_FAULT)
         elif state_before == OPERATION_ENABLED and a.state != OPERATION_ENABLED:
             stop_axis(x, a, STOP_LEFT_OPERATION)
-    elif a.goal == QUICK_STOP:
+    elif a.requested_state == QUICK_STOP:
         if a.state != OPERATION_ENABLED and a.state != QUICK_STOP_ACTIVE:
-            a.goal = DISABLED
+            a.requested_state = DISABLED
         elif a.state == QUICK_STOP_ACTIVE and may_lose_voltage(x, a):
-            a.goal = DISABLED
-    elif a.goal == RESET and a.state != FAULT:
-        a.goal = DISABLED
+            a.requested_state = DISABLED
+    elif a.requested_state == RESET and a.state != FAULT:
+        a.requested_state = DISABLED
 
 
 cdef void guard_observe(axes_t *x, axis_t *a, uint8_t state_before,

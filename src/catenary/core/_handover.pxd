@@ -90,7 +90,7 @@ cdef struct target_t:           # a header and the arrays of TARGET, in its orde
     uint32_t *request
     uint16_t *controlword_bits
     int8_t *mode
-    uint8_t *goal
+    uint8_t *requested_state
     uint8_t *output_bits
     uint8_t *output_bytes
 

@@ -65,7 +65,7 @@ TARGET = (
     ("request", "<u4", "axes", "request", None, None),
     ("controlword_bits", "<u2", "axes", "controlword_bits", None, None),
     ("mode", "i1", "axes", "mode_target", None, "target_mode"),
-    ("goal", "u1", "axes", "goal", None, "goal"),
+    ("requested_state", "u1", "axes", "requested_state", None, "requested_state"),
     ("output_bits", "u1", "output_bits", "output_bits", "bits", "bits"),
     ("output_bytes", "u1", "output_bytes", "output_bytes", None, "bytes"),
 )

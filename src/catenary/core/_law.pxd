@@ -62,5 +62,5 @@ cdef void law_end(law_t *law, uint32_t status, uint64_t number) noexcept nogil
 cdef bint law_run(law_t *law, cat_law_monitor *monitor, const axes_t *axes,
                   const actual_t *actual, target_t *target, int64_t instant,
                   uint64_t number) noexcept nogil
-cdef void law_tell(law_t *law) noexcept nogil
+cdef void law_report(law_t *law) noexcept nogil
 cdef bint law_took(law_t *law, int64_t duration, uint64_t number) noexcept nogil

@@ -137,7 +137,7 @@ cdef bint law_run(law_t *law, cat_law_monitor *monitor, const axes_t *axes,
     return True
 
 
-cdef void law_tell(law_t *law) noexcept nogil:
+cdef void law_report(law_t *law) noexcept nogil:
     """Copy the memory of a law that goes on, if the application has requested it."""
     cdef uint32_t wanted
     if not law.threaded:

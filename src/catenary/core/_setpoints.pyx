@@ -72,11 +72,11 @@ cdef inline double clamp(axis_t *a, double value, double low, double high) noexc
     return value
 
 
-cdef inline double approach(double value, double goal, double step) noexcept nogil:
-    """Return `value` moved towards `goal` by at most `step`."""
-    if fabs(goal - value) <= step:
-        return goal
-    return value + copysign(step, goal - value)
+cdef inline double approach(double value, double target, double step) noexcept nogil:
+    """Return `value` moved towards `target` by at most `step`."""
+    if fabs(target - value) <= step:
+        return target
+    return value + copysign(step, target - value)
 
 
 # ---- fallback: no valid set-point
@@ -356,7 +356,7 @@ cdef void rest(axes_t *x, axis_t *a, const target_t *t, uint32_t i) noexcept nog
     a.command_velocity = 0.0
     if a.state == QUICK_STOP_ACTIVE:
         a.stop_cycles += 1
-    if (a.state == SWITCHED_ON and a.goal == ENABLED and a.armed and not t.header.hold
+    if (a.state == SWITCHED_ON and a.requested_state == ENABLED and a.armed and not t.header.hold
             and quantity_of(a.mode) == TORQUE and isfinite(t.torque[i])):
         a.commanded_torque = limited_torque(a, t.torque[i])
 
@@ -433,7 +433,7 @@ cdef void axis_setpoints(axes_t *x, axis_t *a, const target_t *t, uint32_t i,
         follow(x, a, t, i, fresh)
         if a.followed:
             judge_lateness(x, a)
-    elif a.goal != ENABLED:
+    elif a.requested_state != ENABLED:
         stopping(x, a)
     else:
         waiting(x, a, t, i, fresh)

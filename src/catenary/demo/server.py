@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from catenary.realtime.scheduling import request_scheduling
+from catenary.realtime.system.scheduling import request_scheduling
 from catenary.virtual import Segment, serve
 from catenary.virtual.server import MAX_AGE
 

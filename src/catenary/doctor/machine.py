@@ -12,7 +12,7 @@ from pathlib import Path
 
 from catenary.doctor.card import Card
 from catenary.doctor.clock_state import ClockState
-from catenary.realtime.preparation import SET_CAPABILITIES
+from catenary.realtime.system.preparation import SET_CAPABILITIES
 
 INITIAL_USER_NAMESPACE = (0, 0, 2**32 - 1)  # /proc/self/uid_map, user_namespaces(7)
 CAP_NET_RAW, CAP_IPC_LOCK, CAP_SYS_NICE = 13, 14, 23  # linux/capability.h

@@ -109,7 +109,7 @@ def warn_of_default_velocity(axes: Sequence[Axis]) -> None:
         )
 
 
-def clock_wish(dc: DistributedClock | bool) -> DistributedClock | None:
+def clock_request(dc: DistributedClock | bool) -> DistributedClock | None:
     """Return the clock request of `dc=`."""
     if isinstance(dc, bool):
         return DistributedClock() if dc else None

@@ -16,7 +16,7 @@ from catenary.errors import MappingError
 from catenary.plan.axis_report import AxisReport
 from catenary.plan.cycle import AxisPlan, Bank, Column, Number, NumberKind
 from catenary.plan.numbers import Which
-from catenary.plan.request import ImageLayout, PdoWish, WrittenPdo
+from catenary.plan.request import DeviceRequest, ImageLayout, WrittenPdo
 from catenary.plan.start_up_object import StartUp
 from catenary.wire.cia402 import SLOT_OFFSET, Mode
 
@@ -92,7 +92,7 @@ class Axis:
             self.units,
         )
 
-    def pdo_wish(self, start_up: tuple[tuple[int, int, bytes], ...] = ()) -> PdoWish:
+    def device_request(self, start_up: tuple[tuple[int, int, bytes], ...] = ()) -> DeviceRequest:
         """Objects that the axis exchanges in every cycle."""
         wanted = [
             objects.CONTROLWORD,
@@ -108,7 +108,7 @@ class Axis:
         for column in self.columns.values():
             (wanted if column.output else given).append(column)
         optional = self._optional()
-        return PdoWish(
+        return DeviceRequest(
             outputs=tuple(
                 o.reference(self.slot, required=o not in optional) for o in dict.fromkeys(wanted)
             ),

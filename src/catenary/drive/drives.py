@@ -19,7 +19,7 @@ from catenary.drive.arguments import (
     axis_modes,
     axis_names,
     axis_sources,
-    clock_wish,
+    clock_request,
     cycles_between,
     force_and_torque,
     known,
@@ -45,11 +45,11 @@ from catenary.drive.objects import ACTUAL_VELOCITY
 from catenary.drive.port import AxisPort, PutRate
 from catenary.drive.rates import RateColumns
 from catenary.drive.request import Request
-from catenary.drive.state_machine import Goal
+from catenary.drive.state_machine import RequestedState
 from catenary.drive.units import AxisUnits, one_each, per_axis
 from catenary.drive.values import Array, AxisValues
 from catenary.plan.cycle import Bank, OnLoss
-from catenary.plan.request import DistributedClock, ImageLayout, PdoWish, Views, WishTables
+from catenary.plan.request import DeviceRequest, DistributedClock, ImageLayout, RequestTables, Views
 from catenary.plan.start_up_object import StartUp
 from catenary.plan.stop_reason import StopReason
 from catenary.types import UDINT
@@ -195,7 +195,7 @@ class Drives(Request):
         super().__init__([sub for sub, _ in sources])
         self._columns = named_columns(columns)
         written = written_pdos(pdos, self._columns)
-        self._clock = clock_wish(dc)
+        self._clock = clock_request(dc)
         self._axes = tuple(
             Axis(
                 name=name,
@@ -299,20 +299,20 @@ class Drives(Request):
 
     def enable(self, axes: Axes = ALL) -> None:
         """Request that axes be enabled. Each starts from its actual position."""
-        self._request("enable", Goal.ENABLED, axes)
+        self._request("enable", RequestedState.ENABLED, axes)
 
     def disable(self, axes: Axes = ALL) -> None:
         """Request that axes be disabled."""
-        self._request("disable", Goal.DISABLED, axes)
+        self._request("disable", RequestedState.DISABLED, axes)
 
     def quick_stop(self, axes: Axes = ALL) -> None:
         """Request a quick stop. The ramp and the final state are the drive's (0x605A)."""
-        self._request("quick_stop", Goal.QUICK_STOP, axes)
+        self._request("quick_stop", RequestedState.QUICK_STOP, axes)
 
     def reset_faults(self, axes: Axes = ALL) -> None:
         """Request a fault reset of those axes that are in fault. Nothing moves before `enable`."""
         chosen = set(self._numbers(axes))
-        self._request("reset_faults", Goal.RESET, sorted(chosen & set(self.faults)))
+        self._request("reset_faults", RequestedState.RESET, sorted(chosen & set(self.faults)))
 
     def switch(self, mode: str, axes: Axes = ALL) -> None:
         """Request a change to `mode`, one of those that the Drives were made with.
@@ -446,9 +446,9 @@ class Drives(Request):
         assert self._moves is not None  # bound together with the views
         return self._moves
 
-    # plan.request.Wish
+    # plan.request.ProcessDataRequest
 
-    def pdos(self, period_ns: int) -> Mapping[int, PdoWish]:
+    def pdos(self, period_ns: int) -> Mapping[int, DeviceRequest]:
         """Return the process-data request of each device, by position.
 
         Reads the drives by SDO (PRE-OP or later): rated torque, reactions, limits, mode and
@@ -456,14 +456,16 @@ class Drives(Request):
         """
         self._period_ns = period_ns
         self._read_drives()
-        wishes: dict[int, PdoWish] = {}
+        requests: dict[int, DeviceRequest] = {}
         for axis, sub in zip(self._axes, self.subs, strict=True):
-            wish = axis.pdo_wish(own_objects.downloads(axis, sub, period_ns * axis.divider))
-            wishes[axis.device] = (
-                joined(wishes[axis.device], wish) if axis.device in wishes else wish
+            request = axis.device_request(
+                own_objects.downloads(axis, sub, period_ns * axis.divider)
             )
-            wishes[axis.device] = replace(wishes[axis.device], clock=self._clock)
-        return wishes
+            requests[axis.device] = (
+                joined(requests[axis.device], request) if axis.device in requests else request
+            )
+            requests[axis.device] = replace(requests[axis.device], clock=self._clock)
+        return requests
 
     def _read_drives(self) -> None:
         """Read rated torque and settings once per plan: `pdos` is called twice for each."""
@@ -476,13 +478,13 @@ class Drives(Request):
         self._axes = own_objects.with_settings(rated, self.subs)
         self._is_read = True
 
-    def tables(self, layout: ImageLayout) -> WishTables:
+    def tables(self, layout: ImageLayout) -> RequestTables:
         """Return the axes in their order; columns by name, then by axis: a name is one array."""
         self._is_read = False  # the next plan reads the settings again
         self._units = np.array([layout.sync_unit(axis.device) for axis in self._axes], np.intp)
         self._rates = RateColumns(self._axes, self._columns, layout)
         self._measures_velocity = [axis.maps(ACTUAL_VELOCITY, layout) for axis in self._axes]
-        return WishTables(
+        return RequestTables(
             axes=tuple(axis.plan(layout) for axis in self._axes),
             output_columns=(
                 *(
@@ -559,10 +561,10 @@ class Drives(Request):
             used[bank] += len(self)
         return slices
 
-    def _request(self, call: str, goal: Goal, axes: Axes) -> None:
+    def _request(self, call: str, state: RequestedState, axes: Axes) -> None:
         views = self._of_open_loop(f"{call}()")
         chosen = self._numbers(axes)
-        views.goal[chosen] = goal
+        views.requested_state[chosen] = state
         views.request[chosen] += 1  # a dropped requested state returns only by a new request
 
     def _of_open_loop(self, call: str) -> Views:
@@ -580,7 +582,7 @@ class Drives(Request):
         return self._views
 
 
-def joined(first: PdoWish, second: PdoWish) -> PdoWish:
+def joined(first: DeviceRequest, second: DeviceRequest) -> DeviceRequest:
     """Return the combined requests of two axes of one device."""
     return replace(
         first,

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from catenary.bus import SubDevice
 from catenary.drive.arguments import (
     PdoList,
-    clock_wish,
+    clock_request,
     cycles_between,
     start_up_list,
     written_pdos,
@@ -27,13 +27,13 @@ from catenary.model.device import Direction
 from catenary.plan.cycle import Bank
 from catenary.plan.request import (
     Bytes,
+    DeviceRequest,
     DistributedClock,
     ImageLayout,
     Integers,
-    PdoWish,
     Reals,
+    RequestTables,
     Views,
-    WishTables,
 )
 from catenary.plan.start_up_object import StartUp
 
@@ -91,7 +91,7 @@ class Channels(Request):
         self._pdos = tuple(pdo for pdo in written if pdo.direction is self.direction)
         self._required = required
         self._divider = cycles_between("divider", divider)
-        self._clock = clock_wish(dc)
+        self._clock = clock_request(dc)
         self._start_up = start_up_list(start_up)
         self._units: list[int] = []
         self._arrays: dict[Bank, Reals | Integers | Bytes] | None = None
@@ -128,13 +128,13 @@ class Channels(Request):
         value: float | int = array.item(place)
         return value
 
-    def pdos(self, period_ns: int) -> Mapping[int, PdoWish]:
+    def pdos(self, period_ns: int) -> Mapping[int, DeviceRequest]:
         """Request the channels, or `pdos`; without both, the mapping of the device is unchanged."""
-        wishes: dict[int, PdoWish] = {}
+        requests: dict[int, DeviceRequest] = {}
         for sub in self.subs:
             mine = tuple(c.channel.reference() for c in self._channels if c.device == sub.position)
             output = self.direction is Direction.OUTPUT
-            wishes[sub.position] = PdoWish(
+            requests[sub.position] = DeviceRequest(
                 outputs=mine if output else (),
                 inputs=() if output else mine,
                 clock=self._clock,
@@ -143,15 +143,15 @@ class Channels(Request):
                 pdos=self._pdos,
                 objects=self._start_up,
             )
-        return wishes
+        return requests
 
-    def tables(self, layout: ImageLayout) -> WishTables:
+    def tables(self, layout: ImageLayout) -> RequestTables:
         """Return one column per channel."""
         columns = tuple(column(channel, layout, self.direction) for channel in self._channels)
         self._units = [layout.sync_unit(sub.position) for sub in self.subs]
         if self.direction is Direction.OUTPUT:
-            return WishTables(output_columns=columns)
-        return WishTables(input_columns=columns)
+            return RequestTables(output_columns=columns)
+        return RequestTables(input_columns=columns)
 
     @property
     def present(self) -> tuple[bool, ...]:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Generator
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from catenary.drive.profile import Motion
-from catenary.drive.state_machine import Goal
+from catenary.drive.state_machine import RequestedState
 from catenary.drive.units import AxisUnits
 from catenary.errors import MoveError
 from catenary.plan.request import Views
@@ -22,7 +22,7 @@ WriteObject: TypeAlias = "Callable[[int, int], Pending[None]]"  # (object of slo
 PutRate: TypeAlias = Callable[[str, float], bool]  # False: not in the process data
 
 FOLLOWED = 1  # axis_flags
-GOAL_SHIFT = 6
+REQUESTED_SHIFT = 6
 JUMPS = 3  # counts per exchange of an estimated velocity that are not motion
 
 
@@ -134,7 +134,7 @@ class AxisPort:
         views, i = self._views, self._index
         if views.axis_state.item(i) in IN_FAULT:
             return "the drive is in fault"
-        if views.axis_flags.item(i) >> GOAL_SHIFT == Goal.ENABLED:
+        if views.axis_flags.item(i) >> REQUESTED_SHIFT == RequestedState.ENABLED:
             return None
         reason = StopReason(views.stop_reason.item(i))
         return reason.text if reason else "it was disabled or stopped on request"

@@ -8,7 +8,7 @@ from difflib import get_close_matches
 from catenary.bus import SubDevice
 from catenary.drive.arguments import (
     PdoList,
-    clock_wish,
+    clock_request,
     cycles_between,
     start_up_list,
     written_pdos,
@@ -30,11 +30,11 @@ from catenary.model.device import Direction
 from catenary.plan.cycle import ImageArea
 from catenary.plan.request import (
     Bytes,
+    DeviceRequest,
     DistributedClock,
     ImageLayout,
-    PdoWish,
+    RequestTables,
     Views,
-    WishTables,
     WrittenPdo,
 )
 from catenary.plan.start_up_object import StartUp
@@ -105,7 +105,7 @@ class ProcessData(Request):
         self._start_up = start_up_list(start_up)
         self._divider = cycles_between("divider", divider)
         self._required = required
-        self._clock = clock_wish(dc)
+        self._clock = clock_request(dc)
         self._places: dict[str, tuple[Direction, Place]] = {}
         self._images: dict[Direction, memoryview] = {}
         self._unit = -1
@@ -165,15 +165,15 @@ class ProcessData(Request):
         except (TypeError, ValueError) as error:
             raise type(error)(f"{self!r}: {name!r} = {value!r}: {error}") from None
 
-    # plan.request.Wish
+    # plan.request.ProcessDataRequest
 
-    def pdos(self, period_ns: int) -> Mapping[int, PdoWish]:
+    def pdos(self, period_ns: int) -> Mapping[int, DeviceRequest]:
         """Request the objects, or what is mapped already."""
         references = {
             direction: tuple(each.channel.reference() for each in channels)
             for direction, channels in self._channels.items()
         }
-        wish = PdoWish(
+        request = DeviceRequest(
             outputs=references[Direction.OUTPUT],
             inputs=references[Direction.INPUT],
             clock=self._clock,
@@ -182,9 +182,9 @@ class ProcessData(Request):
             pdos=self._pdos,
             objects=self._start_up,
         )
-        return {self._subs[0].position: wish}
+        return {self._subs[0].position: request}
 
-    def tables(self, layout: ImageLayout) -> WishTables:
+    def tables(self, layout: ImageLayout) -> RequestTables:
         """Return the bytes as areas. Named inputs are columns too, for laws and recordings."""
         device = self._subs[0].position
         self._unit = layout.sync_unit(device)
@@ -195,7 +195,7 @@ class ProcessData(Request):
         }
         inputs = self._channels[Direction.INPUT] if self._is_named else ()
         outputs = layout.byte_range(device, Direction.OUTPUT)
-        return WishTables(
+        return RequestTables(
             input_columns=tuple(column(each, layout, Direction.INPUT) for each in inputs),
             input_areas=self._areas(layout.byte_range(device, Direction.INPUT)),
             output_areas=self._areas(outputs, self._safe_bytes(len(outputs)))

@@ -21,7 +21,7 @@ from catenary.wire.cia402 import (
 )
 
 
-class Goal(IntEnum):
+class RequestedState(IntEnum):
     """Requested state of an axis, with the numbers of the core."""
 
     DISABLED = 0
@@ -30,42 +30,53 @@ class Goal(IntEnum):
     RESET = 3  # disabled, and a fault is acknowledged
 
 
-# (state, goal): the command that leads there. All others: DISABLE_VOLTAGE, which waits in a state
-# that the drive leaves by itself (0, 14), leaves a quick stop (12) and clears bit 7 in a fault.
-TOWARDS: dict[tuple[AxisState, Goal], Controlword] = {
-    (AxisState.READY_TO_SWITCH_ON, Goal.DISABLED): SHUTDOWN,  # stays
-    (AxisState.SWITCHED_ON, Goal.DISABLED): SHUTDOWN,  # transition 6
-    (AxisState.OPERATION_ENABLED, Goal.DISABLED): DISABLE_OPERATION,  # transition 5, ramp of 0x605C
-    (AxisState.SWITCH_ON_DISABLED, Goal.ENABLED): SHUTDOWN,  # transition 2
-    (AxisState.READY_TO_SWITCH_ON, Goal.ENABLED): SWITCH_ON,  # transition 3
-    (AxisState.SWITCHED_ON, Goal.ENABLED): ENABLE_OPERATION,  # transition 4
-    (AxisState.OPERATION_ENABLED, Goal.ENABLED): ENABLE_OPERATION,  # stays
-    (AxisState.FAULT, Goal.ENABLED): FAULT_RESET,  # transition 15
-    (AxisState.READY_TO_SWITCH_ON, Goal.QUICK_STOP): QUICK_STOP,  # transition 7
-    (AxisState.SWITCHED_ON, Goal.QUICK_STOP): QUICK_STOP,  # transition 10
-    (AxisState.OPERATION_ENABLED, Goal.QUICK_STOP): QUICK_STOP,  # transition 11, by 0x605A
-    (AxisState.QUICK_STOP_ACTIVE, Goal.QUICK_STOP): QUICK_STOP,  # stays; 16 would move at once
-    (AxisState.READY_TO_SWITCH_ON, Goal.RESET): SHUTDOWN,
-    (AxisState.SWITCHED_ON, Goal.RESET): SHUTDOWN,
-    (AxisState.OPERATION_ENABLED, Goal.RESET): DISABLE_OPERATION,
-    (AxisState.FAULT, Goal.RESET): FAULT_RESET,
+# Command for (state, requested state). Default: DISABLE_VOLTAGE, which waits in a state that the
+# drive leaves by itself (0, 14), leaves a quick stop (12) and clears bit 7 in a fault.
+TOWARDS: dict[tuple[AxisState, RequestedState], Controlword] = {
+    (AxisState.READY_TO_SWITCH_ON, RequestedState.DISABLED): SHUTDOWN,  # stays
+    (AxisState.SWITCHED_ON, RequestedState.DISABLED): SHUTDOWN,  # transition 6
+    (
+        AxisState.OPERATION_ENABLED,
+        RequestedState.DISABLED,
+    ): DISABLE_OPERATION,  # transition 5, ramp of 0x605C
+    (AxisState.SWITCH_ON_DISABLED, RequestedState.ENABLED): SHUTDOWN,  # transition 2
+    (AxisState.READY_TO_SWITCH_ON, RequestedState.ENABLED): SWITCH_ON,  # transition 3
+    (AxisState.SWITCHED_ON, RequestedState.ENABLED): ENABLE_OPERATION,  # transition 4
+    (AxisState.OPERATION_ENABLED, RequestedState.ENABLED): ENABLE_OPERATION,  # stays
+    (AxisState.FAULT, RequestedState.ENABLED): FAULT_RESET,  # transition 15
+    (AxisState.READY_TO_SWITCH_ON, RequestedState.QUICK_STOP): QUICK_STOP,  # transition 7
+    (AxisState.SWITCHED_ON, RequestedState.QUICK_STOP): QUICK_STOP,  # transition 10
+    (
+        AxisState.OPERATION_ENABLED,
+        RequestedState.QUICK_STOP,
+    ): QUICK_STOP,  # transition 11, by 0x605A
+    (
+        AxisState.QUICK_STOP_ACTIVE,
+        RequestedState.QUICK_STOP,
+    ): QUICK_STOP,  # stays; 16 would move at once
+    (AxisState.READY_TO_SWITCH_ON, RequestedState.RESET): SHUTDOWN,
+    (AxisState.SWITCHED_ON, RequestedState.RESET): SHUTDOWN,
+    (AxisState.OPERATION_ENABLED, RequestedState.RESET): DISABLE_OPERATION,
+    (AxisState.FAULT, RequestedState.RESET): FAULT_RESET,
 }
 
 
-def controlword_towards(state: AxisState | None, goal: Goal, previous: int) -> int:
-    """Return the command bits (0 to 3 and 7) that lead from `state` towards `goal`.
+def controlword_towards(
+    state: AxisState | None, requested_state: RequestedState, previous: int
+) -> int:
+    """Return the command bits (0 to 3 and 7) that lead from `state` towards `requested_state`.
 
     A fault is reset by a rising edge of bit 7, so the commands of an enabled drive are cleared
     first.
 
     Args:
         state: Present state of the drive.
-        goal: Requested state.
+        requested_state: Requested state.
         previous: Controlword that was sent last.
     """
     if state is None:
         return DISABLE_VOLTAGE.value
-    command = TOWARDS.get((state, goal), DISABLE_VOLTAGE)
+    command = TOWARDS.get((state, requested_state), DISABLE_VOLTAGE)
     if command is FAULT_RESET and previous & 0x000F:
         return DISABLE_VOLTAGE.value
     return command.value

@@ -135,7 +135,7 @@ def _device(
     who = f"device {plan.position} ({plan.name})"
     if not config:
         raise _no_handle(f"{who}: no configuration")
-    _tell_process_data(master, plan, config, who)
+    _configure_process_data(master, plan, config, who)
     for download in (*plan.before_mapping, *plan.start_up):
         data = ctypes.create_string_buffer(download.data, len(download.data))
         if download.optional:  # a refused SDO in its own list makes the master give up the device
@@ -144,7 +144,7 @@ def _device(
         place = (download.index, download.subindex, ctypes.addressof(data), len(data))
         what = f"{who}: start-up SDO 0x{download.index:04X}:{download.subindex:02X}"
         library.ask("ecrt_slave_config_sdo", config, *place, what=what)
-    _tell_clock(master, plan, whole.cycle.clock, config, who)
+    _configure_clock(master, plan, whole.cycle.clock, config, who)
     _register(master, plan, domains, config, who)
     library.ask("ecrt_slave_config_emerg_size", config, EMERGENCIES, what=f"{who}: emergencies")
     sdo = 0
@@ -164,7 +164,7 @@ def _download_if_there(master: Reservation, position: int, download: Download) -
             raise
 
 
-def _tell_process_data(master: Reservation, plan: DevicePlan, config: int, who: str) -> None:
+def _configure_process_data(master: Reservation, plan: DevicePlan, config: int, who: str) -> None:
     """Configure PDOs and watchdogs. The master writes only values that differ from the device's."""
     mode = abi.WATCHDOG_ENABLE if plan.watchdog_ns else abi.WATCHDOG_DISABLE
     if plan.watchdog_ns:
@@ -200,7 +200,7 @@ def _pdo_info(pdo: Pdo) -> abi.PdoInfo:
     return abi.PdoInfo(index=pdo.index, n_entries=len(entries), entries=entries)
 
 
-def _tell_clock(
+def _configure_clock(
     master: Reservation, plan: DevicePlan, clock: ClockPlan | None, config: int, who: str
 ) -> None:
     """Configure SYNC0. Its shift from the application time lets the frames pass first."""

@@ -61,7 +61,7 @@ static int igh_emit(void *self)
     rc = igh_do(&x->calls, x->calls.send, x->master);
     if (rc < 0)
         x->send_errors++;
-    x->collected = x->judged = x->heard = x->back = x->attended = 0;
+    x->collected = x->judged = x->received = x->back = x->attended = 0;
     return rc < 0 ? rc : 0;
 }
 
@@ -73,10 +73,10 @@ static void igh_receive(igh_exchange *x)
     if (igh_do(&x->calls, x->calls.receive, x->master) < 0)
         x->receive_errors++;
     x->frame_stamp = igh_now(x->time);
-    if (x->marked && !x->heard)
+    if (x->marked && !x->received)
         x->monitored = x->calls.monitor_process(x->master);
-    x->heard = x->marked && x->monitored != UINT32_MAX;
-    x->back = x->heard || !x->marked || x->deaf >= IGH_DEAF;
+    x->received = x->marked && x->monitored != UINT32_MAX;
+    x->back = x->received || !x->marked || x->deaf >= IGH_DEAF;
 }
 
 /* Process the queued domains. Return the number of domains that are not complete. */
@@ -152,9 +152,9 @@ static void igh_wait_for_answers(igh_exchange *x, int64_t deadline)
         look = x->frame_stamp + IGH_NAP_NS;
         looks++;
     } while (!x->back && x->frame_stamp < deadline);
-    if (looks == 1 && x->heard)
+    if (looks == 1 && x->received)
         x->patience -= x->patience >> IGH_PATIENCE_DECAY;
-    else if (x->heard && x->patience < x->frame_stamp - x->sent)
+    else if (x->received && x->patience < x->frame_stamp - x->sent)
         x->patience += IGH_NAP_NS;
 }
 
@@ -186,7 +186,7 @@ static int igh_collect(void *self, int64_t deadline)
     if (deadline != 0)
         missing = igh_wait_for_backup(x, deadline, missing);
     igh_judge(x);
-    if (x->heard)
+    if (x->received)
         x->deaf = 0;
     else if (first && missing == 0 && x->deaf < IGH_DEAF)
         x->deaf++;

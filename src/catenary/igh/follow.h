@@ -193,9 +193,9 @@ static void igh_attend_clocks(igh_exchange *x)
 /* Process the clock datagrams when they are back. Otherwise count one miss for each emit. */
 static void igh_watch_clocks(igh_exchange *x, int first)
 {
-    if (x->heard && !x->attended)
+    if (x->received && !x->attended)
         igh_attend_clocks(x);
-    if (x->heard || !first)
+    if (x->received || !first)
         return;
     x->clock_misses++;
     x->unheard++;

@@ -121,7 +121,7 @@ class KernelCarrier:
                 self._library.ecrt_slave_config_emerg_pop(device.config, ctypes.addressof(target))
                 == 0
             ):
-                self._hear(device.position, target.raw)
+                self._on_emergency(device.position, target.raw)
         self._look_at_links()
         yield from self._read_difference()
 
@@ -142,14 +142,14 @@ class KernelCarrier:
         assert isinstance(sub, SubDevice)  # made by the scan of a kernel master
         return sub
 
-    def _hear(self, position: int, message: bytes) -> None:
+    def _on_emergency(self, position: int, message: bytes) -> None:
         """Publish an emergency (8 bytes) that the master has stored for a device."""
         sub = self._kernel.subs[position]
-        heard = Emergency(*_EMERGENCY.unpack(message))
+        received = Emergency(*_EMERGENCY.unpack(message))
         if isinstance(sub, SubDevice):
-            sub.hear(heard)
+            sub.add_emergency(received)
         now = self._kernel.main.link.now() * 1e-9
-        self._kernel.main.events.put(emergency(now, sub, heard))
+        self._kernel.main.events.put(emergency(now, sub, received))
 
     def _look_at_links(self) -> None:
         handle = self._kernel.reservation.handle

@@ -25,7 +25,7 @@ if TYPE_CHECKING:  # plan needs NumPy, a scan does not
     from catenary.bus.master import MasterOwner
     from catenary.bus.states import Outcome
     from catenary.plan.planner import Plan
-    from catenary.plan.request import PdoWish, Wish
+    from catenary.plan.request import DeviceRequest, ProcessDataRequest
     from catenary.plan.start_up import DevicePlan
 
 # [s] An INIT request may be lost if the device fails at that moment. The master repeats it after
@@ -75,16 +75,16 @@ class KernelMaster:
             sub.read_state()
         return subs, ()
 
-    def read_mappings(self, wishes: Sequence[Wish], period_ns: int) -> None:
+    def read_mappings(self, requests: Sequence[ProcessDataRequest], period_ns: int) -> None:
         """Read the mapped PDOs, and the lengths of requested objects that are not mapped.
 
         Args:
-            wishes: The process-data requests of the loop.
+            requests: The process-data requests of the loop.
             period_ns: The period of the loop.
         """
-        from catenary.plan.planner import gather_wishes
+        from catenary.plan.planner import gather_requests
 
-        asked = gather_wishes(wishes, period_ns)
+        asked = gather_requests(requests, period_ns)
         for sub in self.main.subs:
             renewed = describe(self.reservation, sub.position)
             _check_same(sub.description, renewed)
@@ -264,11 +264,13 @@ def _check_same(before: DeviceDescription, now: DeviceDescription) -> None:
     check_identity(now, before.identity)
 
 
-def _unmapped(device: DeviceDescription, wish: PdoWish | None) -> Collection[tuple[int, int]]:
+def _unmapped(
+    device: DeviceDescription, request: DeviceRequest | None
+) -> Collection[tuple[int, int]]:
     """Return the requested objects that the device has not mapped."""
-    if wish is None:
+    if request is None:
         return ()
-    sides = ((Direction.OUTPUT, wish.outputs), (Direction.INPUT, wish.inputs))
+    sides = ((Direction.OUTPUT, request.outputs), (Direction.INPUT, request.inputs))
     missing: dict[tuple[int, int], None] = {}
     for direction, references in sides:
         mapped = {(e.index, e.subindex) for e in mapped_entries(device.assignments(direction))}

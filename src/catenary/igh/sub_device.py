@@ -40,17 +40,17 @@ class SubDevice(bus.SubDevice):
         super().__init__(main, description, None)
         self.sdo: Sdo = Sdo(self)
         self.kernel = kernel
-        self._heard: deque[Emergency] = deque(maxlen=EMERGENCIES_KEPT)
+        self._emergencies: deque[Emergency] = deque(maxlen=EMERGENCIES_KEPT)
         self._asking = False  # True while the register request is in use
 
     @property
     def emergencies(self) -> tuple[Emergency, ...]:
         """The last emergencies of the device, oldest first."""
-        return tuple(self._heard)
+        return tuple(self._emergencies)
 
-    def hear(self, emergency: Emergency) -> None:
+    def add_emergency(self, emergency: Emergency) -> None:
         """Record an emergency that the master received from the device."""
-        self._heard.append(emergency)
+        self._emergencies.append(emergency)
 
     def read_state(self) -> DeviceState:
         """Return the last EtherCAT state of the device that the master has read."""

@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TypeVar
 
-from catenary.bus import LaneRunner, MainDevice
+from catenary.bus import AcyclicRunner, MainDevice
 from catenary.bus.thread_priority import step_behind
 from catenary.core import Engine
 from catenary.errors import LoopError
-from catenary.loop.mailbox_watch import MailboxWatch
+from catenary.loop.watches.mailbox import MailboxWatch
 from catenary.plan.planner import Plan
 from catenary.procedure.exchange import Procedure
 
@@ -28,7 +28,7 @@ class Service:
     """
 
     def __init__(self, main: MainDevice, engine: Engine, plan: Plan) -> None:
-        self.runner = LaneRunner(engine, grain_ns=plan.cycle.period_ns // 2)
+        self.runner = AcyclicRunner(engine, grain_ns=plan.cycle.period_ns // 2)
         self._watch = MailboxWatch(plan, main.subs, _mailbox_words(engine, plan), self.runner)
         self.cycle: Callable[[], int] = partial(engine.run, 1)  # replaced when networks share time
         self._main = main
@@ -38,7 +38,9 @@ class Service:
         self._failure: Exception | None = None
         self._thread: threading.Thread | None = None
         if engine.scheduling != "virtual time":
-            self._thread = threading.Thread(target=self._serve, name="catenary lane", daemon=True)
+            self._thread = threading.Thread(
+                target=self._serve, name="catenary acyclic", daemon=True
+            )
 
     def start(self) -> None:
         if self._thread is not None:
@@ -64,7 +66,7 @@ class Service:
             self.runner.asked.clear()
             self._watch.look(now, self._engine.number)
             if self.runner.due:
-                self._engine.lane_wait(BUSY_NS)
+                self._engine.acyclic_wait(BUSY_NS)
                 self.runner.step()
             self._quiet_until = min(self.runner.next_due_ns, self._watch.next_look_ns)
         self._main.deliver_events()
@@ -108,7 +110,7 @@ class Service:
                 self._watch.look(self._engine.now(), self._engine.number)
                 self.runner.step()
                 if self.runner.due:
-                    self._engine.lane_wait(BUSY_NS)
+                    self._engine.acyclic_wait(BUSY_NS)
                 else:
                     self.runner.asked.wait(IDLE)
         except Exception as failure:  # a thread has no caller: the next `converse` reports it

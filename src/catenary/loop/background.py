@@ -38,12 +38,12 @@ class Background:
 
     def __init__(
         self,
-        runnings: Sequence[Session],
+        sessions: Sequence[Session],
         iteration: Iteration | NetworksIteration,
         guard: SignalGuard,
     ) -> None:
         self.error: Exception | None = None
-        self._runnings = runnings
+        self._sessions = sessions
         self._iteration = iteration
         self._guard = guard
         self._commit = threading.Lock()
@@ -51,7 +51,7 @@ class Background:
         self._cycled = threading.Condition()
         self._ended = threading.Event()
         self._told = False  # True after the error was raised
-        self._pace = _Pace(runnings[0])
+        self._pace = _Pace(sessions[0])
         self._process = os.getpid()
         self._thread = threading.Thread(target=self._iterate, name="catenary loop", daemon=True)
 
@@ -62,17 +62,17 @@ class Background:
             ValueError: The loop is inline and exchanges its frames in the thread of the program.
             LoopError: An axis is powered in CST and has no torque set-points.
         """
-        if self._runnings[0].plan.cycle.execution == "inline":
+        if self._sessions[0].plan.cycle.execution == "inline":
             raise ValueError(
                 "run_in_background needs a threaded loop: the frames of an inline loop would be "
                 "delayed by all other Python code"
             )
-        for running in self._runnings:
-            running.refuse_powered_torque("run_in_background")
+        for session in self._sessions:
+            session.refuse_powered_torque("run_in_background")
         next(self._iteration)  # the first call commits nothing: it must not coincide with an update
-        for running in self._runnings:
-            running.engine.background = True
-            running.end_background = self.end
+        for session in self._sessions:
+            session.engine.background = True
+            session.end_background = self.end
         self._iteration.commit_lock = self._commit
         self._thread.start()
 
@@ -83,7 +83,7 @@ class Background:
         self._end_updates()
         if threading.current_thread() is self._thread or self._thread.ident is None:
             return
-        self._thread.join(END_TIMEOUT + 8e-9 * self._runnings[0].plan.cycle.period_ns)
+        self._thread.join(END_TIMEOUT + 8e-9 * self._sessions[0].plan.cycle.period_ns)
         if self._thread.is_alive():
             raise LoopError("the thread that iterates the loop does not end: is a callback stuck?")
 
@@ -121,7 +121,7 @@ class Background:
     @contextmanager
     def _written_targets(self) -> Iterator[None]:
         """Commit the writes of the block; discard all of them if the block raises."""
-        engines = [running.engine for running in self._runnings]
+        engines = [session.engine for session in self._sessions]
         for engine in engines:
             engine.begin_update()
         before = [bytes(engine.blocks()[1]) for engine in engines]
@@ -174,7 +174,7 @@ class Background:
 
     def _require_alive(self) -> None:
         self.raise_error()
-        self._runnings[0].require_open()
+        self._sessions[0].require_open()
         if self._ended.is_set():
             raise RuntimeError("the loop is closed or being left")
 
@@ -188,12 +188,12 @@ class Background:
             self._commit.release()
 
     def _iterate(self) -> None:
-        for running in self._runnings:
-            running.service.runner.adopt()
+        for session in self._sessions:
+            session.service.runner.adopt()
         try:
             while not self._ended.is_set():
                 next(self._iteration)
-                self._tell_cycle()
+                self._report_cycle()
                 self._pace.keep(self._ended)
         except Exception as error:  # a thread has no caller: the next call raises it
             self._fail(error)
@@ -201,18 +201,18 @@ class Background:
             self._fail(LoopError(f"the thread that iterates the loop was ended by {end!r}"))
         finally:
             self._ended.set()
-            self._tell_cycle()
+            self._report_cycle()
 
-    def _tell_cycle(self) -> None:
+    def _report_cycle(self) -> None:
         with self._cycled:
             self._cycled.notify_all()
 
     def _fail(self, error: Exception) -> None:
         """Leave the loop as a `with` block would."""
-        for running in self._runnings:
-            running.tell_end(error)
+        for session in self._sessions:
+            session.report_end(error)
         self.error = error
-        for problem in leave_all(self._runnings, self._guard):
+        for problem in leave_all(self._sessions, self._guard):
             error.add_note(f"while leaving: {problem}")
 
 
@@ -224,9 +224,9 @@ def program_ends() -> bool:
 class _Pace:
     """Pace of virtual time, limited to the wall clock."""
 
-    def __init__(self, running: Session) -> None:
-        self._engine = running.engine
-        self._is_virtual = running.engine.scheduling == VIRTUAL
+    def __init__(self, session: Session) -> None:
+        self._engine = session.engine
+        self._is_virtual = session.engine.scheduling == VIRTUAL
         self._offset: float | None = None  # [s] virtual time minus wall clock at the start
 
     def keep(self, ended: threading.Event) -> None:

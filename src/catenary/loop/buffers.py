@@ -8,7 +8,7 @@ from dataclasses import fields
 import numpy as np
 
 from catenary.plan.cycle import Bank
-from catenary.plan.request import Mover, Views, Wish, WishTables
+from catenary.plan.request import Mover, ProcessDataRequest, RequestTables, Views
 
 COLUMN_BUFFERS: dict[tuple[bool, Bank], str] = {
     (False, Bank.REAL): "input_reals",
@@ -23,9 +23,9 @@ OTHERS = (*PART_BUFFERS, "unit_valid", "movers", "is_open", "is_led")
 AXIS_BUFFERS = tuple(each.name for each in fields(Views) if each.name not in OTHERS)
 
 
-def bind_wishes(
-    wishes: Sequence[Wish],
-    tables: Sequence[WishTables],
+def bind_requests(
+    requests: Sequence[ProcessDataRequest],
+    tables: Sequence[RequestTables],
     buffers: Mapping[str, memoryview],
     is_open: Callable[[], bool],
     is_led: Callable[[], bool] = lambda: False,
@@ -33,7 +33,7 @@ def bind_wishes(
     """Bind every request to its part of the buffers, in the order of the plan.
 
     Args:
-        wishes: Process-data requests.
+        requests: Process-data requests.
         tables: Tables of the plan, one per request.
         buffers: Private buffers of the engine by name.
         is_open: Returns True while the loop runs.
@@ -46,11 +46,11 @@ def bind_wishes(
     unit_valid = np.asarray(buffers["unit_valid"])
     movers: list[Mover] = []
     used = dict.fromkeys(("axes", *PART_BUFFERS), 0)
-    for wish, table in zip(wishes, tables, strict=True):
+    for request, table in zip(requests, tables, strict=True):
         sizes = dict.fromkeys(AXIS_BUFFERS, len(table.axes)) | part_sizes(table)
         starts = {name: used.get(name, used["axes"]) for name in sizes}
         parts = {name: arrays[name][starts[name] :][: sizes[name]] for name in sizes}
-        wish.bind(
+        request.bind(
             Views(**parts, unit_valid=unit_valid, movers=movers, is_open=is_open, is_led=is_led)
         )
         used["axes"] += len(table.axes)
@@ -59,7 +59,7 @@ def bind_wishes(
     return Views(**arrays, unit_valid=unit_valid, movers=movers, is_open=is_open, is_led=is_led)
 
 
-def part_sizes(table: WishTables) -> dict[str, int]:
+def part_sizes(table: RequestTables) -> dict[str, int]:
     """Return the number of columns that a request has in each bank, and of bytes in its areas."""
     sizes = dict.fromkeys(PART_BUFFERS, 0)
     for output, columns in ((False, table.input_columns), (True, table.output_columns)):

@@ -6,42 +6,42 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from catenary.bus import MainDevice, SubDevice
-from catenary.plan.request import Wish
+from catenary.plan.request import ProcessDataRequest
 
 REQUESTS = "Drives, Inputs, Outputs or ProcessData"
-PARTS = ("subs", "pdos", "tables", "bind")  # of a DeviceWish
+PARTS = ("subs", "pdos", "tables", "bind")  # of a LoopRequest
 
 
-class DeviceWish(Wish, Protocol):
+class LoopRequest(ProcessDataRequest, Protocol):
     """A request that names its devices."""
 
     @property
     def subs(self) -> Sequence[SubDevice]: ...
 
 
-def main_device_of(wishes: Sequence[DeviceWish]) -> MainDevice:
+def main_device_of(requests: Sequence[LoopRequest]) -> MainDevice:
     """Return the MainDevice that all requests share."""
-    [(main, _)] = by_network(wishes)
+    [(main, _)] = by_network(requests)
     return main
 
 
-def by_network(wishes: Sequence[DeviceWish]) -> list[tuple[MainDevice, list[DeviceWish]]]:
+def by_network(requests: Sequence[LoopRequest]) -> list[tuple[MainDevice, list[LoopRequest]]]:
     """Return the requests of each MainDevice, in the order of first use.
 
     Raises:
         ValueError: There is no request, or one names devices of several MainDevices.
     """
-    networks: dict[int, tuple[MainDevice, list[DeviceWish]]] = {}
-    for wish in wishes:
-        check_request(wish)
-        mains = {id(sub.main): _main_of(sub) for sub in wish.subs}
+    networks: dict[int, tuple[MainDevice, list[LoopRequest]]] = {}
+    for request in requests:
+        check_request(request)
+        mains = {id(sub.main): _main_of(sub) for sub in request.subs}
         if len(mains) > 1:
             raise ValueError(
                 "a request names devices of several MainDevices: make one request for each, and "
                 "pass both to the Loop"
             )
         for key, main in mains.items():
-            networks.setdefault(key, (main, []))[1].append(wish)
+            networks.setdefault(key, (main, []))[1].append(request)
     if not networks:
         raise ValueError(f"a Loop needs a process-data request: {REQUESTS}")
     return list(networks.values())

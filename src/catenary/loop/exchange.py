@@ -7,7 +7,7 @@ from typing import Protocol
 from catenary.bus import CycleClock, Pending
 from catenary.core import Engine
 from catenary.errors import CatenaryError
-from catenary.loop.device_watch import Attendance
+from catenary.loop.watches.device import Attendance
 
 
 class Exchange(Protocol):

@@ -10,8 +10,8 @@ from catenary.bus.event_types import DeviceLost, DeviceReturned, StateLost
 from catenary.core import Engine
 from catenary.errors import CatenaryError, ConfigurationError
 from catenary.loop.cycle_errors import described, is_astray, silence_error, state_error
-from catenary.loop.device_watch import LOOK, Attendance
 from catenary.loop.session import FATAL, Session
+from catenary.loop.watches.device import LOOK, Attendance
 from catenary.plan.cycle import DatagramKind
 from catenary.plan.planner import Plan
 from catenary.procedure.al_status_poll import Answer
@@ -121,7 +121,7 @@ class CarriedWatch:
             self._announce()
             if self._engine.disturbed or any(a.word != AlState.OP for a in self._answers):
                 answers = yield from self._carrier.survey()
-                self._tell(answers)
+                self._report(answers)
                 self._answers = answers
             yield after(LOOK)
 
@@ -139,7 +139,7 @@ class CarriedWatch:
         """Raise ValueError: the carrier holds no device, it brings devices back itself."""
         raise ValueError(f"{sub.station} is not held: the kernel master leads devices back itself")
 
-    def _tell(self, answers: Sequence[Answer]) -> None:
+    def _report(self, answers: Sequence[Answer]) -> None:
         before = {answer.station.position: answer.word for answer in self._answers}
         now = self._engine.now() * 1e-9
         for answer in answers:

@@ -14,10 +14,10 @@ from catenary.loop.cycle_errors import (
     state_error,
     tight_period,
 )
-from catenary.loop.device_watch import Attendance, Watch
-from catenary.loop.error_watch import ErrorWatch
-from catenary.loop.frame_watch import FrameWatch
 from catenary.loop.session import Session
+from catenary.loop.watches.device import Attendance, Watch
+from catenary.loop.watches.error import ErrorWatch
+from catenary.loop.watches.frame import FrameWatch
 from catenary.model.break_location import judge_silence
 from catenary.model.device import Direction
 from catenary.procedure.al_state import request_state

@@ -20,7 +20,7 @@ from catenary.errors import LawError
 from catenary.log import Log
 from catenary.loop.background import Background, program_ends
 from catenary.loop.clocks import Clocks
-from catenary.loop.devices import DeviceWish, by_network
+from catenary.loop.devices import LoopRequest, by_network
 from catenary.loop.laws.law import Law, LawFunction
 from catenary.loop.laws.law import law as made_law
 from catenary.loop.laws.run import LawRun, Numbers
@@ -86,7 +86,7 @@ class Loop:
 
     def __init__(
         self,
-        *requests: DeviceWish,
+        *requests: LoopRequest,
         period: float = 1e-3,
         execution: ExecutionMode = "threaded",
         enable: bool = True,
@@ -145,7 +145,7 @@ class Loop:
         self._finalizer: weakref.finalize[..., Loop] | None = None
 
     def __enter__(self) -> Loop:
-        if any(running.is_open for running in self._runnings):
+        if any(session.is_open for session in self._sessions):
             raise RuntimeError("the loop is open: `with` and open() open it; use one of them, once")
         for network in self._networks:
             network.main.require_no_loop()
@@ -153,19 +153,19 @@ class Loop:
             self._guard.install()
             self._iteration = self._background = None
             for network in self._networks:
-                network.running = None
+                network.current_session = None
             abandon = leave_method(self._abandon)
-            runnings = [network.prepare(abandon) for network in self._networks]
-            self._leave_at_the_latest(runnings)
-            if len(runnings) > 1:
-                share_time(runnings)
-            for running in runnings:
-                running.open(runnings[0].engine.origin)
+            sessions = [network.prepare(abandon) for network in self._networks]
+            self._leave_at_the_latest(sessions)
+            if len(sessions) > 1:
+                share_time(sessions)
+            for session in sessions:
+                session.open(sessions[0].engine.origin)
             if self._enable:
-                for running in runnings:
-                    running.enable()
-            for running in runnings:
-                running.reset_figures()
+                for session in sessions:
+                    session.enable()
+            for session in sessions:
+                session.reset_figures()
             return self  # inside `try`: a signal may arrive at this line too
         except BaseException as error:
             self._report_end(error)
@@ -202,9 +202,9 @@ class Loop:
 
         Raises the error that ended the loop in the background, unless another call has raised it.
         """
-        if not self._runnings:
+        if not self._sessions:
             return
-        if any(running.is_open for running in self._runnings):
+        if any(session.is_open for session in self._sessions):
             self._guard.install()  # again: a notebook sets its own handlers in each cell
         self.__exit__(None, None, None)
 
@@ -226,7 +226,7 @@ class Loop:
             if self._background.is_alive:
                 return
         iteration = self._iterating()
-        self._background = Background(self._runnings, iteration, self._guard)
+        self._background = Background(self._sessions, iteration, self._guard)
         try:
             self._background.start()
         except BaseException:
@@ -265,8 +265,8 @@ class Loop:
         self._require_foreground()
         if self._iteration is None:
             self._iteration = self._make_iteration()
-            for running in self._runnings:
-                running.service.runner.adopt()
+            for session in self._sessions:
+                session.service.runner.adopt()
         return self._iteration
 
     def __next__(self) -> Cycle:
@@ -366,11 +366,11 @@ class Loop:
             ValueError: An argument is impossible.
         """
         self._require_foreground()
-        running = self._only("a law")
+        session = self._only("a law")
         if not compiled:
             return self._run_as_python(made_law(law), memory, parameters)
-        run = running.laws.start(made_law(law), memory, parameters, budget, overruns)
-        running.laws.run(run, ENDING, self._networks[0].advance)
+        run = session.laws.start(made_law(law), memory, parameters, budget, overruns)
+        session.laws.run(run, ENDING, self._networks[0].advance)
         return run.memory
 
     def _run_as_python(
@@ -406,9 +406,9 @@ class Loop:
         Raises:
             ValueError: The device belongs to another loop.
         """
-        for running in self._runnings:
-            if running.main is sub.main:
-                return running.watch.release(sub)
+        for session in self._sessions:
+            if session.main is sub.main:
+                return session.watch.release(sub)
         raise ValueError(f"{sub.station} is not in this loop: it is on another MainDevice")
 
     @property
@@ -463,11 +463,13 @@ class Loop:
             RuntimeError: No request has `dc=`.
         """
         self._require_foreground()
-        with_clocks = [n for n in self._networks if n.running and n.running.clocks is not None]
+        with_clocks = [
+            n for n in self._networks if n.current_session and n.current_session.clocks is not None
+        ]
         if not with_clocks:
             raise RuntimeError("no distributed clocks in this loop: Drives(..., dc=True)")
-        for running in self._runnings:
-            running.refuse_powered_torque("wait_locked")
+        for session in self._sessions:
+            session.refuse_powered_torque("wait_locked")
         for network in with_clocks:
             network.wait_locked(within, timeout)
 
@@ -496,9 +498,13 @@ class Loop:
         return self._opened
 
     @property
-    def _runnings(self) -> list[Session]:
+    def _sessions(self) -> list[Session]:
         """Sessions of the networks that are prepared."""
-        return [network.running for network in self._networks if network.running is not None]
+        return [
+            network.current_session
+            for network in self._networks
+            if network.current_session is not None
+        ]
 
     @property
     def _opened(self) -> Session:
@@ -509,14 +515,14 @@ class Loop:
         for problem in self._leave():
             warnings.warn(f"the loop was left open: {problem}", RuntimeWarning, stacklevel=2)
 
-    def _leave_at_the_latest(self, runnings: Sequence[Session]) -> None:
+    def _leave_at_the_latest(self, sessions: Sequence[Session]) -> None:
         """Leave the loop when it is deleted, or when the program ends, if it is open then."""
-        self._finalizer = weakref.finalize(self, leave_open_loop, runnings, self._guard)
+        self._finalizer = weakref.finalize(self, leave_open_loop, sessions, self._guard)
 
     def _report_end(self, error: BaseException) -> None:
         """Report the error that ends the loop to the sinks."""
-        for running in self._runnings:
-            running.tell_end(error)
+        for session in self._sessions:
+            session.report_end(error)
 
     def _leave(self) -> list[Exception]:
         """Stop every network that answers, whatever happens to the others; return the problems.
@@ -525,9 +531,9 @@ class Loop:
         """
         is_ours = self._leaving.acquire(timeout=LEAVE_TIMEOUT)
         try:
-            problems = leave_all(self._runnings, self._guard)
+            problems = leave_all(self._sessions, self._guard)
             for network in self._networks:
-                if network.running is None:
+                if network.current_session is None:
                     problems += take_down(network.main)
         finally:
             self._guard.restore()
@@ -564,24 +570,24 @@ def checked_quorum(quorum: int | None, count: int) -> int:
     return count if quorum is None else quorum
 
 
-def leave_open_loop(runnings: Sequence[Session], guard: SignalGuard) -> None:
+def leave_open_loop(sessions: Sequence[Session], guard: SignalGuard) -> None:
     """Stop the axes of a loop that is no longer referenced, then warn if it was left open.
 
     A loop in the background may stay open until the program ends. The warning is last because it
     may be turned into an error.
 
     Args:
-        runnings: Sessions of the loop.
+        sessions: Sessions of the loop.
         guard: Signal handlers of the loop.
     """
-    if not any(running.is_open for running in runnings):
+    if not any(session.is_open for session in sessions):
         return
-    for running in runnings:
-        if running.is_open:
-            running.stop_axes_at_once()
-    problems = leave_all(runnings, guard)
+    for session in sessions:
+        if session.is_open:
+            session.stop_axes_at_once()
+    problems = leave_all(sessions, guard)
     guard.restore()
-    if program_ends() and not problems and all(one.in_background for one in runnings):
+    if program_ends() and not problems and all(one.in_background for one in sessions):
         return
     text = "a Loop was not left: its axes have been stopped. Use it in a with block, or close() it"
     text += "".join(f"; {problem}" for problem in problems)

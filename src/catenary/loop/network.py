@@ -17,7 +17,7 @@ from catenary.core import (
 )
 from catenary.log import Log
 from catenary.loop.clocks import Clocks
-from catenary.loop.devices import DeviceWish
+from catenary.loop.devices import LoopRequest
 from catenary.loop.external_cycle import CarriedExchange, carried
 from catenary.loop.frame_exchange import FrameExchange
 from catenary.loop.laws.law import Law
@@ -56,14 +56,14 @@ class Network:
     def __init__(
         self,
         main: MainDevice,
-        requests: Sequence[DeviceWish],
+        requests: Sequence[LoopRequest],
         settings: Settings,
         *,
         cpu: int | None,
         sink: Sink | None,
     ) -> None:
         self.main = main
-        self.running: Session | None = None
+        self.current_session: Session | None = None
         self._requests = requests
         self._settings = settings
         self._cpu = cpu
@@ -109,9 +109,9 @@ class Network:
     @property
     def session(self) -> Session:
         """Session of the network. RuntimeError before the loop is open."""
-        if self.running is None:
+        if self.current_session is None:
             raise RuntimeError("the loop is not open: with Loop(...) as loop:")
-        return self.running
+        return self.current_session
 
     def prepare(self, abandon: Callable[[], object]) -> Session:
         """Bring all devices to SAFE-OP and compile all laws.
@@ -119,11 +119,11 @@ class Network:
         Args:
             abandon: Leaves the loop; called when the MainDevice is closed.
         """
-        self.running = None
+        self.current_session = None
         plan = self._make_plan()
         self.main.configure(plan)
         is_carried = self.main.carrier is not None
-        running = Session(
+        session = Session(
             self.main,
             carried(plan) if is_carried else plan,
             self._requests,
@@ -131,13 +131,13 @@ class Network:
             stop=self._settings.stop,
             exchange=CarriedExchange if is_carried else FrameExchange,
         )
-        running.switch_interval = self._settings.scheduling.switch_interval
+        session.switch_interval = self._settings.scheduling.switch_interval
         for law in self._settings.laws:
-            running.laws.compile(law)
+            session.laws.compile(law)
         if self._sink is not None:
-            running.publish(self._sink)
-        self.running = running
-        return running
+            session.publish(self._sink)
+        self.current_session = session
+        return session
 
     def _make_plan(self) -> Plan:
         """Return the plan of the requests. Nothing is written to the devices yet."""

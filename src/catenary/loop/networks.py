@@ -27,10 +27,10 @@ VIRTUAL = "virtual time"
 class NetworksCycle(Cycle):
     """One cycle of several networks. Its number and time are those of the first."""
 
-    def __init__(self, runnings: Sequence[Session], quorum: int) -> None:
-        super().__init__(runnings[0].engine)
-        self._networks = tuple(Cycle(running.engine) for running in runnings)
-        self.alive = (True,) * len(runnings)  # True if the network's devices are in OP
+    def __init__(self, sessions: Sequence[Session], quorum: int) -> None:
+        super().__init__(sessions[0].engine)
+        self._networks = tuple(Cycle(session.engine) for session in sessions)
+        self.alive = (True,) * len(sessions)  # True if the network's devices are in OP
         self._quorum = quorum
 
     @property
@@ -72,7 +72,7 @@ class NetworksIteration:
     """Iterator that steps all networks once per `next` and yields their common NetworksCycle."""
 
     def __init__(self, networks: Sequence[Network], quorum: int, *, faults: bool) -> None:
-        self._runnings = [network.session for network in networks]
+        self._sessions = [network.session for network in networks]
         self._quorum = quorum
         self._faults = faults
         self._dead: set[int] = set()  # identities of the failed networks that have not returned
@@ -83,16 +83,16 @@ class NetworksIteration:
         return self
 
     def __next__(self) -> NetworksCycle:
-        for one in self._runnings:
+        for one in self._sessions:
             one.service.step_without_thread()
         if self._cycle is None:
-            flags = [one.engine.run(1) for one in self._runnings]
-            self._cycle = NetworksCycle(self._runnings, self._quorum)
-            for one in self._runnings:
-                one.engine.zero_ns = self._runnings[0].engine.zero_ns
+            flags = [one.engine.run(1) for one in self._sessions]
+            self._cycle = NetworksCycle(self._sessions, self._quorum)
+            for one in self._sessions:
+                one.engine.zero_ns = self._sessions[0].engine.zero_ns
         else:
             self._commit_if_free()
-            flags = [one.engine.next() for one in self._runnings]
+            flags = [one.engine.next() for one in self._sessions]
         self._judge(self._cycle, flags)
         return self._cycle
 
@@ -100,12 +100,12 @@ class NetworksIteration:
         """Commit, unless another thread is writing the targets."""
         lock = self.commit_lock
         if lock is not None and not lock.acquire(blocking=False):
-            for one in self._runnings:
+            for one in self._sessions:
                 one.engine.keep_targets()
             return
         try:
             self.step_movers()
-            for one in self._runnings:
+            for one in self._sessions:
                 one.engine.commit_targets()
         finally:
             if lock is not None:
@@ -115,15 +115,15 @@ class NetworksIteration:
         """Write the targets of moving axes."""
         if self._cycle is None:
             return
-        for one, its in zip(self._runnings, self._cycle.networks, strict=True):
+        for one, its in zip(self._sessions, self._cycle.networks, strict=True):
             for mover in list(one.views.movers):
                 mover.step(its.time)
 
     def _judge(self, cycle: NetworksCycle, flags: Sequence[int]) -> None:
         """Raise the error that ends the loop: too few networks, or trouble in a live one."""
-        alive = [self._lives(one, mine) for one, mine in zip(self._runnings, flags, strict=True)]
+        alive = [self._lives(one, mine) for one, mine in zip(self._sessions, flags, strict=True)]
         cycle.alive = tuple(alive)
-        for one, mine, lives in zip(self._runnings, flags, alive, strict=True):
+        for one, mine, lives in zip(self._sessions, flags, alive, strict=True):
             if not lives and sum(alive) >= self._quorum:
                 continue
             if mine & TROUBLE or one.engine.al_status != AlState.OP:
@@ -144,59 +144,59 @@ class NetworksIteration:
         return id(one) not in self._dead
 
     def _stop_others(self, dead: Session) -> None:
-        for one in self._runnings:
+        for one in self._sessions:
             if one is not dead:
                 one.stop_axes_at_once()
 
 
-def share_time(runnings: Sequence[Session]) -> None:
+def share_time(sessions: Sequence[Session]) -> None:
     """In virtual time, let this thread run the cycles of all networks in turns.
 
     Raises:
         ValueError: The networks have different clocks.
     """
-    virtual = [one.engine.scheduling == VIRTUAL for one in runnings]
+    virtual = [one.engine.scheduling == VIRTUAL for one in sessions]
     if not any(virtual):
         return
-    if not all(virtual) or not _have_one_clock([one.main.link for one in runnings]):
+    if not all(virtual) or not _have_one_clock([one.main.link for one in sessions]):
         raise ValueError(
             "the networks of one loop need a common time: give their segments the same clock, "
             "Segment(..., clock=VirtualClock())"
         )
-    for one in runnings:
-        one.share_time([other for other in runnings if other is not one])
+    for one in sessions:
+        one.share_time([other for other in sessions if other is not one])
 
 
-def leave_all(runnings: Sequence[Session], guard: SignalGuard) -> list[Exception]:
+def leave_all(sessions: Sequence[Session], guard: SignalGuard) -> list[Exception]:
     """Stop every network that answers, whatever happens to the others; return the problems.
 
     Args:
-        runnings: Sessions of the loop.
+        sessions: Sessions of the loop.
         guard: Shortens the waits at a second signal.
     """
     problems: list[Exception] = []
     try:
-        for running in runnings[:1]:  # one thread iterates all
-            running.end_background()
+        for session in sessions[:1]:  # one thread iterates all
+            session.end_background()
     except LoopError as problem:
         problems.append(problem)
-    if len(runnings) > 1:
-        brake(runnings, guard)
-    for running in runnings:
-        problems += running.leave(guard)
+    if len(sessions) > 1:
+        brake(sessions, guard)
+    for session in sessions:
+        problems += session.leave(guard)
     return problems
 
 
-def brake(runnings: Sequence[Session], guard: SignalGuard) -> None:
+def brake(sessions: Sequence[Session], guard: SignalGuard) -> None:
     """Stop all axes of all networks together; wait for standstill, or until the deadline.
 
     Args:
-        runnings: Sessions of the loop.
+        sessions: Sessions of the loop.
         guard: Ends the wait at a second signal.
     """
-    for one in runnings:
+    for one in sessions:
         one.make_outputs_safe()
-    moving = [one for one in runnings if one.is_open and one.plan.cycle.axes]
+    moving = [one for one in sessions if one.is_open and one.plan.cycle.axes]
     for one in moving:
         one.stop_axes_at_once()
     deadline = max((one.plan.cycle.stop_deadline_ns for one in moving), default=0)
@@ -253,8 +253,8 @@ def _have_one_clock(links: Sequence[Link]) -> bool:
     return all(link.now() >= later for link in others)
 
 
-def _stands(running: Session) -> bool:
+def _stands(session: Session) -> bool:
     try:
-        return running.engine.run_until_stopped(STOP_SLICE_NS)
+        return session.engine.run_until_stopped(STOP_SLICE_NS)
     except (CatenaryError, OSError):
         return True  # the link failed: no further action is possible

@@ -40,11 +40,11 @@ class Publisher:
         except BaseException:
             sink.close()
             raise
-        self._forget: Callable[[], None] = main.events.listen(self._hear)
+        self._forget: Callable[[], None] = main.events.listen(self._on_event)
 
-    def tell_end(self, error: BaseException) -> None:
+    def report_end(self, error: BaseException) -> None:
         """Publish the error that ends the loop."""
-        self._tell(type(error).__name__, str(error), self._engine.now() * 1e-9, None, {})
+        self._report(type(error).__name__, str(error), self._engine.now() * 1e-9, None, {})
 
     def close(self) -> None:
         """Close the sink; call it after the engine has stopped."""
@@ -55,16 +55,16 @@ class Publisher:
         self._engine.set_sink(None)
         self._sink.close()
 
-    def _hear(self, event: Event) -> None:
+    def _on_event(self, event: Event) -> None:
         position = None if event.sub is None else event.sub.position
         details = {
             field.name: plain(getattr(event, field.name))
             for field in fields(event)
             if field.name not in EVENT_FIELDS
         }
-        self._tell(type(event).__name__, event.message, event.time, position, details)
+        self._report(type(event).__name__, event.message, event.time, position, details)
 
-    def _tell(
+    def _report(
         self,
         kind: str,
         message: str,
@@ -72,7 +72,7 @@ class Publisher:
         position: int | None,
         details: dict[str, object],
     ) -> None:
-        self._sink.tell(Incident(kind, message, when, position, details))
+        self._sink.report(Incident(kind, message, when, position, details))
 
 
 def plain(value: object) -> object:
@@ -166,8 +166,8 @@ def columns_of(
         columns: Columns of each request.
     """
     used = dict.fromkeys(Bank, 0)
-    for of_wish in columns:
-        for (group, bank), members in groupby(of_wish, key=lambda c: (c.group, c.bank)):
+    for of_request in columns:
+        for (group, bank), members in groupby(of_request, key=lambda c: (c.group, c.bank)):
             here = list(members)
             for part in [here] if group else [[column] for column in here]:
                 start, code, _ = places[BANKS[bank]]

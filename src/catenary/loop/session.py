@@ -19,16 +19,15 @@ from catenary.core import (
     CYCLE_OK,
     CYCLE_STOPPED,
     CYCLE_WORKING_COUNTER,
-    GOAL_ENABLED,
-    GOAL_QUICK_STOP,
-    GOAL_RESET,
+    REQUEST_ENABLED,
+    REQUEST_QUICK_STOP,
+    REQUEST_RESET,
 )
 from catenary.errors import CatenaryError, DriveError, LinkError, LoopError
 from catenary.link import forget_in_child
 from catenary.log import Log
 from catenary.loop.acyclic_service import Service
-from catenary.loop.axis_watch import AxisWatch, RefusedMode, StoppedAxis
-from catenary.loop.buffers import bind_wishes
+from catenary.loop.buffers import bind_requests
 from catenary.loop.clocks import Clocks
 from catenary.loop.cycle_errors import (
     AxisTrouble,
@@ -44,8 +43,9 @@ from catenary.loop.safe_outputs import confirm_safe, make_safe
 from catenary.loop.signals import SignalGuard
 from catenary.loop.stop_error import stopped_error
 from catenary.loop.timing import Timing
+from catenary.loop.watches.axis import AxisWatch, RefusedMode, StoppedAxis
 from catenary.plan.planner import Plan
-from catenary.plan.request import Wish
+from catenary.plan.request import ProcessDataRequest
 from catenary.plan.sink import Sink
 from catenary.plan.stop_reason import UNASKED, StopReason
 from catenary.wire.al import AlState
@@ -65,7 +65,7 @@ class Session:
         self,
         main: MainDevice,
         plan: Plan,
-        wishes: Sequence[Wish],
+        requests: Sequence[ProcessDataRequest],
         *,
         abandon: Callable[[], object],
         stop: StopPolicy,
@@ -75,8 +75,8 @@ class Session:
         self.plan = plan
         self.exchange: Exchange = exchange(self)
         self.engine = self.exchange.make_engine()
-        self.views = bind_wishes(
-            wishes,
+        self.views = bind_requests(
+            requests,
             plan.tables,
             self.engine.buffers,
             is_open=lambda: self.is_open,
@@ -111,10 +111,10 @@ class Session:
         """Publish every cycle to the sink, from the first one on."""
         self._publisher = Publisher(sink, self.main, self.engine, self.plan)
 
-    def tell_end(self, error: BaseException) -> None:
+    def report_end(self, error: BaseException) -> None:
         """Publish the error that ends the loop."""
         if self._publisher is not None:
-            self._publisher.tell_end(error)
+            self._publisher.report_end(error)
 
     def share_time(self, companions: Sequence[Session]) -> None:
         """Let this thread also run the cycles of other networks, in virtual time."""
@@ -171,13 +171,13 @@ class Session:
         """
         in_position = np.isin(self.views.mode_target, (Mode.CSP, Mode.PP))
         if (~in_position & self._in_fault()).any():  # enabling resets too late for their targets
-            self._request(GOAL_RESET, ~in_position & self._in_fault())
+            self._request(REQUEST_RESET, ~in_position & self._in_fault())
             self._await(lambda: ~in_position & self._in_fault())
-        self._request(GOAL_ENABLED, np.ones_like(in_position))
+        self._request(REQUEST_ENABLED, np.ones_like(in_position))
         self._await(lambda: in_position & (self.views.axis_flags & AXIS_FOLLOWED == 0))
 
-    def _request(self, goal: int, axes: npt.NDArray[np.bool_]) -> None:
-        self.views.goal[axes] = goal
+    def _request(self, state: int, axes: npt.NDArray[np.bool_]) -> None:
+        self.views.requested_state[axes] = state
         self.views.request[axes] += 1
 
     def _in_fault(self) -> npt.NDArray[np.bool_]:
@@ -343,7 +343,7 @@ class Session:
             self._stop_axes,
             self._confirm_safe_outputs,
             self._stop_cycle,
-            self._tell_of_watches,
+            self._report_watches,
             self._take_down,
         )
         problems: list[Exception] = []
@@ -379,7 +379,7 @@ class Session:
 
     def stop_axes_at_once(self) -> None:
         """Stop all axes from the next cycle on; replace requests that are not committed yet."""
-        self.views.goal[:] = GOAL_QUICK_STOP
+        self.views.requested_state[:] = REQUEST_QUICK_STOP
         self.views.request[:] += 1
         self.engine.quick_stop_all()
 
@@ -392,7 +392,7 @@ class Session:
             if self._publisher is not None:
                 self._publisher.close()
 
-    def _tell_of_watches(self, guard: SignalGuard) -> None:
+    def _report_watches(self, guard: SignalGuard) -> None:
         """Raise the error of a watch: watches are endless, so one that has ended has failed."""
         for watch in self._watches:
             if watch.error is not None and not isinstance(watch.error, LoopError):

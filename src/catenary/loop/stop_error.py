@@ -10,7 +10,7 @@ import numpy.typing as npt
 from catenary.core import CYCLE_DRY, CYCLE_UNCOMMITTED
 from catenary.errors import DriveError
 from catenary.log import Log
-from catenary.loop.axis_watch import StoppedAxis, mode_name
+from catenary.loop.watches.axis import StoppedAxis, mode_name
 from catenary.plan.cycle import CyclePlan
 from catenary.plan.stop_reason import StopReason
 from catenary.wire.cia402 import Mode
@@ -61,13 +61,13 @@ def stopped_error(stops: Sequence[StoppedAxis], cycle: CyclePlan, log: Log) -> D
     for stop in stops:
         what = f"stopped in cycle {stop.cycle}: {stop.reason.text}{_details(stop, cycle, log)}"
         alike.setdefault(what, []).append(stop.name)
-    told = "; ".join(
+    report = "; ".join(
         f"{', '.join(names)} {'was' if len(names) == 1 else 'were'} {what}"
         for what, names in alike.items()
     )
     reasons = dict.fromkeys(stop.reason for stop in stops)
     advice = "; ".join(ADVICE[reason] for reason in reasons if reason in ADVICE)
-    return DriveError(told, log=log, hint=f"{advice}; {GO_ON}")
+    return DriveError(report, log=log, hint=f"{advice}; {GO_ON}")
 
 
 def _details(stop: StoppedAxis, cycle: CyclePlan, log: Log) -> str:

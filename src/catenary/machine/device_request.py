@@ -12,7 +12,7 @@ from catenary.machine.file import MachineFile
 from catenary.machine.lines import KeyPath
 from catenary.machine.references import data_type, object_of
 from catenary.machine.schema import StartUpTable
-from catenary.plan.request import ImageLayout, PdoWish, Views, WishTables
+from catenary.plan.request import DeviceRequest, ImageLayout, RequestTables, Views
 from catenary.plan.start_up_object import StartUp
 from catenary.types import Octets
 
@@ -45,22 +45,22 @@ def _start_up(file: MachineFile, table: StartUpTable, path: KeyPath) -> StartUp:
         return StartUp(index, subindex, value, **options)
 
 
-class DeviceRequest:
+class StartUpRequest:
     """Request for a device without process data: start-up objects, whether it may be absent."""
 
     def __init__(
         self, sub: SubDevice, objects: Sequence[StartUp], *, required: bool, divider: int
     ) -> None:
         self.subs = (sub,)
-        self._wish = PdoWish(objects=tuple(objects), required=required, divider=divider)
+        self._request = DeviceRequest(objects=tuple(objects), required=required, divider=divider)
 
-    def pdos(self, period_ns: int) -> Mapping[int, PdoWish]:
+    def pdos(self, period_ns: int) -> Mapping[int, DeviceRequest]:
         """Return the request, by position."""
-        return {self.subs[0].position: self._wish}
+        return {self.subs[0].position: self._request}
 
-    def tables(self, layout: ImageLayout) -> WishTables:
+    def tables(self, layout: ImageLayout) -> RequestTables:
         """Return no axes and no columns."""
-        return WishTables()
+        return RequestTables()
 
     def bind(self, views: Views) -> None:
         """Receive the views of the loop that opens. The request has none of its own."""

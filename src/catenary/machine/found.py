@@ -9,7 +9,7 @@ from catenary.bus import SubDevice
 from catenary.drive import Drives
 from catenary.drive.process_data import ProcessData
 from catenary.errors import CatenaryError, IdentityError, SegmentError
-from catenary.loop.devices import DeviceWish
+from catenary.loop.devices import LoopRequest
 from catenary.machine.by_name import ByName
 from catenary.machine.comparison import Comparison, expected_identity
 from catenary.machine.file import MachineFile
@@ -28,7 +28,7 @@ class MachineParts:
     subs: ByName[SubDevice] = field(default_factory=lambda: ByName("device", {}, {}))
     drives: ByName[Drives] = field(default_factory=lambda: ByName("drives", {}, {}))
     process_data: ByName[ProcessData] = field(default_factory=lambda: ByName("data", {}, {}))
-    requests: tuple[DeviceWish, ...] = ()
+    requests: tuple[LoopRequest, ...] = ()
 
 
 def raise_differences(file: MachineFile, found: Sequence[Comparison]) -> None:

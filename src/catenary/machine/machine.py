@@ -14,7 +14,7 @@ from catenary.drive import Drives
 from catenary.drive.process_data import ProcessData
 from catenary.link import LinkSource
 from catenary.loop import ClockOptions, Loop, Scheduling, StopPolicy
-from catenary.loop.devices import DeviceWish
+from catenary.loop.devices import LoopRequest
 from catenary.loop.laws.law import Law, LawFunction
 from catenary.machine.by_name import ByName
 from catenary.machine.comparison import compare
@@ -117,7 +117,7 @@ class Machine:
         return self._opened.process_data
 
     @property
-    def requests(self) -> tuple[DeviceWish, ...]:
+    def requests(self) -> tuple[LoopRequest, ...]:
         """Requests for a loop: `print(machine.main.plan(*machine.requests))`."""
         return self._opened.requests
 

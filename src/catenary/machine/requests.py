@@ -10,7 +10,7 @@ from catenary.bus import SubDevice
 from catenary.drive import Drives
 from catenary.drive.process_data import ProcessData
 from catenary.machine.channels import make_channels
-from catenary.machine.device_request import DeviceRequest, start_up_objects
+from catenary.machine.device_request import StartUpRequest, start_up_objects
 from catenary.machine.file import MachineFile
 from catenary.machine.lines import KeyPath
 from catenary.machine.options import drives_options, process_data_options
@@ -80,7 +80,7 @@ def make_process_data(file: MachineFile, role: str, subs: Subs) -> ProcessData:
         return ProcessData(sub, **options)
 
 
-def make_device_requests(file: MachineFile, subs: Subs) -> list[DeviceRequest]:
+def make_device_requests(file: MachineFile, subs: Subs) -> list[StartUpRequest]:
     """Return requests for devices with start-up objects, and for those that may be absent."""
     made = []
     for number, device in enumerate(file.tables.device):
@@ -89,7 +89,7 @@ def make_device_requests(file: MachineFile, subs: Subs) -> list[DeviceRequest]:
             continue
         dividers = _dividers(file, device.name)
         made.append(
-            DeviceRequest(
+            StartUpRequest(
                 subs[device.name],
                 objects,
                 required=device.required and not dividers,  # else the roles decide

@@ -11,19 +11,26 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from catenary.plan.cycle import CyclePlan, Number, NumberKind
     from catenary.plan.planner import Plan, make_plan
-    from catenary.plan.request import ImageLayout, ObjectReference, PdoWish, Views, Wish, WishTables
+    from catenary.plan.request import (
+        DeviceRequest,
+        ImageLayout,
+        ObjectReference,
+        ProcessDataRequest,
+        RequestTables,
+        Views,
+    )
 
 __all__ = [
     "CyclePlan",
+    "DeviceRequest",
     "ImageLayout",
     "Number",
     "NumberKind",
     "ObjectReference",
-    "PdoWish",
     "Plan",
+    "ProcessDataRequest",
+    "RequestTables",
     "Views",
-    "Wish",
-    "WishTables",
     "make_plan",
 ]
 
@@ -31,7 +38,14 @@ _HOMES = {
     **dict.fromkeys(("CyclePlan", "Number", "NumberKind"), "catenary.plan.cycle"),
     **dict.fromkeys(("Plan", "make_plan"), "catenary.plan.planner"),
     **dict.fromkeys(
-        ("ImageLayout", "ObjectReference", "PdoWish", "Views", "Wish", "WishTables"),
+        (
+            "ImageLayout",
+            "ObjectReference",
+            "DeviceRequest",
+            "Views",
+            "ProcessDataRequest",
+            "RequestTables",
+        ),
         "catenary.plan.request",
     ),
 }

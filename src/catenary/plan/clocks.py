@@ -92,7 +92,7 @@ class ClockChoice:
 
 def choose_clocks(
     devices: Sequence[DeviceDescription],
-    wishes: Mapping[int, DistributedClock],
+    requests: Mapping[int, DistributedClock],
     follow: FollowedClock,
     reference: int | None = None,
 ) -> ClockChoice | None:
@@ -100,7 +100,7 @@ def choose_clocks(
 
     Args:
         devices: All devices, by position.
-        wishes: Clock requests by position.
+        requests: Clock requests by position.
         reference: Position of the reference clock; None: the first device with a system time, as
             in other masters.
         follow: "reference" or "main": see `ClockPlan`.
@@ -108,46 +108,46 @@ def choose_clocks(
     Raises:
         ConfigurationError: A device has no suitable clock, or precedes its reference.
     """
-    if not wishes:
+    if not requests:
         return None
     running = [device for device in devices if device.clock_bits]
     chosen = running[0] if reference is None and running else None
     if reference is not None:
         chosen = _existing(devices, reference)
-    for position in sorted(wishes):
+    for position in sorted(requests):
         _check_follower(_existing(devices, position), chosen)
     assert chosen is not None  # at least one request has passed the check
     if not chosen.clock_bits:
         raise _no_clock(chosen, "it was given as the reference clock")
     return ClockChoice(
         chosen,
-        tuple(d for d in running if d.position in wishes and d is not chosen),
+        tuple(d for d in running if d.position in requests and d is not chosen),
         len(running),
         follow,
     )
 
 
-def make_sync(device: DeviceDescription, wish: DistributedClock, period_ns: int) -> SyncPlan:
+def make_sync(device: DeviceDescription, request: DistributedClock, period_ns: int) -> SyncPlan:
     """Return the SYNC unit settings of a device: as requested, else from the OpMode in its SII.
 
     Args:
         device: Device.
-        wish: Clock request.
+        request: Clock request.
         period_ns: Period of the cycle.
     """
-    mode = _op_mode(device, wish)
-    cycle_ns = _given(wish.sync0, mode.sync0_ns or _multiple(period_ns, mode.sync0_factor))
-    assign = mode.assign_activate if wish.assign_activate is None else wish.assign_activate
-    if wish.sync1 is not None:
+    mode = _op_mode(device, request)
+    cycle_ns = _given(request.sync0, mode.sync0_ns or _multiple(period_ns, mode.sync0_factor))
+    assign = mode.assign_activate if request.assign_activate is None else request.assign_activate
+    if request.sync1 is not None:
         assign |= Activation.SYNC1 << 8
     plan = SyncPlan(
         assign,
         cycle_ns,
-        _given(wish.sync1, _sync1_ns(mode, cycle_ns, period_ns)),
-        _given(wish.shift, mode.shift_ns),
+        _given(request.sync1, _sync1_ns(mode, cycle_ns, period_ns)),
+        _given(request.shift, mode.shift_ns),
         mode.name,
     )
-    _check_sync(device, wish, plan, period_ns)
+    _check_sync(device, request, plan, period_ns)
     return plan
 
 
@@ -245,10 +245,10 @@ def _no_clock(device: DeviceDescription, why: str) -> ConfigurationError:
     )
 
 
-def _op_mode(device: DeviceDescription, wish: DistributedClock) -> OpMode:
+def _op_mode(device: DeviceDescription, request: DistributedClock) -> OpMode:
     """Return the OpMode with the requested name, or the first one that starts a SYNC signal."""
-    if wish.op_mode is not None:
-        return _named_mode(device, wish.op_mode)
+    if request.op_mode is not None:
+        return _named_mode(device, request.op_mode)
     for starts in (_starts_sync0, _starts_sync):
         for mode in device.op_modes:
             if starts(mode.assign_activate):
@@ -269,7 +269,7 @@ def _named_mode(device: DeviceDescription, name: str) -> OpMode:
 
 
 def _check_sync(
-    device: DeviceDescription, wish: DistributedClock, plan: SyncPlan, period_ns: int
+    device: DeviceDescription, request: DistributedClock, plan: SyncPlan, period_ns: int
 ) -> None:
     """Raise ConfigurationError for impossible values.
 
@@ -277,34 +277,34 @@ def _check_sync(
     """
     eeprom = f"{device}: its EEPROM (OpMode {plan.op_mode!r})"
     if not _starts_sync(plan.assign_activate):
-        own = wish.assign_activate is None
+        own = request.assign_activate is None
         raise ConfigurationError(
             f"{eeprom if own else device}: AssignActivate 0x{plan.assign_activate:04X} starts no "
             "SYNC signal",
             hint="its ESI file has the right one (Dc/OpMode/AssignActivate), often 0x0300: "
-            f"{replace(wish, assign_activate=SYNC_BY_ECAT)}",
+            f"{replace(request, assign_activate=SYNC_BY_ECAT)}",
         )
     if not 0 < plan.cycle_ns < REGISTER_END or plan.sync1_ns >= REGISTER_END:
         raise ConfigurationError(
             f"{eeprom}: SYNC0 every {_time(plan.cycle_ns)} and SYNC1 {_time(plan.sync1_ns)} later "
             "do not fit into registers of 32 bits [ns]",
-            hint=f"override it: {replace(wish, sync0=period_ns / 1e9, sync1=0.0)}",
+            hint=f"override it: {replace(request, sync0=period_ns / 1e9, sync1=0.0)}",
         )
     if plan.cycle_ns % period_ns and period_ns % plan.cycle_ns:
-        own = wish.sync0 is None
+        own = request.sync0 is None
         raise ConfigurationError(
             f"{eeprom if own else device}: SYNC0 every {plan.cycle_ns / 1e3:g} us does not go with "
             f"a period of {period_ns / 1e3:g} us",
             hint="one must be a multiple of the other; change the period"
-            + f", or override the EEPROM: {replace(wish, sync0=period_ns / 1e9)}" * own,
+            + f", or override the EEPROM: {replace(request, sync0=period_ns / 1e9)}" * own,
         )
     if abs(plan.shift_ns) >= plan.span_ns:
-        own = wish.shift is None
+        own = request.shift is None
         raise ConfigurationError(
             f"{eeprom if own else device}: a shift of {_time(plan.shift_ns)} is not less than the "
             f"cycle of {_time(plan.span_ns)}",
             hint="shifts lie within one cycle"
-            + f"; override the EEPROM: {replace(wish, shift=0.0)}" * own,
+            + f"; override the EEPROM: {replace(request, shift=0.0)}" * own,
         )
 
 

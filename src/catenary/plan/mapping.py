@@ -38,7 +38,7 @@ from catenary.plan.pdo_search import (
     pdo_names,
 )
 
-if TYPE_CHECKING:  # wish.py needs NumPy, a scan does not
+if TYPE_CHECKING:  # request.py needs NumPy, a scan does not
     from catenary.plan.request import ObjectReference, WrittenPdo
 
 BITS_MAX = 1486 * 8  # a device's data must fit one datagram of one frame

@@ -13,7 +13,7 @@ from catenary.errors import ConfigurationError
 from catenary.model.device import DeviceDescription, Direction
 from catenary.plan.cycle import AxisPlan, Number
 from catenary.plan.layout import Layout
-from catenary.plan.request import Wish, WishTables
+from catenary.plan.request import ProcessDataRequest, RequestTables
 
 AXIS_OUTPUTS = (
     *("controlword", "mode_target", "target_position", "target_velocity", "target_torque"),
@@ -33,8 +33,8 @@ class Owned(NamedTuple):
 
 def check_owners(
     devices: Sequence[DeviceDescription],
-    wishes: Sequence[Wish],
-    tables: Sequence[WishTables],
+    requests: Sequence[ProcessDataRequest],
+    tables: Sequence[RequestTables],
     layout: Layout,
 ) -> None:
     """Check that no byte of the outputs is written by two requests, or by an axis and a column.
@@ -48,12 +48,12 @@ def check_owners(
             for byte in owned.bytes:
                 other = owners.setdefault(byte, owned)
                 if other.request != rank:
-                    raise _conflict(devices, wishes, layout, other, owned, byte)
+                    raise _conflict(devices, requests, layout, other, owned, byte)
                 if other.by_axis and not owned.by_axis and other.what != SHARED:
-                    raise _column_of_axis(wishes, other, owned)
+                    raise _column_of_axis(requests, other, owned)
 
 
-def _owned(rank: int, table: WishTables) -> Iterator[Owned]:
+def _owned(rank: int, table: RequestTables) -> Iterator[Owned]:
     for axis in table.axes:
         for name, number in _axis_outputs(axis):
             yield Owned(rank, name, _bytes(number), by_axis=True)
@@ -75,10 +75,12 @@ def _bytes(number: Number) -> range:
     return range(number.bit_offset // 8, last // 8 + 1)
 
 
-def _column_of_axis(wishes: Sequence[Wish], axis: Owned, column: Owned) -> ConfigurationError:
+def _column_of_axis(
+    requests: Sequence[ProcessDataRequest], axis: Owned, column: Owned
+) -> ConfigurationError:
     return ConfigurationError(
-        f"{wishes[axis.request]!r}: column {column.what!r} is the {axis.what} that the axis itself "
-        "writes",
+        f"{requests[axis.request]!r}: column {column.what!r} is the {axis.what} that the axis "
+        "itself writes",
         hint="write arm.target.position, velocity, torque or mode; they are limited and enabled "
         "without a jump",
     )
@@ -86,7 +88,7 @@ def _column_of_axis(wishes: Sequence[Wish], axis: Owned, column: Owned) -> Confi
 
 def _conflict(
     devices: Sequence[DeviceDescription],
-    wishes: Sequence[Wish],
+    requests: Sequence[ProcessDataRequest],
     layout: Layout,
     first: Owned,
     second: Owned,
@@ -99,7 +101,7 @@ def _conflict(
         if byte in place
     ]
     writers = " and ".join(
-        f"{wishes[owned.request]!r}" + (f" ({owned.what})" if owned.what else "")
+        f"{requests[owned.request]!r}" + (f" ({owned.what})" if owned.what else "")
         for owned in (first, second)
     )
     return ConfigurationError(

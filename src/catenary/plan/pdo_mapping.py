@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from catenary.errors import MappingError
 from catenary.model.device import Assignment, DeviceDescription, Direction, Pdo, mapped_pdos
 
-if TYPE_CHECKING:  # wish.py needs NumPy, a scan does not
+if TYPE_CHECKING:  # request.py needs NumPy, a scan does not
     from catenary.plan.request import ObjectReference
 
 

@@ -11,7 +11,7 @@ from catenary.model.device import DeviceDescription, Direction, Entry, Pdo, mapp
 from catenary.plan.pdo_mapping import Mapping, assignment_refusal, available_pdos, with_pdos
 from catenary.plan.pdo_search import carries, pdo_names
 
-if TYPE_CHECKING:  # wish.py needs NumPy, a scan does not
+if TYPE_CHECKING:  # request.py needs NumPy, a scan does not
     from catenary.plan.request import ObjectReference, WrittenPdo
 
 ENTRIES_MAX = 254  # subindices of a mapping object, ETG.1000.6 table 75

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from catenary.model.device import Pdo
 
-if TYPE_CHECKING:  # wish.py needs NumPy, a scan does not
+if TYPE_CHECKING:  # request.py needs NumPy, a scan does not
     from catenary.plan.request import ObjectReference
 
 STEPS_MAX = 2000  # combinations that are tried: real devices need a few

@@ -24,11 +24,11 @@ from catenary.plan.output_owners import check_owners
 from catenary.plan.pdo_mapping import Mapping
 from catenary.plan.report import report
 from catenary.plan.request import (
+    DeviceRequest,
     DistributedClock,
     ObjectReference,
-    PdoWish,
-    Wish,
-    WishTables,
+    ProcessDataRequest,
+    RequestTables,
     WrittenPdo,
 )
 from catenary.plan.start_up import DevicePlan, make_device_plan
@@ -50,7 +50,7 @@ class Plan:
     cycle: CyclePlan
     devices: tuple[DevicePlan, ...]
     layout: Layout
-    tables: tuple[WishTables, ...]
+    tables: tuple[RequestTables, ...]
     mailboxes: MailboxArea
 
     def __str__(self) -> str:
@@ -63,7 +63,7 @@ class Plan:
 
 def make_plan(
     devices: Sequence[DeviceDescription],
-    wishes: Sequence[Wish] = (),
+    requests: Sequence[ProcessDataRequest] = (),
     *,
     period: float = 1e-3,
     execution: ExecutionMode = "threaded",
@@ -94,7 +94,7 @@ def make_plan(
 
     Args:
         devices: Descriptions of all devices of the segment, by position.
-        wishes: Process-data requests.
+        requests: Process-data requests.
         period: Period of the cycle [s].
         execution: "threaded" or "inline".
         receive_mode: "poll", "wait" or "busy".
@@ -127,13 +127,17 @@ def make_plan(
             frames do not fit into the period.
     """
     period_ns = period_in_ns(period)
-    asked = _asked(devices, wishes, period_ns)
+    asked = _asked(devices, requests, period_ns)
     watchdogs = [
-        choose_watchdog(device, asked.get(device.position, PdoWish()), watchdog, period_ns)
+        choose_watchdog(device, asked.get(device.position, DeviceRequest()), watchdog, period_ns)
         for device in devices
     ]
-    mappings = [_mappings(device, asked.get(device.position, PdoWish())) for device in devices]
-    unasked = PdoWish(required=not asked or any(wish.required for wish in asked.values()))
+    mappings = [
+        _mappings(device, asked.get(device.position, DeviceRequest())) for device in devices
+    ]
+    unasked = DeviceRequest(
+        required=not asked or any(request.required for request in asked.values())
+    )
     data = [
         _device_data(device, mapping, asked.get(device.position, unasked), watchdog_ns)
         for device, mapping, watchdog_ns in zip(devices, mappings, watchdogs, strict=True)
@@ -142,7 +146,7 @@ def make_plan(
     layout = make_layout(data, EXACT_UNIT_MAX if exact_matching else UNIT_MAX)
     syncs = _syncs(devices, asked, period_ns)
     layout, mailboxes = with_mailboxes(layout, devices)
-    choice = choose_clocks(devices, _clock_wishes(asked), clock, reference)
+    choice = choose_clocks(devices, _clock_requests(asked), clock, reference)
     frames = make_frames(
         layout.units, len(devices), choice, mailboxes, exact_matching=exact_matching
     )
@@ -151,8 +155,8 @@ def make_plan(
     collect_ns = round(period_ns * collect_share)
     if execution == "threaded":
         check_return(wire_ns, period_ns, collect_ns)
-    tables = tuple(wish.tables(layout) for wish in wishes)
-    check_owners(devices, wishes, tables, layout)
+    tables = tuple(request.tables(layout) for request in requests)
+    check_owners(devices, requests, tables, layout)
     _check_times(tables, late_limit_torque, handover)
     cycle = CyclePlan(
         period_ns=period_ns,
@@ -197,10 +201,10 @@ def make_plan(
             outputs,
             inputs,
             place,
-            asked.get(device.position, PdoWish()).start_up,
+            asked.get(device.position, DeviceRequest()).start_up,
             each.watchdog_ns if place.output_size else 0,
             syncs.get(device.position),
-            asked.get(device.position, PdoWish()).objects,
+            asked.get(device.position, DeviceRequest()).objects,
         )
         for device, (outputs, inputs), place, each in zip(
             devices, mappings, layout.devices, data, strict=True
@@ -216,18 +220,20 @@ def period_in_ns(period: float) -> int:
     return round(period * 1e9)
 
 
-def gather_wishes(wishes: Sequence[Wish], period_ns: int) -> dict[int, PdoWish]:
+def gather_requests(
+    requests: Sequence[ProcessDataRequest], period_ns: int
+) -> dict[int, DeviceRequest]:
     """Return the combined requests for each device, by position.
 
     Args:
-        wishes: Process-data requests.
+        requests: Process-data requests.
         period_ns: Period of the cycle.
     """
-    gathered: dict[int, PdoWish] = {}
-    for wish in wishes:
-        for position, pdos in wish.pdos(period_ns).items():
-            before = gathered.get(position, PdoWish(divider=pdos.divider, required=False))
-            gathered[position] = PdoWish(
+    gathered: dict[int, DeviceRequest] = {}
+    for request in requests:
+        for position, pdos in request.pdos(period_ns).items():
+            before = gathered.get(position, DeviceRequest(divider=pdos.divider, required=False))
+            gathered[position] = DeviceRequest(
                 _merged(before.outputs, pdos.outputs),
                 _merged(before.inputs, pdos.inputs),
                 before.start_up + tuple(d for d in pdos.start_up if d not in before.start_up),
@@ -241,9 +247,9 @@ def gather_wishes(wishes: Sequence[Wish], period_ns: int) -> dict[int, PdoWish]:
 
 
 def _asked(
-    devices: Sequence[DeviceDescription], wishes: Sequence[Wish], period_ns: int
-) -> dict[int, PdoWish]:
-    asked = gather_wishes(wishes, period_ns)
+    devices: Sequence[DeviceDescription], requests: Sequence[ProcessDataRequest], period_ns: int
+) -> dict[int, DeviceRequest]:
+    asked = gather_requests(requests, period_ns)
     known = [device.position for device in devices]
     if known != list(range(len(devices))):
         raise ValueError(f"devices must be all of a segment in order, not positions {known}")
@@ -299,20 +305,24 @@ def _one_start_up(
     return first + tuple(each for each in second if each not in first)
 
 
-def _clock_wishes(asked: dict[int, PdoWish]) -> dict[int, DistributedClock]:
-    return {position: wish.clock for position, wish in asked.items() if wish.clock is not None}
-
-
-def _syncs(
-    devices: Sequence[DeviceDescription], asked: dict[int, PdoWish], period_ns: int
-) -> dict[int, SyncPlan]:
+def _clock_requests(asked: dict[int, DeviceRequest]) -> dict[int, DistributedClock]:
     return {
-        position: make_sync(devices[position], wish, period_ns * asked[position].divider)
-        for position, wish in _clock_wishes(asked).items()
+        position: request.clock for position, request in asked.items() if request.clock is not None
     }
 
 
-def _check_times(tables: Sequence[WishTables], late_limit_torque: float, handover: float) -> None:
+def _syncs(
+    devices: Sequence[DeviceDescription], asked: dict[int, DeviceRequest], period_ns: int
+) -> dict[int, SyncPlan]:
+    return {
+        position: make_sync(devices[position], request, period_ns * asked[position].divider)
+        for position, request in _clock_requests(asked).items()
+    }
+
+
+def _check_times(
+    tables: Sequence[RequestTables], late_limit_torque: float, handover: float
+) -> None:
     """Raise ValueError for times that would leave an axis in CST under torque indefinitely."""
     if not 0 < handover < math.inf:
         raise ValueError(f"handover must be positive and finite [s], not {handover}")
@@ -333,22 +343,25 @@ def _merged(
     return first + tuple(reference for reference in second if reference not in first)
 
 
-def _mappings(device: DeviceDescription, wish: PdoWish) -> tuple[Mapping, Mapping]:
+def _mappings(device: DeviceDescription, request: DeviceRequest) -> tuple[Mapping, Mapping]:
     return (
-        make_mapping(device, Direction.OUTPUT, wish.outputs, wish.written(Direction.OUTPUT)),
-        make_mapping(device, Direction.INPUT, wish.inputs, wish.written(Direction.INPUT)),
+        make_mapping(device, Direction.OUTPUT, request.outputs, request.written(Direction.OUTPUT)),
+        make_mapping(device, Direction.INPUT, request.inputs, request.written(Direction.INPUT)),
     )
 
 
 def _device_data(
-    device: DeviceDescription, mapping: tuple[Mapping, Mapping], wish: PdoWish, watchdog_ns: int
+    device: DeviceDescription,
+    mapping: tuple[Mapping, Mapping],
+    request: DeviceRequest,
+    watchdog_ns: int,
 ) -> DeviceData:
     outputs, inputs = (direction.assignments for direction in mapping)
     return DeviceData(
         device,
         outputs,
         inputs,
-        wish.divider,
-        optional=not wish.required,
+        request.divider,
+        optional=not request.required,
         watchdog_ns=watchdog_ns,
     )

@@ -1,4 +1,4 @@
-"""Process-data requests (`Wish`): objects to exchange, before their places are known.
+"""Process-data requests (`ProcessDataRequest`): objects to exchange, before their places are known.
 
 `loop` and `drive` share this interface: a Loop takes requests of any kind.
 """
@@ -114,7 +114,7 @@ class DistributedClock:
 
 
 @dataclass(frozen=True, slots=True)
-class PdoWish:
+class DeviceRequest:
     """Objects that one device must exchange cyclically.
 
     An existing mapping is only changed if a requested object is missing, or by `pdos`. If several
@@ -153,7 +153,7 @@ class ImageLayout(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class WishTables:
+class RequestTables:
     """Axes and columns of a request. `axis_reports` has one entry per axis, or none."""
 
     axes: tuple[AxisPlan, ...] = ()
@@ -201,9 +201,9 @@ class Views:
     target_velocity: Reals
     target_torque: Reals
     mode_target: Modes
-    goal: Bytes  # (n,) drive goal: 0 disabled, 1 enabled, 2 quick stop, 3 disabled with a fault
+    requested_state: Bytes  # (n,) 0 disabled, 1 enabled, 2 quick stop, 3 disabled with a fault
     # reset (so that a fault can be acknowledged without moving on); taken over when
-    request: Serials  # (n,) has changed: a goal that dropped comes back only by a new request
+    request: Serials  # (n,) has changed: a dropped request is restored only by a new request
     controlword_bits: Words  # (n,) the mode's own control bits (4, 5, 6, 9, 11 to 15), or-ed in
     input_reals: Reals
     input_integers: Integers
@@ -221,11 +221,11 @@ class Views:
     is_led: Callable[[], bool] = lambda: False
 
 
-class Wish(Protocol):
-    def pdos(self, period_ns: int) -> Mapping[int, PdoWish]:
+class ProcessDataRequest(Protocol):
+    def pdos(self, period_ns: int) -> Mapping[int, DeviceRequest]:
         """Return the requested objects by device position."""
 
-    def tables(self, layout: ImageLayout) -> WishTables:
+    def tables(self, layout: ImageLayout) -> RequestTables:
         """Return the axes and columns of the request for a known layout."""
 
     def bind(self, views: Views) -> None:

@@ -54,7 +54,7 @@ class Sink(Protocol):
     def open(self, layout: SinkLayout) -> object:
         """Return a capsule of native/sink.h for the layout, once a loop has its plan."""
 
-    def tell(self, incident: Incident) -> None:
+    def report(self, incident: Incident) -> None:
         """Receive an incident; from any thread but the cycle's."""
 
     def close(self) -> None:

@@ -116,7 +116,7 @@ def make_device_plan(
     Raises:
         ConfigurationError: The device cannot have a start-up object, or its type is unknown.
     """
-    wished = tuple(Download(index, subindex, data) for index, subindex, data in start_up)
+    requested = tuple(Download(index, subindex, data) for index, subindex, data in start_up)
     before, after = object_downloads(device, objects)
     told = sync.objects if sync is not None and device.coe else ()
     clocks = tuple(Download(*each, optional=True) for each in told)
@@ -130,7 +130,7 @@ def make_device_plan(
         layout=layout,
         before_mapping=before,
         mapping=(*mapping_downloads(outputs), *mapping_downloads(inputs)),
-        start_up=(*wished, *clocks, *after),
+        start_up=(*requested, *clocks, *after),
         mapping_changed=outputs.changed or inputs.changed,
         watchdog_ns=watchdog_ns,
         sync=sync,
@@ -139,7 +139,7 @@ def make_device_plan(
             *mapping_changes(device, Direction.INPUT, inputs),
             *value_changes(
                 device,
-                [(d.index, d.subindex, d.data) for d in (*before, *wished, *clocks, *after)],
+                [(d.index, d.subindex, d.data) for d in (*before, *requested, *clocks, *after)],
             ),
         ),
         rejected=outputs.rejected + inputs.rejected,

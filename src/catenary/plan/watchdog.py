@@ -7,7 +7,7 @@ CSV its own loops hold it meanwhile. In CST it applies a stale torque, so the de
 from __future__ import annotations
 
 from catenary.model.device import DeviceDescription
-from catenary.plan.request import PdoWish
+from catenary.plan.request import DeviceRequest
 from catenary.plan.start_up import WATCHDOG_UNIT_NS
 from catenary.wire.cia402 import SLOT_OFFSET, Object
 
@@ -21,28 +21,28 @@ TARGET_TORQUES = frozenset(Object.TARGET_TORQUE + SLOT_OFFSET * slot for slot in
 
 
 def choose_watchdog(
-    device: DeviceDescription, wish: PdoWish, seconds: float | None, period_ns: int
+    device: DeviceDescription, request: DeviceRequest, seconds: float | None, period_ns: int
 ) -> int:
     """Return the watchdog time of a device [ns], 0 for off.
 
     Args:
         device: The device, for error messages.
-        wish: Its process-data request; a required target torque means CST.
+        request: Its process-data request; a required target torque means CST.
         seconds: The application's choice [s]; 0: off, None: the default.
         period_ns: Period of the cycle.
 
     Raises:
         ValueError: The register cannot hold the time, or it is shorter than three exchanges.
     """
-    exchange_ns = period_ns * wish.divider
+    exchange_ns = period_ns * request.divider
     if seconds is not None:
         watchdog_ns = _rounded(seconds)
-    elif _is_torque_controlled(wish):
+    elif _is_torque_controlled(request):
         longest = max(TORQUE_NS, TORQUE_EXCHANGES * exchange_ns)
         watchdog_ns = -(-longest // WATCHDOG_UNIT_NS) * WATCHDOG_UNIT_NS
     else:
         watchdog_ns = DEFAULT_NS
-    _check(device, wish, watchdog_ns, period_ns)
+    _check(device, request, watchdog_ns, period_ns)
     return watchdog_ns
 
 
@@ -59,14 +59,16 @@ def _range(seconds: float) -> str:
     return f"watchdog of {seconds:g} s: use {unit:.4f} to {unit * COUNT_MAX:.4f} s, or 0 for off"
 
 
-def _is_torque_controlled(wish: PdoWish) -> bool:
-    return any(o.required and o.index in TARGET_TORQUES for o in wish.outputs)
+def _is_torque_controlled(request: DeviceRequest) -> bool:
+    return any(o.required and o.index in TARGET_TORQUES for o in request.outputs)
 
 
-def _check(device: DeviceDescription, wish: PdoWish, watchdog_ns: int, period_ns: int) -> None:
+def _check(
+    device: DeviceDescription, request: DeviceRequest, watchdog_ns: int, period_ns: int
+) -> None:
     if watchdog_ns > COUNT_MAX * WATCHDOG_UNIT_NS:
         raise ValueError(_range(watchdog_ns * 1e-9))
-    if watchdog_ns == 0 or watchdog_ns >= LEAST_EXCHANGES * period_ns * wish.divider:
+    if watchdog_ns == 0 or watchdog_ns >= LEAST_EXCHANGES * period_ns * request.divider:
         return
     seconds, period = watchdog_ns * 1e-9, period_ns * 1e-9
     if watchdog_ns < LEAST_EXCHANGES * period_ns:
@@ -75,7 +77,7 @@ def _check(device: DeviceDescription, wish: PdoWish, watchdog_ns: int, period_ns
             f"of {period} s; use a longer watchdog=... of the Loop"
         )
     raise ValueError(
-        f"{device}: exchanged every {wish.divider} cycles of {period} s, less than "
+        f"{device}: exchanged every {request.divider} cycles of {period} s, less than "
         f"{LEAST_EXCHANGES} times within the watchdog of {seconds:.4f} s; use a smaller divisor, "
         "or a longer watchdog=... of the Loop"
     )

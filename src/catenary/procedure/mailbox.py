@@ -31,8 +31,8 @@ from catenary.procedure.exchange import (
     write,
     write_memory,
 )
-from catenary.procedure.mailbox_channel import Heard as Heard
 from catenary.procedure.mailbox_channel import MailboxChannel as MailboxChannel
+from catenary.procedure.mailbox_channel import ReceivedEmergency as ReceivedEmergency
 from catenary.procedure.station import Deadline, Pace, answered
 from catenary.wire import coe
 from catenary.wire.datagram import EcatCommand
@@ -177,7 +177,7 @@ def _no_answer(
     )
 
 
-def tell(channel: MailboxChannel, kind: Type, data: bytes) -> Procedure[bool]:
+def send_only(channel: MailboxChannel, kind: Type, data: bytes) -> Procedure[bool]:
     """Send one message that has no answer.
 
     Args:
@@ -250,7 +250,7 @@ def _put_aside(channel: MailboxChannel, message: Mailbox) -> None:
     """Drop a late message. An emergency is still reported."""
     emergency = _emergency(message)
     if emergency is not None:
-        channel.hear(emergency)
+        channel.add_emergency(emergency)
     else:
         channel.dropped += 1
 
@@ -408,7 +408,7 @@ def _sorted(
         raise _error_reply(channel, message)
     emergency = _emergency(message)
     if emergency is not None:
-        channel.hear(emergency)
+        channel.add_emergency(emergency)
         return None
     answer = accept(message)
     if answer is None:

@@ -17,14 +17,14 @@ THINKS_FIRST_NS = 100_000
 THINKS_MAX_NS = 20_000_000
 
 
-class Heard(NamedTuple):
+class ReceivedEmergency(NamedTuple):
     """An emergency and the time at which it was read [ns, the link's clock]."""
 
     emergency: coe.Emergency
     time_ns: int
 
 
-Listener: TypeAlias = Callable[[Heard], None]
+Listener: TypeAlias = Callable[[ReceivedEmergency], None]
 
 
 @dataclass(slots=True)
@@ -43,7 +43,9 @@ class MailboxChannel:
     repetitions: int = 0  # requested from the device, not yet read
     received_ns: int = 0  # when the last message was read
     repeat_requested: bool = False  # state of the toggle bit
-    emergencies: deque[Heard] = field(default_factory=lambda: deque(maxlen=EMERGENCIES_KEPT))
+    emergencies: deque[ReceivedEmergency] = field(
+        default_factory=lambda: deque(maxlen=EMERGENCIES_KEPT)
+    )
     listener: Listener | None = None
     dropped: int = 0  # unexpected messages and duplicates
     turns: deque[object] = field(
@@ -98,13 +100,13 @@ class MailboxChannel:
     def listen(self, listener: Listener) -> None:
         """Set the listener, and report earlier emergencies to the first one."""
         if self.listener is None:
-            for heard in tuple(self.emergencies):
-                listener(heard)
+            for received in tuple(self.emergencies):
+                listener(received)
         self.listener = listener
 
-    def hear(self, emergency: coe.Emergency) -> None:
+    def add_emergency(self, emergency: coe.Emergency) -> None:
         """Store an emergency and report it to the listener."""
-        heard = Heard(emergency, self.received_ns)
-        self.emergencies.append(heard)
+        received = ReceivedEmergency(emergency, self.received_ns)
+        self.emergencies.append(received)
         if self.listener is not None:
-            self.listener(heard)
+            self.listener(received)

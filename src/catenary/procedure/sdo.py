@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from catenary.errors import DecodeError, MailboxError, SdoAbort
 from catenary.procedure.exchange import Procedure
-from catenary.procedure.mailbox import MailboxChannel, converse, exclusively, tell
+from catenary.procedure.mailbox import MailboxChannel, converse, exclusively, send_only
 from catenary.procedure.station import Deadline
 from catenary.wire.abort import abort_code
 from catenary.wire.coe import (
@@ -104,7 +104,7 @@ def _upload(
     if first.expedited or len(first.data) >= first.size:
         return first.data
     if first.size > limit:
-        yield from tell(channel, Type.COE, Abort(index, subindex, ABORT_MEMORY).encode())
+        yield from send_only(channel, Type.COE, Abort(index, subindex, ABORT_MEMORY).encode())
         raise MailboxError(
             f"{channel.station}: SDO 0x{index:04X}:{subindex:02X} announces {first.size} bytes, "
             f"the limit is {limit}",
@@ -115,7 +115,7 @@ def _upload(
     deadline = Deadline(timeout)
     while not last:
         if deadline.passed_at(channel.received_ns):
-            yield from tell(channel, Type.COE, Abort(index, subindex, ABORT_TIMEOUT).encode())
+            yield from send_only(channel, Type.COE, Abort(index, subindex, ABORT_TIMEOUT).encode())
             raise _too_slow(channel, (index, subindex), len(data), first.size, timeout)
         segment = yield from _ask(
             channel, UploadSegmentRequest(toggle), UploadSegment, (index, subindex)
@@ -245,7 +245,7 @@ def _break_off(
 
     An abort has no answer. The device receives it unless the frame is lost.
     """
-    yield from tell(channel, Type.COE, Abort(index, subindex, code).encode())
+    yield from send_only(channel, Type.COE, Abort(index, subindex, code).encode())
     return MailboxError(
         f"{channel.station}: SDO 0x{index:04X}:{subindex:02X}: a segment violates the protocol "
         f"({abort_code(code).text})",

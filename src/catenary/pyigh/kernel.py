@@ -12,7 +12,7 @@ from catenary.model.device import Direction
 from catenary.plan.cycle import Number
 from catenary.plan.numbers import Which
 from catenary.plan.planner import Plan
-from catenary.pyigh.request import Wish
+from catenary.pyigh.request import ProcessDataRequest
 from catenary.pyigh.slaves import Cell, RawObject, SlaveBase
 
 WORDS = {
@@ -67,13 +67,13 @@ class KernelSteps:
         self,
         main: MainDevice,
         kernel: KernelMaster,
-        wish: Wish,
+        request: ProcessDataRequest,
         slaves: Sequence[SlaveBase],
         period: float,
     ) -> None:
         self._main = main
         self._kernel = kernel
-        plan = main.plan(wish, period=period)
+        plan = main.plan(request, period=period)
         main.configure(plan)
         self._period_ns = plan.cycle.period_ns
         self._next = main.link.now()

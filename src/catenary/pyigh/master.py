@@ -9,7 +9,7 @@ from catenary.errors import ConfigurationError
 from catenary.link import LinkSource
 from catenary.pyigh.kernel import KernelSteps
 from catenary.pyigh.own import OwnSteps
-from catenary.pyigh.request import Wish
+from catenary.pyigh.request import ProcessDataRequest
 from catenary.pyigh.slaves import SlaveBase
 from catenary.target import MainDevice
 
@@ -74,7 +74,7 @@ class MasterBase:
         self.main = target if isinstance(target, bus.MainDevice) else MainDevice(target)
         self.period = period
         self.slaves: list[SlaveBase] = []
-        self._wish = Wish(self.main, self.slaves)
+        self._request = ProcessDataRequest(self.main, self.slaves)
         self._planned = False
         self._steps: Steps | None = None
         try:
@@ -140,9 +140,9 @@ class MasterBase:
             raise RuntimeError("call ecat_activate_domain() first")
         master = self.main.master
         if isinstance(master, igh.KernelMaster):
-            self._steps = KernelSteps(self.main, master, self._wish, self.slaves, self.period)
+            self._steps = KernelSteps(self.main, master, self._request, self.slaves, self.period)
         else:
-            self._steps = OwnSteps(self._wish, self.slaves, self.period)
+            self._steps = OwnSteps(self._request, self.slaves, self.period)
 
     # A cycle, in this order
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from catenary.loop import Loop
 from catenary.model.device import Direction
 from catenary.plan.request import Integers
-from catenary.pyigh.request import Wish
+from catenary.pyigh.request import ProcessDataRequest
 from catenary.pyigh.slaves import Cell, SlaveBase
 from catenary.wire.al import AlState
 
@@ -32,9 +32,9 @@ class OwnSteps:
     loop starts where the cycle of the program ends.
     """
 
-    def __init__(self, wish: Wish, slaves: list[SlaveBase], period: float) -> None:
-        self._wish = wish
-        self._loop = Loop(wish, period=period, execution="inline", enable=False)
+    def __init__(self, request: ProcessDataRequest, slaves: list[SlaveBase], period: float) -> None:
+        self._request = request
+        self._loop = Loop(request, period=period, execution="inline", enable=False)
         self._loop.__enter__()
         self._cycle = next(self._loop)
         for slave in slaves:
@@ -63,14 +63,14 @@ class OwnSteps:
         return int(last["al_counter"]), int(last["al_status"]) & 0xF, bool(last["al_counter"])
 
     def state(self, position: int) -> tuple[bool, bool, int]:
-        sub = self._wish.main.subs[position]
+        sub = self._request.main.subs[position]
         return sub.state is not None, sub.state is AlState.OP, int(sub.state or 0)
 
     def close(self) -> None:
         self._loop.__exit__(None, None, None)
 
     def _cells(self, slave: SlaveBase) -> dict[tuple[int, int], Cell]:
-        views, made = self._wish.views, self._wish.tables_made
+        views, made = self._request.views, self._request.tables_made
         assert views is not None
         sides = (
             (Direction.OUTPUT, made.output_columns, views.output_integers),

@@ -10,7 +10,7 @@ from catenary.errors import ConfigurationError, DriveError, MappingError
 from catenary.model.device import DeviceDescription, Direction, mapped_entries
 from catenary.plan.cycle import Bank, Column, NumberKind
 from catenary.plan.numbers import Which
-from catenary.plan.request import ImageLayout, ObjectReference, PdoWish, WishTables
+from catenary.plan.request import DeviceRequest, ImageLayout, ObjectReference, RequestTables
 from catenary.wire.cia402 import AxisState, Mode, Object, state_of
 
 COMMANDS = {
@@ -306,10 +306,10 @@ class SlaveIO(SlaveBase):
         return mine[channel]
 
 
-def pdos_of(slaves: Sequence[SlaveBase]) -> dict[int, PdoWish]:
+def pdos_of(slaves: Sequence[SlaveBase]) -> dict[int, DeviceRequest]:
     """Return the process-data requests of all slaves, by position."""
     return {
-        slave.position: PdoWish(
+        slave.position: DeviceRequest(
             outputs=_references(slave, Direction.OUTPUT),
             inputs=_references(slave, Direction.INPUT),
             start_up=slave.start_up,
@@ -318,7 +318,7 @@ def pdos_of(slaves: Sequence[SlaveBase]) -> dict[int, PdoWish]:
     }
 
 
-def columns_of(slaves: Sequence[SlaveBase], layout: ImageLayout) -> WishTables:
+def columns_of(slaves: Sequence[SlaveBase], layout: ImageLayout) -> RequestTables:
     """Return one integer column per mapped object, in the order of slaves and objects."""
     sides: dict[Direction, list[Column]] = {Direction.OUTPUT: [], Direction.INPUT: []}
     for slave in slaves:
@@ -338,7 +338,7 @@ def columns_of(slaves: Sequence[SlaveBase], layout: ImageLayout) -> WishTables:
                 layout.sync_unit(slave.position),
             )
             sides[each.direction].append(column)
-    return WishTables((), tuple(sides[Direction.OUTPUT]), tuple(sides[Direction.INPUT]))
+    return RequestTables((), tuple(sides[Direction.OUTPUT]), tuple(sides[Direction.INPUT]))
 
 
 def _references(slave: SlaveBase, direction: Direction) -> tuple[ObjectReference, ...]:

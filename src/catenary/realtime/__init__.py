@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from catenary.realtime.clock import Participant, VirtualClock
     from catenary.realtime.exchange import Queue, Silence, Value
     from catenary.realtime.job import Job
-    from catenary.realtime.preparation import Session, session
     from catenary.realtime.running_task import Running
     from catenary.realtime.statistics import Statistics
+    from catenary.realtime.system.preparation import Session, session
     from catenary.realtime.task import Task
     from catenary.realtime.tasks import Tasks
     from catenary.realtime.trigger import Signal
@@ -55,7 +55,7 @@ _HOMES = {
     "Participant": "clock",
     "Queue": "exchange",
     "Running": "running_task",
-    "Session": "preparation",
+    "Session": "system.preparation",
     "Signal": "trigger",
     "Silence": "exchange",
     "Statistics": "statistics",
@@ -66,7 +66,7 @@ _HOMES = {
     "VirtualClock": "clock",
     "analyse": "analysis",
     "read_demands": "analysis_file",
-    "session": "preparation",
+    "session": "system.preparation",
 }
 
 

@@ -16,7 +16,7 @@ from catenary.realtime._clock import (
     VirtualTime,
     VirtualTimer,
 )
-from catenary.realtime.memory import SharedMemory
+from catenary.realtime.system.memory import SharedMemory
 
 FIRST = 100  # precedes every task: these have 0 (ordinary scheduling) to 99
 

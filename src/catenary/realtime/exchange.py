@@ -12,7 +12,7 @@ import threading
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from catenary.realtime._exchange import QueueCore, ValueCore, queue_size, value_size
-from catenary.realtime.memory import SharedMemory
+from catenary.realtime.system.memory import SharedMemory
 
 if TYPE_CHECKING:
     import numpy as np

@@ -7,8 +7,8 @@ import signal
 from catenary.errors import TaskError
 from catenary.realtime._task import BLOCK_SIZE, ENDED, FAILED, NEW, Block
 from catenary.realtime.clock import VirtualClock
-from catenary.realtime.memory import SharedMemory
 from catenary.realtime.statistics import Statistics, read_histogram, read_statistics
+from catenary.realtime.system.memory import SharedMemory
 from catenary.realtime.task import Task, check_period
 from catenary.realtime.task_memory import Place
 

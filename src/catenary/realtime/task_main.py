@@ -15,12 +15,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 from catenary.errors import CatenaryError, RealtimeError
-from catenary.realtime import libc
 from catenary.realtime._stack import touch_stack
 from catenary.realtime._task import ENDED, FAILED, STARTED, Block, Releases
-from catenary.realtime.preparation import SET_CAPABILITIES, Session
 from catenary.realtime.running_task import Running
-from catenary.realtime.scheduling import Scheduling, refusal, what_scheduling
+from catenary.realtime.system import libc
+from catenary.realtime.system.preparation import SET_CAPABILITIES, Session
+from catenary.realtime.system.scheduling import Scheduling, refusal, what_scheduling
 from catenary.realtime.task import Task
 from catenary.realtime.task_memory import Place
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from catenary.realtime._clock import MachineTimer, Timer
 from catenary.realtime.clock import Participant
-from catenary.realtime.memory import SharedMemory
+from catenary.realtime.system.memory import SharedMemory
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,14 +16,14 @@ from types import TracebackType
 from typing import Self, TypeVar
 
 from catenary.errors import TaskError
-from catenary.realtime import libc
 from catenary.realtime._task import NEW
 from catenary.realtime.analysis import Demand, Verdict, analyse
 from catenary.realtime.clock import VirtualClock
 from catenary.realtime.handle import Handle
-from catenary.realtime.preparation import Session
 from catenary.realtime.statistics import as_table, measured_demand
 from catenary.realtime.supervisor import Supervisor
+from catenary.realtime.system import libc
+from catenary.realtime.system.preparation import Session
 from catenary.realtime.task import Task
 from catenary.realtime.task_main import START_SECONDS, Work
 from catenary.realtime.worker import ProcessWorker, ThreadWorker, Worker, Workers, check_importable

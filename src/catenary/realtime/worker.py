@@ -11,7 +11,7 @@ from collections.abc import Callable
 from multiprocessing.context import SpawnProcess
 from typing import Literal, Protocol, TypeAlias
 
-from catenary.realtime.preparation import Session
+from catenary.realtime.system.preparation import Session
 from catenary.realtime.task import Task
 from catenary.realtime.task_main import Work, run_in_process, start_thread
 

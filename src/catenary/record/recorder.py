@@ -97,9 +97,9 @@ class Recorder:
         events, events_lost = self._share.events(self._serial)
         if lost:
             self.lost += lost
-            self._tell_lost_cycles(rows)
+            self._report_lost_cycles(rows)
         if events_lost:
-            self._tell_lost_events(events_lost, events[0])
+            self._report_lost_events(events_lost, events[0])
         self._write(rows, events)
         return len(rows)
 
@@ -152,20 +152,20 @@ class Recorder:
             self._on_disk(RecordingFile.write, rows)
             self.cycles += len(rows)
 
-    def _tell_lost_cycles(self, rows: Rows) -> None:
+    def _report_lost_cycles(self, rows: Rows) -> None:
         """Write an event for each gap before or within the rows."""
         numbers = rows[NUMBER].astype(np.int64)
         missing = np.diff(numbers, prepend=self._number) - 1
         for row in np.flatnonzero(missing).tolist():
             time = float(rows[TIME][row]) * 1e-9 - self._share.layout.period
             number, lost = int(numbers[row]) - 1, int(missing[row])
-            self._tell(number, "CyclesLost", f"{lost} cycles", time, {"cycles": lost})
+            self._report(number, "CyclesLost", f"{lost} cycles", time, {"cycles": lost})
 
-    def _tell_lost_events(self, lost: int, first: SharedEvent) -> None:
+    def _report_lost_events(self, lost: int, first: SharedEvent) -> None:
         what = f"{lost} events before this"
-        self._tell(first.number, "EventsLost", what, first.time, {"events": lost})
+        self._report(first.number, "EventsLost", what, first.time, {"events": lost})
 
-    def _tell(
+    def _report(
         self, number: int, kind: str, what: str, time: float, details: Mapping[str, object]
     ) -> None:
         message = f"{what} were overwritten before they could be recorded"

@@ -60,7 +60,7 @@ class Share:
         self._layout: ShareLayout | None = None
         self._cycles: CycleWriter | None = None
         self._events: Ring | None = None
-        self._telling = threading.Lock()
+        self._reporting = threading.Lock()
 
     def __enter__(self) -> Share:
         self._refuse_taken()
@@ -162,9 +162,9 @@ class Share:
         self._events = Ring(segment.memory, events.offset, events.count, events.size, writable=True)
         return cycles.capsule
 
-    def tell(self, incident: Incident) -> None:
+    def report(self, incident: Incident) -> None:
         """Append an event. Called by the loop, from any thread."""
-        with self._telling:
+        with self._reporting:
             if self._events is not None and self._cycles is not None:
                 number = self._events.newest + 1
                 self._events.write(encode_event(incident, number, self._cycles.newest))
@@ -176,7 +176,7 @@ class Share:
         """
         if self._is_a_copy():
             return
-        with self._telling:
+        with self._reporting:
             for ring in (self._events, self._cycles):
                 if ring is not None:
                     ring.end()

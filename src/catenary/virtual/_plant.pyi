@@ -7,7 +7,7 @@ class CompiledPlant:
         joints: int,
         *,
         step: int,
-        hear: int,
+        set_handler: int,
         model: int,
         data: int,
         period_ns: int,

@@ -41,11 +41,11 @@ cdef class CompiledPlant:
     cdef Core _core
     cdef plant *_plant
 
-    def __init__(self, Core core, int joints, *, uintptr_t step, uintptr_t hear, uintptr_t model,
+    def __init__(self, Core core, int joints, *, uintptr_t step, uintptr_t set_handler, uintptr_t model,
                  uintptr_t data, int64_t period_ns, keep):
         """Connect a plant to the segment.
 
-        `step`, `hear`, `model`, `data`: addresses of mj_step, of the function that sets a thread's
+        `step`, `set_handler`, `model`, `data`: addresses of mj_step, of the function that sets a thread's
         message handler (0: none), of an mjModel and of an mjData. `keep` owns them.
         """
         cdef plant *p
@@ -60,7 +60,7 @@ cdef class CompiledPlant:
         if p == NULL or p.joints == NULL:
             raise MemoryError("no memory for the plant")
         p.step = <void (*)(const void *, void *) noexcept nogil>step
-        p.hear = <void (*)(void (*)(const mujoco_message *) noexcept nogil) noexcept nogil>hear
+        p.set_handler = <void (*)(void (*)(const mujoco_message *) noexcept nogil) noexcept nogil>set_handler
         p.model, p.data = <const void *>model, <void *>data
         p.count, p.period = joints, period_ns
         core._plant = keep

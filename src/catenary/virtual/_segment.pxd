@@ -66,7 +66,7 @@ cdef extern from "segment_memory.h" nogil:
     ctypedef struct mujoco_message:
         pass
     ctypedef struct plant:
-        void (*hear)(void (*)(const mujoco_message *) noexcept nogil) noexcept nogil
+        void (*set_handler)(void (*)(const mujoco_message *) noexcept nogil) noexcept nogil
         void (*step)(const void *, void *) noexcept nogil
         const void *model
         void *data

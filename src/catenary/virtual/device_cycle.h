@@ -9,7 +9,7 @@
 
 #include "process_data.h"
 #include "servo.h"
-#include "sync_unit.h"
+#include "controller/sync_unit.h"
 
 enum { CATCH_UP_STEPS = 4000 };       /* limit of catching up after a jump of the clock */
 

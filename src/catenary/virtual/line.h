@@ -10,8 +10,8 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "controller.h"
-#include "datagram.h"
+#include "controller/controller.h"
+#include "controller/datagram.h"
 #include "device_cycle.h"
 #include "plant.h"
 

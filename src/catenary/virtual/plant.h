@@ -35,7 +35,7 @@ enum { MUJOCO_WARNING = 2, MUJOCO_ERROR = 3 };
 
 typedef struct plant {
     void (*step)(const void *model, void *data);
-    void (*hear)(void (*)(const mujoco_message *));   /* sets this thread's message handler; NULL: not available */
+    void (*set_handler)(void (*)(const mujoco_message *));   /* sets this thread's message handler; NULL: not available */
     const void *model;
     void *data;
     plant_joint *joints;
@@ -85,7 +85,7 @@ static void plant_show(plant *p) {
 static __thread plant *plant_stepped;  /* the plant that this thread is stepping */
 
 /* After an error MuJoCo would end the process. Leave the step; its state is not used again. */
-static void plant_hear(const mujoco_message *m) {
+static void plant_message(const mujoco_message *m) {
     plant *p = plant_stepped;
     if (m->level < MUJOCO_WARNING)
         return;
@@ -96,15 +96,15 @@ static void plant_hear(const mujoco_message *m) {
 }
 
 static void plant_simulate(plant *p) {
-    if (p->hear == NULL) {
+    if (p->set_handler == NULL) {
         p->step(p->model, p->data);
         return;
     }
     plant_stepped = p;
-    p->hear(plant_hear);
+    p->set_handler(plant_message);
     if (_setjmp(p->escape) == 0)
         p->step(p->model, p->data);
-    p->hear(NULL);
+    p->set_handler(NULL);
 }
 
 /* Do the step that is due. In real time other threads run while MuJoCo computes; they stop before

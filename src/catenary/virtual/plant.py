@@ -168,7 +168,7 @@ class Plant:
             core,
             len(self.joints),
             step=self._model.function("mj_step"),
-            hear=self._model.function("_mjPRIVATE_setTlsLogHandler"),
+            set_handler=self._model.function("_mjPRIVATE_setTlsLogHandler"),
             model=self._model.model_address,
             data=self._model.data_address,
             period_ns=round(self.step * SECOND),

@@ -4,9 +4,9 @@
 #ifndef CATENARY_VIRTUAL_PROCESS_DATA_H
 #define CATENARY_VIRTUAL_PROCESS_DATA_H
 
-#include "controller.h"
+#include "controller/controller.h"
 #include "servo.h"
-#include "sync_manager.h"
+#include "controller/sync_manager.h"
 
 #define PROCESS_DATA_MAX 2048u
 

@@ -8,7 +8,7 @@
 #ifndef CATENARY_VIRTUAL_ROUTE_H
 #define CATENARY_VIRTUAL_ROUTE_H
 
-#include "ports.h"
+#include "controller/ports.h"
 
 enum {
     FORWARDING_NS = 300,               /* through a controller without its processing unit */

@@ -226,7 +226,7 @@ def serve(
     max_age: float | None = MAX_AGE,
     with_parent: bool = False,
     ready: Callable[[], None] | None = None,
-    tell: Callable[[FaultEvent], None] | None = None,
+    on_fault: Callable[[FaultEvent], None] | None = None,
 ) -> None:
     """Answer on `interface` until SIGINT or SIGTERM. Call this in the main thread.
 
@@ -238,7 +238,7 @@ def serve(
         max_age: See `Server`.
         with_parent: End when the parent process ends, too.
         ready: Called once when frames are being answered.
-        tell: Called with each entry of the fault log.
+        on_fault: Called with each entry of the fault log.
 
     Raises:
         LinkError: The interface does not exist, is down, or access is not permitted.
@@ -256,14 +256,14 @@ def serve(
         with server:
             if ready is not None:
                 ready()
-            told = 0
+            reported = 0
             while not asked_to_end.wait(0.2) and not server.wait(0):
                 server.raise_failure()
-                if tell is not None:
-                    news = segment.fault_log[told:]
-                    told += len(news)
+                if on_fault is not None:
+                    news = segment.fault_log[reported:]
+                    reported += len(news)
                     for event in news:
-                        tell(event)
+                        on_fault(event)
         server.raise_failure()
     finally:
         for number, handler in before.items():

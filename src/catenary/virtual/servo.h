@@ -9,7 +9,7 @@
 
 #include <math.h>
 
-#include "controller.h"
+#include "controller/controller.h"
 
 /* Slots of one axis, by object. `AXIS_SLOTS * axis + slot`; named for Python in devices/servo.py. */
 enum servo_slot {

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from catenary.core import Engine
 from catenary.plan.cycle import Bank, Column
-from catenary.plan.request import WishTables
+from catenary.plan.request import RequestTables
 
 Fields = Mapping[str, tuple[int, str, int | None]]  # name → offset, format, count
 RecordType = np.dtype[np.void]
@@ -25,7 +25,7 @@ class LawLayout:
     target: RecordType
 
 
-def law_layout(engine: Engine, tables: Sequence[WishTables]) -> LawLayout:
+def law_layout(engine: Engine, tables: Sequence[RequestTables]) -> LawLayout:
     """Return the records of a loop's law."""
     (actual, target), (inputs, outputs) = engine.law_fields(), engine.blocks()
     return LawLayout(
@@ -70,8 +70,8 @@ def named(
     used = dict.fromkeys(Bank, 0)
     found: dict[str, tuple[int, str, int | None]] = {}
     twice: set[str] = set()
-    for of_wish in columns:
-        for (group, bank), members in groupby(of_wish, key=lambda c: (c.group, c.bank)):
+    for of_request in columns:
+        for (group, bank), members in groupby(of_request, key=lambda c: (c.group, c.bank)):
             columns_here = list(members)
             names = [group] if group else [column.name for column in columns_here]
             count = len(columns_here) if group else None

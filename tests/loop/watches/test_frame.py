@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from catenary.bus.event_types import DuplicateFrames, Event
-from catenary.loop.frame_watch import DUPLICATES_MIN, SILENCE, FrameWatch
+from catenary.loop.watches.frame import DUPLICATES_MIN, SILENCE, FrameWatch
 
 
 class Bus:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import catenary as cat
 from catenary.bus.event_types import FaultFound
-from catenary.loop.error_watch import ErrorWatch
+from catenary.loop.watches.error import ErrorWatch
 from catenary.procedure.exchange import After, Reply, Request
 from catenary.virtual import Coupler, Segment, Servo
 from catenary.wire.register import ERROR_COUNTERS

@@ -3,10 +3,10 @@
 
 Theory of operation
     One service thread pushes whole frames into `out` and pops returned ones from `back`. Both are
-    rings for one producer and one consumer (native/packet_ring.h). After each cycle `lane_send` sends
+    rings for one producer and one consumer (native/packet_ring.h). After each cycle `acyclic_send` sends
     at most four frames. Their wire time must fit into the part of the period that the plan leaves
     (plan/frames.py) and that has not passed. The first frame is always sent, so that a
-    conversation never starves. Frames with an index from 0x80 on return through `lane_received`.
+    conversation never starves. Frames with an index from 0x80 on return through `acyclic_received`.
     The cycle never waits for the service thread.
 
 Waking
@@ -49,44 +49,44 @@ cdef inline int64_t wire_time(uint32_t length) noexcept nogil:
     return <int64_t>(max(length, CAT_FRAME_MIN) + FRAME_OVERHEAD) * NS_PER_BYTE
 
 
-cdef void lane_send(lane_t *lane, const cat_link *link, int64_t passed) noexcept nogil:
+cdef void acyclic_send(acyclic_queue_t *queue, const cat_link *link, int64_t passed) noexcept nogil:
     """Send at most four frames that fit into the remaining wire time; always send the first one.
     `passed` [ns]: time since the cycle start.
     """
     cdef const cat_packet *packet
-    cdef int64_t left = lane.wire_time - passed
+    cdef int64_t left = queue.wire_time - passed
     cdef uint32_t count
-    lane.under_way = 0
+    queue.under_way = 0
     for count in range(FRAMES_PER_CYCLE):
-        packet = cat_ring_peek(lane.out)
+        packet = cat_ring_peek(queue.out)
         if packet == NULL:
             return
         left -= wire_time(packet.length)
         if count > 0 and left < 0:
             return
         if link.send(link.self, packet.bytes, packet.length) < 0:
-            lane.dropped += 1
+            queue.dropped += 1
         else:
-            lane.sent += 1
-            lane.under_way += 1
-        cat_ring_drop(lane.out)
+            queue.sent += 1
+            queue.under_way += 1
+        cat_ring_drop(queue.out)
 
 
-cdef void lane_received(lane_t *lane, const uint8_t *bytes, uint32_t length,
+cdef void acyclic_received(acyclic_queue_t *queue, const uint8_t *bytes, uint32_t length,
                         int64_t stamp) noexcept nogil:
-    if lane.under_way > 0:
-        lane.under_way -= 1
-    if cat_ring_push(lane.back, bytes, length, stamp) != 0:
-        lane.dropped += 1
+    if queue.under_way > 0:
+        queue.under_way -= 1
+    if cat_ring_push(queue.back, bytes, length, stamp) != 0:
+        queue.dropped += 1
         return
-    lane.received += 1
-    cat_add32(&lane.arrived, 1)
+    queue.received += 1
+    cat_add32(&queue.arrived, 1)
     cat_fence()
-    if cat_load_acquire32(&lane.waiting):
-        cat_futex_wake(&lane.arrived)
+    if cat_load_acquire32(&queue.waiting):
+        cat_futex_wake(&queue.arrived)
 
 
-cdef class Lane:
+cdef class AcyclicQueue:
     def __cinit__(self, int64_t wire_time_ns):
         """`wire_time_ns`: maximum wire time of acyclic frames per cycle."""
         if wire_time_ns < 0:
@@ -99,12 +99,12 @@ cdef class Lane:
     def push(self, bytes frame not None):
         if not CAT_FRAME_MIN <= len(frame) <= CAT_FRAME_MAX:
             raise ValueError(
-                f"lane: a frame of {len(frame)} bytes, must be {CAT_FRAME_MIN} to {CAT_FRAME_MAX}"
+                f"acyclic queue: a frame of {len(frame)} bytes, must be {CAT_FRAME_MIN} to {CAT_FRAME_MAX}"
             )
         if frame[12:14] != b"\x88\xa4":
-            raise ValueError("lane: EtherType is not 0x88A4")
+            raise ValueError("acyclic queue: EtherType is not 0x88A4")
         if frame[FIRST_INDEX] < LANE_INDICES:
-            raise ValueError(f"lane: index {frame[FIRST_INDEX]:#04x} belongs to the cycle")
+            raise ValueError(f"acyclic queue: index {frame[FIRST_INDEX]:#04x} belongs to the cycle")
         return cat_ring_push(self.c.out, frame, <uint32_t>len(frame), 0) == 0
 
     def pop(self):

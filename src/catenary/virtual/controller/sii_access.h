@@ -3,7 +3,7 @@
 #ifndef CATENARY_VIRTUAL_SII_ACCESS_H
 #define CATENARY_VIRTUAL_SII_ACCESS_H
 
-#include "controller.h"
+#include "controller/controller.h"
 
 enum { SII_WORDS_CONFIGURATION = 8, SII_WORD_ALIAS = 4, SII_WORD_CHECKSUM = 7 };
 

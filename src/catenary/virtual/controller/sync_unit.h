@@ -12,7 +12,7 @@
 #ifndef CATENARY_VIRTUAL_SYNC_UNIT_H
 #define CATENARY_VIRTUAL_SYNC_UNIT_H
 
-#include "distributed_clock.h"
+#include "controller/distributed_clock.h"
 
 enum {
     SYNC_ACTIVE = 0x01,              /* in 0x0981 */

@@ -7,7 +7,7 @@ import os
 
 import pytest
 
-from catenary.realtime.memory import SharedMemory
+from catenary.realtime.system.memory import SharedMemory
 
 
 def test_is_zeros_at_first():

@@ -3,7 +3,7 @@ from libc.stdint cimport int64_t, uint8_t, uint32_t, uint64_t
 from catenary.core._memory cimport cat_memory
 from catenary.core._native cimport cat_link, cat_packet_ring
 
-cdef struct lane_t:
+cdef struct acyclic_queue_t:
     cat_packet_ring *out       # frames of the service thread, to be sent
     cat_packet_ring *back      # frames that came back
     int64_t wire_time          # maximum wire time of acyclic frames per cycle [ns]
@@ -14,11 +14,11 @@ cdef struct lane_t:
     uint64_t received
     uint64_t dropped           # frames that returned to a full ring or could not be sent
 
-cdef class Lane:
+cdef class AcyclicQueue:
     """Owner of the two rings of the acyclic queue."""
-    cdef lane_t c
+    cdef acyclic_queue_t c
     cdef cat_memory memory
 
-cdef void lane_send(lane_t *lane, const cat_link *link, int64_t passed) noexcept nogil
-cdef void lane_received(lane_t *lane, const uint8_t *bytes, uint32_t length,
+cdef void acyclic_send(acyclic_queue_t *queue, const cat_link *link, int64_t passed) noexcept nogil
+cdef void acyclic_received(acyclic_queue_t *queue, const uint8_t *bytes, uint32_t length,
                         int64_t stamp) noexcept nogil

@@ -6,8 +6,8 @@
 #ifndef CATENARY_VIRTUAL_AL_STATE_H
 #define CATENARY_VIRTUAL_AL_STATE_H
 
-#include "controller.h"
-#include "sync_manager.h"
+#include "controller/controller.h"
+#include "controller/sync_manager.h"
 
 enum { AL_INIT = 1, AL_PRE_OP = 2, AL_BOOT = 3, AL_SAFE_OP = 4, AL_OP = 8 };
 

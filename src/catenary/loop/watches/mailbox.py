@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from catenary.bus import LaneRunner, Pending, SubDevice
+from catenary.bus import AcyclicRunner, Pending, SubDevice
 from catenary.errors import CatenaryError
 from catenary.plan.planner import Plan
 from catenary.procedure.exchange import Procedure
@@ -29,7 +29,7 @@ class MailboxWatch:
     """
 
     def __init__(
-        self, plan: Plan, subs: Sequence[SubDevice], words: Sequence[int], runner: LaneRunner
+        self, plan: Plan, subs: Sequence[SubDevice], words: Sequence[int], runner: AcyclicRunner
     ) -> None:
         self._subs = subs
         self._words = words

@@ -1,6 +1,6 @@
-"""The acyclic queue. Engine owns it and offers it as lane_push, lane_pop and lane_wait."""
+"""The acyclic queue. Engine owns it and offers it as acyclic_push, acyclic_pop and acyclic_wait."""
 
-class Lane:
+class AcyclicQueue:
     """Owner of the two rings of the acyclic queue."""
 
     def __init__(self, wire_time_ns: int) -> None: ...

@@ -13,9 +13,9 @@ from typing import Self
 
 from catenary.errors import RealtimeError
 from catenary.interpreter import permission_advice
-from catenary.realtime import libc
 from catenary.realtime._stack import touch_stack
-from catenary.realtime.scheduling import lock_all_memory, locked_kilobytes
+from catenary.realtime.system import libc
+from catenary.realtime.system.scheduling import lock_all_memory, locked_kilobytes
 
 TOUCHED_STACK = 128 * 1024  # [bytes], as in the core's own thread
 LATENCY_DEVICE = "/dev/cpu_dma_latency"

@@ -20,12 +20,12 @@ class RingWatch:
         ring: HasState,
         device_count: int,
         *,
-        tell: Callable[[Event], None],
+        report: Callable[[Event], None],
         now: Callable[[], float],
     ) -> None:
         self._ring = ring
         self._device_count = device_count
-        self._tell = tell
+        self._report = report
         self._now = now
         self._found: Cuts | None = None
         self._told: tuple[Ends, ...] = ()
@@ -40,9 +40,9 @@ class RingWatch:
         for cable in self._told:
             if cable not in found.cables:
                 message = f"the cable between {named(cable)} carries again"
-                self._tell(LinkRestored(self._now(), None, message, cable))
+                self._report(LinkRestored(self._now(), None, message, cable))
         for cable in found.cables:
             if cable not in self._told:
                 message = f"the cable between {named(cable)} does not carry; {found}"
-                self._tell(LinkLost(self._now(), None, message, cable))
+                self._report(LinkLost(self._now(), None, message, cable))
         self._told = found.cables

@@ -11,8 +11,8 @@ from catenary.realtime import session
 
 STATE = """
 import gc, os, sys
-from catenary.realtime import libc, session
-from catenary.realtime.scheduling import locked_kilobytes
+from catenary.realtime.system import libc, session
+from catenary.realtime.system.scheduling import locked_kilobytes
 
 def state():
     held = any(os.readlink(f"/proc/self/fd/{n}") == "/dev/cpu_dma_latency"
@@ -24,7 +24,7 @@ def state():
 REFUSE = """
 def refuse(*_):
     raise OSError(1, "Operation not permitted")
-from catenary.realtime import preparation
+from catenary.realtime.system import preparation
 preparation.lock_all_memory = refuse
 """
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from catenary.bus import SubDevice
 from catenary.bus.event_types import AxisStopped, ModeRefused
-from catenary.core import AXIS_MODE_REFUSED, GOAL_ENABLED
+from catenary.core import AXIS_MODE_REFUSED, REQUEST_ENABLED
 from catenary.plan.cycle import AxisPlan
 from catenary.plan.request import Views
 from catenary.plan.stop_reason import StopReason
@@ -87,7 +87,7 @@ class AxisWatch:
 
     def _stop(self, axis: int) -> StoppedAxis:
         plan, reason = self._axes[axis], StopReason(self._views.stop_reason.item(axis))
-        by_request = self._views.goal.item(axis) != GOAL_ENABLED
+        by_request = self._views.requested_state.item(axis) != REQUEST_ENABLED
         return StoppedAxis(
             axis,
             plan.name,

@@ -6,7 +6,7 @@
 #ifndef CATENARY_VIRTUAL_SYNC_MANAGER_H
 #define CATENARY_VIRTUAL_SYNC_MANAGER_H
 
-#include "controller.h"
+#include "controller/controller.h"
 #include "watchdog.h"
 
 static inline uint8_t *sm_registers(controller *c, int n) {

@@ -26,7 +26,7 @@ from catenary.errors import CatenaryError
 from catenary.link import ring_of
 from catenary.loop.cycle_errors import described
 from catenary.loop.options import ReturnPolicy
-from catenary.loop.ring_watch import RingWatch
+from catenary.loop.watches.ring import RingWatch
 from catenary.model.device import Identity
 from catenary.model.device_matching import vacancies
 from catenary.plan.planner import Plan
@@ -115,7 +115,7 @@ class Watch:
         self._all_required = all(charge.required for charge in self._charges)
         self._disturbed = disturbed
         self._submit = submit
-        self._tell = main.events.put
+        self._report = main.events.put
         self._now = now
         self._rejoin = rejoin
         self._cables_seen = cables_seen
@@ -123,7 +123,9 @@ class Watch:
         self._on_replacement = on_replacement
         ring = ring_of(main.link)
         self._ring = (
-            None if ring is None else RingWatch(ring, len(self._charges), tell=self._tell, now=now)
+            None
+            if ring is None
+            else RingWatch(ring, len(self._charges), report=self._report, now=now)
         )
         self._unsettled = False  # True if a device was not running at the last look
         self._strangers: set[tuple[int, Identity]] = set()
@@ -203,7 +205,7 @@ class Watch:
             charge.sub.state = None
             state = answer.word & STATE_MASK
             message = f"{described(answer)}, out of OP"
-            self._tell(
+            self._report(
                 StateLost(self._now(), charge.sub, message, int(AlState.OP), state, answer.code)
             )
         elif charge.standing is Standing.LOST:
@@ -212,7 +214,7 @@ class Watch:
 
     def _lose(self, charge: Charge) -> None:
         if charge.standing in (Standing.RUNNING, Standing.ASTRAY, Standing.HELD):
-            self._tell(
+            self._report(
                 DeviceLost(
                     self._now(), charge.sub, f"{charge.sub.station} does not answer any more"
                 )
@@ -221,12 +223,12 @@ class Watch:
 
     def _is_back(self, charge: Charge) -> None:
         if charge.standing is Standing.LOST:
-            self._tell_returned(charge)
+            self._report_returned(charge)
         charge.standing, charge.failures, charge.sub.state = Standing.RUNNING, 0, AlState.OP
 
-    def _tell_returned(self, charge: Charge) -> None:
+    def _report_returned(self, charge: Charge) -> None:
         message = f"{charge.sub.station} answers again"
-        self._tell(DeviceReturned(self._now(), charge.sub, message))
+        self._report(DeviceReturned(self._now(), charge.sub, message))
 
     def _conclude(self, charge: Charge, task: Pending[None]) -> None:
         """Evaluate a procedure that has ended and was to bring a device back."""
@@ -244,7 +246,7 @@ class Watch:
         charge.standing = Standing.HELD
         state = int(charge.sub.state) if charge.sub.state is not None else 0
         message = f"{charge.sub.station} is held: {reason}"
-        self._tell(DeviceHeld(self._now(), charge.sub, message, state, reason))
+        self._report(DeviceHeld(self._now(), charge.sub, message, state, reason))
 
     def _lead(self, charge: Charge, conversation: Procedure[None]) -> None:
         charge.standing = Standing.RETURNING
@@ -295,7 +297,7 @@ class Watch:
                 return (yield from self._exchanged(charge, presence, found))
         yield from restore.forget_address(presence)
         if lost and found is not None:
-            self._tell_replaced(lost[0], presence, found)
+            self._report_replaced(lost[0], presence, found)
         return None
 
     def _note_unread(self, charge: Charge, error: CatenaryError) -> None:
@@ -304,13 +306,13 @@ class Watch:
         if charge.unread == FAILURES_MAX:
             reason = f"the identity of the device in its place cannot be read: {error.message}"
             message = f"{charge.sub.station} is held: {reason}"
-            self._tell(DeviceHeld(self._now(), charge.sub, message, 0, reason))
+            self._report(DeviceHeld(self._now(), charge.sub, message, 0, reason))
 
     def _exchanged(
         self, charge: Charge, presence: restore.Presence, found: Identity
     ) -> Procedure[Charge | None]:
         """Handle a replacement: the same product with another serial number."""
-        self._tell_replaced(charge, presence, found)
+        self._report_replaced(charge, presence, found)
         if self._on_replacement == "restore" or charge.released:
             charge.identity = found  # the place now belongs to this device
             self._strangers = {each for each in self._strangers if each[0] != charge.plan.position}
@@ -318,19 +320,19 @@ class Watch:
         yield from restore.forget_address(presence)
         return None
 
-    def _tell_replaced(self, charge: Charge, presence: restore.Presence, found: Identity) -> None:
+    def _report_replaced(self, charge: Charge, presence: restore.Presence, found: Identity) -> None:
         """Put the event once for each device in a place that is not its own."""
         if (charge.plan.position, found) in self._strangers:
             return
         self._strangers.add((charge.plan.position, found))
         expected = charge.identity
         message = f"{charge.sub.station} was replaced: found {found} instead of {expected}"
-        self._tell(DeviceReplaced(self._now(), charge.sub, message, expected, found))
+        self._report(DeviceReplaced(self._now(), charge.sub, message, expected, found))
 
     def _welcome(self, charge: Charge) -> None:
         """Bring back or hold a device that was lost and has its address again."""
         charge.unread = 0
-        self._tell_returned(charge)
+        self._report_returned(charge)
         if self._lets_in(charge):
             charge.released = False
             self._lead(charge, self._restored(charge))

@@ -2,7 +2,7 @@
 #ifndef CATENARY_VIRTUAL_FMMU_H
 #define CATENARY_VIRTUAL_FMMU_H
 
-#include "controller.h"
+#include "controller/controller.h"
 #include "sync_manager.h"
 
 static void fmmu_configured(controller *c, int n) {

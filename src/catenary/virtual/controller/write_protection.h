@@ -4,7 +4,7 @@
 #ifndef CATENARY_VIRTUAL_WRITE_PROTECTION_H
 #define CATENARY_VIRTUAL_WRITE_PROTECTION_H
 
-#include "controller.h"
+#include "controller/controller.h"
 
 static inline int enabled_in_this_frame(const controller *c, uint64_t enabled) {
     return enabled == c->segment->counters.frames;

@@ -6,7 +6,7 @@
 #define CATENARY_VIRTUAL_DATAGRAM_H
 
 #include "al_state.h"
-#include "controller.h"
+#include "controller/controller.h"
 #include "fmmu.h"
 #include "frame_faults.h"
 #include "process_data.h"

@@ -20,22 +20,22 @@ def test_a_frame_goes_out_after_the_cyclic_one_and_comes_back(execution: str) ->
     b = bench(axis(0), execution=execution)
     b.engine.run(1)
     sent = len(b.link.sent)
-    assert b.engine.lane_push(request(7))
+    assert b.engine.acyclic_push(request(7))
     b.engine.run(2)
     cyclic, acyclic = b.link.sent[sent : sent + 2]
     assert decode_frame(cyclic).datagrams[0].index < 0x80
     assert acyclic == request(7)
-    back = b.engine.lane_pop()
+    back = b.engine.acyclic_pop()
     assert back is not None
     assert decode_frame(back).datagrams[0].working_counter == 1
-    assert b.engine.lane_pop() is None
+    assert b.engine.acyclic_pop() is None
     assert b.ok
 
 
 def test_at_most_four_a_cycle_in_their_order() -> None:
     b = bench(axis(0))
     for k in range(10):
-        assert b.engine.lane_push(request(k))
+        assert b.engine.acyclic_push(request(k))
     seen = []
     for _ in range(3):
         before = len(lane_frames(b))
@@ -55,7 +55,7 @@ def test_only_what_fits_into_the_wire_time_left_and_one_frame_in_any_case(
 ) -> None:
     b = bench(axis(0), acyclic_ns=budget_us * 1000)
     for k in range(8):
-        assert b.engine.lane_push(request(k, size=1400))
+        assert b.engine.acyclic_push(request(k, size=1400))
     b.engine.run(1)
     assert len(lane_frames(b)) == expected
 
@@ -64,7 +64,7 @@ def test_a_late_body_leaves_less_of_the_wire() -> None:
     b = bench(axis(0), execution="inline", acyclic_ns=900_000)
     b.steps(2)
     for k in range(8):
-        assert b.engine.lane_push(request(k, size=1400))
+        assert b.engine.acyclic_push(request(k, size=1400))
     b.engine.spend(600_000)
     b.engine.next()
     assert len(lane_frames(b)) == 2  # 300 us are left
@@ -77,9 +77,9 @@ def test_a_negative_wire_time_is_refused() -> None:
 
 def test_a_full_queue_refuses() -> None:
     b = bench(axis(0))
-    assert [b.engine.lane_push(request(k)) for k in range(65)] == [True] * 64 + [False]
+    assert [b.engine.acyclic_push(request(k)) for k in range(65)] == [True] * 64 + [False]
     b.engine.run(1)
-    assert b.engine.lane_push(request(64))
+    assert b.engine.acyclic_push(request(64))
 
 
 def test_answers_nobody_takes_are_dropped_and_counted() -> None:
@@ -88,18 +88,18 @@ def test_answers_nobody_takes_are_dropped_and_counted() -> None:
         b.link.arrive(request(k), 1000)
     b.engine.run(1)
     counters = b.engine.counters
-    assert (counters["lane_received"], counters["lane_dropped"]) == (64, 6)
+    assert (counters["acyclic_received"], counters["acyclic_dropped"]) == (64, 6)
     assert b.ok
-    assert sum(b.engine.lane_pop() is not None for _ in range(70)) == 64
+    assert sum(b.engine.acyclic_pop() is not None for _ in range(70)) == 64
 
 
 def test_a_frame_the_link_refuses_is_dropped_and_counted() -> None:
     b = bench(axis(0))
-    b.engine.lane_push(request())
+    b.engine.acyclic_push(request())
     b.link.send_result = -105
     b.engine.run(1)
-    assert b.engine.counters["lane_dropped"] == 1
-    assert b.engine.counters["lane_sent"] == 0
+    assert b.engine.counters["acyclic_dropped"] == 1
+    assert b.engine.counters["acyclic_sent"] == 0
 
 
 @pytest.mark.parametrize(
@@ -113,13 +113,13 @@ def test_a_frame_the_link_refuses_is_dropped_and_counted() -> None:
 )
 def test_what_is_no_acyclic_frame_is_refused(frame: bytes, message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        bench(axis(0)).engine.lane_push(frame)
+        bench(axis(0)).engine.acyclic_push(frame)
 
 
 def test_waiting_says_whether_a_frame_is_there() -> None:
     b = bench(axis(0))
-    assert not b.engine.lane_wait(0)
-    b.engine.lane_push(request())
+    assert not b.engine.acyclic_wait(0)
+    b.engine.acyclic_push(request())
     b.engine.run(1)
     b.engine.run(1)
-    assert b.engine.lane_wait(10**12)
+    assert b.engine.acyclic_wait(10**12)

@@ -25,11 +25,11 @@ NEVER_NS = 1 << 62
 FRAMES_PER_STEP = 4  # acyclic frames per cycle
 
 
-class Lane(Protocol):
+class AcyclicQueue(Protocol):
     """Python side of the acyclic queue, as `core.Engine` has it."""
 
-    def lane_push(self, frame: bytes) -> bool: ...
-    def lane_pop(self) -> bytes | None: ...
+    def acyclic_push(self, frame: bytes) -> bool: ...
+    def acyclic_pop(self) -> bytes | None: ...
     def now(self) -> int: ...
 
 
@@ -58,7 +58,7 @@ class _UnderWay:
     deadline_ns: int
 
 
-class LaneRunner:
+class AcyclicRunner:
     """Owns the procedures that run during one cycle. Only one thread may call `step`.
 
     Any thread may call `submit` and `run`. `grain_ns`: a pause that ends within this time counts as
@@ -67,7 +67,7 @@ class LaneRunner:
 
     def __init__(
         self,
-        lane: Lane,
+        queue: AcyclicQueue,
         *,
         frame_timeout: float = FRAME_TIMEOUT,
         attempts: int = ATTEMPTS,
@@ -75,7 +75,7 @@ class LaneRunner:
     ) -> None:
         self.counts = FrameCounts()
         self.asked = threading.Event()  # set when a procedure was submitted
-        self._lane = lane
+        self._queue = queue
         self._timeout_ns = round(frame_timeout * 1e9)
         self._attempts = attempts
         self._grain_ns = grain_ns
@@ -129,7 +129,7 @@ class LaneRunner:
     @property
     def due(self) -> bool:
         """True if a step has work now: a frame to send or to receive, or the end of a pause."""
-        return self.next_due_ns <= self._lane.now()
+        return self.next_due_ns <= self._queue.now()
 
     @property
     def next_due_ns(self) -> int:
@@ -141,7 +141,7 @@ class LaneRunner:
 
     def step(self) -> None:
         """Advance all procedures by one exchange."""
-        now = self._lane.now()
+        now = self._queue.now()
         self._receive(now)
         self._expire(now)
         self._begin(now)
@@ -160,7 +160,7 @@ class LaneRunner:
             pending.finish(_ended())
 
     def _receive(self, now: int) -> None:
-        while (raw := self._lane.lane_pop()) is not None:
+        while (raw := self._queue.acyclic_pop()) is not None:
             try:
                 frame = decode_frame(raw)
             except DecodeError:
@@ -234,7 +234,7 @@ class LaneRunner:
         for batch in batches([item.request for item in items])[:FRAMES_PER_STEP]:
             group = [items[rank] for rank in batch]
             parcel = make_parcel([item.request for item in group], next(self._indices))
-            if not self._lane.lane_push(parcel.frame):
+            if not self._queue.acyclic_push(parcel.frame):
                 break
             for item in group:
                 item.attempts += 1

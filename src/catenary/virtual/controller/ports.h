@@ -7,7 +7,7 @@
 #ifndef CATENARY_VIRTUAL_PORTS_H
 #define CATENARY_VIRTUAL_PORTS_H
 
-#include "controller.h"
+#include "controller/controller.h"
 #include "watchdog.h"
 
 enum loop_mode { LOOP_AUTO = 0, LOOP_AUTO_CLOSE = 1, LOOP_OPEN = 2, LOOP_CLOSED = 3 };

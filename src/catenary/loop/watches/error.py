@@ -27,7 +27,7 @@ class ErrorWatch:
 
     def __init__(self, main: MainDevice, now: Callable[[], float]) -> None:
         self._subs = main.subs
-        self._tell = main.events.put
+        self._put = main.events.put
         self._now = now
         self._last: Totals = ()
         self._told: dict[str, float] = {}  # place → time of its last event [s]
@@ -66,4 +66,4 @@ class ErrorWatch:
         self._told[finding.where] = now
         sub = self._subs[finding.devices[-1]] if finding.devices else None
         message = f"{finding.where}: {finding.evidence}"
-        self._tell(FaultFound(now, sub, message, finding))
+        self._put(FaultFound(now, sub, message, finding))

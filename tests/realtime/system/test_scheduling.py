@@ -8,12 +8,12 @@ import sys
 
 import pytest
 
-from catenary.realtime.scheduling import Scheduling, request_scheduling, what_scheduling
+from catenary.realtime.system.scheduling import Scheduling, request_scheduling, what_scheduling
 
 
 def in_another_process(code: str) -> str:
     """What `code` prints; the tests' own scheduling stays as it is."""
-    start = "from catenary.realtime.scheduling import *; import os; "
+    start = "from catenary.realtime.system.scheduling import *; import os; "
     done = subprocess.run(
         [sys.executable, "-c", start + code], capture_output=True, text=True, check=True
     )

@@ -3,7 +3,7 @@
 #ifndef CATENARY_VIRTUAL_WATCHDOG_H
 #define CATENARY_VIRTUAL_WATCHDOG_H
 
-#include "controller.h"
+#include "controller/controller.h"
 
 static inline int64_t watchdog_time(const controller *c, uint32_t reg) {
     return (int64_t)(load16(c->memory + REG_WATCHDOG_DIVIDER) + 2) * 40 * load16(c->memory + reg);

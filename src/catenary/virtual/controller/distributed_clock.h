@@ -22,7 +22,7 @@
 
 #include <math.h>
 
-#include "controller.h"
+#include "controller/controller.h"
 
 enum {
     SPEED_START_MIN = 0x0080,

@@ -7,7 +7,7 @@ from collections import deque
 
 import pytest
 
-from catenary.bus import LaneRunner, MainDevice
+from catenary.bus import AcyclicRunner, MainDevice
 from catenary.errors import LoopError, ResponseTimeout, SdoAbort
 from catenary.link import Link
 from catenary.procedure.exchange import Procedure, after, read
@@ -21,7 +21,7 @@ from catenary.wire.register import AL_STATUS
 PERIOD_NS = 1_000_000
 
 
-class Lane:
+class AcyclicQueue:
     """Owns a lane over a virtual link: what is pushed goes out with the next cycle."""
 
     def __init__(self, link: Link, *, slots: int = 64) -> None:
@@ -32,14 +32,14 @@ class Lane:
         self._queue: list[bytes] = []
         self._back: deque[bytes] = deque()
 
-    def lane_push(self, frame: bytes) -> bool:
+    def acyclic_push(self, frame: bytes) -> bool:
         if len(self._queue) >= self.slots:
             return False
         self._queue.append(frame)
         self.pushed.append(frame)
         return True
 
-    def lane_pop(self) -> bytes | None:
+    def acyclic_pop(self) -> bytes | None:
         return self._back.popleft() if self._back else None
 
     def now(self) -> int:
@@ -56,7 +56,7 @@ class Lane:
             self._back.append(frame)
 
 
-def settle(lane: Lane, runner: LaneRunner, cycles: int = 5000) -> int:
+def settle(lane: AcyclicQueue, runner: AcyclicRunner, cycles: int = 5000) -> int:
     for number in range(cycles):
         if not runner.busy:
             return number
@@ -68,8 +68,8 @@ def settle(lane: Lane, runner: LaneRunner, cycles: int = 5000) -> int:
 def test_an_upload_takes_one_step_a_cycle() -> None:
     with MainDevice(demo_segment()) as main:
         [drive, *_] = main.scan().drives
-        lane = Lane(main.link)
-        runner = LaneRunner(lane)
+        lane = AcyclicQueue(main.link)
+        runner = AcyclicRunner(lane)
         task = runner.submit(upload(drive.channel, 0x1000, 0))
         cycles = settle(lane, runner)
         assert UDINT.decode(task.result()) & 0xFFFF == 402
@@ -80,8 +80,8 @@ def test_an_upload_takes_one_step_a_cycle() -> None:
 def test_many_procedures_share_the_frame_of_a_cycle() -> None:
     with MainDevice(demo_segment()) as main:
         subs = main.scan()
-        lane = Lane(main.link)
-        runner = LaneRunner(lane)
+        lane = AcyclicQueue(main.link)
+        runner = AcyclicRunner(lane)
         tasks = [runner.submit(_state(sub.station.address)) for sub in subs]
         settle(lane, runner)
         assert [task.result() for task in tasks] == [2] * 6
@@ -93,8 +93,8 @@ def test_many_procedures_share_the_frame_of_a_cycle() -> None:
 def test_conversations_with_one_mailbox_take_turns() -> None:
     with MainDevice(demo_segment()) as main:
         drive = main.scan()[2]
-        lane = Lane(main.link)
-        runner = LaneRunner(lane)
+        lane = AcyclicQueue(main.link)
+        runner = AcyclicRunner(lane)
         places = [(0x1000, 0), (0x1018, 1), (0x1018, 2), (0x5FFF, 0), (0x1008, 0)]
         tasks = [runner.submit(upload(drive.channel, *place)) for place in places]
         settle(lane, runner)
@@ -109,8 +109,8 @@ def test_conversations_with_one_mailbox_take_turns() -> None:
 def test_a_full_lane_delays_but_loses_nothing() -> None:
     with MainDevice(demo_segment()) as main:
         subs = main.scan()
-        lane = Lane(main.link, slots=0)
-        runner = LaneRunner(lane)
+        lane = AcyclicQueue(main.link, slots=0)
+        runner = AcyclicRunner(lane)
         task = runner.submit(_state(subs[0].station.address))
         for _ in range(5):
             runner.step()
@@ -124,9 +124,9 @@ def test_a_full_lane_delays_but_loses_nothing() -> None:
 def test_lost_frames_are_repeated_or_recovered() -> None:
     with MainDevice(demo_segment()) as main:
         drive = main.scan()[2]
-        lane = Lane(main.link)
+        lane = AcyclicQueue(main.link)
         lane.lose = {0, 2, 4, 7}
-        runner = LaneRunner(lane)
+        runner = AcyclicRunner(lane)
         task = runner.submit(upload(drive.channel, 0x1018, 1))
         settle(lane, runner)
         assert task.result() == UDINT.encode(drive.identity.vendor)
@@ -138,8 +138,8 @@ def test_a_segment_that_is_gone_ends_in_time() -> None:
     with MainDevice(segment) as main:
         drive = main.scan()[2]
         segment.unplug()
-        lane = Lane(main.link)
-        runner = LaneRunner(lane)
+        lane = AcyclicQueue(main.link)
+        runner = AcyclicRunner(lane)
         task = runner.submit(upload(drive.channel, 0x1018, 1))
         assert settle(lane, runner) < 2000
         with pytest.raises(ResponseTimeout, match="device 2"):
@@ -149,9 +149,9 @@ def test_a_segment_that_is_gone_ends_in_time() -> None:
 def test_a_blocking_call_in_the_loops_own_thread_raises_at_once() -> None:
     with MainDevice(demo_segment()) as main:
         drive = main.scan()[2]
-        lane = Lane(main.link)
+        lane = AcyclicQueue(main.link)
         with (
-            main.attached(LaneRunner(lane)),
+            main.attached(AcyclicRunner(lane)),
             pytest.raises(RuntimeError, match="loop's own thread"),
         ):
             drive.sdo.read(0x1000)
@@ -163,7 +163,7 @@ def test_a_scan_is_refused_while_a_loop_runs() -> None:
     with MainDevice(demo_segment()) as main:
         main.scan()
         with (
-            main.attached(LaneRunner(Lane(main.link))),
+            main.attached(AcyclicRunner(AcyclicQueue(main.link))),
             pytest.raises(RuntimeError, match="a loop runs on this MainDevice"),
         ):
             main.scan()
@@ -172,8 +172,8 @@ def test_a_scan_is_refused_while_a_loop_runs() -> None:
 def test_another_thread_reads_while_the_loop_runs() -> None:
     with MainDevice(demo_segment()) as main:
         drive = main.scan()[2]
-        lane = Lane(main.link)
-        runner = LaneRunner(lane)
+        lane = AcyclicQueue(main.link)
+        runner = AcyclicRunner(lane)
         found: list[int] = []
         with main.attached(runner):
             thread = threading.Thread(
@@ -190,7 +190,7 @@ def test_another_thread_reads_while_the_loop_runs() -> None:
 def test_closing_ends_those_who_wait() -> None:
     with MainDevice(demo_segment()) as main:
         drive = main.scan()[2]
-        runner = LaneRunner(Lane(main.link))
+        runner = AcyclicRunner(AcyclicQueue(main.link))
         failures: list[BaseException] = []
 
         def ask() -> None:
@@ -212,8 +212,8 @@ def test_closing_ends_those_who_wait() -> None:
 
 def test_pauses_are_counted_in_the_lanes_time() -> None:
     with demo_segment().open_link() as link:
-        lane = Lane(link)
-        runner = LaneRunner(lane)
+        lane = AcyclicQueue(link)
+        runner = AcyclicRunner(lane)
 
         def waits() -> Procedure[str]:
             yield after(0.020)
@@ -234,8 +234,8 @@ def test_a_loop_that_begins_waits_for_who_talks_and_others_go_beside_it() -> Non
     that comes too late for that goes into the lane."""
     with MainDevice(demo_segment()) as main:
         drive = main.scan()[2]
-        lane = Lane(main.link)
-        runner = LaneRunner(lane)
+        lane = AcyclicQueue(main.link)
+        runner = AcyclicRunner(lane)
         talking, go_on = threading.Event(), threading.Event()
         order: list[str] = []
 
@@ -269,7 +269,7 @@ def test_without_the_lane_nobody_sends_while_a_loop_has_the_link() -> None:
         main.scan()
         blocking = main.runner
         with (
-            main.attached(LaneRunner(Lane(main.link))),
+            main.attached(AcyclicRunner(AcyclicQueue(main.link))),
             pytest.raises(RuntimeError, match="a loop has the link"),
         ):
             blocking.run(_state(0x1001))

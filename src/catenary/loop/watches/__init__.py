@@ -1,0 +1,1 @@
+"""Watches: the checks of a session in every cycle, one module for each kind of fault."""
