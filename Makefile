@@ -14,7 +14,7 @@ RTLAB ?=
 IGH ?=
 SOURCES := CMakeLists.txt pyproject.toml \
            $(shell find src -name '*.pyx' -o -name '*.pxd' -o -name '*.pxi' -o -name '*.h')
-CHECKED := src tests tools examples benchmarks
+CHECKED := src tests tools examples benchmarks docs
 
 ifneq ($(origin PYTHON),file)
   PREFIX := -c 'import sys; print(sys.base_prefix)'

@@ -31,6 +31,7 @@ extensions = [
 exclude_patterns = ["README.md"]
 default_role = "code"
 highlight_language = "none"
+smartquotes = False  # "--" is an option
 pygments_style = "a11y-light"
 pygments_dark_style = "a11y-dark"
 nitpicky = True

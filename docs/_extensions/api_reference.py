@@ -14,17 +14,20 @@ from __future__ import annotations
 import ast
 import inspect
 import re
+from enum import Enum
 from functools import cache
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from docutils import nodes
+from docutils.parsers.rst import directives
 from public_names import EVENTS, public_names
 from sphinx.addnodes import pending_xref
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
 from sphinx.ext.autodoc import Options
+from sphinx.ext.napoleon import GoogleDocstring
 from sphinx.pycode import ModuleAnalyzer
 from sphinx.util import logging
 from sphinx.util.docutils import SphinxDirective
@@ -36,15 +39,22 @@ SOURCE = Path(__file__).resolve().parents[2] / "src"
 # classes whose members are known: they are not repeated in what derives from them
 KNOWN = "object, int, str, tuple, Enum, IntEnum, IntFlag, Struct, Exception, BaseException, Generic"
 PAGE = re.compile(r"\bdocs((?:/\w+)+)\.md")
+SECTION = re.compile(r"^(Args|Attributes):$", re.MULTILINE)
 COMMENT = re.compile(r"^( {4}\w+: [^#\n]*[^#\s])  # (?!noqa|type:|fmt:)", re.MULTILINE)
 
 
 class Api(SphinxDirective):
-    """Document names of a public module. Option `no-inherited`: leave out inherited members."""
+    """Document names of a public module.
+
+    Options: `no-inherited` leaves out inherited members, `exclude` the members that it names.
+    """
 
     required_arguments = 1
     has_content = True
-    option_spec = {"no-inherited": lambda _: True}
+    option_spec: ClassVar = {
+        "no-inherited": directives.flag,
+        "exclude": directives.unchanged_required,
+    }
 
     def run(self) -> list[nodes.Node]:
         module = self.arguments[0]
@@ -66,8 +76,10 @@ class Api(SphinxDirective):
             return self.alias(full, found)
         exception = issubclass(found, BaseException)
         lines = [f".. auto{'exception' if exception else 'class'}:: {full}", "   :members:"]
-        if not exception:
+        if issubclass(found, Enum) or not SECTION.search(inspect.getdoc(found) or ""):
             lines += ["   :undoc-members:"]
+        if "exclude" in self.options:
+            lines += [f"   :exclude-members: {', '.join(self.options['exclude'].split())}"]
         if exception or module == "catenary.events":
             lines += ["   :show-inheritance:"]
         elif "no-inherited" not in self.options:
@@ -77,9 +89,7 @@ class Api(SphinxDirective):
     def alias(self, full: str, found: type) -> list[str]:
         """Document a class under the name of the function that users call."""
         lines = (inspect.getdoc(found) or "").splitlines()
-        self.env.events.emit(
-            "autodoc-process-docstring", "class", full, found, Options(), lines
-        )
+        self.env.events.emit("autodoc-process-docstring", "class", full, found, Options(), lines)
         fields = ModuleAnalyzer.for_module(found.__module__).find_attr_docs()
         for (owner, field), comment in fields.items():
             if owner == found.__name__:
@@ -117,8 +127,11 @@ def mark_examples(lines: list[str]) -> list[str]:
 def improve_docstring(
     app: Sphinx, what: str, name: str, obj: object, options: Options, lines: list[str]
 ) -> None:
-    """Mark examples as code, and link pages. Runs before napoleon."""
+    """Mark examples as code, link pages, add types of stubs. Runs before napoleon."""
     lines[:] = [PAGE.sub(r":doc:`\1`", line) for line in mark_examples(lines)]
+    stub = stub_function(obj) if what in ("attribute", "property") else None
+    if stub is not None and stub.returns is not None:
+        lines += ["", f":type: {ast.unparse(stub.returns)}"]
 
 
 @cache
@@ -135,18 +148,18 @@ def stub_of(module: str) -> dict[str, ast.FunctionDef]:
     return found
 
 
+def stub_function(obj: Any) -> ast.FunctionDef | None:
+    """Return the stub of a compiled function or property; None if it is not compiled."""
+    owner = getattr(obj, "__objclass__", obj)
+    stub = stub_of(getattr(owner, "__module__", None) or "")
+    return stub.get(getattr(obj, "__qualname__", ""))
+
+
 def read_stub_signature(
     app: Sphinx, what: str, name: str, obj: Any, options: Options, signature: str, returns: str
 ) -> tuple[str, str | None] | None:
     """Return the signature that the stub of a compiled function has."""
-    owner = getattr(obj, "__objclass__", obj)
-    module = getattr(owner, "__module__", None) or ""
-    stub = stub_of(module)
-    if not stub:
-        return None
-    if what == "class":
-        return "", None  # the package makes these objects
-    function = stub.get(getattr(obj, "__qualname__", ""))
+    function = stub_function(obj) if what in ("function", "method") else None
     if function is None:
         return None
     arguments = ast.unparse(function.args).removeprefix("self").removeprefix(", ")
@@ -175,7 +188,8 @@ def resolve(
     documented = [
         name
         for name, entry in domain.objects.items()
-        if name.rsplit(".", 1)[-1] == last and entry.objtype in ("class", "exception")
+        if name.rsplit(".", 1)[-1] == last
+        and entry.objtype in ("class", "exception")
         and not entry.aliased
     ]
     if len(documented) != 1:
@@ -196,7 +210,14 @@ def check_public_names(app: Sphinx, env: BuildEnvironment) -> None:
         LOGGER.warning("%s is public, but no page documents it: add it to an {api} block", name)
 
 
+def read_attribute(self: GoogleDocstring) -> list[str]:
+    """Return the docstring of an attribute or property as it is: "a: b" is not "type: text"."""
+    lines: list[str] = self._consume_to_end()
+    return lines
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
+    GoogleDocstring._parse_attribute_docstring = read_attribute  # type: ignore[method-assign]
     ModuleAnalyzer.__init__ = read_comments(ModuleAnalyzer.__init__)  # type: ignore[method-assign]
     app.add_directive("api", Api)
     app.connect("autodoc-process-docstring", improve_docstring, priority=400)

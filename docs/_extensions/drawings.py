@@ -20,6 +20,7 @@ import re
 import runpy
 from html import escape
 from pathlib import Path
+from typing import ClassVar
 
 from docutils import nodes
 from docutils.parsers.rst import directives
@@ -49,7 +50,7 @@ class Drawing(SphinxDirective):
     """A figure of Matplotlib."""
 
     required_arguments = 1
-    option_spec = {"alt": directives.unchanged_required, "caption": directives.unchanged}
+    option_spec: ClassVar = {"alt": directives.unchanged_required, "caption": directives.unchanged}
 
     def run(self) -> list[nodes.Node]:
         name = self.arguments[0]

@@ -39,5 +39,6 @@ def own_names(module: ModuleType) -> list[str]:
         and not isinstance(value, TypeVar)
         and getattr(value, "__module__", None) == module.__name__
     ]
-    words = {id(getattr(module, name)): name for name in own}  # a fault's word comes after its class
+    # the function of a fault is its class under another name, which comes later
+    words = {id(getattr(module, name)): name for name in own}
     return [name for name in own if words[id(getattr(module, name))] == name]
