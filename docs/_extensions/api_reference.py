@@ -14,6 +14,7 @@ from __future__ import annotations
 import ast
 import inspect
 import re
+import sys
 from enum import Enum
 from functools import cache
 from importlib import import_module
@@ -36,11 +37,15 @@ from catenary.types import DataType
 
 LOGGER = logging.getLogger(__name__)
 SOURCE = Path(__file__).resolve().parents[2] / "src"
-# classes whose members are known: they are not repeated in what derives from them
-KNOWN = "object, int, str, tuple, Enum, IntEnum, IntFlag, Struct, Exception, BaseException, Generic"
+# the members of these classes are not repeated in classes that derive from them
+KNOWN = "object, int, str, tuple, Enum, IntEnum, Struct, BaseException, Generic, Device, DataType"
 PAGE = re.compile(r"\bdocs((?:/\w+)+)\.md")
 SECTION = re.compile(r"^(Args|Attributes):$", re.MULTILINE)
-COMMENT = re.compile(r"^( {4}\w+: [^#\n]*[^#\s])  # (?!noqa|type:|fmt:)", re.MULTILINE)
+COMMENT = re.compile(
+    r"^( {4}\w+: [^#\n]*[^#\s]| {8}self\.[a-z]\w*(?:: [^=#\n]+)? = [^#\n]*[^#\s])"
+    r"  # (?!noqa|type:|fmt:)",
+    re.MULTILINE,
+)
 
 
 class Api(SphinxDirective):
@@ -66,8 +71,12 @@ class Api(SphinxDirective):
 
     def entry(self, module: str, name: str) -> list[str]:
         """Return the lines of reStructuredText that document a name."""
-        found = getattr(import_module(EVENTS if module == "catenary.events" else module), name)
+        home = import_module(EVENTS if module == "catenary.events" else module)
+        found = getattr(home, name, None)
+        if found is None:
+            raise self.error(f"{module} has no name {name!r}")
         full = f"{module}.{name}"
+        self.note_files(found)
         if isinstance(found, DataType):
             return [f".. py:data:: {full}", "", f"   {describe_type(found)}"]
         if not isinstance(found, type):
@@ -85,6 +94,13 @@ class Api(SphinxDirective):
         elif "no-inherited" not in self.options:
             lines += [f"   :inherited-members: {KNOWN}"]
         return lines
+
+    def note_files(self, found: object) -> None:
+        """Build the page again after a change of this file, or of the module of a name."""
+        for name in (__name__, getattr(found, "__module__", None)):
+            path = getattr(sys.modules.get(name or ""), "__file__", None)
+            if path is not None:
+                self.env.note_dependency(path)
 
     def alias(self, full: str, found: type) -> list[str]:
         """Document a class under the name of the function that users call."""
