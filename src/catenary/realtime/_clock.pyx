@@ -114,7 +114,7 @@ cdef class MachineTimer(Timer):
 
 
 cdef class VirtualTime:
-    """A view of the participants' table; all participants share its `memory`."""
+    """Table of the participants of a virtual clock, in shared memory."""
     cdef Memory memory
     cdef virtual_time *time
 

@@ -59,4 +59,4 @@ class CycleWriter(Ring):
     ) -> None: ...
     @property
     def capsule(self) -> object:
-        """Sink table of native/sink.h."""
+        """Capsule of the sink table; it keeps the writer and its memory alive."""
