@@ -8,7 +8,9 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-RESULT = Path(__file__).resolve().parents[2] / "benchmarks/results/amd-epyc/2026-11-22/acceptance-3.json"
+RESULT = (
+    Path(__file__).resolve().parents[2] / "benchmarks/results/amd-epyc/2026-11-22/acceptance-3.json"
+)
 MODES = {
     "catenary-inline": "inline",
     "catenary-threaded": "threaded",
