@@ -27,6 +27,7 @@ extensions = [
     "command_line",
     "docstrings",
     "drawings",
+    "name_links",
     "repository_links",
     "short_types",
 ]

@@ -86,7 +86,7 @@ class Api(SphinxDirective):
         if "exclude" in self.options:
             lines += [f"   :exclude-members: {', '.join(self.options['exclude'].split())}"]
         if exception or module == "catenary.events":
-            lines += ["   :show-inheritance:"]
+            lines += ["   :show-inheritance:"] * (found.__base__ is not object)
         elif "no-inherited" not in self.options:
             lines += [f"   :inherited-members: {KNOWN}"]
         return lines

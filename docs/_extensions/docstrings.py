@@ -121,7 +121,7 @@ def choose_signature(
 ) -> tuple[str, str | None] | None:
     """Return the signature of a compiled function; none for classes that users do not call."""
     module, _, last = name.rpartition(".")
-    if what == "class" and last in RETURNED.get(module, ()):
+    if what == "class" and (module == "catenary.events" or last in RETURNED.get(module, ())):
         return "", None
     function = stub_function(obj) if what in ("function", "method") else None
     if function is None:

@@ -34,7 +34,7 @@ TIME_LIMIT = 60  # [s] of this machine's time for a page
 
 
 class LeftEndlessLoop(KeyboardInterrupt):
-    """What a reader's Ctrl-C does to an endless loop."""
+    """Stand-in for a reader's Ctrl-C in an endless loop."""
 
 
 def parse_comments(document: Document) -> Iterable[Region]:
@@ -111,7 +111,7 @@ class Wires:
 
 
 class Helpers:
-    """What a page may call in its `<!-- test: ... -->` comments."""
+    """Functions for the `<!-- test: ... -->` comments."""
 
     def __init__(self, stack: ExitStack) -> None:
         self.stack = stack

@@ -26,6 +26,8 @@ class Task:
     """A function that runs as a task: `function(task, *arguments)` with `for job in task:`.
 
     Args:
+        function: Function of the task. Its first argument yields the jobs.
+        arguments: Further arguments of the function.
         period: Time between two releases [s]. With a `trigger`: the minimum time between them.
         name: Name in reports and errors. Default: the name of the function.
         priority: SCHED_FIFO priority, 1 to 99; a larger number is higher. None: ordinary
