@@ -121,7 +121,7 @@ def test_sdo_information_is_passed_on():
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
-        ("00", "1 bytes, the header needs 2"),
+        ("00", "needs 2 bytes, received 1"),
         ("0050" + "00" * 8, "service 5 is not supported"),
         ("0020" + "40181001", "SDO: needs 10 bytes, received 6"),
         ("0020a0" + "00" * 7, "unknown command specifier 5"),

@@ -37,7 +37,7 @@ def test_circulating_is_bit_14_of_the_length():
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
-        (GOLDEN[:11], "11 bytes left, needs 12"),
+        (GOLDEN[:11], "needs 12 bytes, 11 left"),
         (GOLDEN[:-1], "specifies 2 bytes of data, 1 received"),
         (b"\x0f" + GOLDEN[1:], "unknown command 15"),
         (GOLDEN[:7] + b"\x08" + GOLDEN[8:], "reserved bits"),

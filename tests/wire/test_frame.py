@@ -72,12 +72,12 @@ def test_impossible_frames_are_refused(value):
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
-        (b"", "0 bytes, needs 28"),
-        (FRAME[:27], "27 bytes, needs 28"),
+        (b"", "0 bytes, needs at least 28"),
+        (FRAME[:27], "27 bytes, needs at least 28"),
         (FRAME.ljust(1515), "at most 1514"),
         (FRAME[:12] + b"\x08\x00" + FRAME[14:], "EtherType 0x0800"),
         (FRAME[:12] + b"\x81\x00\x00\x01" + FRAME[12:], "VLAN-tagged"),
-        (FRAME[:14] + b"\x1c\x40" + FRAME[16:], "type 4, needs 1"),
+        (FRAME[:14] + b"\x1c\x40" + FRAME[16:], "type 4 instead of 1"),
         (FRAME[:14] + b"\x1c\x18" + FRAME[16:], "reserved bit 11"),
     ],
 )
@@ -88,7 +88,7 @@ def test_alien_frames_are_named(data, reason):
 
 
 def test_a_frame_that_was_cut_off_is_refused():
-    with pytest.raises(DecodeError, match="specifies 28 bytes, 27 received"):
+    with pytest.raises(DecodeError, match="specifies 28 bytes, but 27 were received"):
         decode_frame(FRAME[:-1])
 
 

@@ -52,7 +52,7 @@ def test_any_bytes_give_a_value_or_decode_error(data):
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
-        (GOLDEN[:5], "5 bytes, the header needs 6"),
+        (GOLDEN[:5], "needs 6 bytes, received 5"),
         (GOLDEN[:15], "specifies 10 bytes, 9 received"),
         (GOLDEN[:5] + b"\x17" + GOLDEN[6:], "unknown protocol 7"),
     ],

@@ -58,7 +58,7 @@ def test_a_cut_record_is_left_out_and_counted() -> None:
     [
         (b"", "magic number missing"),
         (b"\x0a\x0d\x0d\x0a", "magic number 0a0d0d0a"),
-        (pcap()[:23], "23 bytes, the header needs 24"),
+        (pcap()[:23], "needs 24 bytes, received 23"),
     ],
 )
 def test_refusals_say_why(data: bytes, reason: str) -> None:

@@ -104,7 +104,7 @@ def test_any_byte_wrong_gives_a_value_or_decode_error(place, byte):
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
-        (b"\x00" * 11, "11 bytes, a block needs at least 12"),
+        (b"\x00" * 11, "needs 12 bytes, received 11"),
         (b"\x01" * 12, "does not begin with a section header"),
         (encode_header()[:20], "block at byte 0 has an invalid length"),
         (encode_header() + struct.pack("<III", 6, 13, 13), "length of 13 bytes"),

@@ -83,7 +83,7 @@ def test_little_endian_and_signs():
 def test_values_that_do_not_fit_are_refused_before_sending():
     with pytest.raises(ValueError, match=r"AL control \(0x0120\)"):
         register.AL_CONTROL.pack(0x10000)
-    with pytest.raises(ValueError, match="exactly 8 bytes"):
+    with pytest.raises(ValueError, match="needs 8 bytes, got 7"):
         register.sync_manager(0).pack(bytes(7))
 
 

@@ -118,15 +118,15 @@ def test_the_debugging_checksum_is_accepted_as_controllers_do():
 @pytest.mark.parametrize(
     ("image", "reason"),
     [
-        (IMAGE[:127], "127 bytes, the header needs 128"),
+        (IMAGE[:127], "needs 128 bytes, received 127"),
         (
             IMAGE[:128] + b"\x0a\x00\xff\x7f",
-            r"category 10 at byte 128 specifies 65534 bytes, 0 left",
+            r"category 10 at byte 128 specifies 65534 bytes, but 0 are left",
         ),
-        (IMAGE[:128] + b"\x0a\x00\x00", "a category header needs 4 bytes, 3 left"),
+        (IMAGE[:128] + b"\x0a\x00\x00", "category header: needs 4 bytes, 3 left"),
         (IMAGE[:128] + bytes(0x10000), "more than 512 categories"),
-        (IMAGE[:128] + bytes(0x20000), "at most 131072"),
-        (IMAGE[:128] + bytes.fromhex("0a0001000505"), "string 1 at byte 1 does not fit"),
+        (IMAGE[:128] + bytes(0x20000), "the maximum is 131072"),
+        (IMAGE[:128] + bytes.fromhex("0a0001000505"), "string 1 of 5 at byte 1 exceeds"),
         (IMAGE[:128] + bytes.fromhex("1e0001000505"), "general category"),
         (IMAGE[:128] + bytes.fromhex("320004000016ff0000000000"), r"PDO 0x1600: 255 entries"),
     ],
