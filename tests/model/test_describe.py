@@ -134,8 +134,8 @@ def test_a_mailbox_that_no_datagram_can_carry_is_left_out_with_a_note(size: int)
     device = made(mailbox_size=size)
     assert device.mailbox is None
     assert device.notes == (
-        f"its SII has a mailbox of {size} bytes at 0x1000 (16 to 1486 bytes from 0x1000 on are "
-        "possible): the mailbox is not used",
+        f"its SII specifies a mailbox of {size} bytes at 0x1000, which is not used: a mailbox has 16 "
+        "to 1486 bytes and begins at 0x1000 or above",
     )
 
 
@@ -150,7 +150,7 @@ def test_any_other_mailbox_is_used(size: int) -> None:
 def test_more_sync_managers_than_the_controller_has_are_left_out_with_a_note() -> None:
     device = made(sync_managers=17)
     assert len(device.sync_managers) == 4  # as in INFORMATION
-    assert device.notes == ("its SII has 17 SyncManagers, its controller 4",)
+    assert device.notes == ("its SII has 17 SyncManagers, its controller has 4",)
     assert made(sync_managers=4).notes == ()
 
 

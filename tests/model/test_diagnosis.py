@@ -156,7 +156,7 @@ def test_whole_frames_spoilt_inside_a_device() -> None:
 def test_lost_frames_that_no_device_has_seen_broken() -> None:
     [found] = judge(seen(line(3), {}, lost_frames=7))
     assert found.kind is Kind.MAIN
-    assert "the way back from device 0 (d0) to the MainDevice" in found.where
+    assert "the path from device 0 (d0) back to the MainDevice" in found.where
 
 
 def test_lost_frames_are_explained_by_a_cable() -> None:

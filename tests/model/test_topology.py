@@ -101,7 +101,7 @@ def test_a_swapped_device_in_the_middle_is_named() -> None:
 def test_a_swapped_device_at_the_end_is_named() -> None:
     [only] = make_topology([LINE, SWAPPED_END]).contradictions
     assert only == (
-        "frames enter device 1 by port 1, its port 0 is closed: its IN and OUT are swapped"
+        "frames enter device 1 by port 1, and its port 0 is closed: its IN and OUT are swapped"
     )
 
 
