@@ -134,8 +134,8 @@ def test_a_mailbox_that_no_datagram_can_carry_is_left_out_with_a_note(size: int)
     device = made(mailbox_size=size)
     assert device.mailbox is None
     assert device.notes == (
-        f"its SII specifies a mailbox of {size} bytes at 0x1000, which is not used: a mailbox has 16 "
-        "to 1486 bytes and begins at 0x1000 or above",
+        f"its SII specifies a mailbox of {size} bytes at 0x1000, which is not used: a mailbox has "
+        "16 to 1486 bytes and begins at 0x1000 or above",
     )
 
 

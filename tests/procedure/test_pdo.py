@@ -78,7 +78,7 @@ def test_entries_that_differ_from_the_sii_are_a_note() -> None:
     objects[0x1A00, 1] = POSITION
     device = play(read_first_mapping(channel(), servo(0)), MailboxDevice(Dictionary(objects)))
     [note] = device.notes
-    assert note.startswith("PDO 0x1A00 has 0x6064:00/32, its SII specifies 0x6041:00/16, ")
+    assert note.startswith("PDO 0x1A00 has 0x6064:00/32, but its SII specifies 0x6041:00/16, ")
     assert device.inputs[0].pdos[0].entries == (SERVO_INPUTS[3],)
 
 

@@ -126,7 +126,7 @@ def test_fragments_without_an_end_are_cut_off_with_a_note() -> None:
     endless = [SdoInformation(Opcode.LIST_RESPONSE, b"\x01\x00" * 50, 7, True)] * 2000
     indices, note = play(read_object_list(channel()), answering(lambda _: endless))
     assert len(indices) > 10_000
-    assert note == "the list of objects is truncated: its fragments have no end"
+    assert note == "the list of objects is truncated: its fragments do not end"
 
 
 def test_of_fragments_that_stop_the_first_ones_are_kept() -> None:
@@ -160,7 +160,7 @@ def test_half_an_index_at_the_end_has_a_note(data: bytes) -> None:
     indices, note = play(read_object_list(channel()), device)
     assert indices == ((0x1000,) if len(data) > 1 else ())
     assert bool(note) is (len(data) % 2 == 1)
-    assert not note or "are not whole indices" in note
+    assert not note or "are not a whole number of indices" in note
 
 
 def test_a_list_that_does_not_name_its_kind_is_no_answer() -> None:
