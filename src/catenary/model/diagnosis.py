@@ -22,7 +22,7 @@ from catenary.model.finding import Finding, Kind, Names
 from catenary.model.topology import Cable, Topology
 from catenary.wire.error_counters import FULL, ErrorCounters, PortErrors
 
-WIDESPREAD = 3  # from this many noisy cables on, if they are half of all, the cause is shared
+WIDESPREAD = 3  # at least this many noisy cables, and half of all, have a shared cause
 
 _CABLE = "check its plugs, bends, shield and distance to power cables, or replace it"
 _DEVICE = "check its supply, its earth connection and the plugs on both sides, or replace it"

@@ -10,12 +10,12 @@ from catenary.model.topology import Cable
 
 
 class Kind(StrEnum):
-    """Kind of place where a fault is."""
+    """Kind of fault, by its location."""
 
     CABLE = "cable"  # including its plugs
     DEVICE = "device"
     POWER = "power"  # power of a device
-    SILENT = "silent"  # a device, or a device and all devices behind it, does not answer
+    SILENT = "silent"  # a device does not answer, alone or with all devices behind it
     EVERYWHERE = "everywhere"  # a cause that affects the whole segment
     MAIN = "main"  # the MainDevice, its port or driver
     WIRING = "wiring"  # the wiring is not a tree

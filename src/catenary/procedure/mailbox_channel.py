@@ -66,7 +66,7 @@ class MailboxChannel:
         self.emptied = True
 
     def accept(self, message: Mailbox) -> bool:
-        """Return True and accept a message, unless it is a repetition of the last accepted one.
+        """Accept a message. Return False if it is a repetition of the last accepted one.
 
         An equal message is a repetition only if one was requested: a device with a constant counter
         sends equal answers to equal requests.

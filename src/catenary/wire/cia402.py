@@ -94,7 +94,7 @@ class Control(IntFlag):
 
 
 QUICK_STOP_COMMAND = (0x0086, 0x0002)  # (mask, value) of the controlword, IEC 61800-7-201 table 28
-MODE_CONTROL_BITS = 0xFA70  # bits 4, 5, 6, 9, 11 to 15: all except state machine and halt
+MODE_CONTROL_BITS = 0xFA70  # bits 4, 5, 6, 9, 11 to 15: not for the state machine or halt
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +155,7 @@ TRANSITIONS = (
         10, AxisState.SWITCHED_ON, AxisState.SWITCH_ON_DISABLED, (DISABLE_VOLTAGE, QUICK_STOP)
     ),
     Transition(11, AxisState.OPERATION_ENABLED, AxisState.QUICK_STOP_ACTIVE, (QUICK_STOP,)),
-    # 12 is also automatic, when the drive has stopped and 0x605A is 1 to 4
+    # Transition 12 is also automatic when the drive has stopped and 0x605A is 1 to 4.
     Transition(12, AxisState.QUICK_STOP_ACTIVE, AxisState.SWITCH_ON_DISABLED, (DISABLE_VOLTAGE,)),
     Transition(13, None, AxisState.FAULT_REACTION_ACTIVE),
     Transition(14, AxisState.FAULT_REACTION_ACTIVE, AxisState.FAULT),

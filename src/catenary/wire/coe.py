@@ -230,7 +230,7 @@ class Abort:
 
 @dataclass(frozen=True, slots=True)
 class Emergency:
-    """Emergency message of a device, §5.6.4. It reports a fault; code 0 reports its end."""
+    """Emergency message of a device, §5.6.4. Error code 0 means that the fault is cleared."""
 
     error_code: int
     error_register: int

@@ -35,7 +35,7 @@ class EcatCommand(IntEnum):
 
     @property
     def writes(self) -> bool:
-        """True if an addressed device copies data from the datagram."""
+        """True if an addressed device stores data from the datagram."""
         return self in _WRITES
 
     @property

@@ -140,7 +140,7 @@ def is_alien(data: bytes) -> bool:
 
 
 def is_own(data: bytes, source: bytes) -> bool:
-    """Return True if a frame has a source address, ignoring the bit that controllers set.
+    """Return True if a frame was sent by `source`, even if controllers have processed it.
 
     Args:
         data: The frame, starting with the destination address.
