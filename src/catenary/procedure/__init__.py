@@ -1,1 +1,1 @@
-"""Conversations with devices, as generators without I/O, clock or retries (docs/objects.md)."""
+"""Conversations with devices, as generators without I/O, clock or retries."""
